@@ -15,7 +15,7 @@ LONGEST_TEXT, MOST_DIGITS, MOST_ENTRIES = 80, 18, 6
 
 
 class _Short(reprlib.Repr):
-    """Values as a message shows them: what is long is cut, what is huge is told by its power of ten."""
+    """Values as a message shows them: what is long is cut, what is huge is given by its power of ten."""
 
     def __init__(self) -> None:
         super().__init__()

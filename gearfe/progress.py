@@ -1,6 +1,6 @@
-"""What a long run is doing, told on stderr: a line that is rewritten on a terminal, a line for each stage elsewhere.
+"""Progress of a long run on stderr: a line that is rewritten on a terminal, a line for each stage elsewhere.
 
-Work that may take long names itself with `stage` and tells how far it is with `count`. Both do nothing until a program
+Work that may take long names itself with `stage` and counts with `count`. Both do nothing until a program
 opens `shown`, so a library call stays silent. The first two seconds of a run stay silent too.
 """
 
@@ -15,9 +15,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import TextIO
 
-#: Seconds after which a run tells what it does, between two looks at it, and of a count before its rate is told.
+#: Seconds before the first message, between two looks at a run, and of a count before its rate is shown.
 SILENT, LOOK, SETTLED = 2.0, 0.2, 1.0
-#: Seconds after which a stage that still goes on is told again where lines stay; doubled each time.
+#: Seconds after which a stage that still goes on is shown again where lines stay; doubled each time.
 AGAIN = 60.0
 
 
@@ -60,7 +60,7 @@ class Display:
         self._over = threading.Event()
         self._line = ""  # on the terminal now
         self._reported: tuple[str, ...] = ()  # stages of the last line that stays
-        self._next = 0.0  # when they are told again
+        self._next = 0.0  # when they are shown again
         self._wait = AGAIN
         self._thread = threading.Thread(target=self._look, name="progress", daemon=True)
         self._thread.start()

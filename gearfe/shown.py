@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Facts:
-    """What tells of itself in a few words: `facts` are a class's own."""
+    """What describes itself in a few words: `facts` are a class's own."""
 
     def facts(self) -> Mapping[str, str]:
         """What the result is, in a few words: name -> value with its unit."""
@@ -42,7 +42,7 @@ class Shown(Facts):
 
     def plot(self) -> Figure:
         """A picture of the result, which a notebook shows; ``.savefig("name.png")`` keeps it."""
-        # pictures stand above all results, so they are looked up where one is asked for
+        # pictures stand above all results, so they are looked up when one is drawn
         figure: Figure = importlib.import_module(".figures.results", __package__).picture(self)
         return figure
 

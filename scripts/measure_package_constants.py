@@ -181,7 +181,7 @@ def coarse_gears(law: Any) -> Any:
 ROOMS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
     "rigid": (mechanisms, ("kernel_names", "backend", "choice", "packed", "LARGEST", "MOST_STEPS", "FIRST_")),
     "train": (trains, ("program",)),
-    "meshlaw": (laws, ("NANO", "NEVER")),
+    "meshlaw": (laws, ("NANO", "NO_CONTACT")),
     "runup": (run_ups, ("law_kernel.FORCE", "swinging", "report")),
     "housing": (housings, ("modal_test", "superelement", "_NEW", "_OLD", "_ALL", "_FOURTH")),
     "reduction": (housings, ("FORMAT",)),

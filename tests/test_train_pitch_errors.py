@@ -113,7 +113,7 @@ def test_which_teeth_meet(made: Any, phases: tuple[float | None, ...], speed: fl
         errors = [g.pitch_errors[0 if model.meshes[i].sense * side > 0.0 else 1] for g in gears]
         for angle in np.linspace(0.01, 40.0, 61):
             drive_angle = np.array([math.copysign(angle, speed)])
-            phase = flank.place(drive_angle, np.zeros((1, 100)))[0]
+            phase = flank.phase_and_approach(drive_angle, np.zeros((1, 100)))[0]
             turned = abs(model.meshes[i].ratio) * angle
             for shift, psi in zip(flank.shifts_at(phase)[0], flank.law.pair_phases(phase)[0], strict=True):
                 j1, j2, gap = facing(gear_train, i, side, turned, psi)

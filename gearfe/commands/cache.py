@@ -22,13 +22,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="compile the kernels of mechanisms now, half a minute: single runs are over before that pays",
     )
-    one.add_argument("--trim", action="store_true", help="remove the entries not used for longest beyond the limit")
     add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Tell, and remove what is asked; 1 when something could not be removed."""
-    from ..cache import CACHE_VARIABLE, LIMIT_VARIABLE, cache_folder, entries, limit, remove, trim
+    """List the entries, and remove the chosen ones; 1 when something could not be removed."""
+    from ..cache import CACHE_VARIABLE, LIMIT_VARIABLE, cache_folder, entries, limit, remove
     from ..errors import unknown_name
 
     folder = cache_folder()
@@ -47,9 +46,6 @@ def run(args: argparse.Namespace) -> int:
         print(f"removed: {len(gone)} entries, {_size(sum(entry.size for entry in gone))}")
     elif args.compile:
         _compile()
-    elif args.trim:
-        gone = trim(folder, limit())
-        print(f"removed: {len(gone)} entries, {_size(sum(entry.size for entry in gone))}")
     there = entries(folder)
     args.summary = {"folder": str(folder), "limit_bytes": limit(), "kinds": {}}
     for kind in sorted({entry.kind for entry in there}):

@@ -1,4 +1,4 @@
-"""Options that commands share: what is told, and in which forms the results of a run are kept besides."""
+"""Options that commands share: what is printed, and in which forms the results of a run are kept besides."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ REPORT = "report.html"
 
 
 def add_folder(parser: argparse.ArgumentParser) -> None:
-    """``--out``, and how the results in that folder are kept and told."""
+    """``--out``, and how the results in that folder are kept and printed."""
     command = parser.prog.split()[-1]
     parser.add_argument("--out", metavar="DIR", default=None, help=f"output folder (default: out/JOB/{command})")
     parser.set_defaults(folder_of=command)
@@ -51,7 +51,7 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
 
 
-def add_telling(parser: argparse.ArgumentParser) -> None:
+def add_verbosity(parser: argparse.ArgumentParser) -> None:
     """``-q`` and ``-v``."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument("-q", "--quiet", action="store_true", help="print warnings and errors only")
@@ -67,7 +67,7 @@ def with_folder(parsed: argparse.Namespace) -> argparse.Namespace:
 
 
 def run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Namespace, line: list[str]) -> int:
-    """Run a command, tell what it says as its options ask, and keep the results in the forms asked for."""
+    """Run a command, print as its options say, and keep the results in the requested forms."""
     formats = _formats(getattr(parsed, "format", "csv"))
     as_json, report = getattr(parsed, "json", False), getattr(parsed, "report", False)
     if not (formats or as_json or report or parsed.quiet):
@@ -92,7 +92,7 @@ def run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Name
     return code
 
 
-def tell(
+def print_results(
     lines: Iterable[str], folder: Path, names: Iterable[str], seconds: Mapping[str, float], warnings: Iterable[str]
 ) -> None:
     """Print what a command found, the names of its files, the seconds of its stages; warnings to standard error."""
@@ -129,7 +129,7 @@ def _formats(text: str) -> tuple[str, ...]:
     for name in names:
         if name not in ("csv", *FORMATS):
             raise InputError("--format", text, "must name formats of " + ", ".join(("csv", *FORMATS)), "as mat,h5")
-    if "uff" in names and find_spec("pyuff") is None:  # told before the work, not after it
+    if "uff" in names and find_spec("pyuff") is None:  # refused before the work, not after it
         raise MissingLibraryError("universal files need pyuff: pip install 'gearfe[exchange]'")
     return tuple(dict.fromkeys(name for name in names if name != "csv"))
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..progress import stage
 from .arguments import add_job, check_option
-from .common import add_folder, tell
+from .common import add_folder, print_results
 
 if TYPE_CHECKING:
     from ..gear.deviation import ToothDeviations
@@ -42,14 +42,14 @@ def run(args: argparse.Namespace) -> int:
     from ..config import load_job
     from ..tables.stiffness import StiffnessTable
 
-    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness", "microgeometry"))
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
     exports = _exports(args.export)
 
     from ..gear.pair import GearPair
 
-    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
+    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
 
     from ..figures.gears import pair_picture
     from ..figures.style import save
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     _show({"iso_6336": iso})
     if exports and "microgeometry" in tables:
         print("flanks with the deviations of [microgeometry]: dxf, step and brep all teeth, csv tooth 0")
-    tell((), folder, names, {}, pair.warnings)
+    print_results((), folder, names, {}, pair.warnings)
     return 0
 
 

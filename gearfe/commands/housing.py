@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..progress import stage
 from .arguments import add_job
-from .common import add_folder, tell
+from .common import add_folder, print_results
 
 if TYPE_CHECKING:
     from ..housing.modal_test import Comparison
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from ..config import load_job
     from ..errors import InputError
 
-    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
     table = load_job(args.job, ("housing",))["housing"]
     if args.modes < 1:
         raise InputError("--modes", args.modes, "must be 1 or more", "20 is the default")
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
         with stage("pictures"):
             problem = "" if args.no_pictures or not body.has_mesh else _draw(made, body, fields)
         names = sorted(path.name for path in made.iterdir())
-    tell((), folder, names, {}, () if not problem else (f"no pictures: {problem}",))
+    print_results((), folder, names, {}, () if not problem else (f"no pictures: {problem}",))
     from ..figures.offscreen import MISSING
 
     drawn = not problem or problem == MISSING  # who installs no VTK wants no pictures of it

@@ -12,7 +12,7 @@ from ..progress import count
 from ..tables.loadmap import LoadMapTable
 from ..tables.stiffness import StiffnessTable, check_law
 from .arguments import add_job, add_keys, add_removed, check_option, with_keys
-from .common import add_folder, tell
+from .common import add_folder, print_results
 
 Loads = TypeVar("Loads", bound=LoadMapTable)
 
@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     started = time.perf_counter()
     from ..config import load_job
 
-    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness", "loadmap", "microgeometry"))
     tables["stiffness"] = _overridden_model(tables.get("stiffness", StiffnessTable()), args)
     table = with_loads(args, tables.get("loadmap", LoadMapTable()))
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..gear.pair import GearPair
 
-    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
+    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
 
     from ..loadmap.report import report_lines, summary, warnings
     from ..loadmap.report import tables as map_tables
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
-    tell([*report_lines(made_map), *deviations], folder, names, watch.seconds, warnings(job, made_map))
+    print_results([*report_lines(made_map), *deviations], folder, names, watch.seconds, warnings(job, made_map))
     return 1 if made_map.failed.any() else 0
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..tables.mechanism import RunTable, read_mechanism_file
 from .arguments import add_job, add_keys, with_keys
-from .common import add_folder, tell
+from .common import add_folder, print_results
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; 1 when the run stopped before its end or an output is not finite."""
-    # a mistake in the file is told before NumPy and SciPy load
+    # mistakes in the file show before NumPy and SciPy load
     file = read_mechanism_file(args.file)
     file = replace(file, run=with_keys(args, file.run, *KEYS, until="end_s"))
     if args.sensitivity:
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         run = partial(run_mechanism, estimate=not args.no_estimate, draw=drawn)
     with recorded() as written:
         outcome = run(mechanism, folder, slopes=slopes)
-    tell(outcome.text.splitlines(), folder, sorted(name for _, names in written for name in names), {}, ())
+    print_results(outcome.text.splitlines(), folder, sorted(name for _, names in written for name in names), {}, ())
     return 0 if outcome.complete else 1
 
 

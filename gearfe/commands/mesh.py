@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
 
     out = Path(args.out) if args.out else Path("out") / Path(args.job).stem / "mesh"
     args.out = str(out if out.suffix else out / ("gears.inp" if args.deck else "gears.msh"))
-    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness",))
     table = with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen", "flank_coarsen")
     table.check("stiffness")
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..gear.pair import GearPair
 
-    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
+    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
 
     from ..meshing.export import export_mesh, format_of
     from ..output.files import output_folder

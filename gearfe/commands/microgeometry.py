@@ -10,7 +10,7 @@ from ..progress import count
 from ..tables.microgeometry import MicrogeometryTable
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, with_keys
-from .common import add_folder, tell
+from .common import add_folder, print_results
 from .loadmap import add_loads, with_loads
 
 #: Files that a run can leave.
@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     started = time.perf_counter()
     from ..config import load_job
 
-    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair", "microgeometry"), ("stiffness",))
     table = with_keys(args, with_loads(args, tables["microgeometry"]), "mesh_cycles", "flank")
     table.torques()
@@ -69,5 +69,5 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "microgeometry.json", summary(job, table, made, flanks[0], watch.seconds))
         names = sorted(path.name for path in place.iterdir())
-    tell([*report_lines(made), *law_remarks(job)], folder, names, watch.seconds, warnings(pair, made))
+    print_results([*report_lines(made), *law_remarks(job)], folder, names, watch.seconds, warnings(pair, made))
     return 1 if made.failed.any() else 0

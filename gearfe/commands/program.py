@@ -103,11 +103,11 @@ def run_command(module: Any, name: str, summary: str, example: str, arguments: l
 def parser_of(module: Any, name: str, summary: str, example: str) -> CommandParser:
     """Parser of a command module, called by `name`, with the options that all commands have."""
     from .arguments import CommandParser
-    from .common import add_telling
+    from .common import add_verbosity
 
     parser = CommandParser(prog=name, description=summary, example=example)
     module.add_arguments(parser)
-    add_telling(parser)
+    add_verbosity(parser)
     return parser
 
 

@@ -11,7 +11,7 @@ from ..progress import count
 from ..tables.microgeometry import MicrogeometryTable, ReliefTable
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, with_keys
-from .common import add_folder, tell
+from .common import add_folder, print_results
 
 #: Files that a run can leave.
 FILES = ("relief*.csv", "relief.png", "relief.json")
@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     from ..config import load_job
     from ..errors import InputError
 
-    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair", "relief"), ("stiffness", "microgeometry"))
     table = with_keys(args, tables["relief"], "positions", "map_points", "generations", "seed")
     base = tables.get("microgeometry", MicrogeometryTable())
@@ -97,5 +97,5 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "relief.json", summary(job, base, table, made, errors, watch.seconds))
         names = sorted(path.name for path in place.iterdir())
-    tell([*report_lines(table, made, errors), *law_remarks(job)], folder, names, watch.seconds, pair.warnings)
+    print_results([*report_lines(table, made, errors), *law_remarks(job)], folder, names, watch.seconds, pair.warnings)
     return 0

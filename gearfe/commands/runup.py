@@ -9,7 +9,7 @@ from typing import Any
 
 from ..tables.runup import RunUpTable
 from .arguments import with_keys
-from .common import tell
+from .common import print_results
 from .vibration import add_train, title
 
 #: Keys of [runup] that options stand for.
@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     from ..errors import unknown_name
     from ..tables.train import read_train_tables
 
-    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = read_train_tables(args.job, args.variant)
     table = with_keys(args, _own_table(args.job), *KEYS)
     table.check("runup")
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     draw = None if args.no_pictures else RunUpPictures(title(job.table, driven=False))
     choice, further = RunUpChoice(table.multiples, args.attachment, args.fields), described(job, table)
     summary, names = write_runup(folder, made, choice, draw=draw, watch=watch, further=further, unstable=unstable)
-    tell(_report_lines(summary), folder, names, watch.seconds, summary["warnings"])
+    print_results(_report_lines(summary), folder, names, watch.seconds, summary["warnings"])
     return 0 if summary["speeds_reached"] == summary["speeds"] else 1
 
 

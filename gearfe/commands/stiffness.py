@@ -12,7 +12,7 @@ from ..config import check_range
 from ..progress import announce, count
 from ..tables.stiffness import StiffnessTable, check_law
 from .arguments import add_job, add_keys, add_removed, check_option, number, with_keys
-from .common import add_folder, tell
+from .common import add_folder, print_results
 
 if TYPE_CHECKING:
     from ..stiffness.job import StiffnessJob
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     from ..config import load_job
     from ..errors import InputError
 
-    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness", "microgeometry"))
     tables["stiffness"] = overridden(tables.get("stiffness", StiffnessTable()), args)
     chosen = None if args.fields is None else _field_angles(args.fields)
@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..gear.pair import GearPair
 
-    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together: NumPy alone tells
+    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
 
     import numpy as np
 
@@ -125,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "summary.json", summary(job, curve, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
-    tell(report_lines(job, curve), folder, names, watch.seconds, warnings(job, curve))
+    print_results(report_lines(job, curve), folder, names, watch.seconds, warnings(job, curve))
     return 1 if curve.failed.any() else 0
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..progress import count
 from .arguments import add_job
-from .common import add_folder, tell
+from .common import add_folder, print_results
 
 #: Seconds that a scheduler has to answer.
 TIMEOUT_S = 20
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--jobs", args.jobs, "must be >= 1", "the number of processors is the default")
     if (args.row is None) != (args.write is None):
         raise InputError("--row", args.row, "goes with --write", "give both: --row 17 --write best.toml")
-    if args.parquet:  # told before the work, not after it
+    if args.parquet:  # refused before the work, not after it
         library("pyarrow")
     study = read_study(args.study)
     if args.row is not None:
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         first = next(i for i, good in enumerate(made.done) if not good)
         example = f"case {made.cells['case'][first]}: {made.cells['message'][first]}"
         warnings.append(f"{bad} of {len(made.done)} cases are not solved wholly; {example}")
-    tell(report_lines(summary), folder, names, watch.seconds, warnings)
+    print_results(report_lines(summary), folder, names, watch.seconds, warnings)
     return 1 if bad else 0
 
 

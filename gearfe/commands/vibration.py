@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..progress import count
 from ..tables.train import TrainTable, value_text
 from .arguments import add_job, add_keys, with_keys
-from .common import add_folder, tell
+from .common import add_folder, print_results
 
 if TYPE_CHECKING:
     from ..train.gear_train import GearTrain
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     from ..errors import InputError
     from ..tables.train import read_train_tables
 
-    # a mistake in the file is told before NumPy, SciPy and the finite elements load
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = read_train_tables(args.job, args.variant)
     tables["train"] = with_keys(args, tables["train"], *KEYS)
     if args.spectrum_from_ms is not None:
@@ -125,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
         progress=count,
     )
     response = written.response
-    tell(
+    print_results(
         report_lines(response, train, written, choice),
         folder,
         written.names,

@@ -126,7 +126,7 @@ MOST = 40000
 
 
 def mesh_figure(path: str | Path, parts: Mapping[str, MeshPart], pair: GearPair | None) -> None:
-    """The whole meshes, and beside them the meshing zone of `pair`, if it is told; contact boundaries in red."""
+    """The whole meshes, and beside them the meshing zone of `pair`, if it is given; contact boundaries in red."""
     both = pair is not None
     figure = new_figure(12.5 if both else 7.0, 6.4)
     views = list(np.atleast_1d(figure.subplots(1, 2 if both else 1)))

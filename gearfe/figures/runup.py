@@ -43,8 +43,8 @@ class RunUpPictures:
         draw_instability(path, made, self.title)
 
 
-class Pieces(NamedTuple):
-    """A curve over the speed in pieces, one a branch: speeds (rad/s), values, whether each is stable."""
+class BranchCurve(NamedTuple):
+    """A curve over the speed on all branches: speeds (rad/s), values, whether each is stable."""
 
     speed: Array
     value: Array
@@ -56,18 +56,18 @@ def draw_orders(path: Path, run: RunUp, multiples: int, bore: int, title: str) -
     """Order cuts of a signal and its rms, on all branches."""
     signal, cut = signal_of(run, bore), orders(run, multiples)
     lines = [signal.lines(s) for s in run.states]
-    size: dict[str, Pieces] = {}
+    size: dict[str, BranchCurve] = {}
     for one in cut:
         numbers = [s.numbers.get(one.waves) for s in run.states]
         values = [math.nan if k is None else float(x[k]) for k, x in zip(numbers, lines, strict=True)]
-        size[f"{one.order:.4g} ({one.names[0]})"] = _pieces(run, values)
+        size[f"{one.order:.4g} ({one.names[0]})"] = _branch_curve(run, values)
     top = {name: float(np.nanmax(np.where(p.branch % 2 == 0, p.value, np.nan))) for name, p in size.items()}
     loudest = sorted(size, key=lambda name: -top[name])[:4]
     inside = [(s.frequency > 0.0) & (s.frequency <= run.band_hz) for s in run.states]
     rms = [math.sqrt(0.5 * float((x[i] ** 2).sum())) for x, i in zip(lines, inside, strict=True)]
     panels = [
         (f"amplitude  ({signal.unit})", {n: size[n] for n in size if n in loudest}),
-        (f"rms  ({signal.unit})", {f"rms below {1e-3 * run.band_hz:g} kHz": _pieces(run, rms)}),
+        (f"rms  ({signal.unit})", {f"rms below {1e-3 * run.band_hz:g} kHz": _branch_curve(run, rms)}),
     ]
     save(_curves(run, panels, f"{signal.name}: orders of the drive, and rms\n{title}", logarithmic=True), path)
 
@@ -78,9 +78,11 @@ def forces_picture(run: RunUp, title: str = "") -> Any:
     states = run.states
     error, factor, open_ = {}, {}, {}
     for i, line in enumerate(lines):
-        error[f"mesh {i + 1} ({line.name})"] = _pieces(run, [1e6 * np.ptp(s.transmission_error[:, i]) for s in states])
-        factor[f"mesh {i + 1}"] = _pieces(run, dynamic_factors(run, i))
-        open_[f"mesh {i + 1}"] = _pieces(run, [100.0 * s.apart[i] for s in states])
+        error[f"mesh {i + 1} ({line.name})"] = _branch_curve(
+            run, [1e6 * np.ptp(s.transmission_error[:, i]) for s in states]
+        )
+        factor[f"mesh {i + 1}"] = _branch_curve(run, dynamic_factors(run, i))
+        open_[f"mesh {i + 1}"] = _branch_curve(run, [100.0 * s.apart[i] for s in states])
     panels = [
         ("dynamic transmission error,\npeak to peak  (µm)", error),
         (FACTOR, factor),
@@ -97,7 +99,7 @@ def forces_picture(run: RunUp, title: str = "") -> Any:
 
 
 def _curves(
-    run: RunUp, panels: Sequence[tuple[str, Mapping[str, Pieces]]], title: str, *, logarithmic: bool = False
+    run: RunUp, panels: Sequence[tuple[str, Mapping[str, BranchCurve]]], title: str, *, logarithmic: bool = False
 ) -> Any:
     """Curves over the speed, panel by panel; unstable stretches dashed, turning points as thin lines.
 
@@ -164,8 +166,8 @@ def _plain_decades(axes: Any) -> None:
         axes.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-def _pieces(run: RunUp, values: Sequence[float] | Array) -> Pieces:
+def _branch_curve(run: RunUp, values: Sequence[float] | Array) -> BranchCurve:
     speed = np.array([s.speed for s in run.states])
     branch = np.array([s.branch for s in run.states], dtype=np.int64)
     stable = np.array([s.branch % 2 == 0 if s.stable is None else s.stable for s in run.states])
-    return Pieces(speed, np.asarray(values, dtype=float), branch, stable)
+    return BranchCurve(speed, np.asarray(values, dtype=float), branch, stable)

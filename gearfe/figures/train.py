@@ -161,7 +161,7 @@ def _apart(response: TrainResponse, sense: float) -> list[Spans]:
     """Rotations of the drive (deg) between which the teeth of each mesh are apart; none for meshes that do not part.
 
     Where curves are the extremes of parts of the run, all of a part in which they are once. Before the load
-    comes teeth only just touch: that is not told.
+    comes teeth only just touch: that is not drawn.
     """
     angle = np.degrees(response.drive_angle) * sense
     lost = response.statistics.get("contacts_lost", [None] * len(response.mesh_names))

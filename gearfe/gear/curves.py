@@ -30,7 +30,7 @@ _PANELS = 24
 
 @cache
 def _gauss() -> tuple[Array, Array]:
-    """Points and weights on -1..1; made on first use, because gears that cannot run are told before that."""
+    """Points and weights on -1..1; made on first use, because gears that cannot run are refused before that."""
     return np.polynomial.legendre.leggauss(12)
 
 

@@ -1,4 +1,4 @@
-"""What drawings tell in place of coefficients: tip and root diameters, and the span size over several teeth.
+"""Values on drawings in place of coefficients: tip and root diameters, and the span size over several teeth.
 
 The span size over k teeth (base tangent length) of ISO 21771, less what thinning s takes off,
 

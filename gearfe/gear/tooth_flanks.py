@@ -67,9 +67,9 @@ class ToothFlanks:
 
         with t of the same profiles without these turns.
         """
-        return self.met(*candidates(self.pair, np.asarray(angles, dtype=float)))
+        return self.first_touch(*candidates(self.pair, np.asarray(angles, dtype=float)))
 
-    def met(self, position: IntArray, angle: Array, number: IntArray) -> Touching:
+    def first_touch(self, position: IntArray, angle: Array, number: IntArray) -> Touching:
         """The same of the tooth pairs `number` at pinion angles (rad), of those of them that meet; shape (n,)."""
         flank, turn = self.flank(number), self.turn(number)
         couples, couple = np.unique(flank, axis=0, return_inverse=True)
@@ -78,10 +78,10 @@ class ToothFlanks:
             row = np.flatnonzero(couple.ravel() == i)
             flanks = Flanks(self.pair, (self.faces[one], self.faces[other]))
             # the row in place of the position: pairs that do not meet fall out
-            parts.append(flanks.met(row, (angle + turn[:, 0])[row], number[row]))
+            parts.append(flanks.first_touch(row, (angle + turn[:, 0])[row], number[row]))
             rows.append(parts[-1].position)
         if not parts:
-            return self.first.met(position, angle, number)
+            return self.first.first_touch(position, angle, number)
         row = np.concatenate(rows)
         order = np.argsort(row, kind="stable")
         row = row[order]
@@ -105,7 +105,7 @@ def touching_curve(
     """
     place = np.asarray(angles, dtype=float)
     numbers = np.full(len(place), number, dtype=np.int64)
-    found = ToothFlanks(pair, deviations).met(np.arange(len(place)), place, numbers)
+    found = ToothFlanks(pair, deviations).first_touch(np.arange(len(place)), place, numbers)
     made = np.full(len(place), np.inf)
     made[found.position] = found.twist
     return made

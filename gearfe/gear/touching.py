@@ -34,7 +34,7 @@ from .spur_gear import Gear
 
 #: Points of the first search along a flank and of each closer look, and how often it looks closer at most; points
 #: besides for each piece of a deviation, whose waves may be short.
-COARSE, CLOSER, LOOKS, PER_PIECE = 97, 65, 13, 2
+COARSE, CLOSER, REFINEMENTS, PER_PIECE = 97, 65, 13, 2
 #: Change of the least twist (rad) from one look to the next that is rounding.
 ROUNDING = 2e-15
 #: A place is an end of the range, or a mark, when it is so near to it: places have the rounding of angles and radii.
@@ -325,9 +325,9 @@ class Flanks:
 
     def touching(self, angles: Array) -> Touching:
         """First touch of every pair that can meet at the given pinion angles (rad), shape (p,)."""
-        return self.met(*candidates(self.pair, angles))
+        return self.first_touch(*candidates(self.pair, angles))
 
-    def met(self, position: IntArray, angle: Array, number: IntArray) -> Touching:
+    def first_touch(self, position: IntArray, angle: Array, number: IntArray) -> Touching:
         """First touch of the tooth pairs `number` at pinion angles (rad), of those of them that meet, shape (n,)."""
         pieces = [len(face.flank.deviation.pieces) for face in self.faces if face.flank.deviation is not None]
         coarse = COARSE + PER_PIECE * max(pieces, default=0)
@@ -335,7 +335,7 @@ class Flanks:
         u = np.broadcast_to(np.linspace(low, high, coarse), (len(angle), coarse))
         best, least = np.zeros(len(angle)), np.full(len(angle), np.inf)
         open_, step = np.arange(len(angle)), (high - low) / (coarse - 1)
-        for _ in range(LOOKS):
+        for _ in range(REFINEMENTS):
             found = self.twist(angle[open_, None], number[open_, None], u)
             place, value, known = _lowest(u, found, step)
             with np.errstate(invalid="ignore"):

@@ -102,7 +102,7 @@ class LoadMap(ShownTable):
     curves
         The curve of each torque; all have the same angles, shape (n,).
     root
-        Root stresses, when they were asked for.
+        Root stresses, where they were computed.
     timings
         Seconds by stage; not in the CSV file.
     """

@@ -1,4 +1,4 @@
-"""What the loadmap command tells and draws: the table by torque, the printed lines, the summary, the figure."""
+"""Report of a load map: the table by torque, the printed lines, the summary, the figure."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def sweep_loads(
     Returns
     -------
     LoadMap
-        With every cell asked for; one that failed has its status and not-a-number.
+        With all cells; one that failed has its status and not-a-number.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def _cells(
     *,
     finite: bool,
 ) -> tuple[Positions, ToothRoots | None]:
-    """All cells of a map, torque by torque: their positions, and their root stresses where these are asked for."""
+    """All cells of a map, torque by torque: their positions, and their root stresses where they are computed."""
     n, parts, at_roots = len(angles), [], []
     for rows in np.array_split(np.arange(len(goals)), max(1, math.ceil(len(goals) * n / TOGETHER))):
         torque = np.repeat(goals[rows], n)

@@ -18,7 +18,7 @@ from scipy.interpolate import BSpline, PchipInterpolator
 from scipy.sparse.linalg import spsolve
 
 from ..typing import Array
-from .law import NEVER, MeshLaw
+from .law import NO_CONTACT, MeshLaw
 
 #: Weights of the second derivative of b over the phase (in mesh cycles), and of the second and first over ln F (nm/N).
 #: Squares are integrated, so that they mean the same on any nodes: they decide where no pair force was found.
@@ -59,7 +59,7 @@ class PairForces:
 
 @dataclass(frozen=True)
 class TouchCurve:
-    """t and its slope at all nodes of the phase that a pair passes (rad, m, m/rad); `NEVER` where flanks never meet."""
+    """t and its slope at all nodes of the phase of a pair (rad, m, m/rad); `NO_CONTACT` where its flanks never meet."""
 
     angle: Array
     value: Array
@@ -205,10 +205,10 @@ def _couplings(angle: Array, couples: Sequence[Couple], cells: int) -> Array:
 
 
 def touch_cubics(touch: TouchCurve) -> Array:
-    """Cubics of t between the nodes, (cells, 4); constant at `NEVER` beside places where flanks never meet."""
+    """Cubics of t between the nodes, (cells, 4); constant at `NO_CONTACT` beside places where flanks never meet."""
     a, b = touch.value[:-1], touch.value[1:]
     made = _cubics(touch.angle, touch.value, touch.slope)
-    made[(a >= NEVER) | (b >= NEVER)] = (NEVER, 0.0, 0.0, 0.0)
+    made[(a >= NO_CONTACT) | (b >= NO_CONTACT)] = (NO_CONTACT, 0.0, 0.0, 0.0)
     return made
 
 

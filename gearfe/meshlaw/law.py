@@ -44,7 +44,7 @@ from ..errors import InputError
 from ..typing import Array, IntArray
 
 #: Approach (m) at which flanks touch that do not meet at all.
-NEVER = 1.0
+NO_CONTACT = 1.0
 #: Newton steps for the pair forces, and their relative change in the last one.
 STEPS, CHANGE = 60, 1e-10
 
@@ -149,7 +149,7 @@ class MeshLaw:
         """Mesh force (N) up to which the law is known at pinion angles (n,); `shifts` as in `__call__`."""
         return self(angles, self.touching(angles, shifts) + self.reach, shifts).force
 
-    def place(self, angles: Array) -> tuple[IntArray, IntArray, Array]:
+    def locate(self, angles: Array) -> tuple[IntArray, IntArray, Array]:
         """Mesh cycle, cell and angle beyond its first node (rad)."""
         turn = np.floor((angles - self.nodes[0]) / self.cycle)
         rest = angles - turn * self.cycle
@@ -159,16 +159,16 @@ class MeshLaw:
     def pair_phases(self, angles: ArrayLike) -> Array:
         """psi_k (rad) of the pairs in the slots at pinion angles (n,), shape (n, slots)."""
         angle = np.asarray(angles, dtype=float)
-        made: Array = angle[:, None] + self.cycle * (np.arange(self.slots) - self.place(angle)[0][:, None])
+        made: Array = angle[:, None] + self.cycle * (np.arange(self.slots) - self.locate(angle)[0][:, None])
         return made
 
     def pair_numbers(self, angles: ArrayLike) -> IntArray:
         """Numbers k of the tooth pairs in the slots at pinion angles (n,), shape (n, slots)."""
-        return np.asarray(np.arange(self.slots) - self.place(np.asarray(angles, dtype=float))[0][:, None])
+        return np.asarray(np.arange(self.slots) - self.locate(np.asarray(angles, dtype=float))[0][:, None])
 
     def touching(self, angles: ArrayLike, shifts: ArrayLike = 0.0) -> Array:
         """Approach (m) at which the first pair touches; `shifts` as in `__call__`."""
-        _, cell, z = self.place(np.asarray(angles, dtype=float))
+        _, cell, z = self.locate(np.asarray(angles, dtype=float))
         found: Array = (_powers(self.touch[:, cell], z[None])[0].T + np.asarray(shifts, dtype=float)).min(axis=1)
         return found
 
@@ -183,7 +183,7 @@ class MeshLaw:
         angle, delta = np.broadcast_arrays(
             np.atleast_1d(np.asarray(angles, dtype=float)), np.asarray(approaches, dtype=float)
         )
-        _, cell, z = self.place(angle)
+        _, cell, z = self.locate(angle)
         t, slope = (x.T for x in _powers(self.touch[:, cell], z[None]))
         gap = delta[:, None] - t - np.asarray(shifts, dtype=float)
         C, C_slope = self._couplings(cell, z)
@@ -317,7 +317,7 @@ def stacked_laws(laws: Sequence[MeshLaw]) -> Laws:
         np.zeros((count, slots, cells, parts, 5, 4)),
         np.zeros((count, slots * slots, cells, 4)),
     )
-    made.touch[..., 0] = NEVER
+    made.touch[..., 0] = NO_CONTACT
     for i, (law, (s, n, m)) in enumerate(zip(laws, sizes, strict=True)):
         made.nodes[i, : n + 1], made.forces[i, : m + 1] = law.nodes, law.forces
         made.touch[i, :s, :n], made.energies[i, :s, :n, :m] = law.touch, law.energies.swapaxes(3, 4)

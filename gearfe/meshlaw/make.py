@@ -1,4 +1,4 @@
-"""A mesh law from contact solutions of the half-plane law: which positions, and what they tell of each tooth pair."""
+"""A mesh law from contact solutions of the half-plane law: which positions, and the pair forces in them."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from ..errors import InputError
 from ..gear.touching import Touching
 from ..typing import Array, IntArray
 from .fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
-from .law import NEVER, MeshLaw
+from .law import NO_CONTACT, MeshLaw
 
 #: Cells of the phase in a mesh cycle to begin with, and places in each (parts of its width) where contacts are solved.
 CELLS, PLACES = 12, (0.25, 0.75)
-#: Approaches beyond the first touch, in parts of the largest: light ones tell how a pair comes into contact.
+#: Approaches beyond the first touch, in parts of the largest: small ones show how a pair comes into contact.
 DEPTHS = (0.0025, 0.008, 0.025, 0.06, 0.12, 0.2, 0.32, 0.5, 0.75, 1.0)
 #: Places and approaches at which the law is held against contacts: beside the nodes, where kinks are; between `DEPTHS`.
 HELD_PLACES, HELD_DEPTHS = (0.1, 0.9), (0.0045, 0.039, 0.155, 0.4, 0.87)
 #: Error of force and torque there from which on a cell is halved, in parts of them, or of this part of the largest
 #: where that is more: what contacts on elements of the default sizes err by (0.11 % in the shipped pair).
-TOLERANCE, LIGHT = 1e-3, 0.1
+TOLERANCE, LEAST_FORCE = 1e-3, 0.1
 #: Error (m) of the touching curve's cubics from which on a cell is halved, and how often a cell is halved for either.
 CLOSE, HALVINGS = 2e-9, 3
 #: The law's tables go on to where pairs touch at this many times its reach, so that no pair bears at their ends.
 BEYOND = 1.1
 #: Pinion angles at which the approach is searched for that makes the largest force.
-LOOKS = 6
+ANGLES = 6
 #: Corners of the touching curve are nodes; others are left out so near to them, and of corners so near to each other
 #: one stays (parts of a cell).
 NEAR, SAME = 0.4, 0.02
@@ -43,7 +43,7 @@ NEAR, SAME = 0.4, 0.02
 def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE) -> MeshLaw:
     """Law of a pair for mesh forces up to `force` (N), its error from contact solutions that it was not made from.
 
-    Cells of the phase where that is more than `tolerance` are halved; the solutions that told it then count, too.
+    Cells of the phase where that is more than `tolerance` are halved; the solutions that showed it then count, too.
 
     Raises
     ------
@@ -77,7 +77,9 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
             base_radii=(geometry.pinion.base_radius, geometry.wheel.base_radius),
             reach=reach,
         )
-        off = _misses(law, pair, solve(HELD_PLACES, HELD_DEPTHS), LIGHT * force).reshape(len(begin), -1).max(axis=1)
+        off = (
+            _misses(law, pair, solve(HELD_PLACES, HELD_DEPTHS), LEAST_FORCE * force).reshape(len(begin), -1).max(axis=1)
+        )
         coarse = (off > tolerance) & (rest > 0)
         error = max(error, float(off[~coarse].max(initial=0.0)))
         if not coarse.any():
@@ -88,7 +90,7 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
 
 
 def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) -> Array:
-    """Error of force, or of the driver's torque, in parts of what contact solutions tell, or of a least force (N)."""
+    """Error of force, or of the driver's torque, in parts of contact solutions, or of a least force (N)."""
     r1, r2 = law.base_radii
     found = law(solved.pinion_angle, r2 * (solved.twist - pair.pair.contact_twist))
     force = solved.torque_wheel / r2
@@ -99,7 +101,7 @@ def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) 
 
 
 def pair_forces(pair: HalfPlanePair, solved: Positions, met: Touching, coupling: Sequence[Couple]) -> PairForces:
-    """What contact solutions tell of their loaded pairs; forces are torques of the wheel over its base radius."""
+    """Forces and approaches of the loaded pairs in contact solutions; forces are the wheel's torques over r_b2."""
     radius = pair.pair.wheel.base_radius
     c = solved.contacts
     force = c.torque_wheel / radius
@@ -123,7 +125,7 @@ def touch_curve(pair: HalfPlanePair, phases: Array) -> TouchCurve:
     radius = geometry.wheel.base_radius
     met = pair.teeth.touching(phases)
     own = np.flatnonzero(met.pair == 0)
-    value, slope = np.full(len(phases), NEVER), np.zeros(len(phases))
+    value, slope = np.full(len(phases), NO_CONTACT), np.zeros(len(phases))
     at = met.position[own]
     value[at] = radius * (met.twist[own] - geometry.contact_twist)
     slope[at] = radius * (1.0 / geometry.gear_ratio - met.arm[own, 0] / met.arm[own, 1])
@@ -166,7 +168,7 @@ def _reach(pair: HalfPlanePair, force: float) -> float:
     """Approach beyond the first touch (m) at which the mesh force is at least `force` at every phase."""
     geometry = pair.pair
     radius = geometry.wheel.base_radius
-    angles = geometry.mesh_cycle * np.arange(LOOKS) / LOOKS
+    angles = geometry.mesh_cycle * np.arange(ANGLES) / ANGLES
     _, first = _touching(pair, angles)
     reach = 1e-2 * geometry.pinion.module
     for _ in range(4):

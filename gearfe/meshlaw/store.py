@@ -21,7 +21,7 @@ from ..output.files import write_csv
 from ..progress import stage
 from ..stiffness.curve_cache import curve_key
 from ..typing import Array
-from .law import NEVER, MeshLaw
+from .law import NO_CONTACT, MeshLaw
 
 #: Fields that are arrays, with the number of their axes.
 ARRAYS = {"nodes": 1, "forces": 1, "touch": 3, "energies": 5, "coupling": 4}
@@ -70,7 +70,7 @@ def write_law_csv(law: MeshLaw, path: str | Path) -> None:
     touch, angle = law.touch[:, :, 0].ravel(), law.nodes[:-1] + law.cycle * np.arange(law.slots)[:, None]
     columns = {
         "pair_angle_deg": np.degrees(angle).ravel(),
-        "touch_um": np.where(touch < NEVER, 1e6 * touch, math.nan),
+        "touch_um": np.where(touch < NO_CONTACT, 1e6 * touch, math.nan),
     }
     for part, (low, high) in enumerate(zip(law.forces[:-1], law.forces[1:], strict=True)):
         c = law.energies[:, :, part, 0].reshape(-1, 5)

@@ -40,7 +40,7 @@ class ReliefResult(Shown):
     Attributes
     ----------
     problem
-        What was asked.
+        Variables, torques and objective.
     x : ndarray, shape (n,)
         Values of the variables (m).
     best, without

@@ -40,7 +40,7 @@ def relief_problem(
     law: HalfPlanePair,
     roots: PairRoots | None,
 ) -> ReliefProblem:
-    """The search that a job file asks for, of gears without pitch errors."""
+    """The search of a job file, of gears without pitch errors."""
     made = [modification(FlankOf(base, pair, g, base.flank, folder, mirrored=base.flank == "right")) for g in (0, 1)]
     variables = []
     for one in table.variables:
@@ -152,12 +152,7 @@ def summary(
 ) -> dict[str, Any]:
     """Content of relief.json."""
     return {
-        "job": {
-            "pair": asdict(job.pair_table),
-            "stiffness": asdict(job.table),
-            "microgeometry": asdict(base),
-            "relief": asdict(table),
-        },
+        "job": {**job.tables, "microgeometry": asdict(base), "relief": asdict(table)},
         "versions": versions(),
         "best": dict(zip(names_of(table), in_units(table, made.x), strict=True)),
         "objective": made.best.value,

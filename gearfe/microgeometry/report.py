@@ -1,4 +1,4 @@
-"""What the microgeometry command tells: tables, printed lines, the summary."""
+"""Report of a loaded pair with deviations: tables, printed lines, the summary."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def summary(
 ) -> dict[str, Any]:
     """Content of microgeometry.json."""
     return {
-        "job": {"pair": asdict(job.pair_table), "stiffness": asdict(job.table), "microgeometry": asdict(table)},
+        "job": {**job.tables, "microgeometry": asdict(table)},
         "versions": versions(),
         "mesh_cycles": made.mesh_cycles,
         "transmission_error_unloaded_peak_to_peak_um": 1e6 * float(np.ptp(made.transmission_error_unloaded)),

@@ -22,7 +22,7 @@ Columns = Mapping[str, Any]
 WRITING, LEFTOVER_S = ".writing-", 86400.0
 #: Rows of a table that are text at a time.
 AT_ONCE = 4096
-#: The file that tells of a run, and those that are made from its other files after it.
+#: The summary of a run, and those that are made from its other files after it.
 SUMMARY, KEPT_LATER = "summary.json", ("report.html", "tables.npz", "tables.h5", "tables.mat", "tables.uff")
 
 _records: list[list[tuple[Path, list[str]]]] = []
@@ -37,7 +37,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     target = Path(path)
     try:
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
-    except OSError as error:  # tell the file that is wanted, not the temporary one
+    except OSError as error:  # name the file that is wanted, not the temporary one
         raise type(error)(error.errno, error.strerror, str(target)) from None
     os.close(handle)
     temporary = Path(name)
@@ -109,8 +109,8 @@ class Table:
 def csv_table(path: str | Path, *, gaps: bool = True) -> Iterator[Table]:
     """Yield a table; the file appears whole at the end.
 
-    Columns with infinite numbers are told by a `NotFiniteWarning`; without `gaps`, where not-a-number says nothing that
-    the table means, those with such numbers too.
+    Columns with infinite numbers are reported by a `NotFiniteWarning`; without `gaps`, where not-a-number says nothing
+    that the table means, those with such numbers too.
     """
     found: dict[str, list[int]] = {}  # column -> how many, and the first row
     rows = 0

@@ -14,7 +14,7 @@ from typing import Any
 from ..typing import Array
 from ..versions import versions
 
-#: Libraries whose versions are told.
+#: Libraries whose versions the page lists.
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio", "numba", "h5py", "matplotlib", "pyvista")
 #: Rows that are shown of a table, entries of a list, and pictures' kinds.
 ROWS, ENTRIES = 10, 12

@@ -71,7 +71,7 @@ class ModalBody(Shown):
         frequency of 0 where nothing is known of what was left out.
     softening : (N, N)
         Estimate of how much too stiff the mesh makes the body, a quadratic form like the stiffness (see
-        `gearfe.housing.mesh_error`); all zero where it was not asked for.
+        `gearfe.housing.mesh_error`); all zero where it was not estimated.
     held
         Whether a part of the body is fixed to the frame; a free body has six rigid-body modes.
     solver
@@ -121,7 +121,7 @@ class ModalBody(Shown):
 
     @property
     def highest_hz(self) -> float:
-        """Frequency of the highest mode that was kept (Hz), up to which errors can be told; 0 without modes."""
+        """Frequency of the highest mode that was kept (Hz), up to which errors can be estimated; 0 without modes."""
         return float(self.internal_hz[self.modes - 1]) if self.modes else 0.0
 
     @cached_property

@@ -259,7 +259,7 @@ class StiffnessCurve(ShownTable):
         return OUTLIER * float(known.max()) if len(known) else math.nan
 
     def interpolant(self, quantity: str = "k_mesh", *, method: str = "cubic") -> PeriodicInterpolant:
-        """Periodic interpolant of a quantity over the pinion angle; failed positions are left out and named in it.
+        """Periodic interpolant of a quantity over the pinion angle; failed positions are left out.
 
         Parameters
         ----------

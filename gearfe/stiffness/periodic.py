@@ -44,14 +44,11 @@ class PeriodicInterpolant:
         Rising phases; the last is the first plus the period.
     cubics : ndarray, shape (n, 4)
         ``c0 + c1 x + c2 x2 + c3 x3`` of the phase x from each node but the last.
-    left_out : ndarray
-        Phases that were asked for but have no value, for the record.
     """
 
     period: float
     nodes: Array
     cubics: Array
-    left_out: Array
 
     @property
     def values(self) -> Array:
@@ -132,16 +129,13 @@ def periodic_interpolant(
         )
         raise InputError("stiffness curve", None, problem, "ask for angles over a whole cycle, or for smaller steps")
     at = values[order]
-    missing = np.setdiff1d(np.round(wrapped[~known], 12), np.round(nodes, 12))
     secant, bends = (np.roll(at, -1) - at) / gaps, np.zeros((2, len(at)))
     slopes = secant
     if method == "cubic":
         slopes = _monotone_slopes(gaps, secant)
         end = np.roll(slopes, -1)
         bends = np.stack([(3 * secant - 2 * slopes - end) / gaps, (slopes + end - 2 * secant) / gaps**2])
-    return PeriodicInterpolant(
-        period, np.append(nodes, nodes[0] + period), np.stack([at, slopes, *bends], axis=1), missing
-    )
+    return PeriodicInterpolant(period, np.append(nodes, nodes[0] + period), np.stack([at, slopes, *bends], axis=1))
 
 
 def wrapped_phase(phase: Array, period: float) -> Array:

@@ -89,7 +89,7 @@ def evaluate(task: Task, values: Sequence[Any], shared: Shared) -> tuple[dict[st
 
 
 def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -> Row:
-    """Row of a case; what goes wrong in it is told in the row."""
+    """Row of a case; what goes wrong in it stands in the row."""
     began = time.perf_counter()
     nothing = (float("nan"),) * len(task.outputs)
     try:

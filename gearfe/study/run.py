@@ -1,4 +1,4 @@
-"""The cases of a study, one after the other, on processes, or on any executor; each finished one is told at once.
+"""The cases of a study, one after the other, on processes, or on any executor; each finished one is handed on at once.
 
 Cases go in groups of about `GROUP_SECONDS`, so that handing over costs little. The cases of groups that never come
 back run again one by one, with nothing beside them, so that it is known whose fault a death is, `AGAIN` times at most.
@@ -125,7 +125,7 @@ def processes(workers: int) -> Executor:
 
 
 def _begun(workers: int) -> tuple[Executor, Future[int] | None]:
-    """Fresh processes, and what tells whether they begin."""
+    """Fresh processes, and a future that shows whether they begin."""
     pool = processes(workers)
     return pool, pool.submit(os.getpid)
 

@@ -17,7 +17,7 @@ from ..tables.study import LimitTable, StudyTable
 from ..typing import Array, BoolArray, IntArray
 from .case import DONE
 
-#: Quantiles that are told, and the confidence of all intervals.
+#: Quantiles of the summary, and the confidence of all intervals.
 QUANTILES, CONFIDENCE = (0.05, 0.25, 0.5, 0.75, 0.95), 0.95
 
 
@@ -283,7 +283,7 @@ def pareto_set(values: Array) -> IntArray:
 
 
 def report_lines(summary: Mapping[str, Any]) -> list[str]:
-    """What the command tells of a study."""
+    """Lines for the terminal."""
     statuses = ", ".join(f"{n} {status}" for status, n in summary["statuses"].items())
     lines = [f"{summary['cases']} cases: {statuses}; {summary['seconds_of_all_cases']:.3g} s of work"]
     for name, one in summary["outputs"].items():

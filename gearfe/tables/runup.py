@@ -1,4 +1,4 @@
-"""Table ``[runup]``: the range of speeds of a run-up, and what is told of it. The train is that of ``[train]``."""
+"""Table ``[runup]``: the range of speeds of a run-up, and its report. The train is that of ``[train]``."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ PAST = 2e-3
 #: Part of a cell's width that counts as none, and approach (m) whose part `SAME` counts as none.
 SAME, SMALL = 1e-9, 1e-7
 #: Parts of a step in which a series is looked at for leaving its cell.
-LOOKS = 6
+SAMPLES = 6
 
 
 def train_corner(last: int, limit: float, p: Program, memory: Array, pieces: IntArray, ahead: bool) -> float:
@@ -134,8 +134,8 @@ def leaves(memory: Array, row: int, last: int, low: float, high: float, slack: f
         high = max(high, value)
     else:
         low = min(low, value)
-    for i in range(LOOKS):
-        end = limit * (i + 1) / LOOKS
+    for i in range(SAMPLES):
+        end = limit * (i + 1) / SAMPLES
         there, rate = polynomial(memory, row, last, end)
         x = end
         found = there

@@ -86,7 +86,7 @@ class Flank(ABC):
     def bears(self, phase: Array, approach: Array) -> BoolArray:
         """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
 
-    def place(self, angle: Array, u: Array) -> tuple[Array, Array]:
+    def phase_and_approach(self, angle: Array, u: Array) -> tuple[Array, Array]:
         """Phase (rad) and approach beyond the gap (m), u of shape (n, directions)."""
         return self.sense * (self.ratio * angle + u[:, self.turn]) + self.phase, u[:, self.direction] - self.gap
 
@@ -100,7 +100,7 @@ class CurveFlank(Flank):
 
     def forces(self, angle: Array, rate: Array, u: Array, du: Array) -> FlankForces:  # noqa: ARG002
         """Forces at rotations of the drive (rad) and their rates, (n,), u and du of shape (n, directions)."""
-        phase, approach = self.place(angle, u)
+        phase, approach = self.phase_and_approach(angle, u)
         force = self.curve(phase).value * approach
         return FlankForces(np.maximum(force, 0.0) if self.parts else force)
 
@@ -133,7 +133,7 @@ class LawFlank(Flank):
 
     def forces(self, angle: Array, rate: Array, u: Array, du: Array) -> FlankForces:
         """Forces at rotations of the drive (rad) and their rates, (n,), u and du of shape (n, directions)."""
-        phase, approach = self.place(angle, u)
+        phase, approach = self.phase_and_approach(angle, u)
         made = self.law(phase, approach, self.shifts_at(phase))
         presses = np.maximum(1.0 + self.damping * du[:, self.direction], 0.0)
         one = self.sliding

@@ -139,7 +139,7 @@ class GearMesh:
                 raise InputError(f"mesh {self.name!r} stiffness", error.value, error.problem, error.cure) from None
         if isinstance(curve, float | int):
             flat = np.array([[float(curve), 0.0, 0.0, 0.0]])
-            return PeriodicInterpolant(2 * math.pi, np.array([0.0, 2 * math.pi]), flat, np.zeros(0))
+            return PeriodicInterpolant(2 * math.pi, np.array([0.0, 2 * math.pi]), flat)
         if not isinstance(curve, PeriodicInterpolant):
             raise InputError(f"mesh {self.name!r} stiffness", None, "is no curve", "ask its law, or give it a curve")
         return curve

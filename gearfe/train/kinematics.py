@@ -134,7 +134,7 @@ def steady_forces(train: GearTrain) -> Array:
     """Force of each mesh (N) under the final torques of the loads, without inertia; shape (meshes,).
 
     At every shaft that is not driven the moments about the axis balance, base radius times force at each mesh. In a
-    loop of gears the forces of least squares are returned: statics alone do not tell them.
+    loop of gears the forces of least squares are returned: statics alone do not determine them.
     """
     return balanced_forces(train, driving_senses(train), load_torques(train, [load_end(train)]))[:, 0]
 
@@ -167,7 +167,7 @@ def balanced_forces(train: GearTrain, senses: Sequence[float], torques: Array) -
 def driving_senses(train: GearTrain) -> tuple[float, ...]:
     """For each mesh, +1 or -1: sense about the axis in which the driver pushes, that of its rotation.
 
-    Where the drive stands still, the loads tell it.
+    Where the drive stands still, it follows from the loads.
     """
     ratios = shaft_ratios(train)
     made = tuple(math.copysign(1.0, ratios[train.gear(mesh.driver).shaft]) for mesh in train.meshes)
@@ -180,17 +180,17 @@ def driving_senses(train: GearTrain) -> tuple[float, ...]:
 
 def drive_sense(speed: TimeFunction) -> float:
     """Sense in which the drive turns: that of its first speed that is not zero; 0 where it stands still."""
-    found = [float(speed(t)) for t in _looks(speed)]
+    found = [float(speed(t)) for t in _sample_times(speed)]
     return next((math.copysign(1.0, s) for s in found if s != 0.0), 0.0)
 
 
 def fastest(speed: TimeFunction) -> float:
     """Largest speed of the drive (rad/s), without sign and oscillating parts."""
     steady = replace(speed, sines=())
-    return max(abs(float(steady(t))) for t in _looks(speed))
+    return max(abs(float(steady(t))) for t in _sample_times(speed))
 
 
-def _looks(speed: TimeFunction) -> list[float]:
-    """Times at which a function of time is looked at: its breaks, and between them."""
+def _sample_times(speed: TimeFunction) -> list[float]:
+    """Breaks of a function of time, and times between them."""
     ends = (0.0, *speed.breaks)
     return sorted([*ends, *(0.5 * (a + b) for a, b in zip(ends, speed.breaks, strict=False))])

@@ -254,12 +254,29 @@ def mesh_line(train: GearTrain, mesh: GearMesh, shafts: Shafts, running: Operati
     spin = np.zeros(size)
     spin[first[i] + 5], spin[first[j] + 5] = 1.0, -1.0
     slides = np.array([*(relative(np.cross(a, n), point, point) for n in (line, back)), spin])
-    sliding = _sliding(mesh, pair, force, (ratios[i], ratios[j]), running.speed)
     return MeshLine(
-        mesh.name, relative(line, point, point), relative(back, point, point), turn, line, point, curve, law, backlash,
-        mean, mesh.damping + rayleigh, rayleigh, reference, i, ratios[i], sense, running.phase, one.gear.module, slides,
-        sliding, running.shifts,
-    )  # fmt: skip
+        name=mesh.name,
+        row=relative(line, point, point),
+        back=relative(back, point, point),
+        turn=turn,
+        direction=line,
+        point=point,
+        curve=curve,
+        law=law,
+        backlash=backlash,
+        mean=mean,
+        damping=mesh.damping + rayleigh,
+        rayleigh=rayleigh,
+        reference=reference,
+        driver=i,
+        ratio=ratios[i],
+        sense=sense,
+        phase=running.phase,
+        module=one.gear.module,
+        slides=slides,
+        sliding=_sliding(mesh, pair, force, (ratios[i], ratios[j]), running.speed),
+        shifts=running.shifts,
+    )
 
 
 def _sliding(mesh: GearMesh, pair: GearPair, force: float, ratios: tuple[float, float], speed: float) -> Sliding | None:

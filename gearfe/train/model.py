@@ -318,7 +318,7 @@ def _damped(train: GearTrain, elements: list[Element], bodies: list[Element]) ->
 
 
 def _start(train: GearTrain, system: System, shafts: tuple[RigidShaft, ...], first: IntArray) -> Start:
-    """At rest beside rolling but for the asked speeds, which the constraints must allow."""
+    """At rest beside rolling but for the given initial speeds, which the constraints must allow."""
     start = consistent_start(system, 0.0)
     open_rows = {system.row_names()[i] for i in start.freedoms.redundant}
     for mesh in train.meshes:

@@ -1,4 +1,4 @@
-"""What a run tells of the contact of its teeth: when they part, and whether a mesh law reaches."""
+"""Contact of the teeth in a run: when they part, and whether they go beyond a mesh law."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def apart_in_steps(model: TrainModel, trajectory: Trajectory, until: float) -> t
     apart = np.zeros((len(angle), len(model.meshes)), dtype=bool)
     for i, sides in enumerate(model.sides):
         if sides:
-            apart[:, i] = ~np.any([flank.bears(*flank.place(angle, middle)) for flank in sides], axis=0)
+            apart[:, i] = ~np.any([flank.bears(*flank.phase_and_approach(angle, middle)) for flank in sides], axis=0)
     return ends, apart
 
 
@@ -87,7 +87,7 @@ def beyond_law(model: TrainModel, moved: TrainStates) -> tuple[int, str] | None:
         for flank in sides:
             if not isinstance(flank, LawFlank):
                 continue
-            phase, approach = flank.place(model.angle(moved.time), u)
+            phase, approach = flank.phase_and_approach(model.angle(moved.time), u)
             past = approach > flank.law.touching(phase, flank.shifts_at(phase)) + flank.law.reach
             if past.any() and (first is None or int(np.argmax(past)) < first[0]):
                 at = int(np.argmax(past))

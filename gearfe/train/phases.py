@@ -59,7 +59,7 @@ class _Join:
     base_radius: float
     distance: float
 
-    def place(self, phase: float) -> float:
+    def driver_tooth_at(self, phase: float) -> float:
         """Driver's tooth at a phase."""
         return self.towards + self.sense * phase
 
@@ -103,7 +103,7 @@ def tooth_places(train: GearTrain, senses: Sequence[float]) -> ToothPlaces:
     found: dict[str, float] = {}
     for join in sorted(joins, key=lambda j: j.mesh.phase is None):
         if join.mesh.driver not in found and join.mesh.driven not in found:
-            found[join.mesh.driver] = join.place(join.mesh.phase or 0.0)
+            found[join.mesh.driver] = join.driver_tooth_at(join.mesh.phase or 0.0)
             _spread(joins, found)
     room = 2.0 * SAME * sum(join.distance for join in joins)
     for join in joins:

@@ -1,4 +1,4 @@
-"""What a simulated gear train tells: contact forces, speeds, accelerations and the way back to the housing's field."""
+"""Response of a gear train: contact forces, speeds, accelerations and the way back to the housing's field."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class TrainResponse(ShownTable):
         ``redundant_constraints`` (names),
         ``smallest_contact_force_N``; for each mesh ``friction_coefficients``,
         ``contacts_lost``, ``contacts_regained``, ``share_without_contact``
-        and ``longest_without_contact_s`` (None for meshes that do not part); error estimates asked for
+        and ``longest_without_contact_s`` (None for meshes that do not part); error estimates
         (``integration``, ``reduction``).
     warnings : tuple of str
     """

@@ -272,7 +272,7 @@ def train_begin(
     flanks: tuple[CurveFlank | LawFlank, ...] = (*forces.curves, *forces.contacts)
     for k, flank in enumerate(flanks):
         at, row = p.flanks.piece[k], p.flanks.row[k]
-        phase, approach = (float(x[0]) for x in flank.place(np.array([angle]), u[None]))
+        phase, approach = (float(x[0]) for x in flank.phase_and_approach(np.array([angle]), u[None]))
         speed = sign * flank.sense * (flank.ratio * rate + du[flank.turn])
         if isinstance(flank, CurveFlank):
             pieces[at : at + 2] = ahead_of(flank.curve.nodes, phase, speed)
@@ -283,7 +283,7 @@ def train_begin(
         pieces[at : at + 3] = turn, cell, 0 if 1.0 + flank.damping * du[flank.direction] > 0.0 else -1
         force = np.zeros(slots)
         made = flank.law(np.array([phase]), np.array([approach]), flank.shifts_at(np.array([phase]))).pair_forces[0]
-        shift = turn - int(flank.law.place(np.array([phase]))[0][0])  # a node at which a cycle ends lies behind
+        shift = turn - int(flank.law.locate(np.array([phase]))[0][0])  # a node at which a cycle ends lies behind
         for slot in range(flank.law.slots):
             if 0 <= slot + shift < slots:
                 force[slot + shift] = made[slot]

@@ -21,7 +21,7 @@ from .model import TrainModel
 from .parting import Parting, apart_in_steps, beyond_law, parted
 from .response import TrainResponse, joined
 from .states import TrainStates, train_states
-from .statics import NONE
+from .statics import ROUND_OFF
 
 #: The finer run shares a little of the error; with this factor the estimate covers it.
 SAFETY = 1.5
@@ -60,7 +60,7 @@ class TransientOptions:
 
 
 def simulate(model: TrainModel, times: ArrayLike, *, raise_on_failure: bool = True, **options: Any) -> TrainResponse:
-    """Integrate a train and evaluate it at the asked times.
+    """Integrate a train and evaluate it at the output times.
 
     Parameters
     ----------
@@ -99,10 +99,10 @@ def simulate_in_pieces(model: TrainModel, times: ArrayLike, **options: Any) -> I
 
 
 def _pieces(model: TrainModel, t: Array, options: TransientOptions) -> Iterator[TrainResponse]:
-    so_far, begin, start = _SoFar(), 0, model.start
+    totals, begin, start = _Totals(), 0, model.start
     finer = None
     if options.estimate:
-        finer = _Finer(replace(options, tolerance=max(1e-2 * options.tolerance, 1e-13), backend="auto"), model.start)
+        finer = _FinerRun(replace(options, tolerance=max(1e-2 * options.tolerance, 1e-13), backend="auto"), model.start)
     now = options
     for end in _ends(model, t):
         if begin or end < len(t) - 1:
@@ -112,16 +112,16 @@ def _pieces(model: TrainModel, t: Array, options: TransientOptions) -> Iterator[
             trajectory, moved = _run(model, t[begin : end + 1], now, start)
             status, keep, why = _ended(model, trajectory, moved)
         kept = _cut(moved, min(1, begin), keep)
-        so_far.add(model, trajectory, kept, clock.perf_counter() - clocked)
+        totals.add(model, trajectory, kept, clock.perf_counter() - clocked)
         last = status != "done" or end == len(t) - 1
         if finer is not None:
             finer.compare(model, t[begin : end + 1], kept, int(trajectory.statistics["steps"]))
-        response = response_of(model, kept, status, so_far.reached, so_far.statistics(model, trajectory))
+        response = response_of(model, kept, status, totals.reached, totals.statistics(model, trajectory))
         if last:
             if begin:
                 count(0, 0)  # what follows is no part of the count
             ended = f"of {1e3 * float(t[-1]):.6g} ms: {response.status}{why}"
-            yield _whole(model, response, so_far, finer, ended, options)
+            yield _whole(model, response, totals, finer, ended, options)
             return
         yield response
         begin, start = end, replace(start, time=float(t[end]), q=moved.q[-1].copy(), v=moved.v[-1].copy())
@@ -162,7 +162,7 @@ def _run(
 
 
 @dataclass
-class _SoFar:
+class _Totals:
     """What a run adds up from piece to piece."""
 
     seconds: float = 0.0
@@ -221,7 +221,7 @@ class _SoFar:
 
 
 @dataclass
-class _Finer:
+class _FinerRun:
     """A second run beside the first, with a hundredth of the tolerance and steps half as long."""
 
     options: TransientOptions
@@ -258,13 +258,13 @@ class _Finer:
 def _whole(
     model: TrainModel,
     response: TrainResponse,
-    so_far: _SoFar,
-    finer: _Finer | None,
+    totals: _Totals,
+    finer: _FinerRun | None,
     ended: str,
     options: TransientOptions,
 ) -> TrainResponse:
     """The last piece with what holds for the whole run."""
-    warnings = so_far.pulls(model) + _loose(model)
+    warnings = totals.pulls(model) + _loose(model)
     if response.status != "done":
         warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms {ended}")
     estimates: dict[str, float] = {}
@@ -283,7 +283,7 @@ def _loose(model: TrainModel) -> list[str]:
     return [
         f"no load keeps the teeth of mesh {line.name} in contact: what they do depends on how they begin, and without "
         "damping it does not settle"
-        for line, idle in zip(model.meshes, forces <= NONE * forces.max(initial=0.0), strict=True)
+        for line, idle in zip(model.meshes, forces <= ROUND_OFF * forces.max(initial=0.0), strict=True)
         if idle and not (line.rigid or line.pulls)
     ]
 

@@ -30,10 +30,10 @@ from .kinematics import (
 )
 from .phases import pair_shifts, tooth_places
 
-#: Times looked at in each piece of the loads and of the drive.
-LOOKS = 64
+#: Times in each piece of the loads and of the drive.
+SAMPLES = 64
 #: Smaller forces, relative to the largest, are round-off.
-NONE = 1e-9
+ROUND_OFF = 1e-9
 
 
 def check_flanks(train: GearTrain) -> None:
@@ -48,7 +48,7 @@ def check_flanks(train: GearTrain) -> None:
     senses = driving_senses(train)
     loads = balanced_forces(train, senses, load_torques(train, times))
     whole = loads + balanced_forces(train, senses, _inertia(train, times))
-    least = -NONE * float(np.abs(loads).max())
+    least = -ROUND_OFF * float(np.abs(loads).max())
     wrong = (loads < least) & (whole < least) & one_sided(train)[:, None]
     if wrong.any():
         at = int(np.argmin(np.where(wrong, loads, np.inf).min(axis=0)))
@@ -67,7 +67,7 @@ def one_sided(train: GearTrain) -> BoolArray:
 def _times(train: GearTrain) -> Array:
     breaks = {b for load in train.loads for b in load.torque.breaks} | set(train.driven.speed.breaks)
     ends = sorted({0.0, *(b for b in breaks if b > 0.0)})
-    inner = [np.linspace(a, b, LOOKS) for a, b in itertools.pairwise(ends)]
+    inner = [np.linspace(a, b, SAMPLES) for a, b in itertools.pairwise(ends)]
     return np.unique(np.concatenate([ends, *inner]))
 
 

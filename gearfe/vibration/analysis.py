@@ -1,4 +1,4 @@
-"""What ``[spectrum]`` asks for beside the spectrum: over short times, orders over a run-up, measured ones beside."""
+"""Analyses of ``[spectrum]`` beside the spectrum: over short times, orders over a run-up, measured ones beside."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ class Analysed:
     names
         Signals, as in response.csv.
     falls
-        Spectra over short times, one a signal; none where they were not asked for.
+        Spectra over short times, one a signal; none where not requested.
     average
         (lines, signals) of these, from `start` (s) on, over so many `parts`.
     tracks
-        Orders; None where they were not asked for.
+        Orders; None where not requested.
     mesh_orders
         Turns of the first shaft after which each mesh repeats once, inverted.
     measured
@@ -91,14 +91,14 @@ class Analysis:
         self.ratio = float(turning.ratios[0])
         self.mesh_orders = np.array([float(c) for c in turning.cycles]) / abs(self.ratio)
         self._tracked: Tracked | None = None
-        if self.table.short_time_ms is not None:  # told before the long computation
+        if self.table.short_time_ms is not None:  # refused before the long computation
             check_part(1e-3 * self.table.short_time_ms, self._step, float(job.times[-1]))
         if self.table.order_turns is not None:
             check_turns(self.ratio * train.driven.speed.integral()(job.times), self.table.order_turns)
 
     @property
     def requested(self) -> bool:
-        """Whether anything is asked for."""
+        """Whether any analysis is requested."""
         return bool(self.measured) or self._over_time
 
     @property

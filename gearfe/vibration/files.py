@@ -72,7 +72,7 @@ class Pictures(Protocol):
         """Draw curves and spectra into a folder."""
 
     def analysis(self, folder: Path, made: analysis.Analysed, spectra: TrainSpectra | None, attachment: str) -> None:
-        """Draw what [spectrum] asks for beside the spectrum."""
+        """Draw the analyses of [spectrum]."""
 
     def fields(self, path: Path, train: GearTrain, response: TrainResponse, steps: IntArray) -> str:
         """Draw the fields at some output times; an empty text, or why nothing was drawn."""
@@ -130,7 +130,7 @@ def write_run(
     draw
         Draws the pictures.
     beside
-        What [spectrum] asks for beside the spectrum.
+        Analyses of [spectrum] beside the spectrum.
     """
     train, times = planned.model.train, planned.times
     problems: list[str] = []

@@ -73,7 +73,7 @@ class TrainRun:
         Makes the same of a changed train by the method that the run took: the summary's numbers then have estimates
         of their errors.
     band_hz
-        Upper end of the band (Hz) in which the reduction's error is told.
+        Upper end of the band (Hz) for which the reduction's error holds.
     stability
         Of the steady motion.
     """
@@ -109,7 +109,7 @@ class Followed:
     curves
         The response for pictures: all samples, or the least and the largest ones of equal parts of the run.
     kept
-        The response at the output times that were asked for.
+        The response at the output times that are kept.
     spectra
         None where the run was too short.
     """

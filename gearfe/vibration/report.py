@@ -1,4 +1,4 @@
-"""What the vibration command tells: means, dominant lines, the summary."""
+"""Report of a vibration run: means, dominant lines, the summary."""
 
 from __future__ import annotations
 
