@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.config import load_job
+from gearfe.config import build, load_job
 from gearfe.errors import InputError
+from gearfe.gear.pair import GearPair
 from gearfe.stiffness.curve import StiffnessCurve
-from gearfe.tables.train import TrainCurvesTable
+from gearfe.tables.pair import PairTable
+from gearfe.tables.train import TrainCurvesTable, TrainGearTable
 from gearfe.train import build_train, simulate
 from gearfe.train.kinematics import steady_forces
-from gearfe.vibration.job import bore_places, job_train, read_train_job
+from gearfe.vibration.job import bore_places, job_train, read_train_job, train_gear
 from gearfe.vibration.mesh_stiffness import train_curves
 
 SHIPPED = Path(__file__).parent.parent / "geometry" / "gear_train.toml"
@@ -125,6 +127,17 @@ def test_a_train_with_its_own_gears_runs(tmp_path: Path) -> None:
     assert response.contact_force[-1, 0] == pytest.approx(30.0 / (0.027 * math.cos(math.radians(20.0))), rel=0.2)
 
 
+def test_a_gear_of_its_own_with_the_keys_of_a_pair_is_the_pairs(tmp_path: Path) -> None:
+    """Tip relief, too: it was taken for a key and left out of the gear."""
+    form = {"module_mm": 2.5, "pressure_angle_deg": 25.0, "face_width_mm": 10.0, "tip_round_mm": 0.1}
+    form |= {"tip_relief_amount_um": 12.0, "tip_relief_length_mm": 2.0, "tip_relief_exponent": 2.0}
+    gears = {"pinion": {"teeth": 20, "bore_diameter_mm": 10.0}, "wheel": {"teeth": 30, "bore_diameter_mm": 15.0}}
+    expected = GearPair.from_table(build(PairTable, {**form, **gears}, "pair")).pinion
+    job = read_train_job(written(tmp_path, SMALL + BORES))
+    own = build(TrainGearTable, {**form, **gears["pinion"], "name": "a", "shaft": "in", "y_mm": 0.0}, "gear")
+    assert train_gear(job, own, "gear") == expected
+
+
 def test_files_for_curves(tmp_path: Path) -> None:
     angles = np.arange(20.0)
     rows = "\n".join(f"{a},{1.5e8 + 1e7 * math.cos(math.radians(18 * a))}" for a in angles)
@@ -153,6 +166,8 @@ def built(path: Path) -> None:
         ('shaft = "out"\ny_mm', 'shaft = "oat"\ny_mm', "gears\\[1\\].shaft: unknown name 'oat'; did you mean 'out'"),
         ("teeth = 27", "tooth = 27", "did you mean 'teeth'"),
         ("module_mm = 2.0", "", "module_mm.*is required"),
+        ("teeth = 27", "teeth = 27\ntip_relief_amount_um = 9.0", "gears\\[1\\].tip_relief_length_mm: is required"),
+        ("teeth = 27", "teeth = 27\ntip_round_mm = 5.0", "gears\\[1\\].tip_round_mm = 5.0: "),
         ("stiffness_N_per_m = 2e8", "", "has no stiffness: there is no table"),
         ("stiffness_N_per_m = 2e8", "stiffness_N_per_m = 2e8\nrigid = true", "stands beside"),
         ("ratio = 0.05", "ratio = -0.05", "must be finite and >= 0"),

@@ -10,13 +10,14 @@ material of the mate is answered by rolling the pair.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, given
 from ..shown import Shown
 from ..tables.pair import INSTEAD, GearTable, PairTable
 from ..typing import Array
@@ -284,47 +285,58 @@ class GearPair(MeshGeometry, Shown):
         return pair_warnings(self)
 
     @classmethod
-    def from_table(cls, table: PairTable, where: str = "pair") -> GearPair:
+    def from_table(cls, table: PairTable) -> GearPair:
         """Pair that a job file's [pair] table describes; errors name the file's keys and units."""
-        pinion = _gear_from_table(table, "pinion", where)
-        wheel = _gear_from_table(table, "wheel", where)
+        pinion, wheel = _gear_from_table(table, "pinion"), _gear_from_table(table, "wheel")
         distance = table.centre_distance_mm
         try:
             return cls(pinion, wheel, None if distance is None else distance * 1e-3)
         except InputError as error:
             side, _, name = error.field.rpartition(".") if error.field.startswith(("pinion", "wheel")) else ("", "", "")
-            raise _renamed(error, table, side, name or error.field, where) from None
+            raise _renamed(error, table, side, name or error.field) from None
 
 
-def _gear_from_table(table: PairTable, side: str, where: str) -> Gear:
+def _gear_from_table(table: PairTable, side: str) -> Gear:
     own: GearTable = getattr(table, side)
-    value = table.tooth_form(side)
-    value |= coefficients(own, table.module_mm_of(side), value, f"{where}.{side}")
-    relief = None
-    if value["tip_relief_amount_um"]:
-        length = value["tip_relief_length_mm"]
-        relief = TipRelief(value["tip_relief_amount_um"] * 1e-6, length * 1e-3, value["tip_relief_exponent"])
+    form, module_mm = table.tooth_form(side), table.module_mm_of(side)
+    form |= coefficients(own, module_mm, form, f"pair.{side}")
     try:
-        return Gear(
-            own.teeth,
-            table.module_mm_of(side) * 1e-3,
-            math.radians(value["pressure_angle_deg"]),
-            value["face_width_mm"] * 1e-3,
-            own.bore_diameter_mm * 1e-3,
-            profile_shift=value["profile_shift"],
-            addendum=value["addendum"],
-            dedendum=value["dedendum"],
-            rack_tip_radius=value["rack_tip_radius"],
-            tip_round=value["tip_round_mm"] * 1e-3,
-            tip_shortening=value["tip_shortening"],
-            tip_relief=relief,
-            tooth_thinning=value["tooth_thinning_um"] * 1e-6,
-        )
+        return gear_of_form(own.teeth, module_mm, own.bore_diameter_mm, form)
     except InputError as error:
-        raise _renamed(error, table, side, error.field, where) from None
+        raise _renamed(error, table, side, error.field) from None
 
 
-def _renamed(error: InputError, table: PairTable, side: str, name: str, where: str) -> InputError:
+def gear_of_form(teeth: int, module_mm: float, bore_mm: float, form: Mapping[str, Any]) -> Gear:
+    """Gear with a tooth form in everyday units, as `gearfe.tables.pair.tooth_form` gives it."""
+    relief = None
+    if form["tip_relief_amount_um"]:
+        length = 1e-3 * given(form["tip_relief_length_mm"], "tip_relief_length_mm")
+        relief = TipRelief(form["tip_relief_amount_um"] * 1e-6, length, form["tip_relief_exponent"])
+    return Gear(
+        teeth,
+        module_mm * 1e-3,
+        math.radians(form["pressure_angle_deg"]),
+        form["face_width_mm"] * 1e-3,
+        bore_mm * 1e-3,
+        profile_shift=form["profile_shift"],
+        addendum=form["addendum"],
+        dedendum=form["dedendum"],
+        rack_tip_radius=form["rack_tip_radius"],
+        tip_round=form["tip_round_mm"] * 1e-3,
+        tip_shortening=form["tip_shortening"],
+        tip_relief=relief,
+        tooth_thinning=form["tooth_thinning_um"] * 1e-6,
+    )
+
+
+def in_keys(error: InputError, where: str) -> InputError:
+    """The error of an argument of `Gear` as that of its key in a table, in the key's unit."""
+    key, factor = KEYS.get(error.field, (error.field, 1.0))
+    value = float(f"{error.value * factor:.12g}") if isinstance(error.value, float) else error.value
+    return InputError(f"{where}.{key}", value, error.problem, error.cure)
+
+
+def _renamed(error: InputError, table: PairTable, side: str, name: str) -> InputError:
     """The same error in the words of the job file: its key where it was given, its unit."""
     key, factor = KEYS.get(name, (name, 1.0))
     own: Any = getattr(table, side) if side else None
@@ -332,11 +344,11 @@ def _renamed(error: InputError, table: PairTable, side: str, name: str, where: s
         if own is not None and key in stands_for and getattr(own, drawn) is not None:
             number = error.value * factor if isinstance(error.value, float) else error.value
             problem = f"makes {key} {number:.6g}: {error.problem}"
-            return InputError(f"{where}.{side}.{drawn}", getattr(own, drawn), problem, error.cure)
+            return InputError(f"pair.{side}.{drawn}", getattr(own, drawn), problem, error.cure)
     if name == "module" and own.pitch_diameter_mm is not None:
         key, factor = "pitch_diameter_mm", 1e3 * own.teeth
     shared = side and getattr(own, key, None) is None and getattr(table, key, None) is not None
-    field = f"{where}.{key}" if shared or not side else f"{where}.{side}.{key}"
+    field = f"pair.{key}" if shared or not side else f"pair.{side}.{key}"
     value = error.value
     if isinstance(value, float):
         value = float(f"{value * factor:.12g}")

@@ -71,6 +71,14 @@ class ToothFormTable:
     )
 
 
+def tooth_form(*tables: ToothFormTable) -> dict[str, Any]:
+    """Keys of a tooth form but the module, each from the first table that gives it, else its default."""
+    return {
+        key: next((v for v in (getattr(table, key) for table in tables) if v is not None), DEFAULTS.get(key))
+        for key in (*DEFAULTS, *REQUIRED, *OPTIONAL)
+    }
+
+
 @dataclass(frozen=True)
 class GearTable(ToothFormTable):
     """One gear of a pair."""
@@ -102,11 +110,7 @@ class PairTable(ToothFormTable):
 
     def tooth_form(self, side: str) -> dict[str, Any]:
         """Keys of the tooth form of the gear `side` ("pinion" or "wheel"), shared values and defaults filled in."""
-        own: GearTable = getattr(self, side)
-        return {
-            key: next((v for v in (getattr(own, key), getattr(self, key)) if v is not None), DEFAULTS.get(key))
-            for key in (*DEFAULTS, *REQUIRED, *OPTIONAL)
-        }
+        return tooth_form(getattr(self, side), self)
 
     def module_mm_of(self, side: str) -> float:
         """Module of the gear `side` (mm), from its own pitch diameter or module, or from the shared module."""

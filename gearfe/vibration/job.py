@@ -17,13 +17,13 @@ import numpy as np
 
 from ..errors import InputError, given
 from ..gear.deviation_job import pitch_errors_of
-from ..gear.pair import Gear, GearPair
+from ..gear.pair import Gear, GearPair, gear_of_form, in_keys
 from ..meshlaw.law import MeshLaw
 from ..rigid import TimeFunction, smoothed_step
 from ..stiffness.curve import StiffnessCurve
 from ..tables.housing import HousingTable
 from ..tables.microgeometry import MicrogeometryTable
-from ..tables.pair import DEFAULTS, PairTable
+from ..tables.pair import REQUIRED, PairTable, tooth_form
 from ..tables.spectrum import SpectrumTable
 from ..tables.stiffness import StiffnessTable
 from ..tables.timefunction import TrainFunctionTable
@@ -174,31 +174,18 @@ def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:
         made = GearPair.from_table(pair)
         return made.pinion if table.gear == "pinion" else made.wheel
 
-    def value(key: str) -> Any:
-        for source in (table, pair):
-            found = None if source is None else getattr(source, key)
-            if found is not None:
-                return found
-        if key in DEFAULTS:
-            return DEFAULTS[key]
-        raise InputError(f"{where}.{key}", None, "is required", "add it here, or to a table [pair]")
-
-    teeth, module = given(table.teeth, f"{where}.teeth"), 1e-3 * value("module_mm")
-    bore = 0.2 * module * teeth if table.bore_diameter_mm is None else 1e-3 * table.bore_diameter_mm
-    form = {key: value(key) for key in ("profile_shift", "addendum", "dedendum", "rack_tip_radius", "tip_shortening")}
+    sources = (table,) if pair is None else (table, pair)
+    form, modules = tooth_form(*sources), (source.module_mm for source in sources)
+    needed = {"module_mm": next((m for m in modules if m is not None), None), **{key: form[key] for key in REQUIRED}}
+    for key, value in needed.items():
+        if value is None:
+            raise InputError(f"{where}.{key}", None, "is required", "add it here, or to a table [pair]")
+    teeth, module_mm = given(table.teeth, f"{where}.teeth"), given(needed["module_mm"], f"{where}.module_mm")
+    bore_mm = 0.2 * module_mm * teeth if table.bore_diameter_mm is None else table.bore_diameter_mm
     try:
-        return Gear(
-            teeth,
-            module,
-            math.radians(value("pressure_angle_deg")),
-            1e-3 * value("face_width_mm"),
-            bore,
-            tip_round=1e-3 * value("tip_round_mm"),
-            tooth_thinning=1e-6 * value("tooth_thinning_um"),
-            **form,
-        )
+        return gear_of_form(teeth, module_mm, bore_mm, form)
     except InputError as error:
-        raise InputError(f"{where}.{error.field}", error.value, error.problem, error.cure) from None
+        raise in_keys(error, where) from None
 
 
 def _uneven(job: TrainJob, made: ShaftGear, name: str) -> ShaftGear:
