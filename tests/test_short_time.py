@@ -227,6 +227,9 @@ def test_a_run_up_with_all_of_it(tmp_path):
     assert {p.name for p in out.iterdir()} >= {f"{n}.{s}" for n in names for s in ("csv", "png")}
     summary = json.loads((out / "summary.json").read_text())
     assert summary["measured"][0]["measured_rms_m_per_s2"] == pytest.approx(3.0 / math.sqrt(2.0))
+    smeared = [line for lines in summary["dominant_lines"].values() for line in lines]
+    assert smeared  # at a speed that changes no line is one of an order
+    assert all(line["near"] is None and line["order_of_first_shaft"] is None for line in smeared)
     with (out / "order_tracks.csv").open(newline="") as stream:
         tracks = list(csv.DictReader(stream))
     assert {float(row["order"]) for row in tracks} == {20.0, 40.0, 60.0}

@@ -17,7 +17,7 @@ from ..train.response import TrainResponse
 from ..typing import Array
 from ..vibration.analysis import Analysed
 from ..vibration.radiation import RadiatedPower
-from ..vibration.report import lines_of
+from ..vibration.report import lines_of, settled
 from ..vibration.short_time import OrderTracks
 from ..vibration.spectra import TrainSpectra
 from .style import (
@@ -44,6 +44,8 @@ from .style import (
 _DRAWN = 2000
 #: Lines that are named in the picture of a spectrum, and the least amplitude of such a line in parts of the largest.
 _NAMED, _LEAST = 5, 0.2
+#: Lines this near to a larger one that is named (relative) belong to the same resonance and have no name.
+_BESIDE = 0.02
 #: End of the frequency axis: this multiple of the highest mesh frequency, unless larger lines lie above it.
 _MESH_MULTIPLES = 4.2
 #: Lines of the meshes.
@@ -58,7 +60,9 @@ def draw_spectrum(
     amplitude = _inside(spectrum.frequency, made.amplitude(name), band)
     lines = lines_of(response, float(spectrum.frequency[-1]))
     named = []
-    for peak in peaks(spectrum.frequency, amplitude, _NAMED, above=_LEAST):
+    for peak in peaks(spectrum.frequency, amplitude, 4 * _NAMED, above=_LEAST):
+        if len(named) == _NAMED or any(abs(1e-3 * peak.frequency / f - 1.0) < _BESIDE for f, _, _ in named):
+            continue
         line = nearest_line(peak.frequency, lines, 0.51 * spectrum.resolution)
         what = "" if line is None else f"\n{line.name} × {line.order}"
         named.append((1e-3 * peak.frequency, peak.amplitude, f"{peak.frequency:.0f} Hz: {peak.amplitude:.3g}{what}"))
@@ -139,7 +143,7 @@ def _frequency_axes(
     if named:
         figure.legend(fontsize=8.5, loc="lower center", ncols=4, frameon=False)
     name, turns = response.shaft_names[0], 1e-3 * float(abs(response.shaft_frequencies_Hz[0]))
-    if turns > 0.0:
+    if turns > 0.0 and settled(response):
         above = axes.secondary_xaxis("top", functions=(lambda f: f / turns, lambda order: order * turns))
         above.set_xlabel(f"order of the shaft {name}", fontsize=9)
         above.tick_params(labelsize=8.5)

@@ -30,16 +30,23 @@ def fundamentals(response: TrainResponse) -> dict[str, float]:
     return {f"mesh {i + 1}": float(f) for i, f in enumerate(response.mesh_frequencies_Hz)}
 
 
+def settled(response: TrainResponse) -> bool:
+    """Whether the drive turns at one speed in the second half of the run: else a spectrum has no lines of orders."""
+    half = len(response.time) // 2
+    rate = np.diff(response.drive_angle[half:]) / np.diff(response.time[half:])
+    return bool(np.ptp(rate) <= 1e-6 * np.abs(rate).max()) if len(rate) else True
+
+
 def lines_of(response: TrainResponse, highest: float) -> tuple[OrderLine, ...]:
-    """Multiples of the mesh frequencies up to `highest` (Hz)."""
-    return order_lines(fundamentals(response), highest)
+    """Multiples of the mesh frequencies up to `highest` (Hz); none of a speed that changes."""
+    return order_lines(fundamentals(response), highest) if settled(response) else ()
 
 
 def dominant(spectra: TrainSpectra, response: TrainResponse, name: str) -> list[dict[str, Any]]:
     """Largest lines of a signal, each with the multiple of a mesh frequency within one bin of it, if there is one."""
     spectrum = spectra.spectrum
     lines = lines_of(response, float(spectrum.frequency[-1]))
-    drive = float(abs(response.shaft_frequencies_Hz[0]))
+    drive = float(abs(response.shaft_frequencies_Hz[0])) if settled(response) else 0.0
     found = []
     for peak in peaks(spectrum.frequency, spectra.amplitude(name), NAMED, above=LEAST):
         line = nearest_line(peak.frequency, lines, spectrum.resolution)
