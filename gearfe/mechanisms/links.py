@@ -82,11 +82,11 @@ class FlexibleLink:
         """Kelvin and Voigt's time (s)."""
         return self.beam.link.damping
 
-    def elastic_energy(self, q: Array) -> float:
-        """In a state of the system (J)."""
+    def elastic_energy(self, q: Array) -> Array:
+        """In states of the system (times, size) (J)."""
         return self.beam.elastic_energy(q)
 
-    def loss(self, q: Array, v: Array) -> float:
+    def loss(self, q: Array, v: Array) -> Array:
         """Power that damping takes (W)."""
         return self.beam.loss(q, v)
 

@@ -155,7 +155,7 @@ class Mechanism:
         if name not in self.elastic:
             raise unknown_name(f"expression {kind}({what}): flexible links", name, self.elastic)
         if kind == "elastic_energy":
-            return np.array([self.elastic[name].elastic_energy(state) for state in q])
+            return self.elastic[name].elastic_energy(q)
         if name in self.plates:
             return self._of_plate(kind, what, q, v, sections)
         if kind in OF_PLATE:

@@ -111,13 +111,13 @@ class PlateLink:
         """Kelvin and Voigt's time (s)."""
         return self.part.table.damping_s
 
-    def elastic_energy(self, q: Array) -> float:
-        """In a state of the system (J)."""
-        return self.element.elastic_energy(q[self.own])
+    def elastic_energy(self, q: Array) -> Array:
+        """In states of the system (times, size) (J)."""
+        return np.array([self.element.elastic_energy(state[self.own]) for state in q])
 
-    def loss(self, q: Array, v: Array) -> float:
+    def loss(self, q: Array, v: Array) -> Array:
         """Power that damping takes (W)."""
-        return self.element.loss(q[self.own], v[self.own])
+        return np.array([self.element.loss(a[self.own], b[self.own]) for a, b in zip(q, v, strict=True)])
 
     def stresses(self, q: Array, v: Array) -> Array:
         """Stresses of the core in states of the system, shape (times, s)."""

@@ -79,7 +79,7 @@ def energies(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     potential = np.array([system.energy(*state)[1] for state in zip(q, v, strict=True)])
     work = _work(mechanism, trajectory)
     links = mechanism.elastic.values()
-    elastic = {"elastic_J": np.array([sum(e.elastic_energy(state) for e in links) for state in q])} if links else {}
+    elastic = {"elastic_J": np.sum([e.elastic_energy(q) for e in links], axis=0)} if links else {}
     return {
         **elastic,
         "kinetic_J": kinetic,
@@ -118,11 +118,10 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     planar = [state[:, : linkage.size] for state in states]
     power = linkage.power(at, *planar)
     for link in damped:
-        power = power - np.array([link.loss(q, v) for q, v in zip(*states, strict=True)])
+        power = power - link.loss(*states)
     if linkage.driven:
         multipliers = trajectory.multipliers_at(at)[:, : linkage.rows]
-        rates = np.array([linkage.rate(t, q) for t, q in zip(at, planar[0], strict=True)])
-        power = power + (multipliers * rates).sum(axis=1)
+        power = power + (multipliers * linkage.rate(at, planar[0])).sum(axis=1)
     steady = _steady_power(mechanism, states[1])
     gained = ((power - steady).reshape(len(half), -1) @ weights) * half
     work[1:] += np.cumsum(gained)

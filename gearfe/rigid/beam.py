@@ -191,17 +191,17 @@ class Beam(Element):
         """Elastic energy and that of the weight (J)."""
         x = q[self.places]
         turning = 0.0 if self._turning is None else 0.5 * float(x @ self._turning[0] @ x)
-        return self.elastic_energy(q) - float(self._weight @ x) - turning
+        return float(self.elastic_energy(q)) - float(self._weight @ x) - turning
 
-    def elastic_energy(self, q: Array) -> float:
-        """1/2 int EA Gamma^2 + GA gamma^2 + EI kappa^2 ds (J)."""
+    def elastic_energy(self, q: Array) -> Array:
+        """1/2 int EA Gamma^2 + GA gamma^2 + EI kappa^2 ds (J) in states (..., n)."""
         e = self.strains(self._at_points(q)).value
-        return 0.5 * float(self.weights @ (e**2 @ self.stiffness))
+        return 0.5 * (e**2 @ self.stiffness).reshape(*q.shape[:-1], -1) @ self.weights
 
-    def loss(self, q: Array, v: Array) -> float:
-        """Power that damping takes (W)."""
+    def loss(self, q: Array, v: Array) -> Array:
+        """Power that damping takes (W) in states (..., n)."""
         rates = np.einsum("pij,pj->pi", self.strains(self._at_points(q)).slope, self._at_points(v))
-        return self.link.damping * float(self.weights @ (rates**2 @ self.stiffness))
+        return self.link.damping * (rates**2 @ self.stiffness).reshape(*q.shape[:-1], -1) @ self.weights
 
     def _stress(self, e: Strains, dz: Array) -> Array:
         rates = np.einsum("pij,pj->pi", e.slope, dz) if self.link.damping else 0.0
@@ -217,7 +217,7 @@ class Beam(Element):
         return out
 
     def _at_points(self, q: Array) -> Array:
-        return (self._to_points.reshape(-1, len(self.places)) @ q[self.places]).reshape(-1, 4)
+        return (q[..., self.places] @ self._to_points.reshape(-1, len(self.places)).T).reshape(-1, 4)
 
     def _spread(self, blocks: Array) -> Array:
         """P^T blocks P on the coordinates of the linkage."""

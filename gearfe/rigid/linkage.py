@@ -160,11 +160,11 @@ class Linkage(Element):
         return J
 
     # constraints ------------------------------------------------------------------------------------------------
-    def _times(self, t: float, derivative: int) -> Array:
+    def _times(self, t: float | Array, derivative: int) -> Array:
         """Motions of the constraints."""
-        out = np.zeros(self.rows)
+        out = np.zeros((*np.shape(t), self.rows))
         for r in np.flatnonzero(self._forms.motion[: self.rows] >= 0):
-            out[r] = self.assembly.functions[self._forms.motion[r]](t, derivative)
+            out[..., r] = self.assembly.functions[self._forms.motion[r]](t, derivative)
         return out
 
     def _affine(self, pose: Pose) -> Array:
@@ -202,7 +202,7 @@ class Linkage(Element):
         np.add.at(full, (np.arange(self.rows)[:, None, None], columns), self.gradients(q))
         return full[:, : self.size]
 
-    def rate(self, t: float, q: Array) -> Array:  # noqa: ARG002
+    def rate(self, t: float | Array, q: Array) -> Array:  # noqa: ARG002
         """Minus the rates of the prescribed motions."""
         return -self._times(t, 1)
 
