@@ -276,6 +276,26 @@ def test_motions_that_turn_back_out_of_the_range_are_told_and_the_rest_is_found(
     )
 
 
+def test_speeds_without_a_first_motion_are_reached_from_the_next_one_or_told(monkeypatch):
+    from gearfe.runup import run_up as module
+
+    real, failing = module.first_motion, {400.0, 450.0}
+    monkeypatch.setattr(
+        module,
+        "first_motion",
+        lambda system, speed, **options: None if speed in failing else real(system, speed, **options),
+    )
+    model = build_train(loaded([(20, 30)], smooth, ratio=0.05, flexible=False))
+    made = run_up(model, [400.0, 450.0, 500.0])
+    assert made.notes == ()
+    assert [(s.speed, s.branch) for s in made.states] == [(400.0, 0), (450.0, 0), (500.0, 0)]
+    one = steady_state(model, 400.0, made.states[1])
+    assert made.states[0].force.max() == pytest.approx(one.force.max(), rel=1e-3)
+    failing.add(500.0)
+    (note,) = run_up(model, [400.0, 450.0, 500.0]).notes
+    assert "no motion with the periods of the meshes was found at 3 speeds, 400 to 500 rad/s" in note
+
+
 @needs_numba
 def test_a_light_load_within_a_resonance_is_found_on_all_its_branches():
     """Small motion from below, three motions at a time within, the large one alone above."""
