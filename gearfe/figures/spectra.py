@@ -59,7 +59,7 @@ def draw_spectrum(
     name, spectrum = f"attachment_{attachment}_acceleration_m_per_s2", made.spectrum
     amplitude = _inside(spectrum.frequency, made.amplitude(name), band)
     lines = lines_of(response, float(spectrum.frequency[-1]))
-    named = []
+    named: list[tuple[float, float, str]] = []
     for peak in peaks(spectrum.frequency, amplitude, 4 * _NAMED, above=_LEAST):
         if len(named) == _NAMED or any(abs(1e-3 * peak.frequency / f - 1.0) < _BESIDE for f, _, _ in named):
             continue
