@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..solid import EDGES
+from ..solid import EDGES, FACES
 from ..typing import Array, BoolArray, IntArray
 
 #: Number of the edge between two corners.
@@ -25,7 +25,7 @@ for _number, (_one, _two) in enumerate(EDGES):
 #: The two corners that an edge lacks.
 _OTHERS = np.array([sorted({0, 1, 2, 3} - {int(one), int(two)}) for one, two in EDGES])
 #: Edges of each face.
-_FACES = np.array([[0, 1, 2], [0, 4, 3], [1, 5, 4], [2, 5, 3]])
+_FACE_EDGES = FACES[:, 3:] - 4
 #: Quadratic functions at a quarter of an edge a-b: of a, b, its middle (the rest is not needed).
 _QUARTER = np.array([3.0, -1.0, 6.0, 0.0, 0.0]) / 8.0
 #: The same on a face a-b-c, in the middle between c and the middle of a-b: of a, b, middles of a-b, a-c, b-c.
@@ -134,7 +134,7 @@ class _Made:
 
 def _close(marked: BoolArray, order: IntArray, place: IntArray) -> None:
     """Mark the longest edge of every element, and of every face, that has a marked one."""
-    groups = [place, *(place[:, face] for face in _FACES)]
+    groups = [place, *(place[:, face] for face in _FACE_EDGES)]
     longest = [group[np.arange(len(group)), order[group].argmax(axis=1)] for group in groups]
     before = -1
     while before != marked.sum():

@@ -272,20 +272,35 @@ class Housing(Facts):
         )
         return self.with_estimate(body) if estimate else body
 
+    @property
+    def rigid_nodes(self) -> list[IntArray]:
+        """Sets of nodes that are held or move as a rigid thing."""
+        return [self.fixed, *(attachment.nodes for attachment in self.attachments)]
+
+    def moved_fields(self, body: ModalBody) -> tuple[Array, Array]:
+        """Fields in which forces on the attachments move the reduced body, by the mode acceleration method.
+
+        Returns
+        -------
+        fields : (N, k)
+            Its constraint modes, and the modes with free attachments up to the highest frequency of the modes kept.
+        eigenvalues : (k,)
+            Squares of their circular frequencies (rad^2/s^2), 0 of constraint modes.
+        """
+        kept = body.coupled.frequencies_hz <= body.highest_hz
+        static = np.eye(body.size, 6 * len(self.attachments))
+        eigenvalues = (2.0 * np.pi * body.coupled.frequencies_hz[kept]) ** 2
+        fields = np.hstack([static, body.coupled.vectors[:, kept]])
+        return fields, np.concatenate([np.zeros(static.shape[1]), eigenvalues])
+
     def with_estimate(self, body: ModalBody) -> ModalBody:
         """The reduced body with an estimate of the mesh's error, for frequencies up to the highest mode kept.
 
-        The fields are those in which forces on the attachments move the body, by the mode acceleration method: its
-        constraint modes, and the modes with free attachments. What else there is in the body counts as without error.
+        What else there is in the body than `moved_fields` counts as without error.
         """
-        kept = body.coupled.frequencies_hz <= body.highest_hz
-        eigenvalues = (2.0 * np.pi * body.coupled.frequencies_hz[kept]) ** 2
-        static = np.eye(body.size, 6 * len(self.attachments))
-        fields = np.hstack([static, body.coupled.vectors[:, kept]])
-        eigenvalues = np.concatenate([np.zeros(static.shape[1]), eigenvalues])
-        rigid = [self.fixed, *(attachment.nodes for attachment in self.attachments)]
+        fields, eigenvalues = self.moved_fields(body)
         with stage("estimating the mesh's error"):
-            lost = self.mesh.energy_lost(self.material, body.shapes @ fields, eigenvalues, rigid)
+            lost = self.mesh.energy_lost(self.material, body.shapes @ fields, eigenvalues, self.rigid_nodes)
         # weights of the fields in any motion, orthogonal in energy to the rest; a free body's energy needs some mass
         highest = (2.0 * np.pi * body.highest_hz) ** 2
         slow = np.min(eigenvalues[eigenvalues > ROUNDING * highest], initial=highest)  # rigid motions are round-off

@@ -61,10 +61,8 @@ def refined(housing: Housing, unknowns: int, outer: Outer | None = None) -> Hous
 
 def _round(housing: Housing, mesh: Tetrahedra, unknowns: int) -> tuple[Bisected | None, bool]:
     """A finer mesh, and whether all elements that should be refined were: fewer are when they would be too many."""
-    sets = [housing.fixed, *(one.nodes for one in housing.attachments)]
-    members = np.zeros((len(sets), len(mesh.nodes)), dtype=bool)
-    for row, chosen in zip(members, sets, strict=True):
-        row[chosen] = True
+    nodes = np.arange(len(mesh.nodes))
+    members = np.array([np.isin(nodes, chosen) for chosen in housing.rigid_nodes])
     error = _relative_errors(housing, mesh)
     order = np.argsort(error)[::-1]
     count = int(np.searchsorted(np.cumsum(error[order]), BULK * error.sum())) + 1
@@ -89,15 +87,10 @@ def _round(housing: Housing, mesh: Tetrahedra, unknowns: int) -> tuple[Bisected 
 def _relative_errors(housing: Housing, mesh: Tetrahedra) -> Array:
     """(m,) part of each element in the error: energies lost over energies, all fields alike."""
     body = housing.reduce(MODES, quasi_static=0, estimate=False)
-    rates = (2.0 * np.pi * body.coupled.frequencies_hz) ** 2
-    elastic = np.flatnonzero((rates > 0.0) & (body.coupled.frequencies_hz <= body.highest_hz))[:MODES]
-    static = np.eye(body.size, 6 * len(housing.attachments))
-    fields = np.hstack([static, body.coupled.vectors[:, elastic]])
-    eigenvalues = np.concatenate([np.zeros(static.shape[1]), rates[elastic]])
+    fields, eigenvalues = housing.moved_fields(body)
     energies = np.einsum("ik,ij,jk->k", fields, body.stiffness, fields)
-    rigid = [housing.fixed, *(one.nodes for one in housing.attachments)]
-    lost = mesh.energy_lost_by_element(housing.material, body.shapes @ fields, eigenvalues, rigid)
-    bears = energies > 1e-9 * energies.max()
+    lost = mesh.energy_lost_by_element(housing.material, body.shapes @ fields, eigenvalues, housing.rigid_nodes)
+    bears = energies > 1e-9 * energies.max()  # rigid motions do not
     return np.asarray((lost[:, bears] / energies[bears]).sum(axis=1))
 
 
