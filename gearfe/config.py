@@ -1,8 +1,9 @@
 """Job files: TOML tables read into frozen dataclasses, with every mistake named.
 
 A table is a frozen dataclass whose fields are made with `quantity`; the reader checks types, ranges and names. A job
-file may hold the tables of several jobs: a command asks `load_job` for the ones it needs, the others are checked for
-unknown keys only (``gearfe.tables`` says which tables exist), so a misspelt key is an error wherever it stands.
+file may hold the tables of several jobs: a command asks `load_job` for the ones it needs; of the others, keys, types and
+ranges are checked (``gearfe.tables`` says which tables exist), so a misspelt key is an error wherever it stands, but not
+the rules that join several keys.
 """
 
 from __future__ import annotations
@@ -158,8 +159,15 @@ def build(cls: type[T], table: Any, where: str) -> T:
     Raises
     ------
     InputError
-        Unknown key (with the nearest known one), missing key, wrong type, value out of range.
+        Unknown key (with the nearest known one), missing key, wrong type, value out of range, a rule broken.
     """
+    made = _built(cls, table, where)
+    _check_rules(made, where)
+    return made
+
+
+def _built(cls: type[T], table: Any, where: str) -> T:
+    """The same without the rules that join several fields."""
     fields, kind = fields_of(cls), typing.cast(Any, cls)
     if isinstance(table, str) and hasattr(cls, "SHORT"):
         table = {kind.SHORT: table}
@@ -183,11 +191,22 @@ def build(cls: type[T], table: Any, where: str) -> T:
         elif spec.default is MISSING and spec.default_factory is MISSING:
             doc = spec.metadata.get("doc", "")
             raise InputError(label, None, "is required", f"add {_written(hints[name], label)} ({doc})")
-    made = cls(**values)
-    check = getattr(made, "check", None)
-    if check is not None:
-        check(where)
-    return made
+    return cls(**values)
+
+
+def _check_rules(made: Any, where: str) -> None:
+    """Call ``check`` of the tables within a table, and then its own."""
+    if isinstance(made, tuple):
+        for i, item in enumerate(made):
+            _check_rules(item, f"{where}[{i}]")
+    elif isinstance(made, dict):
+        for key, item in made.items():
+            _check_rules(item, f"{where}.{key}")
+    elif dataclasses.is_dataclass(made):
+        for name in fields_of(type(made)):
+            _check_rules(getattr(made, name), _joined(where, name))
+        if hasattr(made, "check"):
+            made.check(where)
 
 
 def _written(hint: Any, label: str) -> str:
@@ -203,7 +222,7 @@ def _joined(where: str, name: str) -> str:
 
 
 def load_job(path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Read the `needed` (and, where present, `optional`) tables of a job file; check all others for unknown keys.
+    """Read the `needed` (and, where present, `optional`) tables of a job file; of all others, check keys, types and ranges.
 
     Returns
     -------
@@ -228,9 +247,10 @@ def job_tables(
             raise InputError(f"[{name}]", None, f"is missing in {Path(path).name}", cure)
     made = {}
     for name, table in raw.items():
-        value: Any = build(table_class(name), table, name)
         if name in needed or name in optional:
-            made[name] = value
+            made[name] = build(table_class(name), table, name)
+        else:
+            _built(table_class(name), table, name)
     return made
 
 
@@ -261,7 +281,7 @@ def _convert(hint: Any, value: Any, label: str, meta: Any) -> Any:
         inner = typing.get_args(hint)[1]
         return {key: _convert(inner, item, f"{label}.{key}", meta) for key, item in value.items()}
     if dataclasses.is_dataclass(hint):
-        return build(typing.cast(type, hint), value, label)
+        return _built(typing.cast(type, hint), value, label)
     if hint is Any:
         return value
     return _convert_scalar(hint, value, label, meta)
