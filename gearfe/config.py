@@ -1,9 +1,9 @@
 """Job files: TOML tables read into frozen dataclasses, with every mistake named.
 
 A table is a frozen dataclass whose fields are made with `quantity`; the reader checks types, ranges and names. A job
-file may hold the tables of several jobs: a command asks `load_job` for the ones it needs; of the others, keys, types and
-ranges are checked (``gearfe.tables`` says which tables exist), so a misspelt key is an error wherever it stands, but not
-the rules that join several keys.
+file may hold the tables of several jobs: a command asks `load_job` for the ones it needs. Of the others, keys, types
+and ranges are checked (``gearfe.tables`` says which tables exist), so a misspelt key is an error wherever it stands;
+the rules that join several keys are not.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ def _joined(where: str, name: str) -> str:
 
 
 def load_job(path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Read the `needed` (and, where present, `optional`) tables of a job file; of all others, check keys, types and ranges.
+    """Read the `needed` (and, where present, `optional`) tables of a job file; check keys and ranges of all others.
 
     Returns
     -------

@@ -17,7 +17,7 @@ PACKAGE = Path(__file__).parents[1] / "gearfe"
 #: Capability -> its modules.
 CAPABILITIES = {
     "microgeometry, deviations, relief": """
-        microgeometry/* gear/deviation* gear/modifications.py gear/pitch_errors.py gear/tooth_flanks.py
+        microgeometry/* gear/deviation* gear/modifications.py gear/pitch_errors.py
         */microgeometry.py commands/relief.py
     """,
     "mesh law, contact loss, friction": """

@@ -10,7 +10,7 @@ import pytest
 from gearfe import InputError
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gear.deviation import NOMINAL, Deviation, ToothDeviations, total
-from gearfe.gear.tooth_flanks import ToothFlanks, touching_curve
+from gearfe.gear.touching import ToothFlanks, touching_curve
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair

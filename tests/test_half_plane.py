@@ -103,7 +103,7 @@ def test_hertz_at_the_pitch_point(name: str, degrees: float) -> None:
     # where the pitch point is contacted: the pinion's flank meets it at the roll length r_b tan(working angle)
     roll = pair.pinion.base_radius * math.tan(pair.working_pressure_angle)
     angles = np.linspace(0, pair.mesh_cycle, 400, endpoint=False)
-    touching = law.flanks.touching(angles)
+    touching = law.teeth.touching(angles)
     face = law.sides[0].curve.face
     u = (roll - face.flank.start) / (face.flank.end - face.flank.start)
     angle = touching.angle[np.argmin(np.abs(touching.place[:, 0] - u))]
@@ -229,7 +229,7 @@ def test_no_jump_at_the_last_station() -> None:
 def test_forces_that_stand_still_by_chance_are_no_solution() -> None:
     """Places and widths count too: the first step moves the contacts by micrometres."""
     law, twist = law_of("rounded"), np.array([math.radians(0.05)])
-    setting, state = first_state(law, twist, law.flanks.touching(np.array([0.1])).take([0]))
+    setting, state = first_state(law, twist, law.teeth.touching(np.array([0.1])).take([0]))
     made = step(setting, state)
     assert np.abs(made.place).max() > 1e-6
     assert change(setting, replace(state, force=made.solution.force), made).min() > NEAR
@@ -239,7 +239,7 @@ def test_an_undercuts_edge_on_a_nearly_flat_mate() -> None:
     """Steps that go to and fro are damped. Nitsche's law on a fine flank agrees."""
     sharp = gear_pair(12, 51, module=1.5e-3, pressure_angle=20.0, width=6e-3, bore=0.25)
     law = half_plane_pair(elastic_pair(sharp, law="half_plane"))
-    assert law.flanks.pinion.undercut
+    assert law.teeth.faces[0].undercut
     angles = np.linspace(0, sharp.mesh_cycle, 80, endpoint=False)
     for module_share in (0.002, 0.008, 0.03):
         found = solve_half_plane(law, angles, module_share * sharp.wheel.module / sharp.wheel.base_radius)

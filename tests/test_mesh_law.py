@@ -134,7 +134,7 @@ def test_force_and_moment_are_the_derivatives_of_the_energy(law):
 
 def test_touch_is_that_of_the_rigid_flanks(law, solver):
     angle = np.linspace(0.0, PAIR.mesh_cycle, 100)
-    met = solver.flanks.touching(angle)
+    met = solver.teeth.touching(angle)
     first = np.full(len(angle), np.inf)
     np.minimum.at(first, met.position, PAIR.wheel.base_radius * (met.twist - PAIR.contact_twist))
     assert law.touching(angle) == pytest.approx(first, abs=1e-11)

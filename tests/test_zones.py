@@ -116,7 +116,7 @@ def test_light_load_touches_where_the_rigid_flanks_do() -> None:
     face = law.teeth.faces[0]
     u = met.place[k, 0] + np.array([-1e-4, 0.0, 1e-4])
     turned = -np.angle(face.normals(u[[2]]) / face.normals(u[[0]]))[0] / float(face.speeds(u[[1]])[0] * 2e-4)
-    curvature = turned + float(law.teeth.faces[1].curvature(met.place[k, 1], math.inf))
+    curvature = turned + float(law.teeth.faces[1].turning(met.place[k, 1])[0])
     line = contacts.force[0] / law.width
     b = math.sqrt(4 * line * 0.5 * math.pi * law.compliance / (math.pi * curvature))
     assert contacts.half_width[0] == pytest.approx(b, rel=0.01)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gearfe.gear.mesh_geometry import MeshGeometry
-from gearfe.gear.touching import Flanks
+from gearfe.gear.touching import ToothFlanks
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def unloaded_twist(pair: MeshGeometry, pinion_angles: ArrayLike) -> Array:
     ndarray, shape (n,)
     """
     angles = np.asarray(pinion_angles, dtype=float)
-    found = Flanks(pair).touching(angles)
+    found = ToothFlanks(pair).touching(angles)
     least = np.full(len(angles), math.inf)
     np.minimum.at(least, found.position, found.twist)
     return least

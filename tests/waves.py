@@ -9,9 +9,9 @@ import numpy as np
 
 from gearfe.contact.compliance import MeshingPair
 from gearfe.gear.deviation import Deviation, ToothDeviations
+from gearfe.gear.face import face_of
 from gearfe.gear.pair import GearPair
 from gearfe.gear.spur_gear import Gear
-from gearfe.gear.touching import face_of
 
 
 def wave(gear: Gear, waves: float, amplitude: float, phase: float = 0.3) -> ToothDeviations:

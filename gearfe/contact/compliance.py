@@ -268,10 +268,7 @@ class MeshingPair:
 
     def tooth_angle(self, gear: int, tooth: Any, pinion_angle: Any, twist: Any) -> Any:
         """Angle (rad) of the frame of a tooth of the pinion (gear 0) or wheel (gear 1); numbers or arrays."""
-        z1, z2 = self.pinion.teeth, self.wheel.teeth
-        if gear == 0:
-            return pinion_angle + 2 * np.pi * tooth / z1
-        return -pinion_angle * z1 / z2 + twist + np.pi + (2 * tooth + 1) * np.pi / z2
+        return self.gears.tooth_angle(gear, tooth, pinion_angle, twist)
 
     def centre(self, gear: int) -> Array:
         """Centre of the pinion (0) or wheel (1), shape (2,) (m)."""

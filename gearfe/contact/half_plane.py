@@ -74,11 +74,8 @@ def unloaded(law: HalfPlanePair, numbers: IntArray, twists: Array, found: Touchi
     twists : ndarray, shape (n,)
         Of all positions that are numbered.
     """
-    turn = [
-        found.angle + found.pair * law.pair.mesh_cycle + found.turn[:, 0],
-        law.flanks.wheel_frame(found.angle, found.pair) + twists[found.position] + found.turn[:, 1],
-    ]
-    setting = Setting(law, numbers, found, np.exp(1j * np.stack(turn, axis=1)))
+    frames = found.frames + twists[found.position, None] * np.arange(2)
+    setting = Setting(law, numbers, found, np.exp(1j * frames))
     nothing, count = np.zeros(len(found)), len(found)
     return setting, State(
         centre=found.point,

@@ -26,8 +26,7 @@ from numpy.typing import NDArray
 from ..gear.deviation import ToothDeviations
 from ..gear.flank_curve import FlankCurve, FlankTables, flank_curve, flank_tables
 from ..gear.pair import GearPair
-from ..gear.tooth_flanks import ToothFlanks
-from ..gear.touching import Flanks
+from ..gear.touching import ToothFlanks
 from ..typing import Array, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliance, shapes_of
@@ -85,11 +84,6 @@ class HalfPlanePair:
     teeth: ToothFlanks
     sides: tuple[FlankCompliance, FlankCompliance]
     width: float
-
-    @property
-    def flanks(self) -> Flanks:
-        """The first profiles of both gears."""
-        return self.teeth.first
 
     @cached_property
     def curves(self) -> tuple[FlankCurve, ...]:

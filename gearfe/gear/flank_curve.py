@@ -30,8 +30,8 @@ import numpy as np
 
 from ..typing import Array, ComplexArray, IntArray
 from .curves import Trochoid
+from .face import Face, face_of
 from .spur_gear import Gear
-from .touching import Face, face_of
 
 #: Knots on the involute, on the tip round and on the upper half of the root.
 INVOLUTE, ROUND, ROOT = 513, 65, 129

@@ -141,6 +141,13 @@ class MeshGeometry:
         """Angle pi + pi/z2 (rad) of the wheel's tooth frame at pinion angle 0: a space faces the pinion."""
         return math.pi + math.pi / self.wheel.teeth
 
+    def tooth_angle(self, gear: int, tooth: Any, pinion_angle: Any, twist: Any) -> Any:
+        """Angle (rad) of the frame of a tooth of the pinion (gear 0) or wheel (gear 1); numbers or arrays."""
+        if gear == 0:
+            return pinion_angle + tooth * self.mesh_cycle
+        wheel = self.wheel_phase + 2.0 * math.pi * tooth / self.wheel.teeth
+        return wheel + self.wheel_angle_at(pinion_angle, twist)
+
     def path_limits(self, *, rounded: bool = True, relieved: bool = False) -> tuple[float, float]:
         """Pinion roll lengths (m) at which contact starts (wheel's tip) and ends (pinion's tip).
 

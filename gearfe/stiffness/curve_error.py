@@ -81,9 +81,8 @@ def torque_changes(law: HalfPlanePair, other: HalfPlanePair, found: Positions) -
     """
     c = found.contacts
     assert isinstance(c, PairContacts)
-    angle, twist = found.pinion_angle[c.position], found.twist[c.position]
-    frames = angle + c.pair * law.pair.mesh_cycle, law.flanks.wheel_frame(angle, c.pair) + twist
-    normal = c.normal[:, None] * np.exp(-1j * (np.stack(frames, axis=1) + law.teeth.turn(c.pair)))
+    frames = law.teeth.frames(found.pinion_angle[c.position], c.pair, found.twist[c.position])
+    normal = c.normal[:, None] * np.exp(-1j * frames)
     couples = couplings(c.position, c.pair, len(found))
     here = c.force, c.arc, normal, 0.25 * c.half_width**2
     total = couples.total(c.force)

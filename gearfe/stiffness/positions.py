@@ -134,7 +134,7 @@ class HalfPlaneSolver:
     def __init__(self, law: HalfPlanePair, elastic: MeshingPair | None = None) -> None:
         self.pair, self._elastic, self.law = law.pair, elastic, law
         self._angles = np.zeros(0)
-        self._known = self.law.teeth.touching(self._angles)
+        self._known: list[Touching] = []
 
     @property
     def elastic(self) -> MeshingPair:
@@ -172,14 +172,14 @@ class HalfPlaneSolver:
     def touching(self, angles: Array) -> Touching:
         """Tooth pairs whose rigid flanks can meet at pinion angles (rad), by position; searched for once an angle."""
         every = np.setdiff1d(angles, self._angles)
-        for start in range(0, len(every), AT_ONCE):
+        for start in range(0, len(every) if self._known else max(1, len(every)), AT_ONCE):
             new = every[start : start + AT_ONCE]
             found = self.law.teeth.touching(new)
-            found = replace(found, position=found.position + len(self._angles))
-            self._known = joined([self._known, found])
+            self._known.append(replace(found, position=found.position + len(self._angles)))
             self._angles = np.concatenate([self._angles, new])
+        self._known = [joined(self._known)]
         order = np.argsort(self._angles)
-        return of_positions(self._known, order[np.searchsorted(self._angles, angles, sorter=order)])
+        return of_positions(self._known[0], order[np.searchsorted(self._angles, angles, sorter=order)])
 
 
 class ElementSolver:
