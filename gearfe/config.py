@@ -245,7 +245,7 @@ def job_tables(
         if name not in raw:
             cure = f"add a table [{name}] (see gearfe new)"
             raise InputError(f"[{name}]", None, f"is missing in {Path(path).name}", cure)
-    made = {}
+    made: dict[str, Any] = {}
     for name, table in raw.items():
         if name in needed or name in optional:
             made[name] = build(table_class(name), table, name)

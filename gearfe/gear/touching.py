@@ -139,7 +139,8 @@ class ToothFlanks:
         """
         flank, frames, a = self.flank(number), self.frames(angle, number, 0.0), self.pair.working_centre_distance
         least, places = np.full(len(number), np.inf), np.zeros((len(number), 2))
-        point, normal = np.zeros((2, len(number)), dtype=complex)
+        point: ComplexArray = np.zeros(len(number), dtype=complex)
+        normal = np.zeros_like(point)
         curvature = np.zeros(len(number))
         couple = flank @ [len(self.faces), 1]
         for one in set(couple.tolist()):
