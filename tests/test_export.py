@@ -89,6 +89,7 @@ def test_inp(tmp_path, parts, plane, kind):
     points, bodies, edges = together(parts)
     text = path.read_text()
     assert set(re.findall(r"TYPE=(\w+)\n", text)) == {kind, "ELEMENT"}
+    assert max(map(len, re.findall(r"[^,\n ]*e[-+]\d\d", text))) <= 20  # what CalculiX reads of a number
     readable = tmp_path / "readable.inp"
     readable.write_text(text.replace("CPS6", "CPE6"))  # meshio knows one of the two
     mesh = meshio.read(readable)

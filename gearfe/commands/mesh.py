@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..progress import stage
 from ..tables.stiffness import StiffnessTable
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
 
     pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
 
-    from ..meshing.export import export_mesh, format_of
+    from ..meshing.export import export_mesh, format_of, group_sizes
     from ..output.files import output_folder
     from ..stiffness.job import StiffnessJob
 
@@ -81,14 +81,10 @@ def run(args: argparse.Namespace) -> int:
     found: dict[str, float] = {}
     if args.deck:
         parts, found = _deck(args, job)
-        counts = {
-            f"{name}_{key}": len(part.boundaries[key]) for name, part in parts.items() for key in ("bore", "contact")
-        }
-        counts = {**{name: len(part.triangles) for name, part in parts.items()}, **counts}
     else:
         parts = _parts(args, job, wheel_angle=pair.wheel_angle_at(math.radians(args.angle_deg)))
         with stage("writing"):
-            counts = export_mesh(args.out, parts, plane=job.table.plane)
+            export_mesh(args.out, parts, plane=job.table.plane)
     if not args.no_pictures:
         from ..figures.gears import mesh_figure
 
@@ -96,9 +92,9 @@ def run(args: argparse.Namespace) -> int:
             mesh_figure(Path(args.out).with_suffix(".png"), parts, None if args.sector else pair)
     nodes = sum(len(part.points) for part in parts.values())
     print(f"written to {args.out}: {nodes} nodes, millimetres, groups with their elements or edges:")
-    for name, count in counts.items():
+    for name, count in group_sizes(parts).items():
         print(f"  {name:<24} {count}")
-    args.summary = {"file": args.out, "nodes": nodes, "groups": counts, **found}
+    args.summary = {"file": args.out, "nodes": nodes, "groups": group_sizes(parts), **found}
     return 0
 
 
@@ -118,9 +114,12 @@ def _check(args: argparse.Namespace) -> None:
 
 def _parts(args: argparse.Namespace, job: StiffnessJob, wheel_angle: float) -> dict[str, MeshPart]:
     """The meshes in their places, the wheel turned by `wheel_angle` (rad) from where a space faces the pinion."""
+    from ..meshing.export import MeshPart
     from ..meshing.tooth_sector import sector_mesh, sector_recipes
+    from ..meshing.whole_gear import in_mesh, mixed_gear, teeth_near
 
     pair, table = job.pair, job.table
+    toward = in_mesh(pair)
     recipes = sector_recipes(pair, coarsen=table.coarsen, flank_coarsen=table.flank_coarsen)
     turned = (math.radians(args.angle_deg), wheel_angle + pair.wheel_phase)
     parts = {}
@@ -128,27 +127,14 @@ def _parts(args: argparse.Namespace, job: StiffnessJob, wheel_angle: float) -> d
         if args.gear in ("both", name):
             gear = (pair.pinion, pair.wheel)[number]
             with stage(f"meshing the {name}"):
-                if args.teeth is None:
-                    made = _uniform(sector_mesh(gear, recipes[number]), sector=args.sector)
+                if args.sector:
+                    mesh = sector_mesh(gear, recipes[number])
+                    made = MeshPart(mesh.points, mesh.triangles, {**mesh.boundaries, "contact": mesh.contact_edges()})
                 else:
-                    from ..meshing.whole_gear import in_mesh, mixed_gear, teeth_near
-
-                    fine = teeth_near(gear, turned[number], in_mesh(pair)[number], min(args.teeth, gear.teeth))
-                    made = mixed_gear(gear, recipes[number], fine)
+                    most = gear.teeth if args.teeth is None else min(args.teeth, gear.teeth)
+                    made = mixed_gear(gear, recipes[number], teeth_near(gear, turned[number], toward[number], most))
             parts[name] = _placed(made, turned[number], pair.working_centre_distance * number)
     return parts
-
-
-def _uniform(mesh: Any, *, sector: bool) -> MeshPart:
-    """The same elements on all teeth."""
-    from ..meshing.export import MeshPart
-    from ..meshing.whole_gear import whole_gear
-
-    if sector:
-        return MeshPart(mesh.points, mesh.triangles, {**mesh.boundaries, "contact": mesh.contact_edges()})
-    whole = whole_gear(mesh)
-    boundaries = {**whole.boundaries, "contact": whole.contact.reshape(-1, 3)}
-    return MeshPart(whole.points, whole.triangles, boundaries)
 
 
 def _placed(part: MeshPart, angle: float, x: float) -> MeshPart:

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..output.files import whole_file
-from ..typing import Array, IntArray
-from .export import MeshPart
+from ..typing import Array
+from .export import MeshPart, abaqus_mesh
 
 #: Contact stiffness (N/mm3): stiffer ones change the torque by less than 1e-4 and cost iterations.
 PENALTY = 1e8
@@ -58,46 +58,23 @@ class Deck:
 def write_deck(path: str | Path, deck: Deck) -> None:
     """Write the deck; ``ccx NAME`` (without .inp) runs it and leaves the reactions of the wheel's bore in NAME.dat."""
     lines = ["*HEADING", "gear pair in contact, by gearfe; mm, N, MPa", *(f"** {text}" for text in deck.heading)]
-    lines += _mesh(deck)
+    lines += abaqus_mesh(deck.parts, deck.plane)
     for name, (youngs_modulus, poisson_ratio) in zip(deck.parts, deck.materials, strict=True):
         lines += [f"*MATERIAL, NAME=M_{name}", "*ELASTIC", f"{1e-6 * youngs_modulus:.9g}, {poisson_ratio:.9g}"]
         lines += [f"*SOLID SECTION, ELSET={name}, MATERIAL=M_{name}", f"{1e3 * deck.width:.9g}"]
     lines += ["*SURFACE INTERACTION, NAME=TOUCH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{PENALTY:g}"]
     lines += ["*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE", "S_wheel_contact, S_pinion_contact"]
-    lines += ["*STEP, NLGEOM, INC=200", "*STATIC", f"{FIRST:g}, 1.", "*BOUNDARY", "N_pinion_bore, 1, 2"]
+    lines += ["*STEP, NLGEOM, INC=200", "*STATIC", f"{FIRST:g}, 1.", "*BOUNDARY", "pinion_bore, 1, 2"]
     c, s = math.cos(deck.twist) - 1.0, math.sin(deck.twist)
     wheel, first = deck.parts["wheel"], len(deck.parts["pinion"].points)
     for node in np.unique(wheel.boundaries["bore"]):
         x, y = 1e3 * (wheel.points[node] - [deck.centre, 0.0])
         number = first + node + 1
         lines += [f"{number}, 1, 1, {c * x - s * y:.12e}", f"{number}, 2, 2, {s * x + c * y:.12e}"]
-    lines += ["*NODE PRINT, NSET=N_wheel_bore, FREQUENCY=999", "RF"]
+    lines += ["*NODE PRINT, NSET=wheel_bore, FREQUENCY=999", "RF"]
     lines += ["*NODE FILE, FREQUENCY=999", "U", "*EL FILE, FREQUENCY=999", "S", "*END STEP"]
     with whole_file(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="ascii", errors="replace", newline="\n")
-
-
-def _mesh(deck: Deck) -> list[str]:
-    """Nodes, elements with their sets, node sets and element surfaces."""
-    lines = ["*NODE, NSET=NALL"]
-    points = 1e3 * np.concatenate([part.points for part in deck.parts.values()])
-    lines += [f"{i + 1}, {x:.12e}, {y:.12e}, 0." for i, (x, y) in enumerate(points)]
-    kind = "CPE6" if deck.plane == "strain" else "CPS6"
-    node = element = 1
-    for name, part in deck.parts.items():
-        lines.append(f"*ELEMENT, TYPE={kind}, ELSET={name}")
-        lines += [f"{element + e}, " + ", ".join(map(str, nodes + node)) for e, nodes in enumerate(part.triangles)]
-        lines += [f"*NSET, NSET=N_{name}_bore", *(f"{n + node}," for n in np.unique(part.boundaries["bore"]))]
-        lines.append(f"*SURFACE, NAME=S_{name}_contact, TYPE=ELEMENT")
-        lines += [f"{element + e}, S{side + 1}" for e, side in _sides(part, part.boundaries["contact"])]
-        node, element = node + len(part.points), element + len(part.triangles)
-    return lines
-
-
-def _sides(part: MeshPart, edges: IntArray) -> list[tuple[int, int]]:
-    """Element and its side of each edge, by the node in the middle."""
-    middle = {int(n): (e, side) for side in range(3) for e, n in enumerate(part.triangles[:, 3 + side])}
-    return [middle[int(n)] for n in edges[:, 1]]
 
 
 def deck_torque(deck: str | Path, centre: float, twist: float) -> float:

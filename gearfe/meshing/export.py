@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -75,9 +74,13 @@ def export_mesh(path: str | Path, parts: Mapping[str, MeshPart], *, plane: str =
     Returns
     -------
     dict
-        Group name -> number of its elements (bodies) or edges (boundaries).
+        See `group_sizes`.
     """
     chosen = format_of(path)
+    if chosen == "abaqus":
+        with whole_file(path) as temporary:
+            temporary.write_text("\n".join(abaqus_mesh(parts, plane)) + "\n", encoding="ascii", newline="\n")
+        return group_sizes(parts)
     try:
         import meshio
     except ImportError as error:
@@ -92,50 +95,48 @@ def export_mesh(path: str | Path, parts: Mapping[str, MeshPart], *, plane: str =
         for (name, p), first in zip(parts.items(), offsets, strict=False)
         for boundary, nodes in p.boundaries.items()
     }
+    groups = bodies | edges
+    cells = [("triangle6", nodes) for nodes in bodies.values()]
+    cells += [("line3", nodes[:, [0, 2, 1]]) for nodes in edges.values()]
+    tags = [np.full(len(nodes), number) for number, (_, nodes) in enumerate(cells, start=1)]
+    mesh = meshio.Mesh(points, cells)
+    if chosen == "gmsh22":
+        mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+        size = {name: 2 if name in bodies else 1 for name in groups}
+        mesh.field_data = {name: np.array([n, size[name]]) for n, name in enumerate(groups, start=1)}
+    else:
+        mesh.cell_data = {"group": tags}
+        for name, nodes in groups.items():
+            mesh.point_data[name] = np.isin(np.arange(len(points)), nodes).astype(np.uint8)
+    options = {"binary": False} if chosen == "gmsh22" else {}
     with whole_file(path) as temporary:
-        if chosen == "abaqus":
-            _write_abaqus(meshio, temporary, points, bodies, edges, plane)
-        else:
-            cells = [("triangle6", nodes) for nodes in bodies.values()]
-            cells += [("line3", nodes[:, [0, 2, 1]]) for nodes in edges.values()]
-            groups = [*bodies, *edges]
-            tags = [np.full(len(nodes), number) for number, (_, nodes) in enumerate(cells, start=1)]
-            mesh = meshio.Mesh(points, cells)
-            if chosen == "gmsh22":
-                mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-                size = {name: 2 if name in bodies else 1 for name in groups}
-                mesh.field_data = {name: np.array([n, size[name]]) for n, name in enumerate(groups, start=1)}
-                mesh.write(temporary, file_format="gmsh22", binary=False)
-            else:
-                mesh.cell_data = {"group": tags}
-                for name, nodes in {**bodies, **edges}.items():
-                    on = np.zeros(len(points), dtype=np.uint8)
-                    on[nodes.ravel()] = 1
-                    mesh.point_data[name] = on
-                mesh.write(temporary, file_format="vtu")
-    return {name: len(nodes) for name, nodes in {**bodies, **edges}.items()}
+        mesh.write(temporary, file_format=chosen, **options)
+    return group_sizes(parts)
 
 
-def _write_abaqus(
-    meshio: Any, path: Path, points: Array, bodies: dict[str, IntArray], edges: dict[str, IntArray], plane: str
-) -> None:
-    """meshio writes nodes, elements and sets; element type and surfaces (which it does not know) are put in here."""
-    blocks = [("triangle6", nodes) for nodes in bodies.values()]
-    sets = {
-        name: [
-            np.arange(len(nodes)) if other == name else np.zeros(0, dtype=np.int64) for other, nodes in bodies.items()
-        ]
-        for name in bodies
-    }
-    mesh = meshio.Mesh(points, blocks, cell_sets=sets)
-    mesh.point_sets = {name: np.unique(nodes) for name, nodes in edges.items()}
-    mesh.write(path, file_format="abaqus")
-    lines = path.read_text(encoding="utf-8").splitlines()
+def group_sizes(parts: Mapping[str, MeshPart]) -> dict[str, int]:
+    """Group name -> number of its elements (bodies) or edges (boundaries)."""
+    edges = {f"{name}_{key}": len(edge) for name, part in parts.items() for key, edge in part.boundaries.items()}
+    return {name: len(part.triangles) for name, part in parts.items()} | edges
+
+
+def abaqus_mesh(parts: Mapping[str, MeshPart], plane: str) -> list[str]:
+    """Lines of an Abaqus mesh: nodes, elements with their sets, node sets, and element surfaces ``S_<group>``.
+
+    CalculiX reads numbers of 20 characters at most.
+    """
+    points = 1e3 * np.concatenate([part.points for part in parts.values()])
+    lines = ["*NODE, NSET=NALL", *(f"{i}, {x:.13e}, {y:.13e}, 0." for i, (x, y) in enumerate(points, start=1))]
     kind = "CPE6" if plane == "strain" else "CPS6"
-    lines = [f"*ELEMENT, TYPE={kind}" if line.startswith("*ELEMENT") else line for line in lines]
-    triangles = np.concatenate(list(bodies.values()))
-    middle = {int(node): (e, side) for side in range(3) for e, node in enumerate(triangles[:, 3 + side])}
-    for name, nodes in edges.items():
-        lines.append(f"*SURFACE, NAME=S_{name}, TYPE=ELEMENT")
-        lines += [f"{e + 1}, S{side + 1}" for e, side in (middle[int(node)] for node in nodes[:, 1])]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    node = element = 1
+    for name, part in parts.items():
+        lines.append(f"*ELEMENT, ELSET={name}, TYPE={kind}")
+        lines += [f"{element + e}, " + ", ".join(map(str, nodes + node)) for e, nodes in enumerate(part.triangles)]
+        sides = ((side, e, int(n)) for side in range(3) for e, n in enumerate(part.triangles[:, 3 + side]))
+        middle = {n: (element + e, side + 1) for side, e, n in sides}
+        for boundary, edges in part.boundaries.items():
+            lines += [f"*NSET, NSET={name}_{boundary}", *(f"{n + node}," for n in np.unique(edges))]
+            lines.append(f"*SURFACE, NAME=S_{name}_{boundary}, TYPE=ELEMENT")
+            lines += ["{}, S{}".format(*middle[int(n)]) for n in edges[:, 1]]
+        node, element = node + len(part.points), element + len(part.triangles)
+    return lines

@@ -44,26 +44,45 @@ class WholeGear:
 
 def whole_gear(mesh: SectorMesh) -> WholeGear:
     """Join `mesh.teeth` turned copies of a sector."""
-    teeth, size = mesh.teeth, len(mesh.points)
-    own = np.ones(size, dtype=bool)
-    own[mesh.cut_left] = False
-    local = np.cumsum(own) - 1
-    count = int(own.sum())
-    first = count * np.arange(teeth)
-    numbers = first[:, None] + local
-    # the left side of a sector is the right side of the next one
-    numbers[:, mesh.cut_left] = np.roll(first, -1)[:, None] + local[mesh.cut_right]
-    turns = 2 * np.pi * np.arange(teeth) / teeth
-    x, y = mesh.points[own].T
-    c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
-    points = np.stack([c * x - s * y, s * x + c * y], axis=-1).reshape(-1, 2)
-    boundaries = {}
-    for name in ("bore", "root", "flank_right", "flank_left", "tip"):
-        parts = [mesh.boundaries[key] for key in (name, f"{name}_right", f"{name}_left") if key in mesh.boundaries]
-        if parts:
-            boundaries[name] = numbers[:, np.concatenate(parts)].reshape(-1, 3)
+    sectors = [mesh] * mesh.teeth
+    points, joined = _joined(sectors)
+    numbers = np.array(joined)
     contact = numbers[:, mesh.contact_edges()]
-    return WholeGear(points, numbers[:, mesh.triangles].reshape(-1, 6), boundaries, contact, numbers)
+    return WholeGear(points, numbers[:, mesh.triangles].reshape(-1, 6), _outline(sectors, joined), contact, numbers)
+
+
+def _joined(sectors: Sequence[SectorMesh]) -> tuple[Array, list[IntArray]]:
+    """Points of a whole gear (m), and the node of each point of its sectors, tooth by tooth.
+
+    Neighbouring sectors have the same nodes on their common side.
+    """
+    own = [np.setdiff1d(np.arange(len(sector.points)), sector.cut_left) for sector in sectors]
+    first = np.cumsum([0, *map(len, own)])
+    numbers, points = [np.zeros(len(sector.points), dtype=np.int64) for sector in sectors], []
+    for k, (sector, kept) in enumerate(zip(sectors, own, strict=True)):
+        numbers[k][kept] = np.arange(first[k], first[k + 1])
+        turn = 2.0 * math.pi * k / len(sectors)
+        (x, y), c, s = sector.points[kept].T, math.cos(turn), math.sin(turn)
+        points.append(np.stack([c * x - s * y, s * x + c * y], axis=-1))
+    for k, sector in enumerate(sectors):  # the left side of a sector is the right side of the next one
+        after = (k + 1) % len(sectors)
+        numbers[k][sector.cut_left] = numbers[after][sectors[after].cut_right]
+    return np.concatenate(points), numbers
+
+
+def _outline(sectors: Sequence[SectorMesh], numbers: Sequence[IntArray]) -> dict[str, IntArray]:
+    """Boundaries of a whole gear by the names of `OUTLINE`, edges (k, 3)."""
+    made = {}
+    for name, parts in OUTLINE.items():
+        found = [
+            own[sector.boundaries[part]]
+            for sector, own in zip(sectors, numbers, strict=True)
+            for part in parts
+            if part in sector.boundaries
+        ]
+        if found:
+            made[name] = np.concatenate(found)
+    return made
 
 
 #: Flank elements of the coarse teeth (modules): nothing touches them.
@@ -89,9 +108,13 @@ def mixed_gear(gear: Gear, recipe: SectorRecipe, fine: Collection[int]) -> MeshP
         With the boundaries of `OUTLINE` round all teeth, and ``contact``: the driving flanks of the fine teeth with
         their tip rounds and the upper half of the fillets, each edge (root side, middle, tip side).
     """
-    mesh = sector_mesh(gear, recipe)
-    fine = {k % gear.teeth for k in fine}
-    return joined([mesh, _coarse(gear, recipe, mesh)], [0 if k in fine else 1 for k in range(gear.teeth)], fine)
+    mesh, numbered = sector_mesh(gear, recipe), {k % gear.teeth for k in fine}
+    coarse = mesh if len(numbered) == gear.teeth else _coarse(gear, recipe, mesh)
+    sectors = [mesh if k in numbered else coarse for k in range(gear.teeth)]
+    points, numbers = _joined(sectors)
+    triangles = np.concatenate([own[sector.triangles] for sector, own in zip(sectors, numbers, strict=True)])
+    contact = np.concatenate([numbers[k][mesh.contact_edges()] for k in sorted(numbered)])
+    return MeshPart(points, triangles, {**_outline(sectors, numbers), "contact": contact})
 
 
 def in_mesh(pair: GearPair) -> tuple[float, float]:
@@ -120,37 +143,3 @@ def _coarse(gear: Gear, recipe: SectorRecipe, fine: SectorMesh) -> SectorMesh:
         if len(sides[0]) == len(sides[1]) and np.allclose(sides[0], sides[1], rtol=0, atol=1e-9 * gear.module):
             return mesh
     return fine
-
-
-def joined(meshes: Sequence[SectorMesh], kinds: Sequence[int], fine: Collection[int]) -> MeshPart:
-    """Whole gear of turned sectors, tooth k of kind ``kinds[k]``, with the boundaries of `mixed_gear`.
-
-    Raises
-    ------
-    ValueError
-        When the sides of the sectors do not have the same nodes.
-    """
-    points: list[Array] = []
-    triangles: list[IntArray] = []
-    pieces: dict[str, list[IntArray]] = {name: [] for name in (*OUTLINE, "contact")}
-    offset = 0
-    for k, kind in enumerate(kinds):
-        mesh = meshes[kind]
-        angle = 2.0 * math.pi * k / len(kinds)
-        c, s = math.cos(angle), math.sin(angle)
-        points.append(mesh.points @ np.array([[c, s], [-s, c]]))
-        triangles.append(mesh.triangles + offset)
-        for name, parts in OUTLINE.items():
-            pieces[name] += [mesh.boundaries[part] + offset for part in parts if part in mesh.boundaries]
-        if k in fine:
-            pieces["contact"].append(mesh.contact_edges() + offset)
-        offset += len(mesh.points)
-    every = np.concatenate(points)
-    # nodes of neighbouring sides coincide: they become one
-    key = np.round(every / (1e-7 * np.abs(every).max())).astype(np.int64)
-    _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    inverse = inverse.ravel()
-    if len(first) != sum(len(meshes[kind].points) - len(meshes[kind].cut_left) for kind in kinds):
-        raise ValueError("fine and coarse sectors do not share the nodes of their sides")
-    boundaries = {name: inverse[np.concatenate(parts)] for name, parts in pieces.items() if parts}
-    return MeshPart(every[first], inverse[np.concatenate(triangles)], boundaries)
