@@ -100,10 +100,9 @@ class RecordSpectrum:
         weights = window_at(window, np.arange(self._last) / self._last)
         self._gain, self._square = float(weights.mean()), float(np.mean(weights**2))
         self._keep = max(1, every // 2)
-        self._filter = low_pass(self._keep)
+        self._decimator = Decimator(self._keep)
         self._kept = ColumnStore(signals, folder)
-        #: samples that do not fill a kept one yet, and what earlier ones add to the next rows
-        self._rest = self._overlap = np.zeros((0, signals))
+        self._decimator.add(np.zeros((2 * self._decimator.half, signals)))
         #: windowed last sample less the first one
         self._rise = np.zeros(signals)
         self._next = 0
@@ -130,26 +129,9 @@ class RecordSpectrum:
         if self.complete:
             self._rise += x[-1]
             x[-1] *= 0.5
-        x = np.concatenate([self._rest, x])
+        self._kept.append(self._decimator.add(x))
         if self.complete:
-            x = np.concatenate([x, np.zeros((-len(x) % self._keep, self.signals))])
-        whole = len(x) // self._keep * self._keep
-        self._rest = x[whole:]
-        self._filtered(x[:whole])
-        if self.complete:
-            self._kept.append(self._overlap)
-
-    def _filtered(self, x: Array) -> None:
-        """Store the rows that the samples x, a multiple of those kept, complete; row i lies at i keep - half of x."""
-        half = len(self._filter) // 2
-        before, after = (np.zeros((n, self.signals)) for n in (2 * half, max(0, 2 * half - self._keep + 1)))
-        padded = np.concatenate([before, x, after])
-        if len(x):
-            made = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0)[:: self._keep] @ self._filter
-            made[: len(self._overlap)] += self._overlap
-            done = len(x) // self._keep
-            self._overlap = made[done:]
-            self._kept.append(made[:done])
+            self._kept.append(self._decimator.add(np.zeros((2 * self._decimator.half + self._keep, self.signals))))
 
     @cached_property
     def frequency(self) -> Array:
@@ -159,11 +141,11 @@ class RecordSpectrum:
     @cached_property
     def _scale(self) -> Array:
         """(lines,) from sums of kept samples to amplitudes; the filter's response is divided out."""
-        half = len(self._filter) // 2
+        half, weights = self._decimator.half, self._decimator.weights
         turn = 2.0 * np.pi * np.arange(self.steps // 2 + 1) / self._last
-        response = np.full(len(turn), self._filter[half])
+        response = np.full(len(turn), weights[half])
         for j in range(1, half + 1):
-            response += 2.0 * self._filter[half + j] * np.cos(j * turn)
+            response += 2.0 * weights[half + j] * np.cos(j * turn)
         scale = 2.0 * self._keep / (self._last * self._gain * response)
         scale[0] *= 0.5
         if self.every == 1 and self.steps % 2 == 0:
@@ -185,7 +167,7 @@ class RecordSpectrum:
             problem = f"{self._next} of {self._last + 1} samples have arrived"
             raise InputError("record", None, problem, "give all of them")
         period, linear = self._last // self._keep, self._kept.column(signal)
-        place = (np.arange(len(linear)) - len(self._filter) // 2 // self._keep) % period
+        place = (np.arange(len(linear)) - self._decimator.half // self._keep) % period
         kept = np.bincount(place, weights=linear, minlength=period)
         return np.asarray(np.fft.rfft(kept)[: self.steps // 2 + 1] * self._scale + self._rise[signal] * self._ramp)
 
@@ -207,6 +189,28 @@ def low_pass(keep: int) -> Array:
     half = REACH * keep
     weights: Any = np.sinc(np.arange(-half, half + 1) / keep) * np.kaiser(2 * half + 1, _BETA)
     return np.asarray(weights / weights.sum())
+
+
+class Decimator:
+    """Every `keep`-th value of signals behind the low-pass filter; samples come piece by piece.
+
+    The first value is that at sample `half`: what comes before the samples is added before them.
+    """
+
+    def __init__(self, keep: int) -> None:
+        self.keep, self.weights = keep, low_pass(keep)
+        self.half = len(self.weights) // 2
+        self._open: Array | None = None
+
+    def add(self, samples: Array) -> Array:
+        """(rows, signals) values that these samples (n, signals) complete."""
+        x = samples if self._open is None else np.concatenate([self._open, samples])
+        count = max(0, (len(x) - len(self.weights)) // self.keep + 1)
+        self._open = x[count * self.keep :]
+        if not count:
+            return x[:0]
+        windows = np.lib.stride_tricks.sliding_window_view(x, len(self.weights), axis=0)[:: self.keep]
+        return np.asarray(windows @ self.weights)
 
 
 #: Bytes up to which the table stays in memory.

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..record_spectrum import low_pass
+from ..record_spectrum import Decimator
 from ..spectrum import Waterfall, waterfall
 from ..train.response import TrainResponse
 from ..typing import Array, ComplexArray
@@ -217,14 +217,12 @@ class Tracked:
     """
 
     def __init__(self, every: int, step: float) -> None:
-        self.keep = max(1, every // 2)
-        self.step = step * self.keep / every
+        self._decimator = Decimator(max(1, every // 2))
+        self.step = step * self._decimator.keep / every
         self.highest = 0.5 / step
         self.names: tuple[str, ...] = ()
-        self._filter = low_pass(self.keep)
-        self._half = len(self._filter) // 2
-        self._buffer = np.zeros((0, 0))
         self._arrived = 0  # samples
+        self._last = np.zeros((0, 0))
         self._rows: list[Array] = []
         self._angles: list[Array] = []
         self._start = 0.0
@@ -233,35 +231,23 @@ class Tracked:
         """Take the samples that follow those taken before."""
         if not len(piece.time):
             return
-        columns = signals(piece)
+        columns, keep = signals(piece), self._decimator.keep
         values = np.column_stack(list(columns.values()))
         if not self.names:
             self.names, self._start = tuple(columns), float(piece.time[0])
-            self._buffer = np.repeat(values[:1], self._half, axis=0)
-        self._angles.append(piece.drive_angle[-self._arrived % self.keep :: self.keep])
+            self._decimator.add(np.repeat(values[:1], self._decimator.half, axis=0))
+        self._angles.append(piece.drive_angle[-self._arrived % keep :: keep])
         self._arrived += len(values)
-        self._pass(values)
-
-    def _pass(self, values: Array) -> None:
-        """Filter what is complete; row i of the buffer is centred half a filter later."""
-        x = np.concatenate([self._buffer, values])
-        width = 2 * self._half + 1
-        if len(x) < width:
-            self._buffer = x
-            return
-        seen = np.lib.stride_tricks.sliding_window_view(x, width, axis=0)[:: self.keep]
-        self._rows.append(np.asarray(seen @ self._filter) / self._filter.sum())
-        self._buffer = x[len(seen) * self.keep :]
+        self._rows.append(self._decimator.add(values))
+        self._last = values[-1:]
 
     def finished(self) -> tuple[Array, Array, Array]:
         """Times (n,), angles of the drive (n,) and signals (n, s)."""
-        angle = np.concatenate(self._angles) if self._angles else np.zeros(0)
-        made = list(self._rows)
-        if len(self._buffer):
-            x = np.concatenate([self._buffer, np.repeat(self._buffer[-1:], self._half + self.keep, axis=0)])
-            seen = np.lib.stride_tricks.sliding_window_view(x, 2 * self._half + 1, axis=0)[:: self.keep]
-            made.append(np.asarray(seen @ self._filter) / self._filter.sum())
-        values = np.concatenate(made)[: len(angle)] if made else np.zeros((0, 0))
+        if not self._rows:
+            return np.zeros(0), np.zeros(0), np.zeros((0, 0))
+        angle = np.concatenate(self._angles)
+        beyond = np.repeat(self._last, self._decimator.half + self._decimator.keep, axis=0)
+        values = np.concatenate([*self._rows, self._decimator.add(beyond)])[: len(angle)]
         return self._start + self.step * np.arange(len(angle)), angle, values
 
 
