@@ -227,7 +227,7 @@ def _spectrum_lines(response: TrainResponse, train: GearTrain, written: Written,
         f"spectrum: resolution {made.spectrum.resolution:.4g} Hz, up to {made.spectrum.frequency[-1]:.6g} Hz, "
         f"from samples every {1e6 * made.step / made.every:.3g} us"
     ]
-    attachment = attachment_to_draw(response, choice.attachment, train)
+    attachment = attachment_to_draw(response.attachment_names, choice.attachment, train)
     found = summary["dominant_lines"][f"attachment_{attachment}_acceleration_m_per_s2"][:4]
     texts = [f"{x['frequency_Hz']:.0f} Hz {x['amplitude']:.3g}{with_error(x.get('error_estimate'))}" for x in found]
     lines += [f"normal acceleration at attachment {attachment} (m/s2): " + ", ".join(texts)] if texts else []

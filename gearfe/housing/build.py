@@ -9,7 +9,7 @@ import numpy as np
 from ..config import load_job
 from ..elasticity import Material
 from ..errors import InputError
-from ..meshing.housing_mesh import bore_ranges, housing_mesh
+from ..meshing.housing_mesh import housing_mesh
 from ..progress import stage
 from ..reduction.modal_body import ModalBody
 from ..tables.housing import HousingReductionTable, HousingTable
@@ -56,7 +56,7 @@ def bores(table: HousingTable) -> list[Bore]:
     """The bores (SI), in the order of the attachments."""
     found = []
     for shaft in table.shafts:
-        for low, high in bore_ranges(table, shaft).values():
+        for low, high in table.bore_ranges(shaft):
             point = (1e-3 * shaft.x_mm, 0.0, 1e-3 * shaft.z_mm)
             along = (1e-3 * low, 1e-3 * high)
             found.append(Bore(point, (0.0, 1.0, 0.0), 1e-3 * shaft.bore_radius_mm, along))

@@ -19,7 +19,7 @@ from ..cache import cached_arrays
 from ..errors import InputError
 from ..prisms import ORDER, volume_ratios
 from ..progress import stage
-from ..tables.housing import HousingTable, ShaftAxisTable
+from ..tables.housing import HousingTable
 from ..typing import Array, BoolArray, IntArray
 from .housing_recipe import RECIPE
 from .session import gmsh_session
@@ -147,15 +147,6 @@ def _plane_mesh(table: HousingTable, sizes: Sizes) -> tuple[Array, IntArray]:
     raise InputError("housing", None, "arcs of bores and bosses fold elements of this mesh", cure)
 
 
-def bore_ranges(table: HousingTable, shaft: ShaftAxisTable) -> dict[str, tuple[float, float]]:
-    """Range along y (mm) of each bore of a shaft axis: ``plus`` and ``minus`` wall, boss included."""
-    half = 0.5 * table.inner_gap_mm
-    plus = (half, half + table.wall_thickness_mm[0] + shaft.boss_height_mm)
-    minus = (-half - table.wall_thickness_mm[1] - shaft.boss_height_mm, -half)
-    both = {"plus": plus, "minus": minus}
-    return both if shaft.walls == "both" else {shaft.walls: both[shaft.walls]}
-
-
 def _layers(table: HousingTable, sizes: Sizes) -> list[tuple[float, float]]:
     """Ranges of y (mm) from one plane at which the solid region changes to the next.
 
@@ -166,7 +157,7 @@ def _layers(table: HousingTable, sizes: Sizes) -> list[tuple[float, float]]:
     planes = dict.fromkeys((low, -half, half, high), True)
     others = [low + feet.inset_y_mm, low + feet.inset_y_mm + feet.width_y_mm]
     others += [high - feet.inset_y_mm, high - feet.inset_y_mm - feet.width_y_mm]
-    others += [y for shaft in table.shafts for ends in bore_ranges(table, shaft).values() for y in ends]
+    others += [y for shaft in table.shafts for ends in table.bore_ranges(shaft) for y in ends]
     for y in others:
         if min(abs(y - known) for known in planes) > 1e-6:
             planes[y] = False
@@ -217,7 +208,7 @@ def _solid(table: HousingTable, place: Array, y: float) -> BoolArray:
     holes = np.zeros(len(x), dtype=bool)
     for shaft in table.shafts:
         away = np.hypot(x - shaft.x_mm, z - shaft.z_mm)
-        for start, end in bore_ranges(table, shaft).values():
+        for start, end in table.bore_ranges(shaft):
             if start < y < end:
                 found |= (away < shaft.boss_radius_mm) & (shaft.boss_height_mm > 0.0)
                 holes |= away < shaft.bore_radius_mm

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from ..output.arrays import save_arrays
 from ..output.files import whole_set, write_csv, write_json
+from ..vibration.report import attachment_to_draw
 from . import report
 from .instability import InstabilityMap
 from .modes import STRONG, CoupledModes, Crossing
@@ -59,7 +60,8 @@ def write_runup(
     unstable
         Map of parametric instability, where one was asked for.
     """
-    multiples, bore = choice.multiples, report.attachment_to_draw(run, choice.attachment)
+    multiples, model = choice.multiples, run.train.model
+    bore = model.bores.index(attachment_to_draw(model.bores, choice.attachment, model.train))
     with watch.stage("modes"):
         modes, met = report.campbell(run, multiples)
     with whole_set(folder, may_write=FILES) as target:
@@ -74,7 +76,6 @@ def write_runup(
                     draw.instability(target / "instability.png", unstable)
         if choice.fields:
             with watch.stage("fields"):
-                model = run.train.model
                 write_modes(target, model, mesh_modes(modes, len(model.meshes), STRONG))
         made = {**further, **report.summary(run, modes, multiples), "warnings": report.warnings(run)}
         made["timings_s"] = dict(watch.seconds)

@@ -250,13 +250,7 @@ def solved(slots: int, work: Array) -> None:
 
 
 FUNCTIONS = (law_jets, compliances, turning, coupled, matrix, solved)
-NAMES = {
-    "math": math, "MOST": MOST, "SETTLED": SETTLED,
-    "FORCE": FORCE, "MOMENT": MOMENT, "TANGENT": TANGENT, "CROSS": CROSS, "BEND": BEND, "BEYOND": BEYOND,
-    "RESULTS": RESULTS, "GAPS": GAPS, "TOUCH1": TOUCH1, "TOUCH2": TOUCH2, "LAMBDA": LAMBDA, "GIVES": GIVES,
-    "TURN": TURN, "TURN2": TURN2, "SHIFT": SHIFT, "BEARS": BEARS, "RIGHT1": RIGHT1, "RIGHT2": RIGHT2,
-    "BEFORE": BEFORE, "PART": PART, "ROWS": ROWS,
-}  # fmt: skip
+NAMES = {name: value for name, value in globals().items() if name == "math" or isinstance(value, int | float)}
 
 
 @lru_cache(maxsize=1)

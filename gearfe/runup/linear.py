@@ -141,7 +141,7 @@ class Linear:
         return made
 
     @cached_property
-    def _swap(self) -> Array:
+    def gyroscopic(self) -> Array:
         """(2 s, 2 s) gyroscopic moments for unit rates of the tilts and unit speed."""
         return np.kron(np.diag(self.momenta), np.array([[0.0, -1.0], [1.0, 0.0]]))
 
@@ -168,7 +168,8 @@ class Linear:
         whole = self._own(omega)
         # gyroscopic moments that react on tilts: those of both tilts of a shaft change places
         other = np.arange(p - m) ^ 1
-        react = (1j * speed * omega[:, None] * self._swap[np.arange(p - m), other])[..., None] * whole[:, m + other]
+        turning = 1j * speed * omega[:, None] * self.gyroscopic[np.arange(p - m), other]
+        react = turning[..., None] * whole[:, m + other]
         left = np.eye(p - m) - react[..., m:]
         moments = np.asarray(np.linalg.solve(left, react[..., :m]), dtype=complex)
         made = np.asarray(whole[:, :m, :m] + whole[:, :m, m:] @ moments)

@@ -78,8 +78,7 @@ def coupled_modes(train: CondensedTrain, speeds: Array, highest_hz: float) -> Co
         if line.law is not None:
             along = modal.T.T @ line.row
             damping += line.damping * np.outer(along, along)
-    swap = np.kron(np.diag(linear.momenta), np.array([[0.0, -1.0], [1.0, 0.0]]))
-    gyro = linear.tilts @ swap @ linear.tilts.T
+    gyro = linear.tilts @ linear.gyroscopic @ linear.tilts.T
     n, rates = len(linear.squares), np.sqrt(linear.squares)
     found = []
     for speed in speeds:

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import unknown_name
 from ..gear.iso6336 import dynamic_factor
 from ..gear.mesh_geometry import MeshGeometry
-from ..typing import Array
+from ..typing import Array, IntArray
 from ..vibration.radiation import power_level
 from . import torus
 from .instability import InstabilityMap
@@ -112,8 +111,7 @@ def iso_dynamic_factors(run: RunUp, mesh: int) -> Array:
     model = run.train.model
     line, given = model.meshes[mesh], model.train.meshes[mesh]
     one, two = (model.train.gear(name) for name in (given.driver, given.driven))
-    names = [shaft.name for shaft in model.train.shafts]
-    inertia = [model.shafts[names.index(gear.shaft)].rotor.polar for gear in (one, two)]
+    inertia = [model.shafts[model.train.shaft_number(gear.shaft)].rotor.polar for gear in (one, two)]
     mass = 1.0 / sum(gear.gear.base_radius**2 / polar for gear, polar in zip((one, two), inertia, strict=True))
     relief = min(0.0 if g.gear.tip_relief is None else g.gear.tip_relief.amount for g in (one, two))
     force = abs(float(run.train.steady[mesh]))
@@ -183,11 +181,14 @@ def mode_columns(modes: CoupledModes) -> dict[str, Any]:
         "frequency_Hz": modes.frequency.T.ravel(),
         "damping_ratio": modes.damping_ratio.T.ravel(),
     }
-    for j, part in enumerate(modes.strain_in):
-        columns[f"strain_share_{part.replace(' ', '_')}"] = modes.strain[number, j]
-    for j, part in enumerate(("shafts", "housing")):
-        columns[f"kinetic_share_{part}"] = modes.kinetic[number, j]
-    return columns
+    return columns | share_columns(modes, number)
+
+
+def share_columns(modes: CoupledModes, rows: IntArray) -> dict[str, Array]:
+    """Shares of the strain and of the kinetic energy of some modes."""
+    strain = {part.replace(" ", "_"): modes.strain[rows, j] for j, part in enumerate(modes.strain_in)}
+    kinetic = {part: modes.kinetic[rows, j] for j, part in enumerate(("shafts", "housing"))}
+    return {f"strain_share_{n}": x for n, x in strain.items()} | {f"kinetic_share_{n}": x for n, x in kinetic.items()}
 
 
 def instability_columns(made: InstabilityMap) -> dict[str, Any]:
@@ -214,10 +215,7 @@ def critical_columns(modes: CoupledModes, met: list[Crossing]) -> dict[str, Any]
         "multiple": np.array([c.multiple for c in met], dtype=int),
         "damping_ratio": modes.damping_ratio[0][mode],
     }
-    for j, part in enumerate(modes.strain_in):
-        columns[f"strain_share_{part.replace(' ', '_')}"] = modes.strain[mode, j]
-    for j, part in enumerate(("shafts", "housing")):
-        columns[f"kinetic_share_{part}"] = modes.kinetic[mode, j]
+    columns |= share_columns(modes, mode)
     columns["name"] = [modes.names[c.mode] for c in met]
     return columns
 
@@ -362,14 +360,3 @@ def warnings(run: RunUp) -> list[str]:
             f"{worst.speed:.6g} rad/s: their motion has more harmonics than the program takes"
         )
     return found
-
-
-def attachment_to_draw(run: RunUp, chosen: str | None) -> int:
-    """Number of the attachment in the pictures: the asked one, else the bore that carries the load's reaction."""
-    names = run.train.model.bores
-    if chosen is not None:
-        if chosen not in names:
-            raise unknown_name("--attachment", chosen, names)
-        return names.index(chosen)
-    loaded = [load.bore for load in run.train.model.train.loads if load.bore in names]
-    return names.index(loaded[0]) if loaded and loaded[0] is not None else len(names) - 1

@@ -168,7 +168,6 @@ def around(
     stages = len(KICKS)
     edges = np.linspace(0.0, span.turns * second, len(A) // stages + 1)
     places, tilts = linear.places[kept], linear.tilts[kept]
-    swap = np.kron(np.diag(linear.momenta), np.array([[0.0, -1.0], [1.0, 0.0]])) * speed
     D = linear.damping if damped else np.zeros_like(linear.damping)
     # what the other modes yield at once: u = P y + R f, f = A u
     rest = linear.places[~kept].T @ (linear.places[~kept] / linear.squares[~kept, None])
@@ -178,7 +177,8 @@ def around(
     reads = np.block([[places, none], [none, places]])
     free = linear.squares[~kept], np.diag(D)[~kept]
     with np.errstate(over="ignore", invalid="ignore"):
-        constant = flow(linear.squares[kept], D[np.ix_(kept, kept)] - tilts @ swap @ tilts.T, edges[-1])
+        turning = speed * tilts @ linear.gyroscopic @ tilts.T
+        constant = flow(linear.squares[kept], D[np.ix_(kept, kept)] - turning, edges[-1])
 
         def found(first: int, last: int) -> Array:
             return monodromy(constant, edges[first : last + 1], places, reads, both[first:last])

@@ -66,7 +66,7 @@ def _sized(model: TrainModel, shape: Array) -> Array:
     train, body = model.train, model.train.housing
     most, places = 0.0, [np.array([train.shaft(gear.shaft).point for gear in train.gears])]
     for gear in train.gears:
-        first = model.first[[s.name for s in train.shafts].index(gear.shaft)]
+        first = model.first[train.shaft_number(gear.shaft)]
         own = shape[first : first + 6]
         most = max(most, float(np.linalg.norm(own[:3]) + gear.gear.tip_radius * np.linalg.norm(own[3:])))
     if body is not None and body.has_mesh:

@@ -284,6 +284,12 @@ class HousingTable:
             _check_apart(first, second, where)
         self._check_size(f"{where}.mesh")
 
+    def bore_ranges(self, shaft: ShaftAxisTable) -> list[tuple[float, float]]:
+        """Range along y (mm) of each bore of a shaft axis, boss included: +y wall, then -y wall."""
+        half, (plus, minus) = 0.5 * self.inner_gap_mm, (t + shaft.boss_height_mm for t in self.wall_thickness_mm)
+        ranges = {"plus": (half, half + plus), "minus": (-half - minus, -half)}
+        return [ends for wall, ends in ranges.items() if shaft.walls in ("both", wall)]
+
     @property
     def reduced(self) -> bool:
         """Whether the body comes reduced, without a mesh."""

@@ -290,9 +290,13 @@ class GearTrain(Facts):
         e1 = e1 / np.linalg.norm(e1)
         return np.array([e1, np.cross(a, e1), a])
 
+    def shaft_number(self, name: str) -> int:
+        """Number of the shaft of that name."""
+        return next(i for i, shaft in enumerate(self.shafts) if shaft.name == name)
+
     def shaft(self, name: str) -> Shaft:
         """The shaft of that name."""
-        return next(s for s in self.shafts if s.name == name)
+        return self.shafts[self.shaft_number(name)]
 
     def gear(self, name: str) -> ShaftGear:
         """The gear of that name."""

@@ -146,21 +146,19 @@ def load_end(train: GearTrain) -> float:
 
 def load_torques(train: GearTrain, times: Sequence[float] | Array) -> Array:
     """Torque of the loads on each shaft without its oscillating part (N m), shape (shafts, times)."""
-    names = [s.name for s in train.shafts]
-    found = np.zeros((len(names), len(times)))
+    found = np.zeros((len(train.shafts), len(times)))
     for load in train.loads:
-        found[names.index(load.shaft)] += replace(load.torque, sines=())(times)
+        found[train.shaft_number(load.shaft)] += replace(load.torque, sines=())(times)
     return found
 
 
 def balanced_forces(train: GearTrain, senses: Sequence[float], torques: Array) -> Array:
     """Mesh forces (N), shape (meshes, n), that balance the torques (N m) on the shafts, shape (shafts, n)."""
-    names = [s.name for s in train.shafts]
-    arms = np.zeros((len(names), len(train.meshes)))
+    arms = np.zeros((len(train.shafts), len(train.meshes)))
     for column, (mesh, sense) in enumerate(zip(train.meshes, senses, strict=True)):
         for gear in (train.gear(mesh.driver), train.gear(mesh.driven)):
-            arms[names.index(gear.shaft), column] += sense * gear.gear.base_radius
-    free = [k for k, name in enumerate(names) if name != train.driven.shaft]
+            arms[train.shaft_number(gear.shaft), column] += sense * gear.gear.base_radius
+    free = [k for k, shaft in enumerate(train.shafts) if shaft.name != train.driven.shaft]
     return np.asarray(np.linalg.lstsq(arms[free], torques[free], rcond=None)[0])
 
 

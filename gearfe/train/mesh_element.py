@@ -211,9 +211,8 @@ class OperatingPoint:
 def mesh_line(train: GearTrain, mesh: GearMesh, shafts: Shafts, running: OperatingPoint) -> MeshLine:
     """Line of action of a mesh in a train."""
     first, size, ratios, sense, force = shafts.first, shafts.size, shafts.ratios, running.sense, running.force
-    names = [s.name for s in train.shafts]
     one, two = train.gear(mesh.driver), train.gear(mesh.driven)
-    i, j = names.index(one.shaft), names.index(two.shaft)
+    i, j = train.shaft_number(one.shaft), train.shaft_number(two.shaft)
     a = train.frame[2]
     pair = GearPair(one.gear, two.gear, mesh.centre_distance)
     alpha = pair.working_pressure_angle

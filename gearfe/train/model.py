@@ -213,9 +213,8 @@ def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tup
             direction[first[i] + 5] = 1.0
             made.append((direction, -ratio * shaft.rotor.polar * change))
     for load in train.loads:
-        i = [s.name for s in train.shafts].index(load.shaft)
         direction = np.zeros(size)
-        direction[first[i] + 5] = 1.0
+        direction[first[train.shaft_number(load.shaft)] + 5] = 1.0
         if train.housing is not None and load.bore is not None:
             direction[: train.housing.size] -= bore_selector(train, load.bore)[:, 3:] @ train.frame[2]
         made.append((direction, load.torque))

@@ -369,11 +369,10 @@ def response_of(
 
 def _gear_poses(model: TrainModel, moved: TrainStates) -> tuple[Array, Array]:
     train, frame = model.train, model.train.frame
-    names = [s.name for s in train.shafts]
     poses = np.zeros((len(moved.time), len(train.gears), 6))
     centres = np.zeros((len(train.gears), 3))
     for i, item in enumerate(train.gears):
-        k = names.index(item.shaft)
+        k = train.shaft_number(item.shaft)
         base = np.array(train.shafts[k].point)
         centres[i] = base + (item.along - float(base @ frame[2])) * frame[2]
         own = moved.q[:, model.first[k] : model.first[k] + 6]

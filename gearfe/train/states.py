@@ -66,7 +66,7 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     if drive.stiffness is None:
         push = -multipliers["drive"]
     else:
-        row = model.spin_reference[[s.name for s in model.train.shafts].index(drive.shaft)]
+        row = model.spin_reference[model.train.shaft_number(drive.shaft)]
         push = -drive.stiffness * (q @ row) - drive.damping * (v @ row)
     rows = np.array([line.row for line in model.meshes]).reshape(-1, q.shape[1])
     force, drag, loss, apart = contact_forces(model, v, flanks, multipliers)

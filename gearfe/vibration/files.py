@@ -146,14 +146,14 @@ def write_run(
         if spectra is not None:
             with watch.stage("tables"):
                 write_csv(target / "spectrum.csv", spectra.columns())
+        attachment = attachment_to_draw(made.curves.attachment_names, choice.attachment, train)
         if draw is not None and spectra is not None:
             with watch.stage("pictures"):
-                draw.curves(target, train, made, spectra, attachment_to_draw(made.curves, choice.attachment, train))
+                draw.curves(target, train, made, spectra, attachment)
         if beside is not None and beside.requested and response.status != "done":
             problems.append("spectra over time and measured ones are left out: the run ended early")
         elif beside is not None and beside.requested:
             with watch.stage("spectra over time"):
-                attachment = attachment_to_draw(made.curves, choice.attachment, train)
                 analysed = beside.write(target, spectra, attachment, None if draw is None else draw.analysis)
             run = Run({**run.summary, **analysed}, spectra)
         if choice.fields and made.outputs:

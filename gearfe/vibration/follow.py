@@ -171,7 +171,7 @@ def follow(
         for piece in pieces:
             if extremes is None:
                 mean = RunningMean(times, piece.load_end_s, piece.common_period_s)
-                extremes = _Extremes(piece.load_end_s)
+                extremes = _Extremes(piece)
             count = len(piece.time)
             if written is not None:
                 written.write(response_columns(piece.every(every, -passed % every), radiation))
@@ -262,27 +262,19 @@ def _integral(time: Array, values: Array, begin: float) -> Array:
     return np.asarray(whole[at:].sum(axis=0) - before)
 
 
-@dataclass
 class _Extremes:
     """Least and largest forces and accelerations so far."""
 
-    load_end: float
-    least: Array = field(default_factory=lambda: np.zeros(0))
-    least_loaded: Array = field(default_factory=lambda: np.zeros(0))
-    largest: Array = field(default_factory=lambda: np.zeros(0))
-    peak: Array = field(default_factory=lambda: np.zeros(0))
-    start: Array = field(default_factory=lambda: np.zeros(0))
+    def __init__(self, first: TrainResponse) -> None:
+        meshes, push = first.contact_force.shape[1], np.abs(first.attachment_acceleration)
+        self.least, self.least_loaded = np.full((2, meshes), np.inf)
+        self.largest, self.peak = np.full(meshes, -np.inf), np.zeros(push.shape[1])
+        self.start = push[:1].sum(axis=0)
 
     def add(self, piece: TrainResponse) -> None:
         force, push = piece.contact_force, np.abs(piece.attachment_acceleration)
-        if not len(self.peak):
-            meshes = force.shape[1]
-            self.least, self.least_loaded = np.full(meshes, np.inf), np.full(meshes, np.inf)
-            self.largest, self.peak = np.full(meshes, -np.inf), np.zeros(push.shape[1])
-            self.start = push[:1].sum(axis=0)
-        loaded = force[piece.time >= self.load_end]
         self.least = np.minimum(self.least, _min(force))
-        self.least_loaded = np.minimum(self.least_loaded, _min(loaded))
+        self.least_loaded = np.minimum(self.least_loaded, _min(force[piece.time >= piece.load_end_s]))
         self.largest = np.maximum(self.largest, -_min(-force))
         self.peak = np.maximum(self.peak, -_min(-push))
 

@@ -258,13 +258,8 @@ def bore_places(table: HousingTable, folder: Path = Path()) -> dict[str, tuple[f
         from ..housing.body import bore_points
 
         return bore_points(table, folder)
-    places, number = {}, 0
-    for shaft in table.shafts:
-        for side, sign in (("plus", 1.0), ("minus", -1.0)):
-            if shaft.walls not in ("both", side):
-                continue
-            number += 1
-            inner = 0.5 * table.inner_gap_mm
-            outer = inner + table.wall_thickness_mm[0 if side == "plus" else 1] + shaft.boss_height_mm
-            places[str(number)] = (1e-3 * shaft.x_mm, 0.5e-3 * sign * (inner + outer), 1e-3 * shaft.z_mm)
-    return places
+    ranges = [(shaft, *ends) for shaft in table.shafts for ends in table.bore_ranges(shaft)]
+    return {
+        str(number): (1e-3 * shaft.x_mm, 0.5e-3 * (low + high), 1e-3 * shaft.z_mm)
+        for number, (shaft, low, high) in enumerate(ranges, start=1)
+    }

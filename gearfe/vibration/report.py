@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -185,9 +185,8 @@ def stiffness_ranges(train: GearTrain) -> dict[str, tuple[float | None, float | 
     return found
 
 
-def attachment_to_draw(response: TrainResponse, chosen: str | None, train: GearTrain) -> str:
+def attachment_to_draw(names: Sequence[str], chosen: str | None, train: GearTrain) -> str:
     """Name of the attachment in the pictures: the chosen one, else the bore that carries the load's reaction."""
-    names = response.attachment_names
     if chosen is not None and chosen not in names:
         raise unknown_name("--attachment", chosen, names)
     loaded = next((load.bore for load in train.loads if load.bore is not None), None)
