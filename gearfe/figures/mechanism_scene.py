@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from ..mechanisms.links import FlexibleLink
 from ..mechanisms.model import Mechanism
 from ..mechanisms.plates import PlateLink
 from ..rigid import GROUND, Prismatic, Slot, Spring
 from ..rigid.distance import Distance
-from ..typing import Array
+from ..typing import Array, ComplexArray
 from .style import COLOURS, GREY
 
 #: Bodies beyond which names would hide the mechanism.
@@ -24,44 +27,38 @@ Point = tuple[float, float]
 
 def draw_state(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0, names: bool = False) -> None:
     """Bodies as outlines of their points at one state, q of shape (1, k); with `names` those of bodies and points."""
-    size = _size(mechanism, q)
-    _couplings(axes, mechanism, q, size, alpha)
-    for number, (name, body, points) in enumerate(_points(mechanism)):
-        ends = np.array([_at(q, body, p) for p in points.values()]).reshape(-1, 2)
-        centre = _at(q, body, (0.0, 0.0))
-        if len(ends) == 1:
-            ends = np.vstack([ends, centre])
-        loop = ends if len(ends) < 3 else np.vstack([ends, ends[:1]])
-        colour = COLOURS[number % len(COLOURS)]
-        if len(ends) > 2:
-            axes.fill(loop[:, 0], loop[:, 1], color=colour, alpha=0.1 * alpha, linewidth=0)
-        axes.plot(loop[:, 0], loop[:, 1], "-o", color=colour, lw=2, ms=3.5, alpha=alpha)
-        axes.plot(*centre, "+", color=colour, ms=8, alpha=alpha)
-        if names:
-            _name(axes, name, ends.mean(axis=0) if len(ends) else centre, colour, weight="bold")
+    _couplings(axes, mechanism, q, _size(mechanism, q), alpha)
     magnification = mechanism.file.figure.magnification
-    for number, (name, link) in enumerate(mechanism.links.items(), start=len(_points(mechanism))):
-        colour = COLOURS[number % len(COLOURS)]
-        shape = link.exaggerated(q, link.smooth, magnification)[0]
-        nodes = link.exaggerated(q, link.beam.link.ends, magnification)[0]
-        axes.plot(*shape.T, lw=2, color=colour, alpha=alpha)
-        axes.plot(*nodes.T, "o", ms=3, color=colour, alpha=alpha)
+    colours = itertools.cycle(COLOURS)
+    for (name, body, points), colour in zip(_points(mechanism), colours, strict=False):
+        centre = _place(q, body, (0.0, 0.0))[0]
+        ends = np.array([_place(q, body, p)[0] for p in points.values()])
+        if len(ends) == 1:
+            ends = np.append(ends, centre)
+        loop = ends if len(ends) < 3 else np.append(ends, ends[0])
+        if len(ends) > 2:
+            axes.fill(loop.real, loop.imag, color=colour, alpha=0.1 * alpha, linewidth=0)
+        axes.plot(loop.real, loop.imag, "-o", color=colour, lw=2, ms=3.5, alpha=alpha)
+        axes.plot(centre.real, centre.imag, "+", color=colour, ms=8, alpha=alpha)
+        if names:
+            _name(axes, name, ends.mean() if len(ends) else centre, colour, weight="bold")
+    for (name, link), colour in zip(mechanism.links.items(), colours, strict=False):
+        shape, nodes = (_of_link(link, q, at, magnification)[0] for at in (link.smooth, link.beam.link.ends))
+        axes.plot(shape.real, shape.imag, lw=2, color=colour, alpha=alpha)
+        axes.plot(nodes.real, nodes.imag, "o", ms=3, color=colour, alpha=alpha)
         if names:
             _name(axes, name, shape[len(shape) // 2], colour, weight="bold")
-    for number, (name, plate) in enumerate(
-        mechanism.plates.items(), start=len(_points(mechanism)) + len(mechanism.links)
-    ):
-        colour = COLOURS[number % len(COLOURS)]
+    for (name, plate), colour in zip(mechanism.plates.items(), colours, strict=False):
         places = plate.exaggerated(q, magnification)[0]
         draw_plate(axes, plate, places, colour, alpha)
         if names:
-            _name(axes, name, np.array([places.real.mean(), places.imag.mean()]), colour, weight="bold")
+            _name(axes, name, places.mean(), colour, weight="bold")
     if mechanism.elastic and magnification != 1.0:
         axes.text(0.01, 0.01, f"deflections x {magnification:g}", transform=axes.transAxes, fontsize=8)
     for name, place in mechanism.file.ground.points_m.items():
         axes.plot(*place, "k^", ms=6, mfc="none", alpha=alpha)
         if names:
-            _name(axes, name, np.array(place), "black")
+            _name(axes, name, complex(*place), "black")
     if names:
         _point_names(axes, mechanism, q)
 
@@ -91,35 +88,21 @@ def draw_paths(axes: Any, mechanism: Mechanism, q: Array) -> None:
             label = f"{path.body} {path.point}"
             centre = mechanism.file.bodies[path.body].centre_m
             point = (path.point[0] - centre[0], path.point[1] - centre[1])
-        axes.plot(*_place(q, body, point), lw=0.8, alpha=0.7, color=GREY, zorder=1, label=label)
+        places = _place(q, body, point)
+        axes.plot(places.real, places.imag, lw=0.8, alpha=0.7, color=GREY, zorder=1, label=label)
 
 
 def frame(axes: Any, mechanism: Mechanism, q: Array) -> None:
     """Limits that hold the whole run, labels with their unit."""
-    x: list[float] = []
-    y: list[float] = []
-    for _, body, points in _points(mechanism):
-        for point in [*points.values(), (0.0, 0.0)]:
-            a, b = _place(q, body, point)
-            x += [a.min(), a.max()]
-            y += [b.min(), b.max()]
-    for link in mechanism.links.values():
-        shapes = link.exaggerated(q, link.beam.link.ends, mechanism.file.figure.magnification)
-        x += [shapes[:, :, 0].min(), shapes[:, :, 0].max()]
-        y += [shapes[:, :, 1].min(), shapes[:, :, 1].max()]
-    for plate in mechanism.plates.values():
-        places = plate.exaggerated(q, mechanism.file.figure.magnification)
-        x += [places.real.min(), places.real.max()]
-        y += [places.imag.min(), places.imag.max()]
-    for a, b in _coupled(mechanism, q):
-        x += [a.min(), a.max()]
-        y += [b.min(), b.max()]
-    ground = mechanism.file.ground.points_m.values()
-    x += [place[0] for place in ground]
-    y += [place[1] for place in ground]
-    pad = 0.06 * max(max(x) - min(x), max(y) - min(y), 1e-9)
-    axes.set_xlim(min(x) - pad, max(x) + pad)
-    axes.set_ylim(min(y) - pad, max(y) + pad)
+    factor = mechanism.file.figure.magnification
+    places = [*_rigid_places(mechanism, q), *(place for _, *ends in _coupled(mechanism, q) for place in ends)]
+    places += [_of_link(link, q, link.beam.link.ends, factor) for link in mechanism.links.values()]
+    places += [plate.exaggerated(q, factor) for plate in mechanism.plates.values()]
+    low, high = (np.array([[f(p.real), f(p.imag)] for p in places]) for f in (np.min, np.max))
+    (x0, y0), (x1, y1) = low.min(axis=0), high.max(axis=0)
+    pad = 0.06 * max(x1 - x0, y1 - y0, 1e-9)
+    axes.set_xlim(x0 - pad, x1 + pad)
+    axes.set_ylim(y0 - pad, y1 + pad)
     axes.set_aspect("equal")
     axes.grid(color="#e5e7eb", linewidth=0.8)
     axes.set_axisbelow(True)
@@ -127,17 +110,24 @@ def frame(axes: Any, mechanism: Mechanism, q: Array) -> None:
     axes.set_ylabel("y (m)")
 
 
-def _coupled(mechanism: Mechanism, q: Array) -> list[tuple[Array, Array]]:
-    """Places of the ends of springs and distance joints."""
+def _of_link(link: FlexibleLink, q: Array, at: Array, factor: float) -> ComplexArray:
+    """Places of a flexible link, deflections times a factor, as complex numbers (n, k)."""
+    shape = link.exaggerated(q, at, factor)
+    return np.asarray(shape[:, :, 0] + 1j * shape[:, :, 1])
+
+
+def _coupled(mechanism: Mechanism, q: Array) -> list[tuple[Spring | Distance, ComplexArray, ComplexArray]]:
+    """Springs and distance joints with the places of both ends."""
+    parts = [p for p in (*mechanism.linkage.forces, *mechanism.linkage.joints) if isinstance(p, (Spring, Distance))]
+    seen = partial(_seen, mechanism, q)
+    return [(part, seen(part.a, part.point_a), seen(part.b, part.point_b)) for part in parts]
+
+
+def _seen(mechanism: Mechanism, q: Array, body: str, at: Point) -> ComplexArray:
+    """Places of a point of a body, or of the ground, which stands still."""
     linkage = mechanism.linkage
-    turned = np.append(q[:, : 3 * len(linkage.bodies)], np.zeros((len(q), 3)), axis=1)  # the ground stands still
-    parts = [*linkage.forces, *linkage.joints]
-    return [
-        _place(turned, linkage.body_index[body], linkage.frames.arm(body, at))
-        for part in parts
-        if isinstance(part, (Spring, Distance))
-        for body, at in ((part.a, part.point_a), (part.b, part.point_b))
-    ]
+    every = np.append(q[:, : 3 * len(linkage.bodies)], np.zeros((len(q), 3)), axis=1)
+    return _place(every, linkage.body_index[body], linkage.frames.arm(body, at))
 
 
 def _points(mechanism: Mechanism) -> list[tuple[str, int, dict[str, Point]]]:
@@ -153,73 +143,60 @@ def _points(mechanism: Mechanism) -> list[tuple[str, int, dict[str, Point]]]:
     ]
 
 
-def _place(q: Array, body: int, point: Point) -> tuple[Array, Array]:
-    c, s = np.cos(q[:, 3 * body + 2]), np.sin(q[:, 3 * body + 2])
-    x, y = point
-    return q[:, 3 * body] + c * x - s * y, q[:, 3 * body + 1] + s * x + c * y
+def _place(q: Array, body: int, point: Point) -> ComplexArray:
+    """Places (n,) of a point relative to the mass centre, as complex numbers (m)."""
+    turn = np.exp(1j * q[:, 3 * body + 2])
+    return np.asarray(q[:, 3 * body] + 1j * q[:, 3 * body + 1] + turn * complex(*point))
 
 
-def _at(q: Array, body: int, point: Point) -> Array:
-    """Place of a point relative to the mass centre at the first state."""
-    return np.array([float(value[0]) for value in _place(q, body, point)])
+def _rigid_places(mechanism: Mechanism, q: Array) -> list[ComplexArray]:
+    """Places of the points and mass centres of rigid bodies, and of the points at rest."""
+    made = [_place(q, body, p) for _, body, points in _points(mechanism) for p in [*points.values(), (0.0, 0.0)]]
+    return [*made, *(np.array([complex(*place)]) for place in mechanism.file.ground.points_m.values())]
 
 
 def _size(mechanism: Mechanism, q: Array) -> float:
     """Largest extent of the bodies and the points at rest (m)."""
-    places = [_at(q, body, p) for _, body, points in _points(mechanism) for p in [*points.values(), (0.0, 0.0)]]
-    places += [np.array(place) for place in mechanism.file.ground.points_m.values()]
-    return float(np.ptp(places, axis=0).max()) if places else 1.0
+    places = np.array([place[0] for place in _rigid_places(mechanism, q)])
+    return float(max(np.ptp(places.real), np.ptp(places.imag))) if len(places) else 1.0
 
 
 def _couplings(axes: Any, mechanism: Mechanism, q: Array, size: float, alpha: float) -> None:
     """Springs as zigzags, rods of constant length as thin lines, slots and guides as dashed ones."""
-    linkage = mechanism.linkage
-    turned = np.append(q[:, : 3 * len(linkage.bodies)], np.zeros((len(q), 3)), axis=1)  # the ground stands still
-
-    def seen(body: str, at: Point) -> Array:
-        return _at(turned, linkage.body_index[body], linkage.frames.arm(body, at))
-
-    for force in linkage.forces:
-        if isinstance(force, Spring):
-            line = _coil(seen(force.a, force.point_a), seen(force.b, force.point_b), COIL_WIDTH * size)
-            axes.plot(*line.T, color=GREY, lw=1.1, alpha=alpha, zorder=1.5)
-    for joint in linkage.joints:
-        if isinstance(joint, Distance):
-            ends = np.array([seen(joint.a, joint.point_a), seen(joint.b, joint.point_b)])
-            axes.plot(*ends.T, color=GREY, lw=1.1, alpha=alpha, zorder=1.5)
-        elif isinstance(joint, (Slot, Prismatic)):
-            origin, point = seen(joint.line, joint.origin), seen(joint.body, joint.point)
+    for part, one, other in _coupled(mechanism, q):
+        line = np.array([one[0], other[0]])
+        if isinstance(part, Spring):
+            line = _coil(one[0], other[0], COIL_WIDTH * size)
+        axes.plot(line.real, line.imag, color=GREY, lw=1.1, alpha=alpha, zorder=1.5)
+    for joint in mechanism.linkage.joints:
+        if isinstance(joint, (Slot, Prismatic)):
             reach = (joint.origin[0] + joint.direction[0], joint.origin[1] + joint.direction[1])
-            along = seen(joint.line, reach) - origin
-            along /= np.linalg.norm(along)
-            places = [0.0, float((point - origin) @ along)]
-            ends = np.array(
-                [origin + (min(places) - 0.15 * size) * along, origin + (max(places) + 0.15 * size) * along]
-            )
-            axes.plot(*ends.T, color=GREY, lw=1.0, dashes=(6, 4), alpha=alpha, zorder=1)
+            ends = ((joint.line, joint.origin), (joint.body, joint.point), (joint.line, reach))
+            origin, point, beyond = (_seen(mechanism, q, *end)[0] for end in ends)
+            along = (beyond - origin) / abs(beyond - origin)
+            places = [0.0, float(((point - origin) * along.conjugate()).real)]
+            line = origin + np.array([min(places) - 0.15 * size, max(places) + 0.15 * size]) * along
+            axes.plot(line.real, line.imag, color=GREY, lw=1.0, dashes=(6, 4), alpha=alpha, zorder=1)
             if joint.line == GROUND:
-                axes.plot(*point, "s", ms=9, mfc="none", color=GREY, alpha=alpha)
+                axes.plot(point.real, point.imag, "s", ms=9, mfc="none", color=GREY, alpha=alpha)
 
 
-def _coil(a: Array, b: Array, half: float) -> Array:
+def _coil(a: complex, b: complex, half: float) -> ComplexArray:
     """Points of a zigzag from a to b."""
-    along = b - a
-    length = float(np.hypot(*along))
-    if length == 0.0:
+    if a == b:
         return np.array([a, b])
-    across = np.array([-along[1], along[0]]) / length * half
     where = np.concatenate([[0.0, 0.15], 0.15 + 0.7 * (np.arange(2 * COILS) + 0.5) / (2 * COILS), [0.85, 1.0]])
     side = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], COILS), [0.0, 0.0]])
-    return np.asarray(a + where[:, None] * along + side[:, None] * across)
+    return np.asarray(a + (where + 1j * side * half / abs(b - a)) * (b - a))
 
 
-def _name(axes: Any, text: str, place: Array, colour: str, weight: str = "normal") -> None:
+def _name(axes: Any, text: str, place: complex, colour: str, weight: str = "normal") -> None:
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=2.5, foreground="white")]
     offset = (8.0, -6.0) if weight == "bold" else (5.0, 5.0)
     low, high = axes.get_xlim()
-    room = 72.0 * axes.bbox.width / axes.figure.dpi * (high - place[0]) / (high - low)  # points to the frame's end
+    room = 72.0 * axes.bbox.width / axes.figure.dpi * (high - place.real) / (high - low)  # points to the frame's end
     if offset[0] + WIDTH * len(text) > room:  # to the left, or it would leave the frame
         offset = (-offset[0], offset[1])
     look = {
@@ -230,16 +207,16 @@ def _name(axes: Any, text: str, place: Array, colour: str, weight: str = "normal
         "path_effects": halo,
         "annotation_clip": True,
     }
-    axes.annotate(text, place, xytext=offset, textcoords="offset points", **look)
+    axes.annotate(text, (place.real, place.imag), xytext=offset, textcoords="offset points", **look)
 
 
 def _point_names(axes: Any, mechanism: Mechanism, q: Array) -> None:
     """Names of the bodies' points, one for those that meet in a joint and have the same name."""
     near = 1e-3 * max(_size(mechanism, q), 1e-12)
-    labelled = [(name, np.array(place)) for name, place in mechanism.file.ground.points_m.items()]
+    labelled = [(name, complex(*place)) for name, place in mechanism.file.ground.points_m.items()]
     for _, body, points in _points(mechanism):
         for name, point in points.items():
-            place = _at(q, body, point)
-            if not any(name == other and np.abs(place - there).max() < near for other, there in labelled):
+            place = complex(_place(q, body, point)[0])
+            if not any(name == other and abs(place - there) < near for other, there in labelled):
                 labelled.append((name, place))
                 _name(axes, name, place, "#374151")
