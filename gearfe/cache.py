@@ -143,7 +143,7 @@ def cache_key(kind: str, recipe: object) -> str:
 
 @functools.cache
 def source_hash(*names: str) -> str:
-    """Hash (hex) of the text of rooms and modules of this package, by name: what they compute hangs on it."""
+    """Hash (hex) of the text of rooms and modules of this package, by name: their results depend on it."""
     text, package = hashlib.sha256(), Path(__file__).parent
     for name in names:
         for file in sorted((package / name).glob("*.py")) or [package / f"{name}.py"]:

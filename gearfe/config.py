@@ -1,7 +1,7 @@
 """Job files: TOML tables read into frozen dataclasses, with every mistake named.
 
 A table is a frozen dataclass whose fields are made with `quantity`; the reader checks types, ranges and names. A job
-file may hold the tables of several jobs: a command asks `load_job` for the ones it needs. Of the others, keys, types
+file may hold the tables of several jobs: a command reads those it needs by `load_job`. Of the others, keys, types
 and ranges are checked (``gearfe.tables`` says which tables exist), so a misspelt key is an error wherever it stands;
 the rules that join several keys are not.
 """

@@ -139,7 +139,7 @@ class Display:
             self._line = ""
 
     def _write(self, text: str) -> None:
-        with suppress(OSError, ValueError):  # a closed pipe ends the telling, not the run
+        with suppress(OSError, ValueError):  # a closed pipe ends the messages, not the run
             self._stream.write(text)
             self._stream.flush()
 
@@ -176,7 +176,7 @@ def shown(stream: TextIO | None = None, *, verbose: bool = False) -> Iterator[No
 
 @contextmanager
 def stage(name: str) -> Iterator[None]:
-    """Name the work inside for whoever watches; also as a decorator."""
+    """Name the work inside for the display; also as a decorator."""
     display = _displays[-1] if _displays else None
     if display is None or threading.current_thread() is not threading.main_thread():
         yield
@@ -189,13 +189,13 @@ def stage(name: str) -> Iterator[None]:
 
 
 def count(done: float, total: float, what: str = "") -> None:
-    """Tell how far the stage is: whole numbers of a whole number of things, or as floats a share."""
+    """Report how far the stage is: whole numbers of a whole number of things, or as floats a share."""
     if _displays and threading.current_thread() is threading.main_thread():
         _displays[-1].count(done, total, what)
 
 
 def announce(text: str) -> None:
-    """Tell a wait of a minute also where nobody watches: a library call that stands still looks broken."""
+    """Report a wait of a minute also without a display."""
     if _displays:
         say(text)
     elif sys.stderr is not None:
@@ -203,7 +203,7 @@ def announce(text: str) -> None:
 
 
 def say(text: str) -> None:
-    """Tell something once, on a line that stays."""
+    """Print a line that stays."""
     if _displays and threading.current_thread() is threading.main_thread():
         _displays[-1].say(text)
 

@@ -35,7 +35,7 @@ from .typing import Array, ComplexArray
 OVERSAMPLING = 2.0
 #: Modes beyond this (Hz) are springs in place of constraints: their motion follows that of the others.
 FASTEST = 1e6
-#: Half length of the filter in kept samples, and the attenuation (dB) for which Kaiser's formulas ask that length.
+#: Half length of the filter in kept samples, and the attenuation (dB) that has this length by Kaiser's formulas.
 REACH, STOP_BAND_DB = 10, 145.0
 #: Kaiser's relation between the attenuation and the parameter of his window.
 _BETA = 0.1102 * (STOP_BAND_DB - 8.7)

@@ -63,7 +63,7 @@ def _encoding_problem(raw: bytes, at: int) -> tuple[str, str]:
 
 
 def _rows(path: str | Path, field: str) -> list[list[str]]:
-    """Cells of a CSV file; semicolons or tabs between them, as spreadsheets of some countries write, are told."""
+    """Cells of a CSV file; semicolons or tabs between them, as spreadsheets of some countries write, are an error."""
     rows = list(csv.reader(io.StringIO(read_text(path, field))))
     if rows and len(rows[0]) == 1 and any(mark in rows[0][0] for mark in ";\t"):
         cure = "write commas between cells and points in numbers"
@@ -93,7 +93,7 @@ def read_csv(path: str | Path, field: str) -> dict[str, list[str]]:
 def read_numbers(
     path: Path, field: str, needed: Sequence[str], optional: Sequence[str] = (), *, others: bool = True
 ) -> dict[str, Any]:
-    """Columns of finite numbers of a CSV file as arrays, by name; `others` tells whether more may stand beside them.
+    """Columns of finite numbers of a CSV file as arrays, by name; `others`: whether further columns are allowed.
 
     Raises
     ------

@@ -2,7 +2,7 @@
 
 A command module provides ``add_arguments(parser)`` and ``run(args) -> int`` (0 done, 1 done but some part failed and is
 marked as such in the output, 2 is kept for bad input). It imports what it needs inside ``run``, and is itself imported
-only when that command runs or its help is asked.
+only when that command runs or prints its help.
 """
 
 #: Command -> what it does in one line, and an example for the end of its help (`gearfe new` writes the job files).

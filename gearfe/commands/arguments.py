@@ -133,7 +133,7 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
     keys
         Keys whose option has their name, ``a_key`` as ``--a-key``.
     renamed
-        Option -> key, where the option has a name of its own.
+        Option -> key, where the names differ.
     """
     hints = type_hints(table)
     for name, key in ({k: k for k in keys} | renamed).items():
@@ -149,7 +149,7 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
 
 
 def _default_of(field: Any) -> str:
-    """The default of a key, for a help; options without a default of their own leave what the file says."""
+    """The default of a key, for a help; an option that is not given leaves the file's value."""
     default = field.default
     plain = isinstance(default, (int, float, str)) and not isinstance(default, bool) and default != ""
     return f" (default: the file's, or {default})" if plain and "default" not in field.metadata["doc"] else ""
@@ -192,7 +192,7 @@ def _option(name: str) -> str:
 
 
 class _Removed(argparse.Action):
-    """Option of a key that is gone: what to write instead."""
+    """Option of a removed key: what to write instead."""
 
     def __init__(self, option_strings: Sequence[str], dest: str, instead: tuple[str, str]) -> None:
         super().__init__(option_strings, dest, nargs="?", help=argparse.SUPPRESS)
@@ -203,7 +203,7 @@ class _Removed(argparse.Action):
 
 
 def add_removed(parser: argparse.ArgumentParser, removed: Mapping[str, tuple[str, str]]) -> None:
-    """Options of keys that are gone, which the help does not show; see ``REMOVED`` in `gearfe.config.build`."""
+    """Options of removed keys, which the help does not show; see ``REMOVED`` in `gearfe.config.build`."""
     for key, instead in removed.items():
         parser.add_argument("--" + key.replace("_", "-"), action=_Removed, instead=instead)
 

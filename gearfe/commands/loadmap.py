@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
         job = stiffness_job(tables, Path(args.job).parent, pair)
-        deviations = deviation_lines(job)  # those that cannot be are told before the folder is made
+        deviations = deviation_lines(job)  # impossible ones are refused before the folder is made
     folder = output_folder(args.out)
     made_map = job_map(job, table, progress=count)
     watch.seconds.update(made_map.timings)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..stiffness.job import StiffnessJob
 
 
-#: Teeth of each gear whose flanks are fine in a deck, where --teeth does not tell.
+#: Teeth of each gear whose flanks are fine in a deck, by default.
 DECK_TEETH = 3
 
 

@@ -33,7 +33,7 @@ CLOSED = 141
 
 
 def answer(arguments: list[str], run: Callable[[list[str]], int] | None = None) -> int:
-    """Run one command, or `run`; return its exit code: that of `gearfe.cli.main`, which tells of an interruption."""
+    """Run one command, or `run`; return its exit code: that of `gearfe.cli.main`."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # a code page that lacks a letter of a name; stderr does so by itself
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -54,7 +54,7 @@ def answer(arguments: list[str], run: Callable[[list[str]], int] | None = None) 
 
 
 def _answered(arguments: list[str], run: Callable[[list[str]], int]) -> int:
-    """Run, and tell mistakes in one line."""
+    """Run, and report mistakes in one line."""
     try:
         return run(arguments)
     except BrokenPipeError:

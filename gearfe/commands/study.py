@@ -88,7 +88,7 @@ def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:
         from dask.distributed import Client
     except ImportError:
         raise MissingLibraryError("--dask needs dask.distributed: pip install 'gearfe[cluster]'") from None
-    logging.disable(logging.CRITICAL)  # of a lost connection `check` tells
+    logging.disable(logging.CRITICAL)  # `check` reports a lost connection
     stack.callback(logging.disable, logging.NOTSET)
     try:
         client = stack.enter_context(Client(address, timeout=TIMEOUT_S))

@@ -1,4 +1,4 @@
-"""Pictures of a housing and of its modes, drawn by VTK in a process of its own.
+"""Pictures of a housing and of its modes, drawn by VTK in a separate process.
 
 Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs
 a picture and a message, not the results.
@@ -79,7 +79,7 @@ def draw_bodies(pictures: Mapping[str | Path, Mapping[str, Array]]) -> str:
 
 
 def _draw(job: Path, target: Path) -> None:
-    """Draw what a job file holds; runs in the process of its own."""
+    """Draw the content of a job file; runs in the separate process."""
     import pyvista
 
     stored: dict[str, Any] = load_arrays(job)

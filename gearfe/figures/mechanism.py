@@ -64,7 +64,7 @@ def draw_modes(folder: Path, mechanism: Mechanism, q: np.ndarray, modes: Modes) 
 
 @stage("animation")
 def draw_animation(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -> None:
-    """animation.gif with the number of frames that the file asks for."""
+    """animation.gif with the number of frames of the file."""
     from matplotlib.animation import PillowWriter
 
     frames = mechanism.file.run.frames

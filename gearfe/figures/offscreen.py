@@ -1,4 +1,4 @@
-"""Drawing with VTK in a process of its own.
+"""Drawing with VTK in a separate process.
 
 Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs
 a picture and a message, not the results.

@@ -1,4 +1,4 @@
-"""Picture and animation of gears in their housing, drawn by VTK in a process of its own.
+"""Picture and animation of gears in their housing, drawn by VTK in a separate process.
 
 Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs
 a picture and a message, not the results. The animation is a GIF, put together by Pillow.
@@ -47,7 +47,7 @@ def draw_scene(path: str | Path, arrays: Mapping[str, Array], title: str, most: 
 
 
 def _draw(job: Path, target: Path) -> None:
-    """Draw what a job file holds; runs in the process of its own."""
+    """Draw the content of a job file; runs in the separate process."""
     import pyvista
 
     stored: dict[str, Any] = load_arrays(job)

@@ -23,7 +23,7 @@ KINK = 1e-9
 
 @dataclass(frozen=True)
 class Deviation:
-    """Deviation of a flank along the normal of its involute, as measured or wanted.
+    """Deviation of a flank along the normal of its involute, measured or designed.
 
     Attributes
     ----------

@@ -31,7 +31,7 @@ LEAST_RIM = 0.25
 LEAST_BORE = 0.05
 #: Largest overlap, times module.
 MOST_OVERLAP = 0.12
-#: Largest yield of a tooth pair (modules) by the standard's stiffness under a torque that is asked for.
+#: Largest yield of a tooth pair (modules) by the standard's stiffness under a given torque.
 MOST_YIELD = 0.25
 
 

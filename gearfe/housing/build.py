@@ -84,7 +84,7 @@ def inside_faces(table: HousingTable, centres: np.ndarray) -> np.ndarray:
 
 
 def reduced(housing: Housing, table: HousingReductionTable) -> ModalBody:
-    """Reduced body with what a ``[housing.reduction]`` table asks for."""
+    """Reduced body by a ``[housing.reduction]`` table."""
     with stage("reducing the housing"):
         return housing.reduce(
             table.modes,

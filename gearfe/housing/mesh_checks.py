@@ -97,7 +97,7 @@ def _only_once(faces: IntArray) -> IntArray:
 
 
 def _ordered(nodes: Array, tets: IntArray) -> IntArray:
-    """Midside nodes in the order of `EDGES`, told by where they lie: VTK's, Abaqus' and gmsh's orders are known."""
+    """Midside nodes in the order of `EDGES`, from their positions: VTK's, Abaqus' and gmsh's orders are known."""
     middles = 0.5 * (nodes[tets[:, EDGES[:, 0]]] + nodes[tets[:, EDGES[:, 1]]])
     lengths = np.linalg.norm(nodes[tets[:, EDGES[:, 0]]] - nodes[tets[:, EDGES[:, 1]]], axis=2)
     for order in ([4, 5, 6, 7, 8, 9], [4, 5, 6, 7, 9, 8]):

@@ -115,7 +115,7 @@ def add_up(place: IntArray, *parts: tuple[Array, Array]) -> None:
 
 
 def energy_taken(residual: Array, stiffness: Array, acting: BoolArray) -> Array:
-    """Energy (k, k) that functions take, each by itself: residuals (n, 3, k), stiffnesses (n, 3, 3)."""
+    """Energy (k, k) that functions take, one by one: residuals (n, 3, k), stiffnesses (n, 3, 3)."""
     taken = _taken(residual, stiffness, acting)[1].reshape(-1, residual.shape[-1])
     return np.asarray(taken.T @ taken)
 

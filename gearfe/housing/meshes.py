@@ -1,6 +1,6 @@
 r"""The two kinds of meshes that a housing may have: tetrahedra that anyone brought, extruded elements of a job's own.
 
-Each tells the same of itself: nodes, cells to show, matrices, outer surface, and how much too stiff it is.
+Both have nodes, cells to show, matrices, an outer surface, and an estimate of the discretisation error.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .mesh_error import energy_lost, energy_lost_by_element
 from .prism_error import prism_energy_lost
 from .surface import Surface, SurfaceQuadrature, normal_velocity, surface_quadrature
 
-#: Which faces are outside, told by their centres (f, 3) in m.
+#: Which faces are outside, from their centres (f, 3) in m.
 Outer = Callable[[Array], BoolArray]
 
 #: Triangles between the ten nodes of one, in its own sense.

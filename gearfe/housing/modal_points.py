@@ -20,11 +20,11 @@ import numpy as np
 from ..typing import Array, IntArray
 from .modal_test import Comparison
 
-#: Agreement below which a point is told, and that from which another place explains it.
+#: Agreement below which a point is reported, and that from which another place explains it.
 LOW, HIGH = 0.5, 0.85
 #: Part of the mean motion of a point below which noise decides.
 STILL = 0.2
-#: Points that are told at most.
+#: Points that are reported at most.
 LISTED = 6
 
 
@@ -43,7 +43,7 @@ def point_columns(made: Comparison) -> dict[str, Array]:
 
 
 def point_lines(made: Comparison) -> list[str]:
-    """What to tell of points that do not move as the model does: exchanged, reversed, elsewhere."""
+    """Remarks on points that do not move as the model does: exchanged, reversed, elsewhere."""
     rows, own = _own(made)
     bad = [int(p) for p in np.flatnonzero(np.array(own) < LOW)] if (made.pairs >= 0).sum() > 1 else []
     names = {p: f"point {p + 1} ({', '.join(f'{1e3 * x:.4g}' for x in made.test.points[rows[p][0]])} mm)" for p in bad}

@@ -22,7 +22,7 @@ from .attachments import RADIUS_TOLERANCE, Attachment, Bore, Plane, bore_attachm
 from .model import Housing
 from .refinement import refined
 
-#: Extent of a housing (mm): a mesh beyond it is in another unit than the job tells.
+#: Extent of a housing (mm): a mesh beyond it has another unit than that of the job.
 SIZES_MM = (2.0, 50e3)
 
 

@@ -130,7 +130,7 @@ def _number(mesh: Extrusion) -> _BothNumbers:
 
 
 def _acting(numbers: _Numbers, level: int, levels: int, still: BoolArray) -> BoolArray:
-    """Whether functions may act: those of a corner, edge or face that lies within no rigid set, told by one node."""
+    """Whether functions may act: those of a corner, edge or face that lies within no rigid set, by one of its nodes."""
     return np.asarray(~still[numbers.node * levels + level].any(axis=1))
 
 

@@ -32,7 +32,7 @@ from .nastran_files import read_nastran
 SYMMETRIC, NO_ENERGY, SAME_MASS = 1e-6, 1e-7, 1e-3
 #: Part of the largest square of a period below which a coordinate has no mass.
 MASSLESS = 1e-12
-#: Bounds on the length that rotational and translational stiffness tell, in parts of the span of the attachments; a
+#: Bounds on the root of rotational over translational stiffness, a length, in parts of the span of the attachments; a
 #: unit of mm in place of m makes a thousand.
 LENGTHS = (1 / 300, 100.0)
 #: Eigenvalue of a mass matrix of unit diagonal that is none; highest frequency of no housing (Hz).
@@ -42,7 +42,7 @@ MOTIONS = ("x", "y", "z", "rotation about x", "rotation about y", "rotation abou
 
 
 class Matrix(NamedTuple):
-    """A square matrix, and what its rows are where the file tells: node and freedom."""
+    """A square matrix, and node and freedom of its rows where the file has them."""
 
     values: Array
     labels: list[Label]
@@ -280,7 +280,7 @@ def _body(k: Array, m: Array, points: Array, table: SuperelementTable, field: st
         rigid_mass=whole,
         truncation=np.zeros((b, b)),
         corrections=0,
-        next_hz=0.0,  # nothing tells what was left out
+        next_hz=0.0,  # what was left out is unknown
         softening=np.zeros_like(M),
         held=not free,
         solver="none",

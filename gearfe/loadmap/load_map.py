@@ -8,7 +8,7 @@ where the rigid flanks touch,
     y = \ln\delta, \quad x = \ln T, \qquad \frac{dy}{dx} = \frac{T}{\delta\, dT/d\vartheta},
 
 a cubic Hermite interpolant with the computed tangents as slopes. A line contact makes y(x) nearly straight; where a
-further pair of teeth comes into contact it bends. `LoadMap.interpolation_error` tells how well the map predicts itself.
+further pair of teeth comes into contact it bends. `LoadMap.interpolation_error` is the leave-one-out error.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-r"""Tension at the tooth roots from the contact forces, on meshes of its own, with an estimate of its error.
+r"""Tension at the tooth roots from the contact forces, on separate meshes, with an error estimate.
 
 The fillet carries no traction, so equilibrium leaves one stress there, along the surface, and it follows from the
 surface's own stretching: with the arc length s and the unit tangent t

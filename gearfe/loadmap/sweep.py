@@ -60,7 +60,7 @@ def sweep_loads(
         Pinion angles (rad); without them, 18 over one mesh cycle. Positions that differ by whole mesh cycles are
         solved once.
     root_stress
-        Also the tension at the tooth roots, on refined meshes of its own, see `gearfe.loadmap.root_stress`.
+        Also the tension at the tooth roots, on separate refined meshes, see `gearfe.loadmap.root_stress`.
     model, kinematics, elastic, progress, changes
         See `gearfe.stiffness.sweep.sweep_stiffness`.
 

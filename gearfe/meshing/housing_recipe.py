@@ -1,4 +1,4 @@
-"""Which meshes of housings `gearfe.meshing.housing_mesh` makes: what the cache asks without loading the mesher."""
+"""Which meshes of housings `gearfe.meshing.housing_mesh` makes: for the cache, without loading the mesher."""
 
 #: Raised when anything there changes the meshes that come out.
 RECIPE = 3

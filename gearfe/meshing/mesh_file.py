@@ -23,7 +23,7 @@ CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 BY_GMSH = (".unv", ".med", ".mesh")
 NASTRAN = (".bdf", ".nas", ".fem")
 SURFACES = (".stl", ".ply", ".off", ".obj", ".wkt", ".svg")
-#: Arrays of whole numbers by which formats tell groups that have no name.
+#: Arrays of whole numbers by which formats number groups without a name.
 NUMBERED = ("gmsh:physical", "medit:ref", "nastran:ref", "ref", "cell_tags", "point_tags", "avsucd:material")
 #: Triangles of .inp files, as gmsh and CalculiX write them beside the tetrahedra, that meshio's reader does not name.
 TRIANGLES = {"CPS6": "triangle6", "CPE3": "triangle", "S6": "triangle6", "M3D3": "triangle", "M3D6": "triangle6"}
@@ -41,7 +41,7 @@ class MeshFile(NamedTuple):
     Attributes
     ----------
     nodes : ndarray, shape (n, 3)
-        In the file's unit, as read; in m where groups are asked for.
+        In the file's unit, as read; in m for `group`.
     tets : ndarray, shape (m, 4) or (m, 10)
         Node numbers from 0.
     groups : dict
@@ -88,7 +88,7 @@ def read_mesh_file(path: str | Path, field: str, size: float) -> MeshFile:
     Parameters
     ----------
     path
-        File; its ending tells the format.
+        File; its suffix gives the format.
     field
         Key that named it, for messages.
     size
@@ -208,7 +208,7 @@ def _nodes(model: Any) -> tuple[Array, IntArray]:
 
 
 def _groups(mesh: Any) -> Iterator[tuple[str, IntArray]]:
-    """Names and nodes of all groups that a mesh tells, one by one; a name may come several times."""
+    """Names and nodes of all groups of a mesh, one by one; a name may come several times."""
     for name, nodes in (mesh.point_sets or {}).items():
         yield name, nodes
     for name, parts in (mesh.cell_sets or {}).items():
@@ -216,7 +216,7 @@ def _groups(mesh: Any) -> Iterator[tuple[str, IntArray]]:
             for block, rows in zip(mesh.cells, parts, strict=False):
                 if rows is not None and len(rows):
                     yield name, block.data[np.asarray(rows, dtype=np.int64)]
-    names: dict[int, list[str]] = {int(np.ravel(tag)[0]): [] for tag in mesh.field_data.values()}  # told by name
+    names: dict[int, list[str]] = {int(np.ravel(tag)[0]): [] for tag in mesh.field_data.values()}  # by name
     for tags in (getattr(mesh, "cell_tags", None), getattr(mesh, "point_tags", None)):
         for tag, own in (tags or {}).items():
             names.setdefault(int(tag), []).extend(own)

@@ -86,7 +86,7 @@ def read_bulk_mesh(text: str, path: Path, field: str) -> BulkMesh:
     Raises
     ------
     InputError
-        For entries that cannot be read, other files, nodes that are missing or in a coordinate system of their own.
+        For entries that cannot be read, other files, nodes that are missing or in a local coordinate system.
     """
     places: dict[int, tuple[float, float, float]] = {}
     elements: dict[str, list[tuple[int, ...]]] = {}

@@ -28,7 +28,7 @@ SHARE = 0.5
 #: Cells of the pair force end at these parts of the largest: Lambda's cubics err by 1e-4 of it in a cell of ratio 2.2,
 #: and by 1e-3 in those of small forces.
 PARTS = (0.0, 0.002, 0.01, 0.05, 0.2, 0.45, 1.0)
-#: Data tell the coefficient of a cubic B-spline if they reach the node beside its middle, where it has this value.
+#: Data determine the coefficient of a cubic B-spline if they reach the node beside its middle, where it has this value.
 EDGE = 1.0 / 6.0
 #: Nodes of b over ln F; what is between the contact solutions' forces, more of them do not know.
 FORCE_NODES = 5
@@ -145,7 +145,7 @@ def fit_law(
 
 
 def _level_beyond(P: sparse.csr_array) -> sparse.csr_array:
-    """Coefficients of all splines over the phase from those that data tell; P has the splines at the data's places.
+    """Coefficients of all splines over the phase from those in reach of data; P has the splines at the data's places.
 
     Before the first and behind the last of these, where pairs touch beyond the reach, b is level: going on as it rises
     at the ends of contact it would make compliances negative, and with these there is more than one set of pair forces.

@@ -28,7 +28,7 @@ ARRAYS = {"nodes": 1, "forces": 1, "touch": 3, "energies": 5, "coupling": 4}
 
 
 def law_arrays(law: MeshLaw) -> dict[str, Array]:
-    """A law as named arrays, those of a law of its own for the back flanks beginning with ``back_``."""
+    """A law as named arrays, those of a separate law of the back flanks beginning with ``back_``."""
     numbers = np.array([*law.base_radii, law.backlash, law.reach, law.error])
     made = {**{name: getattr(law, name) for name in ARRAYS}, "numbers": numbers}
     behind = {} if law.back is None else law_arrays(law.back)

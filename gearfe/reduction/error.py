@@ -111,7 +111,7 @@ class MeshError:
     frequency_errors : (N,)
         Relative errors of the natural frequencies with free attachments; 0 for rigid-body modes. Infinite above the
         highest mode that was kept, where the mesh's error is not estimated, and where the estimate is as large as the
-        stiffness itself: such a mesh (linear tetrahedra) is no approximation from which an error could be told.
+        stiffness itself: such a mesh (linear tetrahedra) is too coarse for an error estimate.
     """
 
     band_hz: float

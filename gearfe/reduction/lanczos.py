@@ -68,9 +68,9 @@ def lowest_modes(
     count
         How many modes; ``None`` for all up to `limit`.
     limit
-        Upper end of the wanted eigenvalues (rad^2/s^2); with `count` given the smaller set is returned.
+        Upper end of the eigenvalues (rad^2/s^2); with `count` given the smaller set is returned.
     at_least
-        Modes wanted even when they lie above the limit.
+        Least number of modes, even above the limit.
     shift
         s >= 0 (rad^2/s^2), for pairs whose K is singular.
     block

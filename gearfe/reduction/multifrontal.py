@@ -216,7 +216,7 @@ def _fronts(graph: Any, order: IntArray, leaf_nodes: int) -> _Tree:
 def _elimination_tree(graph: Any) -> list[int]:
     """Parent of each node (-1: none) when the nodes are eliminated in order (Liu, SIAM J. Matrix Anal. Appl. 11, 1990).
 
-    The tree depends only on which nodes hang together through nodes up to each j. A minimum spanning tree with the
+    The tree depends only on which nodes are connected through nodes up to each j. A minimum spanning tree with the
     larger node of an edge as its weight keeps that, so only its few edges need be gone through one by one.
     """
     nodes = graph.shape[0]

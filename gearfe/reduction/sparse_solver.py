@@ -142,7 +142,7 @@ def _superlu(matrix: Any) -> Callable[[Array], Array]:
 
 
 def _check_definite(matrix: Any, solve: Callable[[Array], Array]) -> None:
-    """One solve with a random right-hand side: an answer without bound, or against the load, tells a free part."""
+    """One solve with a random right-hand side: an unbounded or negative response means a free part."""
     b = np.random.default_rng(0).standard_normal(matrix.shape[0])
     try:
         x = solve(b)

@@ -43,7 +43,7 @@ STEPS, HALVINGS = 60, 8
 #: A motion is found where what is left of the equations is smaller than this part of the tolerance.
 FOUND = 3e-2
 #: Where Newton's method goes to and fro over a touch of flanks that falls on a sample, this many steps without halving
-#: what is left end it; less than this is left to the error estimate to judge, which asks for more samples.
+#: what is left end it; less than this is left to the error estimate, which adds samples.
 IDLE, LEFT = 8, 1e-4
 #: What a step of Newton's method leaves of the linear equations, and of those for the error estimate.
 INEXACT, ROUGH = 0.03, 0.1
@@ -126,7 +126,7 @@ class Oscillator:
         return self.rounded(torus.count_below(periods, max(order, band)))
 
     def rounded(self, harmonics: float) -> int:
-        """Number whose samples transform quickly, at least as many as asked for but for the most."""
+        """Number whose samples transform quickly, at least the given one, up to the most."""
         return min(8 * math.ceil(harmonics / 8), MOST_HARMONICS)
 
     def flexibility(self, speed: float, count: int) -> ComplexArray:
@@ -234,7 +234,7 @@ def product(system: Oscillator, speed: float, at: Evaluated, flexibility: Comple
 
 
 def flexibility_of(system: Oscillator, speed: float, count: int) -> ComplexArray:
-    """H at harmonics 0 to `count`, made at once up to where `error_of` asks for it."""
+    """H at harmonics 0 to `count`, computed at once up to the harmonics of `error_of`."""
     return system.flexibility(speed, 2 * count)[: count + 1]
 
 

@@ -38,8 +38,8 @@ class Pictures(Protocol):
 
 @dataclass(frozen=True)
 class RunUpChoice:
-    """What is told of a run-up: highest multiple of the mesh frequencies, attachment whose acceleration is drawn, and
-    whether modes that the meshes swing in are written as fields.
+    """Outputs of a run-up: highest multiple of the mesh frequencies, attachment whose acceleration is drawn, and whether
+    modes with much strain in the meshes are written as fields.
     """
 
     multiples: int
@@ -56,9 +56,9 @@ def write_runup(
     Parameters
     ----------
     further
-        Entries of the summary that tell what was computed.
+        Entries of the summary that describe the job.
     unstable
-        Map of parametric instability, where one was asked for.
+        Map of parametric instability, or None.
     """
     multiples, model = choice.multiples, run.train.model
     bore = model.bores.index(attachment_to_draw(model.bores, choice.attachment, model.train))

@@ -6,7 +6,7 @@ With the harmonics x in parts of their scale and :math:`\sigma = \Omega/\Omega_u
 .. math:: t_x\cdot(x - x_0) + t_\sigma(\sigma - \sigma_0) = s
 
 (Keller 1977; Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 6.1). Where the curve goes on smoothly from one
-asked speed to the next, extrapolation of the forces (which know nothing of the resonances behind them) and Newton's
+given speed to the next, extrapolation of the forces (which know nothing of the resonances behind them) and Newton's
 method at that speed do, as long as each of its steps contracts; else the short steps decide.
 """
 
@@ -51,7 +51,7 @@ ALIGNED, BENT = 0.5, 1.0 / math.sqrt(3.0)
 TANGENT = 1e-3
 #: A step this long at most leads round a turning point.
 TURNING = 0.1
-#: Steps along the curve between two asked speeds, at most.
+#: Steps along the curve between two given speeds, at most.
 MOST = 400
 #: Extrapolation takes so many speeds before; where it misses, speeds between are halved so many times.
 BACK, HALVINGS = 3, 3
@@ -75,7 +75,7 @@ class Curve:
     Attributes
     ----------
     orbits
-        At asked speeds in the order in which the curve passes them, and the one nearest to each turning point.
+        At given speeds in the order in which the curve passes them, and the one nearest to each turning point.
     branch
         Number of each orbit's branch: it grows at each turning point.
     turns
@@ -130,9 +130,9 @@ class _Walk:
         self.branch: list[int] = []
         self.turns: list[Turn] = []
         self.back: list[Orbit] = []  # on this branch, to extrapolate from
-        self.number = 0  # of the asked speed that was reached
+        self.number = 0  # of the given speed that was reached
         self.heading = 1
-        self.step = FIRST  # along the curve, from one asked speed to the next
+        self.step = FIRST  # along the curve, from one given speed to the next
         self.last: _Place | None = None  # before the orbit that it led to
 
     def run(self, start: Orbit, progress: Callable[[int, int], None] | None) -> Curve:
@@ -170,7 +170,7 @@ class _Walk:
         return orbit
 
     def _count(self, speed: float, orbit: Orbit) -> int:
-        """Harmonics at a speed: what is asked for, and as many more as the orbit before needed."""
+        """Harmonics at a speed: those of the band, and as many more as the orbit before needed."""
         fewer = orbit.error < EASY * self.tolerance
         return max(
             self.system.harmonics(speed, self.highest),
@@ -179,7 +179,7 @@ class _Walk:
 
     def _onward(self, speed: float, halvings: int = HALVINGS) -> tuple[Orbit, Evaluated] | None:
         """Orbit at a speed by extrapolation, where needed over speeds between, and the equations there."""
-        if len(self.back) < (2 if self.turns else 1):  # one orbit behind a turning point does not tell its side
+        if len(self.back) < (2 if self.turns else 1):  # one orbit behind a turning point does not define the branch
             return None
         made = self._extrapolated(speed)
         if made is not None or not halvings:
@@ -202,7 +202,7 @@ class _Walk:
         return orbit, at
 
     def _stepwise(self, orbit: Orbit) -> Orbit | str:
-        """Short steps along the curve until it passes the next asked speed, up or down."""
+        """Short steps along the curve until it passes the next given speed, up or down."""
         sign = 1.0 if self.speeds[-1] >= self.speeds[0] else -1.0
         place = self._tangent(orbit, self.last, sign * self.heading)
         if place is None:
@@ -219,7 +219,7 @@ class _Walk:
             near = [k for k in (self.number - 1, self.number, self.number + 1) if 0 <= k < len(speeds)]
             a, b = place.orbit.speed, new.orbit.speed
             passed = [k for k in near if (a - speeds[k]) * (b - speeds[k]) <= 0.0 and a != speeds[k]]
-            if turned and step > (2.0 * LEAST if passed else TURNING):  # in which order, and where: shorter steps tell
+            if turned and step > (2.0 * LEAST if passed else TURNING):  # order and location need shorter steps
                 step *= 0.5
                 continue
             if turned:

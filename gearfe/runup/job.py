@@ -22,7 +22,7 @@ from .run_up import RunUp, run_up
 def solved(
     job: TrainJob, table: RunUpTable, curves: Sequence[str] = (), *, watch: Any
 ) -> tuple[RunUp, InstabilityMap | None]:
-    """Steady states of the train of a job, and its map of parametric instability where the table asks for one.
+    """Steady states of the train of a job, and its map of parametric instability if the table has loads for one.
 
     Raises
     ------

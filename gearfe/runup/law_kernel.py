@@ -44,7 +44,7 @@ class LawTables(NamedTuple):
 
 
 class Jets(NamedTuple):
-    """Where a law is asked for, and what is found."""
+    """Arguments and results of `law_jets`."""
 
     phase: Array  # (n,) (rad)
     approach: Array  # (n,) (m)

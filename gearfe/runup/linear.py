@@ -158,7 +158,7 @@ class Linear:
     def _turning(self, omega: Array, speed: float) -> tuple[ComplexArray, ComplexArray]:
         """Flexibility at the freedoms, (k, m, m), and gyroscopic moments for unit forces, (k, 2 s, m).
 
-        Those of the last speed are kept: its first frequencies are asked for again and again.
+        Those of the last speed are kept: its first frequencies are evaluated again and again.
         """
         m, count = self.size, len(omega)
         kept = self._last.get(speed)  # once: other threads may be at another speed

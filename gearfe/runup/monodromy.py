@@ -31,7 +31,7 @@ WORST_CONDITION = 1e8
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """Exact flow of the constant part, in coordinates of its own: eigenvectors, of conjugate pairs one.
+    """Exact flow of the constant part, in eigenvector coordinates, one of each conjugate pair.
 
     Attributes
     ----------

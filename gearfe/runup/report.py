@@ -79,7 +79,7 @@ def runup_columns(run: RunUp) -> dict[str, Any]:
 
 
 def stability_columns(run: RunUp) -> dict[str, Array]:
-    """Columns of the largest multiplier; none where they were not asked for, not-a-number where they do not tell."""
+    """Columns of the largest multiplier; none without multipliers, not-a-number where stability is undecided."""
     if any(s.multipliers is None for s in run.states):
         return {}
     largest = np.array([s.multipliers[0] for s in run.states if s.multipliers is not None])
@@ -105,7 +105,7 @@ def dynamic_factors(run: RunUp, mesh: int) -> Array:
 
 
 def iso_dynamic_factors(run: RunUp, mesh: int) -> Array:
-    """K_v of a mesh at the asked speeds by ISO 6336-1, method B, gears without deviations but for the relief of `Gear`:
+    """K_v of a mesh at the given speeds by ISO 6336-1, method B, gears without deviations but for the relief of `Gear`:
     with the mesh's own mean stiffness, and all that turns with its gears.
     """
     model = run.train.model

@@ -61,8 +61,8 @@ class SteadyState:
     span
         Time over which multipliers are made (s): the period, or after which all phases are back.
     multipliers : (2 modes,) or None
-        Floquet multipliers of the motion, largest modulus first; None where they were not asked for, one not-a-number
-        where they do not tell whether the motion is stable.
+        Floquet multipliers of the motion, largest modulus first; None where not computed, one not-a-number
+        where stability is undecided.
     """
 
     speed: float
@@ -85,7 +85,7 @@ class SteadyState:
 
     @property
     def stable(self) -> bool | None:
-        """Whether small disturbances die out; None where that was not asked for or is not known."""
+        """Whether small disturbances die out; None where it was not computed or is undecided."""
         largest = math.nan if self.multipliers is None else abs(self.multipliers[0])
         return None if math.isnan(largest) else bool(largest <= STABLE)
 

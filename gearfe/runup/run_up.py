@@ -37,20 +37,20 @@ class RunUp(ShownTable):
     train
         The condensed train.
     speeds : (n,)
-        Asked speeds (rad/s).
+        Given speeds (rad/s).
     states
         Steady states at these speeds in the order in which their curve passes them: on branch 0 upwards, after a
         turning point on branch 1 back, after the next one on branch 2 upwards again; and one next to each turning
         point, as the last of its branch.
     turning_speeds : (turns,)
-        Speeds of the turning points (rad/s) in the order in which the curves pass them; `bifurcations` tell branches.
+        Speeds of the turning points (rad/s) in the order in which the curves pass them; `bifurcations` name branches.
     bifurcations
-        Where motions change their stability: turning points, period doubling, Neimark-Sacker; only turning points where
-        no multipliers were asked for.
+        Where motions change their stability: turning points, period doubling, Neimark-Sacker; only turning points
+        without multipliers.
     notes
         What could not be followed, and why.
     tolerance, band_hz
-        Asked error (parts of the approach under the steady force) and highest frequency of interest (Hz).
+        Given tolerance (parts of the approach under the steady force) and highest frequency of interest (Hz).
     """
 
     train: CondensedTrain
@@ -74,7 +74,7 @@ class RunUp(ShownTable):
 
     def columns(self) -> dict[str, Any]:
         """The table runup.csv: a row for each steady state, along the curve."""
-        # tables stand above the run-up, so they are looked up where one is asked for
+        # tables stand above the run-up: imported when needed
         made: dict[str, Any] = importlib.import_module(".report", __package__).runup_columns(self)
         return made
 

@@ -33,7 +33,7 @@ REACHED = 0.01
 #: Steps, of seven kicks each: of a period at least, and of a mesh cycle; most in parts of the first number. Where the
 #: forces' derivatives jump they are doubled until the largest modulus stands still to this part.
 STEPS, OF_CYCLE, MOST, SETTLED = 64, 16, 4, 3e-3
-#: Most steps where an accuracy is asked for.
+#: Most steps for a given accuracy.
 MOST_STEPS = 1 << 14
 #: Change of a stiffness from one kick to the next, in parts of that of the whole system, that is a jump.
 JUMP = 0.5
@@ -82,8 +82,7 @@ def window(system: Oscillator) -> Window:
 
 
 def multipliers(system: Oscillator, orbit: Orbit, accuracy: float | None = None) -> ComplexArray:
-    """Floquet multipliers of an orbit over `window`, largest modulus first, (2 n,); (1,) not-a-number where they do not
-    tell whether it is stable.
+    """Floquet multipliers of an orbit over `window`, largest modulus first, (2 n,); (1,) not-a-number if undecided.
 
     Parameters
     ----------

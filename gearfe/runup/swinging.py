@@ -35,7 +35,7 @@ def mesh_modes(modes: CoupledModes, meshes: int, least: float) -> list[int]:
 def swinging(model: TrainModel, modes: Sequence[int], frames: int = FRAMES) -> TrainResponse:
     """A train that does not turn, in one mode after the other, without damping and gyroscopic moments.
 
-    Its `time` is the number of the mode, from 1, and the part of the period; a mode has no size of its own: the
+    Its `time` is the number of the mode, from 1, and the part of the period; the amplitude of a mode is arbitrary: the
     largest displacement of a housing's node or a gear's tip is `SHOWN` of the train's size.
     """
     part = np.arange(frames) / frames

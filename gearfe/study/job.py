@@ -148,7 +148,7 @@ def run_study(
     executor
         Where cases run instead: any of `concurrent.futures`, or a cluster's.
     workers
-        How many cases the executor runs side by side; None: as many as it tells, else 4.
+        How many cases the executor runs side by side; None: its own number, else 4.
     check
         Called now and then while the executor works; raises when that will not answer any more.
     restart

@@ -92,7 +92,7 @@ def side_by_side(
                 group = running.pop(future)
                 try:
                     rows = future.result()
-                except Exception as error:  # cases tell theirs in their rows: this one is the executor's
+                except Exception as error:  # errors of cases are in their rows: this one is the executor's
                     lost.append((group, f"{type(error).__name__}: {error}"))
                     continue
                 mean = sum(row.seconds for row in rows) / len(rows)

@@ -1,4 +1,4 @@
-"""What an optimiser asks of a study: points are solved side by side, kept on disk, and never solved twice.
+"""Points of a study for an optimiser: solved side by side, kept on disk, never solved twice.
 
 The study says what is searched: parameters between their ends, the output in `minimise` or `maximise`, and the limits
 of outputs as constraints. `Search.evolve` is scipy's differential evolution; any other optimiser is an `Optimiser`,
@@ -34,7 +34,7 @@ Point = Mapping[str, Any]
 
 
 class Optimiser(Protocol):
-    """What asks for points and is told their outputs."""
+    """Ask-and-tell interface of an optimiser."""
 
     def ask(self) -> Sequence[Point]:
         """Points to solve side by side, parameter -> value; none: it has ended."""
@@ -53,7 +53,7 @@ class Solution:
 
 
 class Search(Facts):
-    """Points of a study, solved when they are asked for the first time.
+    """Points of a study, each solved once.
 
     Use it with ``with``: its processes stay between the points of one round and the next, and end with it.
 
@@ -66,7 +66,7 @@ class Search(Facts):
     jobs, executor
         As of `gearfe.study.job.run_study`.
     progress
-        Called with points solved, points asked for, and a name.
+        Called with points solved, requested points, and a name.
 
     Raises
     ------
@@ -172,7 +172,7 @@ class Search(Facts):
             self._keep([row for row in rows if row.status != DIED], values, first + len(cases))
         died = [(case, values[case]) for case, row in made.items() if row.status == DIED]
         if died:
-            if self._own is not None:  # whose fault it was is found out by processes of their own
+            if self._own is not None:  # a separate process for each shows whose fault it was
                 end_processes(self._own)
                 self._own = None
                 for rows in solved_rows(self.study.task, died, self._jobs, None, None):
@@ -190,7 +190,7 @@ class Search(Facts):
                 self._progress(len(self._journal.done), total, "points")
 
     def run(self, optimiser: Optimiser) -> Solution | None:
-        """Ask, solve, tell, until the optimiser asks for nothing more; then the best point."""
+        """Ask, solve, tell, until the optimiser has no more points; then the best point."""
         while points := optimiser.ask():
             optimiser.tell(points, self.solve(points))
         return self.best()
@@ -261,7 +261,7 @@ class Search(Facts):
         population
             Members for each parameter.
         seed
-            The same seed asks for the same points: a search that was interrupted goes on where it stood.
+            The same seed gives the same points: a search that was interrupted goes on where it stood.
 
         Returns
         -------

@@ -175,7 +175,7 @@ class StudyResult(ShownTable):
         """Elementary effects of an output: parameter -> mean, mean size, deviation; None where a case has no value.
 
         An effect is the change of the output over the change of the parameter as a share of its distribution, along the
-        trajectories of `gearfe.study.design.trajectories`. Sizes tell what matters, deviations what is not linear or
+        trajectories of `gearfe.study.design.trajectories`. Sizes show what matters, deviations what is not linear or
         acts together with others (Morris 1991; Campolongo et al., Environ. Model. Softw. 22 (2007) 1509).
         """
         d, values = len(self.parameters), self.output(name)

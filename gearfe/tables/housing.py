@@ -126,7 +126,7 @@ class MeshBoreTable:
     )
 
     def check(self, where: str) -> None:
-        """Raise `InputError` for a bore that is told by nothing, or twice."""
+        """Raise `InputError` for a bore that is defined by no key, or by two."""
         if self.group is None and (self.point_mm is None or self.radius_mm is None):
             key = "point_mm" if self.point_mm is None else "radius_mm"
             raise InputError(

@@ -43,7 +43,7 @@ class TrainShaftTable:
 
 @dataclass(frozen=True)
 class TrainGearTable(ToothFormTable):
-    """A gear on a shaft: one of [pair], or one of its own; keys it does not give come from [pair]'s shared ones."""
+    """A gear on a shaft: one of [pair], or one with its own teeth; missing keys come from [pair]'s shared ones."""
 
     name: str = quantity(doc="name of the gear")
     shaft: str = quantity(doc="shaft that carries it")
@@ -56,7 +56,7 @@ class TrainGearTable(ToothFormTable):
     )
 
     def check(self, where: str) -> None:
-        """Either a gear of [pair] or one of its own."""
+        """Either a gear of [pair] or one with its own teeth."""
         own = [
             key
             for key in (*ToothFormTable.__dataclass_fields__, "teeth", "bore_diameter_mm")
@@ -310,7 +310,7 @@ class TrainTable:
                 raise InputError(f"train.meshes[{i}].friction", mesh.friction, problem, 'write law = "map" in the mesh')
 
     def _check_names(self, where: str) -> None:
-        """Shafts and gears have names of their own, and what names one names one that is there."""
+        """Names of shafts and gears are unique, and references to them exist."""
         names: dict[str, list[str]] = {}
         for kind, rows in (("shafts", self.shafts), ("gears", self.gears)):
             known = names[kind] = [row.name for row in rows]

@@ -14,7 +14,7 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
   shaft with the spin d + 2;
 - *torques*: functions of time along a direction.
 
-A mesh has one flank, or two: the back flank has an approach of its own, along the other line of action, and its law is
+A mesh has one flank, or two: the back flank has its own approach, along the other line of action, and its law is
 the driving one's at the mirrored phase, behind the backlash j.
 """
 

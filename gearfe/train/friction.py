@@ -75,7 +75,7 @@ class Lubrication:
         Raises
         ------
         InputError
-            For gears at rest, whose coefficient the formula does not tell.
+            For gears at rest, for which the formula gives no coefficient.
         """
         if not abs(speed) > 0.0:
             problem = "cannot be computed: the gears stand still"

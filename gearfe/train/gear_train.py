@@ -99,7 +99,7 @@ class GearMesh:
         the ideal rigid mesh: a constraint whose multiplier is the contact force.
     phase
         Angle of the driver (rad), counted in its driving sense, at which it starts; 0: a driver's tooth stands on the
-        line of centres. None: from the teeth of the gears that hang together, the first of whose meshes has 0; see
+        line of centres. None: from the teeth of the connected gears, the first of whose meshes has 0; see
         `gearfe.train.phases`.
     damping
         N s/m along the line of action; with a law at the force of steady running.

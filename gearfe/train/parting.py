@@ -80,7 +80,7 @@ def parted(parting: Sequence[Parting], never: Sequence[bool]) -> dict[str, list[
 
 
 def beyond_law(model: TrainModel, moved: TrainStates) -> tuple[int, str] | None:
-    """The first sample at which a mesh goes beyond what its law is known for, and what to ask for."""
+    """The first sample at which a mesh goes beyond the range of its law, and the cure."""
     first: tuple[int, str] | None = None
     u = moved.q @ model.directions
     for i, (line, sides) in enumerate(zip(model.meshes, model.sides, strict=True)):

@@ -8,7 +8,7 @@ from driver (1) to driven gear (2), driving flanks touch when
 
 s the driver's sense (+1 or -1) and h half the backlash as a twist of the driven gear: for h = 0 a tooth on the line
 of centres faces a space. The curve of the mesh begins at :math:`\varphi_0 = s(\tau_1 - \beta)`. Gears joined by meshes
-hang together, so one angle places the teeth of them all; gears on one shaft that are joined by no mesh are keyed on it
+are one group, so one angle places all their teeth; gears on one shaft that are joined by no mesh are keyed on it
 independently of each other.
 """
 
@@ -25,7 +25,7 @@ from ..gear.mesh_geometry import MeshGeometry
 from ..typing import Array
 from .gear_train import GearMesh, GearTrain
 
-#: Agreement of the shafts' places that a check asks for, relative to the centre distance.
+#: Agreement of the shafts' places that is checked, relative to the centre distance.
 SAME = 1e-6
 #: Agreement of a given phase with the teeth of shared gears, as a part of a tooth pitch.
 NEAR = 1e-3
@@ -86,7 +86,7 @@ class _Join:
 def tooth_places(train: GearTrain, senses: Sequence[float]) -> ToothPlaces:
     """Places of all teeth and phases of all meshes.
 
-    The first mesh of gears that hang together has the phase 0, unless one of them is given a phase.
+    The first mesh of a connected group of gears has the phase 0, unless one of them is given a phase.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def _join(train: GearTrain, mesh: GearMesh, sense: float) -> _Join:
 
 
 def _spread(joins: Sequence[_Join], found: dict[str, float]) -> None:
-    """Places of all gears that hang together with those found."""
+    """Places of all gears connected by meshes with those found."""
     before = 0
     while len(found) > before:
         before = len(found)

@@ -245,7 +245,7 @@ def pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, a
     if j == 0:
         return change / largest
     couple = row + SLOTS + PER_SLOT * slots
-    for low in range(slots):  # what hangs on the forces
+    for low in range(slots):  # what depends on the forces
         own = row + SLOTS + PER_SLOT * low
         f = memory[own + F, j]
         bend = f * memory[own + H3, 0]

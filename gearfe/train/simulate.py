@@ -156,7 +156,7 @@ def _run(
         start=start,
         backend=options.backend,
         longest=longest,
-        raise_on_failure=False,  # a response has a status of its own
+        raise_on_failure=False,  # the response has its own status
     )
     return trajectory, train_states(model, trajectory)
 
@@ -263,7 +263,7 @@ def _whole(
     ended: str,
     options: TransientOptions,
 ) -> TrainResponse:
-    """The last piece with what holds for the whole run."""
+    """The last piece with estimates and warnings of the whole run."""
     warnings = totals.pulls(model) + _loose(model)
     if response.status != "done":
         warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms {ended}")

@@ -228,7 +228,7 @@ def _named(values: Mapping[str, Array], summary: Mapping[str, Any]) -> dict[str,
 
 
 def with_error(error: float | None) -> str:
-    """What follows a number: its error, a question mark where that is unknown, nothing where none was asked for."""
+    """Text after a number: its error, a question mark where it is unknown, nothing without an estimate."""
     if error is None:
         return ""
     return f" +- {float(error):.2g}" if math.isfinite(error) else " +- ?"

@@ -78,7 +78,7 @@ def train_curves(
 
 
 def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
-    """A curve from a CSV file; where the file does not tell its period it is that of the driver."""
+    """A curve from a CSV file; without a period in the file, that of the driver."""
     try:
         return StiffnessCurve.from_csv(path)
     except InputError as error:

@@ -1,7 +1,7 @@
 """From functions of time in a job file to those that the integrators take: pieces of polynomials and sines.
 
 An expression becomes pieces of polynomials of degree `DEGREE` through Chebyshev's points (Trefethen, Approximation
-Theory and Approximation Practice, 2nd ed. 2020, chapters 2 and 8), halved until each is as exact as `CLOSE` asks for;
+Theory and Approximation Practice, 2nd ed. 2020, chapters 2 and 8), halved until each has the accuracy `CLOSE`;
 a kink, at which halving would not end, stays within `KINK` of the largest value.
 """
 
