@@ -123,7 +123,7 @@ class Trochoid:
 
 
 @dataclass(frozen=True)
-class Flank:
+class Involute:
     """Involute, moved inwards along its normal by a tip relief delta(s) = amount ((s - relief_start)/length)^exponent.
 
     With u = s/r_b: Q = P - delta e2, dQ/ds = (u - delta/r_b) e1 - delta' e2; normal along (u - delta/r_b) e2 +
@@ -215,7 +215,7 @@ class Segment:
     """
 
     name: str
-    curve: Arc | Trochoid | Flank
+    curve: Arc | Trochoid | Involute
     start: Point
     end: Point
     breaks: tuple[float, ...] = ()

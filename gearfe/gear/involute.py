@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Array
-from .curves import Arc, Flank, Point, Segment, Trochoid, bisect, inv, inverse_inv
+from .curves import Arc, Involute, Point, Segment, Trochoid, bisect, inv, inverse_inv
 from .deviation import Deviation
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ class ToothProfile:
     """
 
     segments: tuple[Segment, ...]
-    flank: Flank
+    flank: Involute
     form_roll: float
     relief_roll: float
     round_roll: float
@@ -171,9 +171,9 @@ def tooth_profile(gear: Gear) -> ToothProfile:
         cure = "use less addendum or profile shift, or some tip_shortening"
         raise InputError("addendum", gear.addendum, problem, cure)
     round_roll = _round_start(gear, flank, tip_roll, end_roll)
-    flank = Flank(flank.base_radius, flank.base_angle, form_roll, round_roll, *_relief_numbers(flank))
+    flank = replace(flank, end=round_roll)
 
-    pieces: list[tuple[str, Arc | Trochoid | Flank]] = []
+    pieces: list[tuple[str, Arc | Trochoid | Involute]] = []
     space = math.pi / gear.teeth
     land_angle = root.offset / root.reference_radius
     if land_angle > 0.0:
@@ -199,20 +199,16 @@ def tooth_profile(gear: Gear) -> ToothProfile:
     )
 
 
-def _radius(flank: Flank, s: float) -> float:
+def _radius(flank: Involute, s: float) -> float:
     return math.hypot(flank.base_radius, s - float(flank.relief(np.array(s))[0]))
 
 
-def _angle(flank: Flank, s: float) -> float:
+def _angle(flank: Involute, s: float) -> float:
     x, y = flank.at(np.array(s))
     return math.atan2(y, x)
 
 
-def _relief_numbers(flank: Flank) -> tuple[float, float, float, float]:
-    return flank.amount, flank.relief_start, flank.length, flank.exponent
-
-
-def _flank(gear: Gear, form_roll: float) -> tuple[Flank, float]:
+def _flank(gear: Gear, form_roll: float) -> tuple[Involute, float]:
     """Flank from the form point, end still open, and the roll length (m) of the tip circle."""
     base, base_angle, tip_roll = gear.base_radius, gear.base_angle, gear.roll_length(gear.tip_radius)
     if tip_roll <= form_roll:
@@ -221,9 +217,9 @@ def _flank(gear: Gear, form_roll: float) -> tuple[Flank, float]:
         raise InputError(
             "addendum", gear.addendum, problem, "use more addendum, teeth or profile shift, or less dedendum"
         )
-    relief = gear.tip_relief
+    flank, relief = Involute(base, base_angle, form_roll, tip_roll), gear.tip_relief
     if relief is None or relief.amount == 0.0:
-        return Flank(base, base_angle, form_roll, tip_roll), tip_roll
+        return flank, tip_roll
     start = tip_roll - relief.length
     if start < form_roll:
         problem = f"is longer than the flank: must be <= {1e3 * (tip_roll - form_roll):.6g} mm of roll length"
@@ -233,16 +229,17 @@ def _flank(gear: Gear, form_roll: float) -> tuple[Flank, float]:
             f"is too steep: must be <= {200.0 * relief.length / relief.exponent:.6g} mm for this length and exponent"
         )
         raise InputError("tip_relief.amount", relief.amount, problem, "use less relief or a longer one")
-    return Flank(base, base_angle, form_roll, tip_roll, relief.amount, start, relief.length, relief.exponent), tip_roll
+    numbers = {"amount": relief.amount, "relief_start": start, "length": relief.length, "exponent": relief.exponent}
+    return replace(flank, **numbers), tip_roll
 
 
-def _round_centre(gear: Gear, flank: Flank, s: float) -> Point:
+def _round_centre(gear: Gear, flank: Involute, s: float) -> Point:
     at = np.array(s)
     x, y = flank.at(at) - gear.tip_round * flank.normal_at(at)
     return float(x), float(y)
 
 
-def _round_start(gear: Gear, flank: Flank, tip_roll: float, end_roll: float) -> float:
+def _round_start(gear: Gear, flank: Involute, tip_roll: float, end_roll: float) -> float:
     """Roll length (m) where the tip round, tangent to flank and tip circle, begins; the flank's end without one."""
     rho, tip = gear.tip_round, gear.tip_radius
     if rho == 0.0:
@@ -266,7 +263,7 @@ def _round_start(gear: Gear, flank: Flank, tip_roll: float, end_roll: float) -> 
     return start
 
 
-def _largest_round(gear: Gear, flank: Flank) -> float:
+def _largest_round(gear: Gear, flank: Involute) -> float:
     """Largest tip round (m) that begins above the form point and leaves a tip land; relief not counted."""
     tip, base = gear.tip_radius, flank.base_radius
 
@@ -278,7 +275,7 @@ def _largest_round(gear: Gear, flank: Flank) -> float:
     return bisect(too_large, 0.0, tip - base)
 
 
-def deviated(gear: Gear, profile: ToothProfile, deviation: Deviation) -> tuple[Flank, Arc | None]:
+def deviated(gear: Gear, profile: ToothProfile, deviation: Deviation) -> tuple[Involute, Arc | None]:
     """Flank of a profile with a deviation of micrometres, and its tip round fitted anew.
 
     The flank starts at the same radius and ends on the same tip circle; its round is tangent to both as before.
@@ -310,7 +307,7 @@ def _addendum_to(gear: Gear, radius: float) -> float:
     return radius / gear.module - gear.teeth / 2 - gear.profile_shift + gear.tip_shortening
 
 
-def _tip_arc(gear: Gear, flank: Flank, round_roll: float) -> tuple[Arc, float]:
+def _tip_arc(gear: Gear, flank: Involute, round_roll: float) -> tuple[Arc, float]:
     """Tip round and the half angle (rad) of the tip land that it leaves."""
     centre = _round_centre(gear, flank, round_roll)
     x, y = flank.normal_at(np.array(round_roll))
@@ -318,7 +315,7 @@ def _tip_arc(gear: Gear, flank: Flank, round_roll: float) -> tuple[Arc, float]:
     return Arc(centre, gear.tip_round, math.atan2(y, x), land), land
 
 
-def _joined(pieces: list[tuple[str, Arc | Trochoid | Flank]], flank: Flank) -> tuple[Segment, ...]:
+def _joined(pieces: list[tuple[str, Arc | Trochoid | Involute]], flank: Involute) -> tuple[Segment, ...]:
     """Segments that share their end points: each inner joint is where the later piece starts."""
     ends = [tuple(map(float, curve.point(np.array(0.0)))) for _, curve in pieces]
     ends.append(tuple(map(float, pieces[-1][1].point(np.array(1.0)))))

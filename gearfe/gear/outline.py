@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..typing import Array
-from .curves import Arc, Flank
+from .curves import Arc, Involute
 from .deviation import NOMINAL, ToothDeviations
 from .spur_gear import Gear
 
@@ -47,7 +47,7 @@ def tooth_outline(gear: Gear, per_piece: int = 48, kinks: Iterable[float] = ()) 
     left: list[Piece] = []
     for segment in gear.profile.segments:
         breaks = {0.0, *segment.breaks, 1.0}
-        if isinstance(flank := segment.curve, Flank):  # its parameter is linear in the roll length
+        if isinstance(flank := segment.curve, Involute):  # its parameter is linear in the roll length
             breaks |= {(s - flank.start) / (flank.end - flank.start) for s in kinks if flank.start < s < flank.end}
         for low, high in itertools.pairwise(sorted(breaks)):
             # even in the curve's own parameter: an involute curves sharply near its base circle, where its arc length

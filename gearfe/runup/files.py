@@ -38,8 +38,8 @@ class Pictures(Protocol):
 
 @dataclass(frozen=True)
 class RunUpChoice:
-    """Outputs of a run-up: highest multiple of the mesh frequencies, attachment whose acceleration is drawn, and whether
-    modes with much strain in the meshes are written as fields.
+    """Outputs of a run-up: highest multiple of the mesh frequencies, attachment whose acceleration is drawn, whether
+    the modes with much strain in the meshes are written as fields.
     """
 
     multiples: int

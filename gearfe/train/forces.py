@@ -55,7 +55,7 @@ class FlankForces(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Flank(ABC):
+class MeshFlank(ABC):
     """One side of a mesh.
 
     Attributes
@@ -92,7 +92,7 @@ class Flank(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class CurveFlank(Flank):
+class CurveFlank(MeshFlank):
     """Force k(phase) times approach; where `parts`, none before the touch."""
 
     curve: PeriodicInterpolant
@@ -110,7 +110,7 @@ class CurveFlank(Flank):
 
 
 @dataclass(frozen=True, eq=False)
-class LawFlank(Flank):
+class LawFlank(MeshFlank):
     """A mesh law; `damping` is chi (s/m), `sliding` its friction or None.
 
     `shifts`, shape (L,), is the approach (m) by which tooth pair k touches later, k taken modulo L: its pitch errors.
@@ -173,7 +173,7 @@ class TrainForces:
     size: int
     angle: TimeFunction
     gyros: tuple[Gyro, ...]
-    flanks: tuple[Flank, ...]
+    flanks: tuple[MeshFlank, ...]
     torques: tuple[tuple[int, TimeFunction], ...]
 
     @cached_property

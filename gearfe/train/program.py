@@ -21,7 +21,7 @@ from ..meshlaw.law import Laws, stacked_laws
 from ..rigid.tables import Times, time_arrays
 from ..stiffness.periodic import Curves, curve_arrays
 from ..typing import Array, IntArray
-from .forces import CurveFlank, Flank, LawFlank, TrainForces
+from .forces import CurveFlank, LawFlank, MeshFlank, TrainForces
 
 Row = tuple[tuple[int, ...], tuple[float, ...]]
 
@@ -169,7 +169,7 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
     tables = stacked_laws(list(laws.values()))
     first, rows, pieces = [], [], []
     slides: list[int] = []
-    flanks: tuple[Flank, ...] = (*forces.curves, *forces.contacts)
+    flanks: tuple[MeshFlank, ...] = (*forces.curves, *forces.contacts)
     for number, flank in enumerate(flanks):
         first.append(len(made.before))
         rows.append(made.rows)
@@ -205,7 +205,7 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
     return program, made.rows, made.pieces
 
 
-def _place(made: Tables, flank: Flank, rows: int) -> int:
+def _place(made: Tables, flank: MeshFlank, rows: int) -> int:
     """First row of a flank that takes so many; phase and approach are inputs, square and cube of the phase follow."""
     row = made.take(rows)
     made.read(row + Z, flank.turn, 0, flank.sense * flank.ratio, flank.sense, flank.phase, row + CELL)
@@ -280,12 +280,12 @@ def _contact(made: Tables, number: int, flank: LawFlank, slots: int) -> int:
     return slides
 
 
-def _slide(flank: Flank) -> tuple[float, float]:
+def _slide(flank: MeshFlank) -> tuple[float, float]:
     sliding = flank.sliding if isinstance(flank, LawFlank) else None
     return (0.0, 0.0) if sliding is None else (sliding.radius, sliding.pitch_phase)
 
 
-def _shifts(flank: Flank) -> Array:
+def _shifts(flank: MeshFlank) -> Array:
     return flank.shifts if isinstance(flank, LawFlank) else np.zeros(1)
 
 
