@@ -229,8 +229,8 @@ def _flank(gear: Gear, form_roll: float) -> tuple[Involute, float]:
             f"is too steep: must be <= {200.0 * relief.length / relief.exponent:.6g} mm for this length and exponent"
         )
         raise InputError("tip_relief.amount", relief.amount, problem, "use less relief or a longer one")
-    numbers = {"amount": relief.amount, "relief_start": start, "length": relief.length, "exponent": relief.exponent}
-    return replace(flank, **numbers), tip_roll
+    flank = replace(flank, amount=relief.amount, relief_start=start, length=relief.length, exponent=relief.exponent)
+    return flank, tip_roll
 
 
 def _round_centre(gear: Gear, flank: Involute, s: float) -> Point:
