@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..typing import Array, BoolArray, ComplexArray
-from .curves import Arc, Flank, Trochoid
+from .curves import Arc, Involute, Trochoid
 from .deviation import Deviation
 from .involute import deviated
 from .spur_gear import Gear
@@ -43,7 +43,7 @@ class Face:
         The root of an undercut tooth, else None.
     """
 
-    flank: Flank
+    flank: Involute
     round_: Arc | None
     root: Trochoid | None = None
 
