@@ -225,7 +225,7 @@ def test_convergence_order_of_collocation(family, order):
     steps = np.array([20, 28, 40])
     for count in steps:
         step = Stepper(system, start, scheme(family, 3))
-        step.restart(system.acceleration(0.0, start.q, start.v)[0])
+        step.restart(system, start, 0.0, start.q, start.v)
         q, v = start.q, start.v
         for k in range(count):
             assert step(k / count, 1 / count, q, v, np.full(3, 1e-9)) > 0

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..rigid import TimeFunction
+from ..rigid.tape import Tape
 from ..tables.mechanism import ValueTableTable
 from ..textfile import read_text
 from ..typing import Array
@@ -60,6 +61,10 @@ class ValueTable:
     def period(self) -> float:
         """Its period, 0 for none."""
         return float(self.x[-1] - self.x[0]) if self.kind == "periodic" else 0.0
+
+    def write(self, tape: Tape, coordinate: int) -> int:
+        """Variable of a tape that is the table of a coordinate."""
+        return tape.curve(coordinate, self.x, self.pieces, self.period)
 
     def over_time(self) -> TimeFunction:
         """The table as a function of time: pieces that every method differentiates exactly, and that end steps."""

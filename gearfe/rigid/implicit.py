@@ -48,7 +48,6 @@ FUNCTIONS = (
     kernel_rows.copy,
     kernel_rows.time_series,
     *kernel_tape.FUNCTIONS,
-    kernel_quadratic.trigonometry_order,
     kernel_quadratic.row_orders,
     kernel_quadratic.gradients,
     *kernel_saddle.FUNCTIONS,
@@ -138,10 +137,13 @@ class Stepper:
         p = self._powers[1:] + 1.0
         self._guess = tab.c[:, None] ** p / p
 
-    def restart(self, a: Array) -> None:
-        """The next step begins with a constant acceleration."""
+    def restart(self, system: System, start: Start, t: float, q: Array, v: Array) -> Array:
+        """The next step begins with a constant acceleration, which is returned."""
+        a, multipliers = system.acceleration(t, q, v, start.active, start.excess)
+        self.w.multipliers[:] = multipliers[start.active]
         self.w.speeds[:] = 0.0
         self.w.speeds[1] = a
+        return a
 
     def keep(self, h: float) -> None:
         """The step just made is the one before the next."""
@@ -167,9 +169,7 @@ class Stepper:
         """From the start to the last time, by steps whose errors stay below the tolerance."""
         w, tab, units = self.w, self.tab, system.units
         q, v, t, end = start.q.copy(), start.v.copy(), start.time, float(times[-1])
-        a, multipliers = system.acceleration(t, q, v, start.active, start.excess)
-        w.multipliers[:] = multipliers[start.active]
-        self.restart(a)
+        a = self.restart(system, start, t, q, v)
         law = StepLaw(
             exponent=1.0 / (len(tab.c) + 1), growth=5.0, least_error=1e-8, predictive=True, steady=tab.level == 1
         )
@@ -206,17 +206,17 @@ class Stepper:
                 control.reject(error)
                 continue
             t = control.accept(error)
-            if not law.steady:
+            if not (law.steady or corners.passing(h)):
                 control.trial = min(control.trial, abs(h) * EASY / max(float(w.measures[2]), 1e-3))
             known.append(w.known.copy())
             forces.append(np.hstack([w.L[:-1], w.S[:-1]]))
             ends.append(t)
             self.keep(h)
             q, v = w.qn.copy(), w.vn.copy()
-            if corners.passing(h) or not system.stressed:
+            if corners.passing(h):  # its multipliers are rounding over the square of its length
+                accelerations.append(self.restart(system, start, t, q, v))
+            elif not system.stressed:
                 accelerations.append(system.acceleration(t, q, v, start.active, start.excess)[0])
-            if corners.passing(h):
-                self.restart(accelerations[-1])
             reach = np.maximum(reach, np.abs(q))
         dense = self._dense(system, start, np.array(ends), known, forces, accelerations)
         counts: dict[str, Any] = {
@@ -282,7 +282,7 @@ def work(s: int, n: int, m: int, k: int, known: int) -> Stages:
 
 def equations(program: Program, s: int, stresses: int) -> Equations:
     """A program with the order of its unknowns and work arrays."""
-    n, m, z = len(program.mass), len(program.rows.constant), len(program.mass) + 2 * len(program.angle)
+    n, m, z = len(program.mass), len(program.rows.constant), len(program.mass) + len(program.curves.sign)
     N, r = n + m, (s - 1) // 2
     held = np.argwhere(program.mass != 0.0)
     band = _band(program, held)
@@ -295,7 +295,7 @@ def equations(program: Program, s: int, stresses: int) -> Equations:
 
     own = Scratch(
         P=np.zeros((z, 3)), R=np.zeros((len(program.code.op), 3)), TF=np.zeros((len(program.times.first) - 1, 4)),
-        pieces=whole(len(program.switches.register)), H=np.zeros(z), F=np.zeros(n), D=np.zeros((m, z)),
+        pieces=whole(len(program.switches.register)), H=np.zeros((z, 1)), F=np.zeros(n), D=np.zeros((m, z)),
         G=np.zeros((m, n)), K=np.zeros((n, n)), C=np.zeros((n, n)), B=np.zeros((2, N, N)),
         A=np.zeros((r, N, N), dtype=complex), pivot=whole(r + 2, N), first=whole(r + 2, N), last=whole(r + 2, N),
         x=np.zeros(N), y=np.zeros(N, dtype=complex), scale=np.zeros(r + 2), law=np.zeros((stresses, width)),
@@ -309,16 +309,13 @@ def _band(program: Program, held: np.ndarray) -> Band:
     """Which entries of the matrices may not vanish, and an order of the unknowns in which they lie in a narrow band."""
     n, m = len(program.mass), len(program.rows.constant)
 
-    def coordinate(variables: np.ndarray) -> np.ndarray:
-        turning = program.angle[np.maximum(variables - n, 0) // 2] if len(program.angle) else variables
-        return np.where(variables < n, variables, turning)
-
+    of = np.append(np.arange(n), program.curves.place[:, 0])  # coordinate of each variable
     rows, code = program.rows, program.code
     filled = np.zeros((n, n), dtype=bool)
     filled[tuple(held.T)] = True
     filled[tuple(program.block.T)] = True
-    filled[program.angle, program.angle] = True
-    pairs = coordinate(rows.pair[:, 1:])
+    filled[of[n:], of[n:]] = True
+    pairs = of[rows.pair[:, 1:]]
     filled[pairs[:, 0], pairs[:, 1]] = filled[pairs[:, 1], pairs[:, 0]] = True
     for nodes in program.bars.place:
         own = (nodes[:, None] + np.arange(3)).ravel()
@@ -326,12 +323,12 @@ def _band(program: Program, held: np.ndarray) -> Band:
     for first, modes in program.floats.place[:, :2]:
         own = first + np.arange(2 * modes + 4)
         filled[np.ix_(own, own)] = True
-    acting = np.unique(coordinate(code.variable))
-    pushed = np.unique(coordinate(code.push[:, 1]))
+    acting = np.unique(of[code.variable])
+    pushed = np.unique(of[code.push[:, 1]])
     filled[np.ix_(pushed, acting)] = True
     graph = np.zeros((n + m, n + m), dtype=bool)
     graph[:n, :n] = filled | filled.T
-    for row, at in ((rows.place[:, 0], coordinate(rows.place[:, 1])), *((rows.pair[:, 0], p) for p in pairs.T)):
+    for row, at in ((rows.place[:, 0], of[rows.place[:, 1]]), *((rows.pair[:, 0], p) for p in pairs.T)):
         graph[n + row, at] = graph[at, n + row] = True
     place = np.empty(n + m, dtype=np.int64)
     place[narrow_order(graph)] = np.arange(n + m)

@@ -9,15 +9,18 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from ..errors import InputError
 from .forms import GROUND, Form, Frames, Point
 from .timefunctions import TimeFunction
 
+if TYPE_CHECKING:
+    from .tape import Tape
+
 
 class Profile(Protocol):
-    """A function of an angle with two derivatives."""
+    """A function of an angle with two derivatives, which are steady."""
 
     def value(self, x: float) -> float:
         """s(x)."""
@@ -28,12 +31,12 @@ class Profile(Protocol):
     def bend(self, x: float) -> float:
         """s''(x)."""
 
+    def write(self, tape: Tape, coordinate: int) -> int:
+        """Variable of the tape that is s of a coordinate."""
+
 
 class Row(NamedTuple):
-    """One constraint: ``form = motion(t)``, ``form = 0``, or with a profile s of a body's angle ``form = s(theta)``.
-
-    A linkage with a profile has no Taylor series.
-    """
+    """One constraint: ``form = motion(t)``, ``form = 0``, or with a profile s of a body's angle ``form = s(theta)``."""
 
     what: str  # it holds, for messages
     form: Form

@@ -12,9 +12,9 @@ import numpy as np
 
 from ..typing import Array, IntArray
 from .kernel_elastic import add_bar_tangents, add_bars, add_float_tangents, add_floats
-from .kernel_quadratic import gradients, row_orders, trigonometry_order
+from .kernel_quadratic import gradients, row_orders
 from .kernel_rows import copy, fill, time_series
-from .kernel_tape import piece_at, tape_order
+from .kernel_tape import curve_forces, curve_orders, piece_at, tape_order
 
 if TYPE_CHECKING:
     from .collocation import Scheme
@@ -39,7 +39,7 @@ class Scratch(NamedTuple):
     R: Array  # (registers, 3)
     TF: Array  # (functions, 4)
     pieces: IntArray  # of the switches
-    H: Array  # (z,)
+    H: Array  # (z, 1)
     F: Array  # (n,)
     D: Array  # (m, z) rows by variables
     G: Array  # (m, n)
@@ -86,24 +86,31 @@ def own_pieces(eq: Equations) -> bool:
 
 def variables(eq: Equations, q: Array, v: Array) -> None:
     """P := variables and rates."""
-    tb, P = eq.program, eq.own.P
+    tb, own, P = eq.program, eq.own, eq.own.P
     for i in range(q.shape[0]):
         P[i, 0] = q[i]
         P[i, 1] = v[i]
         P[i, 2] = 0.0
-    trigonometry_order(tb, P, 0)
-    trigonometry_order(tb, P, 1)
+    for f in range(tb.curves.sign.shape[0]):
+        s = tb.curves.place[f, 2]
+        if s >= 0 and tb.curves.place[f, 3] == 0:
+            piece = piece_at(tb.switches, s, q[tb.curves.place[f, 0]])
+            own.pieces[s] = piece if tb.switches.period[s] > 0.0 else max(0, piece)
+    curve_orders(tb, P, own.pieces, 0)
+    curve_orders(tb, P, own.pieces, 1)
 
 
-def onto_coordinates(eq: Equations, column: int, H: Array, F: Array) -> None:
-    """F += forces H along the variables; `column` of P holds cosines and sines."""
-    tb, P = eq.program, eq.own.P
-    n = F.shape[0]
-    for i in range(n):
-        F[i] += H[i]
-    for a in range(tb.angle.shape[0]):
-        c = n + 2 * a
-        F[tb.angle[a]] += P[c, column] * H[c + 1] - P[c + 1, column] * H[c]
+def registers_push(eq: Equations, k: int, F: Array) -> None:
+    """F += order k of the registers as forces on the coordinates; these are in H, too."""
+    own, code = eq.own, eq.program.code
+    H = own.H
+    for i in range(H.shape[0]):
+        H[i, 0] = 0.0
+    for p in range(code.push.shape[0]):
+        H[code.push[p, 1], 0] += code.share[p] * own.R[code.push[p, 0], k]
+    for i in range(F.shape[0]):
+        F[i] += H[i, 0]
+    curve_forces(eq.program, own.P, H, 0, F)
 
 
 def stage(eq: Equations, w: Stages, tab: Scheme, i: int, t: float) -> None:
@@ -112,8 +119,7 @@ def stage(eq: Equations, w: Stages, tab: Scheme, i: int, t: float) -> None:
     The force is the one that Newton's method sees (`beam.Tangent`).
     """
     tb, own, band = eq.program, eq.own, eq.band
-    code = tb.code
-    F, H = own.F, own.H
+    F = own.F
     q, v, rest = w.Q[i], w.V[i], w.rest[i]
     n = q.shape[0]
     variables(eq, q, v)
@@ -126,11 +132,8 @@ def stage(eq: Equations, w: Stages, tab: Scheme, i: int, t: float) -> None:
     gradients(tb, own.P, own)
     covered = own_pieces(eq)
     tape_order(tb, own.P, own.R, own.TF, own.pieces, 0)
-    fill(H, 0.0)
-    for p in range(code.push.shape[0]):
-        H[code.push[p, 1]] += code.share[p] * own.R[code.push[p, 0], 0]
     copy(tb.constant, F)
-    onto_coordinates(eq, 0, H, F)
+    registers_push(eq, 0, F)
     for e in range(tb.block.shape[0]):
         F[tb.block[e, 0]] -= tb.stiffness[e] * q[tb.block[e, 1]] + tb.damping[e] * v[tb.block[e, 1]]
     add_bars(tb.bars, q, v, w.S[i], own, F)
@@ -168,9 +171,9 @@ def linearise(eq: Equations, w: Stages, i: int, t: float) -> bool:
         K[a, b] -= factor
         K[b, a] -= factor
     for r in range(D.shape[0]):
-        for a in range(tb.angle.shape[0]):
-            c = n + 2 * a
-            K[tb.angle[a], tb.angle[a]] += w.L[i, r] * (D[r, c] * P[c, 0] + D[r, c + 1] * P[c + 1, 0])
+        for f in range(tb.curves.sign.shape[0]):
+            j = tb.curves.place[f, 0]
+            K[j, j] -= w.L[i, r] * D[r, n + f] * bend(tb, P, f)
     for e in range(tb.block.shape[0]):
         K[tb.block[e, 0], tb.block[e, 1]] -= tb.stiffness[e]
         C[tb.block[e, 0], tb.block[e, 1]] -= tb.damping[e]
@@ -189,7 +192,7 @@ def coordinate(tb: Program, variable: int) -> int:
     n = tb.mass.shape[0]
     if variable < n:
         return variable
-    return tb.angle[(variable - n) // 2]
+    return tb.curves.place[variable - n, 0]
 
 
 def turned(tb: Program, P: Array, variable: int) -> float:
@@ -197,27 +200,26 @@ def turned(tb: Program, P: Array, variable: int) -> float:
     n = tb.mass.shape[0]
     if variable < n:
         return 1.0
-    if (variable - n) % 2 == 0:
-        return -P[variable + 1, 0]
-    return P[variable - 1, 0]
+    return tb.curves.sign[variable - n] * P[tb.curves.place[variable - n, 1], 0]
+
+
+def bend(tb: Program, P: Array, f: int) -> float:
+    """Second derivative of a function of a coordinate by it."""
+    return tb.curves.sign[f] * turned(tb, P, tb.curves.place[f, 1])
 
 
 def add_register_tangents(eq: Equations, q: Array, v: Array) -> None:
     """K, C += derivatives of the registers' forces: order 1 of their series along a direction, rates apart."""
     tb, own, band = eq.program, eq.own, eq.band
-    P, R, H, F, code = own.P, own.R, own.H, own.F, tb.code
+    P, R, F, curves = own.P, own.R, own.F, tb.curves
     n = q.shape[0]
     own_pieces(eq)
     tape_order(tb, P, R, own.TF, own.pieces, 0)
     for f in range(own.TF.shape[0]):
         own.TF[f, 1] = 0.0
-    fill(H, 0.0)
-    for p in range(code.push.shape[0]):
-        H[code.push[p, 1]] += code.share[p] * R[code.push[p, 0], 0]
-    for a in range(tb.angle.shape[0]):
-        c = n + 2 * a
-        K = own.K
-        K[tb.angle[a], tb.angle[a]] -= P[c, 0] * H[c] + P[c + 1, 0] * H[c + 1]
+    registers_push(eq, 0, F)
+    for f in range(curves.sign.shape[0]):
+        own.K[curves.place[f, 0], curves.place[f, 0]] += own.H[n + f, 0] * bend(tb, P, f)
     for d in range(2 * band.acting.shape[0]):
         j = band.acting[d // 2]
         by_rate = d % 2 == 1
@@ -228,23 +230,16 @@ def add_register_tangents(eq: Equations, q: Array, v: Array) -> None:
             P[j, 2] = 0.5
         else:
             P[j, 1] = 1.0
-        for a in range(tb.angle.shape[0]):
-            if tb.angle[a] == j:
-                c = n + 2 * a
+        for f in range(curves.sign.shape[0]):
+            if curves.place[f, 0] == j:
                 if by_rate:
-                    P[c, 2] = -0.5 * P[c + 1, 0]
-                    P[c + 1, 2] = 0.5 * P[c, 0]
+                    P[n + f, 2] = 0.5 * turned(tb, P, n + f)
                 else:
-                    P[c, 1] = -P[c + 1, 0]
-                    P[c + 1, 1] = P[c, 0]
-                    P[c, 2] = -0.5 * P[c, 0] * v[j]
-                    P[c + 1, 2] = -0.5 * P[c + 1, 0] * v[j]
+                    P[n + f, 1] = turned(tb, P, n + f)
+                    P[n + f, 2] = 0.5 * bend(tb, P, f) * v[j]
         tape_order(tb, P, R, own.TF, own.pieces, 1)
-        fill(H, 0.0)
-        for p in range(code.push.shape[0]):
-            H[code.push[p, 1]] += code.share[p] * R[code.push[p, 0], 1]
         fill(F, 0.0)
-        onto_coordinates(eq, 0, H, F)
+        registers_push(eq, 1, F)
         for i in range(n):
             if F[i] != 0.0:
                 if by_rate:
@@ -253,4 +248,4 @@ def add_register_tangents(eq: Equations, q: Array, v: Array) -> None:
                     own.K[i, j] += F[i]
 
 
-FUNCTIONS = (own_pieces, variables, onto_coordinates, coordinate, turned, add_register_tangents, stage, linearise)
+FUNCTIONS = (own_pieces, variables, registers_push, coordinate, turned, bend, add_register_tangents, stage, linearise)

@@ -1,7 +1,7 @@
 """Taylor series of systems with a constant mass matrix, quadratic constraints and forces on a tape, compiled.
 
-With z = (q, cosines, sines), q = sum_j q_j (t - t0)^j and the multipliers likewise, order k of the motion and order
-k + 2 of the constraints read
+With z = (q, cosines, sines, tables), q = sum_j q_j (t - t0)^j and the multipliers likewise, order k of the motion and
+order k + 2 of the constraints read
 
     M (k+2)(k+1) q_{k+2} + G_0^T lambda_k = f_k - sum_{i>=1} G_i^T lambda_{k-i},       G_0 q_{k+2} = -r_{k+2}
 
@@ -18,28 +18,13 @@ import numpy as np
 
 from ..typing import Array, IntArray
 from .kernel_rows import fill, time_series
-from .kernel_tape import cauchy, tape_order, weighted
+from .kernel_tape import cauchy, curve_forces, curve_orders, tape_order
 
 if TYPE_CHECKING:
     from .kernel_equations import Scratch
     from .kernel_steps import Run
     from .series import Work
     from .tape import Program
-
-
-def trigonometry_order(tb: Program, Z: Array, k: int) -> None:
-    """Order k of all cosines and sines, as far as orders of the angles are known."""
-    n = tb.mass.shape[0]
-    for a in range(tb.angle.shape[0]):
-        q = tb.angle[a]
-        c = n + 2 * a
-        if k == 0:
-            Z[c, 0] = np.cos(Z[q, 0])
-            Z[c + 1, 0] = np.sin(Z[q, 0])
-        else:
-            cosine = -weighted(Z, q, Z, c + 1, k, k) / k
-            Z[c + 1, k] = weighted(Z, q, Z, c, k, k) / k
-            Z[c, k] = cosine
 
 
 def row_orders(tb: Program, Z: Array, TF: Array, k: int, out: Array) -> None:
@@ -57,7 +42,7 @@ def row_orders(tb: Program, Z: Array, TF: Array, k: int, out: Array) -> None:
 
 def gradients(tb: Program, Z: Array, w: Work | Scratch) -> None:
     """w.G := dg/dq where the variables are Z[:, 0]."""
-    rows, G, D = tb.rows, w.G, w.D
+    rows, curves, G, D = tb.rows, tb.curves, w.G, w.D
     n = tb.mass.shape[0]
     for r in range(D.shape[0]):
         fill(D[r], 0.0)
@@ -70,9 +55,8 @@ def gradients(tb: Program, Z: Array, w: Work | Scratch) -> None:
     for r in range(D.shape[0]):
         for i in range(n):
             G[r, i] = D[r, i]
-        for a in range(tb.angle.shape[0]):
-            c = n + 2 * a
-            G[r, tb.angle[a]] += D[r, c + 1] * Z[c, 0] - D[r, c] * Z[c + 1, 0]
+        for f in range(curves.place.shape[0]):
+            G[r, curves.place[f, 0]] += D[r, n + f] * curves.sign[f] * Z[curves.place[f, 1], 0]
 
 
 def factorise(tb: Program, w: Work) -> float:
@@ -169,14 +153,14 @@ def add_row_forces(tb: Program, w: Work, k: int, first: int) -> None:
 def expand(tb: Program, w: Work, run: Run, t: float, pieces: IntArray) -> None:
     """Series of the variables from orders 0 and 1 of the coordinates in w.Z; w.A holds the factor there."""
     Z, H, L, TF, F, gap = w.Z, w.H, w.L, w.TF, w.F, w.gap
-    code = tb.code
+    code, curves = tb.code, tb.curves
     n = tb.mass.shape[0]
     for i in range(n):
         for k in range(2, run.order + 1):
             Z[i, k] = 0.0
     time_series(tb.times, t, run.sign > 0.0, run.order + 1, TF)
-    trigonometry_order(tb, Z, 0)
-    trigonometry_order(tb, Z, 1)
+    curve_orders(tb, Z, pieces, 0)
+    curve_orders(tb, Z, pieces, 1)
     for k in range(run.order - 1):
         j = k + 2
         share = 1.0 / (j * (j - 1.0))
@@ -191,10 +175,8 @@ def expand(tb: Program, w: Work, run: Run, t: float, pieces: IntArray) -> None:
         for e in range(tb.block.shape[0]):
             i, at = tb.block[e, 0], tb.block[e, 1]
             F[i] -= tb.stiffness[e] * Z[at, k] + tb.damping[e] * (k + 1) * Z[at, k + 1]
-        for a in range(tb.angle.shape[0]):
-            c = n + 2 * a
-            F[tb.angle[a]] += cauchy(Z, c, H, c + 1, k) - cauchy(Z, c + 1, H, c, k)
-        trigonometry_order(tb, Z, j)
+        curve_forces(tb, Z, H, k, F)
+        curve_orders(tb, Z, pieces, j)
         row_orders(tb, Z, TF, j, gap)
         for i in range(n):
             F[i] *= share
@@ -203,14 +185,12 @@ def expand(tb: Program, w: Work, run: Run, t: float, pieces: IntArray) -> None:
         solve(tb, w, F, gap)
         for i in range(n):
             Z[i, j] = F[i]
-        for a in range(tb.angle.shape[0]):
-            c = n + 2 * a
-            Z[c, j] -= Z[c + 1, 0] * F[tb.angle[a]]
-            Z[c + 1, j] += Z[c, 0] * F[tb.angle[a]]
+        for f in range(curves.place.shape[0]):
+            Z[n + f, j] += curves.sign[f] * Z[curves.place[f, 1], 0] * F[curves.place[f, 0]]
         for r in range(gap.shape[0]):
             L[r, k] = gap[r] / share
         add_row_forces(tb, w, k, 0)
     tape_order(tb, Z, w.R, TF, pieces, run.order - 1)
 
 
-FUNCTIONS = (trigonometry_order, row_orders, gradients, factorise, solve, add_row_forces, expand)
+FUNCTIONS = (row_orders, gradients, factorise, solve, add_row_forces, expand)

@@ -137,6 +137,38 @@ def tape_order(tb: Program, Z: Array, R: Array, TF: Array, pieces: IntArray, k: 
         R[r, k] = value
 
 
+def curve_orders(tb: Program, Z: Array, pieces: IntArray, k: int) -> None:
+    """Order k of all variables that are functions of one coordinate, as far as orders of that are known."""
+    place, sign, switches = tb.curves.place, tb.curves.sign, tb.switches
+    n = tb.mass.shape[0]
+    for f in range(place.shape[0]):
+        q = place[f, 0]
+        s = place[f, 2]
+        d = place[f, 3]
+        if k > 0:
+            Z[n + f, k] = sign[f] * weighted(Z, q, Z, place[f, 1], k, k) / k
+        elif s < 0:
+            Z[n + f, 0] = math.sin(Z[q, 0]) if d else math.cos(Z[q, 0])
+        else:
+            x = Z[q, 0] - lower_knot(switches, s, pieces[s])
+            at = switches.first[s] + own_piece(switches, s, pieces[s])
+            value = 0.0
+            for p in range(4 - d):
+                factor = switches.entry[at, p]
+                for e in range(d):
+                    factor *= 3 - p - e
+                value = value * x + factor
+            Z[n + f, 0] = value
+
+
+def curve_forces(tb: Program, Z: Array, H: Array, k: int, out: Array) -> None:
+    """out += order k of the forces on coordinates of the forces with the series H along the variables."""
+    curves = tb.curves
+    n = tb.mass.shape[0]
+    for f in range(curves.place.shape[0]):
+        out[curves.place[f, 0]] += curves.sign[f] * cauchy(Z, curves.place[f, 1], H, n + f, k)
+
+
 def own_piece(switches: Switches, s: int, piece: int) -> int:
     """Number of a table's piece, which goes on to count beyond one period."""
     count = switches.first[s + 1] - switches.first[s] - 1
@@ -255,8 +287,8 @@ def is_pole(switches: Switches, R: Array, s: int, last: int, h: float, size: flo
 
 
 FUNCTIONS = (
-    is_pole,
-    cauchy, weighted, tape_order, own_piece, lower_knot, piece_at, margin, horner, largest, leaves, next_piece,
+    is_pole, cauchy, weighted, curve_orders, curve_forces, tape_order,
+    own_piece, lower_knot, piece_at, margin, horner, largest, leaves, next_piece,
 )  # fmt: skip
 NAMES = {
     "SUM": SUM, "LINEAR": LINEAR, "RATE": RATE, "FUNCTION": FUNCTION, "MUL": MUL, "DIV": DIV, "POWER": POWER,

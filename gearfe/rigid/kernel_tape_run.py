@@ -11,10 +11,21 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..typing import Array, IntArray
-from .kernel_quadratic import expand, factorise, gradients, row_orders, solve, trigonometry_order
+from .kernel_quadratic import expand, factorise, gradients, row_orders, solve
 from .kernel_rows import copy, fill, time_series
 from .kernel_steps import even_step, next_goal, series_step
-from .kernel_tape import OUTSIDE, horner, is_pole, largest, leaves, margin, next_piece, tape_order
+from .kernel_tape import (
+    OUTSIDE,
+    curve_forces,
+    curve_orders,
+    horner,
+    is_pole,
+    largest,
+    leaves,
+    margin,
+    next_piece,
+    tape_order,
+)
 from .steps import Status
 
 if TYPE_CHECKING:
@@ -66,8 +77,8 @@ def project(tb: Program, w: Work, run: Run, t: float, h: float) -> tuple[float, 
     for turn in range(4):
         for i in range(n):
             P[i, 0], P[i, 1] = w.qn[i], w.vn[i]
-        trigonometry_order(tb, P, 0)
-        trigonometry_order(tb, P, 1)
+        curve_orders(tb, P, w.pieces, 0)
+        curve_orders(tb, P, w.pieces, 1)
         row_orders(tb, P, TF, 0, gap)
         most = 0.0
         for r in range(gap.shape[0]):
@@ -113,8 +124,8 @@ def defect(tb: Program, w: Work, run: Run, t: float, h: float, pieces: IntArray)
             for k in range(run.order, 0, -1):
                 value = value * place + k * w.Z[i, k]
             P[i, 0], P[i, 1] = horner(w.Z, i, run.order, place), value
-        trigonometry_order(tb, P, 0)
-        trigonometry_order(tb, P, 1)
+        curve_orders(tb, P, pieces, 0)
+        curve_orders(tb, P, pieces, 1)
         time_series(tb.times, t + place, run.sign < 0.0 if look == LOOKS_WITHIN - 1 else run.sign > 0.0, 1, w.TF)
         tape_order(tb, P, w.R0, w.TF, pieces, 0)
         for s in range(pieces.shape[0]):
@@ -122,15 +133,13 @@ def defect(tb: Program, w: Work, run: Run, t: float, h: float, pieces: IntArray)
             if margin(tb.switches, s, pieces[s], w.R0[r, 0]) < -OUTSIDE * largest(w.R, r, run.order - 1, h):
                 return np.inf
         for i in range(P.shape[0]):
-            w.H0[i] = 0.0
+            w.H0[i, 0] = 0.0
         for p in range(code.push.shape[0]):
             r = code.push[p, 0]
-            w.H0[code.push[p, 1]] += code.share[p] * (w.R0[r, 0] - horner(w.R, r, run.order - 1, place))
+            w.H0[code.push[p, 1], 0] += code.share[p] * (w.R0[r, 0] - horner(w.R, r, run.order - 1, place))
         for i in range(n):
-            F[i] = w.H0[i]
-        for a in range(tb.angle.shape[0]):
-            c = n + 2 * a
-            F[tb.angle[a]] += P[c, 0] * w.H0[c + 1] - P[c + 1, 0] * w.H0[c]
+            F[i] = w.H0[i, 0]
+        curve_forces(tb, P, w.H0, 0, F)
         fill(gap, 0.0)
         solve(tb, w, F, gap)
         for i in range(n):

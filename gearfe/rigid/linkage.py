@@ -93,8 +93,8 @@ class Linkage(Element):
 
     @property
     def has_series(self) -> bool:
-        """Whether the Taylor kernels can run it: no load depends on the state, no constraint has a profile."""
-        return not (self.assembly.state_loads or self.assembly.tension_laws or self.assembly.profiles)
+        """Whether the kernels of rigid linkages can run it: no load depends on the state, no row has a profile."""
+        return not (self.pieced or self.assembly.profiles)
 
     @property
     def pieced(self) -> bool:

@@ -54,9 +54,7 @@ class BodyVariables:
 
 
 def write_linkage(linkage: Linkage, tape: Tape, places: IntArray) -> bool:
-    """The linkage on the tape; False for profiles, and for loads that cannot be written."""
-    if linkage.assembly.profiles:
-        return False
+    """The linkage on the tape; False for loads that cannot be written."""
     tables, bodies = linkage.assembly.tables, BodyVariables(tape, places)
     forms, vectors, functions = tables.forms, tables.vectors, linkage.assembly.functions
 
@@ -70,6 +68,7 @@ def write_linkage(linkage: Linkage, tape: Tape, places: IntArray) -> bool:
         (one, two), ((w, x, y), (v, a, b)) = vectors.bodies[k].tolist(), vectors.end[k].tolist()
         return bodies.point(two, v, a, b, bodies.point(one, w, x, y))
 
+    profiles = {r: (int(forms.bodies[r, k]), p) for r, k, p in linkage.assembly.profiles}
     for r in range(linkage.rows):
         held, products = form(r), []
         terms, constant = dict(held.terms), held.constant
@@ -80,6 +79,9 @@ def write_linkage(linkage: Linkage, tape: Tape, places: IntArray) -> bool:
                     for i, f in a.terms.items():
                         terms[i] = terms.get(i, 0.0) + f * b.constant
                 constant += u.constant * v.constant
+        if r in profiles:
+            body, profile = profiles[r]
+            terms[profile.write(tape, bodies.places[3 * body + 2])] = -1.0
         motion = functions[forms.motion[r]] if forms.motion[r] >= 0 else None
         tape.row(terms, products, constant, motion, float(forms.unit[r]))
     tape.constant[places] += tables.forces.weight[: linkage.size]

@@ -48,7 +48,7 @@ class Work(NamedTuple):
     TF: Array  # (functions, K)
     P: Array  # (z, 2) one state
     R0: Array  # (registers, 1) there
-    H0: Array  # (z,)
+    H0: Array  # (z, 1)
     D: Array  # (m, z) rows by variables
     G: Array  # (m, n)
     A: Array  # (n + m, n + m) factor
@@ -101,10 +101,10 @@ def without_redundant(program: Program, active: np.ndarray) -> Program:
 
 
 def _work(program: Program, order: int) -> Work:
-    n, m, z = len(program.mass), len(program.rows.constant), len(program.mass) + 2 * len(program.angle)
+    n, m, z = len(program.mass), len(program.rows.constant), len(program.mass) + len(program.curves.sign)
     K, registers, functions = order + 2, len(program.code.op), len(program.times.first) - 1
     shapes: list[tuple[int, ...]] = [(z, K), (z, K), (m, K), (registers, K), (functions, K)]
-    shapes += [(z, 2), (registers, 1), (z,), (m, z), (m, n), (n + m, n + m)]
+    shapes += [(z, 2), (registers, 1), (z, 1), (m, z), (m, n), (n + m, n + m)]
     vectors = [np.zeros(n) for _ in range(4)]
     pieces, pivot = (np.zeros(k, dtype=np.int64) for k in (len(program.switches.register), n + m))
     last = [np.zeros(1), np.zeros(n + m), np.zeros(n), np.zeros(m)]
@@ -118,7 +118,7 @@ def first_pieces(program: Program, w: Work, t: float, forward: bool) -> bool:
     w.Z[:n, 0], w.Z[:n, 1] = w.q, w.v
     plain.time_series(program.times, t, forward, 2, w.TF)
     for k in (0, 1):
-        plain.trigonometry_order(program, w.Z, k)
+        plain.curve_orders(program, w.Z, w.pieces, k)
     for s, register in enumerate(program.switches.register):
         plain.tape_order(program, w.Z, w.R, w.TF, w.pieces, 0)
         w.pieces[s] = piece = plain.piece_at(program.switches, s, w.R[register, 0])

@@ -1,6 +1,7 @@
 """Equations of motion as a tape: a list of elementary operations whose Taylor series follow from one another.
 
-The variables are z = (q, cos q_a, sin q_a for some angles q_a). Rows of constraints are quadratic in them,
+The variables are z = (q, functions of single coordinates: cosines, sines, tables). Rows of constraints are quadratic
+in them,
 
     g_r = c_r + sum_i L_ri z_i + sum B_rij z_i z_j - motion_r(t),
 
@@ -63,6 +64,13 @@ class Switches(NamedTuple):
     above: IntArray  # (s,) for a denominator the register above it, -1 for none
 
 
+class Curves(NamedTuple):
+    """Variables u(q) that are functions of one coordinate, f in all; their derivatives u' are such variables, too."""
+
+    place: IntArray  # (f, 4) coordinate, variable u', switch of a table (-1: none), derivative of that
+    sign: Array  # (f,) factor of u'; none for a third derivative, whose pieces are constant
+
+
 class Bars(NamedTuple):
     """Gauss points of beams, p in all, each among four nodes."""
 
@@ -93,7 +101,7 @@ class Program(NamedTuple):
     stiffness: Array  # (e,)
     constant: Array  # (n,) forces
     unit: Array  # (n,) sizes of the coordinates
-    angle: IntArray  # (a,) coordinates whose cosine and sine are the variables n + 2a, n + 2a + 1
+    curves: Curves  # variables n, n + 1, ...
     rows: Rows
     code: Code
     switches: Switches
@@ -113,7 +121,8 @@ class Tape:
 
     def __init__(self, size: int) -> None:
         self.size = size
-        self.angles: dict[int, int] = {}
+        self._curves: dict[tuple[object, ...], int] = {}
+        self._curve_rows: list[tuple[int, int, int, int, float]] = []
         self.constant = np.zeros(size)
         self._functions: list[TimeFunction] = []
         self._rows: list[tuple[Terms, Sequence[tuple[int, int, float]], float, int, float]] = []
@@ -146,8 +155,20 @@ class Tape:
 
     def turn(self, angle: int) -> tuple[int, int]:
         """Variables that are cosine and sine of the coordinate `angle`."""
-        at = self.size + 2 * self.angles.setdefault(angle, len(self.angles))
+        if (angle,) not in self._curves:
+            at = self._curves[angle,] = self.size + len(self._curve_rows)
+            self._curve_rows += [(angle, at + 1, -1, 0, -1.0), (angle, at, -1, 1, 1.0)]
+        at = self._curves[angle,]
         return at, at + 1
+
+    def curve(self, coordinate: int, knots: Array, entries: Array, period: float = 0.0) -> int:
+        """Variable that is a table (as of `table`) of a coordinate."""
+        key = (coordinate, knots.tobytes(), entries.tobytes(), period)
+        if key not in self._curves:
+            at = self._curves[key] = self.size + len(self._curve_rows)
+            number = self._table(self.linear({coordinate: 1.0}), knots, entries, period)
+            self._curve_rows += [(coordinate, at + min(d + 1, 3), number, d, float(d < 3)) for d in range(4)]
+        return self._curves[key]
 
     def row(
         self, terms: Terms, products: Sequence[tuple[int, int, float]] = (), constant: float = 0.0,
@@ -255,7 +276,7 @@ class Tape:
 
     def table(self, a: int, knots: Array, entries: Array, period: float = 0.0) -> int:
         """Piecewise cubic in a with those coefficients (knots - 1, 4) of powers of a - knot, highest first."""
-        number = self._switch(a, knots, np.vstack([entries, np.zeros(4)]), period)
+        number = self._table(a, knots, entries, period)
         shifted = self._append(SHIFT, a, number)
         made = self._append(ENTRY, number, 0)
         for k in range(1, 4):
@@ -288,6 +309,9 @@ class Tape:
         self._ops.append((op, a, b, c))
         self._factors.append(factors)
         return len(self._ops) - 1
+
+    def _table(self, register: int, knots: Array, entries: Array, period: float) -> int:
+        return self._switch(register, knots, np.vstack([entries, np.zeros(4)]), period)
 
     def _switch(self, register: int, knots: Array, entries: Array, period: float, above: int = -1) -> int:
         self._switches.append((register, knots, entries, period, above))
@@ -329,8 +353,8 @@ class Tape:
         at = tuple(block.T)
         return Program(
             np.ascontiguousarray(mass), np.ascontiguousarray(block), damping[at], stiffness[at], self.constant, unit,
-            np.array(list(self.angles), dtype=np.int64), rows, code, switches, time_arrays(self._functions),
-            self._bar_arrays(), self._float_arrays(),
+            Curves(_ints([r[:4] for r in self._curve_rows], 4), np.array([r[4] for r in self._curve_rows], float)),
+            rows, code, switches, time_arrays(self._functions), self._bar_arrays(), self._float_arrays(),
         )  # fmt: skip
 
     def _bar_arrays(self) -> Bars:
