@@ -136,6 +136,12 @@ class Couplings:
         leads = second[np.searchsorted(first, np.arange(len(counts)))] == np.arange(len(counts))
         return [second[(counts == z)[first] & leads[first]].reshape(-1, z) for z in np.unique(counts)]
 
+    @cached_property
+    def dense(self) -> tuple[IntArray, IntArray]:
+        """Places of contacts and couples among vectors and matrices of all slots, shapes (p,) and (c,)."""
+        row = self.position * self.slots + self.slot
+        return row, row[self.first] * self.slots + self.slot[self.second]
+
     def couple(self, first: IntArray, second: IntArray) -> IntArray:
         """Numbers of couples of contacts."""
         return np.asarray(self.starts.take(first) + self.slot.take(second))
@@ -156,15 +162,14 @@ class Couplings:
         """F with F + stiffness (matrix F) = free within each position, shape (p,); both matrices by couple."""
         if self.slots == 1:
             return np.asarray(free / (1.0 + stiffness * matrix))
-        size = self.slots
-        row = self.position * size + self.slot
-        if len(self.first) == self.positions * size * size:  # no slot is empty
-            dense, right = np.stack([stiffness, matrix]), free
+        size, row, place = self.slots, *self.dense
+        if len(place) == self.positions * size * size:  # no slot is empty
+            S, T, right = stiffness, matrix, free
         else:
-            dense, right = np.zeros((2, self.positions * size * size)), np.zeros(self.positions * size)
-            dense[:, row[self.first] * size + self.slot[self.second]] = stiffness, matrix
-            right[row] = free
-        system = np.matmul(*dense.reshape(2, -1, size, size)) + np.eye(size)
+            S, T, right = (np.zeros(self.positions * size**power) for power in (2, 2, 1))
+            S[place], T[place], right[row] = stiffness, matrix, free
+        system = S.reshape(-1, size, size) @ T.reshape(-1, size, size)
+        system.reshape(-1, size * size)[:, :: size + 1] += 1.0
         return np.linalg.solve(system, right.reshape(-1, size, 1)).ravel().take(row)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,23 +18,23 @@ from numpy.typing import NDArray
 from ..typing import Array, BoolArray, Dataclass, IntArray
 
 
+@cache
+def _names(kind: Any) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))
+
+
 def taken(record: Dataclass, index: Any) -> Dataclass:
     """The entries `index` of every array, of records within the record likewise."""
-    own = {field.name: getattr(record, field.name) for field in fields(record)}
-    made = {name: value[index] if isinstance(value, np.ndarray) else taken(value, index) for name, value in own.items()}
-    return type(record)(**made)
+    own = [getattr(record, name) for name in _names(type(record))]
+    return type(record)(*(v[index] if isinstance(v, np.ndarray) else taken(v, index) for v in own))
 
 
 def joined(parts: Sequence[Dataclass]) -> Dataclass:
     """Records of one kind, one after the other."""
     if len(parts) == 1:
         return parts[0]
-    own = {field.name: [getattr(part, field.name) for part in parts] for field in fields(parts[0])}
-    made: dict[str, Any] = {
-        name: np.concatenate(values) if isinstance(values[0], np.ndarray) else joined(values)
-        for name, values in own.items()
-    }
-    return type(parts[0])(**made)
+    own = [[getattr(part, name) for part in parts] for name in _names(type(parts[0]))]
+    return type(parts[0])(*(np.concatenate(v) if isinstance(v[0], np.ndarray) else joined(v) for v in own))
 
 
 def of_positions(record: Dataclass, chosen: IntArray) -> Dataclass:
