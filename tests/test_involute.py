@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from gearfe.gear.curves import coordinates
 from gearfe.gear.involute import inv, inverse_inv, tooth_profile
 from gearfe.gear.pair import Gear, TipRelief
 
@@ -64,7 +65,7 @@ def test_segments_are_joined_tangent_and_simple(one):
         assert corner or tangent < 1e-9, (before.name, after.name)
     for segment in profile.segments:
         ends = segment.curve.point(np.array([0.0, 1.0]))
-        np.testing.assert_allclose(ends, [segment.start, segment.end], atol=NM)
+        np.testing.assert_allclose(coordinates(ends), [segment.start, segment.end], atol=NM)
         np.testing.assert_allclose(np.linalg.norm(segment.normals(t), axis=1), 1.0, rtol=1e-14)
     points = np.concatenate([s.points(t) for s in profile.segments])
     radius, angle = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
@@ -93,7 +94,7 @@ def test_involute_normals_touch_the_base_circle(one):
     profile = one.profile
     end = min(profile.round_roll, profile.relief_roll)
     s = np.linspace(profile.form_roll, end, 50)
-    points, normals = profile.points_of_roll(s), profile.flank.normal_at(s)
+    points, normals = profile.points_of_roll(s), profile.normals_of_roll(s)
     lever = points[:, 0] * normals[:, 1] - points[:, 1] * normals[:, 0]
     np.testing.assert_allclose(lever, one.base_radius, rtol=1e-13)
     # the tangent from the base circle has the length s, and unrolls from the base circle
@@ -201,7 +202,7 @@ def test_tip_relief_is_taken_off_along_the_involute_normal(exponent):
     tip = plain.profile.tip_roll
     s = np.linspace(tip - 1.5 * length, tip, 31)
     moved = relieved.profile.points_of_roll(s) - plain.profile.points_of_roll(s)
-    normal = plain.profile.flank.normal_at(s)
+    normal = plain.profile.normals_of_roll(s)
     expected = amount * np.maximum(0.0, (s - (tip - length)) / length) ** exponent
     np.testing.assert_allclose(moved, -expected[:, None] * normal, atol=1e-17)
     assert expected[-1] == pytest.approx(amount)

@@ -1,7 +1,7 @@
-"""Plane curves of a gear tooth with exact points, normals and arc lengths.
+"""Plane curves of a gear tooth with exact points, normals and arc lengths; points and vectors are complex numbers.
 
 The involute is described by the roll length s, the length of its tangent to the base circle (ISO 21771, 4.3): with
-tau = B - s/r_b, e1 = (cos tau, sin tau), e2 = (-sin tau, cos tau) and B = psi + inv(alpha),
+tau = B - s/r_b, e1 = exp(i tau), e2 = i e1 and B = psi + inv(alpha),
 
     P(s) = r_b e1 + s e2,    radius = sqrt(r_b^2 + s^2),    polar angle = B - (s/r_b - atan(s/r_b)),    normal = e2.
 
@@ -20,7 +20,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from ..typing import Array
+from ..typing import Array, ComplexArray
 from .deviation import Deviation
 
 Point = tuple[float, float]
@@ -74,11 +74,11 @@ class Arc:
     start_angle: float
     end_angle: float
 
-    def point(self, t: Array) -> Array:
-        return np.asarray(self.centre) + self.radius * self.normal(t)
+    def point(self, t: Array) -> ComplexArray:
+        return complex(*self.centre) + self.radius * self.normal(t)
 
-    def normal(self, t: Array) -> Array:
-        return _unit(self.start_angle + t * (self.end_angle - self.start_angle))
+    def normal(self, t: Array) -> ComplexArray:
+        return np.exp(1j * (self.start_angle + t * (self.end_angle - self.start_angle)))
 
     def speed(self, t: Array) -> Array:
         return np.full(np.shape(t), self.radius * abs(self.start_angle - self.end_angle))
@@ -100,26 +100,26 @@ class Trochoid:
     space_angle: float
     end: float
 
-    def at(self, g: Array) -> Array:
-        """Points (m) where the contact normal has the angle g (rad), shape (n, 2)."""
+    def at(self, g: Array) -> ComplexArray:
+        """Points (m) where the contact normal has the angle g (rad), shape (n,)."""
         reach = self.depth / np.cos(g) + self.radius
-        return self._turn(g, reach * np.sin(g), self.reference_radius - reach * np.cos(g))
+        return (1j * self.reference_radius - 1j * reach * np.exp(1j * g)) * self._turn(g)
 
-    def point(self, t: Array) -> Array:
+    def point(self, t: Array) -> ComplexArray:
         return self.at(t * self.end)
 
-    def normal(self, t: Array) -> Array:
+    def normal(self, t: Array) -> ComplexArray:
         g = t * self.end
-        return self._turn(g, -np.sin(g), np.cos(g))
+        return 1j * np.exp(1j * g) * self._turn(g)
 
     def speed(self, t: Array) -> Array:
         g = t * self.end
         reach = self.depth / np.cos(g) + self.radius
         return self.end * np.abs(self.radius + reach * self.depth / (self.reference_radius * np.cos(g) ** 2))
 
-    def _turn(self, g: Array, x: Array, y: Array) -> Array:
+    def _turn(self, g: Array) -> ComplexArray:
         roll = (self.depth * np.tan(g) - self.offset) / self.reference_radius + self.space_angle - math.pi / 2
-        return np.stack([x * np.cos(roll) - y * np.sin(roll), x * np.sin(roll) + y * np.cos(roll)], axis=-1)
+        return np.exp(1j * roll)
 
 
 @dataclass(frozen=True)
@@ -168,28 +168,30 @@ class Involute:
             depth, slope = depth - height, slope - rise
         return depth, slope
 
-    def at(self, s: Array) -> Array:
-        """Points (m) at roll lengths s (m), shape (n, 2)."""
-        along, across = _frame(self.base_angle - np.asarray(s) / self.base_radius)
-        return self.base_radius * along + (s - self.relief(s)[0])[..., None] * across
+    def at(self, s: Array) -> ComplexArray:
+        """Points (m) at roll lengths s (m), shape (n,)."""
+        beside = s - self.relief(s)[0] if self.modified else s
+        return np.exp(1j * (self.base_angle - s / self.base_radius)) * (self.base_radius + 1j * beside)
 
-    def normal_at(self, s: Array) -> Array:
-        """Outward unit normals at roll lengths s (m), shape (n, 2)."""
-        along, across = _frame(self.base_angle - np.asarray(s) / self.base_radius)
+    def normal_at(self, s: Array) -> ComplexArray:
+        """Outward unit normals at roll lengths s (m), shape (n,)."""
+        across = 1j * np.exp(1j * (self.base_angle - s / self.base_radius))
+        if not self.modified:
+            return across
         delta, slope = self.relief(s)
         forward = (s - delta) / self.base_radius
         size = np.hypot(forward, slope)
-        safe = np.where(size > 0.0, size, 1.0)
-        return (np.where(size > 0.0, forward, 1.0) / safe)[..., None] * across + (slope / safe)[..., None] * along
+        turned = (forward - 1j * slope) / np.where(size > 0.0, size, 1.0)
+        return np.asarray(across * np.where(size > 0.0, turned, 1.0))
 
     def roll(self, t: Array) -> Array:
         """Roll length (m) at the parameter t."""
         return self.start + t * (self.end - self.start)
 
-    def point(self, t: Array) -> Array:
+    def point(self, t: Array) -> ComplexArray:
         return self.at(self.roll(t))
 
-    def normal(self, t: Array) -> Array:
+    def normal(self, t: Array) -> ComplexArray:
         return self.normal_at(self.roll(t))
 
     def speed(self, t: Array) -> Array:
@@ -223,12 +225,12 @@ class Segment:
     def points(self, t: Array) -> Array:
         """Points (m) at the parameters t, shape (n, 2); t = 0 and 1 give `start` and `end` exactly."""
         t = np.asarray(t, dtype=float)
-        made = self.curve.point(t)
+        made = coordinates(self.curve.point(t))
         return np.where((t == 0.0)[..., None], self.start, np.where((t == 1.0)[..., None], self.end, made))
 
     def normals(self, t: Array) -> Array:
         """Outward unit normals of the material at the parameters t, shape (n, 2)."""
-        return self.curve.normal(np.asarray(t, dtype=float))
+        return coordinates(self.curve.normal(np.asarray(t, dtype=float)))
 
     @property
     def length(self) -> float:
@@ -274,10 +276,6 @@ class Segment:
         return half * (self.curve.speed(nodes) @ w)
 
 
-def _unit(angle: Array) -> Array:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
-def _frame(angle: Array) -> tuple[Array, Array]:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)
+def coordinates(points: ComplexArray) -> Array:
+    """x and y of complex numbers, shape (..., 2)."""
+    return np.stack([points.real, points.imag], axis=-1)

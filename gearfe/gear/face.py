@@ -7,7 +7,6 @@ does, and the mate's tip passes so close below it that the root may be touched f
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -69,41 +68,24 @@ class Face:
 
     def points(self, u: Array) -> ComplexArray:
         """Points (m) as complex numbers."""
-        flank = self.flank
-        s = flank.roll(np.minimum(np.maximum(u, 0.0), 1.0))
-        beside = s - flank.relief(s)[0] if flank.modified else s
-        made = np.exp(1j * (flank.base_angle - s / flank.base_radius)) * (flank.base_radius + 1j * beside)
-        if self.round_ is not None:
-            round_ = complex(*self.round_.centre) + self.round_.radius * _round_normals(self.round_, u)
-            made = np.where(u > 1.0, round_, made)
-        return self._with_root(u, made, lambda root, v: _complex(root.point(v)))
+        return self._of_curves("point", u)
 
     def normals(self, u: Array) -> ComplexArray:
         """Outward unit normals as complex numbers."""
-        flank = self.flank
-        s = flank.roll(np.minimum(np.maximum(u, 0.0), 1.0))
-        made = 1j * np.exp(1j * (flank.base_angle - s / flank.base_radius))
-        if flank.modified:
-            depth, slope = flank.relief(s)
-            forward = (s - depth) / flank.base_radius
-            size = np.hypot(forward, slope)
-            made = made * np.where(size > 0.0, (forward - 1j * slope) / np.where(size > 0.0, size, 1.0), 1.0)
-        if self.round_ is not None:
-            made = np.where(u > 1.0, _round_normals(self.round_, u), made)
-        return self._with_root(u, made, lambda root, v: _complex(root.normal(v)))
+        return self._of_curves("normal", u)
 
     def speeds(self, u: Array) -> Array:
         """Arc length per unit of u (m)."""
-        made: Array = self.flank.speed(np.clip(u, 0.0, 1.0))
-        if self.round_ is not None:
-            made = np.where(u > 1.0, self.round_.speed(u - 1.0), made)
-        return self._with_root(u, made, lambda root, v: root.speed(v))
+        return self._of_curves("speed", u)
 
-    def _with_root(self, u: Any, values: Any, of_root: Callable[[Trochoid, Array], Any]) -> Any:
-        """Values with those of the root's curve where u < 0."""
-        if self.root is None or not np.any(np.asarray(u) < 0.0):
-            return values
-        return np.where(np.asarray(u) < 0.0, of_root(self.root, 1.0 + np.minimum(u, 0.0)), values)
+    def _of_curves(self, what: str, u: Array) -> Any:
+        """A quantity of the curve that each parameter lies on."""
+        made = getattr(self.flank, what)(np.minimum(np.maximum(u, 0.0), 1.0))
+        if self.round_ is not None:
+            made = np.where(u > 1.0, getattr(self.round_, what)(u - 1.0), made)
+        if self.root is not None and (u < 0.0).any():
+            made = np.where(u < 0.0, getattr(self.root, what)(1.0 + np.minimum(u, 0.0)), made)
+        return made
 
     def parameter(self, roll: Any) -> Any:
         """Parameter at a roll length (m)."""
@@ -127,18 +109,15 @@ class Face:
 
     def at_radius(self, radius: Array) -> Array:
         """Parameter u of the points at given radii (m) within the range."""
-        return self._with_root(
-            np.where(radius < self.radii[0], -1.0, 1.0),
-            self._above_root(radius),
-            lambda root, _: self._in_root(root, radius),
-        )
+        above, low = self._above_root(radius), radius < self.radii[0]
+        return above if self.root is None or not low.any() else np.where(low, self._in_root(self.root, radius), above)
 
     def _in_root(self, root: Trochoid, radius: Array) -> Array:
         """Parameter u in the root by Newton's method from a table; the radius grows all along it."""
         v = np.linspace(0.5, 1.0, 65)
-        v = np.interp(radius, np.abs(_complex(root.point(v))), v)
+        v = np.interp(radius, np.abs(root.point(v)), v)
         for _ in range(3):
-            point, along = _complex(root.point(v)), -1j * _complex(root.normal(v))
+            point, along = root.point(v), -1j * root.normal(v)
             rate = (point.conj() * along).real / np.abs(point) * root.speed(v)
             v = np.clip(v + (radius - np.abs(point)) / rate, 0.5, 1.0)
         return v - 1.0
@@ -208,10 +187,6 @@ class Face:
         return sorted({*found, *self.kinks.tolist()})
 
 
-def _complex(points: Any) -> ComplexArray:
-    return np.asarray(points[..., 0] + 1j * points[..., 1])
-
-
 def face_of(gear: Gear, deviation: Deviation | None = None) -> Face:
     """Working flank of a gear, with a deviation of micrometres."""
     profile = gear.profile
@@ -225,11 +200,5 @@ def face_of(gear: Gear, deviation: Deviation | None = None) -> Face:
         return Face(flank, arc)
     root = profile.segment("trochoid").curve
     # going up a convex flank its normal turns clockwise
-    fall = np.angle(_complex(root.normal(np.array(1.0))) / _complex(flank.normal(np.array(0.0))))
+    fall = np.angle(root.normal(np.array(1.0)) / flank.normal(np.array(0.0)))
     return Face(flank, arc, root if isinstance(root, Trochoid) and fall > 0.0 else None)
-
-
-def _round_normals(round_: Arc, u: Array) -> ComplexArray:
-    """Normals of a tip round at parameters u in [1, 2]."""
-    start, end = round_.start_angle, round_.end_angle
-    return np.asarray(np.exp(1j * (start + (u - 1.0) * (end - start))))

@@ -192,9 +192,9 @@ def flank_curve(gear: Gear, face: Face | None = None) -> FlankCurve:
     root = next((s.curve for s in gear.profile.segments if s.name == "trochoid"), None)
     if isinstance(root, Trochoid):
         v = np.linspace(0.5, 1.0, ROOT)
-        tangent = -1j * (root.normal(v) @ np.array([1, 1j]))
+        tangent = -1j * (root.normal(v))
         u = np.concatenate([v[:-1] - 1, u])
-        points = np.concatenate([(root.point(v) @ np.array([1, 1j]))[:-1], points])
+        points = np.concatenate([root.point(v)[:-1], points])
         size = np.concatenate([_lengths(root.speed, v), size])
         before, after = np.concatenate([tangent[:-1], before]), np.concatenate([tangent[1:], after])
     s = np.concatenate([[0.0], np.cumsum(size)])

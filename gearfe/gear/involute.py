@@ -8,6 +8,8 @@ form point and the undercut, stands first.
 
 from __future__ import annotations
 
+import cmath
+import itertools
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -16,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Array
-from .curves import Arc, Involute, Point, Segment, Trochoid, bisect, inv, inverse_inv
+from .curves import Arc, Involute, Point, Segment, Trochoid, bisect, coordinates, inv, inverse_inv
 from .deviation import Deviation
 
 if TYPE_CHECKING:
@@ -65,7 +67,7 @@ def tooth_root(gear: Gear) -> tuple[Trochoid, float, bool]:
         return whole, max(0.0, form_roll), False
     end, form_roll = _crossing(gear, whole)
     cut = Trochoid(r, d, rho, offset, math.pi / gear.teeth, end)
-    if cut.point(np.linspace(0.0, 1.0, 257))[:, 1].min() <= 0.0:
+    if cut.point(np.linspace(0.0, 1.0, 257)).imag.min() <= 0.0:
         problem = f"the undercut root cuts the tooth through; there is no undercut from {least_shift(gear):.4g} on"
         raise InputError("profile_shift", gear.profile_shift, problem, "use more profile shift or more teeth")
     return cut, form_roll, True
@@ -76,15 +78,14 @@ def _crossing(gear: Gear, root: Trochoid) -> tuple[float, float]:
     base, base_angle = gear.base_radius, gear.base_angle
 
     def radius(g: float) -> float:
-        return float(np.hypot(*root.at(np.array(g))))
+        return abs(complex(root.at(np.array(g))))
 
     def roll(g: float) -> float:
         return gear.roll_length(radius(g))
 
     def outside(g: float) -> float:
-        x, y = root.at(np.array(g))
         u = roll(g) / base
-        return math.atan2(y, x) - (base_angle - u + math.atan(u))
+        return cmath.phase(root.at(np.array(g))) - (base_angle - u + math.atan(u))
 
     lowest = bisect(lambda g: radius(g) - base, 0.0, root.end)
     if outside(lowest) >= 0.0:
@@ -142,7 +143,11 @@ class ToothProfile:
 
     def points_of_roll(self, s: Array) -> Array:
         """Flank points (m) at roll lengths s (m), shape (n, 2)."""
-        return self.flank.at(np.asarray(s, dtype=float))
+        return coordinates(self.flank.at(np.asarray(s, dtype=float)))
+
+    def normals_of_roll(self, s: Array) -> Array:
+        """Outward unit normals of the flank at roll lengths s (m), shape (n, 2)."""
+        return coordinates(self.flank.normal_at(np.asarray(s, dtype=float)))
 
     def polyline(self, per_segment: int = 40) -> Array:
         """Points (m) of the half profile, equally spaced in arc length on each segment, shape (n, 2)."""
@@ -204,8 +209,7 @@ def _radius(flank: Involute, s: float) -> float:
 
 
 def _angle(flank: Involute, s: float) -> float:
-    x, y = flank.at(np.array(s))
-    return math.atan2(y, x)
+    return cmath.phase(flank.at(np.array(s)))
 
 
 def _flank(gear: Gear, form_roll: float) -> tuple[Involute, float]:
@@ -235,8 +239,8 @@ def _flank(gear: Gear, form_roll: float) -> tuple[Involute, float]:
 
 def _round_centre(gear: Gear, flank: Involute, s: float) -> Point:
     at = np.array(s)
-    x, y = flank.at(at) - gear.tip_round * flank.normal_at(at)
-    return float(x), float(y)
+    centre = complex(flank.at(at) - gear.tip_round * flank.normal_at(at))
+    return centre.real, centre.imag
 
 
 def _round_start(gear: Gear, flank: Involute, tip_roll: float, end_roll: float) -> float:
@@ -310,18 +314,17 @@ def _addendum_to(gear: Gear, radius: float) -> float:
 def _tip_arc(gear: Gear, flank: Involute, round_roll: float) -> tuple[Arc, float]:
     """Tip round and the half angle (rad) of the tip land that it leaves."""
     centre = _round_centre(gear, flank, round_roll)
-    x, y = flank.normal_at(np.array(round_roll))
     land = math.atan2(centre[1], centre[0])
-    return Arc(centre, gear.tip_round, math.atan2(y, x), land), land
+    return Arc(centre, gear.tip_round, cmath.phase(flank.normal_at(np.array(round_roll))), land), land
 
 
 def _joined(pieces: list[tuple[str, Arc | Trochoid | Involute]], flank: Involute) -> tuple[Segment, ...]:
     """Segments that share their end points: each inner joint is where the later piece starts."""
-    ends = [tuple(map(float, curve.point(np.array(0.0)))) for _, curve in pieces]
-    ends.append(tuple(map(float, pieces[-1][1].point(np.array(1.0)))))
+    ends = [complex(curve.point(np.array(0.0))) for _, curve in pieces]
+    ends.append(complex(pieces[-1][1].point(np.array(1.0))))
     kink = (flank.relief_start - flank.start) / (flank.end - flank.start)
     made = []
-    for i, (name, curve) in enumerate(pieces):
+    for (name, curve), (start, end) in zip(pieces, itertools.pairwise(ends), strict=True):
         breaks = (kink,) if name == "involute" and 0.0 < kink < 1.0 else ()
-        made.append(Segment(name, curve, (ends[i][0], ends[i][1]), (ends[i + 1][0], ends[i + 1][1]), breaks))
+        made.append(Segment(name, curve, (start.real, start.imag), (end.real, end.imag), breaks))
     return tuple(made)
