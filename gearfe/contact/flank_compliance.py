@@ -33,7 +33,7 @@ import numpy as np
 
 from ..gear.flank_curve import FlankCurve, flank_curve
 from ..gear.spur_gear import Gear
-from ..typing import Array
+from ..typing import Array, ComplexArray
 from .compliance import GearBody
 from .flank import Flank, edge_shapes, gauss_rule
 from .panels import ELLIPSE_W, ELLIPSE_X, LEAST_DISTANCE, mean_log, wedge_tensor
@@ -108,6 +108,17 @@ class Shapes:
         t = s - self.origin.take(piece)
         powers = t[:, :, None, None] ** np.arange(4)[:, None]
         return np.asarray((self.powers.take(piece, axis=0) @ powers).reshape(*s.shape, 3, count))
+
+    def along(self, values: ComplexArray, s: Array) -> ComplexArray:
+        """What has the values at the stations, shape (p, 2, k), at many arc lengths s (m), shape (p, 2, m)."""
+        count = self.stations.shape[1]
+        powers = self.powers.reshape(2, count + 1, 3, count, 4)[:, :, 0].transpose(0, 2, 1, 3).reshape(2, count, -1)
+        cubics = np.matmul(values.swapaxes(0, 1), powers).reshape(2, len(s), count + 1, 4)
+        gear, contact = np.arange(2)[:, None], np.arange(len(s))[:, None, None]
+        piece = (s[..., None] >= self.stations[:, None]).sum(axis=3)
+        t = s - self.origin.reshape(2, -1)[gear, piece]
+        a, b, c, d = np.moveaxis(cubics[gear, contact, piece], -1, 0)
+        return np.asarray(((d * t + c) * t + b) * t + a)
 
 
 def shapes_of(stations: Sequence[Array]) -> Shapes:

@@ -116,10 +116,9 @@ def _yields(setting: Setting, state: State) -> tuple[_Yield, Array]:
     law, normal = setting.law, state.normal[:, None] / setting.turn
     tension, shear = law.wedge
     along = law.inverse_modulus * (tension + (shear * normal.conj() ** 2).real)
-    points = setting.tables.at(state.arc[:, :, None])[0][:, :, 0]
     blunt = np.minimum(setting.found.curvature, 1 / (SHARPEST * law.pair.pinion.module))
     T = smooth_influence(law, normal, state.arc, setting.couples).compliance
-    return _Yield(law.compliance, blunt, along, np.abs(points - setting.corner)), T
+    return _Yield(law.compliance, blunt, along, setting.distances(state.arc[:, :, None])[:, :, 0]), T
 
 
 def first_state(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Setting, State]:

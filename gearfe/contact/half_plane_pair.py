@@ -32,36 +32,11 @@ from .compliance import MeshingPair
 from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliance, shapes_of
 from .panels import LEAST_DISTANCE, Couplings, log_integral, mean_log
 
-#: Even places along a flank for `FineFlanks`; places at which both faces of a contact are compared where they have no
-#: deviations, and besides for each piece of a deviation.
-FINE_PLACES, PLACES, PER_PIECE = 128, 32, 2
+#: Places at which both faces of a contact are compared where they have no deviations, and besides for each piece of a
+#: deviation.
+PLACES, PER_PIECE = 32, 2
 #: Distance (m) from a kink at which its sides' tangents are taken.
 BESIDE = 1e-9
-
-
-@dataclass(frozen=True)
-class FineFlanks:
-    """Flanks of pinion and wheel at m even places.
-
-    Attributes
-    ----------
-    start, per_length : ndarray, shape (2, 1)
-        Arc of the first place (m), places per arc (1/m).
-    values : ndarray, shape (2, k, m)
-        Shape functions of the stations.
-    distance : ndarray, shape (2, m)
-        Distance y from the corner (m).
-    """
-
-    start: Array
-    per_length: Array
-    values: Array
-    distance: Array
-
-    @property
-    def count(self) -> int:
-        """m."""
-        return self.values.shape[2]
 
 
 @dataclass(frozen=True)
@@ -174,15 +149,6 @@ class HalfPlanePair:
             before, after = (curve.at(at + side)[1] for side in (-BESIDE, BESIDE))
             arcs[i, : len(at)], angles[i, : len(at)] = at, np.angle(before / after)
         return arcs, angles
-
-    @cached_property
-    def fine_flanks(self) -> FineFlanks:
-        """Shape functions between the stations."""
-        ends = np.array([[side.curve.low, side.curve.high] for side in self.sides])
-        arcs = ends[:, :1] + np.diff(ends) * np.linspace(0.0, 1.0, FINE_PLACES)
-        distance = np.stack([side.distance(at) for side, at in zip(self.sides, arcs, strict=True)])
-        values = self.shapes.at(arcs.T)[:, :, 0].transpose(1, 2, 0)
-        return FineFlanks(ends[:, :1], (FINE_PLACES - 1) / np.diff(ends), values, distance)
 
     @cached_property
     def looked_at(self) -> Array:

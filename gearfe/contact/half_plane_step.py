@@ -75,6 +75,10 @@ class Setting:
         """Their corners (m), shape (p, 2)."""
         return np.asarray(self.law.corner[self.found.flank])
 
+    def distances(self, arcs: Array) -> Array:
+        """Distances y (m) of the faces at arcs (m) of shape (p, 2, n) from their corners."""
+        return np.maximum(np.abs(self.tables.points(arcs) - self.corner[:, :, None]), LEAST_DISTANCE)
+
     def take(self, contacts: IntArray, numbers: IntArray | None = None) -> Setting:
         """Only some of the contacts, in the positions `numbers` or in all."""
         numbers = self.numbers if numbers is None else numbers
@@ -321,7 +325,7 @@ def _distances(setting: Setting, arc: Array) -> tuple[Array, Array]:
     """Distances y (m) of the faces at arcs (m) from their corners, and shares of the faces by the square of their
     distance from all edges, both of shape (p, 2).
     """
-    y = np.maximum(np.abs(setting.tables.points(arc[:, :, None])[:, :, 0] - setting.corner), LEAST_DISTANCE)
+    y = setting.distances(arc[:, :, None])[:, :, 0]
     near = 1 / y**2 + setting.law.undercut / np.maximum(np.abs(arc), LEAST_DISTANCE) ** 2
     return y, near[:, ::-1] / near.sum(axis=1, keepdims=True)
 

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..gear.flank_curve import WAY, Faces
-from ..typing import Array, BoolArray, ComplexArray, IntArray
+from ..typing import Array, BoolArray, IntArray
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import SIGN, WIDER, WINDOW, Setting, State, Step, answers, reference_approach
 from .panels import EDGES, LEAST_DISTANCE, log_integral, mean_log
@@ -127,8 +127,10 @@ def _gaps(setting: Setting, state: State) -> tuple[Array, Array, Array, Array]:
     x = low[:, None] + (high - low)[:, None] * law.looked_at
     arcs = state.arc[:, :, None] + WAY[:, None] * x[:, None]  # nearly
     arcs = np.minimum(np.maximum(arcs, tables.low), tables.high)
-    moved, y = _smooth(setting, state, seen_normal, arcs)
-    at = np.maximum(np.abs(tables.at(state.arc[:, :, None])[0] - setting.corner[:, :, None]), LEAST_DISTANCE)
+    each = answers(law, law.shapes.at(state.arc)[:, :, 0], seen_normal, couples)[..., 0]
+    load = state.force[couples.second][:, None, None] * SIGN[:, None]
+    moved = law.shapes.along(np.add.reduceat(each * load, couples.starts), arcs)
+    y, at = setting.distances(arcs), setting.distances(state.arc[:, :, None])
     i, j = couples.first[couples.step == 0], couples.second[couples.step == 0]
     load = state.force[:, None] * SIGN * seen_normal
     tension, shear = law.wedge
@@ -155,24 +157,6 @@ def _beside_ellipse(law: HalfPlanePair, state: State, made: Step, i: int, x: Arr
     apart = x[:, None] - made.x[i]
     logs = (log_integral(apart + half) - log_integral(apart - half)) @ made.solution.pressure[i]
     return np.asarray(law.compliance * (state.force[i] * mean_log(x, _half_widths(state)[i]) - logs))
-
-
-def _smooth(setting: Setting, state: State, normal: ComplexArray, arcs: Array) -> tuple[ComplexArray, Array]:
-    """Smooth displacements of the faces at arcs (m) of shape (p, 2, m), tooth axes (m), and the distances y (m) of the
-    arcs from the corners: linear between even places.
-    """
-    law, couples = setting.law, setting.couples
-    each = answers(law, law.shapes.at(state.arc)[:, :, 0], normal, couples)[..., 0]
-    load = state.force[couples.second][:, None] * SIGN
-    at_stations = np.add.reduceat(each * load[:, :, None], couples.starts)
-    fine = law.fine_flanks
-    t = np.minimum(np.maximum((arcs - fine.start) * fine.per_length, 0.0), fine.count - 1.0)
-    moved = np.matmul(at_stations.swapaxes(0, 1), fine.values).swapaxes(0, 1)
-    left = np.minimum(t.astype(np.int64), fine.count - 2)
-    part, gear, contact = t - left, np.arange(2)[:, None], np.arange(len(arcs))[:, None, None]
-    lower, upper = moved[contact, gear, left], moved[contact, gear, left + 1]
-    near, far = fine.distance[gear, left], fine.distance[gear, left + 1]
-    return lower + part * (upper - lower), near + part * (far - near)
 
 
 def _added(setting: Setting, state: State, made: Step, i: int, stretch: Stretch, bound: float) -> State:

@@ -51,8 +51,6 @@ class Touching:
         Twist of the wheel at which the pair touches (rad).
     place : ndarray, shape (n, 2)
         Parameters u of the touching points on pinion and wheel.
-    radius : ndarray, shape (n, 2)
-        Their radii about the own centres (m).
     point, normal : ndarray of complex, shape (n,)
         Point of contact and common normal out of the pinion, global axes.
     arm : ndarray, shape (n, 2)
@@ -70,7 +68,6 @@ class Touching:
     angle: Array
     twist: Array
     place: Array
-    radius: Array
     point: ComplexArray
     normal: ComplexArray
     arm: Array
@@ -157,10 +154,8 @@ class ToothFlanks:
             normals = pinion.normals(u) * turn[:, 0], -wheel.normals(mate) * turn[:, 1] * np.exp(1j * twist)
             normal[rows], curvature[rows] = np.where(bend > mate_bend, *normals[::-1]), bent + mate_bent
             least[rows], places[rows] = twist, np.stack([u, mate], axis=1)
-        seen = point - a
-        radius = np.abs(np.stack([point, seen], axis=1))
-        arm = np.stack([_cross(point, normal), -_cross(seen, normal)], axis=1)
-        every = Touching(position, number, angle, least, places, radius, point, normal, arm, curvature, flank, frames)
+        arm = np.stack([_cross(point, normal), -_cross(point - a, normal)], axis=1)
+        every = Touching(position, number, angle, least, places, point, normal, arm, curvature, flank, frames)
         return every.take(np.isfinite(least))
 
 

@@ -78,6 +78,8 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
 
 def deviation_lines(job: StiffnessJob) -> list[str]:
     """A line about the deviations of the flanks, where there are any."""
+    if job.microgeometry is None:
+        return []
     most = []
     for gear, own in zip((job.pair.pinion, job.pair.wheel), job.model.deviations, strict=True):
         roll = np.linspace(*ends_of(gear), CHECKED)
