@@ -9,8 +9,9 @@ flanks and the stress rows S, a step solves
 What G leaves out (the normals turn and the forces move with the faces; across blended normals the gap also changes as
 its foot point slides) enters with the next step, where gaps and rows are taken anew. Errors shrink by about the ratio
 of pressure to modulus a step; steps are mixed with those before, so that they shrink faster and settle beside corners.
-The matrix of the first step serves all. A position has converged when its pressures are those that the law asks for
-*and* its forces are those of the pressures at the places reached.
+The matrix is made anew until the solution is near: under sharp corners pressures come to a third of the modulus, and
+the rows turn with the faces. A position has converged when its pressures are those that the law asks for *and* its
+forces are those of the pressures at the places reached.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ from .position import taken
 STEPS = 40
 #: Steps that are mixed.
 DEPTH = 8
+#: Error from which on the matrix serves for all further steps (the chord method: Kelley, *Iterative Methods for Linear
+#: and Nonlinear Equations*, 1995, sec. 5.4.1).
+CHORD = 1e-3
 #: So many points beside those that ask for pressure may bear in a step.
 BESIDE = 5
 #: Exchanges of the points that bear, and how often more may be wrong than before.
@@ -286,6 +290,7 @@ class Outcome:
 def solve(batch: Batch, state: State, tolerance: float) -> Outcome:
     """Solve all positions of a batch from a first state, whose pressures choose the points that bear at first."""
     live, iterations = np.ones(batch.size, dtype=bool), np.zeros(batch.size, dtype=np.int64)
+    error = np.full(batch.size, np.inf)
     equations: dict[int, Equations] = {}
     past: list[list[tuple[Array, Array]]] = [[] for _ in range(batch.size)]
     done: set[int] = set()
@@ -293,7 +298,8 @@ def solve(batch: Batch, state: State, tolerance: float) -> Outcome:
         found = projected(batch, state, batch.turn, np.flatnonzero(live[batch.at]))
         state = replace(state, place=_scattered(found.place, found.points, state.place))
         if number:
-            converged = live & (_error(batch, state, found) < np.maximum(tolerance, _rounding(batch, found)))
+            error = _error(batch, state, found)
+            converged = live & (error < np.maximum(tolerance, _rounding(batch, found)))
             done |= set(np.flatnonzero(converged).tolist())
             live &= ~converged
         at, bears = batch.at[found.points], state.pressure[found.points] > 0
@@ -307,7 +313,8 @@ def solve(batch: Batch, state: State, tolerance: float) -> Outcome:
         old = state
         for b in np.flatnonzero(live).tolist():
             mine = slice(*np.searchsorted(at, [b, b + 1]).tolist())
-            if b not in equations or not np.isin(found.points[mine][asks[mine]], equations[b].points).all():
+            known = equations[b].points if error[b] < CHORD else ()
+            if not np.isin(found.points[mine][asks[mine]], known).all():
                 beside = np.convolve(asks[mine], np.ones(2 * BESIDE + 1))[BESIDE:-BESIDE] > 0
                 may = mine.start + np.flatnonzero(beside & found.reached[mine])
                 equations[b] = equations_of(batch, b, taken(found, may), asks[may])
