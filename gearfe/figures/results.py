@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from ..spectrum import Spectrum
     from ..stiffness.curve import StiffnessCurve
     from ..train.response import TrainResponse
+    from ..typing import Array
 
 #: Faces of a body that are drawn at most.
 MOST_FACES = 30_000
@@ -45,41 +47,42 @@ def curve_plot(curve: StiffnessCurve) -> Any:
 
 def response_plot(response: TrainResponse) -> Any:
     """Contact forces, and accelerations of the attachments, over time."""
-    figure = new_figure(9.0, 5.2)
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    time = 1e3 * response.time
-    for colour, name, force in zip(CYCLE, response.mesh_names, 1e-3 * response.contact_force.T, strict=False):
-        upper.plot(time, force, color=colour, linewidth=1.2, label=name)
-    upper.set_ylabel("contact force  (kN)")
-    for colour, name, values in zip(CYCLE, response.attachment_names, response.attachment_acceleration.T, strict=False):
-        lower.plot(time, values, color=colour, linewidth=1.0, label=f"attachment {name}")
-    lower.set_ylabel("acceleration  (m/s²)")
-    lower.set_xlabel("time  (ms)")
-    for axes in (upper, lower):
-        tidy(axes)
-        axes.margins(x=0.0)
-        legend_beside(axes)
-    return figure
+    forces = dict(zip(response.mesh_names, 1e-3 * response.contact_force.T, strict=False))
+    names = [f"attachment {name}" for name in response.attachment_names]
+    accelerations = dict(zip(names, response.attachment_acceleration.T, strict=False))
+    panels = {"contact force  (kN)": forces, "acceleration  (m/s²)": accelerations}
+    return _lines(1e3 * response.time, "time  (ms)", panels, 5.2)
 
 
 def trajectory_plot(run: Trajectory) -> Any:
     """Coordinates over time: one panel for each body, or element."""
-    names = run.system.coordinate_names()
-    groups: dict[str, list[int]] = {}
-    for i, name in enumerate(names):
-        groups.setdefault(
-            name.rpartition("_")[0].removesuffix("_angle").removesuffix("_x").removesuffix("_y"), []
-        ).append(i)
-    figure = new_figure(9.0, 1.0 + 1.6 * len(groups))
-    panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, (group, members) in zip(panels, groups.items(), strict=True):
+    panels: dict[str, dict[str, Array]] = {}
+    for name, values in zip(run.system.coordinate_names(), run.q.T, strict=True):
+        owner = name.rpartition("_")[0].removesuffix("_angle").removesuffix("_x").removesuffix("_y")
+        panels.setdefault(owner, {})[name.removeprefix(f"{owner}_")] = values
+    return _lines(run.time, "time  (s)", panels, 1.0 + 1.6 * len(panels))
+
+
+def spectrum_plot(made: Spectrum) -> Any:
+    """Amplitudes of all signals over the frequency, as lines."""
+    signals = made.amplitude.reshape(len(made.frequency), -1).T
+    named = {f"signal {number}": values for number, values in enumerate(signals, start=1)}
+    return _lines(1e-3 * made.frequency, "frequency  (kHz)", {"amplitude": named}, 3.6)
+
+
+def _lines(x: Array, label: str, panels: Mapping[str, Mapping[str, Array]], height: float) -> Any:
+    """Panels with a common abscissa one above the other: label of the ordinate -> name of the curve -> values."""
+    figure = new_figure(9.0, height)
+    rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (ordinate, curves) in zip(rows, panels.items(), strict=True):
         tidy(axes)
-        for colour, i in zip(CYCLE, members, strict=False):
-            axes.plot(run.time, run.q[:, i], color=colour, linewidth=1.2, label=names[i].removeprefix(f"{group}_"))
-        axes.set_ylabel(group, fontsize=9)
+        for colour, (name, values) in zip(CYCLE, curves.items(), strict=False):
+            axes.plot(x, values, color=colour, linewidth=1.2, label=name)
+        axes.set_ylabel(ordinate)
         axes.margins(x=0.0)
-        legend_beside(axes)
-    panels[-1].set_xlabel("time  (s)")
+        if len(curves) > 1 or len(panels) > 1:
+            legend_beside(axes)
+    rows[-1].set_xlabel(label)
     return figure
 
 
@@ -104,21 +107,6 @@ def body_plot(body: ModalBody) -> Any:
     axes.set_box_aspect(np.maximum(high - low, 0.05 * (high - low).max() + 1e-9))
     axes.set(xlabel="x  (mm)", ylabel="y  (mm)", zlabel="z  (mm)")
     axes.tick_params(labelsize=8, colors=GREY)
-    return figure
-
-
-def spectrum_plot(made: Spectrum) -> Any:
-    """Amplitudes of all signals over the frequency, as lines."""
-    figure = new_figure(8.5, 3.6)
-    axes = figure.subplots()
-    tidy(axes)
-    signals = made.amplitude.reshape(len(made.frequency), -1).T
-    for number, (colour, values) in enumerate(zip(CYCLE, signals, strict=False), start=1):
-        axes.plot(1e-3 * made.frequency, values, color=colour, linewidth=1.2, label=f"signal {number}")
-    if made.value.ndim > 1:
-        legend_beside(axes)
-    axes.set(xlabel="frequency  (kHz)", ylabel="amplitude")
-    axes.margins(x=0.0)
     return figure
 
 

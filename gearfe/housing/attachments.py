@@ -192,25 +192,24 @@ def check_attachments(attachments: Sequence[Attachment], fixed: IntArray, nodes:
 
 def interface_matrix(attachments: Sequence[Attachment], nodes: Array) -> sparse.csc_array:
     """(3 n, 6 a) displacement of all nodes for unit attachment coordinates; rows of other nodes are empty."""
-    rows, columns, values = [], [], []
-    for number, attachment in enumerate(attachments):
+    blocks = [sparse.csc_array((3 * len(nodes), 0))]
+    for attachment in attachments:
+        moved = np.zeros((len(nodes), 18))
         chosen = np.asarray(attachment.nodes, dtype=np.int64)
-        arm = nodes[chosen] - attachment.point
-        for axis in range(3):
-            second, third = (axis + 1) % 3, (axis + 2) % 3
-            # u_axis = t_axis + theta_second arm_third - theta_third arm_second
-            for column, value in (
-                (axis, np.ones(len(chosen))),
-                (3 + second, arm[:, third]),
-                (3 + third, -arm[:, second]),
-            ):
-                rows.append(3 * chosen + axis)
-                columns.append(np.full(len(chosen), 6 * number + column))
-                values.append(value)
-    shape = (3 * len(nodes), 6 * len(attachments))
-    if not rows:
-        return sparse.csc_array(shape)
-    return sparse.csc_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
+        moved[chosen] = rigid_motions(nodes[chosen] - attachment.point).reshape(-1, 18)
+        blocks.append(sparse.csc_array(moved.reshape(-1, 6)))
+    return sparse.csc_array(sparse.hstack(blocks, format="csc"))
+
+
+def rigid_motions(nodes: Array) -> Array:
+    """(3 n, 6) nodal displacement for unit translations and small rotations about the origin."""
+    motions = np.zeros((len(nodes), 3, 6))
+    motions[:, range(3), range(3)] = 1.0
+    for axis in range(3):
+        unit = np.zeros(3)
+        unit[axis] = 1.0
+        motions[:, :, 3 + axis] = np.cross(unit, nodes)
+    return motions.reshape(-1, 6)
 
 
 def _bore(given: Sequence[Any], number: int) -> Bore:

@@ -25,6 +25,7 @@ from .attachments import (
     check_attachments,
     interface_matrix,
     plane_nodes,
+    rigid_motions,
 )
 from .mesh_checks import checked_mesh
 from .meshes import Outer, Prisms, Tetrahedra
@@ -312,17 +313,6 @@ class Housing(Facts):
         """The matrices over the attachments' coordinates and the internal unknowns."""
         interface = interface_matrix(self.attachments, self.nodes)
         return partition(matrices.stiffness, matrices.mass, interface, self.internal)
-
-
-def rigid_motions(nodes: Array) -> Array:
-    """(3 n, 6) nodal displacement for unit translations and small rotations about the origin."""
-    motions = np.zeros((len(nodes), 3, 6))
-    motions[:, range(3), range(3)] = 1.0
-    for axis in range(3):
-        unit = np.zeros(3)
-        unit[axis] = 1.0
-        motions[:, :, 3 + axis] = np.cross(unit, nodes)
-    return motions.reshape(-1, 6)
 
 
 def _fixed_nodes(fixed: Any, nodes: Array, new_number: IntArray) -> IntArray:

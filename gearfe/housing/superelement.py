@@ -24,6 +24,7 @@ from ..reduction.modal_body import ModalBody
 from ..tables.housing import FORCES, UNITS, AttachmentTable, SuperelementTable
 from ..textfile import read_text
 from ..typing import Array, IntArray
+from .attachments import rigid_motions
 from .dmig import Entries, Label, read_dmig
 from .nastran_files import read_nastran
 
@@ -221,11 +222,8 @@ def _rows(one: AttachmentTable, i: int, matrix: Matrix, field: str) -> IntArray:
 
 def rigid_shapes(points: Array) -> Array:
     """Coordinates of the attachments in unit translations and rotations about the origin, shape (6 a, 6)."""
-    made = np.zeros((len(points), 6, 6))
-    made[:, range(6), range(6)] = 1.0
-    for axis in range(3):
-        made[:, :3, 3 + axis] = np.cross(np.eye(3)[axis], points)
-    return made.reshape(-1, 6)
+    turned = np.tile(np.eye(3, 6, 3), (len(points), 1, 1))
+    return np.concatenate([rigid_motions(points).reshape(-1, 3, 6), turned], axis=1).reshape(-1, 6)
 
 
 def _body(k: Array, m: Array, points: Array, table: SuperelementTable, field: str) -> ModalBody:
