@@ -33,7 +33,7 @@ CAPABILITIES = {
         mechanisms/sweep.py mechanisms/tables.py tables/beam.py
         mechanisms/plate* meshing/plate_mesh.py tables/plate.py rigid/floating.py rigid/kernel_elastic.py
         rigid/kernel_collocation.py rigid/kernel_equations.py rigid/kernel_matrices.py rigid/kernel_stages.py
-        rigid/numpy_equations.py
+        rigid/numpy_equations.py rigid/lanes.py rigid/lanes_type.py
     """,
     "extruded housing meshes, compiled kernels kept": """
         prisms.py housing/prism_error.py housing/meshes.py rigid/packed* rigid/parts.py rigid/native.py versions.py

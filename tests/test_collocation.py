@@ -28,7 +28,8 @@ from gearfe.rigid.beam_link import BeamLink, Section
 from gearfe.rigid.cam import Cam
 from gearfe.rigid.collocation import GAUSS, RADAU, path_matrix, scheme
 from gearfe.rigid.floating import Floating, FloatingBody, frame_joint
-from gearfe.rigid.implicit import KERNELS, Stepper, equations
+from gearfe.rigid.implicit import KERNELS, Stepper, equations, narrow_band
+from gearfe.rigid.lanes import as_lanes, lanes
 from gearfe.rigid.ordering import narrow_order
 from gearfe.rigid.series import without_redundant, written
 from gearfe.rigid.start import Start
@@ -80,6 +81,31 @@ def test_a_narrow_order_of_a_shuffled_chain() -> None:
     place = np.argsort(order)
     assert sorted(order) == list(range(40))
     assert all(abs(place[i] - place[j]) == 1 for i, j in np.argwhere(graph))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_saddle_matrices_side_by_side(seed: int) -> None:
+    """Four complex matrices of one band, some of whose diagonals are none, against dense solutions."""
+    rng = np.random.default_rng(seed)
+    size, width = 24, 4
+    near = np.abs(np.subtract.outer(np.arange(size), np.arange(size))) <= width
+    A = near * (rng.standard_normal((4, size, size)) + 1j * rng.standard_normal((4, size, size)))
+    without = rng.permutation(size)[:6]
+    A[:, without[:, None], without] = 0.0
+    b = rng.standard_normal((4, size)) + 1j * rng.standard_normal((4, size))
+    B = as_lanes(np.stack([A.real, A.imag]).transpose(3, 2, 0, 1))
+    x = as_lanes(np.stack([b.real, b.imag]).transpose(2, 0, 1))
+    places = np.arange(size)
+    over, right = lanes(size, 2, 4), np.minimum(places + width, size - 1)
+    pivot, low, top = np.zeros((3, size), dtype=np.int64)
+    names = KERNELS.plain
+    assert names.factorise_band(B, over, right.copy(), pivot, low, top, right.copy())
+    names.solve_band(B, over, pivot, low, top, x)
+    found = x[:, 0] + 1j * x[:, 1]
+    for k in range(4):
+        np.testing.assert_allclose(A[k] @ found[:, k], b[k], atol=1e-10 * np.abs(found).max())
+    B[...] = 0.0
+    assert not names.factorise_band(B, over, right.copy(), pivot, low, top, right.copy())
 
 
 def bent_rod() -> System:
@@ -158,7 +184,8 @@ def test_kernels_step_as_numpy_does(make: Any, family: str) -> None:
     one, two = Stepper(system, start, tab), Stepper(system, start, tab)
     program = written(system)
     assert program is not None
-    eq = equations(without_redundant(program, start.active), 3, one.w.S.shape[1])
+    held = without_redundant(program, start.active)
+    eq = equations(held, narrow_band(held), 3, len(one.w.S))
     two._step = lambda: KERNELS.plain.collocation_step(eq, two.w, tab)
     q, v, limit = start.q, start.v, np.full(system.size, 1e-9)
     for step in (one, two):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gearfe.rigid import compiled
+from gearfe.rigid.lanes import NAMES, Lanes, as_lanes, flat, halves, highest, lanes, total
 from gearfe.rigid.packed import Packed
 from gearfe.typing import Array, IntArray
 
@@ -104,3 +105,61 @@ def hits() -> tuple[int, int]:
     names = compiled.bind((weighted, fill_out), {}, compiled=True, entries=("fill_out",))
     made = names.fill_out(Packed(sample()))
     return int("numba" in sys.modules), made
+
+
+class Sides(NamedTuple):
+    angles: Lanes  # (n, 4)
+    out: Lanes  # (4, n, 4)
+    wave: Lanes  # (2, 2, 4)
+    single: Array  # (3,)
+
+
+def square_order(a, i, k):  # type: ignore[no-untyped-def]
+    """Order k of a square: a sum that begins as a number and goes on with all lanes."""
+    value = 0.0
+    for p in range(k + 1):
+        value += a[i, p] * a[i, k - p]
+    return value
+
+
+def use_sides(sides):  # type: ignore[no-untyped-def]
+    """Everything that kernels do with lanes."""
+    angles, out, single = sides.angles, sides.out, sides.single
+    for i in range(angles.shape[0]):
+        x = angles[i]
+        out[0, i] = np.sin(x)
+        out[1, i] = np.cos(x)
+        out[2, i] = np.maximum(-x, 2.0 - x / 3.0)
+        out[2, i] -= abs(x) * 0.5
+        out[3, i] = 1
+    flat(out)[3, 1, 2] = flat(angles)[0, 3]
+    single[0] = total(halves(angles)[0, 1])
+    single[1] = highest(angles[1])
+    single[2] = total(square_order(sides.wave, 1, 1))
+    return angles.shape[0]
+
+
+@needs_numba
+def test_lanes_compute_as_arrays_do(tmp_path, monkeypatch):
+    """Compiled against NumPy; sines and cosines within two roundings of 1 of the library's, far from zero, too."""
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
+    rng = np.random.default_rng(8)
+    angles = rng.normal(size=(60, 4)) * np.logspace(-8, 6, 60)[:, None]
+    angles[2, 1] = np.nan
+    angles[3] = np.array([0.5, 1.0, -1.5, 1e5]) * np.pi
+    wave = rng.normal(size=(2, 2, 4))
+    made = []
+    for jit in (False, True):
+        sides = Sides(as_lanes(angles), lanes(4, 60, 4), as_lanes(wave), np.zeros(3))
+        names = compiled.bind(
+            (square_order, use_sides), {**NAMES, "np": np}, compiled=jit, entries=("use_sides",) if jit else ()
+        )
+        assert names.use_sides(Packed(sides) if jit else sides) == 60
+        made.append(sides)
+    plain, quick = made
+    np.testing.assert_allclose(quick.out[:2], plain.out[:2], rtol=0.0, atol=4.5e-16)
+    np.testing.assert_allclose(quick.out[2:], plain.out[2:], rtol=1e-15)
+    np.testing.assert_allclose(quick.single, plain.single, rtol=1e-14)
+    np.testing.assert_allclose(plain.single[:2], [angles[0, 2:].sum(), angles[1].max()], rtol=1e-14)
+    assert plain.single[2] == pytest.approx(2.0 * (wave[1, 0] * wave[1, 1]).sum(), rel=1e-14)
+    assert np.isnan(quick.out[2, 2, 1])

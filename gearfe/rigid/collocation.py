@@ -16,10 +16,29 @@ import numpy as np
 
 from ..typing import Array
 from .dense import Polynomials
+from .lanes import Lanes, as_lanes
 
 RADAU, GAUSS = "Radau IIA", "Gauss"
 #: Degree of the polynomial through the speeds of a step that guesses those of the next: more would swing beyond it.
 AHEAD = 4
+
+
+class SideBySide(NamedTuple):
+    """The same coefficients for all stages at once, which lie in lanes, W = s + 1: the last one is the step's begin.
+
+    Of the r + 1 systems the lanes hold the real parts, then the imaginary ones.
+    """
+
+    c: Array  # (W,)
+    middles: Array  # (W,)
+    inverse: Lanes  # (s, W) to all stages from each
+    back: Lanes  # (s, W) to the systems from each stage
+    basis: Lanes  # (W, W) to the stages from each part
+    between: Lanes  # (k, W)
+    defect: Lanes  # (1, W)
+    ends: Lanes  # (2, W)
+    values: Lanes  # (2, r + 1)
+    over: Lanes  # (2, r + 1) of the rows where the stages hold their rates: 1 / values, else 1
 
 
 class Scheme(NamedTuple):
@@ -42,6 +61,7 @@ class Scheme(NamedTuple):
     speed: Array  # (s + 1, s + 1) coefficients of powers of x - 1 from values at 0, c
     ahead: Array  # (d + 1, s + 1) the same of the polynomial of degree d < s next to values at c, 0
     force: Array  # (s, s) coefficients of powers of x from values at the stages
+    side: SideBySide
 
 
 @lru_cache(maxsize=16)
@@ -72,13 +92,34 @@ def scheme(family: str, stages: int) -> Scheme:
     between[:, 0] = 1.0 - between[:, 2:-1].sum(axis=1)  # not 1e-10 off, which the joints would see
     before = np.vander(np.append(0.0, c) - 1.0, increasing=True)
     next_to = np.linalg.pinv(before[:, : min(AHEAD, stages - 1) + 1])
+    mu = np.array([values[k] for k in kept])
+    level = int(family == GAUSS)
+    parts = [0, *range(1, stages, 2), *range(2, stages, 2)]  # real parts, then imaginary ones but for the first
+    lane = [*range(len(kept)), *range(len(kept) + 1, stages + 1)]
+
+    def wide(rows: Array) -> Lanes:
+        return as_lanes(np.pad(rows, ((0, 0), (0, stages + 1 - rows.shape[1]))))
+
+    systems, stage = np.zeros((stages, stages + 1)), np.zeros((stages + 1, stages))
+    back = np.linalg.inv(basis)
+    systems[:, lane], stage[lane] = back[parts].T, basis[:, parts].T
+    begin = np.zeros((inner + 4, 1))
+    begin[0] = 1.0
+    ends = np.stack([b @ inverse, b @ inverse @ inverse])
+    over = 1.0 / mu if level else np.ones(len(mu), dtype=complex)
+    side = SideBySide(
+        np.append(c, 0.0), np.append(middles, 0.0), wide(inverse.T), as_lanes(systems), wide(stage),
+        as_lanes(np.hstack([between.T, begin])), wide(force[:1]), wide(ends), as_lanes(np.stack([mu.real, mu.imag])),
+        as_lanes(np.stack([over.real, over.imag])),
+    )  # fmt: skip
     return Scheme(
-        c=c, inverse=inverse, twice=inverse @ inverse, ends=np.stack([b @ inverse, b @ inverse @ inverse]),
+        c=c, inverse=inverse, twice=inverse @ inverse, ends=ends,
         defect=force[0].copy(), values=np.array([[values[k].real, values[k].imag] for k in kept]),
-        back=np.linalg.inv(basis), basis=basis, level=int(family == GAUSS), inner=inner,
+        back=back, basis=basis, level=level, inner=inner,
         central=int(np.abs(c - 0.5).argmin()),
         path=path, middles=middles, between=between,
         speed=np.linalg.inv(before), ahead=np.roll(next_to, -1, axis=1).copy(), force=force,
+        side=side,
     )  # fmt: skip
 
 

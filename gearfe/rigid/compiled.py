@@ -100,7 +100,7 @@ def _roots() -> list[Path]:
 def _made_by() -> Iterator[str]:
     """What decides compiled code beside its source: Python, the compiler, the processor."""
     yield sys.version
-    for maker in ("compiled.py", "native.py", "packed.py", "packed_type.py", "parts.py"):
+    for maker in ("compiled.py", "native.py", "packed.py", "packed_type.py", "lanes.py", "lanes_type.py", "parts.py"):
         yield Path(__file__).with_name(maker).read_text(encoding="utf-8")
     for name in ("numba", "llvmlite"):
         found = importlib.util.find_spec(name)

@@ -25,6 +25,7 @@ from . import (
     kernel_saddle,
     kernel_stages,
     kernel_tape,
+    lanes,
     numpy_equations,
 )
 from .collocation import RADAU, Collocated, Scheme, path_matrix, powers_of_path, scheme
@@ -34,7 +35,7 @@ from .corners import TRUSTED, Corners, collocated_path, quiet_speeds
 from .dense import Polynomials
 from .elimination import ModalCoordinates, is_linear, modal_coordinates
 from .kernel_collocation import SOLVED, Stages
-from .kernel_equations import Band, Equations, Scratch
+from .kernel_equations import Band, Equations, Scratch, Wide
 from .numpy_equations import SystemEquations
 from .ordering import narrow_order
 from .packed import Packed
@@ -45,7 +46,6 @@ from .tape import Program
 
 FUNCTIONS = (
     kernel_rows.fill,
-    kernel_rows.copy,
     kernel_rows.time_series,
     *kernel_tape.FUNCTIONS,
     kernel_quadratic.row_orders,
@@ -57,10 +57,17 @@ FUNCTIONS = (
     *kernel_stages.FUNCTIONS,
     kernel_collocation.collocation_step,
 )
-HOT = ("fill", "copy", "cauchy", "weighted", "magnitude", "bar_strains", "coordinate", "turned")
+HOT = ("fill", "cauchy", "weighted", "bar_strains", "coordinate", "turned")
 KERNELS = Kernels(
     FUNCTIONS,
-    {**kernel_rows.GLOBALS, **kernel_tape.NAMES, **kernel_collocation.NAMES},
+    {
+        **kernel_rows.GLOBALS,
+        **kernel_tape.NAMES,
+        **kernel_saddle.NAMES,
+        **kernel_matrices.NAMES,
+        **kernel_collocation.NAMES,
+        **lanes.NAMES,
+    },
     ("collocation_step",),
     HOT,
     making=11.0,
@@ -128,14 +135,17 @@ class Stepper:
         if program is None:
             self._step: Callable[[], int] = lambda: _plain()(plain, self.w, tab)
         else:
-            handed = Packed(equations(program, s, plain.stresses)), Packed(self.w), Packed(tab)
-            advance = KERNELS.compiled.collocation_step
+            known = system.__dict__.setdefault("_bands", {})
+            rows = start.active.tobytes()
+            if rows not in known:
+                known[rows] = narrow_band(program)
+            self._held = Packed(equations(program, known[rows], s, plain.stresses)), Packed(self.w), Packed(tab)
             self.w.now[1] = self.w.limit[0] = 1.0
-            self.compile_seconds = KERNELS.load(lambda: advance(*handed))
-            self._step = lambda: advance(*handed)
+            self.compile_seconds = KERNELS.load(lambda: KERNELS.compiled.collocation_step(*self._held))
+            self._step = KERNELS.compiled.collocation_step.on(*self._held)
         self._powers = np.arange(s + 1.0)
         p = self._powers[1:] + 1.0
-        self._guess = tab.c[:, None] ** p / p
+        self._guess = tab.side.c ** p[:, None] / p[:, None]
 
     def restart(self, system: System, start: Start, t: float, q: Array, v: Array) -> Array:
         """The next step begins with a constant acceleration, which is returned."""
@@ -148,15 +158,15 @@ class Stepper:
     def keep(self, h: float) -> None:
         """The step just made is the one before the next."""
         w, tab = self.w, self.tab
-        found = tab.ahead @ w.V
+        found = tab.ahead @ w.V.T
         w.speeds[: len(found)] = found / h ** self._powers[: len(found), None]
-        w.multipliers[:] = w.L[-2]
+        w.multipliers[:] = w.L[:, -2]
 
     def __call__(self, t: float, h: float, q: Array, v: Array, limit: Array) -> int:
         """See `kernel_collocation.collocation_step`."""
         w = self.w
         w.now[:2], w.q[:], w.v[:], w.limit[:] = (t, h), q, v, limit
-        w.guess[:, 1:] = self._guess * h ** (self._powers[1:] + 1.0)
+        w.guess[1:] = self._guess * h ** (self._powers[1:, None] + 1.0)
         return self._step()
 
     def error(self, tolerance: float) -> float:
@@ -175,9 +185,14 @@ class Stepper:
         )
         reach = np.maximum(np.abs(q), 1e-300)
 
+        def least() -> Array:
+            size: Array = np.maximum(reach, 1e-3 * units * max(float((reach / units).max()), 1e-12))
+            return size
+
+        floor = least()
+
         def limit(h: float) -> Array:
-            least = 1e-3 * units * max(float((reach / units).max()), 1e-12)
-            return tolerance * np.maximum(np.maximum(reach, abs(h) * np.abs(v)), least)
+            return tolerance * np.maximum(floor, np.abs(h * v))
 
         first = first_step(q / units, v / units, a / units, abs(end - t))
         if law.steady:
@@ -198,7 +213,7 @@ class Stepper:
                 continue
             error = self.error(tolerance)
             if corners.system is not None and error <= TRUSTED:
-                quiet = quiet_speeds(tab.c, w.v, w.V[:-1], w.vn, units * float((reach / units).max()) / abs(h))
+                quiet = quiet_speeds(tab.c, w.v, w.V[:, :-1].T, w.vn, units * float((reach / units).max()) / abs(h))
                 speeds = (tab.speed @ np.vstack([w.v, quiet])) / h ** self._powers[:, None]
                 if corners.cut(t, h, collocated_path(h, powers_of_path(tab.path, w.known, tab.inner), speeds)):
                     continue
@@ -209,7 +224,7 @@ class Stepper:
             if not (law.steady or corners.passing(h)):
                 control.trial = min(control.trial, abs(h) * EASY / max(float(w.measures[2]), 1e-3))
             known.append(w.known.copy())
-            forces.append(np.hstack([w.L[:-1], w.S[:-1]]))
+            forces.append(np.concatenate((w.L, w.S)))
             ends.append(t)
             self.keep(h)
             q, v = w.qn.copy(), w.vn.copy()
@@ -218,6 +233,7 @@ class Stepper:
             elif not system.stressed:
                 accelerations.append(system.acceleration(t, q, v, start.active, start.excess)[0])
             reach = np.maximum(reach, np.abs(q))
+            floor = least()
         dense = self._dense(system, start, np.array(ends), known, forces, accelerations)
         counts: dict[str, Any] = {
             "scheme": f"{'Radau IIA' if tab.inner < len(tab.c) else 'Gauss'} of {len(tab.c)} stages"
@@ -263,7 +279,7 @@ class Stepper:
         if not system.stressed:
             return Polynomials(times, coefficients)
         s, m = len(self.tab.c), int(start.active.sum())
-        found = np.array(forces)
+        found = np.array(forces)[:, :, :s].transpose(0, 2, 1)
         every = np.zeros((len(found), s, system.rows + found.shape[2] - m))
         every[:, :, np.flatnonzero(start.active)] = found[:, :, :m]
         every[:, :, system.rows :] = found[:, :, m:]
@@ -273,19 +289,18 @@ class Stepper:
 
 def work(s: int, n: int, m: int, k: int, known: int) -> Stages:
     """Arrays of a step."""
-    shapes = [
-        (3,), (3,), (n,), (n,), (m,), (s, s + 1), (s + 1, n), (n,), (s, n), (s + 1, n), (s + 1, n), (s + 1, n),
-        (s + 1, m), (s + 1, k), (s + 1, n), (s + 1, m), (s, n), (s, m), (s, n), (s, m), (known, n), (n,), (n,),
-    ]  # fmt: skip
-    return Stages(*(np.zeros(shape) for shape in shapes))
+    plain = [(3,), (3,), (n,), (n,), (m,), (s + 1, n), (n,)]
+    W = s + 1
+    wide = [(s + 1, W), *[(n, W)] * 4, (m, W), (k, W), *[(n, W), (m, W)] * 3]
+    arrays: list[Array] = [np.zeros(shape) for shape in plain]
+    arrays += [lanes.lanes(*shape) for shape in wide]
+    return Stages._make([*arrays, np.zeros((known, n)), np.zeros(n), np.zeros(n)])
 
 
-def equations(program: Program, s: int, stresses: int) -> Equations:
+def equations(program: Program, band: Band, s: int, stresses: int) -> Equations:
     """A program with the order of its unknowns and work arrays."""
     n, m, z = len(program.mass), len(program.rows.constant), len(program.mass) + len(program.curves.sign)
-    N, r = n + m, (s - 1) // 2
-    held = np.argwhere(program.mass != 0.0)
-    band = _band(program, held)
+    N, R = n + m, (s + 1) // 2
     place = program.floats.place
     widest = int(max([4, *place[:, 1], *place[:, 2]]))
     width = int(max([4, *(2 * place[:, 1] + 4)]))
@@ -294,20 +309,25 @@ def equations(program: Program, s: int, stresses: int) -> Equations:
         return np.zeros(shape, dtype=np.int64)
 
     own = Scratch(
+        q=np.zeros(n), v=np.zeros(n), s=np.zeros(stresses), L=np.zeros(m), gap=np.zeros(m), at=np.full(1, np.nan),
         P=np.zeros((z, 3)), R=np.zeros((len(program.code.op), 3)), TF=np.zeros((len(program.times.first) - 1, 4)),
         pieces=whole(len(program.switches.register)), H=np.zeros((z, 1)), F=np.zeros(n), D=np.zeros((m, z)),
-        G=np.zeros((m, n)), K=np.zeros((n, n)), C=np.zeros((n, n)), B=np.zeros((2, N, N)),
-        A=np.zeros((r, N, N), dtype=complex), pivot=whole(r + 2, N), first=whole(r + 2, N), last=whole(r + 2, N),
-        x=np.zeros(N), y=np.zeros(N, dtype=complex), scale=np.zeros(r + 2), law=np.zeros((stresses, width)),
-        z=np.zeros((2, 4)), slope=np.zeros((3, 4)), by=np.zeros((2, 4, 4)), shapes=np.zeros((3, widest)),
-        blocks=np.zeros((widest, width)),
+        G=np.zeros((m, n)), K=np.zeros((n, n)), C=np.zeros((n, n)), B=lanes.lanes(2, N, N, 2, R),
+        over=lanes.lanes(2, N, 2, R), scale=lanes.lanes(2, R), pivot=whole(2, N), low=whole(2, N), top=whole(2, N),
+        right=whole(N), x=lanes.lanes(N, 2, R), law=np.zeros((stresses, width)), slope=np.zeros((3, 4)),
+        by=np.zeros((2, 4, 4)), shapes=np.zeros((3, widest)), blocks=np.zeros((widest, width)),
     )  # fmt: skip
-    return Equations(program, band, own)
+    W = s + 1
+    wide = Wide(
+        P=lanes.lanes(z, 2, W), TF=lanes.lanes(len(own.TF), 2, W), H=lanes.lanes(z, 1, W), F=lanes.lanes(n, W),
+        shapes=lanes.lanes(2, widest, W), blocks=lanes.lanes(widest, width, W),
+    )  # fmt: skip
+    return Equations(program, band, own, wide)
 
 
-def _band(program: Program, held: np.ndarray) -> Band:
+def narrow_band(program: Program) -> Band:
     """Which entries of the matrices may not vanish, and an order of the unknowns in which they lie in a narrow band."""
-    n, m = len(program.mass), len(program.rows.constant)
+    n, m, held = len(program.mass), len(program.rows.constant), np.argwhere(program.mass != 0.0)
 
     of = np.append(np.arange(n), program.curves.place[:, 0])  # coordinate of each variable
     rows, code = program.rows, program.code
@@ -333,7 +353,16 @@ def _band(program: Program, held: np.ndarray) -> Band:
     place = np.empty(n + m, dtype=np.int64)
     place[narrow_order(graph)] = np.arange(n + m)
     entries = np.ascontiguousarray(np.argwhere(filled).astype(np.int64))
-    return Band(place, entries, np.ascontiguousarray(held.astype(np.int64)), program.mass[tuple(held.T)], acting)
+    graph |= np.eye(n + m, dtype=bool)
+    placed = np.zeros_like(graph)
+    placed[np.ix_(place, place)] = graph
+    last = n + m - 1 - placed[:, ::-1].argmax(axis=1)
+    reach = np.maximum.accumulate(last)  # pivots exchange rows up to it
+    first = np.searchsorted(np.maximum.accumulate(reach[reach]), np.arange(n + m))
+    return Band(
+        place, entries, program.mass[tuple(entries.T)], np.ascontiguousarray(held.astype(np.int64)),
+        program.mass[tuple(held.T)], acting, first.astype(np.int64), reach.astype(np.int64), last.astype(np.int64),
+    )  # fmt: skip
 
 
 def in_modes(modal: ModalCoordinates, start: Start) -> tuple[System, Start]:

@@ -8,6 +8,8 @@ of the mechanism for each mu,
     [ mu^2/h^2 M - mu/h df/dv - df/dq + d(G^T lambda)/dq    G^T ]
     [ G                                                      0  ].
 
+Stages lie side by side in lanes (`lanes`), and so do these systems: all are evaluated, factorised and solved at once.
+
 The error is that of the stages' polynomials at the step's begin, v - V(0) and M (a - A(0)), filtered by the matrix of
 the real eigenvalue (Hairer & Wanner II, Secs. IV.8, VI.1, VII.4). The end is projected onto the constraints of
 positions and velocities by the least changes in the mass norm.
@@ -23,41 +25,41 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..typing import Array
+from .lanes import Lanes
 
 if TYPE_CHECKING:
     from .collocation import Scheme
-    from .kernel_equations import linearise, stage
+    from .kernel_equations import linearise, stages
     from .kernel_matrices import factorise, solve
-    from .kernel_rows import copy, fill
-    from .kernel_stages import change, combine, defect, end_state, gap_between, keep_path, project
+    from .kernel_stages import begin, change, defect, end_state, gap_between, keep_path, project
 
 #: Changes relative to the tolerance below which a step counts, and at which Newton's rate is trusted to tell the rest.
 SOLVED, TRUSTED_CHANGE, MOST_NEWTON = 1e-3, 0.3, 12
 
 
 class Stages(NamedTuple):
-    """State and unknowns of a step: s stages, and row s for its begin; n coordinates, m rows, k stresses."""
+    """State and unknowns of a step: n coordinates, m rows, k stresses; lanes are s stages, and last the begin."""
 
     now: Array  # (3,) time at the begin and step (s), change over the limit at which Newton's method ends
     measures: Array  # (3,) error over the tolerance, gap of the rows between the stages, mean rate of Newton's changes
     q: Array  # (n,) state at the begin
     v: Array
     multipliers: Array  # (m,) first guess
-    guess: Array  # (s, s + 1) from coefficients of the speeds before to Z
     speeds: Array  # (s + 1, n) of powers of the time since the begin
     limit: Array  # (n,) allowed errors of coordinates
-    Z: Array  # (s, n) positions less q + c h v
-    Q: Array  # (s + 1, n) positions, velocities, accelerations
-    V: Array
-    A: Array
-    L: Array  # (s + 1, m) multipliers
-    S: Array  # (s + 1, k) stresses
-    rest: Array  # (s + 1, n) what is left of the equations
-    gap: Array  # (s + 1, m)
-    r: Array  # (s, n) the same in components of the eigenvalues, then changes
-    g: Array  # (s, m)
-    dZ: Array  # (s, n) changes
-    dL: Array  # (s, m)
+    guess: Lanes  # (s + 1, W) from coefficients of the speeds before to Z
+    Z: Lanes  # (n, W) positions less q + c h v
+    Q: Lanes  # (n, W) positions, velocities, accelerations
+    V: Lanes
+    A: Lanes
+    L: Lanes  # (m, W) multipliers
+    S: Lanes  # (k, W) stresses
+    rest: Lanes  # (n, W) what is left of the equations
+    gap: Lanes  # (m, W)
+    r: Lanes  # (n, W) the same of the systems, then their changes
+    g: Lanes  # (m, W)
+    dZ: Lanes  # (n, W) changes
+    dL: Lanes  # (m, W)
     known: Array  # (inner + 4, n) as `Scheme.path` has them
     qn: Array  # (n,) state at the end
     vn: Array
@@ -65,25 +67,13 @@ class Stages(NamedTuple):
 
 def collocation_step(eq: Any, w: Stages, tab: Scheme) -> int:
     """One trial step; the number of Newton's iterations, its negative where they did not converge."""
-    s = tab.c.shape[0]
     t = w.now[0]
     h = w.now[1]
-    copy(w.q, w.Q[s])
-    copy(w.v, w.V[s])
-    fill(w.A[s], 0.0)
-    fill(w.L[s], 0.0)
-    stage(eq, w, tab, s, t)  # the stresses become those of the coordinates
-    stage(eq, w, tab, s, t)
-    combine(w.guess, w.speeds, w.Z)
-    for i in range(s):
-        copy(w.S[s], w.S[i])
-        copy(w.multipliers, w.L[i])
-    change(eq, w, tab, h, False)
+    begin(eq, w, tab)
     if not linearise(eq, w, tab.central, t + tab.c[tab.central] * h):
         return 0
-    for k in range(tab.values.shape[0]):
-        if not factorise(eq, w, tab, k, h):
-            return 0
+    if not factorise(eq, w, tab):
+        return 0
     moved = np.inf
     size = np.inf
     started = 0.0
@@ -91,15 +81,9 @@ def collocation_step(eq: Any, w: Stages, tab: Scheme) -> int:
     solved = False
     while count < MOST_NEWTON and not solved:
         count += 1
-        for i in range(s):
-            stage(eq, w, tab, i, t + tab.c[i] * h)
-        combine(tab.back, w.rest, w.r)
-        combine(tab.back, w.gap, w.g)
-        for k in range(tab.values.shape[0]):
-            solve(eq, w, tab, k)
-        combine(tab.basis, w.r, w.dZ)
-        combine(tab.basis, w.g, w.dL)
-        size = change(eq, w, tab, h, True)
+        stages(eq, w, tab)
+        solve(eq, w, tab)
+        size = change(eq, w, tab)
         solved = size < w.now[2] or (
             size < TRUSTED_CHANGE and moved < np.inf and size * size / max(moved, 1e-300) < w.now[2]
         )
@@ -110,11 +94,11 @@ def collocation_step(eq: Any, w: Stages, tab: Scheme) -> int:
         moved = size
     if not (solved or size < SOLVED):
         return -count
-    w.measures[0] = defect(eq, w, tab, h)
-    end_state(w, tab, h)
-    project(eq, w, t + h)
-    keep_path(w, h)
-    w.measures[1] = gap_between(eq, w, tab, t, h)
+    w.measures[0] = defect(eq, w, tab)
+    end_state(w, tab)
+    project(eq, w, tab)
+    keep_path(w)
+    w.measures[1] = gap_between(eq, w, tab)
     w.measures[2] = (moved / started) ** (1.0 / (count - 1.0)) if count > 2 and moved > 0.0 else 0.0
     return count
 

@@ -7,82 +7,82 @@ of. A stage's force is that of S and, through `law`, of what S lacks; S then bec
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..typing import Array
+from .lanes import Lanes
 
 if TYPE_CHECKING:
     from .kernel_equations import Scratch
     from .tape import Bars, Floats
 
 
-def bar_strains(bars: Bars, p: int, q: Array, z: Array) -> None:
-    """z := (x', y', theta, theta') at a point."""
-    dx = 0.0
-    dy = 0.0
-    turn = 0.0
-    bend = 0.0
+def bar_strains(bars: Bars, p: int, q: Array) -> Any:
+    """(x', y', theta, theta') at a point, of one state or of all stages."""
+    dx = 0.0 * q[0]
+    dy = 0.0 * q[0]
+    turn = 0.0 * q[0]
+    bend = 0.0 * q[0]
     for k in range(4):
         at = bars.place[p, k]
         dx += bars.slope[p, k] * q[at]
         dy += bars.slope[p, k] * q[at + 1]
         turn += bars.shape[p, k] * q[at + 2]
         bend += bars.slope[p, k] * q[at + 2]
-    z[0] = dx
-    z[1] = dy
-    z[2] = turn
-    z[3] = bend
+    return dx, dy, turn, bend
 
 
-def add_bars(bars: Bars, q: Array, v: Array, S: Array, own: Scratch, F: Array) -> None:
+def add_bars(bars: Bars, q: Lanes, v: Lanes, S: Lanes, law: Array, F: Lanes) -> None:
     """Forces of all beams; S := their stresses."""
-    z, d, law = own.z[0], own.z[1], own.law
     for p in range(bars.place.shape[0]):
-        bar_strains(bars, p, q, z)
-        c = math.cos(z[2])
-        s = math.sin(z[2])
-        stretch = c * z[0] + s * z[1]
-        shear = c * z[1] - s * z[0]
+        dx, dy, angle, curl = bar_strains(bars, p, q)
+        c = np.cos(angle)
+        s = np.sin(angle)
+        stretch = c * dx + s * dy
+        shear = c * dy - s * dx
         axial = stretch - 1.0
-        across = shear
-        bend = z[3]
+        across = 1.0 * shear
+        bend = 1.0 * curl
         if bars.damping[p] > 0.0:
-            bar_strains(bars, p, v, d)
-            axial += bars.damping[p] * (c * d[0] + s * d[1] + shear * d[2])
-            across += bars.damping[p] * (c * d[1] - s * d[0] - stretch * d[2])
-            bend += bars.damping[p] * d[3]
+            x, y, turn, curling = bar_strains(bars, p, v)
+            axial += bars.damping[p] * (c * x + s * y + shear * turn)
+            across += bars.damping[p] * (c * y - s * x - stretch * turn)
+            bend += bars.damping[p] * curling
         at = bars.stress[p]
-        one = S[at]
-        two = S[at + 1]
-        three = S[at + 2]
+        one = 1.0 * S[at]
+        two = 1.0 * S[at + 1]
+        three = 1.0 * S[at + 2]
+        lack = axial - one * (1.0 / bars.stiffness[p, 0])
+        skew = across - two * (1.0 / bars.stiffness[p, 1])
+        more = bend - three * (1.0 / bars.stiffness[p, 2])
         S[at] = axial * bars.stiffness[p, 0]
         S[at + 1] = across * bars.stiffness[p, 1]
         S[at + 2] = bend * bars.stiffness[p, 2]
-        lack = (S[at] - one) / bars.stiffness[p, 0]
-        skew = (S[at + 1] - two) / bars.stiffness[p, 1]
-        turn = (S[at + 2] - three) / bars.stiffness[p, 2]
         x = c * one - s * two + lack * law[at, 0] + skew * law[at + 1, 0]
         y = s * one + c * two + lack * law[at, 1] + skew * law[at + 1, 1]
         moment = shear * one - stretch * two + lack * law[at, 2] + skew * law[at + 1, 2]
-        curl = three + turn * law[at + 2, 3]
+        moment *= bars.weight[p]
+        couple = three + more * law[at + 2, 3]
         for k in range(4):
             j = bars.place[p, k]
             slope = bars.weight[p] * bars.slope[p, k]
             F[j] -= slope * x
             F[j + 1] -= slope * y
-            F[j + 2] -= bars.weight[p] * bars.shape[p, k] * moment + slope * curl
+            F[j + 2] -= bars.shape[p, k] * moment + slope * couple
 
 
 def add_bar_tangents(bars: Bars, q: Array, v: Array, S: Array, own: Scratch, K: Array, C: Array) -> None:
     """Their derivatives by coordinates and velocities; law := C de/dz."""
-    z, d, slope, by, rate, law = own.z[0], own.z[1], own.slope, own.by[0], own.by[1], own.law
+    slope, by, rate, law = own.slope, own.by[0], own.by[1], own.law
     for p in range(bars.place.shape[0]):
-        bar_strains(bars, p, q, z)
-        bar_strains(bars, p, v, d)
-        c = math.cos(z[2])
-        s = math.sin(z[2])
-        stretch = c * z[0] + s * z[1]
-        shear = c * z[1] - s * z[0]
+        dx, dy, angle, _ = bar_strains(bars, p, q)
+        d = bar_strains(bars, p, v)
+        c = math.cos(angle)
+        s = math.sin(angle)
+        stretch = c * dx + s * dy
+        shear = c * dy - s * dx
         for i in range(3):
             for j in range(4):
                 slope[i, j] = 0.0
@@ -141,35 +141,35 @@ def add_bar_tangents(bars: Bars, q: Array, v: Array, S: Array, own: Scratch, K: 
                 C[i + 2, j + 2] += both * rate[2, 2] + other * rate[2, 3] + mixed * rate[3, 2] + inner * rate[3, 3]
 
 
-def bar_changes(bars: Bars, dq: Array, dv: Array, own: Scratch, S: Array) -> None:
+def bar_changes(bars: Bars, dq: Lanes, dv: Lanes, law: Array, S: Lanes) -> None:
     """Changes of the stresses with those of coordinates and velocities."""
-    z, d, law = own.z[0], own.z[1], own.law
     for p in range(bars.place.shape[0]):
-        bar_strains(bars, p, dq, z)
+        x, y, turn, bend = bar_strains(bars, p, dq)
         if bars.damping[p] > 0.0:
-            bar_strains(bars, p, dv, d)
-            for k in range(4):
-                z[k] += bars.damping[p] * d[k]
+            a, b, c, d = bar_strains(bars, p, dv)
+            x += bars.damping[p] * a
+            y += bars.damping[p] * b
+            turn += bars.damping[p] * c
+            bend += bars.damping[p] * d
         for i in range(3):
             at = bars.stress[p] + i
-            for k in range(4):
-                S[at] += law[at, k] * z[k]
+            S[at] += law[at, 0] * x + law[at, 1] * y + law[at, 2] * turn + law[at, 3] * bend
 
 
-def float_slopes(floats: Floats, b: int, q: Array, own: Scratch) -> None:
-    """own.blocks := derivatives of the strains by the coordinates (s, size), own.shapes[0] the shares of the modes,
-    own.shapes[1] L + Q eta / 2 times eta: the strains."""
+def float_slopes(floats: Floats, b: int, q: Array, shapes: Array, blocks: Array) -> None:
+    """blocks := derivatives of the strains by the coordinates (s, size), shapes[0] the shares of the modes, shapes[1]
+    L + Q eta / 2 times eta: the strains."""
     first, r, size = floats.place[b, 0], floats.place[b, 1], 2 * floats.place[b, 1] + 4
-    eta, e = own.shapes[0], own.shapes[1]
+    eta, e = shapes[0], shapes[1]
     for k in range(r):
         p = first + 4 + 2 * k
         eta[k] = q[p] * q[first + 2] + q[p + 1] * q[first + 3]
     for s in range(floats.place[b, 2]):
         e[s] = 0.0
         for j in range(size):
-            own.blocks[s, j] = 0.0
+            blocks[s, j] = 0.0
         for k in range(r):
-            bent = 0.0
+            bent = 0.0 * eta[k]
             at = floats.place[b, 4] + (s * r + k) * r
             for m in range(r):
                 bent += floats.quadratic[at + m] * eta[m]
@@ -177,32 +177,34 @@ def float_slopes(floats: Floats, b: int, q: Array, own: Scratch) -> None:
             e[s] += (linear + 0.5 * bent) * eta[k]
             by = linear + bent
             p = first + 4 + 2 * k
-            own.blocks[s, 2] += by * q[p]
-            own.blocks[s, 3] += by * q[p + 1]
-            own.blocks[s, 4 + 2 * k] = by * q[first + 2]
-            own.blocks[s, 5 + 2 * k] = by * q[first + 3]
+            blocks[s, 2] += by * q[p]
+            blocks[s, 3] += by * q[p + 1]
+            blocks[s, 4 + 2 * k] = by * q[first + 2]
+            blocks[s, 5 + 2 * k] = by * q[first + 3]
 
 
-def add_floats(floats: Floats, q: Array, v: Array, S: Array, own: Scratch, F: Array) -> None:
+def add_floats(
+    floats: Floats, q: Lanes, v: Lanes, S: Lanes, law: Array, shapes: Lanes, blocks: Lanes, F: Lanes
+) -> None:
     """Forces of all bodies in floating frames; S := their stresses."""
     for b in range(floats.place.shape[0]):
-        float_slopes(floats, b, q, own)
+        float_slopes(floats, b, q, shapes, blocks)
         first, size, at = floats.place[b, 0], 2 * floats.place[b, 1] + 4, floats.place[b, 5]
         for s in range(floats.place[b, 2]):
-            stress = own.shapes[1, s]
+            stress = 1.0 * shapes[1, s]
             if floats.damping[b] > 0.0:
                 for j in range(size):
-                    stress += floats.damping[b] * own.blocks[s, j] * v[first + j]
+                    stress += floats.damping[b] * blocks[s, j] * v[first + j]
             lack = stress - S[at + s]
             for j in range(size):
-                F[first + j] -= S[at + s] * own.blocks[s, j] + lack * own.law[at + s, j]
+                F[first + j] -= S[at + s] * blocks[s, j] + lack * law[at + s, j]
             S[at + s] = stress
 
 
 def add_float_tangents(floats: Floats, q: Array, v: Array, S: Array, own: Scratch, K: Array, C: Array) -> None:
     """Their derivatives by coordinates and velocities; law := de/dq."""
     for b in range(floats.place.shape[0]):
-        float_slopes(floats, b, q, own)
+        float_slopes(floats, b, q, own.shapes, own.blocks)
         first, r, strains = floats.place[b, 0], floats.place[b, 1], floats.place[b, 2]
         at = floats.place[b, 5]
         size = 2 * r + 4
@@ -252,13 +254,13 @@ def add_share_product(first: int, k: int, m: int, q: Array, factor: float, K: Ar
             K[first + 2 + c, first + 2 + e] += factor * q[one] * q[two]
 
 
-def float_changes(floats: Floats, dq: Array, dv: Array, own: Scratch, S: Array) -> None:
+def float_changes(floats: Floats, dq: Lanes, dv: Lanes, law: Array, S: Lanes) -> None:
     """Changes of the stresses with those of coordinates and velocities."""
     for b in range(floats.place.shape[0]):
         first, at = floats.place[b, 0], floats.place[b, 5]
         for s in range(floats.place[b, 2]):
             for j in range(2 * floats.place[b, 1] + 4):
-                S[at + s] += own.law[at + s, j] * (dq[first + j] + floats.damping[b] * dv[first + j])
+                S[at + s] += law[at + s, j] * (dq[first + j] + floats.damping[b] * dv[first + j])
 
 
 FUNCTIONS = (

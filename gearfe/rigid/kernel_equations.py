@@ -1,4 +1,4 @@
-"""What a step of collocation asks of a system that is written on a tape: forces, tangents, rows, compiled.
+"""What a step of collocation asks of a system that is written on a tape: forces of all stages, tangents of one.
 
 Forces of registers and their derivatives are orders 0 and 1 of the registers' series (`kernel_tape`), those of beams
 and of bodies in floating frames are in closed form, as in `beam.Beam` and `floating.Floating`.
@@ -13,28 +13,40 @@ import numpy as np
 from ..typing import Array, IntArray
 from .kernel_elastic import add_bar_tangents, add_bars, add_float_tangents, add_floats
 from .kernel_quadratic import gradients, row_orders
-from .kernel_rows import copy, fill, time_series
+from .kernel_rows import fill, time_series
 from .kernel_tape import curve_forces, curve_orders, piece_at, tape_order
+from .lanes import Lanes
 
 if TYPE_CHECKING:
     from .collocation import Scheme
     from .kernel_collocation import Stages
+    from .lanes import flat
     from .tape import Program
 
 
 class Band(NamedTuple):
     """Order of the unknowns and entries of the matrices."""
 
-    place: IntArray  # (n + m,) of coordinates, then rows, in the matrices
-    entry: IntArray  # (e, 2) of the tangents that may be none
+    place: IntArray  # (N,) of coordinates, then rows, in the matrices; N = n + m
+    entry: IntArray  # (e, 2) of the matrices that may be none, but for the rows'
+    mass: Array  # (e,) of them
     held: IntArray  # (p, 2) of the mass matrix
-    mass: Array  # (p,)
+    masses: Array  # (p,)
     acting: IntArray  # (a,) coordinates that registers depend on
+    begin: IntArray  # (N,) first and last rows that a column of the factors may come to
+    reach: IntArray  # (N,)
+    right: IntArray  # (N,) last column of each row of the matrices
 
 
 class Scratch(NamedTuple):
-    """Work arrays; N = n + m."""
+    """Work arrays of one state, and the factors of all systems, R = r + 1."""
 
+    q: Array  # (n,)
+    v: Array
+    s: Array  # (k,) stresses
+    L: Array  # (m,) multipliers
+    gap: Array  # (m,)
+    at: Array  # (1,) time of the factor of the mass matrix
     P: Array  # (z, 3) series of the variables
     R: Array  # (registers, 3)
     TF: Array  # (functions, 4)
@@ -45,20 +57,30 @@ class Scratch(NamedTuple):
     G: Array  # (m, n)
     K: Array  # (n, n) derivatives of the forces, less those of the rows' forces, by coordinates
     C: Array  # (n, n) by velocities
-    B: Array  # (2, N, N) factors of the real eigenvalue and of the mass matrix
-    A: np.ndarray  # (r, N, N) complex
-    pivot: IntArray  # (r + 2, N) of all factors, the mass matrix's last
-    first: IntArray
-    last: IntArray
-    x: Array  # (N,)
-    y: np.ndarray  # (N,) complex
-    scale: Array  # (r + 2,)
+    B: Lanes  # (2, N, N, 2, R) factors of the step's matrices and of the mass matrix
+    over: Lanes  # (2, N, 2, R)
+    scale: Lanes  # (2, R)
+    pivot: IntArray  # (2, N)
+    low: IntArray  # (2, N)
+    top: IntArray  # (2, N)
+    right: IntArray  # (N,)
+    x: Lanes  # (N, 2, R)
     law: Array  # (k, widest) derivatives of the stresses
-    z: Array  # (2, 4) of a beam's point: strains' arguments, and their rates or changes
     slope: Array  # (3, 4)
-    by: Array  # (2, 4, 4) tangents by them
+    by: Array  # (2, 4, 4) tangents of a beam's point by its strains' arguments, and by their rates
     shapes: Array  # (3, widest) of a body in a floating frame: shares of modes, strains, rates of the shares
     blocks: Array  # (strains, coordinates)
+
+
+class Wide(NamedTuple):
+    """Work arrays of all stages."""
+
+    P: Lanes  # (z, 2, W) variables and rates
+    TF: Lanes  # (functions, 2, W)
+    H: Lanes  # (z, 1, W)
+    F: Lanes  # (n, W)
+    shapes: Lanes  # (2, widest, W)
+    blocks: Lanes  # (strains, coordinates, W)
 
 
 class Equations(NamedTuple):
@@ -67,6 +89,7 @@ class Equations(NamedTuple):
     program: Program
     band: Band
     own: Scratch
+    wide: Wide
 
 
 def own_pieces(eq: Equations) -> bool:
@@ -84,19 +107,50 @@ def own_pieces(eq: Equations) -> bool:
     return covered
 
 
+def coordinate_pieces(eq: Equations, q: Array) -> None:
+    """Pieces of the tables of coordinates."""
+    tb, pieces = eq.program, eq.own.pieces
+    for f in range(tb.curves.sign.shape[0]):
+        s = tb.curves.place[f, 2]
+        if s >= 0 and tb.curves.place[f, 3] == 0:
+            piece = piece_at(tb.switches, s, q[tb.curves.place[f, 0]])
+            pieces[s] = piece if tb.switches.period[s] > 0.0 else max(0, piece)
+
+
 def variables(eq: Equations, q: Array, v: Array) -> None:
-    """P := variables and rates."""
+    """P := variables and rates of one state."""
     tb, own, P = eq.program, eq.own, eq.own.P
     for i in range(q.shape[0]):
         P[i, 0] = q[i]
         P[i, 1] = v[i]
         P[i, 2] = 0.0
-    for f in range(tb.curves.sign.shape[0]):
-        s = tb.curves.place[f, 2]
-        if s >= 0 and tb.curves.place[f, 3] == 0:
-            piece = piece_at(tb.switches, s, q[tb.curves.place[f, 0]])
-            own.pieces[s] = piece if tb.switches.period[s] > 0.0 else max(0, piece)
+    coordinate_pieces(eq, q)
     curve_orders(tb, P, own.pieces, 0)
+    curve_orders(tb, P, own.pieces, 1)
+
+
+def all_variables(eq: Equations, q: Lanes, v: Lanes) -> None:
+    """wide.P := variables and rates of all stages; these may be on different pieces of tables."""
+    tb, own, P = eq.program, eq.own, eq.wide.P
+    place, values, Q = tb.curves.place, flat(P), flat(q)
+    n = q.shape[0]
+    tables = False
+    for i in range(n):
+        P[i, 0] = q[i]
+        P[i, 1] = v[i]
+    for f in range(place.shape[0]):
+        tables = tables or place[f, 2] >= 0
+    curve_orders(tb, P, own.pieces, 0)
+    if tables:
+        for i in range(Q.shape[1]):
+            for j in range(n):
+                own.q[j] = Q[j, i]
+                own.P[j, 0] = Q[j, i]
+            coordinate_pieces(eq, own.q)
+            curve_orders(tb, own.P, own.pieces, 0)
+            for f in range(place.shape[0]):
+                if place[f, 2] >= 0:
+                    values[n + f, 0, i] = own.P[n + f, 0]
     curve_orders(tb, P, own.pieces, 1)
 
 
@@ -113,48 +167,87 @@ def registers_push(eq: Equations, k: int, F: Array) -> None:
     curve_forces(eq.program, own.P, H, 0, F)
 
 
-def stage(eq: Equations, w: Stages, tab: Scheme, i: int, t: float) -> None:
-    """w.rest[i], w.gap[i]: what is left of the equations at a stage; its stresses become those of its coordinates.
+def lane_times(eq: Equations, places: Array, t: float, h: float) -> None:
+    """Functions of time and their rates at places of the step, of which the last is its begin."""
+    TF, values = eq.own.TF, flat(eq.wide.TF)
+    last = places.shape[0] - 1
+    for i in range(last + 1):
+        time_series(eq.program.times, t + places[i] * h, (h > 0.0) == (i == last), 2, TF)
+        for f in range(TF.shape[0]):
+            values[f, 0, i] = TF[f, 0]
+            values[f, 1, i] = TF[f, 1]
+
+
+def add_registers(eq: Equations) -> None:
+    """H += forces of the registers, stage by stage; not-a-number where a table has no value."""
+    tb, own = eq.program, eq.own
+    code = tb.code
+    P, TF, H = flat(eq.wide.P), flat(eq.wide.TF), flat(eq.wide.H)
+    for i in range(P.shape[2]):
+        for z in range(P.shape[0]):
+            own.P[z, 0] = P[z, 0, i]
+            own.P[z, 1] = P[z, 1, i]
+        for f in range(TF.shape[0]):
+            own.TF[f, 0] = TF[f, 0, i]
+        covered = own_pieces(eq)
+        tape_order(tb, own.P, own.R, own.TF, own.pieces, 0)
+        for p in range(code.push.shape[0]):
+            H[code.push[p, 1], 0, i] += code.share[p] * own.R[code.push[p, 0], 0]
+        if not covered:
+            H[0, 0, i] = np.nan
+
+
+def stages(eq: Equations, w: Stages, tab: Scheme) -> None:
+    """w.rest, w.gap: what is left of the equations at all stages; their stresses become those of their coordinates.
 
     The force is the one that Newton's method sees (`beam.Tangent`).
     """
-    tb, own, band = eq.program, eq.own, eq.band
-    F = own.F
-    q, v, rest = w.Q[i], w.V[i], w.rest[i]
-    n = q.shape[0]
-    variables(eq, q, v)
-    begin = i == w.Z.shape[0]
-    time_series(tb.times, t, (w.now[1] > 0.0) == begin, 2, own.TF)
-    row_orders(tb, own.P, own.TF, tab.level, w.gap[i])
+    tb, band, wide, rows = eq.program, eq.band, eq.wide, eq.program.rows
+    P, H, F = wide.P, wide.H, wide.F
+    n = w.q.shape[0]
+    all_variables(eq, w.Q, w.V)
+    row_orders(tb, P, wide.TF, tab.level, w.gap)
     if tab.level == 1:
-        for r in range(w.gap.shape[1]):
-            w.gap[i, r] *= w.now[1]
-    gradients(tb, own.P, own)
-    covered = own_pieces(eq)
-    tape_order(tb, own.P, own.R, own.TF, own.pieces, 0)
-    copy(tb.constant, F)
-    registers_push(eq, 0, F)
+        for r in range(w.gap.shape[0]):
+            w.gap[r] *= w.now[1]
+    for z in range(H.shape[0]):
+        H[z, 0] = 0.0
+    if tb.code.op.shape[0] > 0:
+        add_registers(eq)
+    for p in range(rows.place.shape[0]):
+        H[rows.place[p, 1], 0] -= rows.factor[p] * w.L[rows.place[p, 0]]
+    for p in range(rows.pair.shape[0]):
+        one = rows.pair[p, 1]
+        two = rows.pair[p, 2]
+        force = rows.weight[p] * w.L[rows.pair[p, 0]]
+        H[one, 0] -= force * P[two, 0]
+        H[two, 0] -= force * P[one, 0]
+    for i in range(n):
+        F[i] = H[i, 0] + tb.constant[i]
+    curve_forces(tb, P, H, 0, F)
     for e in range(tb.block.shape[0]):
-        F[tb.block[e, 0]] -= tb.stiffness[e] * q[tb.block[e, 1]] + tb.damping[e] * v[tb.block[e, 1]]
-    add_bars(tb.bars, q, v, w.S[i], own, F)
-    add_floats(tb.floats, q, v, w.S[i], own, F)
-    for j in range(n):
-        rest[j] = -F[j]
+        F[tb.block[e, 0]] -= tb.stiffness[e] * w.Q[tb.block[e, 1]] + tb.damping[e] * w.V[tb.block[e, 1]]
+    add_bars(tb.bars, w.Q, w.V, w.S, eq.own.law, F)
+    add_floats(tb.floats, w.Q, w.V, w.S, eq.own.law, wide.shapes, wide.blocks, F)
+    for i in range(n):
+        w.rest[i] = -F[i]
     for e in range(band.held.shape[0]):
-        rest[band.held[e, 0]] += band.mass[e] * w.A[i, band.held[e, 1]]
-    for r in range(own.G.shape[0]):
-        for j in range(n):
-            rest[j] += own.G[r, j] * w.L[i, r]
-    if not covered:
-        rest[0] = np.nan
+        w.rest[band.held[e, 0]] += band.masses[e] * w.A[band.held[e, 1]]
 
 
 def linearise(eq: Equations, w: Stages, i: int, t: float) -> bool:
     """Tangents and rows at a stage; whether they are finite."""
     tb, own, band = eq.program, eq.own, eq.band
-    K, C, P, D = own.K, own.C, own.P, own.D
-    q, v = w.Q[i], w.V[i]
+    K, C, P, D, q, v, L = own.K, own.C, own.P, own.D, own.q, own.v, own.L
     n = q.shape[0]
+    Q, V, S, Ls = flat(w.Q), flat(w.V), flat(w.S), flat(w.L)
+    for a in range(n):
+        q[a] = Q[a, i]
+        v[a] = V[a, i]
+    for k in range(own.s.shape[0]):
+        own.s[k] = S[k, i]
+    for r in range(L.shape[0]):
+        L[r] = Ls[r, i]
     for e in range(band.entry.shape[0]):
         K[band.entry[e, 0], band.entry[e, 1]] = 0.0
         C[band.entry[e, 0], band.entry[e, 1]] = 0.0
@@ -165,7 +258,7 @@ def linearise(eq: Equations, w: Stages, i: int, t: float) -> bool:
     for p in range(rows.pair.shape[0]):
         one = rows.pair[p, 1]
         two = rows.pair[p, 2]
-        factor = w.L[i, rows.pair[p, 0]] * rows.weight[p] * turned(tb, P, one) * turned(tb, P, two)
+        factor = L[rows.pair[p, 0]] * rows.weight[p] * turned(tb, P, one) * turned(tb, P, two)
         a = coordinate(tb, one)
         b = coordinate(tb, two)
         K[a, b] -= factor
@@ -173,12 +266,12 @@ def linearise(eq: Equations, w: Stages, i: int, t: float) -> bool:
     for r in range(D.shape[0]):
         for f in range(tb.curves.sign.shape[0]):
             j = tb.curves.place[f, 0]
-            K[j, j] -= w.L[i, r] * D[r, n + f] * bend(tb, P, f)
+            K[j, j] -= L[r] * D[r, n + f] * bend(tb, P, f)
     for e in range(tb.block.shape[0]):
         K[tb.block[e, 0], tb.block[e, 1]] -= tb.stiffness[e]
         C[tb.block[e, 0], tb.block[e, 1]] -= tb.damping[e]
-    add_bar_tangents(tb.bars, q, v, w.S[i], own, K, C)
-    add_float_tangents(tb.floats, q, v, w.S[i], own, K, C)
+    add_bar_tangents(tb.bars, q, v, own.s, own, K, C)
+    add_float_tangents(tb.floats, q, v, own.s, own, K, C)
     if tb.code.push.shape[0] > 0:
         add_register_tangents(eq, q, v)
     total = 0.0
@@ -248,4 +341,7 @@ def add_register_tangents(eq: Equations, q: Array, v: Array) -> None:
                     own.K[i, j] += F[i]
 
 
-FUNCTIONS = (own_pieces, variables, registers_push, coordinate, turned, bend, add_register_tangents, stage, linearise)
+FUNCTIONS = (
+    own_pieces, coordinate_pieces, variables, all_variables, registers_push, lane_times, add_registers, coordinate,
+    turned, bend, add_register_tangents, stages, linearise,
+)  # fmt: skip

@@ -1,76 +1,110 @@
-"""L U of banded saddle matrices [[T, G^T], [G, 0]] with row pivots, real or complex, in dense storage.
+"""L U of several banded saddle matrices [[T, G^T], [G, 0]] of one pattern, side by side in lanes, complex.
 
-Rows keep where their entries begin and end, so an order of the unknowns with a narrow band costs what its band costs.
+Matrices are stored by columns, real and imaginary parts in turn: B[j, i, 0] is the real part of row i of column j. Rows
+are exchanged for all matrices alike, where the diagonal is small in their sum (threshold pivoting: Duff, Erisman &
+Reid, Direct Methods for Sparse Matrices, 2nd ed., Oxford 2017, Sec. 5.2).
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ..typing import IntArray
+from .lanes import Lanes
+
+if TYPE_CHECKING:
+    from .lanes import total
+
+#: Share of the largest entry below the diagonal that the diagonal has where it is the pivot.
+DIAGONAL = 0.1
 
 
-def magnitude(x: Any) -> float:
-    """|Re x| + |Im x|."""
-    return abs(x.real) + abs(x.imag)
+def factorise_band(
+    B: Lanes, over: Lanes, reach: IntArray, pivot: IntArray, low: IntArray, top: IntArray, right: IntArray
+) -> bool:
+    """B := L U; False where a pivot vanishes.
 
-
-def factorise_band(A: Any, pivot: IntArray, first: IntArray, last: IntArray) -> bool:
-    """A := L U; `first`, `last` become the first and last entry of each row. False where a pivot vanishes."""
-    size = A.shape[0]
-    for i in range(size):
-        j = 0
-        while j < size - 1 and magnitude(A[i, j]) == 0.0:
-            j += 1
-        first[i] = j
-        j = size - 1
-        while j > 0 and magnitude(A[i, j]) == 0.0:
-            j -= 1
-        last[i] = j
-    for k in range(size):
-        best = k
-        most = magnitude(A[k, k])
-        for i in range(k + 1, size):
-            if first[i] <= k and magnitude(A[i, k]) > most:
+    `over` (N, 2) becomes 1 / pivot, `low` the last row of a column of L, `top` the first row of one of U; `reach` is
+    the last row that a column may come to, `right` the last column of each row, which changes.
+    """
+    size = B.shape[0]
+    for j in range(size):
+        top[j] = j
+    for c in range(size):
+        best = c
+        most = 0.0
+        here = 0.0
+        low[c] = c
+        for i in range(c, reach[c] + 1):
+            value = total(abs(B[c, i, 0]) + abs(B[c, i, 1]))
+            if i == c:
+                here = value
+            if value > 0.0:
+                low[c] = i
+            if value > most:
+                most = value
                 best = i
-                most = magnitude(A[i, k])
-        pivot[k] = best
         if not 0.0 < most < 1e300:
             return False
-        if best != k:
-            for j in range(size):
-                A[k, j], A[best, j] = A[best, j], A[k, j]
-            first[k], first[best] = first[best], first[k]
-            last[k], last[best] = last[best], last[k]
-        over = 1.0 / A[k, k]
-        end = last[k] + 1
-        for i in range(k + 1, size):
-            if first[i] <= k and magnitude(A[i, k]) != 0.0:
-                factor = A[i, k] * over
-                A[i, k] = factor
-                for j in range(k + 1, end):
-                    A[i, j] -= factor * A[k, j]
-                last[i] = max(last[i], last[k])
+        if here >= DIAGONAL * most:
+            best = c
+        pivot[c] = best
+        if best != c:
+            for j in range(c, max(right[c], right[best]) + 1):
+                for k in range(2):
+                    kept = 1.0 * B[j, c, k]
+                    B[j, c, k] = B[j, best, k]
+                    B[j, best, k] = kept
+            right[c], right[best] = right[best], right[c]
+        x = B[c, c, 0]
+        y = B[c, c, 1]
+        share = 1.0 / (x * x + y * y)
+        x = x * share
+        y = -y * share
+        over[c, 0] = x
+        over[c, 1] = y
+        for i in range(c + 1, low[c] + 1):
+            a = B[c, i, 0]
+            b = B[c, i, 1]
+            B[c, i, 0], B[c, i, 1] = a * x - b * y, a * y + b * x
+            right[i] = max(right[i], right[c])
+        for j in range(c + 1, right[c] + 1):
+            x = B[j, c, 0]
+            y = B[j, c, 1]
+            if total(abs(x) + abs(y)) > 0.0:
+                top[j] = min(top[j], c)
+                for i in range(c + 1, low[c] + 1):
+                    a = B[c, i, 0]
+                    b = B[c, i, 1]
+                    B[j, i, 0] -= a * x - b * y
+                    B[j, i, 1] -= a * y + b * x
     return True
 
 
-def solve_band(A: Any, pivot: IntArray, first: IntArray, last: IntArray, x: Any) -> None:
-    """x := A^-1 x."""
-    size = A.shape[0]
-    for k in range(size):
-        best = pivot[k]
-        if best != k:
-            x[k], x[best] = x[best], x[k]
-    for i in range(size):
-        value = x[i]
-        for j in range(first[i], i):
-            value -= A[i, j] * x[j]
-        x[i] = value
-    for i in range(size - 1, -1, -1):
-        value = x[i]
-        for j in range(i + 1, last[i] + 1):
-            value -= A[i, j] * x[j]
-        x[i] = value / A[i, i]
+def solve_band(B: Lanes, over: Lanes, pivot: IntArray, low: IntArray, top: IntArray, x: Lanes) -> None:
+    """x := B^-1 x, shape (N, 2) of real and imaginary parts."""
+    size = B.shape[0]
+    for c in range(size):
+        best = pivot[c]
+        a = 1.0 * x[best, 0]
+        b = 1.0 * x[best, 1]
+        if best != c:
+            x[best, 0] = x[c, 0]
+            x[best, 1] = x[c, 1]
+            x[c, 0] = a
+            x[c, 1] = b
+        for i in range(c + 1, low[c] + 1):
+            x[i, 0] -= B[c, i, 0] * a - B[c, i, 1] * b
+            x[i, 1] -= B[c, i, 0] * b + B[c, i, 1] * a
+    for c in range(size - 1, -1, -1):
+        a = x[c, 0] * over[c, 0] - x[c, 1] * over[c, 1]
+        b = x[c, 0] * over[c, 1] + x[c, 1] * over[c, 0]
+        x[c, 0] = a
+        x[c, 1] = b
+        for i in range(top[c], c):
+            x[i, 0] -= B[c, i, 0] * a - B[c, i, 1] * b
+            x[i, 1] -= B[c, i, 0] * b + B[c, i, 1] * a
 
 
-FUNCTIONS = (magnitude, factorise_band, solve_band)
+FUNCTIONS = (factorise_band, solve_band)
+NAMES = {"DIAGONAL": DIAGONAL}

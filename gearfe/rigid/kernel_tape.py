@@ -148,7 +148,7 @@ def curve_orders(tb: Program, Z: Array, pieces: IntArray, k: int) -> None:
         if k > 0:
             Z[n + f, k] = sign[f] * weighted(Z, q, Z, place[f, 1], k, k) / k
         elif s < 0:
-            Z[n + f, 0] = math.sin(Z[q, 0]) if d else math.cos(Z[q, 0])
+            Z[n + f, 0] = np.sin(Z[q, 0]) if d else np.cos(Z[q, 0])
         else:
             x = Z[q, 0] - lower_knot(switches, s, pieces[s])
             at = switches.first[s] + own_piece(switches, s, pieces[s])

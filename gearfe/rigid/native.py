@@ -61,12 +61,17 @@ class Entry:
         self._linked: dict[tuple[Layout, ...], Callable[..., int]] = {}
 
     def __call__(self, *blocks: Packed) -> int:
+        return self.on(*blocks)()
+
+    def on(self, *blocks: Packed) -> Callable[[], int]:
+        """The function of these blocks, for many calls."""
         layouts = tuple(block.layout for block in blocks)
         if layouts not in self._linked:
             with _LINKING:
                 if layouts not in self._linked:  # another thread was not first
                     self._linked[layouts] = self._link(layouts)
-        return self._linked[layouts](*(block.address for block in blocks))
+        function, addresses = self._linked[layouts], [block.address for block in blocks]
+        return lambda: function(*addresses)
 
     def _link(self, layouts: tuple[Layout, ...]) -> Callable[..., int]:
         path = None if self.folder is None else self.folder / f"{self.name}-{_digest(repr(layouts).encode())[:16]}.o"

@@ -36,100 +36,100 @@ class SystemEquations:
         self.stresses = at
 
 
-def fill(x: Array, value: float) -> None:
-    """x := value."""
-    x[...] = value
+def begin(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
+    """See `kernel_stages.begin`."""
+    h = w.now[1]
+    w.Z[:] = w.speeds.T @ w.guess
+    w.Q[:] = w.q[:, None] + h * tab.side.c * w.v[:, None] + w.Z
+    w.V[:] = w.v[:, None] + w.Z[:, :-1] @ tab.side.inverse / h
+    w.A[:, :-1] = w.Z[:, :-1] @ tab.twice.T / h**2
+    w.A[:, -1] = w.L[:, -1] = 0.0
+    w.L[:, :-1] = w.multipliers[:, None]
+    for element, index, part, _ in eq.stressed:
+        w.S[part] = element.stress(w.q[index], w.v[index]).ravel()[:, None]
 
 
-def copy(x: Array, y: Array) -> None:
-    """y := x."""
-    y[...] = x
-
-
-def combine(X: Array, Y: Array, out: Array) -> None:
-    """out := X Y, for as many rows of Y as X has columns."""
-    out[: len(X)] = X @ Y[: X.shape[1]]
-
-
-def stage(eq: SystemEquations, w: Stages, tab: Scheme, i: int, t: float) -> None:
-    """See `kernel_equations.stage`."""
-    system, q, v = eq.system, w.Q[i], w.V[i]
-    force = system.force(t, q, v, stressed=False)
-    for k, (element, index, part, shape) in enumerate(eq.stressed):
-        if i == len(w.Z):  # the step's begin
-            w.S[i, part] = element.stress(q[index], v[index]).ravel()
-            force[index] += element.force(t, q[index], v[index])
-            continue
-        pull, lacks = eq.tangents[k].force(q[index], v[index], w.S[i, part].reshape(shape))
-        force[index] += pull
-        w.S[i, part] += lacks.ravel()
-    G = system.jacobian(t, q)[eq.active]
-    w.rest[i] = system.mass @ w.A[i] - force + G.T @ w.L[i]
-    w.gap[i] = w.now[1] * (G @ v + system.rate(t, q)[eq.active]) if tab.level else system.residual(t, q)[eq.active]
+def stages(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
+    """See `kernel_equations.stages`."""
+    system, s = eq.system, len(tab.c)
+    for i, place in enumerate(tab.side.c):
+        t, q, v = w.now[0] + place * w.now[1], w.Q[:, i].view(np.ndarray), w.V[:, i].view(np.ndarray)
+        force = system.force(t, q, v, stressed=False)
+        for k, (element, index, part, shape) in enumerate(eq.stressed):
+            if i == s:  # the step's begin
+                force[index] += element.force(t, q[index], v[index])
+                continue
+            pull, lacks = eq.tangents[k].force(q[index], v[index], w.S[part, i].reshape(shape))
+            force[index] += pull
+            w.S[part, i] += lacks.ravel()
+        G = system.jacobian(t, q)[eq.active]
+        w.rest[:, i] = system.mass @ w.A[:, i] - force + G.T @ w.L[:, i]
+        rate = w.now[1] * (G @ v + system.rate(t, q)[eq.active]) if tab.level else system.residual(t, q)[eq.active]
+        w.gap[:, i] = rate
 
 
 def linearise(eq: SystemEquations, w: Stages, i: int, t: float) -> bool:
     """Tangents and rows at a stage; whether they are finite."""
-    system, q, v = eq.system, w.Q[i], w.V[i]
+    system, q, v = eq.system, w.Q[:, i].view(np.ndarray), w.V[:, i].view(np.ndarray)
     if not (np.isfinite(q).all() and np.isfinite(v).all()):
         return False
     eq.by_q, eq.by_v = system.force_jacobian(t, q, v, stressed=False)
     eq.tangents = []
     for element, index, part, shape in eq.stressed:
-        tangent = element.tangent(q[index], v[index], w.S[i, part].reshape(shape))
+        tangent = element.tangent(q[index], v[index], w.S[part, i].reshape(shape))
         eq.by_q[np.ix_(index, index)] += tangent.by_q
         eq.by_v[np.ix_(index, index)] += tangent.by_v
         eq.tangents.append(tangent)
     multipliers = np.zeros(system.rows)
-    multipliers[eq.active] = w.L[i]
+    multipliers[eq.active] = w.L[:, i]
     eq.curvature = joint_stiffness(system, t, q, multipliers)
     eq.G = system.jacobian(t, q)[eq.active]
     return all(np.isfinite(x).all() for x in (eq.by_q, eq.by_v, eq.curvature, eq.G))
 
 
-def factorise(eq: SystemEquations, w: Stages, tab: Scheme, k: int, h: float) -> bool:  # noqa: ARG001
-    """Factor of eigenvalue k."""
-    system = eq.system
-    mu = tab.values[k, 0] if k == 0 else complex(*tab.values[k])
-    top = mu**2 / h**2 * system.mass - mu / h * eq.by_v - eq.by_q + eq.curvature
-    if k == 0:
-        eq.solves = []
-    eq.solves.append(saddle_solver(top, eq.G, system.units, system.row_units[eq.active]))
+def factorise(eq: SystemEquations, w: Stages, tab: Scheme) -> bool:
+    """Factors of all eigenvalues."""
+    system, h = eq.system, w.now[1]
+    eq.solves = []
+    for k, (real, imag) in enumerate(tab.values):
+        mu = complex(real, imag) if k else real
+        top = mu**2 / h**2 * system.mass - mu / h * eq.by_v - eq.by_q + eq.curvature
+        eq.solves.append(saddle_solver(top, eq.G, system.units, system.row_units[eq.active]))
     return True
 
 
-def solve(eq: SystemEquations, w: Stages, tab: Scheme, k: int) -> None:
-    """w.r, w.g of eigenvalue k := changes."""
-    if k == 0:
-        w.r[0], w.g[0] = eq.solves[0](-w.r[0], -w.g[0] / tab.values[0, 0] ** tab.level)
-        return
-    a, b = 2 * k - 1, 2 * k
-    force, gap = eq.solves[k](-w.r[a] - 1j * w.r[b], (-w.g[a] - 1j * w.g[b]) / complex(*tab.values[k]) ** tab.level)
-    w.r[a], w.r[b], w.g[a], w.g[b] = force.real, force.imag, gap.real, gap.imag
+def solve(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
+    """See `kernel_matrices.solve`."""
+    s = len(tab.c)
+    r, g = tab.back @ w.rest[:, :s].T, tab.back @ w.gap[:, :s].T
+    r[0], g[0] = eq.solves[0](-r[0], -g[0] / tab.values[0, 0] ** tab.level)
+    for k in range(1, len(tab.values)):
+        a, b = 2 * k - 1, 2 * k
+        force, gap = eq.solves[k](-r[a] - 1j * r[b], (-g[a] - 1j * g[b]) / complex(*tab.values[k]) ** tab.level)
+        r[a], r[b], g[a], g[b] = force.real, force.imag, gap.real, gap.imag
+    w.dZ[:, :s], w.dL[:, :s] = (tab.basis @ r).T, (tab.basis @ g).T
 
 
-def change(eq: SystemEquations, w: Stages, tab: Scheme, h: float, moved: bool) -> float:
-    """See `kernel_equations.change`."""
-    s, most = len(w.Z), 0.0
-    if moved:
-        most = float(np.abs(w.dZ / w.limit).max())
-        w.Z[:] += w.dZ
-        w.L[:s] += w.dL
-        rates = tab.inverse @ w.dZ / h
-        for k, (_, index, part, _) in enumerate(eq.stressed):
-            for i in range(s):
-                w.S[i, part] += eq.tangents[k].change(w.dZ[i][index], rates[i][index]).ravel()
-    w.Q[:s] = w.q + h * tab.c[:, None] * w.v + w.Z
-    w.V[:s] = w.v + tab.inverse @ w.Z / h
-    w.A[:s] = tab.twice @ w.Z / h**2
-    return most
+def change(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
+    """See `kernel_stages.change`."""
+    s, h = len(tab.c), w.now[1]
+    rates = w.dZ[:, :-1] @ tab.side.inverse / h
+    w.Z[:] += w.dZ
+    w.Q[:] += w.dZ
+    w.V[:] += rates
+    w.A[:, :-1] += w.dZ[:, :-1] @ tab.twice.T / h**2
+    w.L[:] += w.dL
+    for k, (_, index, part, _) in enumerate(eq.stressed):
+        for i in range(s):
+            w.S[part, i] += eq.tangents[k].change(w.dZ[index, i], rates[index, i]).ravel()
+    return float((np.abs(w.dZ) / w.limit[:, None]).max())
 
 
-def defect(eq: SystemEquations, w: Stages, tab: Scheme, h: float) -> float:
-    """See `kernel_equations.defect`."""
-    s, system, M = len(w.Z), eq.system, eq.system.mass
-    first, second = w.v - tab.defect @ w.V[:s], -w.rest[s] - M @ (tab.defect @ w.A[:s])
-    none = np.zeros(len(w.gap[0]))
+def defect(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
+    """See `kernel_stages.defect`."""
+    system, M, h = eq.system, eq.system.mass, w.now[1]
+    first, second = w.v - w.V[:, :-1] @ tab.defect, -w.rest[:, -1] - M @ (w.A[:, :-1] @ tab.defect)
+    none = np.zeros(len(w.gap))
     if len(none):
         G = system.jacobian(w.now[0], w.q)[eq.active]
         second = M @ saddle_solver(M, G, system.units, system.row_units[eq.active])(second, none)[0]
@@ -137,30 +137,32 @@ def defect(eq: SystemEquations, w: Stages, tab: Scheme, h: float) -> float:
     return float(np.sqrt(np.mean((off / w.limit) ** 2)))
 
 
-def end_state(w: Stages, tab: Scheme, h: float) -> None:
+def end_state(w: Stages, tab: Scheme) -> None:
     """Coordinates and velocities at the step's end."""
-    w.qn[:] = w.q + h * w.v + tab.ends[0] @ w.Z
-    w.vn[:] = w.v + tab.ends[1] @ w.Z / h
+    h = w.now[1]
+    w.qn[:] = w.q + h * w.v + w.Z[:, :-1] @ tab.ends[0]
+    w.vn[:] = w.v + w.Z[:, :-1] @ tab.ends[1] / h
 
 
-def keep_path(w: Stages, h: float) -> None:
+def keep_path(w: Stages) -> None:
     """What the dense output goes through."""
+    h = w.now[1]
     w.known[0], w.known[1], w.known[-2], w.known[-1] = w.q, h * w.v, w.qn, h * w.vn
-    w.known[2:-2] = w.Q[: len(w.known) - 4]
+    w.known[2:-2] = w.Q[:, : len(w.known) - 4].T
 
 
-def gap_between(eq: SystemEquations, w: Stages, tab: Scheme, t: float, h: float) -> float:
+def gap_between(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
     """Largest gap of a row between the stages, in its unit."""
     if not eq.active.any() or not np.isfinite(w.known).all():
         return 0.0
-    states = zip(t + tab.middles * h, tab.between @ w.known, strict=True)
+    states = zip(w.now[0] + tab.middles * w.now[1], tab.between @ w.known, strict=True)
     gaps = [eq.system.residual(*state)[eq.active] / eq.system.row_units[eq.active] for state in states]
     return float(np.abs(gaps).max())
 
 
-def project(eq: SystemEquations, w: Stages, t: float) -> None:
+def project(eq: SystemEquations, w: Stages, tab: Scheme) -> None:  # noqa: ARG001
     """w.qn, w.vn onto the constraints, by the least changes in the mass norm."""
-    made = on_constraints(eq.system, t, w.qn, w.vn, eq.active, eq.excess)
+    made = on_constraints(eq.system, w.now[0] + w.now[1], w.qn, w.vn, eq.active, eq.excess)
     w.qn[:], w.vn[:] = made[: len(w.qn)], made[len(w.qn) :]
 
 
@@ -221,7 +223,7 @@ def saddle_solver(
 
 
 FUNCTIONS = (
-    fill, copy, combine, stage, linearise, factorise, solve, change, defect, end_state, keep_path, gap_between, project,
+    begin, stages, linearise, factorise, solve, change, defect, end_state, keep_path, gap_between, project,
 )  # fmt: skip
 NAMES = {"np": np, "math": math, "saddle_solver": saddle_solver, "joint_stiffness": joint_stiffness,
          "on_constraints": on_constraints}  # fmt: skip

@@ -12,10 +12,24 @@ from typing import Any
 
 import numpy as np
 
-#: Each member: type and number of axes of an array ("d", 2), a number ("d", -1), or the members of a named tuple.
-Layout = tuple[tuple[str, Any], ...]
+from .lanes import Lanes
+
+#: Each member: type and number of axes of an array ("d", 2), of one of lanes without theirs ("v8", 1), a number
+#: ("d", -1), or the members of a named tuple.
+Members = tuple[tuple[str, Any], ...]
 #: Types of elements: float64, int64, uint64, complex128.
 ELEMENTS = "dlLD"
+#: Before the number of lanes in the type of an element of `Lanes`.
+LANES = "v"
+
+
+class Layout(tuple[tuple[str, Any], ...]):
+    """Members of a block. Entries look for their code by it at every call, so it is hashed once."""
+
+    def __hash__(self) -> int:
+        if "known" not in self.__dict__:
+            self.known = super().__hash__()
+        return self.known
 
 
 class Packed:
@@ -34,12 +48,12 @@ class Packed:
 
     def __init__(self, named: Any) -> None:
         words: list[int] = []
-        self.layout = _lay_out(named, words)
+        self.layout = Layout(_lay_out(named, words))
         self._held = named, np.array(words, dtype=np.int64)
         self.address = _address(self._held[1])
 
 
-def _lay_out(named: Any, words: list[int]) -> Layout:
+def _lay_out(named: Any, words: list[int]) -> Members:
     """Layout of a named tuple; its words join `words`."""
     members: list[tuple[str, Any]] = []
     for name, value in zip(named._fields, named, strict=True):
@@ -48,8 +62,11 @@ def _lay_out(named: Any, words: list[int]) -> Layout:
             if kind not in ELEMENTS or not value.flags.c_contiguous:
                 raise TypeError(f"{name}: {value.dtype} array, C-contiguous: {value.flags.c_contiguous}")
             words.append(_address(value))
-            words.extend(value.shape)
-            members.append((name, (kind, value.ndim)))
+            shape = value.shape
+            if isinstance(value, Lanes):
+                kind, shape = f"{LANES}{shape[-1]}", shape[:-1]
+            words.extend(shape)
+            members.append((name, (kind, len(shape))))
         elif isinstance(value, tuple):
             members.append((name, _lay_out(value, words)))
         elif isinstance(value, int):

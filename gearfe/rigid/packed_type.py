@@ -14,13 +14,14 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
 from numba.np import arrayobj
 
-from .packed import Layout
+from .lanes_type import LaneType
+from .packed import LANES, Members
 
 NUMBERS = {"d": types.float64, "l": types.int64, "L": types.uint64, "D": types.complex128}
 
 
 class PackedType(types.Type):
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: Members) -> None:
         self.layout = layout
         super().__init__(name=f"Packed({layout})")
 
@@ -50,7 +51,8 @@ class _Model(models.PrimitiveModel):
 def kind_of(inner: Any) -> Any:
     if not isinstance(inner[0], str):
         return PackedType(inner)
-    return NUMBERS[inner[0]] if inner[1] < 0 else types.Array(NUMBERS[inner[0]], inner[1], "C")
+    number = LaneType(int(inner[0][1:])) if inner[0].startswith(LANES) else NUMBERS[inner[0]]
+    return number if inner[1] < 0 else types.Array(number, inner[1], "C")
 
 
 @infer_getattr
@@ -82,7 +84,7 @@ def _get(context: Any, builder: Any, kind: Any, block: Any, name: str) -> Any:
     array_type = kind_of(inner)
     array = arrayobj.make_array(array_type)(context, builder)
     shape = [load(1 + axis) for axis in range(inner[1])]
-    size = word(16 if inner[0] == "D" else 8)
+    size = word(context.get_abi_sizeof(context.get_value_type(array_type.dtype)))
     strides = [size]
     for length in reversed(shape[1:]):
         strides.insert(0, builder.mul(length, strides[0]))
