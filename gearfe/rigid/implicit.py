@@ -220,6 +220,9 @@ class Stepper:
             if not error <= 1.0:
                 control.reject(error)
                 continue
+            if w.measures[3] > 0.0:  # and the corner there was not found
+                control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
+                continue
             t = control.accept(error)
             if not (law.steady or corners.passing(h)):
                 control.trial = min(control.trial, abs(h) * EASY / max(float(w.measures[2]), 1e-3))
@@ -289,7 +292,7 @@ class Stepper:
 
 def work(s: int, n: int, m: int, k: int, known: int) -> Stages:
     """Arrays of a step."""
-    plain = [(3,), (3,), (n,), (n,), (m,), (s + 1, n), (n,)]
+    plain = [(3,), (4,), (n,), (n,), (m,), (s + 1, n), (n,)]
     W = s + 1
     wide = [(s + 1, W), *[(n, W)] * 4, (m, W), (k, W), *[(n, W), (m, W)] * 3]
     arrays: list[Array] = [np.zeros(shape) for shape in plain]

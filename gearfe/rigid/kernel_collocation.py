@@ -41,7 +41,9 @@ class Stages(NamedTuple):
     """State and unknowns of a step: n coordinates, m rows, k stresses; lanes are s stages, and last the begin."""
 
     now: Array  # (3,) time at the begin and step (s), change over the limit at which Newton's method ends
-    measures: Array  # (3,) error over the tolerance, gap of the rows between the stages, mean rate of Newton's changes
+    #: (4,) error over the tolerance, gap of the rows between the stages, mean rate of Newton's changes, stages that are
+    #: beyond the end of a table
+    measures: Array
     q: Array  # (n,) state at the begin
     v: Array
     multipliers: Array  # (m,) first guess

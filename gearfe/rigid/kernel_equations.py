@@ -93,16 +93,18 @@ class Equations(NamedTuple):
 
 
 def own_pieces(eq: Equations) -> bool:
-    """Pieces of all switches at the variables in P; whether every table has a value there."""
+    """Pieces of all switches at the variables in P, of tables beyond their ends the nearest; whether none is beyond."""
     tb, own = eq.program, eq.own
     switches = tb.switches
     covered = True
     for s in range(own.pieces.shape[0]):
         tape_order(tb, own.P, own.R, own.TF, own.pieces, 0)
-        piece = piece_at(switches, s, own.R[switches.register[s], 0])
-        if switches.first[s + 1] > switches.first[s] and switches.period[s] == 0.0 and piece < 0:
+        x = own.R[switches.register[s], 0]
+        piece = piece_at(switches, s, x)
+        first = switches.first[s]
+        if switches.first[s + 1] > first and switches.period[s] == 0.0 and piece < 0:
             covered = False
-            piece = 0
+            piece = 0 if x < switches.knot[first] else switches.first[s + 1] - first - 2
         own.pieces[s] = piece
     return covered
 
@@ -178,11 +180,12 @@ def lane_times(eq: Equations, places: Array, t: float, h: float) -> None:
             values[f, 1, i] = TF[f, 1]
 
 
-def add_registers(eq: Equations) -> None:
-    """H += forces of the registers, stage by stage; not-a-number where a table has no value."""
+def add_registers(eq: Equations) -> float:
+    """H += forces of the registers, stage by stage; how many stages are beyond the end of a table."""
     tb, own = eq.program, eq.own
     code = tb.code
     P, TF, H = flat(eq.wide.P), flat(eq.wide.TF), flat(eq.wide.H)
+    beyond = 0.0
     for i in range(P.shape[2]):
         for z in range(P.shape[0]):
             own.P[z, 0] = P[z, 0, i]
@@ -193,8 +196,9 @@ def add_registers(eq: Equations) -> None:
         tape_order(tb, own.P, own.R, own.TF, own.pieces, 0)
         for p in range(code.push.shape[0]):
             H[code.push[p, 1], 0, i] += code.share[p] * own.R[code.push[p, 0], 0]
-        if not covered:
-            H[0, 0, i] = np.nan
+        if not covered and i < P.shape[2] - 1:
+            beyond += 1.0
+    return beyond
 
 
 def stages(eq: Equations, w: Stages, tab: Scheme) -> None:
@@ -212,8 +216,7 @@ def stages(eq: Equations, w: Stages, tab: Scheme) -> None:
             w.gap[r] *= w.now[1]
     for z in range(H.shape[0]):
         H[z, 0] = 0.0
-    if tb.code.op.shape[0] > 0:
-        add_registers(eq)
+    w.measures[3] = add_registers(eq) if tb.code.op.shape[0] > 0 else 0.0
     for p in range(rows.place.shape[0]):
         H[rows.place[p, 1], 0] -= rows.factor[p] * w.L[rows.place[p, 0]]
     for p in range(rows.pair.shape[0]):
