@@ -123,9 +123,10 @@ def run(args: argparse.Namespace) -> int:
 
                 stiffness_figure(made / "stiffness.png", job, curve)
         watch.seconds["total"] = time.perf_counter() - started
-        write_json(made / "summary.json", summary(job, curve, watch.seconds))
+        found = summary(job, curve, watch.seconds)
+        write_json(made / "summary.json", found)
         names = sorted(path.name for path in made.iterdir())
-    print_results(report_lines(job, curve), folder, names, watch.seconds, warnings(job, curve))
+    print_results(report_lines(job, curve, found), folder, names, watch.seconds, warnings(job, curve))
     return 1 if curve.failed.any() else 0
 
 

@@ -271,7 +271,7 @@ class Faces:
 
     def range(self, flanks: FlankTables, ends: Array) -> tuple[Array, Array]:
         """Least and largest x (m) that both faces reach between their arcs `ends` (m), shape (p, 2, 2)."""
-        seen = flanks.at(ends)[0] + self.stretch[:, :, None] * (ends - self.arc[:, :, None])
+        seen = flanks.points(ends) + self.stretch[:, :, None] * (ends - self.arc[:, :, None])
         x = -(seen * self.turn[:, :, None] + self.offset[:, :, None]).imag
         return np.maximum(x[:, 0, 0], x[:, 1, 1]), np.minimum(x[:, 0, 1], x[:, 1, 0])
 

@@ -90,17 +90,15 @@ def deviation_lines(job: StiffnessJob) -> list[str]:
     return [f"flanks with the deviations of [microgeometry], up to {both}"]
 
 
-def report_lines(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
-    """Lines to print."""
-    moduli = [material.youngs_modulus for material in job.materials]
-    iso = iso_values(job.pair, moduli[0], moduli[1])
-    count = Counter(map(str, curve.status))
-    lines = [f"{len(curve)} positions: " + ", ".join(f"{n} {status}" for status, n in count.items())]
+def report_lines(job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, Any]) -> list[str]:
+    """Lines to print; `found` is the `summary`."""
+    iso, level = found["iso_6336"], found["mesh_stiffness"]
+    statuses = ", ".join(f"{n} {status}" for status, n in found["statuses"].items())
+    lines = [f"{len(curve)} positions: {statuses}"]
     if curve.contact_law:
         lines.append(f"contact law: {curve.contact_law}")
     lines += deviation_lines(job)
-    lines += _load_lines(load_statistics(job, curve))
-    level = cycle_statistics(curve, job.table.interpolation)
+    lines += _load_lines(found["load"])
     if level is not None:
         mean, low, high = (1e-6 * level[key] for key in ("mean_N_per_m", "least_N_per_m", "largest_N_per_m"))
         lines.append(f"mesh stiffness: mean {mean:.4g}, least {low:.4g}, largest {high:.4g} N/um")
