@@ -168,9 +168,9 @@ def _expected(law: HalfPlanePair, torques: Array, found: Touching) -> Array:
     return twist
 
 
-#: How often missing contacts are added.
+#: How often positions are taken up again, where contacts were missing.
 ROUNDS = 10
-#: Most steps; change of the forces, in units of their sum, from which on windows and bearing panels are held.
+#: Most steps each time; change of the forces, in units of their sum, from which on windows and bearing panels are held.
 STEPS, NEAR = 30, 2e-5
 #: What moves of contacts by their width count as changes of force: they are of second order there (see above).
 MOVED = 0.1
@@ -254,17 +254,17 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
     numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in names}
     contacts: list[PairContacts] = []
     setting, state = first_state(law, twists, found)
-    number, began, rounds = 0, 0, 0
-    while len(setting.numbers) and number - began < STEPS and rounds < ROUNDS:  # again for what is not settled
+    for _ in range(ROUNDS):  # again for what is not settled
         done: list[tuple[Setting, State]] = []
-        while len(setting.numbers) and number - began < STEPS:
-            number += 1
+        for number in range(STEPS):
+            if len(setting.numbers) == 0:
+                break
             couples = setting.couples
-            made = step(setting, state, search=number - began <= SEARCHES)
+            made = step(setting, state, search=number < SEARCHES)
             iterations[setting.numbers] += 1
             unsettled = couples.total(~made.solution.settled | made.outgrown) > 0
             changed = change(setting, state, made)
-            near = (changed <= NEAR) & ~unsettled & (number - began > 1)
+            near = (changed <= NEAR) & ~unsettled & (number > 0)
             bears = couples.total(made.solution.force) > 0
             state = moved_on(setting, state, made, near=(changed <= WIDENED_BELOW)[couples.position])
             if (near & bears).any():
@@ -275,17 +275,15 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
             break
         ended = _finished(*_joined(done), twists)
         iterations[ended.numbers] += HELD_STEPS
-        number += HELD_STEPS
         solved = ended.numbers[ended.settled]
         status[solved] = "converged"
         for name in names:
             numbers[name][solved] = ended.sums[name][ended.settled]
         contacts.append(ended.contacts)
-        if not ended.settled.all():
-            contacts[-1] = taken(ended.contacts, status[ended.contacts.position] == "converged")
-            setting, state = _joined([(setting, state), _kept(*ended.now, ~ended.settled)])
-        if ended.more:
-            began, rounds = number, rounds + 1
+        if ended.settled.all():
+            break
+        contacts[-1] = taken(ended.contacts, status[ended.contacts.position] == "converged")
+        setting, state = _joined([(setting, state), _kept(*ended.now, ~ended.settled)])
     failed = setting.numbers
     status[failed] = "not_converged"
     for name in names:
@@ -313,8 +311,6 @@ class _Ended(NamedTuple):
         Their loaded contacts.
     now
         Where they go on from.
-    more
-        Whether tooth pairs have more contacts there.
     """
 
     numbers: IntArray
@@ -322,7 +318,6 @@ class _Ended(NamedTuple):
     sums: dict[str, Array]
     contacts: PairContacts
     now: tuple[Setting, State]
-    more: bool
 
 
 def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
@@ -358,11 +353,11 @@ def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
     known = contact_rates(setting.law, one, two, ahead[couples.position])
     known["torque_wheel"] = of_pairs["torque_wheel"]
     contacts = contacts_of(setting, *one, known)
-    whole = completed(setting, *one)
-    if whole is None:
-        return _Ended(numbers, settled, sums, contacts, (setting, after), False)
-    now = _joined([_kept(setting, after, ~whole[2]), _kept(*whole)])
-    return _Ended(numbers, settled & ~whole[2], sums, contacts, now, True)
+    now, whole = (setting, after), completed(setting, *one)
+    if whole is not None:  # tooth pairs have more contacts
+        settled &= ~whole[2]
+        now = _joined([_kept(setting, after, ~whole[2]), _kept(*whole)])
+    return _Ended(numbers, settled, sums, contacts, now)
 
 
 def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array) -> tuple[Array, IntArray, Array]:
