@@ -179,7 +179,7 @@ def coarse_gears(law: Any) -> Any:
 
 #: Room -> its job, and modules or names that are left out.
 ROOMS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
-    "rigid": (mechanisms, ("kernel_names", "backend", "choice", "packed", "LARGEST", "MOST_STEPS", "FIRST_")),
+    "rigid": (mechanisms, ("backend", "choice", "packed", "LARGEST", "MOST_STEPS", "FIRST_")),
     "train": (trains, ("program",)),
     "meshlaw": (laws, ("NANO", "NO_CONTACT")),
     "runup": (run_ups, ("law_kernel.FORCE", "swinging", "report")),

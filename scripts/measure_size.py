@@ -28,7 +28,7 @@ CAPABILITIES = {
     "flexible links, couplings, loads, analyses of mechanisms": """
         rigid/beam* rigid/belt.py rigid/cam.py rigid/gear_ratio.py rigid/rack.py rigid/rolling.py rigid/turning.py
         rigid/equilibrium.py rigid/inverse.py rigid/modes.py rigid/statefunctions.py rigid/collocation.py
-        rigid/*tape* rigid/*quadratic* rigid/series.py rigid/corners.py mechanisms/load_series.py
+        rigid/*tape* rigid/*quadratic* rigid/programs.py rigid/corners.py mechanisms/load_series.py
         mechanisms/link* mechanisms/loads.py mechanisms/rest.py mechanisms/sensitivity.py mechanisms/solve.py
         mechanisms/sweep.py mechanisms/tables.py tables/beam.py
         mechanisms/plate* meshing/plate_mesh.py tables/plate.py rigid/floating.py rigid/kernel_elastic.py

@@ -31,7 +31,7 @@ from gearfe.rigid.floating import Floating, FloatingBody, frame_joint
 from gearfe.rigid.implicit import KERNELS, Stepper, equations, narrow_band
 from gearfe.rigid.lanes import as_lanes, lanes
 from gearfe.rigid.ordering import narrow_order
-from gearfe.rigid.series import without_redundant, written
+from gearfe.rigid.programs import without_redundant, written
 from gearfe.rigid.start import Start
 from gearfe.rigid.steps import Status, StepControl, StepLaw
 from gearfe.rigid.turning import TurningFrame

@@ -196,7 +196,7 @@ def test_convergence_order_of_the_series():
     fine = integrate(system, [0.0, 1.0], tolerance=1e-13, start=start, backend="plain").q[-1, 2]
     steps, errors = [], []
     for count in (30, 45, 67, 100):
-        prepared = taylor.prepare(system.linkage.assembly, 8, jit=False)
+        prepared = taylor.prepare(system, start, 8, jit=False)
         dense, _, _ = taylor.run_taylor(prepared, start, 1.0, tolerance=1e3, longest=1.0 / count)
         steps.append(len(dense.coefficients))
         errors.append(abs(dense(np.array([1.0]))[0, 2] - fine))

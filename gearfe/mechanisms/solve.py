@@ -13,7 +13,7 @@ from ..rigid.equilibrium import Equilibrium, equilibrium
 from ..rigid.integrate import use_compiled
 from ..rigid.inverse import prescribed_motion
 from ..rigid.modes import Modes, modes
-from ..rigid.series import tape_program
+from ..rigid.programs import tape_program
 from .job import output_times
 from .model import Mechanism
 from .rest import at_rest, mode_columns
@@ -74,8 +74,7 @@ def _moved(mechanism: Mechanism, start: Start) -> Trajectory:
     method, backend = run.method, "compiled" if use_compiled("auto") else "plain"
     if method == "auto":
         stiff = any(element.stiff for element in system.elements)
-        series = system.linkage is not None or (backend == "compiled" and tape_program(system) is not None)
-        method = "implicit" if stiff else "taylor" if series else "explicit"
+        method = "implicit" if stiff else "explicit" if tape_program(system) is None else "taylor"
     options: dict[str, Any] = {"start": start, "tolerance": mechanism.tolerance, "raise_on_failure": False}
     with np.errstate(over="ignore", invalid="ignore"):
         made = integrate(system, times, method=method, backend=backend, **options)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..progress import announce, count, stage
 from ..typing import Array
-from . import compiled, series, taylor
+from . import compiled, taylor
 from .carried import loose_link
 from .choice import Choice, Way, joined, joined_statistics
 from .collocation import GAUSS, RADAU
@@ -22,11 +22,10 @@ from .dense import Dense
 from .elimination import is_linear, modal_coordinates
 from .linkage import Linkage
 from .modal import series_force
-from .series import tape_program
+from .programs import tape_program, without_redundant, written
 from .start import Start, consistent_start
 from .steps import Status, Watch
 from .system import System
-from .tables import carrying
 from .trajectory import IntegrationError, Trajectory
 
 Run = tuple[Dense, Status, dict[str, Any]]
@@ -75,9 +74,9 @@ def integrate(
     times : array_like
         Times at which results are wanted (s), rising or falling; the first is the start.
     method : {"auto", "taylor", "explicit", "implicit", "symplectic"}
-        "taylor": Taylor series, of the index-3 equations for planar linkages, in modal coordinates (compiled) where the
-        constraints are linear and the only force has a law with a series: gear trains; else on a tape (compiled) where
-        rows and forces can be written on one: loads by expression, frames in vectors. "explicit": any smooth system,
+        "taylor": Taylor series of the index-3 equations, where rows and forces can be written on a tape (planar
+        linkages, loads by expression, frames in vectors); in modal coordinates (compiled) where the constraints are
+        linear and the only force has a law with a series: gear trains. "explicit": any smooth system,
         Runge-Kutta of order 8, with projection where constraints are not linear. "implicit": Radau IIA of 7 stages, for
         stiff ones, compiled where rows and forces can be written on a tape. "auto" takes the one of "taylor" (else
         "explicit") and "implicit" that is predicted to take the fewest seconds, and changes over when that proves wrong
@@ -175,10 +174,9 @@ def ways_of(
     system: System, start: Start, times: Array, method: str, backend: str, options: dict[str, Any], runs: float = 1.0
 ) -> list[Way]:
     """Ways to integrate that `method` and `backend` leave open, the one to begin with first."""
-    linkage = system.linkage
     trial = IMPLICIT_TRIAL + (0.0 if "scipy.linalg" in sys.modules else LOADING_LINALG)
     rate = (
-        partial(_rate, system) if linkage is not None or is_linear(system) else None
+        partial(_rate, system) if system.linkage is not None or is_linear(system) else None
     )  # it does not see all other elements
     auto = method == "auto"
     implicit: list[Way] = []
@@ -192,54 +190,37 @@ def ways_of(
     explicit = Way("explicit", "", partial(_explicit, system, backend, options), PLAIN_TRIAL, cure=cure)
     if stuck or method in ("explicit", *COLLOCATION):
         return [explicit] if method == "explicit" else implicit
-    if linkage is None:
-        ways = _other_ways(system, auto, backend, options, explicit, runs)
-        return [*ways, *implicit]
-    plain = Way("taylor", "plain", partial(_taylor, linkage, False, options), PLAIN_TRIAL, cure=cure)
-    if not use_compiled(backend):
-        return [plain, *implicit]
-    loading = taylor.KERNELS.seconds / runs
-    quick = Way("taylor", "compiled", partial(_taylor, linkage, True, options), loading, loading, COMPILED_FASTER)
-    if backend == "compiled" or loading <= _PLAIN_SPENT["taylor"]:
-        return [quick, *implicit]
-    return [plain, quick, *implicit]
+    return [*_series_ways(system, auto, backend, options, explicit, runs), *implicit]
 
 
-def _other_ways(
+def _series_ways(
     system: System, auto: bool, backend: str, options: dict[str, Any], explicit: Way, runs: float
 ) -> list[Way]:
-    """Series in modal coordinates, or of what can be written on a tape, where the kernels are worth it; Runge-Kutta."""
-    if is_linear(system):
+    """Series of what can be written on a tape, else in modal coordinates; Runge-Kutta where there is none."""
+    if is_linear(system) and not any(isinstance(e, Linkage) for e in system.elements):
         modal = Way("taylor", "", partial(_modal_taylor, system, backend, options), PLAIN_TRIAL)
         return [explicit] if auto and (series_force(system) is None or not use_compiled(backend)) else [modal]
-    explicit = replace(explicit, backend="plain")
-    loading = series.KERNELS.seconds
-    run, trial = partial(_tape_taylor, system, backend, options), PLAIN_TRIAL + loading / runs
-    way = Way("taylor", "compiled", run, trial, instead=explicit if auto else None)
-    if not auto:
-        return [way]
-    if not use_compiled(backend) or tape_program(system) is None:
-        return [explicit]
-    return [way] if backend == "compiled" or loading / runs <= _PLAIN_SPENT["explicit"] else [explicit, way]
-
-
-def _tape_taylor(
-    system: System, backend: str, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
-) -> Run:
     if tape_program(system) is None:
+        if auto:
+            return [explicit]
         problem = "needs rows and forces that can be written on a tape (gearfe.rigid.contract)"
         raise InputError("method", "taylor", problem, "use method='explicit' or 'implicit'")
+    instead = explicit if auto and system.linkage is None else None
+    run = partial(_taylor, system, False, options)
+    plain = Way("taylor", "plain", run, PLAIN_TRIAL, instead=instead, cure=explicit.cure)
     if not use_compiled(backend):
-        raise InputError("backend", backend, "has no series for such a system", "use method='explicit', or numba")
-    local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
-    return series.run_series(system, start, times, local=local, longest=options["longest"], most=most, watch=watch)
+        return [plain]
+    loading = taylor.KERNELS.seconds / runs
+    run = partial(_taylor, system, True, options)
+    quick = Way("taylor", "compiled", run, loading, loading, COMPILED_FASTER, instead=instead)
+    return [quick] if backend == "compiled" or loading <= _PLAIN_SPENT["taylor"] else [plain, quick]
 
 
 def _cure(system: System, backend: str) -> str:
     """What to tell where compiled series could run, were numba there."""
     if backend != "auto" or compiled.available():
         return ""
-    able = system.linkage is not None or series_force(system) is not None or tape_program(system) is not None
+    able = series_force(system) is not None or tape_program(system) is not None
     return MISSING_NUMBA if able else ""
 
 
@@ -286,7 +267,7 @@ def _modal_taylor(
 
 def _implicit_ways(system: System, backend: str, options: dict[str, Any], plain: Way, runs: float) -> list[Way]:
     """The implicit method plain, compiled, or the first and the second where that must be compiled now."""
-    if not use_compiled(backend) or series.written(system) is None:
+    if not use_compiled(backend) or written(system) is None:
         return [replace(plain, backend="")]
     from .implicit import KERNELS
 
@@ -304,24 +285,19 @@ def _implicit(
 ) -> Run:
     from .implicit import run_implicit
 
-    program = series.written(system) if jit else None
-    held = None if program is None else series.without_redundant(program, start.active)
+    program = written(system) if jit else None
+    held = None if program is None else without_redundant(program, start.active)
     return run_implicit(system, start, times, most=most, watch=watch, program=held, **options)
 
 
 def _taylor(
-    linkage: Linkage, jit: bool, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
+    system: System, jit: bool, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
 ) -> Run:
-    local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
-    order = taylor.order_for(local)
     if jit and not taylor.KERNELS.ready:
         announce(COMPILING)
-    assembly = carrying(linkage.assembly, start.excess)
-    known = linkage.__dict__.setdefault("_prepared", {})
-    prepared = known.get((order, jit))
-    if prepared is None or prepared.assembly.tables is not assembly.tables:
-        prepared = known[order, jit] = taylor.prepare(assembly, order, jit)
-    end, longest = float(times[-1]), options["longest"]
+    local, longest = max(LOCAL_SHARE * options["tolerance"], 5e-16), options["longest"]
+    prepared = taylor.prepare(system, start, taylor.order_for(local), jit)
+    end = float(times[-1])
     return taylor.run_taylor(prepared, start, end, tolerance=local, longest=longest, most=most, watch=watch)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..typing import Array
-from .kernel_rows import add_transposed, copy, fill, residuals, time_series, times_gradients
+from .kernel_rows import add_transposed, copy, fill, inner, residuals, time_series, times_gradients
 from .kernel_series import small_solve
 from .kernel_singular import (
     TOGETHER,
@@ -20,13 +20,12 @@ from .kernel_singular import (
     regular_parts,
     row_square,
     singular_frame,
-    weighted,
 )
 
 if TYPE_CHECKING:
     from .kernel_steps import Run
-    from .tables import Forms, Tables
-    from .taylor import Border, Work
+    from .row_tables import Equations
+    from .taylor import Work
 
 #: Pivot of another row at the singular position of one row below which it passes with it (eps^(2/3): at the distance d
 #: between two, rounding leaves eps / d^2 of the velocities, more than taking both for one does).
@@ -35,18 +34,18 @@ SAME = 4e-11
 
 def moved_state(w: Work, run: Run, h: float) -> None:
     """State of the series at h with the corrections w.dq, w.dv."""
-    evaluate(w.QS, run.order, h, w.qn, w.vn)
+    evaluate(w.Z, run.order, h, w.qn, w.vn)
     for i in range(w.qn.shape[0]):
         w.qn[i] += w.dq[i]
         w.vn[i] += w.dv[i]
 
 
-def time_to_singular(border: Border, p: int, mass: Array) -> float:
+def time_to_singular(tb: Equations, w: Work, p: int) -> float:
     """Time from here to the moment at which P_p vanishes along B_p."""
-    return -weighted(border.P[p], border.B[p], mass) / border.schur[p, p]
+    return -inner(tb, w.border.P[p], w.border.B[p]) / w.border.schur[p, p]
 
 
-def locate(tb: Tables, w: Work, run: Run, t: float, guess: float, reach: float, where: int) -> tuple[int, float]:
+def locate(tb: Equations, w: Work, run: Run, t: float, guess: float, reach: float, where: int) -> tuple[int, float]:
     """Time (from the point of expansion) of the singular position near `guess`; count = 0 when there is none.
 
     Newton on: regular rows of g = 0, z^T G v = 0, and time such that B . G^T z = 0. It is a true crossing when z^T g
@@ -64,24 +63,24 @@ def locate(tb: Tables, w: Work, run: Run, t: float, guess: float, reach: float, 
     return count, h
 
 
-def meet(tb: Tables, w: Work, run: Run, guess: float, reach: float, where: int) -> tuple[int, float]:
+def meet(tb: Equations, w: Work, run: Run, guess: float, reach: float, where: int) -> tuple[int, float]:
     """Number of rows (w.skip = 2) that pass about when the row `where` does, and its time along the series."""
     h = guess
     for _ in range(30):
         copy(w.base, w.skip)
         w.skip[where] = 2
-        evaluate(w.QS, run.order, h, w.qn, w.vn)
+        evaluate(w.Z, run.order, h, w.qn, w.vn)
         count = singular_frame(tb, w, w.qn, w.vn, TOGETHER)
         move = np.inf
         for p in range(count):
             if w.border.drop[p] == where:
-                move = time_to_singular(w.border, p, tb.mass)
+                move = time_to_singular(tb, w, p)
         if not abs(h + move - guess) <= reach:
             return 0, h
         if abs(move) < 1e-4 * reach:
             left = 0
             for p in range(count):
-                if abs(time_to_singular(w.border, p, tb.mass) - move) > 0.5 * reach:
+                if abs(time_to_singular(tb, w, p) - move) > 0.5 * reach:
                     w.skip[w.border.drop[p]] = 0
                 else:
                     left += 1
@@ -90,9 +89,9 @@ def meet(tb: Tables, w: Work, run: Run, guess: float, reach: float, where: int) 
     return 0, h
 
 
-def converge(tb: Tables, w: Work, run: Run, t: float, h: float, guess: float, reach: float) -> tuple[int, float]:
+def converge(tb: Equations, w: Work, run: Run, t: float, h: float, guess: float, reach: float) -> tuple[int, float]:
     """Newton of `locate` from the time h for the rows with w.skip = 2."""
-    forms, vectors, mass, border, q, v = tb.forms, tb.vectors, tb.mass, w.border, w.qn, w.vn
+    border, q, v = w.border, w.qn, w.vn
     n = q.shape[0]
     fill(w.dq, 0.0)
     fill(w.dv, 0.0)
@@ -103,27 +102,27 @@ def converge(tb: Tables, w: Work, run: Run, t: float, h: float, guess: float, re
             return 0, h
         move = 0.0
         for p in range(count):
-            move += time_to_singular(border, p, mass) / count
+            move += time_to_singular(tb, w, p) / count
         # position: g_reg and z^T (G v - df/dt)
-        time_series(tb.times, t + h, run.sign > 0.0, 3, w.TF)
-        times_gradients(forms, w.G, v, w.mu)
-        add_rates(forms, w.TF, 1, -1.0, w.mu)
+        time_series(tb.program.times, t + h, run.sign > 0.0, 3, w.TF)
+        times_gradients(tb, w.G, v, w.mu)
+        add_rates(tb, w, 1, -1.0, w.mu)
         for p in range(count):
             border.nu[p] = combination(border, p, w.mu)
-        residuals(forms, vectors, q, w.c, w.s, w.TF[:, 0], w.mu)
+        residuals(tb, w, w.mu)
         copy(q, w.work)
-        change = border_change(tb, w, run, count, q)
+        change = border_change(tb, w, count, q)
         for i in range(n):
             w.dq[i] += q[i] - w.work[i]
         # velocity: G_reg v - df/dt and half of z^T g'' (linear in v along B)
-        times_gradients(forms, w.H, v, w.mu)
-        add_rates(forms, w.TF, 2, -2.0, w.mu)
+        times_gradients(tb, w.dG, v, w.mu)
+        add_rates(tb, w, 2, -2.0, w.mu)
         for p in range(count):
             border.nu[p] = 0.5 * combination(border, p, w.mu)
-        times_gradients(forms, w.G, v, w.mu)
-        add_rates(forms, w.TF, 1, -1.0, w.mu)
+        times_gradients(tb, w.G, v, w.mu)
+        add_rates(tb, w, 1, -1.0, w.mu)
         copy(v, w.work)
-        border_change(tb, w, run, count, v)
+        border_change(tb, w, count, v)
         for i in range(n):
             w.dv[i] += v[i] - w.work[i]
         h += move
@@ -135,23 +134,24 @@ def converge(tb: Tables, w: Work, run: Run, t: float, h: float, guess: float, re
     return 0, h
 
 
-def add_rates(forms: Forms, TF: Array, order: int, factor: float, out: Array) -> None:
+def add_rates(tb: Equations, w: Work, order: int, factor: float, out: Array) -> None:
     """out += factor times the coefficient `order` of every row's time function."""
+    motion = tb.program.rows.motion
     for r in range(out.shape[0]):
-        if forms.motion[r] >= 0:
-            out[r] += factor * TF[forms.motion[r], order]
+        if motion[r] >= 0:
+            out[r] += factor * w.TF[motion[r], order]
 
 
-def split(tb: Tables, w: Work, count: int, where: int) -> bool:
+def split(tb: Equations, w: Work, count: int, where: int) -> bool:
     """Whether some rows pass at another moment than the row `where`; then those that pass with it (w.skip = 2) are
     left."""
-    forms, mass, border = tb.forms, tb.mass, w.border
+    border = w.border
     worst = 0.0
     own = 0.0
     for p in range(count):
-        size = row_square(forms, mass, w.G, border.drop[p])
-        worst = max(worst, weighted(border.P[p], border.P[p], mass) / size)
-        border.nu[p] = time_to_singular(border, p, mass)
+        size = row_square(tb, w, border.drop[p])
+        worst = max(worst, inner(tb, border.P[p], border.P[p]) / size)
+        border.nu[p] = time_to_singular(tb, w, p)
         if border.drop[p] == where:
             own = border.nu[p]
     if worst < SAME:
@@ -168,14 +168,14 @@ def split(tb: Tables, w: Work, count: int, where: int) -> bool:
     return kept < count
 
 
-def exchange(tb: Tables, w: Work, count: int) -> int:
+def exchange(tb: Equations, w: Work, count: int) -> int:
     """Number of singular rows that are left when every redundant row that has a gradient of its own here takes the
     place of a row that lost its.
 
     Which row of a dependent set may be left out changes along the motion: without the x-row of one of three parallel
     cranks, what is left loses rank where that crank's end moves along x, though the mechanism is regular there.
     """
-    forms, mass, border = tb.forms, tb.mass, w.border
+    border = w.border
     for row in range(w.base.shape[0]):
         if w.base[row] == 0 or count == 0:
             continue
@@ -184,11 +184,11 @@ def exchange(tb: Tables, w: Work, count: int) -> int:
             w.mu[r] = -w.mu[r]
         w.mu[row] = 1.0
         fill(w.F, 0.0)
-        add_transposed(forms, w.G, w.mu, 1.0, w.F)
-        if weighted(w.F, w.F, mass) < TOGETHER * row_square(forms, mass, w.G, row):
+        add_transposed(tb, w.G, w.mu, 1.0, w.F)
+        if inner(tb, w.F, w.F) < TOGETHER * row_square(tb, w, row):
             continue
         for p in range(count):
-            border.nu[p] = weighted(border.B[p], w.F, mass)
+            border.nu[p] = inner(tb, border.B[p], w.F)
         small_solve(border.schur, count, border.nu, border.small)
         most = 0
         for p in range(1, count):
@@ -202,14 +202,14 @@ def exchange(tb: Tables, w: Work, count: int) -> int:
     return count
 
 
-def passes(tb: Tables, w: Work, count: int) -> bool:
+def passes(tb: Equations, w: Work, count: int) -> bool:
     """Whether z^T g vanishes, so that two branches cross, for all singular rows."""
-    forms, border = tb.forms, w.border
-    residuals(forms, tb.vectors, w.qn, w.c, w.s, w.TF[:, 0], w.mu)
+    border = w.border
+    residuals(tb, w, w.mu)
     for p in range(count):
         scale = 0.0
         for r in range(w.mu.shape[0]):
-            scale = max(scale, abs(border.Z[p, r]) * forms.unit[r])
+            scale = max(scale, abs(border.Z[p, r]) * tb.program.rows.unit[r])
         if abs(combination(border, p, w.mu)) > 1e-10 * scale:
             return False
     return True

@@ -1,8 +1,7 @@
-"""Constraint rows of a linkage: residuals, gradients, S = G M^-1 G^T = L D L^T. Plain loops, compiled
-when numba is.
+"""Rows of a program: values, gradients, S = G M^-1 G^T = L D L^T. Plain loops, compiled when numba is.
 
 The functions here are written in the subset of Python that numba compiles; `gearfe.rigid.compiled` binds them together.
-Coordinates q hold (x, y, theta) of every body and of the ground, shape (3 (n + 1),).
+Variables are z = (q, functions of one coordinate, squares' forms), see `gearfe.rigid.row_tables`.
 """
 
 from __future__ import annotations
@@ -13,11 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..typing import Array, IntArray
-from .kernel_names import EW, EX, EY, KC, KS, KT, KX, KY
+from .kernel_tape import curve_orders
 
 if TYPE_CHECKING:
-    from .ordering import Factor
-    from .tables import Forms, Times, Vectors
+    from .row_tables import Equations
+    from .tables import Times
+    from .taylor import Work
 
 
 def fill(x: Array, value: float) -> None:
@@ -32,151 +32,148 @@ def copy(x: Array, y: Array) -> None:
         y[i] = x[i]
 
 
-def trigonometry(q: Array, c: Array, s: Array) -> None:
-    """Cosine and sine of every angle."""
-    for b in range(c.shape[0]):
-        c[b] = math.cos(q[3 * b + 2])
-        s[b] = math.sin(q[3 * b + 2])
+def variables(tb: Equations, w: Work, q: Array) -> None:
+    """Variables at the coordinates q in w.P, their slopes dz/dq in w.slope."""
+    curves, square, P, slope = tb.program.curves, tb.square, w.P, w.slope
+    n = q.shape[0]
+    for i in range(n):
+        P[i, 0] = q[i]
+        slope[i] = 1.0
+    curve_orders(tb.program, P, w.pieces, 0)
+    for f in range(curves.sign.shape[0]):
+        slope[n + f] = curves.sign[f] * P[curves.place[f, 1], 0]
+    for s in range(square.row.shape[0]):
+        value = 0.0
+        for e in range(square.first[s], square.first[s + 1]):
+            value += square.weight[e] * P[square.variable[e], 0]
+        P[slope.shape[0] + s, 0] = value
 
 
-def vector_at(vectors: Vectors, k: int, q: Array, c: Array, s: Array) -> tuple[float, float]:
-    """Components of vector k."""
-    x = 0.0
-    y = 0.0
-    for side in range(2):
-        b = vectors.bodies[k, side]
-        px = vectors.end[k, side, EX]
-        py = vectors.end[k, side, EY]
-        x += vectors.end[k, side, EW] * q[3 * b] + c[b] * px - s[b] * py
-        y += vectors.end[k, side, EW] * q[3 * b + 1] + s[b] * px + c[b] * py
-    return x, y
+def rates(tb: Equations, w: Work, v: Array) -> None:
+    """Rates of the variables in w.P, of their slopes in w.bend, after `variables`."""
+    curves, square, P, bend = tb.program.curves, tb.square, w.P, w.bend
+    n = v.shape[0]
+    for i in range(n):
+        P[i, 1] = v[i]
+    for f in range(curves.sign.shape[0]):
+        P[n + f, 1] = w.slope[n + f] * v[curves.place[f, 0]]
+    for f in range(curves.sign.shape[0]):
+        bend[n + f] = curves.sign[f] * P[curves.place[f, 1], 1]
+    for s in range(square.row.shape[0]):
+        value = 0.0
+        for e in range(square.first[s], square.first[s + 1]):
+            value += square.weight[e] * P[square.variable[e], 1]
+        P[bend.shape[0] + s, 1] = value
 
 
-def arm_at(vectors: Vectors, k: int, a: int, c: Array, s: Array) -> tuple[float, float]:
-    """Arm of vector k at its end a, in the ground's axes."""
-    b = vectors.bodies[k, a]
-    px = vectors.end[k, a, EX]
-    py = vectors.end[k, a, EY]
-    return c[b] * px - s[b] * py, s[b] * px + c[b] * py
+def gradients(tb: Equations, w: Work, q: Array) -> None:
+    """Gradients of all rows at the coordinates q in w.G."""
+    gradient, square, slope, G = tb.gradient, tb.square, w.slope, w.G
+    variables(tb, w, q)
+    copy(gradient.still, G)
+    for e in range(gradient.turning.shape[0]):
+        G[gradient.turning[e, 1]] += gradient.factor[e] * slope[gradient.turning[e, 2]]
+    for s in range(square.row.shape[0]):
+        value = 2.0 * square.factor[s] * w.P[slope.shape[0] + s, 0]
+        for e in range(square.first[s], square.first[s + 1]):
+            G[square.entry[e]] += value * square.weight[e] * slope[square.variable[e]]
 
 
-def vector_rate(vectors: Vectors, k: int, v: Array, c: Array, s: Array) -> tuple[float, float]:
-    """Components of the rate of vector k."""
-    x = 0.0
-    y = 0.0
-    for side in range(2):
-        b = vectors.bodies[k, side]
-        px = vectors.end[k, side, EX]
-        py = vectors.end[k, side, EY]
-        x += vectors.end[k, side, EW] * v[3 * b] - v[3 * b + 2] * (s[b] * px + c[b] * py)
-        y += vectors.end[k, side, EW] * v[3 * b + 1] + v[3 * b + 2] * (c[b] * px - s[b] * py)
-    return x, y
+def gradient_rates(tb: Equations, w: Work, v: Array) -> None:
+    """w.dG = dG/dt along the velocity v, after `gradients`."""
+    gradient, square, slope, bend, H = tb.gradient, tb.square, w.slope, w.bend, w.dG
+    rates(tb, w, v)
+    fill(H, 0.0)
+    for e in range(gradient.turning.shape[0]):
+        H[gradient.turning[e, 1]] += gradient.factor[e] * bend[gradient.turning[e, 2]]
+    for s in range(square.row.shape[0]):
+        value = 2.0 * square.factor[s] * w.P[slope.shape[0] + s, 0]
+        rate = 2.0 * square.factor[s] * w.P[slope.shape[0] + s, 1]
+        for e in range(square.first[s], square.first[s + 1]):
+            i = square.variable[e]
+            H[square.entry[e]] += square.weight[e] * (rate * slope[i] + value * bend[i])
 
 
-def gradients(forms: Forms, vectors: Vectors, q: Array, c: Array, s: Array, G: Array) -> None:
-    """G[r, side] = gradient of constraint r with respect to (x, y, theta) of its body on that side; shape (m, 2, 3)."""
-    for r in range(G.shape[0]):
-        for a in range(2):
-            b = forms.bodies[r, a]
-            G[r, a, 0] = forms.factor[r, a, KX]
-            G[r, a, 1] = forms.factor[r, a, KY]
-            G[r, a, 2] = forms.factor[r, a, KT] - forms.factor[r, a, KC] * s[b] + forms.factor[r, a, KS] * c[b]
-    for p in range(forms.product.shape[0]):
-        r = forms.product[p, 0]
-        for one in range(2):
-            k = forms.product[p, 1 + one]
-            ux, uy = vector_at(vectors, forms.product[p, 2 - one], q, c, s)
-            for a in range(2):
-                rx, ry = arm_at(vectors, k, a, c, s)
-                G[r, a, 0] += vectors.end[k, a, EW] * ux
-                G[r, a, 1] += vectors.end[k, a, EW] * uy
-                G[r, a, 2] += rx * uy - ry * ux
-
-
-def gradient_rates(forms: Forms, vectors: Vectors, q: Array, v: Array, c: Array, s: Array, H: Array) -> None:
-    """H = dG/dt along the velocity v, same layout as G."""
-    for r in range(H.shape[0]):
-        for a in range(2):
-            b = forms.bodies[r, a]
-            H[r, a, 0] = 0.0
-            H[r, a, 1] = 0.0
-            H[r, a, 2] = -v[3 * b + 2] * (forms.factor[r, a, KC] * c[b] + forms.factor[r, a, KS] * s[b])
-    for p in range(forms.product.shape[0]):
-        r = forms.product[p, 0]
-        for one in range(2):
-            k = forms.product[p, 1 + one]
-            ux, uy = vector_at(vectors, forms.product[p, 2 - one], q, c, s)
-            dx, dy = vector_rate(vectors, forms.product[p, 2 - one], v, c, s)
-            for a in range(2):
-                spin = v[3 * forms.bodies[r, a] + 2]
-                rx, ry = arm_at(vectors, k, a, c, s)
-                H[r, a, 0] += vectors.end[k, a, EW] * dx
-                H[r, a, 1] += vectors.end[k, a, EW] * dy
-                H[r, a, 2] += rx * dy - ry * dx - spin * (rx * ux + ry * uy)
-
-
-def residuals(forms: Forms, vectors: Vectors, q: Array, c: Array, s: Array, f: Array, g: Array) -> None:
-    """Value of every constraint; f holds the value of every time function."""
+def residuals(tb: Equations, w: Work, g: Array) -> None:
+    """Value of every row, after `gradients`; w.TF holds the value of every function of time."""
+    rows, gradient, square = tb.program.rows, tb.gradient, tb.square
     for r in range(g.shape[0]):
-        value = forms.constant[r]
-        if forms.motion[r] >= 0:
-            value -= f[forms.motion[r]]
-        for a in range(2):
-            b = forms.bodies[r, a]
-            value += forms.factor[r, a, KX] * q[3 * b] + forms.factor[r, a, KY] * q[3 * b + 1]
-            value += forms.factor[r, a, KT] * q[3 * b + 2]
-            value += forms.factor[r, a, KC] * c[b] + forms.factor[r, a, KS] * s[b]
+        value = rows.constant[r]
+        if rows.motion[r] >= 0:
+            value -= w.TF[rows.motion[r], 0]
+        for e in range(gradient.first[r], gradient.first[r + 1]):
+            value += gradient.still[e] * w.P[gradient.column[e], 0]
         g[r] = value
-    for p in range(forms.product.shape[0]):
-        ux, uy = vector_at(vectors, forms.product[p, 1], q, c, s)
-        vx, vy = vector_at(vectors, forms.product[p, 2], q, c, s)
-        g[forms.product[p, 0]] += ux * vx + uy * vy
+    for e in range(gradient.turning.shape[0]):
+        g[gradient.turning[e, 0]] += gradient.factor[e] * w.P[gradient.turning[e, 2], 0]
+    for s in range(square.row.shape[0]):
+        value = w.P[w.slope.shape[0] + s, 0]
+        g[square.row[s]] += square.factor[s] * value * value
 
 
-def times_gradients(forms: Forms, G: Array, u: Array, out: Array) -> None:
+def times_gradients(tb: Equations, G: Array, u: Array, out: Array) -> None:
     """out = G u, one number per row."""
+    gradient = tb.gradient
     for r in range(out.shape[0]):
-        a = 3 * forms.bodies[r, 0]
-        b = 3 * forms.bodies[r, 1]
-        out[r] = (
-            G[r, 0, 0] * u[a] + G[r, 0, 1] * u[a + 1] + G[r, 0, 2] * u[a + 2]
-            + G[r, 1, 0] * u[b] + G[r, 1, 1] * u[b + 1] + G[r, 1, 2] * u[b + 2]
-        )  # fmt: skip
+        value = 0.0
+        for e in range(gradient.first[r], gradient.first[r + 1]):
+            value += G[e] * u[gradient.column[e]]
+        out[r] = value
 
 
-def add_transposed(forms: Forms, G: Array, mu: Array, factor: float, out: Array) -> None:
+def add_transposed(tb: Equations, G: Array, mu: Array, factor: float, out: Array) -> None:
     """out += factor G^T mu."""
+    gradient = tb.gradient
     for r in range(mu.shape[0]):
-        for side in range(2):
-            b = 3 * forms.bodies[r, side]
-            value = factor * mu[r]
-            out[b] += G[r, side, 0] * value
-            out[b + 1] += G[r, side, 1] * value
-            out[b + 2] += G[r, side, 2] * value
+        value = factor * mu[r]
+        for e in range(gradient.first[r], gradient.first[r + 1]):
+            out[gradient.column[e]] += G[e] * value
 
 
-def factorise(
-    plan: Factor, mass: Array, G: Array, skip: IntArray, val: Array, diag: Array, bound: float
-) -> tuple[float, int]:
-    """L D L^T of S in val (m reciprocals of D, then the entries of L); rows with skip != 0 become unit rows.
+def accelerations(tb: Equations, force: Array, out: Array) -> None:
+    """out = M^-1 force, the masses raised by their excess."""
+    mass = tb.mass
+    if mass.inverse.shape[0] == out.shape[0]:  # diagonal
+        for i in range(out.shape[0]):
+            out[i] = mass.inverse[i] * force[i]
+        return
+    fill(out, 0.0)
+    for e in range(mass.inverse.shape[0]):
+        out[mass.place[e, 0]] += mass.inverse[e] * force[mass.place[e, 1]]
+
+
+def inner(tb: Equations, a: Array, b: Array) -> float:
+    """a . M^-1 b."""
+    mass = tb.mass
+    total = 0.0
+    if mass.inverse.shape[0] == a.shape[0]:  # diagonal
+        for i in range(a.shape[0]):
+            total += a[i] * b[i] * mass.inverse[i]
+        return total
+    for e in range(mass.inverse.shape[0]):
+        total += a[mass.place[e, 0]] * b[mass.place[e, 1]] * mass.inverse[e]
+    return total
+
+
+def factorise(tb: Equations, w: Work, skip: IntArray, bound: float) -> tuple[float, int]:
+    """L D L^T of S in w.val (m reciprocals of D, then the entries of L); rows with skip != 0 become unit rows.
 
     Rows whose pivot falls below `bound` of their diagonal become unit rows, too, and get skip = 2.
     Returns the smallest pivot relative to its diagonal of S, and its row (-1 when there is none).
     """
+    plan, product, inverse, G, val, diag = tb.factor, tb.product, tb.mass.inverse, w.G, w.val, w.diag
     m = diag.shape[0]
     fill(val, 0.0)
-    for e in range(plan.entry.shape[0]):
-        r = plan.entry[e, 1]
-        s = plan.entry[e, 3]
-        if skip[r] == 0 and skip[s] == 0:
-            a = plan.entry[e, 2]
-            b = plan.entry[e, 4]
-            k = 3 * plan.entry[e, 5]
-            val[plan.entry[e, 0]] += (
-                G[r, a, 0] * G[s, b, 0] * mass[k]
-                + G[r, a, 1] * G[s, b, 1] * mass[k + 1]
-                + G[r, a, 2] * G[s, b, 2] * mass[k + 2]
-            )
+    for e in range(product.shape[0]):
+        val[product[e, 0]] += G[product[e, 1]] * G[product[e, 2]] * inverse[product[e, 3]]
+    for j in range(m):
+        if skip[j] != 0:
+            val[j] = 0.0
+            for e in range(plan.start[j], plan.start[j + 1]):
+                val[m + e] = 0.0
+    for e in range(plan.row.shape[0]):
+        if skip[plan.row[e]] != 0:
+            val[m + e] = 0.0
     least = 1.0
     where = -1
     dropped = False
@@ -215,8 +212,9 @@ def factorise(
     return least, where
 
 
-def solve(plan: Factor, val: Array, x: Array) -> None:
+def solve(tb: Equations, val: Array, x: Array) -> None:
     """x := S^-1 x with the factor of `factorise`."""
+    plan = tb.factor
     m = x.shape[0]
     for e in range(plan.row.shape[0]):
         x[plan.row[e]] -= val[m + e] * x[plan.column[e]]
@@ -253,19 +251,7 @@ def time_series(times: Times, t: float, forward: bool, orders: int, out: Array) 
 
 
 FUNCTIONS = (
-    fill,
-    copy,
-    trigonometry,
-    vector_at,
-    arm_at,
-    vector_rate,
-    gradients,
-    gradient_rates,
-    residuals,
-    times_gradients,
-    add_transposed,
-    factorise,
-    solve,
-    time_series,
-)
+    fill, copy, variables, rates, gradients, gradient_rates, residuals, times_gradients, add_transposed,
+    accelerations, inner, factorise, solve, time_series,
+)  # fmt: skip
 GLOBALS = {"math": math, "np": np}

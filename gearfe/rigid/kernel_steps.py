@@ -1,4 +1,5 @@
-"""Where steps of a series begin and end: their length from the last terms, breaks of the forces, the end of the run.
+"""Where steps of a series begin and end: their length from the last terms, breaks of the forces, the end of the run;
+values in between.
 
 Step length from the last two coefficients (Jorba & Zou, Exp. Math. 14 (2005) 99-117): |q_N| h^N <= tolerance.
 """
@@ -22,7 +23,6 @@ class Run(NamedTuple):
     tolerance: float  # of the last terms
     longest: float  # step (s)
     breaks: Array  # times at which steps end, rising (s)
-    length: float = 1.0  # that compares with 1 rad (m), where coordinates have no units of their own
 
 
 def series_step(last: float, before: float, run: Run) -> float:
@@ -61,4 +61,39 @@ def even_step(size: float, remains: float) -> float:
     return 0.5 * remains if size > 0.5 * remains else size
 
 
-FUNCTIONS = (series_step, next_goal, even_step)
+class Samples(NamedTuple):
+    """Where the pieces of a run are asked for, and what is found."""
+
+    ends: Array  # (pieces + 1,) of the steps (s)
+    coefficients: Array  # (pieces, orders, c)
+    sign: float  # of time
+    times: Array  # (t,) in order of travel (s)
+    derivative: int
+    out: Array  # (t, c) coordinates, or that derivative of them
+
+
+def sample(samples: Samples) -> int:
+    """Coordinates or a derivative of them from the series of the steps; returns 0."""
+    T, C, sign, times, derivative, out = (
+        samples.ends, samples.coefficients, samples.sign, samples.times, samples.derivative, samples.out,
+    )  # fmt: skip
+    piece = 0
+    last = C.shape[0] - 1
+    for i in range(times.shape[0]):
+        while piece < last and sign * (times[i] - T[piece + 1]) > 0.0:
+            piece += 1
+        while piece > 0 and sign * (times[i] - T[piece]) < 0.0:
+            piece -= 1
+        h = times[i] - T[piece]
+        for c in range(out.shape[1]):
+            out[i, c] = 0.0
+        for j in range(C.shape[1] - 1, derivative - 1, -1):
+            factor = 1.0
+            for d in range(derivative):
+                factor *= j - d
+            for c in range(out.shape[1]):
+                out[i, c] = out[i, c] * h + factor * C[piece, j, c]
+    return 0
+
+
+FUNCTIONS = (series_step, next_goal, even_step, sample)

@@ -92,8 +92,8 @@ class Linkage(Element):
         return np.tile([length, length, 1.0], self.size // 3), self._forms.unit
 
     @property
-    def has_series(self) -> bool:
-        """Whether the kernels of rigid linkages can run it: no load depends on the state, no row has a profile."""
+    def algebraic(self) -> bool:
+        """Whether loads do not depend on the state, and no constraint has a profile."""
         return not (self.pieced or self.assembly.profiles)
 
     @property

@@ -89,32 +89,36 @@ def write_linkage(linkage: Linkage, tape: Tape, places: IntArray) -> bool:
     for k, (stiffness, damping, free) in enumerate(tables.forces.spring):
         x, y = vector(k)
         span = [tape.linear(*x), tape.linear(*y)]
-        if damping == 0.0 and free == 0.0 and k not in laws:
-            pull = tape.number(stiffness)
-        else:
-            length = tape.power(tape.sum(tape.mul(span[0], span[0]), tape.mul(span[1], span[1])), 0.5)
-            speed = [tape.rate(x.terms), tape.rate(y.terms)]
-            rate = tape.div(tape.sum(tape.mul(span[0], speed[0]), tape.mul(span[1], speed[1])), length)
-            tension = tape.sum(length, rate, f=stiffness, g=damping, c=-stiffness * free)
+        pull = tape.number(stiffness)  # tension over length
+        if free != 0.0 or damping != 0.0 or k in laws:
+            square = tape.sum(tape.mul(span[0], span[0]), tape.mul(span[1], span[1]))
+            inverse = tape.power(square, -0.5)
+            if free != 0.0:
+                pull = tape.sum(inverse, f=-stiffness * free, c=stiffness)
+            if damping != 0.0 or k in laws:
+                speed = [tape.rate(x.terms), tape.rate(y.terms)]
+                flow = tape.sum(tape.mul(span[0], speed[0]), tape.mul(span[1], speed[1]))
+                pull = tape.sum(pull, tape.div(flow, square), g=damping)
             if k in laws:
-                own = laws[k].write(tape, length, rate)
+                own = laws[k].write(tape, tape.mul(square, inverse), tape.mul(flow, inverse))
                 if own is None:
                     return False
-                tension = tape.sum(tension, own)
-            pull = tape.div(tension, length)
+                pull = tape.sum(pull, tape.mul(own, inverse))
         for part, along in zip(span, (x, y), strict=True):
-            tape.push(tape.sum(tape.mul(pull, part), f=-1.0), along.terms)
+            opposite = {i: -f for i, f in along.terms.items()}
+            tape.push(tape.mul(pull, part), opposite, told=k not in laws)
     loads = dict(linkage.assembly.state_loads)
     for k, (stiffness, damping) in enumerate(tables.forces.along):
         r = linkage.rows + k
         along = form(r)
-        value = tape.sum(tape.linear(*along), tape.rate(along.terms), f=-stiffness, g=-damping)
+        if stiffness != 0.0 or damping != 0.0:
+            pull = tape.sum(tape.linear(*along), tape.rate(along.terms), f=-stiffness, g=-damping)
+            tape.push(pull, along.terms, told=True)
         if k in loads:
             load = loads[k].write(bodies)
             if load is None:
                 return False
-            value = tape.sum(value, load)
+            tape.push(load, along.terms)
         elif forms.motion[r] >= 0:
-            value = tape.sum(value, tape.function(functions[forms.motion[r]]))
-        tape.push(value, along.terms)
+            tape.push(tape.function(functions[forms.motion[r]]), along.terms, told=True)
     return True

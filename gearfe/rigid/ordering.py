@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import heapq
 from collections import defaultdict
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -23,32 +24,24 @@ class Factor(NamedTuple):
     start: IntArray  # (m + 1,) columns of the factor L
     row: NDArray[np.uint64]  # (nnz,) row number of each entry
     column: NDArray[np.uint64]  # (nnz,) and its column (unsigned: compiled code need not ask for negative numbers)
-    entry: IntArray  # (e, 6) target, row, side, row, side, body: products that make G M^-1 G^T
     update_start: IntArray  # (m + 1,)
     update: IntArray  # (u, 3) target, entry, entry of L
 
 
-class Plan(NamedTuple):
-    """Order in which the rows are numbered, and the symbolic factor."""
+def symbolic_factor(m: int, coupled: Iterable[tuple[int, int]]) -> tuple[Factor, Callable[[int, int], int]]:
+    """Symbolic factor of m rows, and the place of an entry (r, s) of S: r for a diagonal one, else m + its number.
 
-    order: list[int]
-    factor: Factor
-
-
-def elimination_plan(rows: list[tuple[int, tuple[int, int]]], n_bodies: int) -> Plan:
-    """Plan for rows given as (joint, (body, body)); body `n_bodies` is the ground and couples nothing."""
-    order = _minimum_degree(rows, n_bodies)
-    bodies = [rows[i][1] for i in order]
-    m = len(bodies)
-    holders: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    for r, pair in enumerate(bodies):
-        for side, body in enumerate(pair):
-            if body != n_bodies:
-                holders[body].append((r, side))
+    Parameters
+    ----------
+    m
+        Number of rows.
+    coupled
+        Entries (r, s), r >= s, of S.
+    """
     below: list[set[int]] = [set() for _ in range(m)]
-    for users in holders.values():
-        for r, _ in users:
-            below[r].update(s for s, _ in users if s > r)
+    for r, s in coupled:
+        if r > s:
+            below[s].add(r)
     for j in range(m):  # fill: the first row below the diagonal inherits the rest of the column
         if below[j]:
             first = min(below[j])
@@ -61,33 +54,27 @@ def elimination_plan(rows: list[tuple[int, tuple[int, int]]], n_bodies: int) -> 
     def target(r: int, s: int) -> int:
         return r if r == s else m + place[(max(r, s), min(r, s))]
 
-    entry = [
-        (target(r, s), r, side, s, other, body)
-        for body, users in holders.items()
-        for u, (r, side) in enumerate(users)
-        for s, other in users[u:]
-    ]
     update, update_start = [], [0]
     for j, column in enumerate(columns):
         first = int(start[j])
         for b, k in enumerate(column):
             update += [(target(i, k), first + a, first + b) for a, i in enumerate(column) if i >= k]
         update_start.append(len(update))
-    return Plan(
-        order,
-        Factor(
-            start,
-            np.array([i for column in columns for i in column], dtype=np.uint64),
-            np.array([j for j, column in enumerate(columns) for _ in column], dtype=np.uint64),
-            np.array(entry, dtype=np.int64).reshape(-1, 6),
-            np.array(update_start, dtype=np.int64),
-            np.array(update, dtype=np.int64).reshape(-1, 3),
-        ),
+    made = Factor(
+        start,
+        np.array([i for column in columns for i in column], dtype=np.uint64),
+        np.array([j for j, column in enumerate(columns) for _ in column], dtype=np.uint64),
+        np.array(update_start, dtype=np.int64),
+        np.array(update, dtype=np.int64).reshape(-1, 3),
     )
+    return made, target
 
 
-def _minimum_degree(rows: list[tuple[int, tuple[int, int]]], n_bodies: int) -> list[int]:
-    """Rows, joint by joint, always next the joint with the fewest neighbours left."""
+def elimination_order(rows: list[tuple[int, tuple[int, int]]], n_bodies: int) -> list[int]:
+    """Order of rows given as (joint, (body, body)); body `n_bodies` is the ground and couples nothing.
+
+    Joint by joint, always next the joint with the fewest neighbours left.
+    """
     members: dict[int, list[int]] = defaultdict(list)
     on_body: dict[int, set[int]] = defaultdict(set)
     for i, (joint, pair) in enumerate(rows):

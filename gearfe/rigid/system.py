@@ -103,9 +103,9 @@ class System:
 
     @property
     def linkage(self) -> Linkage | None:
-        """The linkage when the system is nothing else: the Taylor kernels can run it."""
+        """The linkage when the system is nothing else, and under no loads that depend on the state."""
         one = self.elements[0] if len(self.elements) == 1 else None
-        return one if isinstance(one, Linkage) and one.has_series else None
+        return one if isinstance(one, Linkage) and one.algebraic else None
 
     def coordinates(self, element: Element) -> np.ndarray:
         """Numbers of the coordinates that `element` owns."""

@@ -20,7 +20,7 @@ from ..typing import Array, BoolArray, IntArray
 from .forces import Along, Force, Tension, Weight
 from .forms import End, Form, Frames, Terms, Vector
 from .joints import Joint, Profile
-from .ordering import Factor, elimination_plan
+from .ordering import elimination_order
 from .planar import Body
 from .statefunctions import SpanFunction, StateFunction
 from .timefunctions import TimeFunction, constant
@@ -64,16 +64,11 @@ class Times(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """Everything the planar kernels need, for n bodies and m constraints."""
+    """A linkage of n bodies and m constraints."""
 
-    mass: Array  # (3 (n + 1),) inverse of m, m, I of each body (with the excess of light ones), zero for the ground
-    light: IntArray  # (k,) coordinates that are eliminated with more than their own mass, see `gearfe.rigid.carried`
-    excess: Array  # (k,) by how much
     forms: Forms
     vectors: Vectors
-    plan: Factor
     forces: Forces
-    times: Times
 
 
 class Assembly(NamedTuple):
@@ -124,8 +119,7 @@ def assemble(joints: tuple[Joint, ...], forces: tuple[Force, ...], frames: Frame
             bodies = _two(form.bodies, n, label)
             held = None if profile is None else (bodies.index(frames.number[profile[0]]), profile[1])
             rows.append(_Row(number, f"{label} ({what})", form, bodies, numbered(motion), held))
-    plan = elimination_plan([(r.joint, r.bodies) for r in rows], n)
-    rows = [rows[i] for i in plan.order]
+    rows = [rows[i] for i in elimination_order([(r.joint, r.bodies) for r in rows], n)]
     weight = np.zeros((n + 1, 3))
     masses = np.array([b.mass for b in frames.bodies], dtype=float)
     tensions: list[tuple[str, Tension]] = []
@@ -146,15 +140,12 @@ def assemble(joints: tuple[Joint, ...], forces: tuple[Force, ...], frames: Frame
     length = _length(rows, [part for _, part in tensions], q0, n)
     lengths = np.array([_holds_length(r.form) for r in rows], dtype=bool)
     forms, vectors = _form_arrays(rows, loads, spans, np.where(lengths, length, 1.0))
-    inverse = np.zeros(3 * (n + 1))
-    with np.errstate(divide="ignore"):  # a link may be without mass: see `carrying`
-        inverse[:-3] = 1.0 / np.array([(b.mass, b.mass, b.inertia) for b in frames.bodies], dtype=float).ravel()
     acting = Forces(
         weight.ravel(),
         _floats([(t.stiffness, t.damping, t.free_length) for _, t in tensions], 3),
         _floats([(a.stiffness, a.damping) for a in along], 2),
     )
-    tables = Tables(inverse, *_NONE, forms, vectors, plan.factor, acting, time_arrays(functions))
+    tables = Tables(forms, vectors, acting)
     return Assembly(
         tables,
         row_joint=tuple(r.joint for r in rows),
@@ -171,20 +162,6 @@ def assemble(joints: tuple[Joint, ...], forces: tuple[Force, ...], frames: Frame
         length=length,
         centre=np.array([*(b.centre for b in frames.bodies), (0.0, 0.0)], dtype=float),
     )
-
-
-_NONE = (np.zeros(0, dtype=np.int64), np.zeros(0))
-
-
-def carrying(assembly: Assembly, excess: Array) -> Assembly:
-    """The assembly with masses raised by `excess`, shape (3n,), in the elimination."""
-    light = np.flatnonzero(excess)
-    if light.size == 0:
-        return assembly
-    tables = assembly.tables
-    inverse = tables.mass.copy()
-    inverse[light] = 1.0 / (1.0 / inverse[light] + excess[light])
-    return assembly._replace(tables=tables._replace(mass=inverse, light=light, excess=excess[light]))
 
 
 def _two(bodies: tuple[int, ...], ground: int, label: str) -> tuple[int, int]:

@@ -51,6 +51,7 @@ class Code(NamedTuple):
     weight: Array  # (terms,)
     push: IntArray  # (pushes, 2) register, variable that it acts along
     share: Array  # (pushes,)
+    checked: IntArray  # (c,) pushes of which a series may say too little: x^30, tanh 100 x
 
 
 class Switches(NamedTuple):
@@ -130,6 +131,7 @@ class Tape:
         self._factors: list[tuple[float, float, float]] = []
         self._leaves: list[Terms] = []
         self._pushes: list[tuple[int, int, float]] = []
+        self._checked: list[int] = []
         self._switches: list[tuple[int, Array, Array, float, int]] = []
         self._known: dict[tuple[object, ...], int] = {}
         self._bars: list[tuple[Array, ...]] = []
@@ -177,8 +179,11 @@ class Tape:
         """A constraint."""
         self._rows.append((terms, products, constant, -1 if motion is None else self._numbered(motion), unit))
 
-    def push(self, register: int, terms: Terms) -> None:
-        """The force of a register along a form of the variables."""
+    def push(self, register: int, terms: Terms, *, told: bool = False) -> None:
+        """The force of a register along a form of the variables; `told` where the terms of its series tell how far it
+        reaches."""
+        if not told:
+            self._checked += range(len(self._pushes), len(self._pushes) + len(terms))
         self._pushes += [(register, variable, factor) for variable, factor in terms.items()]
 
     # leaves ---------------------------------------------------------------------------------------------------
@@ -339,6 +344,7 @@ class Tape:
             np.array([f for _, f in terms], dtype=float),
             _ints([p[:2] for p in self._pushes], 2),
             np.array([p[2] for p in self._pushes], dtype=float),
+            np.array(self._checked, dtype=np.int64),
         )
         switches = Switches(
             np.array([s[0] for s in self._switches], dtype=np.int64),
