@@ -318,7 +318,8 @@ def equations(program: Program, band: Band, s: int, stresses: int) -> Equations:
         G=np.zeros((m, n)), K=np.zeros((n, n)), C=np.zeros((n, n)), B=lanes.lanes(2, N, N, 2, R),
         over=lanes.lanes(2, N, 2, R), scale=lanes.lanes(2, R), pivot=whole(2, N), low=whole(2, N), top=whole(2, N),
         right=whole(N), x=lanes.lanes(N, 2, R), law=np.zeros((stresses, width)), slope=np.zeros((3, 4)),
-        by=np.zeros((2, 4, 4)), shapes=np.zeros((3, widest)), blocks=np.zeros((widest, width)),
+        by=np.zeros((2, 4, 4)), shapes=np.zeros((4, widest)),
+        pairs=np.zeros((widest, widest)), drift=np.zeros(width), blocks=np.zeros((widest, width)),
     )  # fmt: skip
     W = s + 1
     wide = Wide(

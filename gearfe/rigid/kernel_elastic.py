@@ -209,18 +209,19 @@ def add_float_tangents(floats: Floats, q: Array, v: Array, S: Array, own: Scratc
         at = floats.place[b, 5]
         size = 2 * r + 4
         tau = floats.damping[b]
-        eta, swing = own.shapes[0], own.shapes[2]
+        eta, swing, pull, pairs, drift = own.shapes[0], own.shapes[2], own.shapes[3], own.pairs, own.drift
         for k in range(r):  # rates of the shares
             p = first + 4 + 2 * k
             swing[k] = v[p] * q[first + 2] + v[p + 1] * q[first + 3] + q[p] * v[first + 2] + q[p + 1] * v[first + 3]
+        for k in range(r):
+            pull[k] = 0.0
+            for m in range(r):
+                pairs[k, m] = 0.0
         for s in range(strains):
-            for i in range(size):
-                own.law[at + s, i] = own.blocks[s, i]
-                for j in range(size):
-                    value = own.blocks[s, i] * own.blocks[s, j]
-                    K[first + i, first + j] -= value
-                    C[first + i, first + j] -= tau * value
-        for s in range(strains):
+            stress = S[at + s]
+            for j in range(size):
+                own.law[at + s, j] = own.blocks[s, j]
+                drift[j] = 0.0
             for k in range(r):
                 place = floats.place[b, 4] + (s * r + k) * r
                 bent = floats.linear[floats.place[b, 3] + s * r + k]
@@ -229,17 +230,24 @@ def add_float_tangents(floats: Floats, q: Array, v: Array, S: Array, own: Scratc
                     value = floats.quadratic[place + m]
                     bent += value * eta[m]
                     speed += value * swing[m]
-                    if value != 0.0:
-                        add_share_product(first, k, m, q, -S[at + s] * value, K)
-                for c in range(2):
-                    p = first + 4 + 2 * k + c
-                    K[p, first + 2 + c] -= S[at + s] * bent
-                    K[first + 2 + c, p] -= S[at + s] * bent
-                    if tau > 0.0:
-                        for i in range(size):
-                            factor = tau * own.blocks[s, i]
-                            K[first + i, p] -= factor * (speed * q[first + 2 + c] + bent * v[first + 2 + c])
-                            K[first + i, first + 2 + c] -= factor * (speed * q[p] + bent * v[p])
+                    pairs[k, m] += stress * value
+                pull[k] += stress * bent
+                for c in range(2):  # of the strains' rates with the state
+                    p = 4 + 2 * k + c
+                    drift[p] = speed * q[first + 2 + c] + bent * v[first + 2 + c]
+                    drift[2 + c] += speed * q[first + p] + bent * v[first + p]
+            for i in range(size):
+                value = own.blocks[s, i]
+                for j in range(size):
+                    K[first + i, first + j] -= value * (own.blocks[s, j] + tau * drift[j])
+                    C[first + i, first + j] -= tau * value * own.blocks[s, j]
+        for k in range(r):
+            for m in range(r):
+                add_share_product(first, k, m, q, -pairs[k, m], K)
+            for c in range(2):
+                p = first + 4 + 2 * k + c
+                K[p, first + 2 + c] -= pull[k]
+                K[first + 2 + c, p] -= pull[k]
 
 
 def add_share_product(first: int, k: int, m: int, q: Array, factor: float, K: Array) -> None:

@@ -68,7 +68,11 @@ class Scratch(NamedTuple):
     law: Array  # (k, widest) derivatives of the stresses
     slope: Array  # (3, 4)
     by: Array  # (2, 4, 4) tangents of a beam's point by its strains' arguments, and by their rates
-    shapes: Array  # (3, widest) of a body in a floating frame: shares of modes, strains, rates of the shares
+    shapes: (
+        Array  # (4, widest) of a body in a floating frame: shares of modes, strains, rates of the shares, their forces
+    )
+    pairs: Array  # (widest, widest) derivatives of these forces by the shares
+    drift: Array  # (coordinates,) derivatives of a strain's rate
     blocks: Array  # (strains, coordinates)
 
 
