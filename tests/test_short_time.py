@@ -238,6 +238,10 @@ def test_a_run_up_with_all_of_it(tmp_path):
         assert float(row["frequency_Hz"]) == pytest.approx(
             float(row["order"]) * float(row["speed_rad_per_s"]) / (2.0 * math.pi)
         )
+    # the option's window is that of the measured record, too: 3, and half of it in both lines beside it
+    assert run(job(tmp_path, spectrum), "--no-pictures", "--window", "hann") == 0
+    windowed = json.loads((out / "summary.json").read_text())["measured"][0]["measured_rms_m_per_s2"]
+    assert windowed == pytest.approx(3.0 * math.sqrt(0.75))
     # without [spectrum] nothing of it is left
     assert run(job(tmp_path, ""), "--no-pictures") == 0
     assert not {p.name for p in out.iterdir()} & {f"{n}.csv" for n in names}

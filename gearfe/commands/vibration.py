@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ..progress import count
+from ..tables.spectrum import SpectrumTable
 from ..tables.train import TrainTable, value_text
 from .arguments import add_job, add_keys, with_keys
 from .common import add_folder, print_results
@@ -19,23 +20,15 @@ if TYPE_CHECKING:
     from ..train.response import TrainResponse
     from ..vibration.files import OutputChoice, Written
 
-#: Keys of [train] that options stand for.
+#: Keys of [train] that options stand for, and of [spectrum]: option -> key.
 KEYS = ("tolerance", "method")
+RECORD = {"window": "window", "spectrum_from_ms": "spectrum_from", "spectrum_ms": "spectrum_ms"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_train(parser, "job file with the table [train]", TrainTable, *KEYS)
-    parser.add_argument(
-        "--window", metavar="NAME", help="none, hann, hamming, blackman or flattop (default: [spectrum], or none)"
-    )
-    parser.add_argument(
-        "--spectrum-from-ms",
-        type=float,
-        metavar="T",
-        help="begin of the spectrum's record (ms; default: [spectrum], or 0)",
-    )
-    parser.add_argument("--spectrum-ms", type=float, metavar="T", help="its duration (ms; default: to the end)")
+    add_keys(parser, SpectrumTable, **RECORD)
     parser.add_argument(
         "--band", nargs=2, type=float, metavar=("LOW", "HIGH"), help="frequencies of the pictures' spectra (Hz)"
     )
@@ -73,11 +66,7 @@ def run(args: argparse.Namespace) -> int:
     # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = read_train_tables(args.job, args.variant)
     tables["train"] = with_keys(args, tables["train"], *KEYS)
-    if args.spectrum_from_ms is not None:
-        check_range(args.spectrum_from_ms, "--spectrum-from-ms", {"low": 0.0, "doc": "begin of the record (ms)"})
-    if args.spectrum_ms is not None:
-        check_range(args.spectrum_ms, "--spectrum-ms", {"above": 0.0, "doc": "duration of the record (ms)"})
-
+    tables["spectrum"] = with_keys(args, tables.get("spectrum", SpectrumTable()), **RECORD)
     if args.range is not None:
         check_range(args.range, "--range", {"above": 0.0, "doc": "end of the colours (m/s2)"})
     if args.band is not None and not 0.0 <= args.band[0] < args.band[1]:
@@ -86,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     from ..figures.train import TrainPictures
     from ..output.files import output_folder
     from ..progress import Stopwatch
-    from ..vibration.analysis import Analysis, options, record_start
+    from ..vibration.analysis import Analysis, record_start
     from ..vibration.files import OutputChoice, check_choice, write_run
     from ..vibration.job import train_job
     from ..vibration.run import simulated
@@ -99,8 +88,9 @@ def run(args: argparse.Namespace) -> int:
             animation=not args.no_animation,
             attachment=args.attachment,
             picture_time=None if args.picture_ms is None else 1e-3 * args.picture_ms,
-            spectrum_start=1e-3 * (args.spectrum_from_ms or 0.0),
-            **options(job.spectrum, args.window, args.spectrum_ms),
+            window=job.spectrum.window,
+            spectrum_start=job.spectrum.start or 0.0,
+            spectrum_length=job.spectrum.duration,
         )
         bores = tuple(str(a) for s in job.table.shafts for a in s.attachments)
         check_choice(choice, job.times, bores)
@@ -112,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
         with watch.stage("stability of the steady motion"):
             planned = replace(planned, stability=train_stability(planned.model))
     train, every = planned.model.train, planned.every
-    start = record_start(job, train, every, args.spectrum_from_ms, watch.stage)
+    start = record_start(job, train, every, watch.stage)
     choice = replace(choice, spectrum_start=start)
     check_choice(choice, job.times, bores)
     written = write_run(

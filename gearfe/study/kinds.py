@@ -104,7 +104,7 @@ def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Ans
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     from ..rigid.integrate import use_compiled
     from ..tables.train import train_tables
-    from ..vibration.analysis import Analysis, options, record_start
+    from ..vibration.analysis import Analysis, record_start
     from ..vibration.files import OutputChoice, write_run
     from ..vibration.job import train_job
     from ..vibration.run import simulated
@@ -113,8 +113,8 @@ def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     if job.table.method == "auto":
         job = replace(job, table=replace(job.table, method="taylor" if use_compiled("auto") else "explicit"))
     planned = simulated(job, (), watch=watch, estimate=estimate)
-    start = record_start(job, planned.model.train, planned.every, None, watch.stage)
-    choice = OutputChoice(spectrum_start=start, **options(job.spectrum, None, None))
+    start = record_start(job, planned.model.train, planned.every, watch.stage)
+    choice = OutputChoice(window=job.spectrum.window, spectrum_start=start, spectrum_length=job.spectrum.duration)
     beside = Analysis(job, planned.model.train, planned.every, start)
     with TemporaryDirectory() as name:  # a response may be longer than memory
         folder = Path(name)

@@ -26,11 +26,11 @@ class MeasuredTable:
 class SpectrumTable:
     """Spectra of a run."""
 
-    window: str | None = quantity(
-        None, choices=("none", "hann", "hamming", "blackman", "flattop"), doc="window of the spectrum; left out: none"
+    window: str = quantity(
+        "none", choices=("none", "hann", "hamming", "blackman", "flattop"), doc="window of the spectrum"
     )
     spectrum_from: float | str = quantity(
-        0.0, low=0.0, doc='begin of the record (ms), or "steady": where the start-up has died away'
+        0.0, low=0.0, doc='begin of the record (ms); "steady" in a job file: where the start-up has died away'
     )
     spectrum_ms: float | None = quantity(None, above=0.0, doc="duration of the record (ms); left out: to the end")
     short_time_ms: float | None = quantity(
@@ -45,6 +45,16 @@ class SpectrumTable:
         doc="orders that are tracked (turns of the first shaft); left out: multiples 1 to 3 of the meshes",
     )
     measured: tuple[MeasuredTable, ...] = quantity((), doc="[[spectrum.measured]]")
+
+    @property
+    def start(self) -> float | None:
+        """Begin of the record (s); None: where the motion is steady."""
+        return None if self.spectrum_from == STEADY else 1e-3 * float(self.spectrum_from)
+
+    @property
+    def duration(self) -> float | None:
+        """Duration of the record (s); None: to the end."""
+        return None if self.spectrum_ms is None else 1e-3 * self.spectrum_ms
 
     def check(self, where: str) -> None:
         """A text is the one word that is known."""

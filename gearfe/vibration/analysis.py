@@ -12,7 +12,6 @@ import numpy as np
 
 from ..output.files import write_csv
 from ..spectrum import Waterfall
-from ..tables.spectrum import STEADY, SpectrumTable
 from ..train import build_train
 from ..train.gear_train import GearTrain
 from ..train.kinematics import rolling
@@ -205,15 +204,10 @@ def steady_start(job: TrainJob, train: GearTrain, every: int) -> float:
     return float(last)
 
 
-def record_start(
-    job: TrainJob, train: GearTrain, every: int, option_ms: float | None, watch: Callable[[str], Any]
-) -> float:
-    """Begin of the spectrum's record (s): the option's, or that of [spectrum]; "steady" is looked for."""
-    if option_ms is not None:
-        return 1e-3 * option_ms
-    given = job.spectrum.spectrum_from
-    if given != STEADY:
-        return 1e-3 * float(given)
+def record_start(job: TrainJob, train: GearTrain, every: int, watch: Callable[[str], Any]) -> float:
+    """Begin of the spectrum's record (s): that of [spectrum], or where the motion is found to be steady."""
+    if job.spectrum.start is not None:
+        return job.spectrum.start
     with watch("steady part"):
         return steady_start(job, train, every)
 
@@ -251,11 +245,3 @@ def measured_columns(made: Analysed) -> dict[str, Any]:
         "frequency_Hz": np.concatenate([one.frequency for one in made.measured]),
         "acceleration_m_per_s2": np.concatenate([one.amplitude for one in made.measured]),
     }
-
-
-def options(table: SpectrumTable, window: str | None, length_ms: float | None) -> dict[str, Any]:
-    """Window and duration of the spectrum's record: the options', or those of [spectrum]."""
-    duration = table.spectrum_ms if length_ms is None else length_ms
-    return {
-        "window": window or table.window or "none", "spectrum_length": None if duration is None else 1e-3 * duration
-    }  # fmt: skip

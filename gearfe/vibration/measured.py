@@ -45,7 +45,7 @@ def read_measured(job: TrainJob) -> tuple[Measured, ...]:
             raise unknown_name(f"{where}.attachment", str(one.attachment), known)
         abscissa, values, over_time = _read(one, f"{where}.file", job.path.parent)
         if over_time:
-            spectrum = amplitude_spectrum(values, uniform_step(abscissa), window=job.spectrum.window or "none")
+            spectrum = amplitude_spectrum(values, uniform_step(abscissa), window=job.spectrum.window)
             abscissa, values = spectrum.frequency, spectrum.amplitude
         made.append(Measured(one.name, str(one.attachment), abscissa, np.abs(values)))
     return tuple(made)
