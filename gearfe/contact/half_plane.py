@@ -205,11 +205,10 @@ def solve_half_plane(
     angles = np.array(pinion_angles, dtype=float, ndmin=1)
     twist = np.array(np.broadcast_to(np.asarray(twists, dtype=float), angles.shape))
     met = law.teeth.touching(angles) if touching is None else touching
-    met = met.take(np.flatnonzero(met.twist < twist[met.position]))
-    made = []
+    touch, made = np.flatnonzero(met.twist < twist[met.position]), []
     for start in range(0, max(1, len(angles)), BATCH):
         part = slice(start, start + BATCH)
-        found = met.take(slice(*np.searchsorted(met.position, [start, start + BATCH])))
+        found = met.take(touch[slice(*np.searchsorted(met.position[touch], [start, start + BATCH]))])
         made.append(_batch(law, angles[part], twist[part], replace(found, position=found.position - start)))
     return together(made)
 
@@ -253,12 +252,13 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
     names = (*SUMS, "tangent")
     numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in names}
     contacts: list[PairContacts] = []
-    setting, state = first_state(law, twists, found)
-    for _ in range(ROUNDS):  # again for what is not settled
+    open_ = [first_state(law, twists, found)] if len(found) else []  # positions to be solved, together or none
+    for _ in range(ROUNDS):
         done: list[tuple[Setting, State]] = []
         for number in range(STEPS):
-            if len(setting.numbers) == 0:
+            if not open_:
                 break
+            setting, state = open_.pop()
             couples = setting.couples
             made = step(setting, state, search=number < SEARCHES)
             iterations[setting.numbers] += 1
@@ -269,8 +269,8 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
             state = moved_on(setting, state, made, near=(changed <= WIDENED_BELOW)[couples.position])
             if (near & bears).any():
                 done.append(_kept(setting, state, near & bears))
-            if near.any():
-                setting, state = _kept(setting, state, ~near)
+            if not near.all():
+                open_.append(_kept(setting, state, ~near))
         if not done:
             break
         ended = _finished(*_joined(done), twists)
@@ -283,11 +283,11 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
         if ended.settled.all():
             break
         contacts[-1] = taken(ended.contacts, status[ended.contacts.position] == "converged")
-        setting, state = _joined([(setting, state), _kept(*ended.now, ~ended.settled)])
-    failed = setting.numbers
-    status[failed] = "not_converged"
-    for name in names:
-        numbers[name][failed] = np.nan
+        open_ = [_joined([*open_, _kept(*ended.now, ~ended.settled)])]
+    for setting, _ in open_:
+        status[setting.numbers] = "not_converged"
+        for name in names:
+            numbers[name][setting.numbers] = np.nan
     found_ = joined(contacts) if contacts else no_contacts()
     if len(contacts) > 1:
         found_ = taken(found_, np.lexsort((found_.arc[:, 0], found_.pair, found_.position)))
