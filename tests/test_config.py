@@ -100,6 +100,31 @@ def test_a_misspelt_key_of_another_job_is_an_error_too(tmp_path):
         load_job(job, ())
 
 
+def test_rules_of_another_job_are_left_to_its_command(tmp_path):
+    """A load map that is not finished hinders no other command, but a value out of its range does."""
+    job = tmp_path / "job.toml"
+    job.write_text("[loadmap]\ntorques_Nm = [10.0]\ntorque_start_Nm = 5.0\n", encoding="utf-8")
+    assert load_job(job, ()) == {}
+    with pytest.raises(InputError, match=r"loadmap.torque_start_Nm = 5.0: stands beside torques_Nm"):
+        load_job(job, ("loadmap",))
+    job.write_text("[loadmap]\ntorques_Nm = 10.0\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"loadmap.torques_Nm = 10.0: must be a list"):
+        load_job(job, ())
+
+
+def test_rules_of_tables_within_tables_are_checked():
+    @dataclass(frozen=True)
+    class Outer:
+        parts: tuple[Table, ...] = quantity((), doc="parts")
+        one: dict[str, Table] = quantity(dict, doc="by name")  # noqa: RUF009
+
+    broken = {"count": 3, "limit": 2.0}
+    with pytest.raises(InputError, match=r"outer.parts\[1\].limit = 2.0: is below count"):
+        build(Outer, {"parts": [{"count": 1}, broken]}, "outer")
+    with pytest.raises(InputError, match=r"outer.one.a.limit = 2.0: is below count"):
+        build(Outer, {"one": {"a": broken}}, "outer")
+
+
 @pytest.mark.parametrize("text", ["time_s;torque_Nm\r\n0;1,5\r\n1;2\r\n", "\ufefftime_s\ttorque_Nm\n0\t1.5\n"])
 def test_tables_of_other_countries_are_told(tmp_path, text):
     path = tmp_path / "table.csv"
