@@ -94,12 +94,12 @@ class Linkage(Element):
     @property
     def algebraic(self) -> bool:
         """Whether loads do not depend on the state, and no constraint has a profile."""
-        return not (self.pieced or self.assembly.profiles)
+        return not (self.assembly.state_loads or self.assembly.tension_laws or self.assembly.profiles)
 
     @property
     def pieced(self) -> bool:
-        """Whether loads may have corners."""
-        return bool(self.assembly.state_loads or self.assembly.tension_laws)
+        """Whether loads have corners."""
+        return bool(self.pieces(0.0, *self.start()))
 
     def blame(self, t: float, q: Array, v: Array) -> None:
         """Let the largest load say that it has a pole there."""
