@@ -39,7 +39,7 @@ def main() -> None:
     print(f"{made.message} in {made.statistics['steps']} steps")
     print(f"{len(passages)} singular passages, the first at {passages[0]:.6f} s")
     print(f"crank at the end: {made.q[-1, 2]:.12f} rad, {made.v[-1, 2]:.12f} rad/s")
-    energy = [sum(system.energy(q, v)) for q, v in zip(made.q, made.v, strict=True)]
+    energy = sum(system.energy(made.q, made.v))
     print(f"energy {energy[0]:.12f} J, kept within {np.ptp(energy):.1e} J")
 
 

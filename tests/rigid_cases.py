@@ -70,7 +70,7 @@ def chain(count: int, seed: int = 1) -> System:
 
 def total_energy(trajectory) -> np.ndarray:  # type: ignore[no-untyped-def]
     """Kinetic plus potential energy at the output times."""
-    return np.array([sum(trajectory.system.energy(q, v)) for q, v in zip(trajectory.q, trajectory.v, strict=True)])
+    return np.sum(trajectory.system.energy(trajectory.q, trajectory.v), axis=0)
 
 
 def residuals(trajectory) -> tuple[float, float]:  # type: ignore[no-untyped-def]

@@ -215,6 +215,14 @@ def test_derivatives_of_the_force() -> None:
             np.testing.assert_allclose(given[:, j], (ends[0] - ends[1]) / 2e-6, rtol=1e-6, atol=1e-6)
         slope = -(element.potential(q + step) - element.potential(q - step)) / 2e-6
         assert element.force(0.0, q, 0.0 * v)[j] == pytest.approx(slope, rel=1e-6, abs=1e-6)
+    damped = element.force(0.0, q, v) - element.force(0.0, q, 0.0 * v)
+    swing = 0.7 * 2.0 * v @ element.mass() @ np.kron(np.eye(element.size // 2), [[0.0, 1.0], [-1.0, 0.0]]) @ v
+    assert element.loss(q, v) == pytest.approx(swing - damped @ v, rel=1e-10)  # Coriolis forces do no work
+    many = np.stack([q, v, q - v]), np.stack([v, q, q])
+    np.testing.assert_allclose(element.potential(many[0]), [element.potential(a) for a in many[0]], rtol=1e-12)
+    np.testing.assert_allclose(
+        element.loss(*many), [element.loss(*pair) for pair in zip(*many, strict=True)], rtol=1e-12
+    )
 
 
 # mechanism files -------------------------------------------------------------------------------------------------

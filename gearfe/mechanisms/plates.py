@@ -113,11 +113,11 @@ class PlateLink:
 
     def elastic_energy(self, q: Array) -> Array:
         """In states of the system (times, size) (J)."""
-        return np.array([self.element.elastic_energy(state[self.own]) for state in q])
+        return self.element.elastic_energy(q[..., self.own])
 
     def loss(self, q: Array, v: Array) -> Array:
         """Power that damping takes (W)."""
-        return np.array([self.element.loss(a[self.own], b[self.own]) for a, b in zip(q, v, strict=True)])
+        return self.element.loss(q[..., self.own], v[..., self.own])
 
     def stresses(self, q: Array, v: Array) -> Array:
         """Stresses of the core in states of the system, shape (times, s)."""

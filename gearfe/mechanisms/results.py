@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeGuard
 
@@ -15,6 +16,9 @@ from ..textfile import read_text
 from ..typing import Array
 from .expressions import PLAIN, compute, quantities
 from .model import Mechanism
+
+#: States that are evaluated at once: links of some dozen points take 6 kB each for their strains.
+BLOCK = 4096
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,12 @@ def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
     return Results(trajectory, outputs, energy, sections)
 
 
+def in_blocks(function: Callable[..., Array], *states: Array) -> Array:
+    """A function of many states (times, ...) by blocks of times, which bounds the memory that it needs."""
+    parts = [function(*(x[k : k + BLOCK] for x in states)) for k in range(0, len(states[0]), BLOCK)]
+    return np.concatenate(parts)
+
+
 def wrapped(values: Array, period: float) -> Array:
     """Remainder in [0, period); what rounding leaves just below the period is 0."""
     rest = np.mod(values, period)
@@ -75,11 +85,10 @@ def energies(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     """Kinetic, potential, work and total energy (J) at the output times."""
     system = mechanism.system
     q, v = trajectory.q, trajectory.v
-    kinetic = 0.5 * ((v @ system.mass) * v).sum(axis=1)
-    potential = np.array([system.energy(*state)[1] for state in zip(q, v, strict=True)])
+    kinetic, potential = in_blocks(lambda q, v: np.array(system.energy(q, v)).T, q, v).T
     work = _work(mechanism, trajectory)
     links = mechanism.elastic.values()
-    elastic = {"elastic_J": np.sum([e.elastic_energy(q) for e in links], axis=0)} if links else {}
+    elastic = {"elastic_J": np.sum([in_blocks(link.elastic_energy, q) for link in links], axis=0)} if links else {}
     return {
         **elastic,
         "kinetic_J": kinetic,
@@ -114,16 +123,19 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     nodes, weights = np.polynomial.legendre.leggauss(8)
     half = 0.5 * np.diff(time)
     at = (0.5 * (time[1:] + time[:-1])[:, None] + half[:, None] * nodes).ravel()
-    states = trajectory.dense(at, 0), trajectory.dense(at, 1)
-    planar = [state[:, : linkage.size] for state in states]
-    power = linkage.power(at, *planar)
-    for link in damped:
-        power = power - link.loss(*states)
-    if linkage.driven:
-        multipliers = trajectory.multipliers_at(at)[:, : linkage.rows]
-        power = power + (multipliers * linkage.rate(at, planar[0])).sum(axis=1)
-    steady = _steady_power(mechanism, states[1])
-    gained = ((power - steady).reshape(len(half), -1) @ weights) * half
+
+    def varying_power(at: Array) -> Array:
+        states = trajectory.dense(at, 0), trajectory.dense(at, 1)
+        planar = [state[:, : linkage.size] for state in states]
+        power = linkage.power(at, *planar) - _steady_power(mechanism, states[1])
+        for link in damped:
+            power = power - link.loss(*states)
+        if linkage.driven:
+            multipliers = trajectory.multipliers_at(at)[:, : linkage.rows]
+            power = power + (multipliers * linkage.rate(at, planar[0])).sum(axis=1)
+        return power
+
+    gained = (in_blocks(varying_power, at).reshape(len(half), -1) @ weights) * half
     work[1:] += np.cumsum(gained)
     return work
 

@@ -187,11 +187,11 @@ class Beam(Element):
         """
         return np.einsum("np,tpk->tnk", self._to_nodes, stress)
 
-    def potential(self, q: Array) -> float:
-        """Elastic energy and that of the weight (J)."""
-        x = q[self.places]
-        turning = 0.0 if self._turning is None else 0.5 * float(x @ self._turning[0] @ x)
-        return float(self.elastic_energy(q)) - float(self._weight @ x) - turning
+    def potential(self, q: Array) -> Array:
+        """Elastic energy and that of the weight (J) in states (..., n)."""
+        x = q[..., self.places]
+        turning = 0.0 if self._turning is None else 0.5 * ((x @ self._turning[0]) * x).sum(axis=-1)
+        return np.asarray(self.elastic_energy(q) - x @ self._weight - turning)
 
     def elastic_energy(self, q: Array) -> Array:
         """1/2 int EA Gamma^2 + GA gamma^2 + EI kappa^2 ds (J) in states (..., n)."""

@@ -32,7 +32,7 @@ eliminated at
 8. Being a `gearfe.rigid.Linkage`: planar bodies, whose Taylor recurrences the compiled kernels know.
    The Taylor method runs when it is the only element; ``method="auto"`` takes it or else the explicit method, or the
    implicit one, whichever is predicted to take the fewest seconds.
-9. ``energy(q, v)``: (kinetic, potential) of the element. Absent: 1/2 v M v of its own coordinates, and zero.
+9. ``potential(q)``: its potential energy in local coordinates (..., k). Absent: zero. (The kinetic one is 1/2 v M v.)
 10. Being a `LocalForce`: a force along few directions, ``f = W phi(t, W^T q, W^T v)``, with a law that can be compiled.
     Absent: the force is called as it is; the integration in modal coordinates then calls Python in every stage.
 11. ``units()``: sizes of the own coordinates and of the rows that count as much as 1 rad, so that bounds do not depend

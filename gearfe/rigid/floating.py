@@ -129,6 +129,12 @@ class Floating(Element):
         vectors = q[..., 2:].reshape(*q.shape[:-1], -1, 2)
         return np.asarray(np.einsum("...kc,...c->...k", vectors[..., 1:, :], vectors[..., 0, :]))
 
+    def _share_rates(self, q: Array, v: Array) -> Array:
+        """d eta / dt, shape (..., r)."""
+        vectors, rates = (x[..., 2:].reshape(*x.shape[:-1], -1, 2) for x in (q, v))
+        turning = np.einsum("...kc,...c->...k", vectors[..., 1:, :], rates[..., 0, :])
+        return np.asarray(turning + np.einsum("...kc,...c->...k", rates[..., 1:, :], vectors[..., 0, :]))
+
     def _slope(self, q: Array) -> Array:
         """d eta / d q, shape (r, size)."""
         r = self.body.modes
@@ -202,18 +208,22 @@ class Floating(Element):
         out = self._weight - pull
         return out if self._turning is None else out + self._turning[0] @ q + self._turning[1] @ v
 
-    def potential(self, q: Array) -> float:
-        """Elastic energy and that of the weight (J)."""
-        turning = 0.0 if self._turning is None else 0.5 * float(q @ self._turning[0] @ q)
-        return self.elastic_energy(q) - float(self._weight @ q) - turning
+    def potential(self, q: Array) -> Array:
+        """Elastic energy and that of the weight (J) in states (..., size)."""
+        turning = 0.0 if self._turning is None else 0.5 * ((q @ self._turning[0]) * q).sum(axis=-1)
+        return np.asarray(self.elastic_energy(q) - q @ self._weight - turning)
 
-    def elastic_energy(self, q: Array) -> float:
-        """1/2 e . e (J)."""
-        return 0.5 * float((self._strains(q)[0] ** 2).sum())
+    def elastic_energy(self, q: Array) -> Array:
+        """1/2 e . e (J) in states (..., size)."""
+        eta = self.shares(q)
+        strains = eta @ self.body.linear.T + 0.5 * np.einsum("skl,...k,...l->...s", self.body.quadratic, eta, eta)
+        return np.asarray(0.5 * (strains**2).sum(axis=-1))
 
-    def loss(self, q: Array, v: Array) -> float:
-        """Power that damping takes (W)."""
-        return self.body.damping * float(((self._strains(q)[1] @ v) ** 2).sum())
+    def loss(self, q: Array, v: Array) -> Array:
+        """Power that damping takes (W) in states (..., size)."""
+        eta, rates = self.shares(q), self._share_rates(q, v)
+        strains = rates @ self.body.linear.T + np.einsum("skl,...k,...l->...s", self.body.quadratic, eta, rates)
+        return np.asarray(self.body.damping * (strains**2).sum(axis=-1))
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..progress import announce
 from ..typing import Array
 from . import (
     kernel_collocation,
@@ -74,6 +75,8 @@ KERNELS = Kernels(
 )
 #: Stages of a step (measured: five and nine take as long for the same error).
 STAGES = 7
+#: Steps whose polynomials are made at once; bytes of a run's steps from which on they are told.
+BLOCK, TOLD_BYTES = 1024, 1e9
 #: Share of a step that is tried after Newton did not converge.
 NOT_SOLVED_SHARE = 0.3
 #: Rate of Newton's changes with which the next step is as long as the last; it grows with the step.
@@ -198,6 +201,9 @@ class Stepper:
         if law.steady:
             w.now[2] = 0.0  # to rounding: what Newton's method leaves is a force at random, which the energy follows
             first = self._steady_step(first, tolerance, (t, float(times[1]) - t, q, v), limit, options["longest"])
+            size = 16.0 * abs(end - t) / first * (w.known.size + w.L.size + w.S.size)  # as it goes, and as it is kept
+            if size > TOLD_BYTES:
+                announce(f"about {abs(end - t) / first:.2g} steps will take {size / 1e9:.2g} GB of memory")
         control = StepControl(law, (t, end), first, breaks=system.breaks, watch=watch, **options)
         corners = Corners(system, control, tolerance)
         ends, known, forces, accelerations, newton = [t], [], [], [a], 0
@@ -270,23 +276,27 @@ class Stepper:
 
         Accelerations of stiff links at the ends are the rounding of their strains; those of others are exact and in it.
         """
-        whole, inner = np.array(known), self.tab.inner
+        inner, s = self.tab.inner, len(self.tab.c)
         if not known:
             return Polynomials(times, np.zeros((0, *self.w.known.shape)))
         h = np.diff(times)[:, None, None]
         path = self.tab.path if system.stressed else path_matrix(self.tab.c[:inner], accelerations=True)
-        if not system.stressed:
-            a = np.array(accelerations)[:, None, :]
-            whole = np.concatenate([whole, h**2 * a[:-1], h**2 * a[1:]], axis=1)
-        coefficients = powers_of_path(path, whole, inner) / h ** np.arange(len(path))[:, None]
-        if not system.stressed:
+        coefficients = np.empty((len(known), len(path), system.size))
+        carried = [*np.flatnonzero(start.active), *(system.rows + np.arange(self.w.S.shape[0]))]
+        parts = np.zeros((len(known), s, system.rows + self.w.S.shape[0])) if system.stressed else None
+        for k in range(0, len(known), BLOCK):
+            block = slice(k, k + BLOCK)
+            whole, own = np.array(known[block]), h[block]
+            if not system.stressed:
+                a = np.array(accelerations[k : k + BLOCK + 1])[:, None, :]
+                whole = np.concatenate([whole, own**2 * a[:-1], own**2 * a[1:]], axis=1)
+            coefficients[block] = powers_of_path(path, whole, inner) / own ** np.arange(len(path))[:, None]
+            if parts is not None:
+                found = np.array(forces[block])[:, :, :s].transpose(0, 2, 1)
+                parts[block, :, carried] = self.tab.force @ found / own ** np.arange(s)[:, None]
+            known[block] = forces[block] = [self.w.known[:0]] * len(whole)  # their memory is free
+        if parts is None:
             return Polynomials(times, coefficients)
-        s, m = len(self.tab.c), int(start.active.sum())
-        found = np.array(forces)[:, :, :s].transpose(0, 2, 1)
-        every = np.zeros((len(found), s, system.rows + found.shape[2] - m))
-        every[:, :, np.flatnonzero(start.active)] = found[:, :, :m]
-        every[:, :, system.rows :] = found[:, :, m:]
-        parts = self.tab.force @ every / h ** np.arange(s)[:, None]
         return Collocated(times, coefficients, forces=Polynomials(times, parts))
 
 

@@ -336,14 +336,14 @@ class Linkage(Element):
         losses = springs.rate**2 @ self._forces.spring[:, 1] + along.rate**2 @ self._forces.along[:, 1]
         return (along.given * along.rate).sum(axis=-1) - (springs.given * springs.rate).sum(axis=-1) - losses
 
-    def potential(self, q: Array) -> float:
-        """Energy of gravity (datum x = y = 0) and of all springs (J)."""
-        pose = self.pose(q)
-        count = len(self._forces.spring)
-        stretch = np.hypot(*pose.vector[:count].T) - self._forces.spring[:, 2]
-        moved = self._affine(pose)[self.rows :]
-        elastic = 0.5 * (self._forces.spring[:, 0] @ stretch**2 + self._forces.along[:, 0] @ moved**2)
-        return float(elastic - self._forces.weight[: self.size] @ q)
+    def potential(self, q: Array) -> Array:
+        """Energy of gravity (datum x = y = 0) and of all springs (J) in states (..., size)."""
+        pose = self._pose(q)
+        span = pose.vector[..., : len(self._forces.spring), :]
+        stretch = np.hypot(span[..., 0], span[..., 1]) - self._forces.spring[:, 2]
+        moved = self._affine(pose)[..., self.rows :]
+        elastic = 0.5 * (stretch**2 @ self._forces.spring[:, 0] + moved**2 @ self._forces.along[:, 0])
+        return np.asarray(elastic - q @ self._forces.weight[: self.size])
 
     def _along(self, t: float | Array, pose: Pose, motion: Rates) -> _Along:
         """Forces along forms."""

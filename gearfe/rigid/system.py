@@ -228,14 +228,14 @@ class System:
         multipliers[keep] = pulls @ shares
         return made, multipliers
 
-    def energy(self, q: Array, v: Array) -> tuple[float, float]:
-        """Kinetic and potential energy (J)."""
-        kinetic = 0.5 * float(v @ self.mass @ v)
-        potential = 0.5 * float(q @ self.stiffness @ q)
+    def energy(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Kinetic and potential energy (J) in states (..., size)."""
+        kinetic = 0.5 * ((v @ self.mass) * v).sum(axis=-1)
+        potential = 0.5 * ((q @ self.stiffness) * q).sum(axis=-1)
         for element, index in zip(self.elements, self.index, strict=True):
             own = getattr(element, "potential", None)
             if own is not None:
-                potential += float(own(q[index]))
+                potential = potential + own(q[..., index])
         return kinetic, potential
 
     def _stack(self, name: str, t: float, q: Array) -> Array:
