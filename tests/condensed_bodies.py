@@ -71,6 +71,11 @@ def turned(body: GearBody, angle: float, shift: Array) -> GearBody:
     )
 
 
+def tooth_angle(gear: int, tooth: int, angle: float, twist: float) -> float:
+    """Of the frames of the bodies, as of the teeth of two gears alike (rad)."""
+    return (angle if gear == 0 else np.pi - angle + twist) + (2 * tooth + gear) * np.pi / TEETH
+
+
 def pressed_pair(lower: GearBody, upper: GearBody, law: ContactLaw, overlap: float) -> MeshingPair:
     """The upper body's top-down surface pressed by `overlap` (m) into the lower one's; both surfaces lie near y = 0.
 
@@ -81,7 +86,7 @@ def pressed_pair(lower: GearBody, upper: GearBody, law: ContactLaw, overlap: flo
     centre = left + np.array([CENTRES * size, 0.0])
     pinion = turned(lower, 0.0, left)
     wheel = turned(upper, np.pi - np.pi / TEETH, centre + np.array([0.0, overlap]))
-    gears: Any = SimpleNamespace(working_centre_distance=CENTRES * size)
+    gears: Any = SimpleNamespace(working_centre_distance=CENTRES * size, tooth_angle=tooth_angle)
     return MeshingPair(gears, pinion, wheel, PairModel(law=law))
 
 
