@@ -114,20 +114,16 @@ def residuals(tb: Equations, w: Work, g: Array) -> None:
 def times_gradients(tb: Equations, G: Array, u: Array, out: Array) -> None:
     """out = G u, one number per row."""
     gradient = tb.gradient
-    for r in range(out.shape[0]):
-        value = 0.0
-        for e in range(gradient.first[r], gradient.first[r + 1]):
-            value += G[e] * u[gradient.column[e]]
-        out[r] = value
+    fill(out, 0.0)
+    for e in range(G.shape[0]):
+        out[gradient.row[e]] += G[e] * u[gradient.column[e]]
 
 
 def add_transposed(tb: Equations, G: Array, mu: Array, factor: float, out: Array) -> None:
     """out += factor G^T mu."""
     gradient = tb.gradient
-    for r in range(mu.shape[0]):
-        value = factor * mu[r]
-        for e in range(gradient.first[r], gradient.first[r + 1]):
-            out[gradient.column[e]] += G[e] * value
+    for e in range(G.shape[0]):
+        out[gradient.column[e]] += factor * G[e] * mu[gradient.row[e]]
 
 
 def accelerations(tb: Equations, force: Array, out: Array) -> None:

@@ -36,6 +36,7 @@ class Gradients(NamedTuple):
     """Gradients of the rows: what stands still, and the shares of curves (cosines, sines, tables)."""
 
     first: IntArray  # (m + 1,) entries of each row
+    row: Numbers  # (entries,)
     column: Numbers  # (entries,) coordinate
     still: Array  # (entries,)
     turning: Numbers  # (t, 3) row, entry, variable
@@ -95,7 +96,8 @@ def row_tables(program: Program, inverse: Array, excess: Array) -> Equations:
             turning.append((r, entry(r, variable), variable))
             factor.append(value)
     column = np.array([i for row in entries for i in row], dtype=np.uint64)
-    gradient = Gradients(first, column, still, _numbers(turning, 3), np.array(factor, dtype=float))
+    row = np.repeat(np.arange(m, dtype=np.uint64), np.diff(first))
+    gradient = Gradients(first, row, column, still, _numbers(turning, 3), np.array(factor, dtype=float))
     squares = [(r, d, w) for r in range(m) for d, w in _squares(rows.pair, rows.weight, r)]
     terms = [(v, w, entry(r, v)) for r, _, weights in squares for v, w in weights.items()]
     square = Squares(
