@@ -144,7 +144,8 @@ class Nitsche:
     gamma0
         gamma h/E (-); about 1 is the most accurate, far above it the law turns into a stiff penalty.
     sides
-        ``both``: unbiased, neither gear is the master.
+        ``both``: unbiased, neither gear is the master. Where a sharp edge bears, ``tip`` (see `Penalty`) is nearer to the
+        truth (docs/contact_laws.md).
     """
 
     gamma0: float = 1.0
@@ -153,7 +154,7 @@ class Nitsche:
     uses_stress: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        check_sides(self.sides, ("both", "pinion", "wheel"))
+        check_sides(self.sides, get_args(Sides))
         _check_positive("gamma0", self.gamma0, "gamma h/E")
 
     def parameter(self, youngs_modulus: float, sizes: Array) -> Array:
