@@ -144,8 +144,8 @@ class Nitsche:
     gamma0
         gamma h/E (-); about 1 is the most accurate, far above it the law turns into a stiff penalty.
     sides
-        ``both``: unbiased, neither gear is the master. Where a sharp edge bears, ``tip`` (see `Penalty`) is nearer to the
-        truth (docs/contact_laws.md).
+        ``both``: unbiased, neither gear is the master. Where a sharp edge bears, ``tip`` (see `Penalty`) is nearer to
+        the truth (docs/contact_laws.md).
     """
 
     gamma0: float = 1.0
