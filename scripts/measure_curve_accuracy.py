@@ -2,12 +2,12 @@
 """Default settings and their error estimate against converged curves, over random legal gear pairs.
 
 Pairs are drawn from a seed: teeth 12 to 90, module 1 to 6 mm, pressure angle 17 to 25 deg, profile shifts, sharp and
-round tips, relief, bores, face widths, materials, plane states. Positions are spread over the mesh cycle, with as many
-again about the pair changes; twists count from contact. The truth is the same sweep with all sizes times --finest,
-by Nitsche's law on the gear whose tip is nearer: points on both would take half of the normals from a sharp edge's own
-flank. A position is at a pair change when a loaded pair stands within 4 % of a base pitch of the ends of its path, or
-beyond. Twists at which twist times wheel teeth exceeds --most-load deg are left out: contacts there are wide, and fine meshes
-of them take minutes a position.
+round tips, relief, bores, face widths, materials, plane states. Positions are spread over the mesh cycle, with as
+many again about the pair changes; twists count from contact. The truth is the same sweep with all sizes times
+--finest, by Nitsche's law on the gear whose tip is nearer: points on both would take half of the normals from a sharp
+edge's own flank. A position is at a pair change when a loaded pair stands within 4 % of a base pitch of the ends of
+its path, or beyond. Twists at which twist times wheel teeth exceeds --most-load deg are left out: contacts there are
+wide, and fine meshes of them take minutes a position.
 
 Usage: python scripts/measure_curve_accuracy.py [--seed 1] [--pairs 25] [--twists 0.02 0.05 0.2 0.5] [--finest 0.4]
 """
