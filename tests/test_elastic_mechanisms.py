@@ -34,16 +34,17 @@ def off(mechanism: str, tolerance: float) -> tuple[float, float, float]:
 def test_andrews_with_a_steel_strip_as_coupler() -> None:
     """Within exudyn's own errors, 2e-6 rad of its steps and 4e-8 m of its elements; the crank turns by 16.4 rad.
 
-    The strip is 140 times as long as thick: shear and rotary inertia, which the cable lacks, are 2e-5 of it.
+    The strip is 140 times as long as thick: shear and rotary inertia, which the cable lacks, are 2e-5 of it. At 1e-5
+    the integration's own error of the deflection is up to 1e-3 of it, by which steps converge.
     """
     angles, deflections = [], []
-    for tolerance in (1e-2, 1e-3, 1e-5):
+    for tolerance in (1e-2, 1e-3, 1e-5, 1e-6):
         angle, deflection, largest = off("elastic_andrews", tolerance)
         angles.append(angle)
         deflections.append(deflection / largest)
     assert angles[-1] < 2e-6
     assert deflections[-1] < 4e-8 / 8.1e-5
-    assert np.polyfit([-2.0, -3.0, -5.0], np.log10(angles), 1)[0] > 0.8  # the error follows the tolerance
+    assert np.polyfit([-2.0, -3.0, -5.0], np.log10(angles[:3]), 1)[0] > 0.8  # the error follows the tolerance
     assert deflections[0] > 5 * deflections[-1]
 
 
