@@ -245,7 +245,15 @@ def _part(function: FunctionType, inline: bool) -> Any:
     """A function that entries contain; it is translated when they are."""
     import numba
 
-    return numba.njit(function, forceinline=inline, **part_options(), **OPTIONS)
+    made = numba.njit(function, forceinline=inline, **part_options(), **OPTIONS)
+    template = made.get_call_template
+
+    def of_any_number(args: Any, kws: Any) -> Any:
+        """Not once more for each number that stands in a call."""
+        return template(tuple(map(numba.types.unliteral, args)), kws)
+
+    made.get_call_template = of_any_number
+    return made
 
 
 def _entry(function: FunctionType, layouts: tuple[Layout, ...]) -> ObjectCode:
