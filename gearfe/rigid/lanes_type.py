@@ -102,6 +102,11 @@ def _reduced(builder: Any, x: Any, join: Any) -> Any:
     return builder.extract_element(x, INDEX(0))
 
 
+def _teach(key: Any, template: Any) -> None:
+    """Make the template the types of a function. (As a decorator it asks ufuncs for a module: NumPy 2.1 and later.)"""
+    infer_global(key, types.Function(type(template.__name__, (template,), {"key": key})))
+
+
 def _operation(key: Any, count: int, result: Any, make: Any) -> None:
     """Teach numba a function of so many vectors, of which numbers may be some but not all; `result` gives its type."""
 
@@ -115,7 +120,7 @@ def _operation(key: Any, count: int, result: Any, make: Any) -> None:
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # noqa: ARG001
         return make(builder, *args)
 
-    infer_global(key)(type("_operation", (Template,), {}))
+    _teach(key, Template)
     lower_builtin(key, *[LaneType] * count)(lower)
 
 
@@ -128,8 +133,9 @@ def _number_type(kind: Any) -> Any:  # noqa: ARG001
 
 
 def _larger(builder: Any, x: Any, y: Any) -> Any:
-    """Not-a-number where one is."""
-    return _call(builder, "maximum", x, y)
+    """Not-a-number where one is. (LLVM's own maximum cannot be lowered for x86 before version 18.)"""
+    first = builder.or_(builder.fcmp_unordered("uno", x, x), builder.fcmp_ordered(">", x, y))
+    return builder.select(first, x, y)
 
 
 for _key, _name in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
@@ -169,7 +175,7 @@ def _view(key: Any, kind_of: Any) -> None:
                 return None
             return signature(types.Array(kind_of(args[0].dtype), args[0].ndim + 1, "C"), args[0])
 
-    infer_global(key)(type("_view", (Template,), {}))
+    _teach(key, Template)
     lower_builtin(key, types.Array)(_seen_as)
 
 
