@@ -208,6 +208,23 @@ def test_no_method_steps_over_a_pole(tmp_path: Path, method: str) -> None:
     assert caught.value.result.reached == pytest.approx(0.5, abs=1e-3)
 
 
+@pytest.mark.parametrize("load", ["log(0.5 - time)", "sqrt(0.5 - time)", "1/(0.5 - time)**0.5", "1e-4/(time - 0.5)"])
+@pytest.mark.parametrize("link", ["rigid", "flexible"])
+def test_a_load_without_value_on_the_way_is_named_with_all_links(tmp_path: Path, load: str, link: str) -> None:
+    beam = "[bodies.rod.beam]\nlength_m = 0.7\ndiameter_m = 0.02\nyoungs_modulus_GPa = 200\ndensity_kg_per_m3 = 7800\n"
+    bends = ROD.replace("mass_kg = 2.0\ninertia_kg_m2 = 0.5\n", "") + beam
+    with pytest.raises(IntegrationError, match=r"forces\.drive\.moment_N_m = '.*' at 0\.5 s: .*(no value|zero|\*\*)"):
+        ran(tmp_path, (ROD if link == "rigid" else bends) + MOMENT.format(load))
+
+
+def test_output_times_by_rounding_beyond_the_end_of_a_stopped_run_are_left_out(tmp_path: Path) -> None:
+    mechanism = load_mechanism(write(tmp_path, ROD + MOMENT.format("log(0.5 - time)")))
+    options = {"start": mechanism.start(), "method": "taylor", "backend": "plain", "raise_on_failure": False}
+    end = integrate(mechanism.system, [0.0, 10.0], **options).dense.times[-1]  # type: ignore[arg-type]
+    run = integrate(mechanism.system, [0.0, end + 5e-12, 10.0], **options)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(run.time, [0.0])
+
+
 @pytest.mark.parametrize(("load", "text"), [("1/(time - 0.5)", "1 / 0"), ("motor(time)", "from 0 to 0.4")])
 def test_a_prescribed_motion_under_a_load_without_value_is_refused(tmp_path: Path, load: str, text: str) -> None:
     (tmp_path / "motor.csv").write_text("t,torque\n0,1\n0.4,2\n", encoding="utf-8")

@@ -109,6 +109,20 @@ def _pole(system: System, t: float, h: float, path: Path, x: float) -> bool:
     return True
 
 
+def blame_ahead(system: System, t: float, state: tuple[Array, Array, Array], reach: float) -> None:
+    """Let loads that have no value, or a pole, within `reach` (s) of the state (q, q', q'') at t say so."""
+    q, v, a = state
+    if not np.isfinite(state).all():
+        return
+
+    def path(x: float) -> tuple[Array, Array]:
+        return q + x * reach * v, v + x * reach * a
+
+    system.blame(t + reach, *path(1.0))
+    if not system.complaint and (found := _corner(system, t, reach, path)) is not None:
+        _pole(system, t, reach, path, found[0])
+
+
 def quiet_speeds(c: Array, v: Array, V: Array, vn: Array, scale: Array) -> Array:
     """Speeds V (s, n) at the shares c of a step, those on the line from v to vn that are off it by rounding alone.
 
