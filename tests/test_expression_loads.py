@@ -95,8 +95,10 @@ def test_steps_end_at_corners_and_jumps(tmp_path: Path, kind: str, method: str, 
         "jump": ("-2*(1 + abs(angle(rod) - 0.4)/(angle(rod) - 0.4))", 0.95, -1.0),
         "pulses": ("3*max(0, sin(30*time))", 7 * math.pi / 15, 1.0 + 7 * 2 * 3 / 30 / inertia),
     }[kind]
-    _, run = ran(tmp_path, rod + MOMENT.format(load), end, method=method, tolerance=tolerance)
+    mechanism, run = ran(tmp_path, rod + MOMENT.format(load), end, method=method, tolerance=tolerance)
     assert run.v[-1, 2] == pytest.approx(speed, abs=5 * tolerance)
+    total = evaluate(mechanism, run).energy["total_J"]
+    assert total[-1] == pytest.approx(total[0], abs=5 * tolerance)
     assert run.statistics["steps"] < 250
     if kind != "pulses":
         assert run.q[-1, 2] == pytest.approx(0.1, abs=5 * tolerance)

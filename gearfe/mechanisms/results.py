@@ -99,7 +99,9 @@ def energies(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
 
 
 def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
-    """Work since the start: closed form for constant moments, else Gauss quadrature of the power on every interval."""
+    """Work since the start: closed form for constant moments, else Gauss quadrature of the power between output times
+    and ends of steps.
+    """
     linkage = mechanism.linkage
     time = trajectory.time
     work = np.zeros(len(time))
@@ -121,8 +123,13 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     if not (varying or damped or linkage.driven) or len(time) < 2:
         return work
     nodes, weights = np.polynomial.legendre.leggauss(8)
-    half = 0.5 * np.diff(time)
-    at = (0.5 * (time[1:] + time[:-1])[:, None] + half[:, None] * nodes).ravel()
+    # steps end at the corners of loads, between which the power is smooth
+    way = 1.0 if time[-1] >= time[0] else -1.0
+    ends = getattr(trajectory.dense, "times", time)
+    inside = ends[(way * ends > way * time[0]) & (way * ends < way * time[-1])]
+    edges = way * np.unique(way * np.concatenate([time, inside]))
+    half = 0.5 * np.diff(edges)
+    at = (0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * nodes).ravel()
 
     def varying_power(at: Array) -> Array:
         states = trajectory.dense(at, 0), trajectory.dense(at, 1)
@@ -136,8 +143,7 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
         return power
 
     gained = (in_blocks(varying_power, at).reshape(len(half), -1) @ weights) * half
-    work[1:] += np.cumsum(gained)
-    return work
+    return np.asarray(work + np.append(0.0, np.cumsum(gained))[np.searchsorted(way * edges, way * time)])
 
 
 def _is_polynomial(load: TimeFunction | StateFunction) -> TypeGuard[TimeFunction]:
