@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from gearfe.errors import InputError
 from gearfe.mechanisms import evaluate, load_mechanism
+from gearfe.mechanisms.error_estimate import finer_run
 from gearfe.mechanisms.job import run_mechanism
 from gearfe.mechanisms.loads import ExpressionLoad
 from gearfe.rigid import IntegrationError, integrate
@@ -290,3 +292,17 @@ def test_a_flexible_link_driven_by_tables_beside_the_file(tmp_path: Path) -> Non
     text = ROD.replace("mass_kg = 2.0\ninertia_kg_m2 = 0.5\n", "").replace("[joints.O]", beam + "[joints.O]")
     _, run = ran(tmp_path, text + TABLED.format(coordinate="rate"), 0.1)
     np.testing.assert_allclose(run.v[:, 2], 2.0, atol=1e-9)
+
+
+def test_the_finer_run_of_one_that_stuck_is_not_made_of_its_last_steps(tmp_path: Path) -> None:
+    """A run that sticks, as at the fold, which the implicit method need not pass, ends with many steps of next to no
+    length; so does this one, with twice as many of 1e-9 s.
+    """
+    crank = (Path(__file__).parents[1] / "geometry" / "slider_crank.toml").read_text(encoding="utf-8")
+    load = MOMENT.replace("rod", "crank").format("sqrt(angle(crank) - 0.5)")
+    mechanism, run = ran(tmp_path, crank + load, 3.0, method="implicit", tolerance=1e-9, raise_on_failure=False)
+    ends = run.dense.times
+    made = replace(run, dense=replace(run.dense, times=np.append(ends, ends[-1] + 1e-9 * np.arange(1, 2 * len(ends)))))
+    finer = finer_run(mechanism, mechanism.start(), made, 1e-9 / 30)
+    assert finer is not None
+    assert finer.statistics["steps"] < 30 * len(ends)

@@ -96,9 +96,9 @@ def finer_run(mechanism: Mechanism, start: Start, made: Trajectory, tolerance: f
     if len(ends) < 2 or len(made.time) < 2:
         return None
     steps = np.abs(np.diff(ends))
-    longest = SHORTER * float(np.median(steps))
-    if tolerance < SHARPEST:  # a step that both runs take is an error that both make
-        longest = max(SHORTER * float(steps.min()), float(steps.mean()) / MOST_STEPS)
+    # a step that both runs take is an error that both make
+    usual = float(steps.min() if tolerance < SHARPEST else np.median(steps))
+    longest = max(SHORTER * usual, float(steps.mean()) / MOST_STEPS)  # a run that failed ends with many short ones
     backend = "compiled" if made.statistics.get("backend") == "compiled" else "plain"
     options: dict[str, Any] = {"method": made.method, "backend": backend, "start": start, "longest": longest}
     options["raise_on_failure"] = False
