@@ -124,9 +124,8 @@ def test_material_that_stands_out_leaves_the_stiffness(tmp_path) -> None:
         assert made.k_mesh == pytest.approx(plain.k_mesh, rel=1e-6)
         moved = 15e-6 * math.cos(PAIR.pinion.pressure_angle)
         assert made.transmission_error == pytest.approx(plain.transmission_error - moved, abs=1e-11)
-    found = sweep_loads(PAIR, np.geomspace(20, 200, 14), angles=angles, elastic=out, kinematics="small")
-    curve = found.curve_at(80.0, tolerance=0.1)
-    assert curve.k_mesh == pytest.approx(made.k_mesh, rel=2e-3)
+    found = sweep_loads(PAIR, [20.0, 80.0], angles=angles, elastic=out, kinematics="small")
+    assert found.curves[1].k_mesh == pytest.approx(made.k_mesh, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -1,16 +1,15 @@
-"""Load maps: against positions solved directly at a torque, against power laws, as files, from the command line."""
+"""Load maps: against positions solved directly at a torque, as files, from the command line."""
 
 import csv
 import itertools
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gearfe import LoadMap, StiffnessCurve, sweep_loads, sweep_stiffness
+from gearfe import LoadMap, sweep_loads, sweep_stiffness
 from gearfe.cli import main
 from gearfe.errors import InputError
 from gearfe.loadmap.load_map import RootMap
@@ -58,103 +57,6 @@ def test_cells_are_what_sweeps_at_their_twists_find(gears, elastic, made, kinema
         assert curve.peak_pressure[i] == pytest.approx(direct.peak_pressure[0], rel=1e-4, nan_ok=True)
 
 
-def test_a_curve_between_the_torques(gears, elastic, made):
-    torque = 101.0
-    direct = sweep_stiffness(gears, torque=torque, angles=ANGLES, elastic=elastic)
-    curve = made.curve_at(torque)
-    worst = np.nanmax(made.interpolation_error())
-    np.testing.assert_allclose(curve.twist, direct.twist, rtol=worst)  # what the map says of itself
-    np.testing.assert_allclose(np.median(curve.twist / direct.twist), 1.0, atol=1e-4)
-    np.testing.assert_array_equal(curve.torque_wheel, torque)
-    np.testing.assert_allclose(curve.k_mesh, torque / curve.twist / gears.wheel.base_radius**2, rtol=1e-14)
-    np.testing.assert_allclose(curve.wheel_angle - curve.twist, direct.wheel_angle - direct.twist, atol=1e-15)
-    np.testing.assert_allclose(curve.load_share[:, :2].sum(axis=1), 1.0, rtol=1e-12)
-    assert np.median(np.abs(curve.k_tangent / direct.k_tangent - 1)) < 2e-3
-    assert made.curve_at(float(made.torque[2])) is made.curves[2]
-
-
-def power_law(torques, stiffness, exponent, bend=0.0):
-    """A map of T = stiffness delta^exponent (1 + bend ln delta) at two angles, exact tangents."""
-    curves = []
-    for torque in torques:
-        twist = np.full(2, 1e-3)
-        for _ in range(60):  # Newton
-            value = stiffness * twist**exponent * (1 + bend * np.log(twist))
-            slope = value * exponent / twist + stiffness * twist ** (exponent - 1) * bend
-            twist = np.maximum(twist - (value - torque) / slope, 0.2 * twist)
-        radius = 0.03
-        zero, one = np.zeros(2), np.ones(2)
-        curves.append(
-            StiffnessCurve(
-                pinion_angle=np.array([0.0, 0.1]),
-                wheel_angle=twist,
-                twist=twist,
-                torque_wheel=torque * one,
-                torque_pinion=torque * one / 1.5,
-                torque_wheel_reaction=torque * one,
-                k_torsional=torque / twist,
-                k_mesh=torque / twist / radius**2,
-                k_tangent=slope / radius**2,
-                transmission_error=twist * radius,
-                transmission_error_unloaded=zero,
-                leading_pair=zero,
-                load_share=np.ones((2, 1)),
-                teeth_in_contact=np.ones(2, dtype=np.int64),
-                peak_pressure=1e8 * np.sqrt(torque) * one,
-                iterations=np.ones(2, dtype=np.int64),
-                status=np.array(["converged"] * 2),
-                mesh_cycle=0.2,
-                base_radius=radius,
-            )
-        )
-    return LoadMap(np.array(torques), tuple(curves))
-
-
-def test_a_power_law_is_interpolated_exactly():
-    """ln delta is straight over ln T then, so a Hermite cubic is exact; so are pressures as a power of the torque."""
-    mapped = power_law([10.0, 30.0, 100.0], 1e5, 1.07)
-    curve = mapped.curve_at(52.0)
-    np.testing.assert_allclose(curve.twist, (52.0 / 1e5) ** (1 / 1.07), rtol=1e-12)
-    np.testing.assert_allclose(curve.peak_pressure, 1e8 * math.sqrt(52.0), rtol=1e-12)
-    assert np.nanmax(mapped.interpolation_error()) < 1e-12
-
-
-def test_interpolation_errors_fall_with_the_fourth_power_of_the_spacing():
-    errors = []
-    for count in (3, 5, 9, 17):
-        mapped = power_law(list(np.geomspace(10.0, 1000.0, count)), 1e5, 1.3, bend=0.08)
-        errors.append(np.nanmax(mapped.interpolation_error()))
-    slopes = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert (slopes > 3.5).all()
-    assert slopes[-1] == pytest.approx(4.0, abs=0.2)
-
-
-def test_the_map_knows_its_range_and_its_gaps():
-    mapped = power_law([10.0, 1000.0, 1e5], 1e5, 1.3, bend=0.08)
-    with pytest.raises(InputError, match=r"too far apart.*more torques"):
-        mapped.curve_at(100.0, tolerance=1e-6)
-    for torque in (9.0, 2e5, math.nan):
-        with pytest.raises(InputError, match="outside the load map, 10 to 100000 N m"):
-            mapped.curve_at(torque)
-    with pytest.raises(InputError, match="too few solved torques"):
-        power_law([10.0, 20.0], 1e5, 1.1).curve_at(15.0)
-
-
-def test_a_failed_cell_leaves_its_neighbours_failed_there():
-    mapped = power_law([10.0, 20.0, 40.0, 80.0], 1e5, 1.1)
-    lost = np.array([False, True])
-    broken = {
-        name: np.where(lost, np.nan, getattr(mapped.curves[1], name)) for name in ("twist", "k_mesh", "k_tangent")
-    }
-    status = np.array(["converged", "not_converged"])
-    curves = (mapped.curves[0], replace(mapped.curves[1], status=status, **broken), *mapped.curves[2:])
-    curve = replace(mapped, curves=curves).curve_at(30.0)
-    assert list(curve.status) == ["converged", "not_converged"]
-    assert np.isfinite(curve.twist[0])
-    assert np.isnan(curve.twist[1])
-    assert list(curve.failed) == [False, True]
-
-
 def test_tables_come_back_exactly(made, tmp_path):
     made.to_csv(tmp_path / "map.csv")
     again = LoadMap.from_csv(tmp_path / "map.csv")
@@ -163,7 +65,6 @@ def test_tables_come_back_exactly(made, tmp_path):
         np.testing.assert_array_equal(again.quantity(name), made.quantity(name))
     np.testing.assert_array_equal(again.root.stress, made.root.stress)
     np.testing.assert_array_equal(again.root.diameter, made.root.diameter)
-    np.testing.assert_allclose(again.curve_at(100.0).twist, made.curve_at(100.0).twist, rtol=1e-15)
     with open(tmp_path / "map.csv") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 36
@@ -208,28 +109,10 @@ def test_torques_that_are_none(gears, elastic, torques):
 # ---- the gear train --------------------------------------------------------------------------------------------------
 
 
-def train_with_map(tmp_path, path):
-    """The small train of the job tests; its mesh takes the load map `path`."""
-    text = SMALL.replace("stiffness_N_per_m = 2e8", f'load_map = "{path}"') + BORES
-    (tmp_path / "job.toml").write_text(text)
-    return read_train_job(tmp_path / "job.toml")
-
-
-def test_a_train_takes_its_curve_from_a_map(tmp_path):
-    """18/27 teeth, 30 N m at the output, which is the driven gear's shaft: the map's curve at 30 N m."""
-    gears = pair(18, 27, module=2e-3, pressure_angle=20.0, width=12e-3)
-    mapped = sweep_loads(gears, [25.0, 28.0, 33.0, 38.0], angles=np.arange(6) * gears.mesh_cycle / 6, coarsen=4.0)
-    mapped.to_csv(tmp_path / "map.csv")
-    (curve,) = train_curves(train_with_map(tmp_path, "map.csv"))
-    expected = mapped.curve_at(30.0)
-    np.testing.assert_allclose(curve.k_mesh, expected.k_mesh, rtol=1e-9)
-    np.testing.assert_allclose(curve.torque_wheel, 30.0, rtol=1e-9)
-
-
-def test_a_train_refuses_the_map_of_other_gears(tmp_path, made):
-    made.to_csv(tmp_path / "map.csv")
-    with pytest.raises(InputError, match="is of other gears: mesh cycle 18 deg"):
-        train_curves(train_with_map(tmp_path, "map.csv"))
+def test_a_train_names_what_stands_for_a_load_map(tmp_path):
+    (tmp_path / "job.toml").write_text(SMALL.replace("stiffness_N_per_m = 2e8", 'load_map = "map.csv"') + BORES)
+    with pytest.raises(InputError, match=r"load_map = 'map.csv': is gone.*law = \"curve\".*curve"):
+        read_train_job(tmp_path / "job.toml")
 
 
 def test_backlash_and_law_of_the_job_reach_maps_and_trains(tmp_path):

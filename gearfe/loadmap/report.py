@@ -50,14 +50,12 @@ def tables(made: LoadMap) -> dict[str, Mapping[str, Any]]:
 
 def summary(job: StiffnessJob, table: LoadMapTable, made: LoadMap, timings: Mapping[str, float]) -> dict[str, Any]:
     """Content of loadmap.json."""
-    missed = made.interpolation_error()
     return {
         "job": {**job.tables, "loadmap": asdict(table)},
         "versions": versions(),
         "derived_geometry": derived_geometry(job.pair),
         "warnings": list(job.pair.warnings),
         "by_torque": torque_table(made),
-        "relative_twist_error_with_a_torque_left_out": missed,
         "root_stress_error_estimate": None if made.root is None else _largest(made.root.error),
         "statuses": dict(Counter(map(str, made.status.ravel()))),
         "timings_s": dict(timings),
@@ -83,12 +81,6 @@ def report_lines(made: LoadMap) -> list[str]:
             pinion, wheel = 1e-6 * made.root.largest[row].max(axis=0)
             line += f", root stress {pinion:.4g} MPa (pinion), {wheel:.4g} MPa (wheel)"
         lines += [line, *("  " + one for one in pressure_lines(curve))]
-    missed = made.interpolation_error()
-    if np.isfinite(missed).any():
-        lines.append(
-            "curves between the torques: with a torque left out, its twists are missed by "
-            f"{100 * np.nanmedian(missed):.2g} % (median), {100 * np.nanmax(missed):.2g} % at worst"
-        )
     if made.root is not None:
         lines.append(f"root stress: estimated error at worst {100 * _largest(made.root.error):.2g} %")
     return lines

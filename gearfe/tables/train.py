@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from ..config import job_tables, quantity, read_toml
 from ..errors import InputError, unknown_name
@@ -112,17 +112,20 @@ class TrainMeshTable:
     roughness_um: float | None = quantity(None, above=0.0, doc="mean Ra of both gears' flanks, for that")
     oil_factor: float | None = quantity(None, above=0.0, doc="X_L for that; left out: 1, mineral oil")
     curve: str | None = quantity(None, doc="CSV file with pinion_angle_deg and k_mesh_N_per_m, beside the job file")
-    load_map: str | None = quantity(
-        None, doc="CSV file of gearfe loadmap, beside the job file: its curve at the torque that the mesh carries"
-    )
     stiffness_N_per_m: float | None = quantity(None, above=0.0, doc="constant stiffness (N/m)")
     rigid: bool = quantity(False, doc="true: an ideal rigid mesh, a constraint")
 
+    #: Key that was: what became of it, and what to write instead.
+    REMOVED: ClassVar[dict[str, tuple[str, str]]] = {
+        "load_map": (
+            "is gone: trains solve the contacts of their meshes themselves",
+            'leave it out (law = "curve": the curve at the mesh\'s torque), or give a file of gearfe stiffness: curve',
+        ),
+    }
+
     def check(self, where: str) -> None:
         """At most one source of the stiffness."""
-        given = [
-            k for k in ("curve", "load_map", "stiffness_N_per_m", "rigid") if getattr(self, k) not in (None, False)
-        ]
+        given = [k for k in ("curve", "stiffness_N_per_m", "rigid") if getattr(self, k) not in (None, False)]
         if len(given) > 1:
             raise InputError(
                 f"{where}.{given[1]}", getattr(self, given[1]), f"stands beside {given[0]}", "leave one out"
@@ -296,7 +299,7 @@ class TrainTable:
 
     def check_laws(self) -> None:
         """Nothing that is given for stiffness curves stands beside mesh laws alone, nor friction beside curves."""
-        given = ("curve", "load_map", "stiffness_N_per_m", "rigid")
+        given = ("curve", "stiffness_N_per_m", "rigid")
         computed = [m.law or self.curves.law for m in self.meshes if not any(getattr(m, k) for k in given)]
         for key in ("load", "positions"):
             value = getattr(self.curves, key)

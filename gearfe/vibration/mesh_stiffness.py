@@ -1,4 +1,4 @@
-"""Stiffness of the meshes of a train job: from files, from load maps at the carried torque, or computed."""
+"""Stiffness of the meshes of a train job: from files or computed."""
 
 from __future__ import annotations
 
@@ -66,8 +66,6 @@ def train_curves(
             found.append(mesh.stiffness_N_per_m)
         elif mesh.curve is not None:
             found.append(_read_curve(job.path.parent / mesh.curve, teeth))
-        elif mesh.load_map is not None:
-            found.append(_mapped_curve(job.path.parent / mesh.load_map, train, number))
         elif (mesh.law or job.table.curves.law) == "map":
             found.append(_computed_law(job, train, number, estimate))
         else:
@@ -91,28 +89,6 @@ def _carried_torque(train: GearTrain, number: int) -> float:
     """Torque (N m) at the driven gear of a mesh in steady running, without sign."""
     driven = train.gear(train.meshes[number].driven).gear
     return abs(float(steady_forces(train)[number])) * driven.base_radius
-
-
-def _mapped_curve(path: Path, train: GearTrain, number: int) -> StiffnessCurve:
-    """The curve of a load map at the torque that a mesh carries; the map's pinion is the driver."""
-    from ..loadmap.load_map import LoadMap
-
-    mesh = train.meshes[number]
-    made, torque = LoadMap.from_csv(path), _carried_torque(train, number)
-    driver, driven = train.gear(mesh.driver).gear, train.gear(mesh.driven).gear
-    cycle, radius = 2.0 * math.pi / driver.teeth, driven.base_radius
-    fits = math.isclose(made.mesh_cycle, cycle, rel_tol=1e-9)
-    if not (fits and math.isclose(made.curves[0].base_radius, radius, rel_tol=1e-9)):
-        problem = (
-            f"is of other gears: mesh cycle {math.degrees(made.mesh_cycle):.6g} deg and base radius of the wheel "
-            f"{1e3 * made.curves[0].base_radius:.6g} mm, but {math.degrees(cycle):.6g} deg and {1e3 * radius:.6g} mm "
-            f"in mesh {mesh.name!r}"
-        )
-        raise InputError("load_map", str(path), problem, "make a map of this pair, the driver as its pinion")
-    if not torque > 0.0:
-        problem = "carries no torque, so its load map has no load to be read at"
-        raise InputError(f"mesh {mesh.name!r}", None, problem, "add a load, or give another stiffness")
-    return made.curve_at(torque)
 
 
 def _computed_curve(job: TrainJob, train: GearTrain, number: int, progress: Any, estimate: bool) -> StiffnessCurve:
