@@ -19,7 +19,6 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .loadmap.load_map import LoadMap
     from .loadmap.sweep import sweep_loads
     from .microgeometry.loaded_mesh import LoadedMesh
-    from .microgeometry.relief import optimise_relief
     from .microgeometry.solve import load_mesh
     from .reduction.modal_body import ModalBody
     from .runup.run_up import run_up, steady_state
@@ -51,7 +50,6 @@ _PUBLIC: dict[str, str] = {
     "housing_from_job": "housing.build",
     "load_mesh": "microgeometry.solve",
     "read_study": "study.job",
-    "optimise_relief": "microgeometry.relief",
     "run_study": "study.job",
     "run_up": "runup.run_up",
     "simulate": "train",
@@ -79,7 +77,6 @@ __all__ = [
     "build_train",
     "housing_from_job",
     "load_mesh",
-    "optimise_relief",
     "read_study",
     "run_study",
     "run_up",

@@ -34,12 +34,18 @@ TABLES: dict[str, str] = {
     "stiffness": "gearfe.tables.stiffness:StiffnessTable",
     "loadmap": "gearfe.tables.loadmap:LoadMapTable",
     "microgeometry": "gearfe.tables.microgeometry:MicrogeometryTable",
-    "relief": "gearfe.tables.microgeometry:ReliefTable",
     "housing": "gearfe.tables.housing:HousingTable",
     "train": "gearfe.tables.train:TrainTable",
     "runup": "gearfe.tables.runup:RunUpTable",
     "spectrum": "gearfe.tables.spectrum:SpectrumTable",
     "study": "gearfe.tables.study:StudyTable",
+}
+#: Tables that were: what became of them, and what to write instead.
+REMOVED_TABLES = {
+    "relief": (
+        "is gone: the best relief is a search of gearfe study",
+        'take the table out; [study] with design = "search" varies [microgeometry] (gearfe new relief.toml)',
+    ),
 }
 
 
@@ -237,6 +243,8 @@ def job_tables(
 ) -> dict[str, Any]:
     """The same of tables that are parsed; `path` is named in messages."""
     for name in raw:
+        if name in REMOVED_TABLES:
+            raise InputError(f"[{name}]", None, *REMOVED_TABLES[name])
         if name not in TABLES:
             if {"run", "bodies"} <= raw.keys():
                 raise InputError("job file", str(path), "describes a mechanism", "run it: gearfe mechanism FILE")

@@ -18,7 +18,7 @@ PACKAGE = Path(__file__).parents[1] / "gearfe"
 CAPABILITIES = {
     "microgeometry, deviations, relief": """
         microgeometry/* gear/deviation* gear/modifications.py gear/pitch_errors.py
-        */microgeometry.py commands/relief.py
+        */microgeometry.py
     """,
     "mesh law, contact loss, friction": """
         meshlaw/* train/friction.py train/parting.py train/statics.py train/phases.py

@@ -11,7 +11,7 @@ from gearfe.cli import main
 from gearfe.config import TABLES, build, load_job, quantity, table_class
 from gearfe.tables.examples import JOBS, job_file
 from gearfe.tables.mechanism import BodyTable, MechanismFile, RunTable, read_mechanism_file
-from gearfe.tables.microgeometry import GearMicrogeometryTable, VariableTable
+from gearfe.tables.microgeometry import GearMicrogeometryTable
 from gearfe.tables.text import table_text
 from gearfe.tables.train import TrainShaftTable, read_train_tables
 
@@ -61,7 +61,7 @@ def test_every_key_of_the_tables_is_named(kind):
     text = job_file(kind)
     inside = {
         "mechanism": [RunTable, BodyTable],
-        "microgeometry": [GearMicrogeometryTable, VariableTable],
+        "microgeometry": [GearMicrogeometryTable],
         "vibration": [TrainShaftTable],
     }
     for table in [*map(table_class, JOBS.get(kind, ("", {}))[1]), *inside.get(kind, [])]:

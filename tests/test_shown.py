@@ -15,7 +15,6 @@ from gearfe import (
     build_train,
     housing_from_job,
     load_mesh,
-    optimise_relief,
     read_study,
     run_study,
     run_up,
@@ -25,9 +24,7 @@ from gearfe import (
 from gearfe.contact.half_plane import half_plane_pair
 from gearfe.errors import MissingLibraryError
 from gearfe.figures.results import PICTURES
-from gearfe.gear.modifications import FlankModification
 from gearfe.mechanisms import load_mechanism
-from gearfe.microgeometry.relief_problem import ReliefProblem, Variable
 from gearfe.rigid import constant, integrate
 from gearfe.shown import Shown, as_numbers
 from gearfe.spectrum import amplitude_spectrum
@@ -68,17 +65,6 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         integrate(crank.system, np.linspace(0.0, 0.01, 3)),
         run_study(read_study(written(trial, cases=8)), trial / "out", jobs=1),
         amplitude_spectrum(np.column_stack([tone, 2.0 * tone]), 1e-3),
-        optimise_relief(
-            ReliefProblem(
-                half_plane_pair(elastic),
-                (FlankModification(), FlankModification()),
-                (Variable("tip_relief.amount", 0.0, 3e-5, tolerance=2e-6),),
-                torques=(100.0,),
-                positions=4,
-            ),
-            map_points=2,
-            generations=1,
-        ),
     ]
     return {type(one).__name__: one for one in made}
 

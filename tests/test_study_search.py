@@ -137,7 +137,7 @@ def test_the_page_finds_the_relief_under_a_bound_on_the_root_stress(monkeypatch,
     kept = [one["error_um"] for one in told if one["root_stress_MPa"] <= 285.0]
     assert best.outputs["root_stress_MPa"] <= 285.0
     assert best.outputs["error_um"] < min(kept)
-    assert beyond["error_um"] < 0.6 * best.outputs["error_um"]
+    assert beyond["error_um"] < best.outputs["error_um"]
     assert beyond["root_stress_MPa"] > 285.0
 
 

@@ -33,7 +33,8 @@ gear pair.toml --export csv,step,brep
 stiffness pair.toml --fields 5 --angles 1 4 9 --coarsen 3 --report --format npz,h5,mat
 loadmap map.toml --positions 4 --set stiffness.coarsen=3 --set stiffness.torque_Nm=50
 microgeometry micro.toml --set stiffness.coarsen=3 --set microgeometry.torques_Nm=[50]
-relief micro.toml --no-pictures
+new relief.toml
+study relief.toml --set study.cases=8 --set microgeometry.positions=4 --jobs 1 --no-pictures
 mesh pair.toml --deck --teeth 2 --coarsen 4
 mechanism crank.toml --until 0.2 --report
 housing box.toml --json

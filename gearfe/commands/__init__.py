@@ -19,10 +19,6 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "reliefs, pitch errors, measured flanks: transmission error, orders, load sharing, pressure against torque",
         "gearfe microgeometry microgeometry.toml --torques-Nm 50 100 --report",
     ),
-    "relief": (
-        "tip and root relief, crowning, slope: search for the best at some torques, with its tolerances",
-        "gearfe relief microgeometry.toml --workers 2",
-    ),
     "gear": (
         "derived geometry of a gear pair, and a drawing of it in mesh",
         "gearfe gear pair.toml --angle-deg 5 --export dxf,step",

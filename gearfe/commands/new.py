@@ -8,7 +8,7 @@ from pathlib import Path
 KINDS = {
     "stiffness": "mesh stiffness of a gear pair",
     "loadmap": "stiffness and root stress over angle and torque",
-    "microgeometry": "reliefs and errors of micrometres, and the best relief",
+    "microgeometry": "reliefs and errors of micrometres",
     "study": "many microgeometries of a pair: yield, sensitivities",
     "vibration": "two shafts with a gear pair in a housing",
     "runup": "that train over its speed: orders, critical speeds",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ from .common import add_folder, print_results
 
 #: Seconds that a scheduler has to answer.
 TIMEOUT_S = 20
+#: Job file of the best point of a search.
+BEST = "best.toml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Solve the cases that are missing and write the files; 1 when a case has no answer."""
+    """Solve the cases that are missing and write the files; 1 when a case has no answer, but for a search's."""
     started = time.perf_counter()
     from ..errors import InputError
     from ..shown import library
@@ -44,22 +47,31 @@ def run(args: argparse.Namespace) -> int:
         library("pyarrow")
     study = read_study(args.study)
     if args.row is not None:
-        return _write_case(study, args.row, Path(args.write))
+        return _write_row(study, args.row, Path(args.write))
 
     from ..output.files import output_folder, whole_set, write_json
     from ..progress import Stopwatch
-    from ..study.statistics import report_lines
+    from ..study import optimum, statistics
+    from ..study.search import Search
 
+    searched: bool = study.table.design == "search"
     watch = Stopwatch({"program start": time.perf_counter() - started})
     folder = output_folder(args.out)
     with ExitStack() as stack, watch.stage("cases"):
         where: dict[str, Any] = {"jobs": args.jobs}
         if args.dask is not None:
             where = _cluster(args.dask, stack)
-        made = run_study(study, folder, restart=args.restart, progress=count, **where)
-    with watch.stage("statistics"):
-        summary = made.summary()
-    with whole_set(folder, ("study*.png", "study.parquet"), ("study.csv", "study.json")) as place:
+        where |= {"restart": args.restart, "progress": count}
+        if searched:
+            best = optimum.optimum(stack.enter_context(Search(study, folder, **where)))
+            made, summary, lines = best.result, best.summary(), optimum.report_lines
+        else:
+            made, lines = run_study(study, folder, **where), statistics.report_lines
+            with watch.stage("statistics"):
+                summary = made.summary()
+    with whole_set(folder, ("study*.png", "study.parquet", BEST), ("study.csv", "study.json")) as place:
+        if searched:
+            _write_case(study, summary["best_case"], list(summary["best"].values()), place / BEST, folder)
         if args.parquet:
             made.to_parquet(place / "study.parquet")
         if not args.no_pictures:
@@ -76,8 +88,8 @@ def run(args: argparse.Namespace) -> int:
         first = next(i for i, good in enumerate(made.done) if not good)
         example = f"case {made.cells['case'][first]}: {made.cells['message'][first]}"
         warnings.append(f"{bad} of {len(made.done)} cases are not solved wholly; {example}")
-    print_results(report_lines(summary), folder, names, watch.seconds, warnings)
-    return 1 if bad else 0
+    print_results(lines(summary), folder, names, watch.seconds, warnings)
+    return 1 if bad and not searched else 0
 
 
 def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:
@@ -107,19 +119,28 @@ def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:
     return {"executor": client.get_executor(pure=False), "workers": workers, "check": check}
 
 
-def _write_case(study: Any, number: int, path: Path) -> int:
+def _write_row(study: Any, number: int, path: Path) -> int:
     from ..errors import InputError
+
+    if not study.cases:
+        problem = "is of no case: a search has none beforehand"
+        raise InputError("--row", number, problem, f"{BEST} beside its study.csv is its best point")
+    if not 0 <= number < len(study.cases):
+        raise InputError("--row", number, f"must be >= 0 and <= {len(study.cases) - 1}", "see the column case")
+    _write_case(study, number, study.cases[number], path, path.absolute().parent)
+    print(f"written: {path}")
+    print(f"run it:  gearfe {study.table.job} {path} --out out/{path.stem}")
+    return 0
+
+
+def _write_case(study: Any, number: int, values: Sequence[Any], path: Path, folder: Path) -> None:
+    """The job file of a case; it finds the files that it names from `folder`."""
     from ..output.files import whole_file
     from ..study.case import job_beside
     from ..tables.text import toml_document
 
-    if not 0 <= number < len(study.cases):
-        raise InputError("--row", number, f"must be >= 0 and <= {len(study.cases) - 1}", "see the column case")
-    values = dict(zip(study.task.names, study.cases[number], strict=True))
-    head = f"# Case {number} of the study {study.path.name}: " + ", ".join(f"{k} = {v!r}" for k, v in values.items())
-    raw = job_beside(study.task.tables(study.cases[number]), study.task.path.parent, path.absolute().parent)
+    named = dict(zip(study.task.names, values, strict=True))
+    head = f"# Case {number} of the study {study.path.name}: " + ", ".join(f"{k} = {v!r}" for k, v in named.items())
+    raw = job_beside(study.task.tables(values), study.task.path.parent, folder.absolute())
     with whole_file(path) as temporary:
         temporary.write_text(f"{head}\n\n{toml_document(raw)}", encoding="utf-8", newline="\n")
-    print(f"written: {path}")
-    print(f"run it:  gearfe {study.table.job} {path} --out out/{path.stem}")
-    return 0

@@ -1,8 +1,7 @@
-"""Pictures of microgeometry: K-charts of the flanks, the Harris map with the order spectrum, the map of a search."""
+"""Pictures of microgeometry: K-charts of the flanks, the Harris map with the order spectrum."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,9 +12,7 @@ from ..gear import pitch_errors
 from ..gear.deviation_job import GEARS, FlankOf, flank_deviations
 from ..gear.pair import GearPair
 from ..microgeometry.loaded_mesh import LoadedMesh
-from ..microgeometry.relief import ReliefResult
-from ..microgeometry.relief_job import comparison
-from ..tables.microgeometry import VARIABLES, MicrogeometryTable
+from ..tables.microgeometry import MicrogeometryTable
 from ..typing import Array
 from .style import BLUE, GREY, ORANGE, RED, headed, labelled, new_figure, save, shades, some_of, tidy
 
@@ -155,66 +152,3 @@ def microgeometry_picture(made: LoadedMesh) -> Any:
     title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, {made.span}"
     headed(figure, title)
     return figure
-
-
-def relief_picture(made: ReliefResult, compared: Mapping[str, Array] | None = None) -> Any:
-    """Map of the objective over one or two variables, error against torque of the best one, and its sensitivity.
-
-    Parameters
-    ----------
-    compared
-        Of `gearfe.microgeometry.relief_job.comparison`, where it is there already.
-    """
-    compared = comparison(made) if compared is None else compared
-    problem, value = made.problem, made.best.value
-    keys = {quantity: (key, factor) for key, (quantity, factor) in VARIABLES.items()}
-    names = [_in_words(keys[one.quantity][0], one.gear) for one in problem.variables]
-    units = [keys[one.quantity][1] for one in problem.variables]
-    best = [float(x / unit) for x, unit in zip(made.x, units, strict=True)]
-    places = [axis / unit for axis, unit in zip(made.axes, units, strict=False)]
-    objective = np.where(np.isfinite(made.map), made.map, np.nan)
-    figure = new_figure(12.0, 4.2)
-    first, second, third = figure.subplots(1, 3, width_ratios=(1.3, 1.1, 1))
-    if len(places) == 2:
-        filled = first.contourf(places[0], places[1], objective.T, levels=20, cmap="viridis")
-        figure.colorbar(filled, ax=first, shrink=0.9)
-        first.plot(best[0], best[1], "o", color="white", markeredgecolor="black")
-        first.set_ylabel(names[1], fontsize=9)
-    else:
-        tidy(first)
-        first.plot(places[0], objective, ".-", color=BLUE)
-        first.axvline(best[0], color=GREY, linewidth=1)
-    first.set_xlabel(names[0], fontsize=9)
-    weighed = problem.pressure_weight or problem.root_stress_weight or len(problem.torques) > 1
-    first.set_title("objective" if weighed else "peak to peak (µm)", loc="left", fontsize=9.5)
-    tidy(second)
-    for label, color in (("without", GREY), ("best", BLUE)):
-        values = compared[f"peak_to_peak_{label}_um"]
-        second.plot(compared["torque_Nm"], values, "o-", markersize=3, color=color, label=label)
-    second.set_ylim(bottom=0)
-    second.legend(fontsize=8, frameon=False)
-    second.set_xlabel("torque at the wheel (N m)", fontsize=9)
-    second.set_title("transmission error, peak to peak (µm)", loc="left", fontsize=9.5)
-    tidy(third)
-    wide = [i for i, one in enumerate(problem.variables) if one.tolerance > 0.0]
-    for row, i in enumerate(wide):
-        for end, shift, color, sign in ((made.low[i], -0.06, ORANGE, "less"), (made.high[i], 0.06, BLUE, "more")):
-            named = {"label": sign} if row == 0 else {}
-            third.plot([value, end], [row + shift] * 2, "-", color=color, linewidth=5, **named)
-    third.axvline(value, color=GREY, linewidth=1)
-    third.set_ylim(-0.6, max(len(wide), 1) - 0.4)
-    allowed = [f"{names[i].replace(', ', chr(10))}\n± {problem.variables[i].tolerance / units[i]:g}" for i in wide]
-    third.set_yticks(range(len(wide)), allowed, fontsize=8)
-    third.set_title("the same within tolerances" if wide else "no tolerances given", loc="left", fontsize=9.5)
-    if wide:
-        third.legend(fontsize=8, frameon=False)
-        third.set_xlabel("peak to peak (µm)")
-    else:
-        third.set_xticks([])
-    return figure
-
-
-def _in_words(key: str, gear: str) -> str:
-    """A variable with its unit, as ``tip relief (µm), both gears``."""
-    name, _, unit = key.rpartition("_")
-    return f"{name.replace('_', ' ')} ({unit.replace('um', 'µm')}), {'both gears' if gear == 'both' else gear}"

@@ -116,7 +116,6 @@ PICTURES = {
     "LoadMap": "load_map:load_map_picture",
     "LoadedMesh": "microgeometry:microgeometry_picture",
     "ModalBody": "results:body_plot",
-    "ReliefResult": "microgeometry:relief_picture",
     "RunUp": "runup:forces_picture",
     "Spectrum": "results:spectrum_plot",
     "StiffnessCurve": "results:curve_plot",

@@ -108,8 +108,10 @@ def _tornado(path: Path, title: str, outputs: Mapping[str, Mapping[str, Any]]) -
     """How much each parameter changes each output (what the summary says of it), the largest on top."""
     sobol = {name: (one.get("sobol") or {}).get("total_order", {}) for name, one in outputs.items()}
     morris = {n: {p: e["mean_size"] for p, e in (one.get("morris") or {}).items()} for n, one in outputs.items()}
-    effects, what = {n: one["effects"]["change"] for n, one in outputs.items()}, "change over the parameter's range:"
-    if all(sobol.values()):
+    effects, what = {n: _changes(one) for n, one in outputs.items()}, "change over the parameter's range:"
+    if any("less" in one for one in outputs.values()):
+        what = "a parameter off by its tolerance: change of"
+    elif all(sobol.values()):
         effects, what = sobol, "Sobol's total index of"
     elif all(morris.values()):
         effects, what = morris, "mean size of the elementary effects on"
@@ -128,6 +130,13 @@ def _tornado(path: Path, title: str, outputs: Mapping[str, Mapping[str, Any]]) -
         part.tick_params(labelsize=8.5)
     headed(figure, title)
     save(figure, path)
+
+
+def _changes(one: Mapping[str, Any]) -> dict[str, float]:
+    """Changes of an output over the ranges of a study, or off a search's best point by the tolerances."""
+    if "less" not in one:
+        return dict(one["effects"]["change"])
+    return {f"{key} {sign}": value - one["best"] for sign in ("less", "more") for key, value in one[sign].items()}
 
 
 def _pareto(path: Path, title: str, result: StudyResult, aims: list[str]) -> None:

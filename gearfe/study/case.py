@@ -44,6 +44,8 @@ class Task:
         Dotted names of the parameters.
     outputs
         Name -> expression.
+    also
+        Parameter -> names of further keys that take its value.
     """
 
     kind: str
@@ -52,12 +54,14 @@ class Task:
     estimate: bool
     names: tuple[str, ...]
     outputs: Mapping[str, str]
+    also: Mapping[str, Sequence[str]]
 
     def tables(self, values: Sequence[Any]) -> dict[str, Any]:
         """Tables of the job with these values."""
         made = copy.deepcopy(dict(self.raw))
         for name, value in zip(self.names, values, strict=True):
-            set_key(made, name, value, f"study.parameters.{name}")
+            for key in (name, *self.also.get(name, ())):
+                set_key(made, key, value, f"study.parameters.{name}")
         return made
 
     def expressions(self) -> dict[str, ast.expr]:

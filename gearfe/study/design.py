@@ -34,6 +34,8 @@ def study_cases(table: StudyTable, folder: Path, base: Mapping[str, Any]) -> tup
     if table.design == "rows":
         return _rows(table, folder, base)
     parameters = read_parameters(table.parameters, table.job, base)
+    if table.design == "search":
+        return parameters, ()
     if table.design == "factorial":
         levels = [one.levels() for one in parameters]
         count = math.prod(map(len, levels))

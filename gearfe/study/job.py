@@ -16,7 +16,7 @@ from ..tables.study import StudyTable
 from ..threads import one_thread
 from .case import DIED, ERROR, HERE, INVALID, Row, Task, evaluate, files_named
 from .design import Cases, study_cases
-from .journal import HEAD, TABLE, Journal, only_writer
+from .journal import Journal, only_writer
 from .parameters import Parameter
 from .run import serially, side_by_side
 from .statistics import StudyResult
@@ -108,9 +108,11 @@ def read_study(path: str | Path) -> Study:
     tables = {name: one for name, one in (raw if table.base is None else read_toml(base)).items() if name != "study"}
     parameters, cases = study_cases(table, path.parent, tables)
     names = tuple(one.name for one in parameters)
-    task = Task(table.job, base, tables, table.estimate, names, table.outputs)
+    also = {one.name: one.also for one in parameters}
+    task = Task(table.job, base, tables, table.estimate, names, table.outputs, also)
     task.expressions()
-    task.tables(cases[0])
+    for case in cases[:1]:
+        task.tables(case)
     return Study(path, table, parameters, cases, task)
 
 
@@ -160,18 +162,18 @@ def run_study(
     ------
     InputError
         Outputs that the job does not give, a folder with another study or that another program writes, a study whose
-        first cases all have no answer.
+        first cases all have no answer, or whose cases are not known beforehand.
     """
     from ..versions import versions
 
+    if study.table.design == "search":
+        raise InputError("study.design", "search", "has no cases beforehand", "gearfe study runs it; or gearfe.Search")
     folder = Path(folder)
     base = check_outputs(study)
     folder.mkdir(parents=True, exist_ok=True)
     with only_writer(folder):
-        if restart:
-            for name in (TABLE, HEAD):
-                (folder / name).unlink(missing_ok=True)
-        journal = Journal(folder, study.head, versions(), study.task.names, tuple(study.table.outputs))
+        names = study.task.names, tuple(study.table.outputs)
+        journal = Journal(folder, study.head, versions(), *names, restart=restart)
         bad, first = 0, ""
         missing = [n for n in _order(study) if n not in journal.done]
         cases = [(n, study.cases[n]) for n in missing]

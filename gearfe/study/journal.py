@@ -87,6 +87,8 @@ class Journal:
         Of program and libraries.
     parameters, outputs
         Names of the columns.
+    restart
+        Begin anew, whatever the folder holds.
 
     Raises
     ------
@@ -101,8 +103,12 @@ class Journal:
         versions: Mapping[str, str],
         parameters: Sequence[str],
         outputs: Sequence[str],
+        *,
+        restart: bool = False,
     ) -> None:
         self.path = folder / TABLE
+        if restart:
+            self.path.unlink(missing_ok=True)
         self.columns = (*FIRST, *parameters, *outputs, *LAST)
         self.done: set[int] = set()
         plain = json.loads(json.dumps(head, default=str))

@@ -44,17 +44,35 @@ class Parameter:
         The values it takes, each as likely; empty with a distribution.
     distribution
         In the unit of the key; None with values.
+    also
+        Further keys that take the same value.
     """
 
     name: str
     whole: bool
     values: tuple[Any, ...] = ()
     distribution: DistributionTable | None = None
+    also: tuple[str, ...] = ()
 
     @property
     def path(self) -> list[str]:
         """Names from the job's table down to the key; numbers count entries of lists."""
         return self.name.split(".")
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest value.
+
+        Raises
+        ------
+        InputError
+            For a parameter without two ends.
+        """
+        d = self.distribution
+        if d is None or d.low is None or d.high is None:
+            cure = "write { low = a, high = b }"
+            raise InputError(f"{WHERE}.{self.name}", None, "has no two ends to search between", cure)
+        return d.low, d.high
 
     def at(self, share: Array) -> list[Any]:
         """Values below which the distribution has these shares: its inverse cumulative distribution, (n,) in [0, 1)."""
@@ -119,13 +137,16 @@ def read_parameters(given: Mapping[str, Any], kind: str, base: Mapping[str, Any]
             made.append(Parameter(name, whole, tuple(spec)))
             continue
         found = build(DistributionTable, spec, label)
+        also = found.also
         if not {int, float} & set(_options(hint)):
             raise InputError(label, None, "is no number: low, high, mean do not apply", "give a list of values")
         if found.iso_class is not None:
             found = _of_class(found, found.iso_class, name, base)
         if whole and found.low is not None and found.high is not None and math.ceil(found.low) > found.high:
             raise InputError(label, (found.low, found.high), "holds no whole number", "widen it")
-        made.append(Parameter(name, whole, distribution=found))
+        for other in also:
+            key_hint(kind, other, base)
+        made.append(Parameter(name, whole, distribution=found, also=also))
     return tuple(made)
 
 

@@ -1,8 +1,8 @@
 """Points of a study for an optimiser: solved side by side, kept on disk, never solved twice.
 
 The study says what is searched: parameters between their ends, the output in `minimise` or `maximise`, and the limits
-of outputs as constraints. `Search.evolve` is scipy's differential evolution; any other optimiser is an `Optimiser`,
-with `ask` and `tell`, or calls `Search.solve` itself.
+of outputs as constraints. `Search.evolve` is scipy's differential evolution, `Search.refine` its Nelder-Mead; any other
+optimiser is an `Optimiser`, with `ask` and `tell`, or calls `Search.solve` itself.
 """
 
 from __future__ import annotations
@@ -26,9 +26,13 @@ from .case import DIED, DONE, Row
 from .job import Study, check_outputs, solved_rows
 from .journal import Journal, cell_text, only_writer
 from .run import end_processes, processes
+from .statistics import StudyResult
 
 #: A constraint's value of a point that has no answer, beyond its limit.
 FAR = 1e30
+#: Of `Search.refine`, as shares of the ranges: its first steps, and those in which it ends; the change of the output in
+#: which it ends, as a share of it.
+FIRST_STEP, LAST_STEP, LAST_CHANGE = 0.03, 1e-4, 1e-5
 
 Point = Mapping[str, Any]
 
@@ -63,7 +67,7 @@ class Search(Facts):
         Its parameters are the coordinates; its design is not used.
     folder
         Of ``study.csv`` and ``study.json``: a search that was interrupted finds its points there. None: kept in memory.
-    jobs, executor
+    jobs, executor, workers, check, restart
         As of `gearfe.study.job.run_study`.
     progress
         Called with points solved, requested points, and a name.
@@ -81,11 +85,14 @@ class Search(Facts):
         *,
         jobs: int | None = None,
         executor: Executor | None = None,
+        workers: int | None = None,
+        check: Callable[[], None] | None = None,
+        restart: bool = False,
         progress: Callable[[int, int, str], None] | None = None,
     ) -> None:
-        check_outputs(study)
-        self.study = study
+        self.study, self._base = study, check_outputs(study)
         self._jobs, self._executor, self._progress = jobs or os.cpu_count() or 1, executor, progress
+        self._workers, self._check = workers, check
         self._own: Executor | None = None
         self._case: dict[tuple[str, ...], int] = {}
         self._rows: list[Row] = []
@@ -96,15 +103,15 @@ class Search(Facts):
             Path(folder).mkdir(parents=True, exist_ok=True)
             with ExitStack() as held:
                 held.enter_context(only_writer(Path(folder)))
-                self._journal = self._known(Path(folder))
+                self._journal = self._known(Path(folder), restart)
                 self._held = held.pop_all()
 
-    def _known(self, folder: Path) -> Journal:
+    def _known(self, folder: Path, restart: bool) -> Journal:
         """The points that stand in the folder, from now on with those of this search."""
         from ..versions import versions
 
         names, outputs = self.study.task.names, tuple(self.study.table.outputs)
-        journal = Journal(folder, {**self.study.head, "search": True}, versions(), names, outputs)
+        journal = Journal(folder, {**self.study.head, "search": True}, versions(), names, outputs, restart=restart)
         columns = journal.finish()
         for i, case in enumerate(columns["case"]):
             self._case[tuple(columns[name][i] for name in names)] = len(self._rows)
@@ -167,7 +174,7 @@ class Search(Facts):
         executor = self._executor
         if executor is None and self._jobs > 1:
             executor = self._own = self._own or processes(self._jobs)
-        for rows in solved_rows(self.study.task, cases, self._jobs, executor, None):
+        for rows in solved_rows(self.study.task, cases, self._jobs, executor, self._workers, self._check):
             made |= {row.case: row for row in rows}
             self._keep([row for row in rows if row.status != DIED], values, first + len(cases))
         died = [(case, values[case]) for case, row in made.items() if row.status == DIED]
@@ -242,14 +249,7 @@ class Search(Facts):
         InputError
             For a parameter without two ends.
         """
-        made = []
-        for one in self.study.parameters:
-            d = one.distribution
-            if d is None or d.low is None or d.high is None:
-                where = f"study.parameters.{one.name}"
-                raise InputError(where, None, "has no two ends to search between", "write { low = a, high = b }")
-            made.append((d.low, d.high))
-        return made
+        return [one.ends for one in self.study.parameters]
 
     def evolve(self, *, rounds: int = 40, population: int = 10, seed: int = 1) -> Solution | None:
         """Search by differential evolution (Storn & Price 1997, by scipy), limits as its constraints (Lampinen 2002).
@@ -298,6 +298,55 @@ class Search(Facts):
             updating="deferred",
         )
         return self.best()
+
+    def refine(self) -> Solution | None:
+        """Nelder's and Mead's method (by scipy) from the best point on, over the ranges scaled to 0..1; whole numbers
+        stay, points beyond the limits are no better than any.
+
+        Returns
+        -------
+        Solution or None
+            The best point of all; None where none keeps the limits.
+        """
+        from scipy.optimize import minimize
+
+        begun, (name, sign) = self.best(), self.aim
+        free = [one for one in self.study.parameters if not one.whole]
+        if begun is None or not free:
+            return begun
+        low, high = np.array([one.ends for one in free]).T
+        start = (np.array([begun.point[one.name] for one in free]) - low) / (high - low)
+        steps = np.where(start < 0.5, FIRST_STEP, -FIRST_STEP)
+
+        def objective(u: Array) -> float:
+            values = dict(zip([one.name for one in free], (low + u * (high - low)).tolist(), strict=True))
+            (found,) = self.solve([{**begun.point, **values}])
+            good = math.isfinite(found[name]) and self._excess(found) <= 0.0
+            return sign * found[name] if good else math.inf
+
+        minimize(
+            objective,
+            start,
+            method="Nelder-Mead",
+            bounds=[(0.0, 1.0)] * len(free),
+            options={
+                "initial_simplex": np.vstack([start, start + np.diag(steps)]),
+                "xatol": LAST_STEP,
+                "fatol": LAST_CHANGE * abs(begun.outputs[name]),
+                "maxfev": 40 * len(free),
+            },
+        )
+        return self.best()
+
+    def result(self) -> StudyResult:
+        """All points that stand in the folder."""
+        if self._journal is None:
+            raise InputError("folder", None, "is not given: the points are in memory alone", "name one to the Search")
+        return StudyResult(self.study.table, self._journal.finish(), self._base)
+
+    def first_problem(self) -> str:
+        """What is told of the first point without an answer, after a colon; empty where all have one."""
+        return next((f"; the first one: {row.message}" for row in self._rows if row.message), "")
 
 
 def _plain(value: Any) -> Any:

@@ -38,14 +38,6 @@ MICROGEOMETRY_OF_STUDY: dict[str, Any] = {
     "wheel": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7},
 }
 
-RELIEF: dict[str, Any] = {
-    "torques_Nm": [100.0],
-    "variables": [
-        {"key": "tip_relief_um", "low": 0.0, "high": 30.0, "tolerance": 2.0},
-        {"key": "tip_relief_length_mm", "low": 1.0, "high": 4.5, "tolerance": 0.2},
-    ],
-}
-
 STUDY: dict[str, Any] = {
     "job": "microgeometry",
     "design": "sobol",
@@ -140,9 +132,8 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
         {"pair": PAIR, "loadmap": LOADMAP},
     ),
     "microgeometry": (
-        "Deviations of micrometres of a gear pair, and the search for the best relief. Run it: gearfe microgeometry "
-        "FILE --out DIR, gearfe relief FILE --out DIR. " + OPTIONAL_KEYS,
-        {"pair": PAIR, "microgeometry": MICROGEOMETRY, "relief": RELIEF},
+        "Deviations of micrometres of a gear pair. Run it: gearfe microgeometry FILE --out DIR. " + OPTIONAL_KEYS,
+        {"pair": PAIR, "microgeometry": MICROGEOMETRY},
     ),
     "study": (
         "Many microgeometries of a gear pair. Run it: gearfe study FILE --out DIR. " + OPTIONAL_KEYS,

@@ -1,4 +1,4 @@
-"""The [microgeometry] and [relief] tables: deviations of micrometres of both gears, in everyday units."""
+"""The [microgeometry] table: deviations of micrometres of both gears, in everyday units."""
 
 from __future__ import annotations
 
@@ -114,59 +114,3 @@ class MicrogeometryTable(LoadMapTable):
     )
     pinion: GearMicrogeometryTable = quantity(GearMicrogeometryTable, doc="the driving gear")  # noqa: RUF009
     wheel: GearMicrogeometryTable = quantity(GearMicrogeometryTable, doc="the driven gear")  # noqa: RUF009
-
-
-#: What can be varied: key -> (quantity of `gearfe.microgeometry.relief_problem.Variable`, factor to SI).
-VARIABLES: dict[str, tuple[str, float]] = {
-    "tip_relief_um": ("tip_relief.amount", 1e-6),
-    "tip_relief_length_mm": ("tip_relief.length", 1e-3),
-    "root_relief_um": ("root_relief.amount", 1e-6),
-    "root_relief_length_mm": ("root_relief.length", 1e-3),
-    "crowning_um": ("crowning", 1e-6),
-    "slope_um": ("slope", 1e-6),
-}
-
-
-@dataclass(frozen=True)
-class VariableTable:
-    """One number that the search varies."""
-
-    key: str = quantity(doc="key of [microgeometry.pinion] or [microgeometry.wheel]", choices=tuple(VARIABLES))
-    gear: str = quantity("both", doc="pinion, wheel or both", choices=("pinion", "wheel", "both"))
-    low: float = quantity(doc="least value, in the key's unit")
-    high: float = quantity(doc="largest value")
-    tolerance: float = quantity(0.0, doc="+- of manufacture, for the sensitivity", low=0.0)
-
-    def check(self, where: str) -> None:
-        """Raise `InputError` for bounds that hold nothing."""
-        if not self.low < self.high:
-            raise InputError(f"{where}.high", self.high, f"must be > low = {self.low:g}", "swap them")
-
-
-@dataclass(frozen=True)
-class ReliefTable:
-    """Search for the relief that is best at some torques, from the deviations of [microgeometry]."""
-
-    variables: tuple[VariableTable, ...] = quantity(doc="what is varied")
-    torques_Nm: tuple[float, ...] = quantity(doc="torques at the wheel's hub (N m)", above=0.0)
-    weights: tuple[float, ...] = quantity((), doc="of these torques, by default all 1", low=0.0)
-    peak_to_peak_weight: float = quantity(1.0, doc="of the peak-to-peak transmission error (um)", low=0.0)
-    pressure_weight: float = quantity(0.0, doc="of the largest pressure (GPa), edges included", low=0.0)
-    root_stress_weight: float = quantity(0.0, doc="of the largest root stress (100 MPa)", low=0.0)
-    positions: int = quantity(20, doc="pinion angles in the mesh cycle", low=4, high=1000)
-    map_points: int = quantity(9, doc="points of the map along each of the first two variables", low=2, high=200)
-    generations: int = quantity(8, doc="most generations of the search (differential evolution)", low=0, high=1000)
-    seed: int = quantity(1, doc="seed of the search", low=0, high=2**63 - 1)
-
-    def check(self, where: str) -> None:
-        """Raise `InputError` for keys that contradict each other."""
-        if not self.variables:
-            raise InputError(f"{where}.variables", [], "is empty", "give at least one [[relief.variables]]")
-        if not self.torques_Nm:
-            raise InputError(f"{where}.torques_Nm", [], "is empty", "give at least one torque")
-        if self.weights and len(self.weights) != len(self.torques_Nm):
-            problem = f"must have one entry for each of the {len(self.torques_Nm)} torques"
-            raise InputError(f"{where}.weights", list(self.weights), problem, "or leave it out")
-        if not any((self.peak_to_peak_weight, self.pressure_weight, self.root_stress_weight)):
-            problem = "leaves nothing to minimise: all weights are 0"
-            raise InputError(f"{where}.peak_to_peak_weight", self.peak_to_peak_weight, problem, "give one weight > 0")

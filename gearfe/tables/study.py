@@ -10,7 +10,7 @@ from ..errors import InputError, unknown_name
 
 #: Kinds of job that a study can vary.
 KINDS = ("stiffness", "loadmap", "microgeometry", "vibration", "runup", "mechanism")
-DESIGNS = ("factorial", "latin_hypercube", "sobol", "saltelli", "morris", "rows")
+DESIGNS = ("factorial", "latin_hypercube", "sobol", "saltelli", "morris", "rows", "search")
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,8 @@ class DistributionTable:
         doc="for slope_um: normal about mean, cut off at the tolerance of this class of ISO 1328-1",
     )
     count: int | None = quantity(None, low=2, high=100_000, doc="even steps from low to high for a factorial design")
+    tolerance: float = quantity(0.0, low=0.0, doc="+- of manufacture: a search tells the outputs at its ends")
+    also: tuple[str, ...] = quantity((), doc="dotted names of further keys that take the same value")
 
     def check(self, where: str) -> None:
         """Ends or mean and deviation, not half of them; or a class."""
@@ -78,10 +80,15 @@ class StudyTable:
         "latin_hypercube",
         choices=DESIGNS,
         doc="factorial: all combinations; latin_hypercube, sobol: that many random cases; saltelli: those that Sobol's "
-        "indices need; morris: those of elementary effects; rows: a CSV file",
+        "indices need; morris: those of elementary effects; rows: a CSV file; search: for the least of the output in "
+        "minimise or the largest of that in maximise, within the limits",
     )
     cases: int = quantity(
-        64, low=1, high=10_000_000, doc="number of random cases; saltelli: base points; morris: trajectories"
+        64,
+        low=1,
+        high=10_000_000,
+        doc="number of random cases; saltelli: base points; morris: trajectories; "
+        "search: about how many, besides those of its end",
     )
     seed: int = quantity(1, low=0, doc="seed of the random cases")
     rows_csv: str | None = quantity(None, doc="CSV file whose columns are named as the keys, for design = rows")
