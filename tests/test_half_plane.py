@@ -232,7 +232,7 @@ def test_forces_that_stand_still_by_chance_are_no_solution() -> None:
     setting, state = first_state(law, twist, law.teeth.touching(np.array([0.1])).take([0]))
     made = step(setting, state)
     assert np.abs(made.place).max() > 1e-6
-    assert change(setting, replace(state, force=made.solution.force), made).min() > NEAR
+    assert change(setting, replace(state, force=made.force), made).min() > NEAR
 
 
 def test_an_undercuts_edge_on_a_nearly_flat_mate() -> None:

@@ -32,7 +32,7 @@ add :math:`(\langle x^2\rangle - a^2/4)\,H_{ss}`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,11 +46,10 @@ from .half_plane_result import (
     PairContacts,
     contact_rates,
     contacts_of,
-    no_contacts,
     pair_sums,
 )
 from .half_plane_step import WINDOW, Setting, State, Step, moved_on, reference_approach, smooth_influence, step
-from .panels import PANELS, forces_of_overlaps
+from .panels import PANELS, Couplings, unilateral
 from .position import STATUS, Positions, joined, of_positions, taken, together
 from .zones import completed
 
@@ -64,20 +63,11 @@ TWIST_STEPS, FORCE_ROUNDS, SHARPEST = 10, 2, 0.02
 SMALL = 1e-6
 
 
-def unloaded(law: HalfPlanePair, numbers: IntArray, twists: Array, found: Touching) -> tuple[Setting, State]:
-    """Tooth pairs where their rigid flanks touch, at twists (rad) of their positions, without forces.
-
-    Parameters
-    ----------
-    numbers : ndarray, shape (m,)
-        Of the positions, in rising order.
-    twists : ndarray, shape (n,)
-        Of all positions that are numbered.
-    """
+def unloaded(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Setting, State]:
+    """Tooth pairs where their rigid flanks touch, at twists (rad) of their positions, without forces."""
     frames = found.frames + twists[found.position, None] * np.arange(2)
-    setting = Setting(law, numbers, found, np.exp(1j * frames))
     nothing, count = np.zeros(len(found)), len(found)
-    return setting, State(
+    return Setting(law, found, np.exp(1j * frames)), State(
         centre=found.point,
         normal=found.normal,
         arc=law.arc_at(found.flank, found.place),
@@ -91,45 +81,44 @@ def unloaded(law: HalfPlanePair, numbers: IntArray, twists: Array, found: Touchi
     )
 
 
-@dataclass(frozen=True)
-class _Yield:
-    """What Hertz's approach of p contacts needs: C (1/Pa), kappa (1/m), n W n/E' (1/Pa) and y (m), shape (p, 2)."""
-
-    compliance: float
-    curvature: Array
-    along: Array
-    distance: Array
-
-    def half_width(self, force: Array) -> Array:
-        """b (m) of forces per width (N/m), shape (p,)."""
-        return np.asarray(np.sqrt(2 * self.compliance * np.maximum(force, SMALL) / self.curvature))
-
-    def at(self, force: Array) -> Array:
-        """c (m2/N) at the half width of these forces."""
-        b = self.half_width(force)
-        wedge = (self.along * np.log(2 * np.maximum(self.distance, b[:, None]))).sum(axis=1)
-        return np.asarray(self.compliance * (0.5 - np.log(0.5 * b)) - wedge)
+def smooth_compliance(setting: Setting, state: State) -> Array:
+    """T by couple (m2/N)."""
+    normal = state.normal[:, None] / setting.turn
+    return smooth_influence(setting.law, setting.couples, normal, state.arc, state.variance).compliance
 
 
-def _yields(setting: Setting, state: State) -> tuple[_Yield, Array]:
-    """How contacts yield by themselves, and T by couple."""
+def hertz(setting: Setting, state: State, force: Array) -> tuple[Array, Array]:
+    """How contacts yield by themselves (m2/N) and half widths (m) for forces per width (N/m), all of shape (p,)."""
     law, normal = setting.law, state.normal[:, None] / setting.turn
     tension, shear = law.wedge
-    along = law.inverse_modulus * (tension + (shear * normal.conj() ** 2).real)
     blunt = np.minimum(setting.found.curvature, 1 / (SHARPEST * law.pair.pinion.module))
-    T = smooth_influence(law, normal, state.arc, setting.couples).compliance
-    return _Yield(law.compliance, blunt, along, setting.distances(state.arc[:, :, None])[:, :, 0]), T
+    b = np.sqrt(2 * law.compliance * np.maximum(force, SMALL) / blunt)
+    along = law.inverse_modulus * (tension + (shear * normal.conj() ** 2).real)
+    y = np.maximum(setting.distances(state.arc[:, :, None])[:, :, 0], b[:, None])
+    return law.compliance * (0.5 - np.log(0.5 * b)) - (along * np.log(2 * y)).sum(axis=1), b
+
+
+def shared(couples: Couplings, T: Array, own: Array, overlap: Array, on: BoolArray, *, held: bool = False) -> Array:
+    """Forces per width (N/m) that take up overlaps (m), both of shape (p,), where contacts yield by `own` (m2/N) as
+    well as by T; `on` and `held` as in `unilateral`.
+    """
+    compliance = T.copy()
+    compliance[couples.own] += own
+    gap, first = (couples.vectors(values[:, None]) for values in (-overlap, on))
+    found, _ = unilateral(couples.matrices(compliance[:, None, None]), gap, first, held=held)
+    return couples.parts(found)[:, 0]
 
 
 def first_state(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Setting, State]:
     """What the iteration for all tooth pairs begins with at twists (rad) of the positions."""
-    setting, state = unloaded(law, np.unique(found.position), twists, found)
-    yields, T = _yields(setting, state)
+    setting, state = unloaded(law, twists, found)
+    T = smooth_compliance(setting, state)
     overlap = found.arm[:, 1] * (twists[found.position] - found.twist)
     force = np.maximum(overlap, 0.0) / reference_approach(law)
     for _ in range(FORCE_ROUNDS):
-        force = forces_of_overlaps(overlap, yields.at(force), T, setting.couples)
-    return setting, replace(state, force=force, variance=0.25 * yields.half_width(force) ** 2)
+        own, b = hertz(setting, state, force)
+        force = np.maximum(shared(setting.couples, T, own, overlap, overlap > 0), 0.0)
+    return setting, replace(state, force=force, variance=0.25 * b**2)
 
 
 def expected_twists(law: HalfPlanePair, torques: Array, touching: Touching) -> Array:
@@ -150,19 +139,18 @@ def expected_twists(law: HalfPlanePair, torques: Array, touching: Touching) -> A
 
 def _expected(law: HalfPlanePair, torques: Array, found: Touching) -> Array:
     count, arm, position = len(torques), found.arm[:, 1], found.position
-    touch = np.full(count, np.inf)
+    touch, twist = np.full((2, count), np.inf)
     np.minimum.at(touch, position, found.twist)
-    setting, state = unloaded(law, np.arange(count), touch, found)
-    couples, (yields, T) = setting.couples, _yields(setting, state)
+    setting, state = unloaded(law, touch, found)
+    couples, T = setting.couples, smooth_compliance(setting, state)
     force = torques[position] / (arm * law.width)
-    twist = np.full(count, np.inf)
-    alone = touch[position] + force * (yields.at(force) + T[couples.own]) / arm
+    alone = touch[position] + force * (hertz(setting, state, force)[0] + T[couples.own]) / arm
     np.minimum.at(twist, position, np.maximum(alone, touch[position]))
     for _ in range(TWIST_STEPS):
-        c, overlap = yields.at(force), arm * (twist[position] - found.twist)
-        force = forces_of_overlaps(overlap, c, T, couples)
-        weight = (force > 0) / c
-        rate = couples.solved(weight * arm, couples.diagonal(weight), T)
+        own, _ = hertz(setting, state, force)
+        overlap = arm * (twist[position] - found.twist)
+        force = shared(couples, T, own, overlap, overlap > 0)
+        rate = shared(couples, T, own, arm, force > 0, held=True)
         torque, slope = (couples.total(one * arm) * law.width for one in (force, rate))
         twist = np.maximum(twist + (torques - torque) / np.maximum(slope, 1e-300), touch + 0.1 * (twist - touch))
     return twist
@@ -184,8 +172,6 @@ SEARCHES = 12
 HELD_STEPS, TOLERANCE = 3, 1e-6
 #: What the twist is ahead for derivatives: share of its way since the touch, and at least (rad).
 AHEAD, LEAST_AHEAD = 1e-3, 1e-10
-#: Force per width (N/m) below which there is none.
-TINY = 1e-300
 
 
 def solve_half_plane(
@@ -218,106 +204,82 @@ def _kept(setting: Setting, state: State, positions: BoolArray) -> tuple[Setting
     if positions.all():
         return setting, state
     index = np.flatnonzero(positions[setting.couples.position])
-    return setting.take(index, setting.numbers[positions]), taken(state, index)
+    return setting.take(index), taken(state, index)
 
 
 def _joined(parts: Sequence[tuple[Setting, State]]) -> tuple[Setting, State]:
     """One after the other, in rising order."""
-    if len(parts) == 1:
-        return parts[0]
     settings, states = zip(*parts, strict=True)
-    whole = replace(
-        settings[0],
-        numbers=np.sort(np.concatenate([one.numbers for one in settings])),
-        found=joined([one.found for one in settings]),
-        turn=np.concatenate([one.turn for one in settings]),
-    )
-    order = np.lexsort((whole.found.pair, whole.found.position))
-    return whole.take(order), taken(joined(states), order)
+    found, turn = joined([one.found for one in settings]), np.concatenate([one.turn for one in settings])
+    order = np.lexsort((found.pair, found.position))
+    return Setting(settings[0].law, found, turn).take(order), taken(joined(states), order)
 
 
 def change(setting: Setting, state: State, made: Step) -> Array:
     """What a step changed, shape (m,): the forces in units of their sum, and weighted by them the places and widths of
     the contacts, in units of these.
     """
-    new, variance, couples = made.solution.force, made.variance, setting.couples
+    new, variance, couples = made.force, made.variance, setting.couples
     safe = np.where(variance > 0, variance, 1.0)
     moved = (variance > 0) * (0.5 * np.abs(made.place) / np.sqrt(safe) + np.abs(1 - state.variance / safe))
     all_ = np.abs(new - state.force) + MOVED * new * moved
-    return couples.total(all_) / np.maximum(couples.total(new), TINY)
+    return couples.total(all_) / np.maximum(couples.total(new), SMALL)
 
 
 def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> Positions:
     status, iterations = np.full(len(angles), "no_contact", dtype=STATUS), np.zeros(len(angles), dtype=np.int64)
-    names = (*SUMS, "tangent")
-    numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in names}
+    numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in (*SUMS, "tangent")}
     contacts: list[PairContacts] = []
-    open_ = [first_state(law, twists, found)] if len(found) else []  # positions to be solved, together or none
+    open_ = first_state(law, twists, found)  # positions to be solved
     for _ in range(ROUNDS):
-        done: list[tuple[Setting, State]] = []
-        for number in range(STEPS):
-            if not open_:
-                break
-            setting, state = open_.pop()
-            couples = setting.couples
-            made = step(setting, state, search=number < SEARCHES)
-            iterations[setting.numbers] += 1
-            unsettled = couples.total(~made.solution.settled | made.outgrown) > 0
-            changed = change(setting, state, made)
-            near = (changed <= NEAR) & ~unsettled & (number > 0)
-            bears = couples.total(made.solution.force) > 0
-            state = moved_on(setting, state, made, near=(changed <= WIDENED_BELOW)[couples.position])
-            if (near & bears).any():
-                done.append(_kept(setting, state, near & bears))
-            if not near.all():
-                open_.append(_kept(setting, state, ~near))
-        if not done:
+        near, open_ = _approached(*open_, iterations)
+        ended = _finished(*near, twists)
+        now, settled = near[0].numbers, ended.settled
+        iterations[now] += HELD_STEPS
+        status[now[settled]] = "converged"
+        for name, values in numbers.items():
+            values[now[settled]] = ended.sums[name][settled]
+        contacts.append(taken(ended.contacts, status[ended.contacts.position] == "converged"))
+        open_ = _joined([open_, ended.rest])
+        if settled.all():
             break
-        ended = _finished(*_joined(done), twists)
-        iterations[ended.numbers] += HELD_STEPS
-        solved = ended.numbers[ended.settled]
-        status[solved] = "converged"
-        for name in names:
-            numbers[name][solved] = ended.sums[name][ended.settled]
-        contacts.append(ended.contacts)
-        if ended.settled.all():
-            break
-        contacts[-1] = taken(ended.contacts, status[ended.contacts.position] == "converged")
-        open_ = [_joined([*open_, _kept(*ended.now, ~ended.settled)])]
-    for setting, _ in open_:
-        status[setting.numbers] = "not_converged"
-        for name in names:
-            numbers[name][setting.numbers] = np.nan
-    found_ = joined(contacts) if contacts else no_contacts()
+    status[open_[0].numbers] = "not_converged"
+    for values in numbers.values():
+        values[open_[0].numbers] = np.nan
+    every = joined(contacts)
     if len(contacts) > 1:
-        found_ = taken(found_, np.lexsort((found_.arc[:, 0], found_.pair, found_.position)))
-    return Positions(
-        pinion_angle=angles, twist=twists, status=status, iterations=iterations, contacts=found_, **numbers
-    )
+        every = taken(every, np.lexsort((every.arc[:, 0], every.pair, every.position)))
+    return Positions(pinion_angle=angles, twist=twists, status=status, iterations=iterations, contacts=every, **numbers)
+
+
+def _approached(setting: Setting, state: State, iterations: IntArray) -> tuple[tuple[Setting, State], ...]:
+    """Steps until positions are near their solution; those that are, and those that are not. Counts steps."""
+    near = []
+    for number in range(STEPS):
+        couples = setting.couples
+        made = step(setting, state, search=number < SEARCHES)
+        iterations[setting.numbers] += 1
+        unsettled = couples.total(~made.settled | made.outgrown) > 0
+        changed = change(setting, state, made)
+        there = (changed <= NEAR) & ~unsettled & (number > 0)
+        bears = couples.total(made.force) > 0
+        state = moved_on(setting, state, made, near=(changed <= WIDENED_BELOW)[couples.position])
+        near.append(_kept(setting, state, there & bears))
+        setting, state = _kept(setting, state, ~there)
+        if len(setting.found) == 0:
+            break
+    return _joined(near), (setting, state)
 
 
 class _Ended(NamedTuple):
-    """Positions after their last steps.
-
-    Attributes
-    ----------
-    numbers : ndarray, shape (m,)
-        Theirs.
-    settled : ndarray of bool, shape (m,)
-        Whether that is their solution.
-    sums : dict of str to ndarray, shape (m,)
-        Sums over their contacts.
-    contacts
-        Their loaded contacts.
-    now
-        Where they go on from.
+    """Positions after their last steps: which are solved, sums over their contacts, and loaded contacts; and from where
+    the others go on.
     """
 
-    numbers: IntArray
     settled: BoolArray
     sums: dict[str, Array]
     contacts: PairContacts
-    now: tuple[Setting, State]
+    rest: tuple[Setting, State]
 
 
 def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
@@ -330,12 +292,8 @@ def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
     np.minimum.at(touch, couples.position, found.twist)
     ahead = np.maximum(AHEAD * (twists[numbers] - touch), LEAST_AHEAD)
     further = setting.turn * np.exp(1j * ahead[couples.position, None] * np.arange(2))
-    both = replace(
-        setting,
-        numbers=np.concatenate([numbers, numbers + len(twists)]),
-        found=joined([found, replace(found, position=found.position + len(twists))]),
-        turn=np.concatenate([setting.turn, further]),
-    )
+    later = replace(found, position=found.position + len(twists))
+    both = Setting(setting.law, joined([found, later]), np.concatenate([setting.turn, further]))
     state = joined([start, start])
     made = step(both, state, search=False, held=True)
     for _ in range(HELD_STEPS - 1):
@@ -348,16 +306,16 @@ def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
     of_pairs = {name: values[here] for name, values in of_both.items()}
     sums = {name: couples.total(of_pairs[name]) for name in SUMS}
     sums["tangent"] = couples.total(of_both["torque_wheel"][on] - of_pairs["torque_wheel"]) / ahead
-    right = couples.total(~one[1].solution.settled) == 0
+    right = couples.total(~one[1].settled) == 0
     settled = right & (changed <= TOLERANCE) & (sums["tangent"] > 0)
     known = contact_rates(setting.law, one, two, ahead[couples.position])
     known["torque_wheel"] = of_pairs["torque_wheel"]
     contacts = contacts_of(setting, *one, known)
-    now, whole = (setting, after), completed(setting, *one)
+    rest, whole = _kept(setting, after, ~settled), completed(setting, *one)
     if whole is not None:  # tooth pairs have more contacts
+        rest = _joined([_kept(setting, after, ~settled & ~whole[2]), _kept(*whole)])
         settled &= ~whole[2]
-        now = _joined([_kept(setting, after, ~whole[2]), _kept(*whole)])
-    return _Ended(numbers, settled, sums, contacts, now)
+    return _Ended(settled, sums, contacts, rest)
 
 
 def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array) -> tuple[Array, IntArray, Array]:
@@ -371,10 +329,8 @@ def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array
     """
     met = law.teeth.touching(pinion_angles)
     met = met.take(np.flatnonzero(met.twist < twists[met.position]))
-    setting, state = unloaded(law, np.arange(len(twists)), twists, met)
-    couples, normal = setting.couples, state.normal[:, None] / setting.turn
-    arm = met.arm[:, 1] / law.pair.wheel.base_radius
-    found = smooth_influence(law, normal, state.arc, couples).compliance / law.width
-    found = found / (arm[couples.first] * arm[couples.second])
+    setting, state = unloaded(law, twists, met)
+    couples, arm = setting.couples, met.arm[:, 1] / law.pair.wheel.base_radius
+    found = smooth_compliance(setting, state) / (law.width * arm[couples.first] * arm[couples.second])
     upper, own = couples.step > 0, met.angle + met.pair * law.pair.mesh_cycle
     return own[couples.second[upper]], couples.step[upper], found[upper]

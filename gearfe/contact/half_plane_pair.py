@@ -8,11 +8,8 @@ the half-plane and the wedge between them. A load :math:`f_j n_j` at the arc t m
 Its part along :math:`n_i` acts between the panels of both (exactly integrated over each, so that two windows may lie
 side by side); its part across moves the face as a whole.
 
-The bumps' and the contacts' own widths enter H between two contacts as they do within one: with the variances v of the
-pressures and a^2/4 of the bumps, :math:`\tfrac12(v_i-\tfrac14a_i^2)\,\partial_{ss}H
-+\tfrac12(v_j-\tfrac14a_j^2)\,\partial_{tt}H`, here along the normals.
-
-Arrays are over the q couples of `.panels.Couplings.neighbours`, then over pinion and wheel.
+Arrays are over the q couples of `.panels.Couplings.beside`, a contact with itself among them, then over pinion and
+wheel.
 """
 
 from __future__ import annotations
@@ -194,7 +191,7 @@ def half_plane_pair(elastic: MeshingPair) -> HalfPlanePair:
     return HalfPlanePair(pair, ToothFlanks(pair, elastic.deviations), (pinion, wheel), elastic.width)
 
 
-def sideways(law: HalfPlanePair, couples: Couplings, normal: ComplexArray, arc: Array, y: Array) -> ComplexArray:
+def moved_beside(law: HalfPlanePair, couples: Couplings, normal: ComplexArray, arc: Array, y: Array) -> ComplexArray:
     """Displacement of the faces at the first contact across its normal, by a unit force per width along the normal of
     the second, shape (q, 2), tooth axes (m2/N).
 
@@ -205,7 +202,7 @@ def sideways(law: HalfPlanePair, couples: Couplings, normal: ComplexArray, arc: 
     arc, y : ndarray, shape (p, 2)
         Arcs of the contacts and their distances from the corners (m).
     """
-    i, j = couples.first[couples.neighbours], couples.second[couples.neighbours]
+    i, j = couples.first, couples.second
     tension, shear = law.wedge
     apart = np.maximum(np.abs(arc[i] - arc[j]), LEAST_DISTANCE)
     wedge = (tension * normal[j] + shear * normal[j].conj()) * np.log(y[i] + y[j])
@@ -216,8 +213,8 @@ def sideways(law: HalfPlanePair, couples: Couplings, normal: ComplexArray, arc: 
 def panel_influence(
     law: HalfPlanePair, couples: Couplings, normal: ComplexArray, arcs: Array, widths: Array, y: Array
 ) -> Array:
-    """Displacement of each face into its material at the first contact's panels, for pressures on the second's,
-    shape (q, 2, n, n) (m/Pa).
+    """Displacement of each face into its material at the first contact's panels, for pressures on the second's, but for
+    the half-plane's by the contact's own, shape (q, 2, n, n) (m/Pa).
 
     Parameters
     ----------
@@ -226,17 +223,19 @@ def panel_influence(
     widths : ndarray, shape (p, n)
         Of the panels (m).
     """
-    i, j = couples.first[couples.neighbours], couples.second[couples.neighbours]
-    if len(i) == 0:
-        return np.zeros((0, 2, arcs.shape[2], arcs.shape[2]))
+    i, j = couples.first, couples.second
     tension, shear = law.wedge
-    turned = normal[i] * normal[j].conj()
-    half = 0.5 * widths[j][:, None, None, :]
-    apart = arcs[i][..., None] - arcs[j][:, :, None]
-    plane = (2 / np.pi * turned.real)[..., None, None] * (log_integral(apart + half) - log_integral(apart - half))
-    across = tension * turned.real + (shear * (normal[i] * normal[j]).conj()).real
-    wedge = across[..., None, None] * np.log(y[i][..., None] + y[j][:, :, None]) * (2 * half)
-    return np.asarray(-law.inverse_modulus[:, None, None] * (plane + wedge))
+    across = tension * (normal[i] * normal[j].conj()).real + (shear * (normal[i] * normal[j]).conj()).real
+    factor = -(law.inverse_modulus * across)[..., None, None] * widths[j][:, None, None]
+    made: Array = np.log(y[i][..., None] + y[j][:, :, None]) * factor
+    other = np.flatnonzero(i != j)
+    if len(other):
+        i, j = i[other], j[other]
+        plane = -2 / np.pi * law.inverse_modulus * (normal[i] * normal[j].conj()).real
+        half = 0.5 * widths[j][:, None, None]
+        apart = arcs[i][..., None] - arcs[j][:, :, None]
+        made[other] += plane[..., None, None] * (log_integral(apart + half) - log_integral(apart - half))
+    return made
 
 
 def opened(
@@ -251,29 +250,11 @@ def opened(
         Arcs (m), shape (p, 2), forces per width (N/m) and variances of the pressures (m2), shape (p,).
     """
     arc, force, variance = contacts
-    i, j = couples.first[couples.neighbours], couples.second[couples.neighbours]
+    other = couples.first != couples.second
+    i, j = couples.first[other], couples.second[other]
     half = np.maximum(2 * np.sqrt(variance[j]), LEAST_DISTANCE)[:, None, None]
     turned = (normal[i] * normal[j].conj()).real * law.inverse_modulus * force[j][:, None]
     made = np.zeros((len(arcs), arcs.shape[2]))
     far = mean_log(arcs[i] - arc[j][:, :, None], half) * turned[:, :, None]
     np.add.at(made, i, -2 / np.pi * far.sum(axis=1))
     return made
-
-
-def widths_in_smooth(couples: Couplings, normal: ComplexArray, bends: ComplexArray, excess: Array) -> Array:
-    """What the widths add to the displacement of the first contact's faces along n by a unit force per width on the
-    second, shape (q, 2) (m2/N).
-
-    Parameters
-    ----------
-    bends : ndarray of complex, shape (c, 2)
-        Curvature of the displacement of each couple's first face, `Smooth.moved`.
-    excess : ndarray, shape (p, 2)
-        Variance of the pressure less that of the bumps (m2).
-    """
-    there = couples.neighbours
-    i, j = couples.first[there], couples.second[there]
-    back = couples.couple(j, i)
-    at_first = excess[i] * (bends[there] * normal[i].conj()).real
-    at_second = excess[j] * (bends[back] * normal[j].conj()).real
-    return np.asarray(0.5 * (at_first + at_second))

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from .flank import Flank, edge_shapes
 from .flank_compliance import FlankCompliance
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import Setting, State, Step, cross
-from .panels import PANELS
 from .position import FlankLoads, taken
 
 #: Sums over the contacts of a position.
@@ -88,20 +86,10 @@ class PairContacts:
         )
 
 
-def no_contacts() -> PairContacts:
-    """None."""
-    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(("arc", "arc_rate"), (0, 2))
-    shapes |= dict.fromkeys(("x", "width", "pressure"), (0, PANELS))
-    shapes |= dict.fromkeys(("panel_arc", "panel_radius"), (0, 2, PANELS))
-    kinds: dict[str, Any] = {"position": np.int64, "pair": np.int64, "point": complex, "normal": complex}
-    names = [f.name for f in fields(PairContacts)]
-    return PairContacts(**{name: np.zeros(shapes.get(name, (0,)), kinds.get(name, float)) for name in names})
-
-
 def pair_sums(setting: Setting, state: State, made: Step) -> dict[str, Array]:
     """What each contact adds to the sums over its position (N m, N m, N m, J)."""
     law, normal, centre = setting.law, state.normal, _centres(state, made)
-    force = made.solution.force * law.width
+    force = made.force * law.width
     wheel = setting.tables.at(_material(made)[:, :, None])[0][:, 1, 0] * setting.turn[:, 1]
     return {
         "torque_wheel": -force * cross(centre - law.hub[1], normal),
@@ -123,21 +111,21 @@ def _material(made: Step) -> Array:
 
 def contacts_of(setting: Setting, state: State, made: Step, known: dict[str, Array]) -> PairContacts:
     """The contacts of a step that carry load; `known`, of all: the wheel's torques, and what `contact_rates` gives."""
-    law, index = setting.law, np.flatnonzero(made.solution.force > 0)
+    law, index = setting.law, np.flatnonzero(made.force > 0)
     if len(index) < len(setting.found):
         setting, state, made = setting.take(index), taken(state, index), taken(made, index)
     found = setting.found
     return PairContacts(
         position=found.position,
         pair=found.pair,
-        force=made.solution.force * law.width,
+        force=made.force * law.width,
         point=_centres(state, made),
         normal=state.normal,
         arc=_material(made),
         half_width=2 * np.sqrt(made.variance),
         x=made.x - made.place[:, None],
         width=made.width,
-        pressure=made.solution.pressure,
+        pressure=made.pressure,
         panel_arc=made.arcs,
         panel_radius=np.abs(setting.tables.at(made.arcs)[0]),
         **{name: values[index] for name, values in known.items()},
@@ -151,7 +139,7 @@ def contact_rates(
     (state, one), (state_on, two) = here, ahead
     wider = np.divide(two.variance, one.variance, out=np.ones(len(by)), where=one.variance > 0)
     return {
-        "force_rate": (two.solution.force - one.solution.force) * law.width / by,
+        "force_rate": (two.force - one.force) * law.width / by,
         "normal_rate": np.angle(state_on.normal / state.normal) / by,
         "growth": 0.5 * (wider - 1) / by,
         "arc_rate": (_material(two) - _material(one)) / by[:, None],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,18 +10,17 @@ import numpy as np
 from ..gear.flank_curve import LOOK, WAY, Faces, FlankTables, windows
 from ..gear.touching import Touching
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from .half_plane_pair import HalfPlanePair, opened, panel_influence, sideways, widths_in_smooth
+from .half_plane_pair import HalfPlanePair, moved_beside, opened, panel_influence
 from .panels import (
     LEAST_DISTANCE,
     MIDDLES,
     PANELS,
     WIDTHS,
     Couplings,
-    Pressed,
     couplings,
     first_guess,
     influence,
-    pressed,
+    unilateral,
 )
 from .position import taken
 
@@ -47,8 +46,6 @@ class Setting:
     ----------
     law
         The pair.
-    numbers : ndarray, shape (m,)
-        Of the positions, in rising order.
     found
         Where the rigid flanks of the contacts' tooth pairs first touch, sorted by position, pair and place.
     turn : ndarray of complex, shape (p, 2)
@@ -56,9 +53,13 @@ class Setting:
     """
 
     law: HalfPlanePair
-    numbers: IntArray
     found: Touching
     turn: ComplexArray
+
+    @cached_property
+    def numbers(self) -> IntArray:
+        """Numbers of the positions, rising, shape (m,)."""
+        return np.unique(self.found.position)
 
     @cached_property
     def couples(self) -> Couplings:
@@ -79,11 +80,9 @@ class Setting:
         """Distances y (m) of the faces at arcs (m) of shape (p, 2, n) from their corners."""
         return np.maximum(np.abs(self.tables.points(arcs) - self.corner[:, :, None]), LEAST_DISTANCE)
 
-    def take(self, contacts: IntArray, numbers: IntArray | None = None) -> Setting:
-        """Only some of the contacts, in the positions `numbers` or in all."""
-        numbers = self.numbers if numbers is None else numbers
-        found = taken(self.found, contacts)
-        return replace(self, numbers=numbers, found=found, turn=self.turn[contacts])
+    def take(self, contacts: IntArray) -> Setting:
+        """Only some of the contacts."""
+        return Setting(self.law, taken(self.found, contacts), self.turn[contacts])
 
 
 @dataclass(frozen=True)
@@ -123,21 +122,19 @@ class State:
 
 @dataclass(frozen=True)
 class Smooth:
-    """Influence of the loads of p contacts along n on the smooth displacements of the faces, in c couples.
+    """Influence of the loads of contacts along n on the smooth displacements of the faces, in c couples.
 
     Attributes
     ----------
-    values : ndarray, shape (p, 2, k)
-        Shape functions of the stations at the arcs.
-    moved : ndarray of complex, shape (c, 2, 3)
-        Displacement, its slope and curvature of the first face of each couple by a unit force per width on the second,
-        tooth axes (m2/N, m/N, 1/N).
+    moved, slope : ndarray of complex, shape (c, 2)
+        Displacement and its slope of the first faces of each couple by a unit force per width on the second, tooth axes
+        (m2/N, m/N).
     compliance : ndarray, shape (c,)
         T = w n H n (m2/N).
     """
 
-    values: Array
     moved: ComplexArray
+    slope: ComplexArray
     compliance: Array
 
 
@@ -147,8 +144,12 @@ class Step:
 
     Attributes
     ----------
-    solution
-        Pressures and forces.
+    pressure : ndarray, shape (p, n)
+        On the panels (Pa).
+    force : ndarray, shape (p,)
+        Force per width (N/m).
+    settled : ndarray of bool, shape (p,)
+        Whether it was found which panels of the position bear.
     low, high : ndarray, shape (p,)
         Ends of the windows (m).
     outgrown : ndarray of bool, shape (p,)
@@ -167,7 +168,9 @@ class Step:
         Elastic energy of each contact per width (J/m); 0 while windows are searched for.
     """
 
-    solution: Pressed
+    pressure: Array
+    force: Array
+    settled: BoolArray
     low: Array
     high: Array
     outgrown: BoolArray
@@ -187,14 +190,25 @@ def cross(a: ComplexArray, b: ComplexArray) -> Array:
     return np.asarray((np.conj(a) * b).imag)
 
 
-def smooth_influence(law: HalfPlanePair, normal: ComplexArray, arc: Array, couples: Couplings) -> Smooth:
-    """H at the arcs (m) and along the normals (tooth axes) of all contacts, both of shape (p, 2)."""
+def smooth_influence(
+    law: HalfPlanePair, couples: Couplings, normal: ComplexArray, arc: Array, variance: Array
+) -> Smooth:
+    r"""H at the arcs (m) and along the normals (tooth axes) of all contacts, both of shape (p, 2).
+
+    The bumps average over their widths, the contacts have widths of their own: with the variances v of the pressures
+    (m2), shape (p,), and a^2/4 of the bumps, H on one tooth is more by
+    :math:`\tfrac12(v_i-\tfrac14a_i^2)\,\partial_{ss}H+\tfrac12(v_j-\tfrac14a_j^2)\,\partial_{tt}H` along the normals.
+    """
     shapes = law.shapes.at(arc)
     values = shapes[:, :, 0]
     at_stations = answers(law, values, normal, couples)
     moved = (shapes.take(couples.first, axis=0) @ at_stations.view(float)).view(complex)[..., 0]
-    compliance = (moved[:, :, 0] * normal.take(couples.first, axis=0).conj()).real.sum(axis=1)
-    return Smooth(values, moved, compliance)
+    excess = variance[:, None] - np.einsum("pgk,gk->pg", values, law.bump_squares)
+    along = normal.take(couples.first, axis=0)
+    bent = moved[:, :, 2] * excess.take(couples.first, axis=0) * (couples.step == 0)[:, None]
+    half = 0.5 * (bent * along.conj()).real
+    here = moved[:, :, 0] + bent + along * (half.take(couples.back, axis=0) - half)
+    return Smooth(here, moved[:, :, 1], (here * along.conj()).real.sum(axis=1))
 
 
 def answers(law: HalfPlanePair, values: Array, normal: ComplexArray, couples: Couplings) -> ComplexArray:
@@ -233,27 +247,16 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     """
     law, couples, tables, corner = setting.law, setting.couples, setting.tables, setting.corner
     normal, force = state.normal[:, None] / setting.turn, state.force
-    smooth = smooth_influence(law, normal, state.arc, couples)
-    tension, shear = law.wedge
-    shear = shear * normal.conj() ** 2
+    beside = couples.beside
+    smooth = smooth_influence(law, couples, normal, state.arc, state.variance)
     y, far = _distances(setting, state.arc)
-    load = force[:, None] * SIGN
-    displaced = np.add.reduceat(smooth.moved * (force.take(couples.second)[:, None] * SIGN)[..., None], couples.starts)
-    # the contact's own width, and that of the bumps
-    bend = smooth.moved[couples.own, :, 2] * load
-    excess = state.variance[:, None] - np.einsum("pgk,gk->pg", smooth.values, law.bump_squares)
-    wider = excess * bend
-    # across n the wedge moves the faces as a whole: n W along the tangent -i n
-    edge = law.inverse_modulus * shear.imag * np.log(2 * y) * load * (-1j * normal)
-    beside = couples.neighbours
-    if len(beside):
-        i, j = couples.first[beside], couples.second[beside]
-        np.add.at(edge, i, sideways(law, couples, normal, state.arc, y) * load[j])
-        across = widths_in_smooth(couples, normal, smooth.moved[:, :, 2], excess)
-        np.add.at(wider, i, across * load[j] * normal[i])
+    load = (force[:, None] * SIGN).take(couples.second, axis=0)
+    displaced, stretch = couples.sums(smooth.moved * load), couples.sums(smooth.slope * load)
+    load = (force[:, None] * SIGN).take(beside.second, axis=0)
+    displaced += beside.sums(moved_beside(law, beside, normal, state.arc, y) * load)
     turn = setting.turn / state.normal[:, None]
-    offset = (law.hub - state.centre[:, None]) / state.normal[:, None] + turn * (displaced[:, :, 0] + edge + wider)
-    faces = Faces(turn, offset, displaced[:, :, 1], state.arc)
+    offset = (law.hub - state.centre[:, None]) / state.normal[:, None] + turn * displaced
+    faces = Faces(turn, offset, stretch, state.arc)
 
     low, high, found = state.low, state.high, None
     if search:
@@ -264,8 +267,8 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
         look = np.minimum(np.maximum(scale[:, None] * LOOK, reach[0][:, None]), reach[1][:, None])
         arcs, heights, _ = faces.heights(tables, look)
         gap = heights[:, 1] - heights[:, 0]
-        if len(beside):
-            gap += opened(law, couples, normal, (state.arc, force, state.variance), arcs)
+        if len(beside.first) > len(force):
+            gap += opened(law, beside, normal, (state.arc, force, state.variance), arcs)
         found = windows(look, heights, gap, state.reach * law.compliance * floor)
         low, high = found.low, np.maximum(found.high, found.low + 2e-4 * scale)
     half = 0.5 * (high - low)
@@ -278,38 +281,51 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     if law.kinks[0].shape[1]:
         gap += _mean_over_kinks(setting, arcs, width)
     y = np.maximum(np.abs(points[:, :, :PANELS] - corner[:, :, None]), LEAST_DISTANCE)
-    along = law.inverse_modulus * (tension + shear.real)
-    edges = np.log(y[:, :, :, None] + y[:, :, None, :]) * (-along[:, :, None, None] * width[:, None, None, :])
-    K = influence(half, law.compliance) + edges[:, 0] + edges[:, 1]
-    shared = panel_influence(law, couples, normal, arcs, width, y)
+    local = panel_influence(law, beside, normal, arcs, width, y)
+    blocks = (smooth.compliance[:, None] * width.take(couples.second, axis=0))[:, None].repeat(PANELS, axis=1)
+    blocks[couples.step == 0] += local[:, 0] + local[:, 1]
+    blocks[couples.own] += influence(half, law.compliance)
+    K = couples.matrices(blocks)
     bearing = state.bearing if state.bearing.any() else first_guess(gap)
-    both = shared[:, 0] + shared[:, 1]
-    solution = pressed(K, both, gap, width, smooth.compliance, force, couples, bearing, held=held)
+    free = gap - couples.sums(smooth.compliance * force.take(couples.second))[:, None]  # the gap holds these forces
+    pressure, settled = unilateral(K, couples.vectors(free), couples.vectors(bearing), held=held)
 
-    p, loaded = solution.pressure, solution.force > 0
-    shares = p * width / np.where(loaded, solution.force, 1.0)[:, None]
+    p = couples.parts(pressure)
+    force = (p * width).sum(axis=1)
+    loaded = force > 0
+    shares = p * width / np.where(loaded, force, 1.0)[:, None]
     place = (shares * x).sum(axis=1)
     variance = (shares * ((x - place[:, None]) ** 2 + width**2 / 12)).sum(axis=1)
     between = 0.5 * (p[:, 1:] + p[:, :-1])
     # both deformed faces have the same slope; the one further from its edges changes less with where it is taken
-    into = (edges @ p[:, None, :, None])[..., 0]
-    if len(beside):
-        np.add.at(into, couples.first[beside], (shared @ p[couples.second[beside], None, :, None])[..., 0])
+    into = beside.sums((local @ p.take(beside.second, axis=0)[:, None, :, None])[..., 0])
     deformed = heights - WAY[:, None] * into
     middle = (far[:, :, None] * deformed).sum(axis=1)
     area = between @ _BETWEEN
     slope = (between * (middle[:, 1:] - middle[:, :-1])).sum(axis=1) / np.where(area > 0, half * area, 1.0)
     outgrown, energy = np.zeros(len(p), dtype=bool), np.zeros(len(p))
     if found is None:
-        energy = 0.5 * (
-            (p * width * solution.approach).sum(axis=1)
-            + solution.force * couples.times(smooth.compliance, solution.force)
-            + ((wider * normal.conj()).real * load).sum(axis=1)
-        )
+        energy = 0.5 * (p * width * couples.parts((K @ pressure[..., None])[..., 0])).sum(axis=1)
     else:
         place, slope = np.where(loaded, place, found.nearest), np.where(loaded, slope, found.mean_slope)
         outgrown = ((p[:, 0] > 0) & (low > reach[0])) | ((p[:, -1] > 0) & (high < reach[1]))
-    return Step(solution, low, high, outgrown, x, width, arcs, arc, height, place, variance, slope, energy)
+    return Step(
+        p,
+        force,
+        settled[couples.position],
+        low,
+        high,
+        outgrown,
+        x,
+        width,
+        arcs,
+        arc,
+        height,
+        place,
+        variance,
+        slope,
+        energy,
+    )
 
 
 def _mean_over_kinks(setting: Setting, arcs: Array, width: Array) -> Array:
@@ -335,7 +351,7 @@ def moved_on(setting: Setting, state: State, made: Step, *, near: BoolArray | bo
 
     Windows grow only `near` the solution, so that they do not depend on the way to it.
     """
-    solution, place = made.solution, made.place
+    place = made.place
     arc = made.arc + place[:, None] * WAY
     turned = 1 + 1j * made.slope
     return State(
@@ -343,10 +359,10 @@ def moved_on(setting: Setting, state: State, made: Step, *, near: BoolArray | bo
         normal=state.normal * turned / np.abs(turned),
         arc=np.minimum(np.maximum(arc, setting.tables.low[:, :, 0]), setting.tables.high[:, :, 0]),
         ends=state.ends,
-        force=solution.force,
+        force=made.force,
         variance=made.variance,
         low=made.low - place,
         high=made.high - place,
-        bearing=solution.pressure > 0,
+        bearing=made.pressure > 0,
         reach=np.where(made.outgrown & near, WIDER * state.reach, state.reach),
     )

@@ -1,15 +1,13 @@
 r"""Unilateral pressure on panels, for all contacts of many positions at once.
 
 Each contact has n panels over its window; the pressure p (N/m2) is constant on each. With the gap g that the faces
-would have without their local deformation, the influence K of the panels on each other, of all contacts of one tooth
-pair, and the compliance T between the forces per width :math:`F=\int p` of the contacts of one position,
+would have without these pressures, and the influence K of all panels of one position on each other,
 
 .. math::
-    p \ge 0, \qquad g + K p + y \ge 0, \qquad p\,(g + K p + y) = 0, \qquad y = T (F - F_0),
+    p \ge 0, \qquad g + K p \ge 0, \qquad p\,(g + K p) = 0 .
 
-where the gap holds the forces F_0 already. On the set of panels that bear, every tooth pair of z contacts gives their
-F = c - S y with 1 + z right sides of one matrix, and the few forces of a position follow from a system of their own
-size.
+On the panels that bear the gap is closed; which bear is found by taking out those that pull and letting in those that
+overlap, until none does.
 
 **Surfaces.** A line load f per width at t moves the surface of a half-plane at s by :math:`-\tfrac{2}{\pi
 E'}\ln|s-t|\,f` plus a constant, with :math:`E' = E/(1-\nu^2)` in plane strain and E in plane stress (Flamant); at the
@@ -31,7 +29,7 @@ sharp tips by at most 0.006 %: left out.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -90,7 +88,7 @@ class Couplings:
     position, slot : ndarray, shape (p,)
         Position of each contact, and its number within the position.
     first, second : ndarray, shape (c,)
-        The contacts i and j of each couple.
+        The contacts i and j of each couple, in rising order.
     step : ndarray, shape (c,)
         Tooth pair's number of i less that of j: 0 for contacts of one tooth pair.
     positions, slots
@@ -111,66 +109,53 @@ class Couplings:
         return int(np.abs(self.step).max(initial=0))
 
     @cached_property
-    def starts(self) -> IntArray:
-        """Where the couples of each first contact start, shape (p,)."""
-        return np.searchsorted(self.first, np.arange(len(self.position)))
-
-    @cached_property
     def own(self) -> IntArray:
         """Couple of each contact with itself, shape (p,)."""
         return np.flatnonzero(self.first == self.second)
 
     @cached_property
-    def neighbours(self) -> IntArray:
-        """Couples of different contacts of one tooth pair, shape (q,)."""
-        return np.flatnonzero((self.step == 0) & (self.first != self.second))
+    def back(self) -> IntArray:
+        """The couple (j, i) of each couple (i, j), shape (c,)."""
+        return np.lexsort((self.first, self.second))
 
     @cached_property
-    def groups(self) -> list[IntArray]:
-        """Contacts of each tooth pair, an array of shape (pairs, z) for every number z of them."""
-        if len(self.neighbours) == 0:
-            return [np.arange(len(self.position))[:, None]]
-        together = self.step == 0
-        first, second = self.first[together], self.second[together]
-        counts = np.bincount(first)
-        leads = second[np.searchsorted(first, np.arange(len(counts)))] == np.arange(len(counts))
-        return [second[(counts == z)[first] & leads[first]].reshape(-1, z) for z in np.unique(counts)]
+    def starts(self) -> IntArray:
+        """Where the couples of each first contact start, shape (p,)."""
+        return np.searchsorted(self.first, np.arange(len(self.position)))
 
     @cached_property
-    def dense(self) -> tuple[IntArray, IntArray]:
-        """Places of contacts and couples among vectors and matrices of all slots, shapes (p,) and (c,)."""
-        row = self.position * self.slots + self.slot
-        return row, row[self.first] * self.slots + self.slot[self.second]
-
-    def couple(self, first: IntArray, second: IntArray) -> IntArray:
-        """Numbers of couples of contacts."""
-        return np.asarray(self.starts.take(first) + self.slot.take(second))
+    def beside(self) -> Couplings:
+        """The couples of contacts of one tooth pair alone."""
+        same = self.step == 0
+        return replace(self, first=self.first[same], second=self.second[same], step=self.step[same])
 
     def total(self, of_contacts: Array | BoolArray) -> Array:
         """Sums over the contacts of each position, shape (positions,)."""
         return np.bincount(self.position, of_contacts, self.positions).astype(float, copy=False)
 
-    def diagonal(self, of_contacts: Array) -> Array:
-        """The diagonal matrix with these entries, by couple, shape (c,)."""
-        return np.asarray(np.where(self.first == self.second, of_contacts[self.first], 0.0), dtype=float)
+    def sums(self, of_couples: Array) -> Array:
+        """Sums over the couples of each first contact, shape (p, ...)."""
+        return np.asarray(np.add.reduceat(of_couples, self.starts))
 
-    def times(self, matrix: Array, vector: Array) -> Array:
-        """sum_j matrix_ij vector_j for each contact i; `matrix` has one entry a couple, shape (c,)."""
-        return np.bincount(self.first, matrix * vector.take(self.second), len(self.position)).astype(float, copy=False)
+    def matrices(self, blocks: Array) -> Array:
+        """Matrices of the positions, shape (positions, z n, z n) with z slots, of blocks by couple, shape (c, n, n)."""
+        z, n = self.slots, blocks.shape[1]
+        made = np.zeros((self.positions, z, n, z, n))
+        made[self.position[self.first], self.slot[self.first], :, self.slot[self.second]] = blocks
+        return made.reshape(self.positions, z * n, z * n)
 
-    def solved(self, free: Array, stiffness: Array, matrix: Array) -> Array:
-        """F with F + stiffness (matrix F) = free within each position, shape (p,); both matrices by couple."""
-        if self.slots == 1:
-            return np.asarray(free / (1.0 + stiffness * matrix))
-        size, row, place = self.slots, *self.dense
-        if len(place) == self.positions * size * size:  # no slot is empty
-            S, T, right = stiffness, matrix, free
-        else:
-            S, T, right = (np.zeros(self.positions * size**power) for power in (2, 2, 1))
-            S[place], T[place], right[row] = stiffness, matrix, free
-        system = S.reshape(-1, size, size) @ T.reshape(-1, size, size)
-        system.reshape(-1, size * size)[:, :: size + 1] += 1.0
-        return np.linalg.solve(system, right.reshape(-1, size, 1)).ravel().take(row)
+    def vectors(self, of_contacts: Array) -> Array:
+        """Vectors of the positions, shape (positions, z n), of parts by contact, shape (p, n); 0 in empty slots."""
+        n = of_contacts.shape[1]
+        made = np.zeros((self.positions, self.slots, n), dtype=of_contacts.dtype)
+        made[self.position, self.slot] = of_contacts
+        return made.reshape(self.positions, self.slots * n)
+
+    def parts(self, vectors: Array) -> Array:
+        """The parts by contact, shape (p, n), of vectors of the positions."""
+        n = vectors.shape[1] // self.slots
+        made: Array = vectors.reshape(self.positions, self.slots, n)[self.position, self.slot]
+        return made
 
 
 def couplings(position: IntArray, number: IntArray, positions: int) -> Couplings:
@@ -185,135 +170,48 @@ def couplings(position: IntArray, number: IntArray, positions: int) -> Couplings
     return Couplings(position, slot, first, second, number[first] - number[second], positions, slots)
 
 
-@dataclass(frozen=True)
-class Pressed:
-    """Solution of the unilateral problem.
-
-    Attributes
-    ----------
-    force : ndarray, shape (p,)
-        Force per width of each pair (N/m).
-    pressure : ndarray, shape (p, n)
-        On the panels (Pa).
-    approach : ndarray, shape (p, n)
-        K p (m).
-    settled : ndarray of bool, shape (p,)
-        Whether the set of panels that bear was found.
-    """
-
-    force: Array
-    pressure: Array
-    approach: Array
-    settled: BoolArray
-
-
 def influence(half: Array, compliance: float) -> Array:
     """K of half-planes on panels over windows of half width `half` (m), shape (p,), `compliance` = 2/pi sum 1/E'."""
     log = np.log(half)[:, None, None] * WIDTHS
     return np.asarray(compliance * half[:, None, None] * (LOGS - log))
 
 
-@dataclass(frozen=True)
-class _Group:
-    """Tooth pairs with z contacts each: the contacts, shape (P, z), and K of all their panels, shape (P, z n, z n)."""
-
-    contacts: IntArray
-    K: Array
-
-    def responses(self, on: BoolArray, gap: Array) -> Array:
-        """Pressures on the panels `on` for the gap and for an even approach in each contact, shape (P, z n, 1 + z)."""
-        (count, z), n, size = self.contacts.shape, gap.shape[1], self.K.shape[1]
-        right = np.zeros((count, size, 1 + z))
-        right[..., 0] = -gap.take(self.contacts, axis=0).reshape(count, size)
-        for k in range(z):
-            right[:, k * n : (k + 1) * n, 1 + k] = 1.0
-        bears = on.take(self.contacts, axis=0).reshape(count, size, 1)
-        system = np.where(bears & bears.swapaxes(1, 2), self.K, np.eye(size))
-        return np.asarray(np.linalg.solve(system, right * bears))
-
-
-def _groups(K: Array, between: Array, couples: Couplings) -> list[_Group]:
-    if len(couples.neighbours) == 0:
-        return [_Group(couples.groups[0], K)]
-    first, second = couples.first[couples.neighbours], couples.second[couples.neighbours]
-    n, made = K.shape[1], []
-    for contacts in couples.groups:
-        count, z = contacts.shape
-        whole = np.zeros((count, z, n, z, n))
-        row, place = np.full((2, len(K)), -1)
-        row[contacts], place[contacts] = np.arange(count)[:, None], np.arange(z)
-        whole[row[contacts], place[contacts], :, place[contacts]] = K[contacts]
-        mine = row[first] >= 0
-        whole[row[first[mine]], place[first[mine]], :, place[second[mine]]] = between[mine]
-        made.append(_Group(contacts, whole.reshape(count, z * n, z * n)))
-    return made
-
-
-def pressed(
-    K: Array,
-    between: Array,
-    gap: Array,
-    widths: Array,
-    T: Array,
-    carried: Array,
-    couples: Couplings,
-    bearing: BoolArray,
-    *,
-    held: bool = False,
-) -> Pressed:
-    """Solve the unilateral problem of p contacts with n panels each.
+def unilateral(K: Array, gap: Array, bearing: BoolArray, *, held: bool = False) -> tuple[Array, BoolArray]:
+    """Solve the unilateral problems of m positions with n unknowns each.
 
     Parameters
     ----------
-    K : ndarray, shape (p, n, n)
-        Approach of the panels' middles for pressures on the panels of the same contact (m/Pa).
-    between : ndarray, shape (q, n, n)
-        The same between contacts of one tooth pair, in the order of `Couplings.neighbours`.
-    gap, widths : ndarray, shape (p, n)
-        Gap at the panels' middles and widths of the panels (m).
-    T : ndarray, shape (c,)
-        Compliance between the contacts (m2/N), by couple.
-    carried : ndarray, shape (p,)
-        F_0, the forces per width (N/m) that the gap holds.
-    bearing : ndarray of bool, shape (p, n)
+    K : ndarray, shape (m, n, n)
+        Approach of the panels' middles by pressures on all panels (m/Pa).
+    gap : ndarray, shape (m, n)
+        g (m).
+    bearing : ndarray of bool, shape (m, n)
         First guess of the panels that bear.
     held
         Whether that is no guess but what bears.
+
+    Returns
+    -------
+    pressure : ndarray, shape (m, n)
+        p (Pa).
+    settled : ndarray of bool, shape (m,)
+        Whether the set of panels that bear was found.
     """
-    n, groups, on, responses = gap.shape[1], _groups(K, between, couples), bearing, []
-    y0 = -couples.times(T, carried)
-    pressure, approach, free, stiffness = np.empty_like(gap), np.empty_like(gap), np.empty(len(gap)), np.zeros(len(T))
-    changed: BoolArray = np.zeros(0, dtype=bool)
-    for number in range(1 if held else CHANGES):
-        for k, group in enumerate(groups):
-            part = group
-            if number == 0:
-                both = part.responses(on, gap)
-                responses.append(both)
-            else:
-                rows = np.flatnonzero(changed.take(group.contacts).any(axis=1))
-                if len(rows) == 0:
-                    continue
-                part = _Group(group.contacts[rows], group.K[rows])
-                responses[k][rows] = both = part.responses(on, gap)
-            (count, z), contacts = part.contacts.shape, part.contacts
-            forces = (widths.take(contacts, axis=0)[:, :, None] @ both.reshape(count, z, n, 1 + z))[:, :, 0]
-            free[contacts] = forces[:, :, 0]
-            stiffness[couples.couple(contacts[:, :, None], contacts[:, None])] = forces[:, :, 1:]
-        force = couples.solved(free - couples.times(stiffness, y0), stiffness, T)
-        y = couples.times(T, force) + y0
-        for group, both in zip(groups, responses, strict=True):
-            p = both[:, :, 0] - (both[:, :, 1:] @ y.take(group.contacts)[:, :, None])[:, :, 0]
-            pressure[group.contacts] = p.reshape(*group.contacts.shape, n)
-            approach[group.contacts] = (group.K @ p[:, :, None]).reshape(*group.contacts.shape, n)
+    pressure, settled, bearing = np.zeros_like(gap), np.zeros(len(gap), dtype=bool), bearing.copy()
+    open_, eye = np.arange(len(gap)), np.eye(gap.shape[1])
+    for _ in range(1 if held else CHANGES):
+        on, own, g = bearing[open_], K[open_], gap[open_]
+        system = np.where(on[:, :, None] & on[:, None], own, eye)
+        p = np.linalg.solve(system, np.where(on, -g, 0.0)[..., None])
+        approach, p = (own @ p)[..., 0], p[..., 0]
         bound = ROUNDING * np.abs(approach).max(axis=1, keepdims=True)
-        now = np.where(on, pressure > 0, gap + y[:, None] + approach < -bound)
-        changed = (now != on).any(axis=1)
-        if not changed.any():
+        now = np.where(on, p > 0, g + approach < -bound)
+        same = (now == on).all(axis=1)
+        pressure[open_], settled[open_], bearing[open_] = p, same, now
+        open_ = open_[~same]
+        if len(open_) == 0:
             break
-        on = now
-    # without a bearing panel the force is rounding
-    return Pressed(np.where(on.any(axis=1), force, 0.0), np.where(on, pressure, 0.0), approach, ~changed)
+    return pressure, settled
 
 
 def first_guess(gap: Array) -> BoolArray:
@@ -321,15 +219,3 @@ def first_guess(gap: Array) -> BoolArray:
     least = gap.min(axis=1, keepdims=True)
     end = gap[:, [0, -1]].min(axis=1, keepdims=True)
     return np.asarray(gap < least + 0.75 * (end - least))
-
-
-def forces_of_overlaps(overlap: Array, compliance: Array, T: Array, couples: Couplings) -> Array:
-    """Forces per width (N/m) >= 0 that take up overlaps (m) when contacts yield by `compliance` (m2/N) besides T."""
-    on = overlap > 0
-    force = np.zeros_like(overlap)
-    for _ in range(couples.slots + 1):
-        force = couples.solved(np.where(on, overlap / compliance, 0.0), couples.diagonal(on / compliance), T)
-        if (force >= 0).all():
-            break
-        on = on & (force > 0)
-    return np.maximum(force, 0.0)

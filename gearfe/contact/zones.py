@@ -57,7 +57,7 @@ def completed(setting: Setting, state: State, made: Step) -> tuple[Setting, Stat
         of them now; None where no pair does.
     """
     couples, found = setting.couples, setting.found
-    bearing = made.solution.pressure > 0
+    bearing = made.pressure > 0
     cut = {int(i): _split(state, made, int(i)) for i in np.flatnonzero(_stretches(bearing) > 1)}
     x, arcs, heights, gap = _gaps(setting, state)
     total = couples.total(state.force)
@@ -93,8 +93,8 @@ def _stretches(bearing: BoolArray) -> IntArray:
 def _split(state: State, made: Step, i: int) -> State:
     """The contact i cut in the middle of each hole of its pressure."""
     edges = 0.5 * (made.high[i] + made.low[i]) + 0.5 * (made.high[i] - made.low[i]) * EDGES
-    load = np.concatenate([[0.0], np.cumsum(made.solution.pressure[i] * made.width[i])])
-    on = np.concatenate([[False], made.solution.pressure[i] > 0, [False]])
+    load = np.concatenate([[0.0], np.cumsum(made.pressure[i] * made.width[i])])
+    on = np.concatenate([[False], made.pressure[i] > 0, [False]])
     first, end = np.flatnonzero(on[1:] & ~on[:-1]), np.flatnonzero(on[:-1] & ~on[1:])
     force = load[end] - load[first]
     half = 0.5 * (edges[end] - edges[first])
@@ -155,7 +155,7 @@ def _beside_ellipse(law: HalfPlanePair, state: State, made: Step, i: int, x: Arr
     """What the pressure of the contact i makes of the gap at places x (m) beside what an ellipse would (m)."""
     half = 0.5 * made.width[i]
     apart = x[:, None] - made.x[i]
-    logs = (log_integral(apart + half) - log_integral(apart - half)) @ made.solution.pressure[i]
+    logs = (log_integral(apart + half) - log_integral(apart - half)) @ made.pressure[i]
     return np.asarray(law.compliance * (state.force[i] * mean_log(x, _half_widths(state)[i]) - logs))
 
 

@@ -37,7 +37,7 @@ import numpy as np
 from ..contact.compliance import MeshingPair
 from ..contact.half_plane_pair import HalfPlanePair, half_plane_pair
 from ..contact.half_plane_result import PairContacts
-from ..contact.half_plane_step import SIGN, smooth_influence
+from ..contact.half_plane_step import smooth_influence
 from ..contact.laws import COARSENING
 from ..contact.panels import Couplings, couplings
 from ..contact.position import ANGLE_ROUNDING, Positions
@@ -104,8 +104,5 @@ def _energy(
     law: HalfPlanePair, couples: Couplings, force: Array, arc: Array, normal: ComplexArray, variance: Array
 ) -> Array:
     """Energy (J) of the smooth displacements of each position, shape (n,), for forces (N)."""
-    smooth = smooth_influence(law, normal, arc, couples)
-    own = smooth.moved[couples.own, :, 2] * SIGN * force[:, None]
-    excess = variance[:, None] - np.einsum("pgk,gk->pg", smooth.values, law.bump_squares)
-    wider = ((own * normal.conj()).real * SIGN * excess).sum(axis=1)
-    return couples.total(0.5 * force * (couples.times(smooth.compliance, force) + wider)) / law.width
+    T = smooth_influence(law, couples, normal, arc, variance).compliance
+    return couples.total(0.5 * force * couples.sums(T * force[couples.second])) / law.width
