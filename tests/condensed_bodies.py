@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from gearfe.contact.compliance import REACH, FarField, GearBody, MeshingPair, turn
-from gearfe.contact.element_batch import FirstContacts
+from gearfe.contact.compliance import GearBody, MeshingPair, turn
 from gearfe.contact.elements import solve_elements
 from gearfe.contact.flank import flank_of, normal_stress_rows
 from gearfe.contact.laws import ContactLaw, PairModel
-from gearfe.contact.position import Positions
+from gearfe.contact.position import FlankLoads, Positions
 
 from .verification.bodies import Bodies, ElasticBody
 
@@ -52,10 +51,9 @@ def condensed_body(body: ElasticBody, surface: str, held: Mapping[str, tuple[boo
     of_body = unknowns.ravel()  # node unknowns (2 n, 2 n + 1) of the body -> unknowns of the mesh
     stress = np.einsum("eqa,eaf->eqf", rows, moved[of_body[where]]).reshape(-1, len(surface_unknowns))
     none = np.zeros((len(surface_unknowns), 0))
-    far = FarField(none, np.zeros((len(stress), 0)), dict.fromkeys(range(-REACH, REACH + 1), none.T))
     return GearBody(
         mesh, flank, body.material, body.plane, body.thickness, moved[surface_unknowns], none, np.zeros((TEETH, 0, 0)),
-        stress, far, None, body.thickness,  # type: ignore[arg-type]
+        stress, np.zeros((len(stress), 0)), None, body.thickness,  # type: ignore[arg-type]
     )  # fmt: skip
 
 
@@ -92,18 +90,12 @@ def pressed_pair(lower: GearBody, upper: GearBody, law: ContactLaw, overlap: flo
 
 def pressed(pair: MeshingPair, low: float, high: float, pressure: Callable[[Array], Array]) -> Positions:
     """The pair solved from a guessed pressure (Pa) as a function of x between `low` and `high` (m)."""
-    ends = np.linspace(low, high, 201)
-    x = 0.5 * (ends[1:] + ends[:-1])
-    origin = float(pair.pinion.flank.points[:, 0].min())
-    arcs = []
+    origin, zero = float(pair.pinion.flank.points[:, 0].min()), np.zeros(1, dtype=np.int64)
+    loads = []
     for gear, tooth in ((0, 0), (1, -1)):
-        body = pair.bodies[gear]
-        placed = body.flank.points @ turn(pair.tooth_angle(gear, tooth, 0.0, 0.0)).T + pair.centre(gear)
-        along = placed[::2, 0] - origin
-        order = np.argsort(along)
-        arcs.append(np.interp(x, along[order], np.concatenate([[0.0], np.cumsum(body.flank.sizes)])[order]))
-    none = np.zeros(1, dtype=np.int64)
-    first = FirstContacts(
-        none, none, np.array([1j]), np.array([arcs]), pressure(x)[None], np.diff(ends)[None]
-    )  # fmt: skip
-    return solve_elements(pair, np.zeros(1), np.zeros(1), first)[0]
+        flank, axes = pair.bodies[gear].flank, turn(pair.tooth_angle(gear, tooth, 0.0, 0.0))
+        x = (flank.points @ axes.T + pair.centre(gear))[:, 0] - origin
+        load = np.where((low < x) & (x < high), pressure(x), 0.0) * np.abs(np.gradient(x)) * pair.width
+        force = (2 * gear - 1) * np.stack([0 * load, load], axis=1) @ axes
+        loads.append(FlankLoads(zero, zero + tooth, force.reshape(1, -1), force.reshape(1, -1)))
+    return solve_elements(pair, np.zeros(1), np.zeros(1), tuple(loads))[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearfe.contact.compliance import MeshingPair
-from gearfe.contact.elements import first_contacts, solve_elements
+from gearfe.contact.elements import solve_elements
 from gearfe.contact.laws import HalfPlane
 from gearfe.contact.position import Positions
 from gearfe.stiffness.positions import position_solver
@@ -17,8 +17,9 @@ def solve_positions(elastic: MeshingPair, angles, twists) -> Positions:
     solver, twists = position_solver(elastic), np.broadcast_to(twists, angles.shape)
     if isinstance(elastic.law, HalfPlane):
         return solver.solve(angles, twists, kept=np.arange(len(angles)))
-    contacts = solver.half_plane.solve(angles, twists).contacts
-    return solve_elements(elastic, angles, twists, first_contacts(solver.law.sides, contacts))
+    return solve_elements(
+        elastic, angles, twists, solver.half_plane.solve(angles, twists, np.arange(len(angles))).loads
+    )
 
 
 def solve_position(elastic: MeshingPair, angle: float, twist: float) -> Positions:

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from gearfe.contact.compliance import MeshingPair, gear_body
-from gearfe.contact.elements import first_contacts, solve_elements
+from gearfe.contact.elements import solve_elements
 from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.contact.laws import ContactLaw, Nitsche, PairModel, Penalty
 from gearfe.contact.position import Positions
+from gearfe.stiffness.positions import position_solver
 from gearfe.stiffness.sweep import elastic_pair
 
 from .contact_cases import IRON, STEEL, WIDTH, condensed, gears, meshes
@@ -104,15 +105,15 @@ def test_company_does_not_matter() -> None:
 
 @pytest.mark.parametrize("law", [Nitsche(), Penalty()], ids=["nitsche", "penalty"])
 def test_where_it_starts_does_not_matter(law: ContactLaw) -> None:
-    """From pressures half as large on a third of the width, half of that beside the place: the same solution."""
-    pair, angles = condensed("modified", 2.0, "strain", law), np.radians([2.0, 9.0, 20.0])
-    half_plane = half_plane_pair(pair)
-    contacts = solve_half_plane(half_plane, angles, 3 * TWIST).contacts
-    first = first_contacts(half_plane.sides, contacts)
-    middle = first.arc.mean(axis=2, keepdims=True)
-    beside = contacts.half_width[:, None, None] / 6 * np.array([1.0, -1.0])[:, None]
-    off = replace(first, arc=middle + beside + (first.arc - middle) / 3, pressure=0.5 * first.pressure)
-    one, other = (solve_elements(pair, angles, np.full(3, 3 * TWIST), start) for start in (first, off))
+    """From loads half as large, moved along both flanks by two edges away from each other: the same solution."""
+    pair, angles, twists = (
+        condensed("modified", 2.0, "strain", law),
+        np.radians([2.0, 9.0, 20.0]),
+        np.full(3, 3 * TWIST),
+    )
+    loads = position_solver(pair).half_plane.solve(angles, twists, kept=np.arange(3)).loads
+    off = [replace(one, force=0.5 * np.roll(one.force, 8, axis=1)) for one in loads]
+    one, other = (solve_elements(pair, angles, twists, start) for start in (loads, tuple(off)))
     for a, b in zip(one, other, strict=True):
         assert a.status == b.status == "converged"
         assert a.torque_wheel == pytest.approx(b.torque_wheel, rel=1e-8)

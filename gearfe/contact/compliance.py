@@ -20,6 +20,7 @@ are the same at every position.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -35,25 +36,6 @@ from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
 from .laws import DEFAULT_MODEL, ContactLaw, PairModel
 from .position import FlankLoads
-
-
-@dataclass(frozen=True)
-class FarField:
-    """What flank and neighbours do to each other through the cut sides, in r << b numbers (their smooth modes).
-
-    Attributes
-    ----------
-    flank : ndarray, shape (f, r)
-        Flank displacements for the modes of the cut sides.
-    stress : ndarray, shape (e q, r)
-        Normal stress for the same; no rows where no law asks for it.
-    driven : dict of int to ndarray, shape (r, f)
-        Step k -> modes of tooth k for flank forces on tooth 0 (1/N), for the few k that can matter.
-    """
-
-    flank: Array
-    stress: Array
-    driven: dict[int, Array]
 
 
 @dataclass(frozen=True)
@@ -74,12 +56,10 @@ class GearBody:
         X_k: displacements of the cut sides of tooth k for forces on the cut sides of tooth 0 (m/N).
     width
         Width of the contact (m): the mate may be narrower.
-    stress_own : ndarray, shape (e q, f)
-        Normal stress at the quadrature points for flank forces with the cut sides held (Pa/N), per area of contact: the
-        body's own times thickness/width, as a pressure on the width of the contact spreads over the thickness. No rows
-        where no law asks for it.
-    far : FarField
-        The same cyclic part in its numerical rank.
+    stress_own, stress_interface : ndarray, shapes (e q, f), (e q, b)
+        Normal stress at the quadrature points for the same two (Pa/N, Pa/m), per area of contact: the body's own times
+        thickness/width, as a pressure on the width of the contact spreads over the thickness. No rows where no law asks
+        for it.
     condensed
         The way back to the full field.
     """
@@ -93,7 +73,7 @@ class GearBody:
     interface: Array
     coupling: Array
     stress_own: Array
-    far: FarField
+    stress_interface: Array
     condensed: Condensed
     width: float
 
@@ -101,6 +81,17 @@ class GearBody:
     def teeth(self) -> int:
         """Number of teeth."""
         return self.mesh.teeth
+
+    def driven(self, step: int) -> Array:
+        """X_k P^T: displacements of the cut sides of the tooth `step` on, for flank forces, shape (b, f) (m/N)."""
+        k = step % self.teeth
+        if k not in self._driven:
+            self._driven[k] = self.coupling[k] @ self.interface.T
+        return self._driven[k]
+
+    @cached_property
+    def _driven(self) -> dict[int, Array]:
+        return {}
 
     @property
     def surface_modulus(self) -> float:
@@ -164,38 +155,8 @@ def gear_body(
         stress = condensed.on_retained((thickness / width * rows).reshape(len(every), -1), every)
         stress_own = stress[:, :f] @ own
         stress_interface = stress[:, :f] @ interface + stress[:, f:]
-    far = _far_field(interface, stress_interface, coupling)
-    return GearBody(
-        mesh,
-        flank,
-        material,
-        plane,
-        thickness,
-        own,
-        interface,
-        coupling,
-        stress_own,
-        far,
-        condensed,
-        width,
-    )
-
-
-#: Neighbours whose coupling is kept at hand: teeth in contact at the same time are never further apart.
-REACH = 12
-
-
-def _far_field(interface: Array, stress: Array, coupling: Array) -> FarField:
-    """Compress displacements and stresses onto the side motions that reach the flank (Saint-Venant: a dozen or two)."""
-    scale = np.linalg.norm(interface) / np.linalg.norm(stress) if len(stress) else 1.0
-    rows = np.concatenate([interface, stress * scale])
-    triangular = np.linalg.qr(rows, mode="r")
-    _, values, modes = np.linalg.svd(triangular, full_matrices=False)
-    basis = modes[values > 1e-13 * values[0]].T
-    flank, teeth = interface @ basis, len(coupling)
-    steps = range(-REACH, REACH + 1)
-    driven = dict(zip(steps, basis.T @ coupling[[k % teeth for k in steps]] @ basis @ flank.T, strict=True))
-    return FarField(flank, stress @ basis, driven)
+    stressed = stress_own, stress_interface
+    return GearBody(mesh, flank, material, plane, thickness, own, interface, coupling, *stressed, condensed, width)
 
 
 def _cyclic_compliance(stiffness: Array, teeth: int) -> Array:

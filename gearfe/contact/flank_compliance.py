@@ -40,6 +40,8 @@ from .panels import ELLIPSE_W, ELLIPSE_X, LEAST_DISTANCE, mean_log, wedge_tensor
 
 #: Half width of a bump, in elements and at least in modules; distance of two stations in half widths.
 BUMP_ELEMENTS, BUMP_MODULES, SPACING = 2.0, 0.2, 0.8
+#: Teeth whose coupling is kept at hand: two in contact at the same time are never further apart.
+REACH = 12
 #: Nearer to an end of the flank than this share of an element there is no station.
 TOO_NEAR = 0.75
 
@@ -177,8 +179,8 @@ def flank_compliance(gear: Gear, body: GearBody) -> FlankCompliance:
     corner, wedge = corner_of(curve)
     stations, bumps, nodal = _stations(body.flank, offset + curve.low, module)
     loads = np.kron(nodal, np.eye(2))
-    modes = loads @ body.far.flank
-    smooth = {step: modes @ (driven @ loads.T) for step, driven in body.far.driven.items()}
+    sides = loads @ body.interface
+    smooth = {step: sides @ body.coupling[step % body.teeth] @ sides.T for step in range(-REACH, REACH + 1)}
     made = FlankCompliance(curve, inverse_modulus, corner, wedge, stations - offset, bumps, smooth, offset)
     smooth[0] = smooth[0] + loads @ body.own @ loads.T + inverse_modulus / body.width * _local(made)
     return made

@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..contact.compliance import MeshingPair
-from ..contact.elements import first_contacts, solve_elements
+from ..contact.elements import solve_elements
 from ..contact.finite_strain import finite_strain_shares, with_shares
 from ..contact.half_plane import HalfPlanePair, expected_twists, half_plane_pair, solve_half_plane
 from ..contact.half_plane_result import flank_loads
@@ -202,12 +202,10 @@ class ElementSolver:
 
     def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
         """Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads."""
-        expected = self.half_plane.solve(angles, twists)
+        expected = self.half_plane.solve(angles, twists, kept=np.arange(len(angles)))
         loaded = expected.status == "converged"
         thin = loaded & (self.elements_per_contact(expected) < 1.0)
-        contacts = expected.contacts
-        first = first_contacts(self.law.sides, taken(contacts, ~thin[contacts.position]))
-        found = solve_elements(self.elastic, expected.pinion_angle, expected.twist, first)
+        found = solve_elements(self.elastic, angles, twists, expected.with_loads(~thin).loads)
         status = np.where(thin, "under_resolved", np.where(loaded, found.status, expected.status))
         iterations = np.where(loaded & ~thin, found.iterations, expected.iterations)
         return replace(found.with_status(status), iterations=iterations).with_loads(
