@@ -29,7 +29,11 @@ def condensed_body(body: ElasticBody, surface: str, held: Mapping[str, tuple[boo
     """Compliance of the boundary `surface` with some components of other boundaries held at zero."""
     chain = body.chain(surface)
     mesh: Any = SimpleNamespace(
-        points=body.points, triangles=body.triangles, contact_edges=lambda: chain, teeth=TEETH, boundaries={}
+        points=body.points,
+        triangles=body.triangles,
+        contact_edges=lambda: chain,
+        teeth=TEETH,
+        boundaries={"flank_left": chain[::-1, ::-1]},
     )
     flank = flank_of(mesh, points)
     bodies = Bodies((body,))

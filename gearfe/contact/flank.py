@@ -49,6 +49,8 @@ class Flank:
         Quadrature weight times arc length (m).
     sizes : ndarray, shape (e,)
         Edge lengths (m).
+    start
+        Edge at which the working flank starts: arc lengths count from there.
     """
 
     nodes: IntArray
@@ -56,6 +58,7 @@ class Flank:
     shapes: Array
     weights: Array
     sizes: Array
+    start: int
 
     @property
     def edges(self) -> int:
@@ -64,31 +67,14 @@ class Flank:
 
     @cached_property
     def ends(self) -> Array:
-        """Arc lengths of the edges' ends, from the root's (m), shape (e + 1,)."""
-        return np.concatenate([[0.0], np.cumsum(self.sizes)])
+        """Arc lengths of the edges' ends (m), shape (e + 1,)."""
+        arc = np.concatenate([[0.0], np.cumsum(self.sizes)])
+        return np.asarray(arc - arc[self.start])
 
     def place(self, arc: Array) -> tuple[IntArray, Array]:
         """Edges and positions in them (0 to 1) at arc lengths (m)."""
         edge = np.clip(np.searchsorted(self.ends, arc, side="right") - 1, 0, self.edges - 1)
         return edge, np.clip((arc - self.ends[edge]) / self.sizes[edge], 0.0, 1.0)
-
-    def arc_at(self, radius: float) -> float:
-        """Arc length (m) at a radius (m)."""
-        radii = np.linalg.norm(self.points[::2], axis=1)
-        edge = int(np.clip(np.searchsorted(radii, radius) - 1, 0, self.edges - 1))
-        corners = self.points[2 * edge : 2 * edge + 3]
-        xi = min(1.0, max(0.0, (radius - radii[edge]) / (radii[edge + 1] - radii[edge])))
-        for _ in range(8):
-            value, slope, _ = edge_shapes(np.array(xi))
-            point = value @ corners
-            now = float(np.linalg.norm(point))
-            rate = float(point @ (slope @ corners)) / now
-            step = (radius - now) / rate if rate > 0 else 0.0
-            xi = min(1.0, max(0.0, xi + step))
-            if abs(step) < 1e-12:
-                break
-        at, weight = gauss_rule(10)
-        return float(self.ends[edge] + xi * (weight @ np.linalg.norm(edge_shapes(xi * at)[1] @ corners, axis=-1)))
 
 
 def flank_of(mesh: SectorMesh, points_per_edge: int) -> Flank:
@@ -101,7 +87,8 @@ def flank_of(mesh: SectorMesh, points_per_edge: int) -> Flank:
     corners = points[edge_nodes(np.arange(len(chain)))]
     speed = np.linalg.norm(np.einsum("qa,eai->eqi", first, corners), axis=-1)
     weights = speed * weight
-    return Flank(nodes, points, shapes, weights, weights.sum(axis=1))
+    start = int(np.flatnonzero(nodes[::2] == mesh.boundaries["flank_left"][-1, 2])[0])
+    return Flank(nodes, points, shapes, weights, weights.sum(axis=1), start)
 
 
 def gauss_rule(count: int) -> tuple[Array, Array]:

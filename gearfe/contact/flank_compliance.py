@@ -64,8 +64,6 @@ class FlankCompliance:
         Arc lengths of the stations and half widths of their bumps (m).
     smooth : dict of int to ndarray, shape (2k, 2k)
         Step -> H between the stations of teeth so many steps apart, tooth axes, xy by station (m/N).
-    offset
-        Arc length on the mesh's chain of edges where the working flank starts (m).
     """
 
     curve: FlankCurve
@@ -75,7 +73,6 @@ class FlankCompliance:
     stations: Array
     bumps: Array
     smooth: dict[int, Array]
-    offset: float
 
     def distance(self, s: Array) -> Array:
         """Distance y (m) of the flank at arc lengths s (m) from the corner."""
@@ -175,13 +172,12 @@ def cubic_spline(at: Array) -> Array:
 def flank_compliance(gear: Gear, body: GearBody) -> FlankCompliance:
     """Reduce the finite-element flank of a gear to its stations."""
     curve, inverse_modulus, module = flank_curve(gear), body.contact_compliance, gear.module
-    offset = body.flank.arc_at(float(curve.face.radii[0]))
     corner, wedge = corner_of(curve)
-    stations, bumps, nodal = _stations(body.flank, offset + curve.low, module)
+    stations, bumps, nodal = _stations(body.flank, curve.low, module)
     loads = np.kron(nodal, np.eye(2))
     sides = loads @ body.interface
     smooth = {step: sides @ body.coupling[step % body.teeth] @ sides.T for step in range(-REACH, REACH + 1)}
-    made = FlankCompliance(curve, inverse_modulus, corner, wedge, stations - offset, bumps, smooth, offset)
+    made = FlankCompliance(curve, inverse_modulus, corner, wedge, stations, bumps, smooth)
     smooth[0] = smooth[0] + loads @ body.own @ loads.T + inverse_modulus / body.width * _local(made)
     return made
 
@@ -212,7 +208,7 @@ def _stations(flank: Flank, start: float, module: float) -> tuple[Array, Array, 
         first = min(max(bisect_right(ends, low) - 1, 0), len(sizes) - 1)
         return max(sizes[first : max(bisect_left(ends, high), first + 1)])
 
-    end = ends[-1]
+    begin, end = ends[0], ends[-1]
     places = np.sort(np.concatenate([flank.ends, 0.5 * (flank.ends[1:] + flank.ends[:-1])]))
     before = 2 * float(np.interp(start, 0.5 * (flank.ends[1:] + flank.ends[:-1]), flank.sizes))
     places = places[(places > start - before) & (places < end - 1e-9)]
@@ -221,8 +217,8 @@ def _stations(flank: Flank, start: float, module: float) -> tuple[Array, Array, 
         here = largest(s, s)
         a = BUMP_ELEMENTS * here
         for _ in range(3):
-            a = 0.5 * (a + BUMP_ELEMENTS * largest(max(0.0, s - a), min(end, s + a)))
-        a = min(max(a, BUMP_MODULES * module), end - s, s)
+            a = 0.5 * (a + BUMP_ELEMENTS * largest(max(begin, s - a), min(end, s + a)))
+        a = min(max(a, BUMP_MODULES * module), end - s, s - begin)
         if a >= TOO_NEAR * here and not (kept and s - kept[-1][0] < SPACING * a):
             kept.append((s, a))
     s, a = np.array(kept).T

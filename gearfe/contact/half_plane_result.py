@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +10,6 @@ from ..gear.flank_curve import WAY
 from ..typing import Array, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .flank import Flank, edge_shapes
-from .flank_compliance import FlankCompliance
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import Setting, State, Step, cross
 from .position import FlankLoads, taken
@@ -147,7 +145,7 @@ def contact_rates(
 
 
 def flank_loads(
-    sides: Sequence[FlankCompliance], elastic: MeshingPair, contacts: PairContacts, angles: Array, twists: Array
+    elastic: MeshingPair, contacts: PairContacts, angles: Array, twists: Array
 ) -> tuple[FlankLoads, FlankLoads]:
     """Loads on the flanks of pinion and wheel: for fields, root stress and finite strain.
 
@@ -157,8 +155,6 @@ def flank_loads(
 
     Parameters
     ----------
-    sides
-        Flanks of pinion and wheel.
     contacts
         m loaded pairs.
     angles, twists : ndarray, shape (n,)
@@ -167,7 +163,7 @@ def flank_loads(
     place = angles[contacts.position], twists[contacts.position]
     made = []
     for g, tooth in enumerate((contacts.pair, -1 - contacts.pair)):
-        shares, moved = _nodal(sides[g], elastic.bodies[g].flank, contacts, g)
+        shares, moved = _nodal(elastic.bodies[g].flank, contacts, g)
         along = (2 * g - 1) * contacts.normal * np.exp(-1j * elastic.tooth_angle(g, tooth, *place))
         # the wheel's axes turn on with the twist
         rate = contacts.force_rate + 1j * (contacts.normal_rate - g) * contacts.force
@@ -177,12 +173,12 @@ def flank_loads(
     return made[0], made[1]
 
 
-def _nodal(side: FlankCompliance, flank: Flank, contacts: PairContacts, gear: int) -> tuple[Array, Array]:
+def _nodal(flank: Flank, contacts: PairContacts, gear: int) -> tuple[Array, Array]:
     """Of each pair the shares of the force on the nodes of the flank, which add up to 1, and their rates with the twist
     (1/rad) as the pressure moves along the flank and widens, both of shape (m, nodes).
     """
     load = contacts.pressure * contacts.width
-    edge, xi = flank.place(contacts.panel_arc[:, gear] + side.offset)
+    edge, xi = flank.place(contacts.panel_arc[:, gear])
     value, slope, _ = edge_shapes(xi)
     share = load / load.sum(axis=1, keepdims=True)
     moves = contacts.arc_rate[:, gear, None] + WAY[gear] * contacts.x * contacts.growth[:, None]

@@ -80,10 +80,10 @@ def bumped(body: GearBody, position: Positions, gear: int) -> tuple[FlankLoads, 
     force = loads.force.copy()
     for k in range(len(contacts)):
         flank, load = body.flank, contacts.pressure[k] * contacts.width[k]
-        centre = flank.arc_at(float(contacts.panel_radius[k, gear] @ load / load.sum()))
+        centre = float(contacts.panel_arc[k, gear] @ load / load.sum())
         edge = int(flank.place(np.array(centre))[0])
         half = BUMP_ELEMENTS * float(flank.sizes[edge])
-        if half <= contacts.half_width[k] or not half < centre < flank.ends[-1] - half:
+        if half <= contacts.half_width[k] or not flank.ends[0] + half < centre < flank.ends[-1] - half:
             continue
         nodal = force[k].view(complex)
         total = nodal.sum()

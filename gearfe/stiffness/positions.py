@@ -148,7 +148,7 @@ class HalfPlaneSolver:
         if len(kept) == 0:
             return found
         loaded = taken(found.contacts, np.isin(found.contacts.position, kept))
-        loads = flank_loads(self.law.sides, self.elastic, loaded, found.pinion_angle, found.twist)
+        loads = flank_loads(self.elastic, loaded, found.pinion_angle, found.twist)
         return replace(found, loads=loads)
 
     def touching_twists(self, angles: Array) -> Array:
@@ -218,8 +218,8 @@ class ElementSolver:
         """
         contacts = found.contacts
         sizes = np.zeros(len(contacts))
-        for gear, (side, body) in enumerate(zip(self.law.sides, self.elastic.bodies, strict=True)):
-            edge, _ = body.flank.place(contacts.arc[:, gear] + side.offset)
+        for gear, body in enumerate(self.elastic.bodies):
+            edge, _ = body.flank.place(contacts.arc[:, gear])
             sizes = np.maximum(sizes, body.flank.sizes[edge])
         weights = contacts.force, contacts.force * sizes / (2 * contacts.half_width)
         force, spread = (np.bincount(contacts.position, weight, len(found)) for weight in weights)
