@@ -38,4 +38,4 @@ def nodal(elastic: MeshingPair, position: Positions, angle: float, twist: float)
 
 def peak_pressure(position: Positions) -> float:
     """Largest pressure (Pa) at the contact points, or on the panels."""
-    return float((position.contacts if position.points is None else position.points).pressure.max())
+    return float(position.points.pressure.max())

@@ -115,7 +115,7 @@ def _points(batch: Batch, state: State) -> PointPressures:
     place = np.concatenate([batch.slave_place, state.place[mates]]) + batch.first_edge[window]
     pressure = np.maximum(np.concatenate([state.pressure, state.pressure[mates]]), 0.0)
     pair, gear = batch.tooth[window % (len(batch.gear) // 2)], batch.gear[window]
-    order = np.lexsort((place, pair, gear, batch.position[window]))
+    order = np.argsort(batch.position[window], kind="stable")
     return PointPressures(batch.position[window][order], gear[order], pair[order], place[order], pressure[order])
 
 

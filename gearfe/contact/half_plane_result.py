@@ -12,7 +12,7 @@ from .compliance import MeshingPair
 from .flank import Flank, edge_shapes
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import Setting, State, Step, cross
-from .position import FlankLoads, taken
+from .position import FlankLoads, PointPressures, taken
 
 #: Sums over the contacts of a position.
 SUMS = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "energy")
@@ -46,8 +46,8 @@ class PairContacts:
         b = 2 sqrt(variance of the pressure about its mean) (m): Hertz's where the pressure is elliptic.
     x, width, pressure : ndarray, shape (m, n)
         Panels: middles along the tangent -i n from the centre of pressure, widths (m), and pressures (Pa).
-    panel_arc, panel_radius : ndarray, shape (m, 2, n)
-        Arc lengths of the panels' middles on both faces, and their undeformed distances from the gears' centres (m).
+    panel_arc : ndarray, shape (m, 2, n)
+        Arc lengths of the panels' middles on both faces (m).
     """
 
     position: IntArray
@@ -66,7 +66,6 @@ class PairContacts:
     width: Array
     pressure: Array
     panel_arc: Array
-    panel_radius: Array
 
     def __len__(self) -> int:
         return len(self.pair)
@@ -125,7 +124,6 @@ def contacts_of(setting: Setting, state: State, made: Step, known: dict[str, Arr
         width=made.width,
         pressure=made.pressure,
         panel_arc=made.arcs,
-        panel_radius=np.abs(setting.tables.at(made.arcs)[0]),
         **{name: values[index] for name, values in known.items()},
     )
 
@@ -171,6 +169,15 @@ def flank_loads(
         change = along[:, None] * (rate[:, None] * shares + contacts.force[:, None] * moved)
         made.append(FlankLoads(contacts.position, tooth, force.view(float), change.view(float)))
     return made[0], made[1]
+
+
+def panel_pressures(elastic: MeshingPair, contacts: PairContacts) -> PointPressures:
+    """Pressures on the panels of loaded pairs, at their places on both flanks."""
+    places = [np.add(*body.flank.place(contacts.panel_arc[:, g])) for g, body in enumerate(elastic.bodies)]
+    place, panels = np.stack(places, axis=1), contacts.pressure.shape[1]  # (m, 2, n)
+    position, pair = (np.repeat(one, 2 * panels) for one in (contacts.position, contacts.pair))
+    gear = np.tile(np.repeat([0, 1], panels), len(contacts))
+    return PointPressures(position, gear, pair, place.ravel(), np.repeat(contacts.pressure, 2, axis=0).ravel())
 
 
 def _nodal(flank: Flank, contacts: PairContacts, gear: int) -> tuple[Array, Array]:

@@ -107,7 +107,7 @@ class FlankLoads:
 
 @dataclass(frozen=True)
 class PointPressures:
-    """Pressures at the contact points of a law on the mesh, q of them: tooth by tooth, from root to tip.
+    """Pressures at the contact points of a law on the mesh, or on the panels of the half-plane law, q of them.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ class Positions:
     loads
         What fields need, of pinion and wheel, at the positions where it was asked for; none at all otherwise.
     points
-        Pressures at the contact points of a law on the mesh; None for other laws.
+        Pressures along the flanks at the same positions; None where nothing was asked for.
     """
 
     pinion_angle: Array

@@ -159,30 +159,16 @@ class FlankPressure:
 
 
 def flank_pressures(pair: MeshingPair, position: Positions) -> list[FlankPressure]:
-    """Pressure on each loaded flank of one solved position, from its points or the half-plane law's panels."""
-    points = position.points
-    if points is None:
-        return _of_panels(pair, position.contacts)
+    """Pressure on each loaded flank of one solved position."""
     made: list[FlankPressure] = []
+    points = position.points
+    assert points is not None
     for gear, number in dict.fromkeys(zip(points.gear.tolist(), points.pair.tolist(), strict=True)):
-        mine = (points.gear == gear) & (points.pair == number)
+        mine = np.flatnonzero((points.gear == gear) & (points.pair == number))
+        mine = mine[np.argsort(points.place[mine], kind="stable")]
         radius = np.linalg.norm(_points(pair.bodies[gear].flank, points.place[mine]), axis=1)
         tooth = number if gear == 0 else -1 - number
         made.append(FlankPressure(gear, number, tooth, points.place[mine], radius, points.pressure[mine]))
-    return made
-
-
-def _of_panels(pair: MeshingPair, contacts: PairContacts) -> list[FlankPressure]:
-    """Pressure on the panels of the half-plane law."""
-    made = []
-    for k, number in enumerate(contacts.pair.tolist()):
-        for g, tooth in enumerate((number, -1 - number)):
-            nodes = np.linalg.norm(pair.bodies[g].flank.points, axis=1)
-            radius, pressure = contacts.panel_radius[k, g], contacts.pressure[k]
-            if g == 1:  # the panels run along the pinion's flank, against the wheel's
-                radius, pressure = radius[::-1], pressure[::-1]
-            place = 0.5 * np.interp(radius, nodes, np.arange(len(nodes)))
-            made.append(FlankPressure(g, number, tooth, place, radius, pressure))
     return made
 
 

@@ -22,7 +22,7 @@ from ..contact.compliance import MeshingPair
 from ..contact.elements import solve_elements
 from ..contact.finite_strain import finite_strain_shares, with_shares
 from ..contact.half_plane import HalfPlanePair, expected_twists, half_plane_pair, solve_half_plane
-from ..contact.half_plane_result import flank_loads
+from ..contact.half_plane_result import flank_loads, panel_pressures
 from ..contact.laws import HalfPlane
 from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, joined, of_positions, taken, together
 from ..errors import InputError
@@ -149,7 +149,7 @@ class HalfPlaneSolver:
             return found
         loaded = taken(found.contacts, np.isin(found.contacts.position, kept))
         loads = flank_loads(self.elastic, loaded, found.pinion_angle, found.twist)
-        return replace(found, loads=loads)
+        return replace(found, loads=loads, points=panel_pressures(self.elastic, loaded))
 
     def touching_twists(self, angles: Array) -> Array:
         """Twists (rad) at which the rigid gears just touch."""
