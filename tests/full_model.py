@@ -32,8 +32,6 @@ class FullModel:
         Number of attachment coordinates, which come first.
     held
         Whether a part of the body is fixed.
-    solver
-        Sparse solver, see `gearfe.reduction.sparse_solver`.
     """
 
     mass: Any
@@ -41,7 +39,6 @@ class FullModel:
     transform: Any
     interfaces: int
     held: bool
-    solver: str = "auto"
 
     @one_thread()
     def static(self, loads: Array) -> Array:
@@ -51,7 +48,7 @@ class FullModel:
         loads = np.asarray(loads, dtype=float)
         force = np.zeros((self.mass.shape[0], *loads.shape[1:]))
         force[: self.interfaces] = loads
-        factor = factorize(self.stiffness, solver=self.solver)
+        factor = factorize(self.stiffness)
         found = factor.solve(force)
         return found + factor.solve(force - self.stiffness @ found)
 
@@ -59,7 +56,7 @@ class FullModel:
     def frequencies_hz(self, count: int = 20) -> Array:
         """Lowest natural frequencies (Hz) with the attachments free to move, rigid-body modes (zero) included."""
         shift = 0.0 if self.held else rigid_shift(self.stiffness, self.mass)
-        factor = factorize(self.stiffness + shift * self.mass if shift else self.stiffness, solver=self.solver)
+        factor = factorize(self.stiffness + shift * self.mass if shift else self.stiffness)
         values = lowest_modes(factor.solve, self.mass, count=count, shift=shift).eigenvalues
         if shift:
             values = np.where(np.abs(values) < 1e-3 * shift, 0.0, values)
@@ -70,7 +67,7 @@ class FullModel:
         return np.asarray((self.transform @ q).reshape(-1, 3))
 
 
-def full_model(housing: Housing, solver: str = "auto") -> FullModel:
+def full_model(housing: Housing) -> FullModel:
     """The body of a housing over [attachments | all internal unknowns]."""
     parts = housing.partition(housing.matrices())
     k, m = (
@@ -80,4 +77,4 @@ def full_model(housing: Housing, solver: str = "auto") -> FullModel:
     count, rows = len(parts.internal), len(parts.boundary)
     unit = sparse.csc_array((np.ones(count), (parts.internal, np.arange(count))), shape=(rows, count))
     transform = sparse.hstack([sparse.csc_array(parts.boundary), unit], format="csc")
-    return FullModel(m, k, transform, parts.boundary.shape[1], len(housing.fixed) > 0, solver)
+    return FullModel(m, k, transform, parts.boundary.shape[1], len(housing.fixed) > 0)

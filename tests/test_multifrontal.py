@@ -9,7 +9,7 @@ from scipy.sparse.linalg import spsolve
 
 from gearfe.reduction import multifrontal as module
 from gearfe.reduction.multifrontal import MultifrontalFactor, NotPositiveDefinite, multifrontal
-from gearfe.reduction.sparse_solver import node_graph
+from gearfe.reduction.sparse_solver import elimination_order, node_graph
 
 
 def grid(cells: tuple[int, int, int], width: int = 1) -> sparse.csr_array:
@@ -85,12 +85,10 @@ def test_indefinite_matrices_have_no_factor() -> None:
 def test_cost_of_a_plate_stays_near_linear() -> None:
     """Nested dissection of a plane grid of n nodes stores O(n log n) numbers (George, 1973): exponent below 1.2."""
     pytest.importorskip("pymetis")
-    from gearfe.reduction.sparse_solver import metis_order
-
     stored = []
     for side in (40, 80):
         matrix = grid((side, side, 1))
         graph = node_graph(sparse.bsr_array(matrix, blocksize=(1, 1)))
-        fronts = multifrontal(matrix, graph, metis_order(graph)).fronts
+        fronts = multifrontal(matrix, graph, elimination_order(graph)).fronts
         stored.append(sum(front.pivot.size + front.coupling.size for front in fronts))
     assert np.log(stored[1] / stored[0]) / np.log(4.0) < 1.2

@@ -1,16 +1,18 @@
-"""Every installed sparse solver against numpy; the choice among them; matrices that are not positive definite."""
+"""The sparse solver against numpy, in the orders of METIS and SciPy; matrices that are not positive definite."""
 
 from __future__ import annotations
+
+import sys
 
 import numpy as np
 import pytest
 from scipy import sparse
 
 from gearfe.elasticity import Material
-from gearfe.errors import InputError, MissingLibraryError
-from gearfe.reduction import sparse_solver
+from gearfe.errors import InputError
 from gearfe.reduction.lanczos import lowest_modes
-from gearfe.reduction.sparse_solver import PACKAGES, choose_solver, factorize, installed_solvers
+from gearfe.reduction.multifrontal import multifrontal
+from gearfe.reduction.sparse_solver import elimination_order, factorize, node_graph
 from gearfe.solid import assemble
 from tests.housing_meshes import box
 
@@ -22,13 +24,20 @@ def cantilever() -> tuple[sparse.csr_array, sparse.csr_array]:
     return found.stiffness.tocsr()[free][:, free], found.mass[free][:, free]
 
 
-@pytest.mark.parametrize("name", PACKAGES)
-def test_solves_like_numpy(name: str) -> None:
-    if name not in installed_solvers():
-        pytest.skip(f"{PACKAGES[name]} is not installed")
+@pytest.fixture(params=["pymetis", "scipy"])
+def order(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """What finds the order of elimination."""
+    if request.param == "scipy":
+        monkeypatch.setitem(sys.modules, "pymetis", None)
+    else:
+        pytest.importorskip("pymetis")
+    return str(request.param)
+
+
+@pytest.mark.usefixtures("order")
+def test_solves_like_numpy() -> None:
     k, _ = cantilever()
-    factor = factorize(k, solver=name)
-    assert (factor.solver, factor.unknowns) == (name, k.shape[0])
+    factor = factorize(k)
     rng = np.random.default_rng(0)
     for shape in ((k.shape[0],), (k.shape[0], 1), (k.shape[0], 7)):
         b = rng.standard_normal(shape)
@@ -40,40 +49,38 @@ def test_solves_like_numpy(name: str) -> None:
         np.testing.assert_allclose(x, truth, atol=1e-10 * np.abs(truth).max())
 
 
-@pytest.mark.parametrize("name", PACKAGES)
-def test_two_factorisations_do_not_disturb_each_other(name: str) -> None:
-    if name not in installed_solvers():
-        pytest.skip(f"{PACKAGES[name]} is not installed")
+@pytest.mark.usefixtures("order")
+def test_two_factorisations_do_not_disturb_each_other() -> None:
     k, m = cantilever()
-    first = factorize(k, solver=name)
-    second = factorize(k + 1e6 * m, solver=name)
+    first = factorize(k)
+    second = factorize(k + 1e6 * m)
     b = np.ones(k.shape[0])
     for factor, matrix in ((first, k), (second, k + 1e6 * m), (first, k)):
         np.testing.assert_allclose(factor.solve(b), np.linalg.solve(matrix.toarray(), b), rtol=1e-7, atol=1e-14)
 
 
-@pytest.mark.parametrize("name", PACKAGES)
-def test_a_body_that_can_move_is_refused(name: str) -> None:
-    if name not in installed_solvers():
-        pytest.skip(f"{PACKAGES[name]} is not installed")
+@pytest.mark.usefixtures("order")
+def test_a_body_that_can_move_is_refused() -> None:
     free = assemble(*box((2, 1, 1), (0.2, 0.1, 0.1)), Material()).stiffness
     for matrix in (free, -cantilever()[0]):
         with pytest.raises(InputError, match="positive definite"):
-            factorize(matrix, solver=name)
+            factorize(matrix)
 
 
-def test_scipy_alone_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sparse_solver.importlib.util, "find_spec", lambda name: None)
-    assert installed_solvers() == ("superlu",)
-    assert choose_solver() == "superlu"
-    with pytest.raises(MissingLibraryError, match=r"pip install 'gearfe\[fast\]'"):
-        choose_solver("multifrontal")
-
-
-def test_choice_can_be_named() -> None:
-    assert choose_solver("superlu") == "superlu"
-    with pytest.raises(InputError, match="choose one"):
-        choose_solver("umfpack")
+@pytest.mark.usefixtures("order")
+def test_order_leaves_little_fill() -> None:
+    """Against the order of the mesher's numbers, a bar of 24 x 4 x 4 cubes from end to end and then crosswise."""
+    nodes, tets = box((24, 4, 4), (0.6, 0.1, 0.1))
+    blocks = assemble(nodes, tets, Material()).stiffness
+    graph = node_graph(blocks)
+    found = elimination_order(graph)
+    np.testing.assert_array_equal(np.sort(found), np.arange(graph.shape[0]))
+    held = sparse.bsr_array(blocks + 1e9 * sparse.eye_array(blocks.shape[0]), blocksize=(3, 3))
+    here, there = (
+        sum(front.pivot.size + front.coupling.size for front in multifrontal(held, graph, one).fronts)
+        for one in (found, np.arange(graph.shape[0]))
+    )
+    assert here < 0.5 * there
 
 
 def test_blocks_that_do_not_divide_the_order() -> None:

@@ -111,7 +111,7 @@ def frame_body(gear_train: GearTrain, *, uneven: float = 0.0, skew: float = 0.0)
         elements=np.zeros((0, 4), dtype=np.int64), shapes=shapes, faces=none, normals=np.zeros((n, 3)),
         radiation=np.zeros_like(M), momentum=np.zeros((6, size)), rigid_mass=np.eye(6),
         truncation=np.zeros((2, 2)), corrections=1, next_hz=math.inf,
-        softening=np.zeros_like(M), held=True, solver="none",
+        softening=np.zeros_like(M), held=True,
     )  # fmt: skip
 
 

@@ -114,7 +114,7 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
     kept = f"{body.modes} modes to {body.internal_hz[body.modes - 1]:.0f} Hz" if body.modes else "no modes"
     extra = len(body.internal_hz) - body.modes
     print(f"reduced to      {body.size} coordinates: {6 * len(body.attachment_names)} of attachments, {kept},")
-    print(f"                {extra} quasi-static corrections; sparse solver {body.solver}; {seconds:.2f} s")
+    print(f"                {extra} quasi-static corrections; {seconds:.2f} s")
     for name, point in zip(body.attachment_names, body.attachment_points, strict=True):
         x, y, z = np.round(1e3 * point, 6) + 0.0
         print(f"bore {name:<10} reference point x {x:8.3f}  y {y:8.3f}  z {z:8.3f} mm")
@@ -197,7 +197,6 @@ def _write(
         "coordinates": body.size,
         "modes": body.modes,
         "corrections": len(body.internal_hz) - body.modes,
-        "sparse_solver": body.solver,
         "fixed": body.held,
         "frequencies_free_attachments_Hz": body.coupled.frequencies_hz[:shown],
         "frequencies_held_attachments_Hz": body.internal_hz[: body.modes],

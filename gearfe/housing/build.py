@@ -91,5 +91,4 @@ def reduced(housing: Housing, table: HousingReductionTable) -> ModalBody:
             below_hz=table.modes_below_Hz,
             least_modes=table.least_modes,
             quasi_static=table.quasi_static_levels,
-            solver=table.solver,
         )

@@ -209,7 +209,6 @@ class Housing(Facts):
         below_hz: float = 10_000.0,
         least_modes: int = 40,
         quasi_static: int = 1,
-        solver: str = "auto",
         estimate: bool = True,
     ) -> ModalBody:
         """Reduced body: constraint modes, modes with the attachments held, quasi-static corrections.
@@ -224,8 +223,6 @@ class Housing(Facts):
             See `modes`.
         quasi_static
             Levels of correction vectors; 0 for none.
-        solver
-            Sparse solver, see `gearfe.reduction.sparse_solver`.
         estimate
             Whether the body carries an estimate of the mesh's error (`ModalBody.softening`).
         """
@@ -240,35 +237,26 @@ class Housing(Facts):
             at_least=least_modes,
             corrections=quasi_static,
             free=len(self.fixed) == 0,
-            solver=solver,
         )
         del parts
         if len(found.mass) == 0:
             raise InputError("modes", modes, "leaves no coordinate: there is no attachment either", "keep a mode")
         count = len(self.attachments)
         body = ModalBody(
-            mass=found.mass,
+            **vars(found),
             damping=np.zeros_like(found.mass),
-            stiffness=found.stiffness,
             attachment_names=tuple(a.name for a in self.attachments),
             attachment_points=np.array([a.point for a in self.attachments]).reshape(count, 3),
             attachment_axes=np.array([a.axis for a in self.attachments]).reshape(count, 3),
-            internal_hz=np.sqrt(np.maximum(found.eigenvalues, 0.0)) / (2.0 * np.pi),
-            modes=found.modes,
             nodes=self.nodes,
             elements=self.mesh.cells,
-            shapes=found.shapes,
             faces=self.surface.faces,
             normals=nodal_normals(self.nodes, self.surface.faces),
             radiation=self.surface.radiation(found.shapes),
             momentum=momenta.T @ found.shapes,
             rigid_mass=motions.T @ momenta,
-            truncation=found.truncation,
-            corrections=found.corrections,
-            next_hz=float(np.sqrt(max(found.next_eigenvalue, 0.0)) / (2.0 * np.pi)),
             softening=np.zeros_like(found.mass),
             held=len(self.fixed) > 0,
-            solver=found.solver,
             notes=self.notes,
         )
         return self.with_estimate(body) if estimate else body

@@ -281,7 +281,6 @@ def _body(k: Array, m: Array, points: Array, table: SuperelementTable, field: st
         next_hz=0.0,  # what was left out is unknown
         softening=np.zeros_like(M),
         held=not free,
-        solver="none",
         notes=(NO_ESTIMATE,),
     )
 

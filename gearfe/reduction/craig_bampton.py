@@ -41,46 +41,12 @@ from ..progress import stage
 from ..threads import one_thread
 from ..typing import Array, IntArray
 from .lanczos import lowest_modes
-from .sparse_solver import Factorization, factorize
+from .modal_body import Reduction
+from .multifrontal import MultifrontalFactor
+from .sparse_solver import factorize
 
 #: Part of its own size below which a correction vector counts as contained in the others.
 DEPENDENT = 1e-6
-
-
-@dataclass(frozen=True)
-class Reduction:
-    """Reduced matrices over ``[interface coordinates (m) | internal coordinates (k)]`` and the way back.
-
-    Attributes
-    ----------
-    mass, stiffness : (m + k, m + k)
-        Projected matrices; the internal part has unit mass and diagonal stiffness, and no stiffness couples it to the
-        interfaces.
-    shapes : (n, m + k)
-        Full unknowns ``u = shapes @ q``.
-    eigenvalues : (k,)
-        Diagonal of the internal stiffness (rad^2/s^2), ascending: modes first, then corrections.
-    modes
-        How many of the k internal coordinates are modes.
-    truncation : (k, k), or (m, m) without corrections
-        S of the error bound.
-    corrections
-        Levels of correction vectors.
-    next_eigenvalue
-        Square of ``w_next``; infinite when no mode is left out.
-    solver
-        Name of the sparse solver.
-    """
-
-    mass: Array
-    stiffness: Array
-    shapes: Array
-    eigenvalues: Array
-    modes: int
-    truncation: Array
-    corrections: int
-    next_eigenvalue: float
-    solver: str
 
 
 @dataclass(frozen=True)
@@ -143,7 +109,6 @@ def reduce_model(
     at_least: int = 0,
     corrections: int = 1,
     free: bool = False,
-    solver: str = "auto",
 ) -> Reduction:
     """Reduce a sparse model to its interface coordinates, its lowest modes and their quasi-static corrections.
 
@@ -159,8 +124,6 @@ def reduce_model(
         Levels of correction vectors; 0 gives plain Craig-Bampton.
     free
         Whether a model without interfaces is held nowhere, so that its first modes are rigid-body modes.
-    solver
-        See `gearfe.reduction.sparse_solver.factorize`.
 
     Raises
     ------
@@ -172,7 +135,7 @@ def reduce_model(
     m = k_ib.shape[1]
     shift = rigid_shift(k_ii, m_ii) if m == 0 and free else 0.0
     with stage("factorising"):
-        factor = factorize(k_ii + shift * m_ii if shift else k_ii, solver=solver)
+        factor = factorize(k_ii + shift * m_ii if shift else k_ii)
         psi = -factor.solve(k_ib) if m else k_ib
     coupling = m_ii @ psi + m_ib
     limit = (2.0 * math.pi * below_hz) ** 2
@@ -204,16 +167,17 @@ def reduce_model(
         mass=m_red,
         stiffness=k_red,
         shapes=shapes,
-        eigenvalues=eigenvalues,
+        internal_hz=np.sqrt(np.maximum(eigenvalues, 0.0)) / (2.0 * np.pi),
         modes=len(modes.eigenvalues),
         truncation=truncation,
         corrections=corrections,
-        next_eigenvalue=modes.next_eigenvalue,
-        solver=factor.solver,
+        next_hz=math.sqrt(max(modes.next_eigenvalue, 0.0)) / (2.0 * math.pi),
     )
 
 
-def _corrections(factor: Factorization, m_ii: Any, modes: Array, coupling: Array, levels: int) -> tuple[Array, Array]:
+def _corrections(
+    factor: MultifrontalFactor, m_ii: Any, modes: Array, coupling: Array, levels: int
+) -> tuple[Array, Array]:
     """M-orthonormal correction vectors, and ``V^T M K^-1 M V`` of the last level's.
 
     ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. Without corrections ``X_1^T b`` comes second.

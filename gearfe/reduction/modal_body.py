@@ -32,29 +32,53 @@ FORMAT = 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ModalBody(Shown):
-    """Constant matrices of an elastic body over ``[attachments (6 each) | internal]``, N coordinates.
+class Reduction:
+    """Reduced matrices over ``[attachments (6 each) | internal]``, N coordinates, and the way back.
 
     Attributes
     ----------
-    mass, damping, stiffness : (N, N)
-        M, C, K blocks (SI).
+    mass, stiffness : (N, N)
+        M, K (SI); the internal part has unit mass and diagonal stiffness, and no stiffness couples it to the
+        attachments.
+    shapes : (3 n, N)
+        Nodal displacement for unit coordinates, rows ``3 node + axis``.
+    internal_hz : (N - 6 a,)
+        Frequencies with the attachments held (Hz), ascending: modes first, then those of the correction vectors.
+    modes
+        How many of the internal coordinates are modes.
+    truncation, corrections, next_hz
+        Matrix S, levels of corrections and frequency of the error bound in `gearfe.reduction.craig_bampton`: infinite
+        where no mode is left out, 0 where nothing is known of what was.
+    """
+
+    mass: Array
+    stiffness: Array
+    shapes: Array
+    internal_hz: Array
+    modes: int
+    truncation: Array
+    corrections: int
+    next_hz: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalBody(Reduction, Shown):
+    """A reduced elastic body in its place: a `Reduction` with damping, attachments and mesh.
+
+    Attributes
+    ----------
+    damping : (N, N)
+        C (SI).
     attachment_names
         One a attachment.
     attachment_points : (a, 3)
         Reference points (m), on the bores' axes.
     attachment_axes : (a, 3)
         Unit vectors along the bores' axes.
-    internal_hz : (N - 6 a,)
-        Frequencies with the attachments held (Hz): modes first, then those of the correction vectors.
-    modes
-        How many of the internal coordinates are modes.
     nodes : (n, 3)
         Mesh nodes (m).
     elements : (m, 4), (m, 10) or (m, 6)
         Cells to show: tetrahedra, or linear wedges between the nodes of extruded elements.
-    shapes : (3 n, N)
-        Nodal displacement for unit coordinates, rows ``3 node + axis``.
     faces : (f, 3) or (f, 6)
         Triangles of the outer surface, anticlockwise from outside, midside nodes last.
     normals : (n, 3)
@@ -66,42 +90,28 @@ class ModalBody(Shown):
         Linear (kg m/s) and angular momentum about the frame's origin (kg m2/s) for unit coordinate rates.
     rigid_mass : (6, 6)
         Mass, static moments and inertia about the origin: kinetic energy of rigid translations and rotations.
-    truncation, corrections, next_hz
-        Matrix S, levels of corrections and frequency of the error bound in `gearfe.reduction.craig_bampton`; a
-        frequency of 0 where nothing is known of what was left out.
     softening : (N, N)
         Estimate of how much too stiff the mesh makes the body, a quadratic form like the stiffness (see
         `gearfe.housing.mesh_error`); all zero where it was not estimated.
     held
         Whether a part of the body is fixed to the frame; a free body has six rigid-body modes.
-    solver
-        Sparse solver that made it.
     notes
         What the user should know about how it was made.
     """
 
-    mass: Array
     damping: Array
-    stiffness: Array
     attachment_names: tuple[str, ...]
     attachment_points: Array
     attachment_axes: Array
-    internal_hz: Array
-    modes: int
     nodes: Array
     elements: IntArray
-    shapes: Array
     faces: IntArray
     normals: Array
     radiation: Array
     momentum: Array
     rigid_mass: Array
-    truncation: Array
-    corrections: int
-    next_hz: float
     softening: Array
     held: bool
-    solver: str
     notes: tuple[str, ...] = ()
 
     @property

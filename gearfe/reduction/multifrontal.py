@@ -64,7 +64,7 @@ class MultifrontalFactor:
 
     def solve(self, b: Array) -> Array:
         """(n,) or (n, p) right-hand sides to solutions of the same shape; several at a time are much cheaper."""
-        x = np.ascontiguousarray(np.reshape(b, (len(self.order), -1))[self.order], dtype=float)
+        x = np.ascontiguousarray(np.atleast_2d(np.transpose(b)).T[self.order], dtype=float)
         # rows of x are contiguous: x[a:b].T is in Fortran order, and BLAS changes it in place
         for front in self.fronts:
             own = x[front.begin : front.end]

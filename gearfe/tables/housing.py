@@ -210,6 +210,8 @@ MOST_ELEMENTS = 100_000
 class HousingReductionTable:
     """What is kept of the full model."""
 
+    REMOVED: ClassVar[dict[str, tuple[str, str]]] = {"solver": ("is gone: there is one solver", "leave it out")}
+
     modes: int | None = quantity(
         None, low=0, high=2000, doc="number of modes with the bores held; left out: by frequency"
     )
@@ -217,9 +219,6 @@ class HousingReductionTable:
     least_modes: int = quantity(40, low=0, high=2000, doc="modes kept at least when they are chosen by frequency")
     quasi_static_levels: int = quantity(1, low=0, high=6, doc="levels of quasi-static corrections; 0 for none")
     band_Hz: float = quantity(5000.0, above=0.0, doc="highest frequency of interest, for the error estimate (Hz)")
-    solver: str = quantity(
-        "auto", doc="sparse solver: auto (the first that is installed)", choices=("auto", "multifrontal", "superlu")
-    )
 
 
 @dataclass(frozen=True)

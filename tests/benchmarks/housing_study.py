@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 
 from gearfe.housing.model import Housing
-from gearfe.reduction.craig_bampton import Partition, reduce_model
-from gearfe.reduction.sparse_solver import installed_solvers
 
 from ..full_model import full_model
 from ..newmark import newmark, smooth_ramp
@@ -52,7 +50,6 @@ def run_housing(record: Record) -> None:
         others(record)
     reductions(record)
     sizes(record)
-    solvers(record)
 
 
 def fresh(housing: Housing) -> Housing:
@@ -62,9 +59,9 @@ def fresh(housing: Housing) -> Housing:
     return replace(housing)
 
 
-def reduced(housing: Housing, modes: int = 40, levels: int = 1, solver: str = "auto") -> Any:
+def reduced(housing: Housing, modes: int = 40, levels: int = 1) -> Any:
     """Assembly and reduction, nothing kept from before; the estimate of the mesh's error apart."""
-    return fresh(housing).reduce(modes, quasi_static=levels, solver=solver, estimate=False)
+    return fresh(housing).reduce(modes, quasi_static=levels, estimate=False)
 
 
 def sizes(record: Record) -> None:
@@ -78,7 +75,7 @@ def sizes(record: Record) -> None:
         body, cost = measured(lambda: reduced(housing), runs=1 if record.quick else 2, most_s=12.0)
         told = float(mesh_error(housing.with_estimate(body), 1.0).frequency_errors[:FREQUENCIES].max())
         found = {f"f{k + 1}_Hz": float(f) for k, f in enumerate(body.coupled.frequencies_hz[:FREQUENCIES])}
-        return {"unknowns": housing.unknowns, **cost.columns, "told": told, "solver": body.solver, **found}
+        return {"unknowns": housing.unknowns, **cost.columns, "told": told, **found}
 
     for size in QUICK_SIZES if record.quick else SIZES:
         record.row(table, {"size_mm": size}, partial(make, size))
@@ -132,28 +129,6 @@ def below(signal: np.ndarray, step: float, limit_hz: float) -> np.ndarray:
     spectrum = np.fft.rfft(signal)
     spectrum[np.fft.rfftfreq(len(signal), step) > limit_hz] = 0.0
     return np.fft.irfft(spectrum, len(signal))
-
-
-def solvers(record: Record) -> None:
-    """Every sparse solver that is there, reduction to 40 modes; the slowest one is spared the large meshes."""
-    table = record.table("housing_solvers", "solver", "size_mm")
-    for size in QUICK_SIZES[-1:] if record.quick else (12.0, 6.0, 4.5):
-        for solver in installed_solvers():
-            if solver == "superlu" and size < 12.0:
-                continue
-
-            def make(solver: str = solver, size: float = size) -> Mapping[str, Any]:
-                housing = housing_of(size, small=record.quick)
-                parts = housing.partition(housing.matrices())
-                _, cost = measured(lambda: reduced_from(parts, solver), runs=1 if record.quick else 2, most_s=10.0)
-                return {"unknowns": housing.unknowns, **cost.columns}
-
-            record.row(table, {"solver": solver, "size_mm": size}, make)
-
-
-def reduced_from(parts: Partition, solver: str) -> Any:
-    """Reduction only, matrices assembled."""
-    return reduce_model(parts, count=40, below_hz=np.inf, at_least=40, corrections=1, free=False, solver=solver)
 
 
 def reference_housing(mass: Any = "4-point") -> Housing:

@@ -105,17 +105,13 @@ def time_error(
     return draw
 
 
-def over(x: str, y: str, labels: tuple[str, str], title: str, by: tuple[str, ...] = (), *, fit: bool = False) -> Draw:
+def over(x: str, y: str, labels: tuple[str, str], title: str, *, fit: bool = False) -> Draw:
     """Any column over any other, with the fitted exponent when asked."""
 
     def draw(figure: Any, rows: list[Row]) -> None:
         axes = figure.subplots()
-        found = {}
-        for label, own in groups(rows, *by).items():
-            several = fit and len([r for r in own if _positive(r.get(y))]) > 1
-            slope = f", exponent {exponent(own, x, y):.2f}" if several else ""
-            found[f"{label}{slope}".removeprefix(", ")] = own
-        curves(axes, found, x, y)
+        several = fit and len([r for r in rows if _positive(r.get(y))]) > 1
+        curves(axes, {f"exponent {exponent(rows, x, y):.2f}" if several else "": rows}, x, y)
         axes.set(xlabel=labels[0], ylabel=labels[1], title=title)
         _finish(axes)
 
@@ -211,9 +207,6 @@ PICTURES: Mapping[str, Draw] = {
         "housing: modes (numbers) and correction levels (colours)",
         error="largest_error",
         parameter="modes",
-    ),
-    "housing_solvers": over(
-        "unknowns", "cpu_s", ("unknowns", "processor time (s)"), "sparse solvers", ("solver",), fit=True
     ),
     "transient_tolerance": time_error(
         ("variant", "program", "method"), "gear train, 7 ms: largest error of all signals", parameter="tolerance"

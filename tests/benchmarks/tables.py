@@ -302,7 +302,6 @@ SECTIONS: tuple[Section, ...] = (
             "error": ("error", percent),
             "told": ("told", percent),
             **COST,
-            "solver": ("solver", PLAIN),
         },
         "housing",
         _frequency_errors,
@@ -334,13 +333,6 @@ SECTIONS: tuple[Section, ...] = (
             "largest_error": ("at the worst coordinate", digits),
             "cpu_s": ("reduction, CPU (s)", digits),
         },
-        "housing",
-    ),
-    Section(
-        "housing_solvers",
-        "Housing: sparse solvers",
-        "Reduction to 40 modes with every solver that is installed; matrices assembled before.",
-        {"solver": ("solver", PLAIN), "unknowns": ("unknowns", digits), **COST},
         "housing",
     ),
     Section(

@@ -57,7 +57,7 @@ def symmetric_frame(random: np.random.Generator, names: tuple[str, ...], points:
         elements=np.zeros((0, 4), dtype=np.int64), shapes=np.zeros((3 * a, n)), faces=np.zeros((0, 3), dtype=np.int64),
         normals=np.zeros((a, 3)), radiation=np.zeros((n, n)), momentum=np.zeros((6, n)), rigid_mass=np.eye(6),
         truncation=np.zeros((m, m)), corrections=1, next_hz=math.inf,
-        softening=np.zeros((n, n)), held=True, solver="none",
+        softening=np.zeros((n, n)), held=True,
     )  # fmt: skip
     return body.with_damping(ratio=float(random.choice([0.0, 0.01, 0.05]))), reflect
 
