@@ -14,7 +14,6 @@ from .common import add_folder, print_results
 
 if TYPE_CHECKING:
     from ..housing.modal_test import Comparison
-    from ..reduction.error import MeshError, ReductionError
     from ..reduction.modal_body import ModalBody
 
 
@@ -65,41 +64,35 @@ def run(args: argparse.Namespace) -> int:
     shown = min(args.modes, body.size)
     with stage("error estimates"):
         fields = body.reconstruct(body.coupled.vectors[:, :shown].T)
-        mesh = mesh_error(body, table.reduction.band_Hz)
-        left_out = reduction_error(body, table.reduction.band_Hz)
-        errors = _frequency_errors(body, shown, mesh)
+        band = table.reduction.band_Hz
+        mesh, left_out = mesh_error(body, band), reduction_error(body, band)
+        both = {"mesh": mesh.frequency_errors[:shown], "reduction": left_out.frequency_errors[:shown]}
+        errors = {name: np.where(np.isfinite(one), one, np.nan) for name, one in both.items()}
+        errors["all"] = errors["mesh"] + errors["reduction"]
+        response = {
+            "band_Hz": band,
+            "response_error_estimate": mesh.response + left_out.response,
+            "mesh_response_error_estimate": mesh.response,
+            "reduction_response_error_bound": left_out.response,
+        }
     compared = None if test is None else compare(body, test, args.modes)
-    _report(body, errors, mesh, left_out, seconds)
+    _report(body, errors, response)
     with whole_set(folder, ("housing.png", "modes.png", "comparison.csv", "points.csv", "mac.csv", "mac.png")) as made:
         with stage("tables"):
-            _write(made, body, fields, errors, mesh, left_out)
+            _write(made, body, fields, errors, response)
         if compared is not None:
             _compare(made, compared, args)
         with stage("pictures"):
             problem = "" if args.no_pictures or not body.has_mesh else _draw(made, body, fields)
         names = sorted(path.name for path in made.iterdir())
-    print_results((), folder, names, {}, () if not problem else (f"no pictures: {problem}",))
+    print_results((), folder, names, {"reduced body": seconds}, () if not problem else (f"no pictures: {problem}",))
     from ..figures.offscreen import MISSING
 
     drawn = not problem or problem == MISSING  # who installs no VTK wants no pictures of it
     return int(not drawn or not np.all(np.isfinite(body.coupled.frequencies_hz)))
 
 
-def _frequency_errors(body: ModalBody, shown: int, mesh: MeshError) -> dict[str, Any]:
-    """Relative errors of the first frequencies: of mesh, of reduction, of both; not-a-number beyond the modes kept."""
-    import numpy as np
-
-    from ..reduction.error import reduction_error
-
-    highest = body.coupled.frequencies_hz[shown - 1] * (1.0 + 1e-9)
-    known = reduction_error(body, max(min(highest, 0.999 * body.next_hz), 1e-9), points=1).frequency_errors[:shown]
-    reduction = np.full(shown, np.nan)
-    reduction[: len(known)] = np.where(np.isfinite(known), known, np.nan)
-    own = np.where(np.isfinite(mesh.frequency_errors), mesh.frequency_errors, np.nan)[:shown]
-    return {"mesh": own, "reduction": reduction, "all": own + reduction}
-
-
-def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: ReductionError, seconds: float) -> None:
+def _report(body: ModalBody, errors: dict[str, Any], response: dict[str, float]) -> None:
     import numpy as np
 
     for note in body.notes:
@@ -114,7 +107,7 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
     kept = f"{body.modes} modes to {body.internal_hz[body.modes - 1]:.0f} Hz" if body.modes else "no modes"
     extra = len(body.internal_hz) - body.modes
     print(f"reduced to      {body.size} coordinates: {6 * len(body.attachment_names)} of attachments, {kept},")
-    print(f"                {extra} quasi-static corrections; {seconds:.2f} s")
+    print(f"                {extra} quasi-static corrections")
     for name, point in zip(body.attachment_names, body.attachment_points, strict=True):
         x, y, z = np.round(1e3 * point, 6) + 0.0
         print(f"bore {name:<10} reference point x {x:8.3f}  y {y:8.3f}  z {z:8.3f} mm")
@@ -125,12 +118,12 @@ def _report(body: ModalBody, errors: dict[str, Any], mesh: MeshError, left_out: 
         if not math.isfinite(estimate):
             said = "unknown: " + (_UNKNOWN if not body.has_mesh else _COARSE if number < body.modes else _FEW)
         print(f"  {number + 1:3d} {frequency:10.2f} Hz   {said}")
-    bound = mesh.response + left_out.response
+    band, bound, mesh, reduction = response.values()
     why = "keep more modes" if body.has_mesh else _UNKNOWN
     text = f"<= {100.0 * bound:.2g} % rms" if math.isfinite(bound) else f"unknown: {why}"
-    part = f" (mesh {100.0 * mesh.response:.2g} %, reduction {100.0 * left_out.response:.2g} %)"
+    part = f" (mesh {100.0 * mesh:.2g} %, reduction {100.0 * reduction:.2g} %)"
     text += part if math.isfinite(bound) else ""
-    print(f"response of the bores up to {left_out.band_hz:.0f} Hz (1 % damping): estimated error {text}")
+    print(f"response of the bores up to {band:.0f} Hz (1 % damping): estimated error {text}")
 
 
 def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:
@@ -164,9 +157,7 @@ def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:
         )
 
 
-def _write(
-    folder: Path, body: ModalBody, fields: Any, errors: dict[str, Any], mesh: MeshError, left_out: ReductionError
-) -> None:
+def _write(folder: Path, body: ModalBody, fields: Any, errors: dict[str, Any], response: dict[str, float]) -> None:
     import numpy as np
 
     from ..housing.superelement import write_matrix
@@ -200,10 +191,7 @@ def _write(
         "fixed": body.held,
         "frequencies_free_attachments_Hz": body.coupled.frequencies_hz[:shown],
         "frequencies_held_attachments_Hz": body.internal_hz[: body.modes],
-        "band_Hz": left_out.band_hz,
-        "response_error_estimate": mesh.response + left_out.response,
-        "mesh_response_error_estimate": mesh.response,
-        "reduction_response_error_bound": left_out.response,
+        **response,
         "frequency_error_estimates": errors["all"],
         "mesh_frequency_error_estimates": errors["mesh"],
         "attachments": {n: list(p) for n, p in zip(body.attachment_names, body.attachment_points, strict=True)},

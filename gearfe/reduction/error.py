@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -37,28 +38,25 @@ PARTS = (0.25, 0.5, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class ReductionError:
-    """Bounds on what the left-out modes do in a band.
+class BodyError:
+    """Estimated errors of a reduced body, by its mesh or by its reduction.
 
     Attributes
     ----------
-    band_hz
-        Upper end of the band (Hz).
     response
-        Estimated error of the attachments' accelerations under forces on them: relative, rms over band and pairs.
-    frequencies_hz : (k,)
-        Natural frequencies within the band, attachments free (Hz).
-    frequency_errors : (k,)
-        Relative errors of these.
+        Of the attachments' accelerations under forces on them, up to the end of a band: relative, rms over band and
+        pairs.
+    frequency_errors : (N,)
+        Relative ones of the natural frequencies with free attachments; 0 for rigid-body modes. Infinite where there is
+        no estimate: of the reduction beyond the first frequency that was left out; of the mesh above the highest mode
+        kept, and where it is as large as the stiffness itself: such a mesh (linear tetrahedra) is too coarse for one.
     """
 
-    band_hz: float
     response: float
-    frequencies_hz: Array
     frequency_errors: Array
 
 
-def reduction_error(body: ModalBody, band_hz: float, *, points: int = 200) -> ReductionError:
+def reduction_error(body: ModalBody, band_hz: float, *, points: int = 200) -> BodyError:
     """Bound the error of a reduced body up to `band_hz`.
 
     Parameters
@@ -70,59 +68,29 @@ def reduction_error(body: ModalBody, band_hz: float, *, points: int = 200) -> Re
     points
         Number of frequencies, evenly spaced in the band.
     """
-    if not band_hz > 0.0:
-        raise InputError("band_hz", band_hz, "must be > 0", "give a frequency in Hz")
-    coupled = body.coupled
-    inside = coupled.frequencies_hz <= band_hz
-    own = coupled.frequencies_hz[inside]
-    m = 6 * len(body.attachment_names)
-    if not m:  # nothing outside sees the modes that are left out, and those that are kept are exact
-        return ReductionError(band_hz, 0.0, own, np.zeros(len(own)))
-    if band_hz >= body.next_hz:
-        return ReductionError(band_hz, math.inf, own, np.full(len(own), math.inf))
-    shapes = coupled.vectors[:m]
+    own, shapes = body.coupled.frequencies_hz, _at_attachments(body)
+    errors = np.zeros(len(own))
+    if not len(shapes):  # nothing outside sees the modes that are left out, and those that are kept are exact
+        return BodyError(0.0, errors)
     omega = 2.0 * math.pi * own
-    energy = np.array([v @ lost_stiffness(body, w) @ v for v, w in zip(shapes[:, inside].T, omega, strict=True)])
-    errors = energy / np.maximum(2.0 * omega**2, 1e-300)
+    errors[own >= body.next_hz] = math.inf
+    for k in np.flatnonzero(own < body.next_hz):
+        energy = lost_stiffness(body, float(omega[k]), shapes[:, k : k + 1]).item()
+        errors[k] = energy / max(2.0 * omega[k] ** 2, 1e-300)
+    if band_hz >= body.next_hz:
+        return BodyError(math.inf, errors)
     forces = shapes.reshape(-1, 6, body.size)[:, :3].reshape(-1, body.size)
     lost = total = 0.0
-    all_omega = 2.0 * math.pi * coupled.frequencies_hz
-    for w in 2.0 * math.pi * band_hz * (np.arange(points) + 0.5) / points:
-        gain = w**2 / (all_omega**2 - w**2 + 2j * RATIO * all_omega * w)
-        response = (shapes * gain) @ forces.T
-        direct = (forces * gain) @ forces.T
-        change = (response.T @ lost_stiffness(body, float(w)) @ response) / w**2
-        lost += float(np.sum(np.abs(change) ** 2))
-        total += float(np.sum(np.abs(direct) ** 2))
-    response = SAFETY * math.sqrt(lost / total) + EIGENSOLVER if lost else 0.0
-    return ReductionError(band_hz, response, own, errors)
+    for w, gain in zip(*_gains(body, band_hz, points), strict=True):
+        response = (shapes * (gain / w**2)) @ forces.T
+        lost += float(np.sum(np.abs(w**2 * lost_stiffness(body, float(w), response)) ** 2))
+        total += float(np.sum(np.abs((forces * gain) @ forces.T) ** 2))
+    response_error = SAFETY * math.sqrt(lost / total) + EIGENSOLVER if lost else 0.0
+    return BodyError(response_error, errors)
 
 
-@dataclass(frozen=True, eq=False)
-class MeshError:
-    """Estimates of what the mesh does to a body.
-
-    Attributes
-    ----------
-    band_hz
-        Upper end of the band (Hz).
-    response
-        Estimated error of the attachments' accelerations under forces on them: relative, rms over band and pairs.
-    frequency_errors : (N,)
-        Relative errors of the natural frequencies with free attachments; 0 for rigid-body modes. Infinite above the
-        highest mode that was kept, where the mesh's error is not estimated, and where the estimate is as large as the
-        stiffness itself: such a mesh (linear tetrahedra) is too coarse for an error estimate.
-    """
-
-    band_hz: float
-    response: float
-    frequency_errors: Array
-
-
-def mesh_error(body: ModalBody, band_hz: float) -> MeshError:
+def mesh_error(body: ModalBody, band_hz: float) -> BodyError:
     """Estimate the mesh's error of a reduced body up to `band_hz`; arguments as those of `reduction_error`."""
-    if not band_hz > 0.0:
-        raise InputError("band_hz", band_hz, "must be > 0", "give a frequency in Hz")
     bodies = [body, *(body.softened(part) for part in PARTS)]
     own, vectors = body.coupled.frequencies_hz, body.coupled.vectors
     soft = np.maximum(bodies[-1].coupled.frequencies_hz, 1e-300)
@@ -131,31 +99,46 @@ def mesh_error(body: ModalBody, band_hz: float) -> MeshError:
     unknown = (own > 0.0) & ((lost == 0.0) | (lost >= stiffness) | (own > body.highest_hz))
     errors = np.where(unknown, math.inf, np.where(own > 0.0, own / soft - 1.0, 0.0))
     if np.any(unknown & (own <= band_hz)):
-        return MeshError(band_hz, math.inf, errors)
+        return BodyError(math.inf, errors)
     direct, *softer = (accelerances(b, band_hz) for b in bodies)
     size = float(np.linalg.norm(direct))
-    response = max(float(np.linalg.norm(h - direct)) for h in softer) / size if size else 0.0
-    return MeshError(band_hz, response, errors)
+    return BodyError(max(float(np.linalg.norm(h - direct)) for h in softer) / size if size else 0.0, errors)
 
 
 def accelerances(body: ModalBody, band_hz: float, *, points: int = 200) -> ComplexArray:
     """Accelerations of all attachments' points for forces on them, (points, 3 a, 3 a) over a band (1/kg)."""
-    m = 6 * len(body.attachment_names)
-    coupled = body.coupled
-    shapes = coupled.vectors[:m].reshape(-1, 6, body.size)[:, :3].reshape(-1, body.size)
-    own = 2.0 * math.pi * coupled.frequencies_hz
+    shapes = _at_attachments(body).reshape(-1, 6, body.size)[:, :3].reshape(-1, body.size)
+    return np.asarray((shapes * _gains(body, band_hz, points)[1][:, None, :]) @ shapes.T)
+
+
+def _at_attachments(body: ModalBody) -> Array:
+    """(6 a, N) the modes with free attachments in their coordinates."""
+    return body.coupled.vectors[: 6 * len(body.attachment_names)]
+
+
+def _gains(body: ModalBody, band_hz: float, points: int) -> tuple[Array, ComplexArray]:
+    """Circular frequencies (points,) in a band, and accelerations (points, N) of the modes for unit modal forces.
+
+    Raises
+    ------
+    InputError
+        For a band that is none.
+    """
+    if not band_hz > 0.0:
+        raise InputError("band_hz", band_hz, "must be > 0", "give a frequency in Hz")
+    own = 2.0 * math.pi * body.coupled.frequencies_hz
     omega = 2.0 * math.pi * band_hz * (np.arange(points) + 0.5) / points
-    gains = omega[:, None] ** 2 / (own**2 - omega[:, None] ** 2 + 2j * RATIO * own * omega[:, None])
-    return np.asarray((shapes * gains[:, None, :]) @ shapes.T)
+    square = omega[:, None] ** 2
+    return omega, square / (own**2 - square + 2j * RATIO * own * omega[:, None])
 
 
-def lost_stiffness(body: ModalBody, omega: float) -> Array:
-    """E of the bound ``dD <= E`` at a circular frequency (rad/s), over the attachments' coordinates, (6 a, 6 a)."""
-    m = 6 * len(body.attachment_names)
+def lost_stiffness(body: ModalBody, omega: float, shapes: ComplexArray | Array) -> Any:
+    """``x^T E y`` of the bound ``dD <= E`` at a circular frequency (rad/s), x and y columns of `shapes` (6 a, p)."""
     if math.isinf(body.next_hz):
-        return np.zeros((m, m))
+        return np.zeros((shapes.shape[1],) * 2)
     left = 1.0 - (omega / (2.0 * math.pi * body.next_hz)) ** 2
     if body.corrections == 0:
-        return np.asarray(omega**4 / left * body.truncation)
-    weights = body.mass[m:, :m] / (np.diag(body.stiffness)[m:, None] - omega**2)
-    return np.asarray(omega**8 / left * (weights.T @ body.truncation @ weights))
+        return omega**4 / left * (shapes.T @ body.truncation @ shapes)
+    m = len(shapes)
+    weights = (body.mass[m:, :m] @ shapes) / (np.diag(body.stiffness)[m:, None] - omega**2)
+    return omega**8 / left * (weights.T @ body.truncation @ weights)
