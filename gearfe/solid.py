@@ -73,7 +73,12 @@ def assemble(nodes: Array, tets: IntArray, material: Material, *, mass_rule: Mas
     curved = curved_elements(nodes, tets)
     tets = np.concatenate([tets[~curved], tets[curved]])
     straight, bent = np.split(tets, [int((~curved).sum())])
-    parts = [_by_blocks(nodes, part, material, mass_rule) for part in (straight, bent) if len(part)]
+    parts = []
+    for part, degrees in ((straight, (2, 6)), (bent, (CURVED_DEGREE, 7))):
+        if len(part):
+            degree = 2 if mass_rule == "4-point" else degrees[1]
+            stiff, heavy = (shape_functions(tets.shape[1], one) for one in (degrees[0], degree))
+            parts.append(element_matrices(nodes, part, material, (stiff, stiff), (heavy, heavy)))
     pattern = _pattern(tets, len(nodes))
 
     def summed(local: list[Array]) -> Array:
@@ -159,9 +164,20 @@ def _pattern(tets: IntArray, n: int) -> _Pattern:
     return _Pattern(starts, (found % n).astype(np.int32), place)
 
 
+class Functions(NamedTuple):
+    """Functions of an element at the ``p`` points of a quadrature rule."""
+
+    #: (a, p)
+    values: Array
+    #: (a, 3, p) derivatives by the reference axes
+    slopes: Array
+    #: (p,)
+    weights: Array
+
+
 @cache
-def shape_functions(a: int, order: int) -> tuple[Array, Array, Array]:
-    """Shape functions (a, p), their gradients (a, 3, p) and weights (p,) at quadrature points of the given degree."""
+def shape_functions(a: int, order: int) -> Functions:
+    """Shape functions of an element with `a` nodes, at the points of a rule of the given degree."""
     from skfem import ElementTetP1, ElementTetP2
     from skfem.quadrature import get_quadrature_tet
 
@@ -170,7 +186,7 @@ def shape_functions(a: int, order: int) -> tuple[Array, Array, Array]:
     values = [element.lbasis(points, k) for k in range(a)]
     phi = np.array([np.broadcast_to(v, weights.shape) for v, _ in values])
     gradients = np.array([np.broadcast_to(g, (3, len(weights))) for _, g in values])
-    return phi, gradients, weights
+    return Functions(phi, gradients, weights)
 
 
 @cache
@@ -185,42 +201,47 @@ def node_gradients(a: int) -> Array:
 
 
 @dataclass(frozen=True)
-class _Blocks:
-    """Element matrices of ``m`` elements as (coefficients of each element) @ (integrals over the reference element)."""
+class ElementMatrices:
+    """Element matrices of ``m`` elements as (coefficients of each element) @ (integrals over the reference element).
+
+    Rows are functions (s of them), columns others (a), or the same.
+    """
 
     #: (m, 3, 3, 9 p) coefficients of the stiffness blocks; p quadrature points (straight: one set for all)
     coefficients: Array
-    #: (9 p, a a) of d phi_a / d xi_m  d phi_b / d xi_n
+    #: (9 p, s a) of d phi_s / d xi_m  d phi_a / d xi_n
     gradients: Array
-    #: (m, q) density times volume ratio, and (q, a a) of phi_a phi_b
+    #: (m, q) density times volume ratio, and (q, s a) of phi_s phi_a
     density: Array
     products: Array
 
     def stiffness(self, i: int, j: int) -> Array:
-        """(m, a a) block that couples axes i and j."""
+        """(m, s a) block that couples axes i and j."""
         return np.asarray(self.coefficients[:, i, j] @ self.gradients)
 
     def mass(self) -> Array:
-        """(m, a a) mass of one axis."""
+        """(m, s a) mass of one axis."""
         return np.asarray(self.density @ self.products)
 
 
-def _by_blocks(nodes: Array, tets: IntArray, material: Material, mass_rule: MassRule) -> _Blocks:
-    """Factors of the element matrices of elements that are all straight or all curved.
+Pair = tuple[Functions, Functions]
 
-    With J the gradient of the inverse map, ``d phi_a/d x_i = J[m, i] d phi_a/d xi_m``, block (i, j) of the element
-    stiffness is the sum over quadrature points of ``w det (lambda J[m,i] J[n,j] + mu J[m,j] J[n,i] + mu delta_ij
-    J[m,k] J[n,k])`` times ``d phi_a/d xi_m d phi_b/d xi_n``. On straight elements all but the last factor is constant.
+
+def element_matrices(nodes: Array, tets: IntArray, material: Material, stiff: Pair, heavy: Pair) -> ElementMatrices:
+    """Factors of the matrices of elements that are all straight or all curved, between pairs of functions.
+
+    The second ones are the elements' own. With J the gradient of the inverse map, ``d phi_a/d x_i = J[m, i] d phi_a/d
+    xi_m``, block (i, j) of the element stiffness is the sum over quadrature points of ``w det (lambda J[m,i] J[n,j] +
+    mu J[m,j] J[n,i] + mu delta_ij J[m,k] J[n,k])`` times ``d phi_s/d xi_m d phi_a/d xi_n``. On straight elements all
+    but the last factor is constant.
     """
-    a = tets.shape[1]
     curved = bool(curved_elements(nodes, tets[:1])[0])
-    _, gradients, weights = shape_functions(a, CURVED_DEGREE if curved else 2)
-    if curved:
-        products = np.einsum("amp,bnp,p->pmnab", gradients, gradients, weights).reshape(-1, a * a)
-        det, inverse = maps(nodes, tets, gradients)
-    else:
-        products = np.einsum("amp,bnp,p->mnab", gradients, gradients, weights).reshape(-1, a * a)
-        det, inverse = maps(nodes, tets[:, :4], shape_functions(4, 1)[1])
+
+    def mapped(own: Functions) -> tuple[Array, Array]:
+        return maps(nodes, tets, own.slopes) if curved else maps(nodes, tets[:, :4], shape_functions(4, 1).slopes)
+
+    rows, own = stiff
+    det, inverse = mapped(own)
     (lam, mu), c = material.lame(), np.empty((len(tets), 3, 3, det.shape[1], 3, 3))
     total = np.einsum("epmk,epnk->epmn", inverse, inverse)
     for i in range(3):
@@ -229,13 +250,17 @@ def _by_blocks(nodes: Array, tets: IntArray, material: Material, mass_rule: Mass
             c[:, i, j] = lam * direct + mu * direct.swapaxes(-1, -2)
         c[:, i, i] += mu * total
     c *= det[:, None, None, :, None, None]
-    phi, slopes, weights = shape_functions(a, 2 if mass_rule == "4-point" else (7 if curved else 6))
-    if curved:
-        phi_phi = np.einsum("ap,bp,p->pab", phi, phi, weights).reshape(-1, a * a)
-        det, _ = maps(nodes, tets, slopes)
-    else:
-        phi_phi = np.einsum("ap,bp,p->ab", phi, phi, weights).reshape(-1, a * a)
-    return _Blocks(c.reshape(len(tets), 3, 3, -1), products, material.density * det, phi_phi)
+    gradients = np.einsum("smp,anp,p->pmnsa", rows.slopes, own.slopes, own.weights)
+    lighter, own = heavy
+    products = np.einsum("sp,ap,p->psa", lighter.values, own.values, own.weights)
+    if not curved:
+        gradients, products = gradients.sum(axis=0), products.sum(axis=0)
+    return ElementMatrices(
+        c.reshape(len(tets), 3, 3, -1),
+        gradients.reshape(c[0, 0, 0].size, -1),
+        material.density * mapped(own)[0],
+        products.reshape(-1, products.shape[-2] * products.shape[-1]),
+    )
 
 
 def maps(nodes: Array, tets: IntArray, gradients: Array) -> tuple[Array, Array]:

@@ -32,7 +32,7 @@ import numpy as np
 from scipy import sparse
 
 from ..elasticity import Material
-from ..solid import EDGES, curved_elements, maps, shape_functions
+from ..solid import EDGES, ElementMatrices, Functions, curved_elements, element_matrices, shape_functions
 from ..typing import Array, BoolArray, IntArray
 
 #: Error over what the next order's functions take one by one: 1.7 by theory, at most 2.5 measured.
@@ -45,7 +45,7 @@ _FACE_EDGES = np.array([[0, 1, 2], [0, 4, 3], [1, 5, 4], [2, 5, 3]])
 #: Degree of the quadrature rule: 1 and 2 from the gradients on straight elements, two more on curved ones.
 _DEGREE = 5
 #: Elements at a time, for the memory that takes.
-_CHUNK = 1000
+_CHUNK = 300
 
 
 def energy_lost(
@@ -94,12 +94,10 @@ def _unbalanced(
         for part in (first + np.flatnonzero(~curved[chosen]), first + np.flatnonzero(curved[chosen])):
             if not len(part):
                 continue
-            bent = bool(curved[part[0]])
-            det, inverse = maps(nodes, tets[part] if bent else tets[part, :4], made.slopes if bent else _linear())
-            sound = det.min(axis=1) > _SOUND * np.abs(det).mean(axis=1)
-            det = np.where(sound[:, None], det, 0.0)
-            own = _residual if bent else _straight_residual
-            found, block = own(made, material, det, inverse, field[tets[part]], eigenvalues)
+            matrices = element_matrices(nodes, tets[part], material, made[:2], made[:2])
+            unsound = matrices.density.min(axis=1) <= _SOUND * np.abs(matrices.density).mean(axis=1)
+            matrices.coefficients[unsound], matrices.density[unsound] = 0.0, 0.0
+            found, block = _residual(made, matrices, field[tets[part]], eigenvalues)
             found *= numbers.signs[part][:, :, None, None]
             add_up(numbers.place[part], (found, residual), (block, stiffness))
     return numbers, residual.reshape(-1, 3, count), stiffness.reshape(-1, 3, 3)
@@ -128,16 +126,12 @@ def _taken(residual: Array, stiffness: Array, acting: BoolArray) -> tuple[IntArr
 
 
 class _Functions(NamedTuple):
-    """Functions that the next order adds (s of them) and the elements' own (a), at p quadrature points."""
+    """Functions that the next order adds (s of them), and the elements' own, at p quadrature points."""
 
-    #: (s, p), (s, 3, p)
-    added: Array
-    added_slopes: Array
-    #: (a, p), (a, 3, p)
-    values: Array
-    slopes: Array
-    #: (p,)
-    weights: Array
+    added: Functions
+    own: Functions
+    #: (9 p, s) of d phi_s / d xi_m  d phi_s / d xi_n
+    themselves: Array
 
 
 @cache
@@ -160,14 +154,10 @@ def _functions(a: int) -> _Functions:
         x, y, z = corner[one], corner[two], corner[three]
         values.append(x * y * z)
         slopes.append(y * z * slope[one] + x * z * slope[two] + x * y * slope[three])
-    own, own_slopes, weights = shape_functions(a, _DEGREE)
-    return _Functions(np.array(values), np.array(slopes), own, own_slopes, weights)
-
-
-@cache
-def _linear() -> Array:
-    """(4, 3, 1) slopes of the corners' functions: the map of straight elements."""
-    return np.asarray(shape_functions(4, 1)[1])
+    own = shape_functions(a, _DEGREE)
+    added = Functions(np.array(values), np.array(slopes), own.weights)
+    themselves = np.einsum("smp,snp,p->pmns", added.slopes, added.slopes, added.weights)
+    return _Functions(added, own, themselves.reshape(-1, len(values)))
 
 
 class _Numbers(NamedTuple):
@@ -205,50 +195,15 @@ def _number(nodes: Array, tets: IntArray, rigid: list[IntArray]) -> _Numbers:
     return _Numbers(place, np.hstack([signs, np.ones(face.shape)]), acting, len(acting))
 
 
-def _straight_residual(
-    made: _Functions, material: Material, det: Array, inverse: Array, field: Array, eigenvalues: Array
-) -> tuple[Array, Array]:
-    """(m, s, 3, k) residuals and (m, s, 3, 3) stiffnesses of straight elements, one map each."""
-    weight, inverse = det[:, 0], inverse[:, 0]
-    m, k, s, a = len(det), field.shape[-1], len(made.added), field.shape[1]
-    pairs = np.einsum("emi,enj->eijmn", inverse, inverse) * weight[:, None, None, None, None]
-    mixed = np.einsum("smp,anp,p->mnsa", made.added_slopes, made.slopes, made.weights).reshape(9, s * a)
-    blocks = _stiffness(material, (pairs.reshape(-1, 9) @ mixed).reshape(m, 3, 3, s, a))
-    loads = np.matmul(blocks.transpose(0, 3, 1, 4, 2).reshape(m, 3 * s, 3 * a), field.reshape(m, 3 * a, k))
-    mass = (made.added * made.weights) @ made.values.T
-    inertia = np.matmul(mass[None], field.reshape(m, a, 3 * k)).reshape(m, s, 3, k) * eigenvalues
-    own = np.einsum("smp,snp,p->mns", made.added_slopes, made.added_slopes, made.weights).reshape(9, s)
-    stiffness = _stiffness(material, (pairs.reshape(-1, 9) @ own).reshape(m, 3, 3, s))
-    residual = material.density * weight[:, None, None, None] * inertia - loads.reshape(m, s, 3, k)
-    return residual, stiffness.transpose(0, 3, 1, 2)
-
-
-def _residual(
-    made: _Functions, material: Material, det: Array, inverse: Array, field: Array, eigenvalues: Array
-) -> tuple[Array, Array]:
-    """The same of curved elements, point by point."""
-    lam, mu = material.lame()
-    volume = det * made.weights
-    slopes = np.einsum("amp,epmj->epaj", made.slopes, inverse)
-    added = np.einsum("smp,epmj->epsj", made.added_slopes, inverse)
-    strain = np.einsum("epaj,eaik->epijk", slopes, field, optimize=True)
-    trace = np.einsum("epiik->epk", strain)
-    stress = mu * (strain + strain.transpose(0, 1, 3, 2, 4))
+def _residual(made: _Functions, matrices: ElementMatrices, field: Array, eigenvalues: Array) -> tuple[Array, Array]:
+    """(m, s, 3, k) residuals and (m, s, 3, 3) stiffnesses of the added functions, for fields (m, a, 3, k)."""
+    (m, a, _, k), s = field.shape, len(made.added.values)
+    stiffness = np.empty((m, s, 3, a, 3))
     for i in range(3):
-        stress[:, :, i, i] += lam * trace
-    weighted = added * volume[:, :, None, None]
-    residual = -np.einsum("epsj,epijk->esik", weighted, stress, optimize=True)
-    moved = np.einsum("ap,eaik->epik", made.values, field, optimize=True)
-    residual += material.density * eigenvalues * np.einsum("sp,epik,ep->esik", made.added, moved, volume, optimize=True)
-    stiffness = _stiffness(material, np.einsum("epsi,epsj->eijs", weighted, added, optimize=True))
-    return residual, stiffness.transpose(0, 3, 1, 2)
-
-
-def _stiffness(material: Material, gradients: Array) -> Array:
-    """(m, 3, 3, ...) blocks of the stiffness from the integrals of d/dx_i of one function times d/dx_j of the other."""
-    lam, mu = material.lame()
-    blocks = lam * gradients + mu * gradients.swapaxes(1, 2)
-    total = mu * np.trace(gradients, axis1=1, axis2=2)
-    for i in range(3):
-        blocks[:, i, i] += total
-    return np.asarray(blocks)
+        for j in range(3):
+            stiffness[:, :, i, :, j] = matrices.stiffness(i, j).reshape(m, s, a)
+    residual = np.matmul(matrices.mass().reshape(m, s, a), field.reshape(m, a, 3 * k)).reshape(m, s, 3, k)
+    residual *= eigenvalues
+    residual -= np.matmul(stiffness.reshape(m, 3 * s, 3 * a), field.reshape(m, 3 * a, k)).reshape(m, s, 3, k)
+    themselves = made.themselves.reshape(-1, matrices.coefficients.shape[-1], s).sum(axis=0)
+    return residual, (matrices.coefficients @ themselves).transpose(0, 3, 1, 2)

@@ -18,7 +18,7 @@ import numpy as np
 from ..elasticity import Material
 from ..meshing.housing_mesh import Extrusion
 from ..prisms import ORDER, isotropic_blocks, lagrange, plane_parts, triangle_maps, triangle_rule
-from ..typing import Array, BoolArray, IntArray
+from ..typing import Array, IntArray
 from .mesh_error import add_up, energy_taken
 
 #: Error over what the next order's functions take one by one.
@@ -29,10 +29,9 @@ ELEMENTS = 32
 
 #: Ends of a triangle's edges.
 _EDGES = np.array([[0, 1], [1, 2], [2, 0]])
-#: Rows of the plane functions of degree 4 (edges, inside), and of those of lower degree (corners, edges, inside).
-_NEW, _OLD = slice(0, 5), slice(5, 15)
-#: Rows of the line's functions: ends and degrees 2 to 4 with new plane functions, degree 4 with old ones.
-_ALL, _FOURTH = slice(0, 5), slice(4, 5)
+#: Products by their factors: rows of the plane functions (of degree 4 first), rows of the line's (ends, then degrees 2
+#: to 4), and places of these in a layer, of which each has four and the next layer's first.
+_GROUPS = ((slice(0, 5), slice(0, 5), np.array([0, 4, 1, 2, 3])), (slice(5, 15), slice(4, 5), np.array([1])))
 
 
 def prism_energy_lost(
@@ -54,84 +53,65 @@ def prism_energy_lost(
         Sets of nodes that are held or move as a rigid thing: no function acts within one.
     """
     count, levels = fields.shape[1], len(mesh.levels)
-    field = fields.reshape(-1, 3, count)
-    plane, numbers, line = _plane(mesh), _number(mesh), _line()
-    still = np.zeros((len(mesh.points) * levels, len(rigid)), dtype=bool)
-    for column, chosen in enumerate(rigid):
-        still[used[chosen], column] = True
-    groups = [_Group(numbers.new, _NEW, _ALL), _Group(numbers.old, _OLD, _FOURTH)]
-    lost = np.zeros((count, count))
-    # residuals and stiffnesses of functions at the level between two layers: (plane functions, 3, k), (.., 3, 3)
-    below = (np.zeros((len(numbers.new.node), 3, count)), np.zeros((len(numbers.new.node), 3, 3)))
+    field, plane, line, numbers = fields.reshape(-1, 3, count), _plane(mesh), _line(), _number(mesh)
+    found = _found(mesh, numbers)
+    residual, stiffness = np.zeros((len(found), 3, count)), np.zeros((len(found), 3, 3))
     for layer, solid in enumerate(mesh.solid):
-        chosen = np.flatnonzero(solid)
         half = 0.5 * (mesh.levels[ORDER * layer + ORDER] - mesh.levels[ORDER * layer])
-        own = mesh.triangles[chosen][:, :, None] * levels + ORDER * layer + np.arange(ORDER + 1)
-        own = np.searchsorted(used, own)
-        for group in groups:
-            total, lines = len(group.numbers.node), len(line.mass[group.line])
-            residual, stiffness = np.zeros((total, lines, 3, count)), np.zeros((total, lines, 3, 3))
-            for first in range(0, len(chosen), ELEMENTS):
-                part = slice(first, first + ELEMENTS)
-                elements = _elements(plane, line, group, chosen[part], half, material)
-                found = elements.residual(field[own[part]], eigenvalues)
-                place, signs = group.numbers.place[chosen[part]], group.numbers.signs[chosen[part]]
-                found *= signs[:, :, None, None, None]
-                add_up(place, (found, residual), (elements.own, stiffness))
-            inside = _acting(group.numbers, ORDER * layer + 1, levels, still)
-            for j in range(residual.shape[1]):
-                if group.line == _ALL and j == 0:
-                    below = (below[0] + residual[:, j], below[1] + stiffness[:, j])
-                    lost += energy_taken(*below, _acting(group.numbers, ORDER * layer, levels, still))
-                elif group.line == _ALL and j == 1:
-                    below = (residual[:, j], stiffness[:, j])
-                else:
-                    lost += energy_taken(residual[:, j], stiffness[:, j], inside)
-    lost += energy_taken(*below, _acting(numbers.new, levels - 1, levels, still))
-    return np.asarray(FACTOR * lost)
+        for chosen in np.array_split(np.flatnonzero(solid), np.arange(ELEMENTS, solid.sum(), ELEMENTS)):
+            own = mesh.triangles[chosen][:, :, None] * levels + ORDER * layer + np.arange(ORDER + 1)
+            values = field[np.searchsorted(used, own)]
+            for group in _GROUPS:
+                elements = _elements(plane, line, group, chosen, half, material)
+                left = elements.residual(values, eigenvalues) * numbers.signs[chosen, group[0]][..., None, None, None]
+                place = np.searchsorted(found, _places(mesh, numbers, layer, chosen, group))
+                add_up(place, (left, residual), (elements.own, stiffness))
+    own_plane, step = divmod(found, 4 * len(mesh.solid) + 1)
+    node = numbers.node[own_plane] * levels + ORDER * (step // 4) + (step % 4 > 0)
+    acting = np.ones(len(found), dtype=bool)
+    for chosen in rigid:
+        acting &= ~np.isin(node, used[chosen])
+    return FACTOR * energy_taken(residual, stiffness, acting)
 
 
 class _Numbers(NamedTuple):
-    """Numbers of plane functions in the mesh."""
+    """Numbers of the plane functions in the mesh."""
 
-    #: (m, s)
+    #: (m, 15)
     place: IntArray
-    #: (m, s) sign that makes a function the same in all its triangles
+    #: (m, 15) sign that makes a function the same in all its triangles
     signs: Array
     #: (count,) a node of the mesh on the corner or edge, or in the triangle, that the function belongs to
     node: IntArray
 
 
-class _Group(NamedTuple):
-    """Plane functions, their rows, and the rows of the line functions that they are multiplied with."""
-
-    numbers: _Numbers
-    plane: slice
-    line: slice
+_Group = tuple[slice, slice, IntArray]
 
 
-class _BothNumbers(NamedTuple):
-    new: _Numbers
-    old: _Numbers
-
-
-def _number(mesh: Extrusion) -> _BothNumbers:
+def _number(mesh: Extrusion) -> _Numbers:
     triangles, n = mesh.triangles, len(mesh.points)
     ends = np.sort(triangles[:, _EDGES], axis=2)
-    keys, first, edge = np.unique(ends[..., 0] * n + ends[..., 1], return_index=True, return_inverse=True)
-    edge = edge.reshape(-1, 3)
-    e, m = len(keys), len(triangles)
+    _, first, edge = np.unique(ends[..., 0] * n + ends[..., 1], return_index=True, return_inverse=True)
+    edge, m = edge.reshape(-1, 3), len(triangles)
     on_edge, centre, own = triangles[:, [3, 5, 7]].ravel()[first], triangles[:, 9], np.arange(m)[:, None]
-    new = _Numbers(np.hstack([edge, e + own, e + m + own]), np.ones((m, 5)), np.concatenate([on_edge, centre, centre]))
     turned = np.where(triangles[:, _EDGES[:, 0]] < triangles[:, _EDGES[:, 1]], 1.0, -1.0)
-    place = np.hstack([triangles[:, :3], n + edge, n + e + edge, n + 2 * e + own])
-    signs = np.hstack([np.ones((m, 6)), turned, np.ones((m, 1))])
-    return _BothNumbers(new, _Numbers(place, signs, np.concatenate([np.arange(n), on_edge, on_edge, centre])))
+    parts = [edge, own, own, triangles[:, :3], edge, edge, own]
+    nodes = [on_edge, centre, centre, np.arange(n), on_edge, on_edge, centre]
+    begin = np.cumsum([0, *(len(one) for one in nodes[:-1])])
+    place = np.hstack([part + offset for part, offset in zip(parts, begin, strict=True)])
+    return _Numbers(place, np.hstack([np.ones((m, 11)), turned, np.ones((m, 1))]), np.concatenate(nodes))
 
 
-def _acting(numbers: _Numbers, level: int, levels: int, still: BoolArray) -> BoolArray:
-    """Whether functions may act: those of a corner, edge or face that lies within no rigid set, by one of its nodes."""
-    return np.asarray(~still[numbers.node * levels + level].any(axis=1))
+def _places(mesh: Extrusion, numbers: _Numbers, layer: int, chosen: IntArray, group: _Group) -> IntArray:
+    """(m, s, j) numbers of products in all layers, those of elements in one of them."""
+    rows, _, steps = group
+    return np.asarray(numbers.place[chosen, rows][:, :, None] * (4 * len(mesh.solid) + 1) + 4 * layer + steps)
+
+
+def _found(mesh: Extrusion, numbers: _Numbers) -> IntArray:
+    """Numbers of the products that solid elements have, ascending."""
+    layers = [(layer, np.flatnonzero(solid), group) for layer, solid in enumerate(mesh.solid) for group in _GROUPS]
+    return np.unique(np.concatenate([_places(mesh, numbers, *one).ravel() for one in layers]))
 
 
 class _Plane(NamedTuple):
@@ -230,10 +210,10 @@ def _elements(
     plane: _Plane, line: _Line, group: _Group, chosen: IntArray, half: float, material: Material
 ) -> _Elements:
     """Matrices of the chosen triangles' elements in a layer of half the thickness `half`."""
-    added = {name: part[chosen][:, group.plane] for name, part in plane.added.items()}
+    added = {name: part[chosen][:, group[0]] for name, part in plane.added.items()}
     lower = {name: part[chosen].transpose(0, 2, 1) for name, part in plane.own.items()}
     mass, row_slope, column_slope, stiff = (
-        factor * part[group.line] for factor, part in zip((half, 1.0, 1.0, 1.0 / half), line[:4], strict=True)
+        factor * part[group[1]] for factor, part in zip((half, 1.0, 1.0, 1.0 / half), line[:4], strict=True)
     )
 
     def product(row: str, column: str, along: Array) -> Array:
@@ -250,7 +230,7 @@ def _elements(
     def with_itself(one: str, two: str, along: Array) -> Array:
         return np.asarray(np.sum(added[one] * added[two] / areas, axis=2)[:, :, None] * along)
 
-    m_own, s_own, k_own = (part[group.line] for part in line.own)
+    m_own, s_own, k_own = (part[group[1]] for part in line.own)
     xy, yz = with_itself("x", "0", s_own), with_itself("z", "0", s_own)
     xz = with_itself("x", "z", half * m_own)
     own = isotropic_blocks(
