@@ -1,8 +1,8 @@
 """VTKHDF files: unstructured grids, one or a series in time, in one HDF5 file that ParaView and VTK open.
 
 The layout is VTK's own (VTK file formats, section "VTKHDF", type UnstructuredGrid, version 2.x): arrays of all steps
-stand one after the other, and ``Steps`` says for each step where its part begins. Points and cells that do not change
-are stored once and shared by the steps that follow.
+stand one after the other, and ``Steps`` says for each step where its part begins. All steps share the cells of the
+first; points that do not change are stored once.
 """
 
 from __future__ import annotations
@@ -54,11 +54,9 @@ class VtkHdfSeries:
         self._series = series
         self._whole = whole_file(path)
         self._columns: dict[str, Any] = {}
-        self._steps: dict[str, list[Any]] = {}
+        self._steps: dict[str, list[Any]] = {"Values": [], "PointOffsets": []}
         self._field_names: tuple[frozenset[str], frozenset[str]] | None = None
         self._points = self._cells = 0
-        #: where the points and cells that hold now begin in the file
-        self._place: dict[str, int] = {}
 
     def __enter__(self) -> VtkHdfSeries:
         import h5py
@@ -103,33 +101,29 @@ class VtkHdfSeries:
         points : (n, 2) or (n, 3)
             Coordinates; ``None`` for those of the step before.
         cells
-            Cell type (see `CELL_TYPES`) to (m, points a cell) point numbers; ``None`` for those of the step before.
+            Cell type (see `CELL_TYPES`) to (m, points a cell) point numbers; of the first step alone.
         point_data, cell_data
             Name to values, (n,) or (n, k); every step has the same names. Cell data follow the order of `cells`.
         """
-        times = self._steps.setdefault("Values", [])
+        times, offsets = self._steps["Values"], self._steps["PointOffsets"]
         if times and not time > times[-1]:
             raise InputError("time", time, f"must be larger than the step before, {times[-1]:g}", "add steps in order")
         if times and not self._series:
             raise InputError("time", time, "a file without times holds one grid", "pass series=True")
-        if not times and (points is None or cells is None):
-            raise InputError("points", None, "the first step needs points and cells", "give both")
+        if bool(times) != (cells is None) or (not times and points is None):
+            raise InputError("points", None, "the first step needs points and cells, others no cells", "give both")
         names = (frozenset(point_data or {}), frozenset(cell_data or {}))
         if self._field_names not in (None, names):
             raise InputError(
                 "fields", None, "every step must have the same fields as the first", "add the missing ones"
             )
         self._field_names = names
-        times.append(float(time))
+        offsets.append(offsets[-1] if points is None else self._length("Points"))
         if points is not None:
-            before = self._points
             self._add_points(points)
-            if cells is None and self._points != before:
-                raise InputError("points", self._points, f"another number than before ({before})", "give the cells too")
         if cells is not None:
             self._add_cells(cells)
-        for key, value in self._place.items():
-            self._steps.setdefault(key, []).append(value)
+        times.append(float(time))
         for group, fields, count in (("PointData", point_data, self._points), ("CellData", cell_data, self._cells)):
             for name, values in (fields or {}).items():
                 self._add_field(group, name, np.asarray(values), count)
@@ -138,11 +132,10 @@ class VtkHdfSeries:
         coordinates = np.asarray(points, dtype=float)
         if coordinates.ndim != 2 or coordinates.shape[1] not in (2, 3):
             raise InputError("points", coordinates.shape, "must have the shape (n, 2) or (n, 3)", "")
-        if coordinates.shape[1] == 2:
-            coordinates = np.column_stack([coordinates, np.zeros(len(coordinates))])
-        self._place["PointOffsets"] = self._length("Points")
+        if self._cells and len(coordinates) != self._points:
+            raise InputError("points", len(coordinates), f"another number than before ({self._points})", "give as many")
         self._points = len(coordinates)
-        self._append("Points", coordinates)
+        self._append("Points", np.pad(coordinates, ((0, 0), (0, 3 - coordinates.shape[1]))))
 
     def _add_cells(self, cells: Mapping[str, NDArray[Any]]) -> None:
         kinds, sizes, links = [], [], []
@@ -156,22 +149,17 @@ class VtkHdfSeries:
                 raise InputError(f"cells.{name}", table.shape, f"must have {width} columns", "")
             if table.size and (table.min() < 0 or table.max() >= self._points):
                 raise InputError(f"cells.{name}", int(table.max()), f"point numbers lie in 0..{self._points - 1}", "")
-            kinds.append(np.full(len(table), number, dtype=np.uint8))
-            sizes.append(np.full(len(table), width, dtype=np.int64))
+            kinds += [number] * len(table)
+            sizes += [width] * len(table)
             links.append(table.astype(np.int64).ravel())
+        self._cells = len(kinds)
         connectivity = np.concatenate(links) if links else np.zeros(0, dtype=np.int64)
-        lengths = np.concatenate(sizes) if sizes else np.zeros(0, dtype=np.int64)
-        self._cells = len(lengths)
-        # a part is what has its own entry in the NumberOf... arrays and one entry more than cells in Offsets
-        self._place["PartOffsets"] = self._length("NumberOfCells")
-        self._place["CellOffsets"] = self._length("Types")
-        self._place["ConnectivityIdOffsets"] = self._length("Connectivity")
-        counts = {"NumberOfPoints": self._points, "NumberOfCells": self._cells}
-        for key, count in (counts | {"NumberOfConnectivityIds": len(connectivity)}).items():
-            self._append(key, np.array([count], dtype=np.int64))
-        self._append("Types", np.concatenate(kinds) if kinds else np.zeros(0, dtype=np.uint8))
+        counts = {"Points": self._points, "Cells": self._cells, "ConnectivityIds": len(connectivity)}
+        for key, count in counts.items():
+            self._append(f"NumberOf{key}", np.array([count], dtype=np.int64))
+        self._append("Types", np.array(kinds, dtype=np.uint8))
         self._append("Connectivity", connectivity)
-        self._append("Offsets", np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64))
+        self._append("Offsets", np.cumsum([0, *sizes], dtype=np.int64))
 
     def _add_field(self, group: str, name: str, values: NDArray[Any], count: int) -> None:
         if len(values) != count or values.ndim > 2:
@@ -202,23 +190,19 @@ class VtkHdfSeries:
         return int(self._columns[path].shape[0]) if path in self._columns else 0
 
     def _finish(self) -> None:
-        times = self._steps.get("Values", [])
-        if not times:
+        count = len(self._steps["Values"])
+        if not count:
             raise InputError("steps", 0, "nothing was added to the file", "add one step at least")
         if not self._series:
             return
         steps = self._root.create_group("Steps")
-        steps.attrs["NSteps"] = np.int64(len(times))
-        steps.create_dataset("Values", data=np.array(times))
-        count = len(times)
+        steps.attrs["NSteps"] = np.int64(count)
         steps.create_dataset("NumberOfParts", data=np.ones(count, dtype=np.int64))
-        for key in ("PartOffsets", "PointOffsets"):
-            steps.create_dataset(key, data=np.array(self._steps[key], dtype=np.int64))
+        steps.create_dataset("PartOffsets", data=np.zeros(count, dtype=np.int64))
         for key in ("CellOffsets", "ConnectivityIdOffsets"):
-            steps.create_dataset(key, data=np.array(self._steps[key], dtype=np.int64)[:, None])
-        for key, offsets in self._steps.items():
-            if key.startswith(("PointDataOffsets/", "CellDataOffsets/")):
-                steps.create_dataset(key, data=np.array(offsets, dtype=np.int64))
+            steps.create_dataset(key, data=np.zeros((count, 1), dtype=np.int64))
+        for key, values in self._steps.items():
+            steps.create_dataset(key, data=np.array(values))
 
 
 def write_vtkhdf(
