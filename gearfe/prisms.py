@@ -113,18 +113,12 @@ def lagrange() -> list[np.polynomial.Polynomial]:
     return [one / one(grid[k]) for k, one in enumerate(made)]
 
 
-class PrismMatrices(NamedTuple):
-    """Matrices over the nodes that solid elements use."""
-
-    #: (n,) number ``point * levels + level`` of each node
-    used: IntArray
-    matrices: SolidMatrices
-
-
 def assemble_prisms(
     points: Array, triangles: IntArray, levels: Array, solid: BoolArray, material: Material
-) -> PrismMatrices:
+) -> SolidMatrices:
     """Stiffness and consistent mass as sums of (plane matrix) x (line matrix), one term for each set of solid faces.
+
+    Over the nodes that solid elements use, in the order of their numbers ``point * levels + level``.
 
     Parameters
     ----------
@@ -178,7 +172,7 @@ def assemble_prisms(
         blocks[here] += terms.pop()
     n = len(used)
     stiffness = sparse.bsr_array((blocks, columns, starts), shape=(3 * n, 3 * n))
-    return PrismMatrices(used, SolidMatrices(stiffness, sparse.csr_array((mass, columns, starts), shape=(n, n))))
+    return SolidMatrices(stiffness, sparse.csr_array((mass, columns, starts), shape=(n, n)))
 
 
 def isotropic_blocks(products: list[list[Array]], material: Material) -> Array:

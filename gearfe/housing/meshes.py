@@ -93,7 +93,7 @@ class Prisms:
 
     def assemble(self, material: Material) -> SolidMatrices:
         """Stiffness and mass."""
-        return assemble_prisms(*self.extrusion, material).matrices
+        return assemble_prisms(*self.extrusion, material)
 
     def surface(self, without: list[IntArray], outer: Outer | None = None) -> Surface:
         """Surface but for faces that lie wholly within one of the sets of nodes, or are not `outer`."""

@@ -29,6 +29,12 @@ RECIPE_NUMBER = 3
 #: Factor on the sizes of a boundary beside which elements are inside out, and how often a sector is filled at most.
 FINER, MOST_FILLINGS = 0.7, 12
 
+#: Sizes of the recipe that cut a curved boundary into edges; the cuts between sectors are straight.
+SIZES = {
+    "flank_left": ("flank", "strip"), "flank_right": ("back",), "root_left": ("root",), "root_right": ("root",),
+    "tip": ("back",), "bore": ("bore",),
+}  # fmt: skip
+
 #: Fewer second-order edges round the whole bore stiffen the gear measurably (0.3 % with seven).
 MINIMUM_BORE_EDGES = 24
 
@@ -40,7 +46,7 @@ class SectorRecipe:
     Parameters
     ----------
     flank
-        On the driving flank.
+        On the driving flank, the left one in the convention of this package.
     strip
         At the tip and at the start of active profile of the driving flank, where the mate's tip corner bears.
     strip_length
@@ -55,8 +61,6 @@ class SectorRecipe:
         Growth of the size inside the body per depth below the root circle (-): far from the teeth the field is smooth.
     growth
         Largest change of size per length along the outline (-).
-    fine
-        Which flank is fine: ``left`` drives in the convention of this package.
     """
 
     flank: float
@@ -69,7 +73,6 @@ class SectorRecipe:
     bore: float
     growth: float = 0.35
     deepening: float = 0.2
-    fine: str = "left"
 
     def scaled(self, factor: float) -> SectorRecipe:
         """The recipe with every size multiplied by `factor` (the strips keep their length)."""
@@ -179,8 +182,8 @@ def _join(chains: list[_Chain]) -> _Chain:
 
 def _outline(gear: Gear, recipe: SectorRecipe) -> dict[str, _Chain]:
     """Outline of the sector by boundary name, counter-clockwise from the bore end of the right cut."""
-    left = _half_profile(gear, recipe, fine=recipe.fine in ("left", "both"))
-    right = _half_profile(gear, recipe, fine=recipe.fine in ("right", "both"))
+    left = _half_profile(gear, recipe, fine=True)
+    right = _half_profile(gear, recipe, fine=False)
     half, inner = np.pi / gear.teeth, gear.bore_diameter / 2
     edges = max(1, round(2 * half * inner / recipe.bore), int(np.ceil(MINIMUM_BORE_EDGES / gear.teeth)))
     angles = np.linspace(half, -half, 2 * edges + 1)
@@ -277,20 +280,12 @@ def _make(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:
             return made
         bulging = np.unique(made["triangles"][wrong])
         named = {name[3:] for name in made if name.startswith("on_") and np.isin(made[name][:, 1], bulging).any()}
-        finer = {size for name in named for size in _sizes_of(name, recipe.fine)}
+        finer = {size for name in named for size in SIZES.get(name, ())}
         if not finer:
             break
         recipe = replace(recipe, **{size: FINER * getattr(recipe, size) for size in finer})
     problem = f"{len(wrong)} elements of the gear with {gear.teeth} teeth are inside out"
     raise InputError("mesh", None, problem, "use smaller elements: coarsen or flank_coarsen")
-
-
-def _sizes_of(boundary: str, fine: str) -> tuple[str, ...]:
-    """Sizes of the recipe that cut a curved boundary into edges; the cuts between sectors are straight."""
-    name, _, side = boundary.partition("_")
-    if name == "flank":
-        return ("flank", "strip") if fine in (side, "both") else ("back",)
-    return {"root": ("root",), "tip": ("back",), "bore": ("bore",)}.get(name, ())
 
 
 def _filled(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:

@@ -233,17 +233,15 @@ class ModalBody(Reduction, Shown):
         save_arrays(path, {"format": np.array(FORMAT)} | {name: np.asarray(value) for name, value in values.items()})
 
     @classmethod
-    def load(cls, path: str | Path, *, verify: bool = False) -> ModalBody:
-        """Read a saved body; its large matrix stays on disk until it is used.
-
-        With `verify` all of the file is read once and held against its checksums.
+    def load(cls, path: str | Path) -> ModalBody:
+        """Read a saved body.
 
         Raises
         ------
         InputError
             When the file is missing, damaged, or of another format.
         """
-        stored = load_arrays(path, verify=verify)
+        stored = load_arrays(path)
         made: dict[str, Any] = {}
         if int(stored.get("format", np.array(-1))) != FORMAT:
             raise InputError("reduced model", str(path), "was written by another version", "make it anew")
