@@ -129,7 +129,7 @@ def _gains(body: ModalBody, band_hz: float, points: int) -> tuple[Array, Complex
     own = 2.0 * math.pi * body.coupled.frequencies_hz
     omega = 2.0 * math.pi * band_hz * (np.arange(points) + 0.5) / points
     square = omega[:, None] ** 2
-    return omega, square / (own**2 - square + 2j * RATIO * own * omega[:, None])
+    return omega, np.asarray(square / (own**2 - square + 2j * RATIO * own * omega[:, None]), dtype=complex)
 
 
 def lost_stiffness(body: ModalBody, omega: float, shapes: ComplexArray | Array) -> Any:
