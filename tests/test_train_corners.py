@@ -10,7 +10,8 @@ from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import build_train, simulate
 from gearfe.train.corners import leaves, train_corner
 from gearfe.train.forces import CurveFlank, Gyro, LawFlank, TrainForces
-from gearfe.train.series import train_order, train_series
+from gearfe.train.program import train_series
+from gearfe.train.series import train_order
 
 from .mesh_laws import hertzian_law
 from .trains import SHIPPED, curve, train

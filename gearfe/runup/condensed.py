@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..gear.mesh_geometry import MeshGeometry
-from ..train.forces import CurveFlank, LawFlank
+from ..train.forces import Flank
 from ..train.friction import Lubrication
 from ..train.kinematics import drive_sense, fastest, mesh_phases, steady_forces
 from ..train.model import TrainModel
@@ -85,7 +86,7 @@ def condense(model: TrainModel, shared: int = SHARED) -> CondensedTrain:
         problem = f"need {len(phases)} phases of their own, more than {MOST_PHASES}: {model.rolling.note}"
         raise InputError("train.meshes", None, problem, "look at it with gearfe vibration")
     turns = [turns for turns, _ in phases]
-    flanks = [f for f in model.forces.flanks if isinstance(f, CurveFlank | LawFlank)]
+    flanks = model.forces.flanks
     reads = [_directions(f) for f in flanks]
     used = sorted({x for four in reads for x in four if x >= 0})
     freedoms = np.array([[used.index(x) if x >= 0 else -1 for x in four] for four in reads])
@@ -101,7 +102,8 @@ def condense(model: TrainModel, shared: int = SHARED) -> CondensedTrain:
     )  # fmt: skip
     sense = drive_sense(model.train.driven.speed) or 1.0
     steady = steady_forces(model.train)
-    of_mesh = _of_meshes(model)
+    ends = np.cumsum([0, *map(len, model.sides)]).tolist()
+    of_mesh = tuple(tuple(range(a, b)) for a, b in itertools.pairwise(ends))
     mesh_of = {number: mesh for mesh, numbers in enumerate(of_mesh) for number in numbers}
     rubbing = [_rubbing(model, flank, mesh_of[i], float(steady[mesh_of[i]])) for i, flank in enumerate(flanks)]
     orders = np.array([[int(c * t) * (i in at) for t, at in phases] for i, c in enumerate(model.rolling.cycles)])
@@ -114,15 +116,9 @@ def condense(model: TrainModel, shared: int = SHARED) -> CondensedTrain:
     return CondensedTrain(model, system, forces, of_mesh, steady)
 
 
-def _of_meshes(model: TrainModel) -> tuple[tuple[int, ...], ...]:
-    """Numbers of the flanks of each mesh: driving ones first."""
-    ends = np.cumsum([0, *(1 if line.backlash is None else 2 for line in model.meshes)])
-    return tuple(tuple(range(a, b)) for a, b in itertools.pairwise(ends.tolist()))
-
-
-def _rubbing(model: TrainModel, flank: CurveFlank | LawFlank, mesh: int, force: float) -> Rubbing | None:
+def _rubbing(model: TrainModel, flank: Flank, mesh: int, force: float) -> Rubbing | None:
     """Friction of a flank of a mesh, whose coefficient may follow from the speed."""
-    if not isinstance(flank, LawFlank) or flank.sliding is None:
+    if flank.sliding is None:
         return None
     train, given = model.train, model.train.meshes[mesh].friction
     coefficient = None
@@ -138,9 +134,9 @@ def _of_drive(oil: Lubrication, pair: MeshGeometry, force: float, ratio: float, 
     return oil.coefficient(pair, force, ratio * speed)
 
 
-def _directions(flank: CurveFlank | LawFlank) -> tuple[int, int, int, int]:
+def _directions(flank: Flank) -> tuple[int, int, int, int]:
     """Numbers of a flank's approach and turn, and of those of its friction or -1."""
-    sliding = flank.sliding if isinstance(flank, LawFlank) else None
+    sliding = flank.sliding
     return flank.direction, flank.turn, *((-1, -1) if sliding is None else (sliding.across, sliding.spin))
 
 
@@ -171,7 +167,7 @@ def _damping(model: TrainModel) -> Array:
     return made
 
 
-def _scale(model: TrainModel, linear: Linear, freedoms: Array, flanks: list[CurveFlank | LawFlank]) -> Array:
+def _scale(model: TrainModel, linear: Linear, freedoms: Array, flanks: Sequence[Flank]) -> Array:
     """Approach of each mesh under its steady force; rotations that move a base circle so far."""
     size = max(float(np.abs(linear.rest[np.unique(freedoms[:, 0])]).max()), 1e-9)
     scale = np.full(linear.size, size)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..train.forces import CurveFlank, LawFlank
+from ..train.forces import CurveFlank, Flank, LawFlank
 from ..train.friction import Sliding, smooth_sign
 from ..typing import Array, BoolArray, IntArray
 from .balance import Pushes
@@ -92,7 +92,7 @@ class MeshForces:
         Friction of each flank, or None.
     """
 
-    flanks: Sequence[CurveFlank | LawFlank]
+    flanks: Sequence[Flank]
     freedoms: IntArray
     turns: Array
     rubbing: Sequence[Rubbing | None]

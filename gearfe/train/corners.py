@@ -7,7 +7,8 @@ The functions see each other and their constants by name, in plain Python and co
 from __future__ import annotations
 
 from ..typing import Array, IntArray
-from .program import BEFORE, GAP, PAIR, PER_FLANK, PHASE, SLIDE, TOUCH, UNKNOWN, F, Program
+from .friction import UNKNOWN
+from .series import BEFORE, GAP, PAIR, PER_FLANK, PHASE, SLIDE, TOUCH, F, Program
 
 #: Part of a cell's width by which a corner is passed in its prediction, so that the step contains it.
 PAST = 2e-3
@@ -43,7 +44,7 @@ def watched(w: int, p: Program, pieces: IntArray) -> int:
     k = p.watches[w, 1]
     row = p.watches[w, 2]
     if p.watches[w, 0] == PAIR:
-        bears = pieces[p.flanks.piece[k] + PER_FLANK + p.watches[w, 3]] >= 0
+        bears = pieces[p.places.piece[k] + PER_FLANK + p.watches[w, 3]] >= 0
         return row + F if bears else row + GAP
     return row
 
@@ -52,11 +53,11 @@ def bounds(w: int, p: Program, pieces: IntArray) -> tuple[float, float, float]:
     """Cell of what is watched, and how much beyond it counts as none."""
     kind = p.watches[w, 0]
     k = p.watches[w, 1]
-    at = p.flanks.piece[k]
-    law = p.flanks.laws[k]
+    at = p.places.piece[k]
+    law = p.places.law[k]
     if kind == PHASE:
-        if p.flanks.curves[k] >= 0:
-            node = p.curves.first[p.flanks.curves[k]] + pieces[at + 1]
+        if p.places.curve[k] >= 0:
+            node = p.curves.first[p.places.curve[k]] + pieces[at + 1]
             width = p.curves.nodes[node + 1] - p.curves.nodes[node]
         else:
             width = p.laws.nodes[law, pieces[at + 1] + 1] - p.laws.nodes[law, pieces[at + 1]]
@@ -80,8 +81,8 @@ def go_on(w: int, last: int, x: float, corner: bool, p: Program, memory: Array, 
     """Keep the pair forces at x for the next step; where x is a corner, go on to the cell beyond it."""
     kind = p.watches[w, 0]
     k = p.watches[w, 1]
-    at = p.flanks.piece[k]
-    row = p.flanks.row[k]
+    at = p.places.piece[k]
+    row = p.places.row[k]
     slot = p.watches[w, 3]
     low, high, slack = bounds(w, p, pieces)
     value, slope = polynomial(memory, watched(w, p, pieces), last, x)
@@ -89,11 +90,11 @@ def go_on(w: int, last: int, x: float, corner: bool, p: Program, memory: Array, 
     down = corner and slope < 0.0 and value <= low + slack
     if kind == PAIR:
         part = pieces[at + PER_FLANK + slot]
-        law = p.flanks.laws[k]
+        law = p.places.law[k]
         memory[row + BEFORE, slot] = p.laws.forces[law, part] + value if part >= 0 else 0.0
         if up or (down and part >= 0):
             pieces[at + PER_FLANK + slot] = part + 1 if up else part - 1
-            if p.flanks.slides[k] >= 0 and part == 0 and down:
+            if part == 0 and down:
                 pieces[at + PER_FLANK + p.laws.touch.shape[1] + slot] = UNKNOWN
     elif kind == SLIDE:
         if up or down:
@@ -102,15 +103,15 @@ def go_on(w: int, last: int, x: float, corner: bool, p: Program, memory: Array, 
         if up or down:
             pieces[at + 2] = 0 if up else -1
     elif up or down:
-        cells = p.laws.cells[p.flanks.laws[k]] if p.flanks.curves[k] < 0 else 0
-        if p.flanks.curves[k] >= 0:
-            cells = p.curves.first[p.flanks.curves[k] + 1] - 1 - p.curves.first[p.flanks.curves[k]]
+        cells = p.laws.cells[p.places.law[k]] if p.places.curve[k] < 0 else 0
+        if p.places.curve[k] >= 0:
+            cells = p.curves.first[p.places.curve[k] + 1] - 1 - p.curves.first[p.places.curve[k]]
         pieces[at + 1] += 1 if up else -1
         if 0 <= pieces[at + 1] < cells:
             return
         pieces[at + 1] = 0 if up else cells - 1
         pieces[at] += 1 if up else -1
-        if p.flanks.curves[k] < 0:  # each pair goes on to the next slot
+        if p.places.curve[k] < 0:  # each pair goes on to the next slot
             slots = p.laws.touch.shape[1]
             for i in range(slots):
                 to = slots - 1 - i if up else i
@@ -118,8 +119,7 @@ def go_on(w: int, last: int, x: float, corner: bool, p: Program, memory: Array, 
                 inside = 0 <= come < slots
                 pieces[at + PER_FLANK + to] = pieces[at + PER_FLANK + come] if inside else -1
                 memory[row + BEFORE, to] = memory[row + BEFORE, come] if inside else 0.0
-                if p.flanks.slides[k] >= 0:
-                    pieces[at + PER_FLANK + slots + to] = UNKNOWN
+                pieces[at + PER_FLANK + slots + to] = UNKNOWN
 
 
 def leaves(memory: Array, row: int, last: int, low: float, high: float, slack: float, limit: float) -> float:

@@ -24,8 +24,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -95,6 +94,9 @@ class MeshFlank(ABC):
 class CurveFlank(MeshFlank):
     """Force k(phase) times approach; where `parts`, none before the touch."""
 
+    damping: ClassVar[float] = 0.0
+    rayleigh: ClassVar[float] = 0.0
+    sliding: ClassVar[None] = None
     curve: PeriodicInterpolant
     parts: bool
 
@@ -147,6 +149,9 @@ class LawFlank(MeshFlank):
         return FlankForces(made.force * presses, made.moment, friction)
 
 
+Flank = CurveFlank | LawFlank
+
+
 @dataclass(frozen=True)
 class Gyro:
     """Gyroscopic moments on the tilts `direction` and the one after it; `polar` in kg m2."""
@@ -173,18 +178,8 @@ class TrainForces:
     size: int
     angle: TimeFunction
     gyros: tuple[Gyro, ...]
-    flanks: tuple[MeshFlank, ...]
+    flanks: tuple[Flank, ...]
     torques: tuple[tuple[int, TimeFunction], ...]
-
-    @cached_property
-    def curves(self) -> tuple[CurveFlank, ...]:
-        """Flanks with stiffness curves."""
-        return tuple(f for f in self.flanks if isinstance(f, CurveFlank))
-
-    @cached_property
-    def contacts(self) -> tuple[LawFlank, ...]:
-        """Flanks with mesh laws."""
-        return tuple(f for f in self.flanks if isinstance(f, LawFlank))
 
     def of_flanks(self, t: Array, u: Array, du: Array) -> list[FlankForces]:
         """Forces of each flank at the times t (n,), u and du of shape (n, directions)."""
@@ -199,12 +194,11 @@ class TrainForces:
         out = np.zeros_like(u)
         rate = self.angle(t, 1)
         for flank, made in zip(self.flanks, flanks or self.of_flanks(t, u, du), strict=True):
-            out[:, flank.direction] += flank.mean * u[:, flank.direction] - made.force
+            out[:, flank.direction] += flank.mean * u[:, flank.direction] + flank.rayleigh * du[:, flank.direction]
+            out[:, flank.direction] -= made.force
             if made.moment is not None:
                 out[:, flank.turn] -= flank.sense * made.moment
-            if isinstance(flank, LawFlank):
-                out[:, flank.direction] += flank.rayleigh * du[:, flank.direction]
-            if isinstance(flank, LawFlank) and flank.sliding is not None and made.drag is not None:
+            if flank.sliding is not None and made.drag is not None:
                 out[:, flank.sliding.across] -= made.drag.across
                 out[:, flank.sliding.spin] -= made.drag.turning
         for gyro in self.gyros:

@@ -32,7 +32,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..gear.mesh_geometry import MeshGeometry
-from ..typing import Array
+from ..typing import Array, IntArray
 
 #: Largest coefficient that is no slip of the pen.
 MOST = 0.5
@@ -40,6 +40,8 @@ MOST = 0.5
 NEAR = 0.02
 #: ... and where the drive stands still (m/s).
 CREEP = 2e-3
+#: In place of the range of a smoothed sign: not known.
+UNKNOWN = 2
 #: Range of the formula: least load of a width (N/m), largest speed of the pitch circles (m/s).
 LEAST_LOAD, FASTEST = 150e3, 50.0
 
@@ -49,6 +51,30 @@ def smooth_sign(x: Array) -> tuple[Array, Array]:
     inside = np.clip(x, -1.0, 1.0)
     square = inside * inside
     return inside * (15.0 - square * (10.0 - 3.0 * square)) / 8.0, 1.875 * (1.0 - square) ** 2
+
+
+def product(j: int, a: int, b: int, memory: Array) -> float:
+    """Order j of the product of two rows (Cauchy)."""
+    value = 0.0
+    for k in range(j + 1):
+        value += memory[a, k] * memory[b, j - k]
+    return value
+
+
+def smoothed_sign(j: int, x: int, row: int, piece: int, memory: Array, pieces: IntArray) -> None:
+    """Order j of s(x) in a row, of x2 and of s / x in the next ones; a range that is not known follows from x.
+
+    The range, -1, 0 (within +-1) or 1, is the whole number `piece`.
+    """
+    if j == 0 and pieces[piece] == UNKNOWN:
+        pieces[piece] = 1 if memory[x, 0] > 1.0 else -1 if memory[x, 0] < -1.0 else 0
+    if pieces[piece] != 0:
+        memory[row, j] = float(pieces[piece]) if j == 0 else 0.0
+        return
+    memory[row + 1, j] = product(j, x, x, memory)
+    inner = 0.375 * product(j, row + 1, row + 1, memory) - 1.25 * memory[row + 1, j]
+    memory[row + 2, j] = inner + 1.875 if j == 0 else inner
+    memory[row, j] = product(j, x, row + 2, memory)
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ from ..rigid import Element, LinearJoint
 from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array, IntArray
 from .elements import LinearForce, RigidShaft
-from .forces import CurveFlank, LawFlank, MeshFlank
+from .forces import CurveFlank, Flank, LawFlank
 from .friction import CREEP, NEAR, Lubrication, Sliding
 from .gear_train import GearMesh, GearTrain
 
@@ -154,11 +154,11 @@ class MeshLine:
         damping = self.rayleigh if self.law is not None else self.damping
         return LinearForce(tuple(bodies), damping * square, self.mean * square, f"mesh {self.name}")
 
-    def flanks(self, first: int) -> tuple[MeshFlank, ...]:
+    def flanks(self, first: int) -> tuple[Flank, ...]:
         """Driving and back flanks, `first` the number of their first direction, see `columns`."""
         ends = [(1.0, self.mean, 0.0)] + ([] if self.backlash is None else [(-1.0, 0.0, self.backlash)])
         turn = first + len(ends) if self.law is not None else 3 * self.driver + 2
-        made: list[MeshFlank] = []
+        made: list[Flank] = []
         for number, (side, mean, gap) in enumerate(ends):
             place = (first + number, turn, self.ratio, side * self.sense, side * self.phase, mean, gap)
             if self.law is not None:

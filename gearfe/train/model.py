@@ -23,12 +23,12 @@ from ..shown import Facts
 from ..typing import Array, IntArray
 from .checks import check_train
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge, rotor
-from .forces import Gyro, MeshFlank, TrainForces, derivative
+from .forces import Flank, Gyro, TrainForces, derivative
 from .gear_train import Drive, GearTrain
 from .kinematics import Rolling, driving_senses, fastest, load_end, rolling, steady_forces
 from .mesh_element import MeshLine, OperatingPoint, Shafts, mesh_line
 from .phases import pair_shifts, tooth_places
-from .series import train_series
+from .program import train_series
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -116,7 +116,7 @@ class TrainModel(Facts):
         return np.sqrt(np.maximum(self.modal.eigenvalues, 0.0)) / (2.0 * math.pi)
 
     @cached_property
-    def sides(self) -> tuple[tuple[MeshFlank, ...], ...]:
+    def sides(self) -> tuple[tuple[Flank, ...], ...]:
         """Flanks of each mesh: none of a rigid one, else the driving ones, and the back ones behind a backlash."""
         left = iter(self.forces.flanks)
         counts = (0 if line.rigid else 1 if line.backlash is None else 2 for line in self.meshes)
@@ -233,7 +233,7 @@ def _forces(
         gyros = tuple(
             Gyro(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(shafts.ratios, shafts.bodies, strict=True))
         )
-    flanks: list[MeshFlank] = []
+    flanks: list[Flank] = []
     for line in lines:
         flanks += line.flanks(len(columns))
         columns += line.columns

@@ -1,101 +1,267 @@
 r"""The forces of a train by the orders of their Taylor series: those of `gearfe.train.forces`, as recurrences.
 
-Over x, time :math:`t + s x`, all forces follow order by order from Cauchy's rule for products
-(`gearfe.train.program`). A step ends where a phase or a pair force leaves its cell, where flanks meet or part, and
-where a damper would begin to pull.
+Over x, time :math:`t + s x`, all forces follow order by order from Cauchy's rule for products. Rows of a memory hold
+series: first the functions of time, then those of the gyroscopic moments and of the flanks. The forces of tooth pairs
+(mesh laws) are solved for from :math:`t + \Lambda(z, f) + \sum C F = \delta`, in which their highest order is linear.
+Whole numbers tell on which cells of their laws the flanks are; a step ends where one leaves its cell
+(`gearfe.train.corners`). The functions see each other and the constants by name, in plain Python and compiled.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
-from ..rigid import SeriesLaw
+from ..meshlaw.law import Laws
 from ..rigid.kernel_rows import time_series
+from ..rigid.tables import Times
+from ..stiffness.periodic import Curves
 from ..typing import Array, IntArray
-from . import corners
-from . import program as tables
-from .corners import SAME, train_corner
-from .forces import CurveFlank, LawFlank, TrainForces
-from .program import (
-    BEFORE,
-    CELL,
-    DELTA,
-    ENERGIES,
-    FULL,
-    GAP,
-    H1,
-    H2,
-    H3,
-    JACOBIAN,
-    LEVER,
-    NUMBERS,
-    ORIGIN,
-    PER_COUPLE,
-    PER_FLANK,
-    PER_SLIDE,
-    PER_SLOT,
-    SLOTS,
-    SMOOTH,
-    TOUCHES,
-    UNKNOWN,
-    F,
-    Operations,
-    Program,
-    train_program,
-)
+from .friction import product, smoothed_sign
 
+#: Rows of a flank: phase from the cell's node with its square and cube, approach, numbers of the cell (four
+#: coefficients, then the phase of its node); of one with a curve then its stiffness; of one with a mesh law 1 + chi
+#: delta', J, forces at the end of the step before, sliding for unit e.
+Z, Z2, Z3, DELTA, CELL, STIFFNESS, PER_CURVE = range(7)
+DAMPED, JACOBIAN, BEFORE, SPIN, SLOTS = range(STIFFNESS, STIFFNESS + 5)
+#: Rows of a slot: f = F - F_0, F, gap of a pair that does not bear, Lambda's inner polynomials (Horner), coefficients
+#: of t (then F_0), and of the energy; t', inner polynomials of the energy's slope, normal force; of friction e with its
+#: coefficients, v/v0, its smoothed sign with what makes it, force.
+F, FULL, GAP, H1, H2, H3, TOUCHES, ENERGIES, RISE, E1, E2, E3, E4 = range(13)
+NORMAL, ARM, LEVER, SPEED, SIGN, SQUARE, INNER, DRAG, PER_SLOT = range(E4 + 1, E4 + 10)
+#: Rows of a couple of slots: C, its coefficients, C', product of both forces.
+COUPLE, NUMBERS, COUPLE_SLOPE, BOTH, PER_COUPLE = range(5)
+#: Rows of a gyroscopic moment: angular momentum, rates of both tilts.
+MOMENTUM, TILT, OTHER, PER_GYRO = range(4)
+#: Column of the phase of a cell's node, and of F_0 beside the coefficients of t.
+ORIGIN = 4
+#: What a step may not pass: the cell of a phase, touch of a flank with a curve, pull of a damper, the cell of a pair,
+#: the range of its sliding speed.
+PHASE, TOUCH, PULL, PAIR, SLIDE = range(5)
+#: Whole numbers of a flank: mesh cycle, cell, whether it bears (a curve) or damping acts (>= 0: it does); then the
+#: cells of the slots, -1 for pairs that do not bear; then the ranges of
+#: v/v0, see `gearfe.train.friction.smoothed_sign`.
+PER_FLANK = 3
 #: Most Newton steps for order 0 of the pair forces, and their relative change in the last one.
 NEWTON, CHANGED = 50, 1e-9
+
+
+class Gyros(NamedTuple):
+    """Gyroscopic moments, see `gearfe.train.forces.Gyro`."""
+
+    direction: IntArray
+    ratio: Array
+    polar: Array
+
+
+class Flanks(NamedTuple):
+    """Flanks, see `gearfe.train.forces.LawFlank`; of those with curves the damping is 0."""
+
+    direction: IntArray
+    turn: IntArray
+    ratio: Array
+    sense: Array
+    phase: Array
+    mean: Array
+    gap: Array
+    damping: Array
+    rayleigh: Array
+
+
+class Slides(NamedTuple):
+    """Friction of each flank, see `gearfe.train.friction.Sliding`; the coefficient is 0 where there is none."""
+
+    coefficient: Array
+    speed: Array
+    across: IntArray
+    spin: IntArray
+    ratio: Array
+    radius: Array
+    pitch_phase: Array
+
+
+class Places(NamedTuple):
+    """Which tables and rows belong to each flank."""
+
+    curve: IntArray  # (f,) number of the curve, -1 for one with a mesh law
+    law: IntArray  # (f,) number of the mesh law
+    row: IntArray  # (f,) first row
+    piece: IntArray  # (f,) first whole number
+    shifted: IntArray  # (f + 1,) first of the shifts of each flank
+    shifts: Array  # of the tooth pairs (m), one flank after the other
+
+
+class Program(NamedTuple):
+    """The whole."""
+
+    times: Times  # psi and the torques
+    torques: IntArray  # directions
+    gyros: Gyros
+    flanks: Flanks
+    slides: Slides
+    places: Places
+    watches: IntArray  # (w, 4): what, flank, row, slot
+    curves: Curves
+    laws: Laws
 
 
 def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array) -> None:
     """Order j of the forces over x, time t + s x, from the orders up to j + 1 of u; see the module's docstring."""
     if j == 0:
         step_begins(t, s, p, memory, pieces)
-    for i in range(p.inputs.reals.shape[0]):
-        row = p.inputs.ints[i, 0]
-        d = p.inputs.ints[i, 1]
-        k = j + p.inputs.ints[i, 2]
-        value = p.inputs.reals[i, 0] * memory[0, k] + p.inputs.reals[i, 1] * u[d, k]
-        if k > j:
-            value *= (j + 1) / s
-        if j == 0:
-            value += p.inputs.reals[i, 2]
-            if p.inputs.ints[i, 3] >= 0:
-                value -= memory[p.inputs.ints[i, 3], ORIGIN]
-        memory[row, j] = value
-    slots = p.laws.touch.shape[1]
-    flanks = p.flanks.row.shape[0]
-    row = 0
-    at = 0
-    for k in range(flanks + 1):  # the last ones: what follows when all pair forces are known
-        contact = k < flanks and p.flanks.curves[k] < 0
-        if contact:
-            row = p.flanks.row[k]
-            at = p.flanks.piece[k] + PER_FLANK
-        settled = j > 0 or not contact
-        for _ in range(NEWTON):  # for order 0 alone, whose forces then are those that make the gaps vanish
-            if contact:
-                for slot in range(slots):
-                    own = row + SLOTS + PER_SLOT * slot
-                    memory[own + GAP, j] = memory[row + DELTA, j]
-                    memory[own + F, j] = memory[own + FULL, 0] - memory[own + TOUCHES, ORIGIN] if j == 0 else 0.0
-                    if j > 0:
-                        memory[own + FULL, j] = 0.0
-            operate(j, p.operations, p.flanks.first[k], p.flanks.first[k + 1], memory, pieces)
-            if contact and not (settled and j == 0):
-                change = pair_forces(j, slots, memory, row, pieces, at)
-                settled = settled or change <= CHANGED
-                if j > 0:
-                    break
-            else:
-                break
+    rate = (j + 1) / s
     for i in range(out.shape[0]):
         out[i] = 0.0
-    for i in range(p.outputs.reals.shape[0]):
-        d = p.outputs.ints[i, 0]
-        row = p.outputs.ints[i, 1]
-        out[d] += p.outputs.reals[i, 0] * (memory[row, j] if row >= 0 else u[d, j])
+    for i in range(p.torques.shape[0]):
+        out[p.torques[i]] += memory[1 + i, j]
+    for i in range(p.gyros.polar.shape[0]):
+        d = p.gyros.direction[i]
+        row = 1 + p.torques.shape[0] + PER_GYRO * i
+        memory[row + MOMENTUM, j] = p.gyros.polar[i] * rate * (p.gyros.ratio[i] * memory[0, j + 1] + u[d + 2, j + 1])
+        memory[row + TILT, j] = rate * u[d, j + 1]
+        memory[row + OTHER, j] = rate * u[d + 1, j + 1]
+        out[d] -= product(j, row + MOMENTUM, row + OTHER, memory)
+        out[d + 1] += product(j, row + MOMENTUM, row + TILT, memory)
+    for k in range(p.places.row.shape[0]):
+        row = p.places.row[k]
+        d = p.flanks.direction[k]
+        memory[row + Z, j] = p.flanks.sense[k] * (p.flanks.ratio[k] * memory[0, j] + u[p.flanks.turn[k], j])
+        memory[row + DELTA, j] = u[d, j]
+        if j == 0:
+            memory[row + Z, 0] += p.flanks.phase[k] - memory[row + CELL, ORIGIN]
+            memory[row + DELTA, 0] -= p.flanks.gap[k]
+        memory[row + Z2, j] = product(j, row + Z, row + Z, memory)
+        memory[row + Z3, j] = product(j, row + Z2, row + Z, memory)
+        out[d] += p.flanks.mean[k] * u[d, j]
+        if p.places.curve[k] < 0:
+            contact(j, k, rate, u, p, memory, pieces, out)
+        else:
+            memory[row + STIFFNESS, j] = cubic(j, row, row + CELL, 0, memory)
+            if pieces[p.places.piece[k] + 2] >= 0:
+                out[d] -= product(j, row + STIFFNESS, row + DELTA, memory)
+
+
+def cubic(j: int, z: int, numbers: int, column: int, memory: Array) -> float:
+    """Order j of a cubic of the phase in row z, whose square and cube follow it."""
+    value = memory[numbers, column + 1] * memory[z, j] + memory[numbers, column + 2] * memory[z + 1, j]
+    value += memory[numbers, column + 3] * memory[z + 2, j]
+    return value + memory[numbers, column] if j == 0 else value
+
+
+def cubic_slope(j: int, z: int, numbers: int, column: int, memory: Array) -> float:
+    """Order j of the slope of that cubic."""
+    value = 2.0 * memory[numbers, column + 2] * memory[z, j] + 3.0 * memory[numbers, column + 3] * memory[z + 1, j]
+    return value + memory[numbers, column + 1] if j == 0 else value
+
+
+def contact(
+    j: int, k: int, rate: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array
+) -> None:  # fmt: skip
+    """Order j of the forces of flank k with a mesh law; its pair forces are solved for."""
+    slots = p.laws.touch.shape[1]
+    row = p.places.row[k]
+    at = p.places.piece[k] + PER_FLANK
+    d = p.flanks.direction[k]
+    turn = p.flanks.turn[k]
+    memory[row + DAMPED, j] = p.flanks.damping[k] * rate * u[d, j + 1]
+    if j == 0:
+        memory[row + DAMPED, 0] += 1.0
+    out[d] += p.flanks.rayleigh[k] * rate * u[d, j + 1]
+    settled = False
+    for _ in range(NEWTON):  # for order 0 alone, whose forces then are those that make the gaps vanish
+        gaps(j, slots, memory, row, pieces, at)
+        if settled:
+            break
+        change = pair_forces(j, slots, memory, row, pieces, at)
+        if j > 0:
+            break
+        settled = change <= CHANGED
+    moment = 0.0
+    couple = row + SLOTS + PER_SLOT * slots
+    for slot in range(slots):
+        own = row + SLOTS + PER_SLOT * slot
+        bears = pieces[at + slot] >= 0
+        if bears:
+            memory[own + RISE, j] = cubic_slope(j, row, own + TOUCHES, 0, memory)
+            memory[own + E4, j] = cubic_slope(j, row, own + ENERGIES, 16, memory)
+            moment += product(j, own + FULL, own + RISE, memory)
+            for power in range(3, -1, -1):  # Horner over f of the energy's slope
+                slope = cubic_slope(j, row, own + ENERGIES, 4 * power, memory)
+                slope += product(j, own + E1 + power, own + F, memory)
+                if power > 0:
+                    memory[own + E1 + power - 1, j] = slope
+                else:
+                    moment += slope
+            memory[own + NORMAL, j] = product(j, own + FULL, row + DAMPED, memory)
+            if pieces[at - 1] >= 0:
+                out[d] -= memory[own + NORMAL, j]
+        for up in range(slot + 1, slots):
+            if bears and pieces[at + up] >= 0:
+                other = row + SLOTS + PER_SLOT * up
+                memory[couple + COUPLE_SLOPE, j] = cubic_slope(j, row, couple + NUMBERS, 0, memory)
+                memory[couple + BOTH, j] = product(j, own + FULL, other + FULL, memory)
+                moment += product(j, couple + COUPLE_SLOPE, couple + BOTH, memory)
+            couple += PER_COUPLE
+    out[turn] += p.flanks.sense[k] * moment
+    if p.slides.coefficient[k] > 0.0:
+        friction(j, k, rate, u, p, memory, pieces, out)
+
+
+def gaps(j: int, slots: int, memory: Array, row: int, pieces: IntArray, at: int) -> None:
+    """Order j of what the gap of each pair lacks, with the pair forces known so far."""
+    for slot in range(slots):
+        own = row + SLOTS + PER_SLOT * slot
+        if j == 0:
+            memory[own + F, 0] = memory[own + FULL, 0] - memory[own + TOUCHES, ORIGIN]
+        else:
+            memory[own + F, j] = 0.0
+            memory[own + FULL, j] = 0.0
+        gap = memory[row + DELTA, j] - cubic(j, row, own + TOUCHES, 0, memory)
+        if pieces[at + slot] >= 0:  # less Lambda, by Horner over f
+            memory[own + H3, j] = 4.0 * cubic(j, row, own + ENERGIES, 16, memory)
+            for power in range(3, 0, -1):
+                value = power * cubic(j, row, own + ENERGIES, 4 * power, memory)
+                value += product(j, own + H1 + power - 1, own + F, memory)
+                if power > 1:
+                    memory[own + H1 + power - 2, j] = value
+                else:
+                    gap -= value
+        memory[own + GAP, j] = gap
+    couple = row + SLOTS + PER_SLOT * slots
+    for low in range(slots):
+        own = row + SLOTS + PER_SLOT * low
+        for up in range(low + 1, slots):
+            other = row + SLOTS + PER_SLOT * up
+            memory[couple, j] = cubic(j, row, couple + NUMBERS, 0, memory)
+            if pieces[at + up] >= 0:
+                memory[own + GAP, j] -= product(j, couple, other + FULL, memory)
+            if pieces[at + low] >= 0:
+                memory[other + GAP, j] -= product(j, couple, own + FULL, memory)
+            couple += PER_COUPLE
+
+
+def friction(
+    j: int, k: int, rate: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array
+) -> None:  # fmt: skip
+    """Order j of the friction of flank k, whose pair forces are known."""
+    slots = p.laws.touch.shape[1]
+    row = p.places.row[k]
+    at = p.places.piece[k] + PER_FLANK
+    across = p.slides.across[k]
+    spin = p.slides.spin[k]
+    scale = rate / p.slides.speed[k]
+    memory[row + SPIN, j] = scale * (p.slides.ratio[k] * memory[0, j + 1] + u[spin, j + 1])
+    for slot in range(slots):
+        own = row + SLOTS + PER_SLOT * slot
+        memory[own + SPEED, j] = scale * u[across, j + 1]
+        if pieces[at + slot] < 0:
+            continue
+        memory[own + ARM, j] = cubic(j, row, own + LEVER, 0, memory)
+        memory[own + SPEED, j] += product(j, own + ARM, row + SPIN, memory)
+        smoothed_sign(j, own + SPEED, own + SIGN, at + slots + slot, memory, pieces)
+        if pieces[at - 1] >= 0:
+            memory[own + DRAG, j] = p.slides.coefficient[k] * product(j, own + NORMAL, own + SIGN, memory)
+            out[across] -= memory[own + DRAG, j]
+            out[spin] -= product(j, own + DRAG, own + ARM, memory)
 
 
 def step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray) -> None:
@@ -107,19 +273,19 @@ def step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray)
             memory[k, i] *= scale
             scale *= s
     slots = p.laws.touch.shape[1]
-    for k in range(p.flanks.row.shape[0]):
-        row = p.flanks.row[k]
-        at = p.flanks.piece[k]
+    for k in range(p.places.row.shape[0]):
+        row = p.places.row[k]
+        at = p.places.piece[k]
         cell = pieces[at + 1]
-        if p.flanks.curves[k] >= 0:
-            first = p.curves.first[p.flanks.curves[k]]
-            last = p.curves.first[p.flanks.curves[k] + 1] - 1
+        if p.places.curve[k] >= 0:
+            first = p.curves.first[p.places.curve[k]]
+            last = p.curves.first[p.places.curve[k] + 1] - 1
             cycle = p.curves.nodes[last] - p.curves.nodes[first]
             memory[row + CELL, ORIGIN] = p.curves.nodes[first + cell] + pieces[at] * cycle
             for a in range(4):
                 memory[row + CELL, a] = p.curves.cubics[first + cell, a]
             continue
-        law = p.flanks.laws[k]
+        law = p.places.law[k]
         cycle = p.laws.nodes[law, p.laws.cells[law]] - p.laws.nodes[law, 0]
         memory[row + CELL, ORIGIN] = p.laws.nodes[law, cell] + pieces[at] * cycle
         couple = row + SLOTS + PER_SLOT * slots + NUMBERS
@@ -130,9 +296,9 @@ def step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray)
             memory[own + TOUCHES, ORIGIN] = p.laws.forces[law, part] if part >= 0 else 0.0
             for a in range(4):
                 memory[own + TOUCHES, a] = p.laws.touch[law, slot, cell, a]
-            period = p.flanks.shifted[k + 1] - p.flanks.shifted[k]
+            period = p.places.shifted[k + 1] - p.places.shifted[k]
             number = (slot - pieces[at]) % period  # of the pair
-            memory[own + TOUCHES, 0] += p.flanks.shifts[p.flanks.shifted[k] + number]
+            memory[own + TOUCHES, 0] += p.places.shifts[p.places.shifted[k] + number]
             for power in range(5):
                 for a in range(4):
                     if part >= 0:
@@ -141,67 +307,9 @@ def step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray)
                 for a in range(4):
                     memory[couple, a] = p.laws.coupling[law, slot * slots + up, cell, a]
                 couple += PER_COUPLE
-            if p.flanks.slides[k] >= 0:
-                lever = p.flanks.slides[k] + PER_SLIDE * slot + LEVER
-                begin = p.laws.nodes[law, cell] + slot * cycle - p.flanks.slide[k, 1]
-                memory[lever, 0] = p.flanks.slide[k, 0] * begin
-                memory[lever, 1] = p.flanks.slide[k, 0]
-
-
-def operate(j: int, operations: Operations, first: int, end: int, memory: Array, pieces: IntArray) -> None:
-    """Order j of the rows that the operations change."""
-    for i in range(first, end):
-        one = operations.ints[i, 7]
-        two = operations.ints[i, 8]
-        if (one >= 0 and pieces[one] < 0) or (two >= 0 and pieces[two] < 0):
-            continue
-        row = operations.ints[i, 0]
-        a = operations.ints[i, 1]
-        b = operations.ints[i, 2]
-        kind = operations.ints[i, 3]
-        z = operations.ints[i, 4]
-        value = 0.0
-        if kind == SMOOTH:
-            smoothed_sign(j, z, row, operations.ints[i, 5], memory, pieces)
-            continue
-        if kind > 0:
-            n = operations.ints[i, 5]
-            c = operations.ints[i, 6]
-            if kind == 1:
-                value = memory[n, c + 1] * memory[z, j] + memory[n, c + 2] * memory[z + 1, j]
-                value += memory[n, c + 3] * memory[z + 2, j]
-                if j == 0:
-                    value += memory[n, c]
-            else:
-                value = 2.0 * memory[n, c + 2] * memory[z, j] + 3.0 * memory[n, c + 3] * memory[z + 1, j]
-                if j == 0:
-                    value += memory[n, c + 1]
-            value *= operations.reals[i, 0]
-        if a >= 0:
-            for k in range(j + 1):  # Cauchy
-                value += memory[a, k] * memory[b, j - k]
-        memory[row, j] = operations.reals[i, 2] * memory[row, j] + operations.reals[i, 1] * value
-
-
-def smoothed_sign(j: int, x: int, row: int, piece: int, memory: Array, pieces: IntArray) -> None:
-    """Order j of s(x) in a row, of x2 and of s / x in the next ones; a range that is not known follows from x."""
-    if j == 0 and pieces[piece] == UNKNOWN:
-        pieces[piece] = 1 if memory[x, 0] > 1.0 else -1 if memory[x, 0] < -1.0 else 0
-    if pieces[piece] != 0:
-        memory[row, j] = float(pieces[piece]) if j == 0 else 0.0
-        return
-    square = 0.0
-    for k in range(j + 1):
-        square += memory[x, k] * memory[x, j - k]
-    memory[row + 1, j] = square
-    inner = -1.25 * square
-    for k in range(j + 1):
-        inner += 0.375 * memory[row + 1, k] * memory[row + 1, j - k]
-    memory[row + 2, j] = inner + 1.875 if j == 0 else inner
-    value = 0.0
-    for k in range(j + 1):
-        value += memory[x, k] * memory[row + 2, j - k]
-    memory[row, j] = value
+            begin = p.laws.nodes[law, cell] + slot * cycle - p.slides.pitch_phase[k]
+            memory[own + LEVER, 0] = p.slides.radius[k] * begin
+            memory[own + LEVER, 1] = p.slides.radius[k]
 
 
 def pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, at: int) -> float:
@@ -259,70 +367,6 @@ def pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, a
     return 0.0
 
 
-def train_begin(
-    t: float, sign: float, motion: tuple[Array, Array], p: Program, forces: TrainForces, memory: Array, pieces: IntArray
-) -> None:
-    """Cells of all flanks at a start, at a node the one that lies ahead, and the pair forces there; not compiled.
-
-    `motion` are values and rates along the directions of the forces.
-    """
-    u, du = motion
-    angle, rate = float(forces.angle(t)), float(forces.angle(t, 1))
-    slots = p.laws.touch.shape[1]
-    flanks: tuple[CurveFlank | LawFlank, ...] = (*forces.curves, *forces.contacts)
-    for k, flank in enumerate(flanks):
-        at, row = p.flanks.piece[k], p.flanks.row[k]
-        phase, approach = (float(x[0]) for x in flank.phase_and_approach(np.array([angle]), u[None]))
-        speed = sign * flank.sense * (flank.ratio * rate + du[flank.turn])
-        if isinstance(flank, CurveFlank):
-            pieces[at : at + 2] = ahead_of(flank.curve.nodes, phase, speed)
-            bears = approach > 0.0 or (approach == 0.0 and sign * du[flank.direction] > 0.0)
-            pieces[at + 2] = 0 if bears or not flank.parts else -1
-            continue
-        turn, cell = ahead_of(flank.law.nodes, phase, speed)
-        pieces[at : at + 3] = turn, cell, 0 if 1.0 + flank.damping * du[flank.direction] > 0.0 else -1
-        force = np.zeros(slots)
-        made = flank.law(np.array([phase]), np.array([approach]), flank.shifts_at(np.array([phase]))).pair_forces[0]
-        shift = turn - int(flank.law.locate(np.array([phase]))[0][0])  # a node at which a cycle ends lies behind
-        for slot in range(flank.law.slots):
-            if 0 <= slot + shift < slots:
-                force[slot + shift] = made[slot]
-        part = np.minimum(np.searchsorted(flank.law.forces, force, side="right") - 1, len(flank.law.forces) - 2)
-        pieces[at + PER_FLANK : at + PER_FLANK + slots] = np.where(force > 0.0, part, -1)
-        if flank.sliding is not None:
-            pieces[at + PER_FLANK + slots : at + PER_FLANK + 2 * slots] = UNKNOWN
-        memory[row + BEFORE, :slots] = force
-
-
-def ahead_of(nodes: Array, phase: float, speed: float) -> tuple[int, int]:
-    """Cycle and cell that a phase is in, at a node those that lie ahead."""
-    cells, period = len(nodes) - 1, nodes[-1] - nodes[0]
-    turn = int(np.floor((phase - nodes[0]) / period))
-    place = phase - turn * period
-    cell = min(max(int(np.searchsorted(nodes, place, side="right")) - 1, 0), cells - 1)
-    width = nodes[cell + 1] - nodes[cell]
-    if speed > 0.0 and nodes[cell + 1] - place < SAME * width:
-        cell += 1
-    elif speed < 0.0 and place - nodes[cell] < SAME * width:
-        cell -= 1
-    return turn + cell // cells, cell % cells
-
-
-def train_series(forces: TrainForces) -> SeriesLaw:
-    """The series of a train's forces."""
-    program, rows, pieces = train_program(forces)
-
-    def begin(
-        t: float, sign: float, u: Array, du: Array, memory: Array,
-        numbers: IntArray,
-    ) -> None:  # fmt: skip
-        train_begin(t, sign, (u, du), program, forces, memory, numbers)
-
-    constants: dict[str, float] = {"NEWTON": NEWTON, "CHANGED": CHANGED}
-    for module in (tables, corners):
-        found = {name: value for name, value in vars(module).items() if name.isupper()}
-        constants |= {name: value for name, value in found.items() if isinstance(value, int | float)}
-    own = (step_begins, operate, smoothed_sign, pair_forces, *corners.FUNCTIONS)
-    return SeriesLaw(
-        begin, train_order, train_corner, (*own, time_series), program, rows, pieces, constants,
-    )  # fmt: skip
+FUNCTIONS = (
+    step_begins, product, cubic, cubic_slope, contact, gaps, friction, smoothed_sign, pair_forces, time_series,
+)  # fmt: skip
