@@ -152,27 +152,18 @@ def element_stiffness(coordinates: Array, material: Material, plane: Plane, thic
     return stiffness.reshape(m, 12, 12)
 
 
-def stress(gradients: Array, displacement: Array, material: Material, plane: Plane) -> Array:
-    """Stresses (xx, yy, zz, xy) from shape-function gradients.
+def stress_rows(gradients: Array, material: Material, plane: Plane) -> Array:
+    """Stresses xx, yy, xy for unit displacements of the nodes (Pa/m), shape (m, q, 3, 6, 2).
 
     Parameters
     ----------
     gradients : ndarray, shape (m, q, 6, 2)
         d N_a / d x_i (1/m).
-    displacement : ndarray, shape (m, 6, 2)
-        Nodal displacements (m).
-
-    Returns
-    -------
-    ndarray, shape (m, q, 4)
-        Pa; zz is nu (xx + yy) in plane strain and 0 in plane stress.
     """
     lam, mu = material.lame(plane)
-    h = np.einsum("mai,mqaj->mqij", displacement, gradients, optimize=True)
-    trace = lam * (h[..., 0, 0] + h[..., 1, 1])
-    xx, yy = trace + 2 * mu * h[..., 0, 0], trace + 2 * mu * h[..., 1, 1]
-    zz = material.poisson_ratio * (xx + yy) if plane == "strain" else np.zeros_like(xx)
-    return np.stack([xx, yy, zz, mu * (h[..., 0, 1] + h[..., 1, 0])], axis=-1)
+    x, y = np.moveaxis(gradients, -1, 0)
+    xx, yy, xy = ((lam + 2 * mu) * x, lam * y), (lam * x, (lam + 2 * mu) * y), (mu * y, mu * x)
+    return np.stack([np.stack(row, axis=-1) for row in (xx, yy, xy)], axis=2)
 
 
 def von_mises(stresses: Array) -> Array:

@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import coo_matrix, csc_matrix
 from scipy.sparse.linalg import spsolve
 
-from gearfe.elasticity import Material, Plane, element_stiffness, physical_gradients, stress, triangle_shapes
+from gearfe.elasticity import Material, Plane, element_stiffness, physical_gradients, stress_rows, triangle_shapes
 
 MATERIAL = Material(200e9, 0.30)
 WIDTH = 10e-3
@@ -59,6 +59,13 @@ def _solved(stiffness: csc_matrix, force: np.ndarray, fixed: np.ndarray, values:
     return u.reshape(-1, 2)
 
 
+def _stress(gradients: np.ndarray, u: np.ndarray, plane: Plane) -> np.ndarray:
+    """Stresses xx, yy, zz, xy; nothing strains along the axis in plane strain."""
+    xx, yy, xy = np.moveaxis(np.einsum("mqsai,mai->mqs", stress_rows(gradients, MATERIAL, plane), u), -1, 0)
+    zz = MATERIAL.poisson_ratio * (xx + yy) if plane == "strain" else 0 * xx
+    return np.stack([xx, yy, zz, xy], axis=-1)
+
+
 def _slope(sizes: list[float], errors: list[float]) -> float:
     return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
 
@@ -91,7 +98,7 @@ def test_lame_ring_under_inner_or_outer_pressure(plane: Plane, inner: float, out
         exact = radial(r)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         middle = triangle_shapes(np.array([1 / 3]), np.array([1 / 3]))
         gradients, _ = physical_gradients(points[triangles], middle[1])
-        found = stress(gradients, u[triangles], MATERIAL, plane)[:, 0]
+        found = _stress(gradients, u[triangles], plane)[:, 0]
         sizes.append(1 / n)
         of_u.append(float(np.linalg.norm(u - exact) / np.linalg.norm(exact)))
         trace = 2 * big_a * (1 + (nu if plane == "strain" else 0))
@@ -157,7 +164,7 @@ def test_linear_displacements_pass_the_patch_test_on_curved_triangles(plane: Pla
         law = e / ((1 + nu) * (1 - 2 * nu)) * np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, 0.5 - nu]])
     xx, yy, xy = law @ [strain[0, 0], strain[1, 1], 2 * strain[0, 1]]
     gradients, _ = physical_gradients(points[triangles], triangle_shapes(np.array([0.2, 0.6]), np.array([0.3, 0.1]))[1])
-    found = stress(gradients, u[triangles], MATERIAL, plane)
+    found = _stress(gradients, u[triangles], plane)
     zz = nu * (xx + yy) if plane == "strain" else 0.0
     np.testing.assert_allclose(found, np.broadcast_to([xx, yy, zz, xy], found.shape), rtol=1e-9, atol=1e-9 * abs(xx))
     force = (_assembled(points, triangles, plane) @ u.ravel()).reshape(-1, 2)

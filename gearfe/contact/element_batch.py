@@ -17,7 +17,7 @@ import numpy as np
 
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .compliance import GearBody, MeshingPair
-from .flank import Flank, Projection, project
+from .flank import Flank
 from .laws import carrying, on_elements, uses_stress
 from .position import FlankLoads, ranges
 
@@ -129,16 +129,6 @@ class Batch:
     def slaves(self, placed: ComplexArray, points: IntArray) -> ComplexArray:
         """Places of contact points (m) for places of the nodes."""
         return np.asarray((self.slave_shapes[points] * placed[self.slave_nodes[points]]).sum(axis=1))
-
-    def project(self, placed: ComplexArray, points: IntArray, start: Array) -> Projection:
-        """Closest points of the contact points `points` on their mates, from starting places."""
-        mates = self.counts, self.mate[self.owner[points]]
-        return project(self.slaves(placed, points), placed, *mates, start, self.end_weighting[points])
-
-    def areas(self, place: Array, points: IntArray) -> Array:
-        """Areas of contact points (m2) as far as they lie before the end of the mate's surface."""
-        past = self.counts[self.mate[self.owner[points]]] - place
-        return self.weight[points] * np.clip(0.5 + past / (2 * self.end_weighting[points]), 0.0, 1.0)
 
 
 def batch_of(

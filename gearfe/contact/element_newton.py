@@ -23,6 +23,7 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .element_batch import Batch
+from .flank import project
 from .position import taken
 
 #: Relative error of pressures and forces at which a position has converged, and steps after which it has not.
@@ -116,21 +117,21 @@ def projected(
     batch: Batch, turn: ComplexArray, displacement: ComplexArray, stress: Array, place: Array, points: IntArray
 ) -> ProjectedPoints:
     """The contact points `points` from starting places, with windows turned by `turn` and nodes displaced."""
-    found = batch.project(batch.placed(displacement, turn), points, place[points])
-    own, mate = turn[batch.owner[points]], turn[batch.mate[batch.owner[points]]]
-    sides = (
-        batch.slave_shapes[points] * (found.normal * own.conj())[:, None],
-        -found.shapes * (found.normal * mate.conj())[:, None],
-    )
+    placed, own = batch.placed(displacement, turn), batch.owner[points]
+    mate, half_stretch = batch.mate[own], batch.end_weighting[points]
+    found = project(batch.slaves(placed, points), placed, batch.counts, mate, place[points], half_stretch)
+    on_own = batch.slave_shapes[points] * (found.normal * turn[own].conj())[:, None]
+    on_mate = -found.shapes * (found.normal * turn[mate].conj())[:, None]
+    before_end = np.clip(0.5 + (batch.counts[mate] - found.place) / (2 * half_stretch), 0.0, 1.0)
     trial = np.maximum(-batch.parameter[points] * found.gap - stress[points], 0.0)
     return ProjectedPoints(
         points=points,
-        at=batch.at[points],
+        at=batch.position[own],
         nodes=np.concatenate([batch.slave_nodes[points], found.edge[:, None] + np.arange(3)], axis=1),
-        normal=np.concatenate(sides, axis=1),
+        normal=np.concatenate([on_own, on_mate], axis=1),
         place=found.place,
         gap=found.gap,
-        area=np.where(found.reached, batch.areas(found.place, points), 0.0),
+        area=np.where(found.reached, batch.weight[points] * before_end, 0.0),
         reached=found.reached,
         trial=np.where(found.reached, trial, 0.0),
     )

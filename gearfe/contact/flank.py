@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elasticity import Material, Plane, physical_gradients, triangle_shapes
+from ..elasticity import Material, Plane, physical_gradients, stress_rows, triangle_shapes
 from ..meshing.tooth_sector import SectorMesh
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 
@@ -107,8 +107,7 @@ def normal_stress_rows(
 ) -> tuple[IntArray, Array]:
     r"""Rows of :math:`\sigma_n = n\cdot\sigma(u)\,n` at the quadrature points of the contact surface.
 
-    :math:`\sigma_n = \sum_{a,i} (\lambda N_{a,i} + 2\mu\, n_i\, n\cdot\nabla N_a)\, u_{ai}` with the gradients of the
-    triangle behind the edge and the normal of the undeformed edge.
+    With the gradients of the triangle behind the edge and the normal of the undeformed edge.
 
     Returns
     -------
@@ -132,9 +131,10 @@ def normal_stress_rows(
     tangent = np.einsum("qa,eai->eqi", first, mesh.points[chain])
     tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
     normal = np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1)
-    lam, mu = material.lame(plane)
-    slope = np.einsum("eqaj,eqj->eqa", gradients, normal)
-    rows = lam * gradients + 2 * mu * slope[..., None] * normal[:, :, None, :]
+    x, y = normal[..., 0], normal[..., 1]
+    rows = np.einsum(
+        "eqs,eqsai->eqai", np.stack([x * x, y * y, 2 * x * y], axis=-1), stress_rows(gradients, material, plane)
+    )
     unknowns = 2 * mesh.triangles[triangle][:, :, None] + np.arange(2)
     return unknowns.reshape(len(chain), 12), rows.reshape(*shape, 12)
 

@@ -38,7 +38,7 @@ from ..contact.flank_compliance import BUMP_ELEMENTS, bumps
 from ..contact.half_plane_result import PairContacts
 from ..contact.panels import EDGES
 from ..contact.position import FlankLoads, Positions
-from ..elasticity import physical_gradients, principal_stresses, triangle_shapes, von_mises
+from ..elasticity import physical_gradients, principal_stresses, stress_rows, triangle_shapes, von_mises
 from ..meshing.whole_gear import WholeGear, whole_gear
 from ..typing import Array, IntArray
 from .contact_pressure import flank_pressures
@@ -182,15 +182,10 @@ class GearRecovery:
         from scipy.sparse import csr_array
 
         mesh = self.body.mesh
-        lam, mu = self.body.material.lame(self.body.plane)
         r = np.array([0.0, 1.0, 0.0, 0.5, 0.5, 0.0])
         s = np.array([0.0, 0.0, 1.0, 0.0, 0.5, 0.5])
         gradients, _ = physical_gradients(mesh.points[mesh.triangles], triangle_shapes(r, s)[1])  # (m, 6 places, 6, 2)
-        x, y = gradients[..., 0], gradients[..., 1]
-        rows = np.zeros((*x.shape[:2], 3, 6, 2))
-        rows[:, :, 0, :, 0], rows[:, :, 0, :, 1] = (lam + 2 * mu) * x, lam * y
-        rows[:, :, 1, :, 0], rows[:, :, 1, :, 1] = lam * x, (lam + 2 * mu) * y
-        rows[:, :, 2, :, 0], rows[:, :, 2, :, 1] = mu * y, mu * x
+        rows = stress_rows(gradients, self.body.material, self.body.plane)
         row = 3 * mesh.triangles[:, :, None, None, None] + np.arange(3)[:, None, None]
         column = 2 * mesh.triangles[:, None, None, :, None] + np.arange(2)
         row, column = np.broadcast_arrays(row, column)
