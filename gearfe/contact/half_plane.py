@@ -130,20 +130,13 @@ def expected_twists(law: HalfPlanePair, torques: Array, touching: Touching) -> A
     touching
         What `law.teeth.touching` says of their angles.
     """
-    made, touched = np.full(len(torques), np.inf), np.unique(touching.position)
-    for start in range(0, len(touched), BATCH):
-        chosen = touched[start : start + BATCH]
-        made[chosen] = _expected(law, torques[chosen], of_positions(touching, chosen))
-    return made
-
-
-def _expected(law: HalfPlanePair, torques: Array, found: Touching) -> Array:
-    count, arm, position = len(torques), found.arm[:, 1], found.position
-    touch, twist = np.full((2, count), np.inf)
+    numbers, position = np.unique(touching.position, return_inverse=True)
+    found, goal, arm = replace(touching, position=position), torques[numbers], touching.arm[:, 1]
+    touch, twist = np.full((2, len(numbers)), np.inf)
     np.minimum.at(touch, position, found.twist)
     setting, state = unloaded(law, touch, found)
     couples, T = setting.couples, smooth_compliance(setting, state)
-    force = torques[position] / (arm * law.width)
+    force = goal[position] / (arm * law.width)
     alone = touch[position] + force * (hertz(setting, state, force)[0] + T[couples.own]) / arm
     np.minimum.at(twist, position, np.maximum(alone, touch[position]))
     for _ in range(TWIST_STEPS):
@@ -152,8 +145,10 @@ def _expected(law: HalfPlanePair, torques: Array, found: Touching) -> Array:
         force = shared(couples, T, own, overlap, overlap > 0)
         rate = shared(couples, T, own, arm, force > 0, held=True)
         torque, slope = (couples.total(one * arm) * law.width for one in (force, rate))
-        twist = np.maximum(twist + (torques - torque) / np.maximum(slope, 1e-300), touch + 0.1 * (twist - touch))
-    return twist
+        twist = np.maximum(twist + (goal - torque) / np.maximum(slope, 1e-300), touch + 0.1 * (twist - touch))
+    made = np.full(len(torques), np.inf)
+    made[numbers] = twist
+    return made
 
 
 #: How often positions are taken up again, where contacts were missing.
@@ -191,11 +186,10 @@ def solve_half_plane(
     angles = np.array(pinion_angles, dtype=float, ndmin=1)
     twist = np.array(np.broadcast_to(np.asarray(twists, dtype=float), angles.shape))
     met = law.teeth.touching(angles) if touching is None else touching
-    touch, made = np.flatnonzero(met.twist < twist[met.position]), []
+    met, made = taken(met, met.twist < twist[met.position]), []
     for start in range(0, max(1, len(angles)), BATCH):
-        part = slice(start, start + BATCH)
-        found = met.take(touch[slice(*np.searchsorted(met.position[touch], [start, start + BATCH]))])
-        made.append(_batch(law, angles[part], twist[part], replace(found, position=found.position - start)))
+        part = np.arange(start, min(start + BATCH, len(angles)))
+        made.append(_batch(law, angles[part], twist[part], of_positions(met, part)))
     return together(made)
 
 
@@ -209,6 +203,9 @@ def _kept(setting: Setting, state: State, positions: BoolArray) -> tuple[Setting
 
 def _joined(parts: Sequence[tuple[Setting, State]]) -> tuple[Setting, State]:
     """One after the other, in rising order."""
+    parts = [part for part in parts if len(part[0].found)] or parts[:1]
+    if len(parts) == 1:
+        return parts[0]
     settings, states = zip(*parts, strict=True)
     found, turn = joined([one.found for one in settings]), np.concatenate([one.turn for one in settings])
     order = np.lexsort((found.pair, found.position))
@@ -254,7 +251,7 @@ def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) ->
 
 def _approached(setting: Setting, state: State, iterations: IntArray) -> tuple[tuple[Setting, State], ...]:
     """Steps until positions are near their solution; those that are, and those that are not. Counts steps."""
-    near = []
+    near = [_kept(setting, state, np.zeros(len(setting.numbers), dtype=bool))]
     for number in range(STEPS):
         couples = setting.couples
         made = step(setting, state, search=number < SEARCHES)
@@ -262,10 +259,10 @@ def _approached(setting: Setting, state: State, iterations: IntArray) -> tuple[t
         unsettled = couples.total(~made.settled | made.outgrown) > 0
         changed = change(setting, state, made)
         there = (changed <= NEAR) & ~unsettled & (number > 0)
-        bears = couples.total(made.force) > 0
         state = moved_on(setting, state, made, near=(changed <= WIDENED_BELOW)[couples.position])
-        near.append(_kept(setting, state, there & bears))
-        setting, state = _kept(setting, state, ~there)
+        if there.any():
+            near.append(_kept(setting, state, there & (couples.total(made.force) > 0)))
+            setting, state = _kept(setting, state, ~there)
         if len(setting.found) == 0:
             break
     return _joined(near), (setting, state)
@@ -294,14 +291,12 @@ def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
     further = setting.turn * np.exp(1j * ahead[couples.position, None] * np.arange(2))
     later = replace(found, position=found.position + len(twists))
     both = Setting(setting.law, joined([found, later]), np.concatenate([setting.turn, further]))
-    state = joined([start, start])
-    made = step(both, state, search=False, held=True)
-    for _ in range(HELD_STEPS - 1):
-        state = moved_on(both, state, made)
-        made = step(both, state, search=False, held=True)
+    state = after = joined([start, start])
+    for _ in range(HELD_STEPS):
+        state, made = after, step(both, after, search=False, held=True)
+        after = moved_on(both, state, made)
     here, on = slice(0, len(found)), slice(len(found), None)
     changed, of_both = change(both, state, made)[: len(numbers)], pair_sums(both, state, made)
-    after = taken(moved_on(both, state, made), here)
     one, two = ((taken(state, part), taken(made, part)) for part in (here, on))
     of_pairs = {name: values[here] for name, values in of_both.items()}
     sums = {name: couples.total(of_pairs[name]) for name in SUMS}
@@ -311,10 +306,9 @@ def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
     known = contact_rates(setting.law, one, two, ahead[couples.position])
     known["torque_wheel"] = of_pairs["torque_wheel"]
     contacts = contacts_of(setting, *one, known)
-    rest, whole = _kept(setting, after, ~settled), completed(setting, *one)
-    if whole is not None:  # tooth pairs have more contacts
-        rest = _joined([_kept(setting, after, ~settled & ~whole[2]), _kept(*whole)])
-        settled &= ~whole[2]
+    *whole, lacking = completed(setting, *one)
+    rest = _joined([_kept(setting, taken(after, here), ~settled & ~lacking), _kept(*whole, lacking)])
+    settled &= ~lacking
     return _Ended(settled, sums, contacts, rest)
 
 

@@ -27,7 +27,7 @@ from ..gear.touching import ToothFlanks
 from ..typing import Array, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliance, shapes_of
-from .panels import LEAST_DISTANCE, Couplings, log_integral, mean_log
+from .panels import LEAST_DISTANCE, Couplings, log_integral
 
 #: Places at which both faces of a contact are compared where they have no deviations, and besides for each piece of a
 #: deviation.
@@ -211,50 +211,34 @@ def moved_beside(law: HalfPlanePair, couples: Couplings, normal: ComplexArray, a
 
 
 def panel_influence(
-    law: HalfPlanePair, couples: Couplings, normal: ComplexArray, arcs: Array, widths: Array, y: Array
+    law: HalfPlanePair,
+    couples: Couplings,
+    normal: ComplexArray,
+    places: tuple[Array, Array],
+    panels: tuple[Array, Array, Array],
 ) -> Array:
-    """Displacement of each face into its material at the first contact's panels, for pressures on the second's, but for
-    the half-plane's by the contact's own, shape (q, 2, n, n) (m/Pa).
+    """Displacement of each face into its material at places on the first contact, by pressures on panels of the second,
+    without that of the half-plane by the contact itself, shape (q, 2, m, n) (m/Pa).
 
     Parameters
     ----------
-    arcs, y : ndarray, shape (p, 2, n)
-        Arcs of the panels' middles and their distances from the corners (m).
-    widths : ndarray, shape (p, n)
-        Of the panels (m).
+    places
+        Arcs of the places and their distances from the corners, shape (p, 2, m) (m).
+    panels
+        The same of the panels' middles, shape (p, 2, n), and the panels' widths, shape (p, n) (m).
     """
     i, j = couples.first, couples.second
+    (arcs, y), (panel_arcs, panel_y, widths) = places, panels
     tension, shear = law.wedge
-    across = tension * (normal[i] * normal[j].conj()).real + (shear * (normal[i] * normal[j]).conj()).real
-    factor = -(law.inverse_modulus * across)[..., None, None] * widths[j][:, None, None]
-    made: Array = np.log(y[i][..., None] + y[j][:, :, None]) * factor
+    turned = (normal[i] * normal[j].conj()).real
+    across = -law.inverse_modulus * (tension * turned + (shear * (normal[i] * normal[j]).conj()).real)
+    factor = across[..., None, None] * widths[j][:, None, None]
+    made: Array = np.log(y[i][..., None] + panel_y[j][:, :, None]) * factor
     other = np.flatnonzero(i != j)
     if len(other):
+        plane = -2 / np.pi * law.inverse_modulus * turned[other]
         i, j = i[other], j[other]
-        plane = -2 / np.pi * law.inverse_modulus * (normal[i] * normal[j].conj()).real
         half = 0.5 * widths[j][:, None, None]
-        apart = arcs[i][..., None] - arcs[j][:, :, None]
+        apart = arcs[i][..., None] - panel_arcs[j][:, :, None]
         made[other] += plane[..., None, None] * (log_integral(apart + half) - log_integral(apart - half))
-    return made
-
-
-def opened(
-    law: HalfPlanePair, couples: Couplings, normal: ComplexArray, contacts: tuple[Array, Array, Array], arcs: Array
-) -> Array:
-    """How far the half-planes' displacements by the other contacts of the pair open the gap at arcs (m) of the faces of
-    each contact, shape (p, 2, n) (m): under elliptic pressures.
-
-    Parameters
-    ----------
-    contacts
-        Arcs (m), shape (p, 2), forces per width (N/m) and variances of the pressures (m2), shape (p,).
-    """
-    arc, force, variance = contacts
-    other = couples.first != couples.second
-    i, j = couples.first[other], couples.second[other]
-    half = np.maximum(2 * np.sqrt(variance[j]), LEAST_DISTANCE)[:, None, None]
-    turned = (normal[i] * normal[j].conj()).real * law.inverse_modulus * force[j][:, None]
-    made = np.zeros((len(arcs), arcs.shape[2]))
-    far = mean_log(arcs[i] - arc[j][:, :, None], half) * turned[:, :, None]
-    np.add.at(made, i, -2 / np.pi * far.sum(axis=1))
     return made

@@ -10,7 +10,7 @@ import numpy as np
 from ..gear.flank_curve import LOOK, WAY, Faces, FlankTables, windows
 from ..gear.touching import Touching
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from .half_plane_pair import HalfPlanePair, moved_beside, opened, panel_influence
+from .half_plane_pair import HalfPlanePair, moved_beside, panel_influence
 from .panels import (
     LEAST_DISTANCE,
     MIDDLES,
@@ -268,7 +268,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
         arcs, heights, _ = faces.heights(tables, look)
         gap = heights[:, 1] - heights[:, 0]
         if len(beside.first) > len(force):
-            gap += opened(law, beside, normal, (state.arc, force, state.variance), arcs)
+            gap += _opened(setting, state, arcs)
         found = windows(look, heights, gap, state.reach * law.compliance * floor)
         low, high = found.low, np.maximum(found.high, found.low + 2e-4 * scale)
     half = 0.5 * (high - low)
@@ -281,7 +281,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     if law.kinks[0].shape[1]:
         gap += _mean_over_kinks(setting, arcs, width)
     y = np.maximum(np.abs(points[:, :, :PANELS] - corner[:, :, None]), LEAST_DISTANCE)
-    local = panel_influence(law, beside, normal, arcs, width, y)
+    local = panel_influence(law, beside, normal, (arcs, y), (arcs, y, width))
     blocks = (smooth.compliance[:, None] * width.take(couples.second, axis=0))[:, None].repeat(PANELS, axis=1)
     blocks[couples.step == 0] += local[:, 0] + local[:, 1]
     blocks[couples.own] += influence(half, law.compliance)
@@ -326,6 +326,17 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
         slope,
         energy,
     )
+
+
+def _opened(setting: Setting, state: State, arcs: Array) -> Array:
+    """How far the other contacts of the pair open the gap at arcs (m) of each, (p, 2, m), under even pressures (m)."""
+    couples, normal = setting.couples.beside, state.normal[:, None] / setting.turn
+    width = np.maximum(4 * np.sqrt(state.variance), LEAST_DISTANCE)[:, None]
+    own = state.arc[:, :, None]
+    panels = own, setting.distances(own), width
+    by = (state.force[:, None] / width)[couples.second] * (couples.first != couples.second)[:, None]
+    into = panel_influence(setting.law, couples, normal, (arcs, setting.distances(arcs)), panels)[..., 0]
+    return couples.sums(into.sum(axis=1) * by)
 
 
 def _mean_over_kinks(setting: Setting, arcs: Array, width: Array) -> Array:

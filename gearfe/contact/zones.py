@@ -14,14 +14,13 @@ or less is another discretisation of the same pressure, and no other answer.
 
 **The gap of the deformed faces** over all of their length, seen from a contact's centre along its normal n, is that of
 the rigid faces (`gearfe.gear.flank_curve`) and :math:`n\cdot(u_2-u_1)`: u by the smooth influence of all pairs of the
-position, by the half-planes and wedges of the pair's own contacts. It is of the first order in the displacements, which
-is enough to look with: a contact that is added by mistake carries no force.
+position, by the half-planes and wedges of the pair's own contacts. It is of the first order in the
+displacements, which is enough to look with: a contact that is added by mistake carries no force.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -38,43 +37,32 @@ MISSED = 1e-5
 RIM = 0.02
 
 
-class Stretch(NamedTuple):
-    """Both faces over the stretch of flank of a contact: places (m), arcs and heights, (2, m), and deformed gap (m)."""
-
-    x: Array
-    arcs: Array
-    heights: Array
-    gap: Array
-
-
-def completed(setting: Setting, state: State, made: Step) -> tuple[Setting, State, BoolArray] | None:
+def completed(setting: Setting, state: State, made: Step) -> tuple[Setting, State, BoolArray]:
     """Contacts of tooth pairs that bear in more places than they have contacts.
 
     Returns
     -------
-    tuple or None
+    tuple
         All contacts again, sorted by position, pair and place, and for each position (shape (m,)) whether it has more
-        of them now; None where no pair does.
+        of them now.
     """
     couples, found = setting.couples, setting.found
     bearing = made.pressure > 0
     cut = {int(i): _split(state, made, int(i)) for i in np.flatnonzero(_stretches(bearing) > 1)}
-    x, arcs, heights, gap = _gaps(setting, state)
-    total = couples.total(state.force)
-    outside = _beyond(made, x)
-    outside = outside[0] | outside[1]
-    for i in np.flatnonzero((outside & (gap < 0)).any(axis=1)).tolist():
+    x, arcs, gap = _gaps(setting, state)
+    bound = -MISSED * reference_approach(setting.law) * couples.total(state.force)[couples.position]
+    sides = _beyond(made, x)
+    for i in np.flatnonzero((sides.any(axis=0) & (gap < 0)).any(axis=1)).tolist():
         exact = gap[i] + _beside_ellipse(setting.law, state, made, i, x[i])
-        bound = -MISSED * reference_approach(setting.law) * total[couples.position[i]]
-        if i not in cut and (outside[i] & (exact < bound)).any():
-            cut[i] = _added(setting, state, made, i, Stretch(x[i], arcs[i], heights[i], exact), bound)
+        if i not in cut and (sides[:, i].any(axis=0) & (exact < bound[i])).any():
+            cut[i] = _added(setting, state, i, (x[i], arcs[i, 0], exact), sides[:, i], bound[i])
+    changed = np.zeros(couples.positions, dtype=bool)
     if not cut:
-        return None
+        return setting, state, changed
     rest = np.setdiff1d(np.arange(len(state.force)), list(cut))
     numbers = np.concatenate([rest, *(np.full(len(part.force), i) for i, part in cut.items())])
     whole: State = joined([taken(state, rest), *cut.values()])
     order = np.lexsort((whole.arc[:, 0], found.pair[numbers], found.position[numbers]))
-    changed = np.zeros(couples.positions, dtype=bool)
     changed[couples.position[list(cut)]] = True
     return setting.take(numbers[order]), taken(whole, order), changed
 
@@ -115,36 +103,33 @@ def _copies(state: State, i: int, place: Array) -> State:
     )
 
 
-def _gaps(setting: Setting, state: State) -> tuple[Array, Array, Array, Array]:
-    """Places x (m) over the stretches of flank of all contacts, shape (p, m), the faces' arcs and rigid heights there,
-    shape (p, 2, m), and the gap of the deformed faces, shape (p, m) (m).
+def _gaps(setting: Setting, state: State) -> tuple[Array, Array, Array]:
+    """Places x over the stretches of flank of all contacts, shape (p, m), the faces' arcs there, shape (p, 2, m), and
+    the gap of the deformed faces under elliptic pressures, shape (p, m), all in m.
     """
     law, couples, tables = setting.law, setting.couples, setting.tables
-    turn, seen_normal = setting.turn / state.normal[:, None], state.normal[:, None] / setting.turn
+    turn, normal = setting.turn / state.normal[:, None], state.normal[:, None] / setting.turn
     rigid = (law.hub - state.centre[:, None]) / state.normal[:, None]
     faces = Faces(turn, rigid, np.zeros_like(turn), state.arc)
     low, high = faces.range(tables, state.ends)
     x = low[:, None] + (high - low)[:, None] * law.looked_at
     arcs = state.arc[:, :, None] + WAY[:, None] * x[:, None]  # nearly
     arcs = np.minimum(np.maximum(arcs, tables.low), tables.high)
-    each = answers(law, law.shapes.at(state.arc)[:, :, 0], seen_normal, couples)[..., 0]
+    each = answers(law, law.shapes.at(state.arc)[:, :, 0], normal, couples)[..., 0]
     load = state.force[couples.second][:, None, None] * SIGN[:, None]
-    moved = law.shapes.along(np.add.reduceat(each * load, couples.starts), arcs)
-    y, at = setting.distances(arcs), setting.distances(state.arc[:, :, None])
-    i, j = couples.first[couples.step == 0], couples.second[couples.step == 0]
-    load = state.force[:, None] * SIGN * seen_normal
+    moved = law.shapes.along(couples.sums(each * load), arcs)
+    beside, load = couples.beside, state.force[:, None] * SIGN * normal
+    i, j = beside.first, beside.second
     tension, shear = law.wedge
-    wedge = tension * load + shear * load.conj()
-    half = _half_widths(state)[j, None, None]
-    local = 2 / np.pi * mean_log(arcs[i] - state.arc[j][:, :, None], half) * load[j][:, :, None]
-    local += np.log(y[i] + at[j]) * wedge[j][:, :, None]
-    np.add.at(moved, i, -law.inverse_modulus[:, None] * local)
-    seen = moved * turn[:, :, None]
+    wedge = (tension * load + shear * load.conj())[j][:, :, None]
+    y, at = setting.distances(arcs), setting.distances(state.arc[:, :, None])
+    logs = mean_log(arcs[i] - state.arc[j][:, :, None], _half_widths(state)[j, None, None])
+    local = 2 / np.pi * logs * load[j][:, :, None] + np.log(y[i] + at[j]) * wedge
+    seen = (moved - law.inverse_modulus[:, None] * beside.sums(local)) * turn[:, :, None]
     arcs, heights, _ = faces.heights(tables, x[:, None] + seen.imag)  # of the points that come to x
-    first, last = state.ends[:, :, :1], state.ends[:, :, 1:]
-    past = ((arcs <= first) | (arcs >= last)).any(axis=1)
-    apart = heights[:, 1] - heights[:, 0] + seen[:, 1].real - seen[:, 0].real
-    return x, arcs, heights, np.where(past, np.inf, apart)
+    past = ((arcs <= state.ends[:, :, :1]) | (arcs >= state.ends[:, :, 1:])).any(axis=1)
+    gap = heights[:, 1] - heights[:, 0] + seen[:, 1].real - seen[:, 0].real
+    return x, arcs, np.where(past, np.inf, gap)
 
 
 def _half_widths(state: State) -> Array:
@@ -159,39 +144,33 @@ def _beside_ellipse(law: HalfPlanePair, state: State, made: Step, i: int, x: Arr
     return np.asarray(law.compliance * (state.force[i] * mean_log(x, _half_widths(state)[i]) - logs))
 
 
-def _added(setting: Setting, state: State, made: Step, i: int, stretch: Stretch, bound: float) -> State:
+def _added(
+    setting: Setting, state: State, i: int, seen: tuple[Array, Array, Array], sides: BoolArray, bound: float
+) -> State:
     """The contact i, and others where the faces overlap most beyond either end of its window, if they are clear of
     each other in between; else its window is to be wider.
+
+    Parameters
+    ----------
+    seen
+        Places (m), arcs of the pinion's face and gaps there (m), shape (m,).
+    sides : ndarray of bool, shape (2, m)
+        Whether these lie before and behind the window.
     """
-    law = setting.law
-    own, ends, reach = taken(state, [i]), state.ends[[i]].copy(), state.reach[[i]]
-    parts = []
-    for way, side in enumerate(_beyond(taken(made, [i]), stretch.x[None])[:, 0]):
+    x, arcs, gap = seen
+    own, parts = taken(state, [i]), []
+    for way, side in enumerate(sides):
         beyond = np.flatnonzero(side)
-        if len(beyond) == 0 or stretch.gap[beyond].min() >= bound:
+        if len(beyond) == 0 or gap[beyond].min() >= bound:
             continue
-        k = int(beyond[np.argmin(stretch.gap[beyond])])
+        k = int(beyond[np.argmin(gap[beyond])])
         between = beyond[beyond < k] if way else beyond[beyond > k]
-        if len(between) == 0 or stretch.gap[between].max() <= 0:
-            reach = WIDER * state.reach[[i]]
+        if len(between) == 0 or gap[between].max() <= 0:
+            own = replace(own, reach=WIDER * own.reach)
             continue
-        cut = stretch.arcs[0, between[np.argmax(stretch.gap[between])]]
-        tangent = law.tables.of(setting.found.flank[i]).at(stretch.arcs[:, k, None])[1][:, 0] * setting.turn[i]
-        along = 1j * (tangent[0] - tangent[1])
-        new, limits, nothing = _copies(own, 0, stretch.x[[k]]), state.ends[[i]].copy(), np.zeros(1)
-        limits[0, 0, 1 - way] = ends[0, 0, way] = cut
-        parts.append(
-            replace(
-                new,
-                centre=new.centre + new.normal * stretch.heights[:, k].mean(),
-                normal=along[None] / np.abs(along),
-                arc=stretch.arcs[None, :, k],
-                ends=limits,
-                force=-stretch.gap[[k]] / reference_approach(law),
-                variance=nothing,
-                low=nothing,
-                high=nothing,
-                reach=np.array([WINDOW]),
-            )
-        )
-    return joined([replace(own, ends=ends, reach=reach), *parts])
+        new, nothing = _copies(own, 0, x[[k]]), np.zeros(1)
+        new.ends[0, 0, 1 - way] = own.ends[0, 0, way] = arcs[between[np.argmax(gap[between])]]
+        force = -gap[[k]] / reference_approach(setting.law)
+        reach = np.array([WINDOW])
+        parts.append(replace(new, force=force, variance=nothing, low=nothing, high=nothing, reach=reach))
+    return joined([own, *parts])
