@@ -306,8 +306,8 @@ def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
     known = contact_rates(setting.law, one, two, ahead[couples.position])
     known["torque_wheel"] = of_pairs["torque_wheel"]
     contacts = contacts_of(setting, *one, known)
-    *whole, lacking = completed(setting, *one)
-    rest = _joined([_kept(setting, taken(after, here), ~settled & ~lacking), _kept(*whole, lacking)])
+    now, whole, lacking = completed(setting, *one)
+    rest = _joined([_kept(setting, taken(after, here), ~settled & ~lacking), _kept(now, whole, lacking)])
     settled &= ~lacking
     return _Ended(settled, sums, contacts, rest)
 
