@@ -217,16 +217,18 @@ def solve(batch: Batch, start: State, turn: ComplexArray, equations: dict[int, E
         moved = np.where(live[batch.node_position], here, moved)
         rows = projected(batch, turn, moved, stress, place, np.flatnonzero(live[batch.at]))
         place[rows.points] = rows.place
-        error = _error(batch, pressure[rows.points], forces, rows)
+        p = pressure[rows.points]
+        now = rows.forces(p, len(forces))
+        error = _error(batch, rows, p, forces, now)
         converged |= live & (error < np.maximum(TOLERANCE, _rounding(batch, rows)))
-        asks = (rows.trial > 0) | (pressure[rows.points] > 0)
+        asks = (rows.trial > 0) | (p > 0)
         live &= ~converged & (np.bincount(rows.at[asks], minlength=batch.size) > 0)
         if number == STEPS or not live.any():
             break
         iterations[live] += 1
-        rows, asks = taken(rows, live[rows.at]), asks[live[rows.at]]
-        p = pressure[rows.points]
-        guess, stress = batch.respond(rows.forces(p, len(forces)), np.flatnonzero(live))
+        goes_on = live[rows.at]
+        rows, asks, p = taken(rows, goes_on), asks[goes_on], p[goes_on]
+        guess, stress = batch.respond(now, np.flatnonzero(live))
         # what the law asks for, linearised, beside the pressures
         off = -batch.parameter[rows.points] * (rows.gap + rows.closing(guess - moved)) - stress[rows.points] - p
         new = np.zeros(len(p))
@@ -260,20 +262,18 @@ def _mixed(past: list[tuple[Array, Array]]) -> Array:
     return np.asarray(reached[-1] - share @ np.diff(reached, axis=0))
 
 
-def _error(batch: Batch, pressure: Array, forces: ComplexArray, rows: ProjectedPoints) -> Array:
+def _error(batch: Batch, rows: ProjectedPoints, pressure: Array, forces: ComplexArray, now: ComplexArray) -> Array:
     """Of each position how far its pressures are from what the law asks or its forces from those of its pressures at
-    the places reached, the larger, relative to their sums, shape (B,).
+    the places reached, `now`, the larger, relative to their sums, shape (B,).
     """
 
     def total(at: IntArray, values: Array) -> Array:
         return np.bincount(at, values, batch.size)
 
-    off = total(rows.at, rows.area * np.abs(pressure - rows.trial)) / np.maximum(
-        total(rows.at, rows.area * rows.trial), 1e-300
-    )
-    now, of = rows.forces(pressure, len(forces)), batch.node_position
-    turned = total(of, np.abs(forces - now)) / np.maximum(total(of, np.abs(now)), 1e-300)
-    return np.maximum(off, turned)
+    least, of = 1e-300, batch.node_position
+    off = total(rows.at, rows.area * np.abs(pressure - rows.trial))
+    off /= np.maximum(total(rows.at, rows.area * rows.trial), least)
+    return np.maximum(off, total(of, np.abs(forces - now)) / np.maximum(total(of, np.abs(now)), least))
 
 
 def _rounding(batch: Batch, rows: ProjectedPoints) -> Array:
