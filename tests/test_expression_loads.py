@@ -14,7 +14,7 @@ from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import finer_run
 from gearfe.mechanisms.job import run_mechanism
 from gearfe.mechanisms.loads import ExpressionLoad
-from gearfe.rigid import IntegrationError, integrate
+from gearfe.rigid import IntegrationError, compiled, integrate
 from gearfe.rigid.inverse import prescribed_motion
 
 ROD = """
@@ -177,6 +177,14 @@ def test_a_run_out_of_the_table_tells_where(tmp_path: Path, how: dict[str, str])
         ("sqrt(-angle(rod))", "have no value at the start"),
         ("(-1 - angle(rod))**0.5", "have no value at the start"),
         ("__import__('os')", "unknown name"),
+        ("1 + 1e400", r"a number in it is larger than 1.8e\+308"),
+        ("0**time", r"raises 0 to a power that varies"),
+        ("(-1)**angle(rod)", r"raises -1 to a power that varies"),
+        ("1/(time*rate(rod))", r"1 / 0 has no value"),
+        ("time**(-1 - time)", r"0 \*\* -1 has no value"),
+        ("(time - 1)**(time + 0.5)", r"-1 \*\* 0.5 has no value"),
+        ("exp(1000 + time)", r"exp\(1000\) has no value"),
+        ("-log(time)", r"log\(0\) has no value"),
     ],
 )
 def test_wrong_expressions(tmp_path: Path, expression: str, text: str) -> None:
@@ -219,6 +227,21 @@ def test_a_load_without_value_on_the_way_is_named_with_all_links(tmp_path: Path,
     bends = ROD.replace("mass_kg = 2.0\ninertia_kg_m2 = 0.5\n", "") + beam
     with pytest.raises(IntegrationError, match=r"forces\.drive\.moment_N_m = '.*' at 0\.5 s: .*(no value|zero|\*\*)"):
         ran(tmp_path, (ROD if link == "rigid" else bends) + MOMENT.format(load))
+
+
+@pytest.mark.parametrize("load", ["1e-6/(time - 0.5)", "1e-8/(time - 0.5)**3", "1e-6*tan(pi*time)"])
+def test_a_pole_that_is_seen_from_afar_is_named_by_taylor(tmp_path: Path, load: str) -> None:
+    """The series tells of the pole a step before it, where the load is still small."""
+    with pytest.raises(IntegrationError, match=r"forces\.drive\.moment_N_m = '.*' at 0\.5 s: .*division by zero"):
+        ran(tmp_path, ROD + MOMENT.format(load), method="taylor", tolerance=1e-6)
+
+
+@pytest.mark.skipif(not compiled.available(), reason="numba is not installed")
+def test_a_load_that_grows_without_bound_ends_the_run_and_is_named(tmp_path: Path) -> None:
+    """The rod turns ever faster, twice as many times every 70 microseconds; no number of steps gets it to the end."""
+    with pytest.raises(IntegrationError, match=r"would take more .*'exp\(10000\*time\)' at 0\.00.*: grows") as caught:
+        ran(tmp_path, ROD + MOMENT.format("exp(10000*time)"), method="taylor", tolerance=1e-6, backend="compiled")
+    assert caught.value.result.statistics["steps"] < 100_000
 
 
 def test_output_times_by_rounding_beyond_the_end_of_a_stopped_run_are_left_out(tmp_path: Path) -> None:

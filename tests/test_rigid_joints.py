@@ -180,6 +180,8 @@ def test_crank_with_prescribed_speed():
     made = integrate(system, times, tolerance=1e-11, start=start, backend="compiled")
     x_b = made.q[:, 3] + length / 2 * np.cos(made.q[:, 5])
     assert np.abs(x_b - r * np.cos(w * times) - np.sqrt(length**2 - (r * np.sin(w * times)) ** 2)).max() <= 1e-10
+    each = [system.acceleration(t, q, v)[1] for t, q, v in zip(times, made.q, made.v, strict=True)]
+    np.testing.assert_allclose(made.multipliers, each, rtol=0, atol=1e-9 * np.abs(each).max())
 
 
 def test_prescribed_place_of_a_point():

@@ -43,6 +43,11 @@ NAMED = (*OF_BODY, *OF_POINT, *OF_SECTION, *OF_LINK)
 #: Quantities of the whole mechanism.
 PLAIN = ("time", "kinetic", "potential", "work", "total")
 _OPERATORS: dict[type, str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
+_ARITHMETIC: dict[str, Callable[..., Any]] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power, "negative": np.negative,
+}  # fmt: skip
+#: The largest number that there is.
+LARGEST = float(np.finfo(float).max)
 #: A function of numbers, not-a-number where it has no value.
 Table = Callable[[Any], Any]
 
@@ -71,6 +76,8 @@ def parse(text: str, label: str, tables: Mapping[str, Table] | None = None, *, p
     def node(tree: ast.expr) -> Node:  # noqa: PLR0911 (a value for each kind of node)
         match tree:
             case ast.Constant(value=float() | int() as value) if not isinstance(value, bool):
+                if not abs(value) <= LARGEST:
+                    raise _wrong(label, text, f"a number in it is larger than {LARGEST:.2g}")
                 return Node("number", float(value))
             case ast.Name(id="pi"):
                 return Node("number", float(np.pi))
@@ -117,20 +124,36 @@ def quantities(node: Node) -> set[tuple[str, str | None]]:
 
 def compute(node: Node, values: Mapping[tuple[str, str | None], Any]) -> Any:
     """Value of the expression; `values` holds every quantity as a number or an array."""
+    with np.errstate(all="ignore"):
+        return value_of(node, values)
+
+
+def value_of(node: Node, values: Mapping[tuple[str, str | None], Any]) -> Any:
+    """As `compute`; what becomes of an operation without a value is the caller's `numpy.errstate`."""
     if node.kind == "number":
         return node.value
     if node.kind == "quantity":
         return values[node.value]
+    parts = [np.asarray(value_of(part, values), dtype=float) for part in node.parts]
     if node.kind == "table":
-        return node.value[1](compute(node.parts[0], values))
-    parts = [compute(p, values) for p in node.parts]
-    with np.errstate(all="ignore"):
-        if node.kind == "call":
-            return FUNCTIONS[node.value][1](*parts)
-        if node.kind == "negative":
-            return -parts[0]
-        left, right = (np.asarray(p, dtype=float) for p in parts)
-        return {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power}[node.kind](left, right)
+        return node.value[1](*parts)
+    return FUNCTIONS[node.value][1](*parts) if node.kind == "call" else _ARITHMETIC[node.kind](*parts)
+
+
+def without_value(node: Node, values: Mapping[tuple[str, str | None], Any]) -> str:
+    """The first operation that has no value, with its numbers, in words; empty where all have one."""
+    for part in node.parts:
+        if found := without_value(part, values):
+            return found
+    if np.isfinite(compute(node, values)):
+        return ""
+    numbers = [f"{float(compute(part, values)):g}" for part in node.parts]
+    if node.kind == "table":
+        name, table = node.value
+        return f"table {name!r} goes from {table.x[0]:g} to {table.x[-1]:g} and is asked at {numbers[0]}"
+    if node.kind in _OPERATORS.values():
+        return f"{f' {node.kind} '.join(numbers)} has no value"
+    return f"{node.value}({', '.join(numbers)}) has no value"
 
 
 def _wrong(label: str, text: str, problem: str) -> InputError:

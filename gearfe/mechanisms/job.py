@@ -18,7 +18,7 @@ from ..rigid import Start, Trajectory, integrate
 from ..rigid.inverse import prescribed_motion
 from .error_estimate import RUNS, TrajectoryError, trajectory_error
 from .model import Mechanism
-from .results import Results, evaluate, reactions, reference_table
+from .results import Results, evaluate, in_blocks, reactions, reference_table
 
 if TYPE_CHECKING:
     from .sensitivity import Sensitivities
@@ -170,7 +170,7 @@ def summarise(
     statistics.pop("compile_seconds", None)  # stands under timings
     passages = np.asarray(statistics.pop("singular_passages", []), dtype=float)
     inside = passages[passages <= trajectory.reached]
-    residual = np.array([mechanism.system.residual(t, q) for t, q in zip(trajectory.time, trajectory.q, strict=True)])
+    residual = in_blocks(mechanism.system.residual, trajectory.time, trajectory.q)
     return {
         "title": mechanism.file.title,
         "status": trajectory.message,

@@ -5,13 +5,12 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeGuard
 
 import numpy as np
 
 from ..errors import InputError
 from ..progress import stage
-from ..rigid import CoordinateSpring, Moment, PointForce, Spring, StateFunction, TimeFunction, Trajectory
+from ..rigid import Trajectory
 from ..textfile import read_text
 from ..typing import Array
 from .expressions import PLAIN, compute, quantities
@@ -99,28 +98,14 @@ def energies(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
 
 
 def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
-    """Work since the start: closed form for constant moments, else Gauss quadrature of the power between output times
-    and ends of steps.
+    """Work since the start: closed form for constant loads, else Gauss quadrature of the power between output times and
+    ends of steps.
     """
-    linkage = mechanism.linkage
-    time = trajectory.time
-    work = np.zeros(len(time))
-    index = linkage.body_index
-    varying = False
-    for force in linkage.forces:
-        if isinstance(force, Moment) and _is_polynomial(force.function):
-            row = force.function.coefficients[0]
-            if len(row) == 1:
-                for body, sign in ((force.body, 1.0), (force.reaction, -1.0)):
-                    if index[body] < len(linkage.bodies):
-                        angle = trajectory.q[:, 3 * index[body] + 2]
-                        work += sign * row[0] * (angle - angle[0])
-                continue
-        loses = isinstance(force, Spring | CoordinateSpring) and force.damping
-        if isinstance(force, Moment | PointForce) or loses or (isinstance(force, Spring) and force.law is not None):
-            varying = True
+    linkage, time = mechanism.linkage, trajectory.time
+    work = in_blocks(linkage.steady_work, trajectory.q[:, : linkage.size])
+    work = work - work[:1]
     damped = [link for link in mechanism.elastic.values() if link.damping]
-    if not (varying or damped or linkage.driven) or len(time) < 2:
+    if not (linkage.powered or damped or linkage.driven) or len(time) < 2:
         return work
     nodes, weights = np.polynomial.legendre.leggauss(8)
     # steps end at the corners of loads, between which the power is smooth
@@ -134,7 +119,7 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     def varying_power(at: Array) -> Array:
         states = trajectory.dense(at, 0), trajectory.dense(at, 1)
         planar = [state[:, : linkage.size] for state in states]
-        power = linkage.power(at, *planar) - _steady_power(mechanism, states[1])
+        power = linkage.power(at, *planar)
         for link in damped:
             power = power - link.loss(*states)
         if linkage.driven:
@@ -146,25 +131,6 @@ def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     return np.asarray(work + np.append(0.0, np.cumsum(gained))[np.searchsorted(way * edges, way * time)])
 
 
-def _is_polynomial(load: TimeFunction | StateFunction) -> TypeGuard[TimeFunction]:
-    return isinstance(load, TimeFunction) and not load.breaks and not load.sines
-
-
-def _steady_power(mechanism: Mechanism, v: Array) -> Array:
-    """Power of the constant moments, which have a closed form."""
-    linkage = mechanism.linkage
-    index = linkage.body_index
-    power = np.zeros(len(v))
-    for force in linkage.forces:
-        if isinstance(force, Moment) and _is_polynomial(force.function):
-            row = force.function.coefficients[0]
-            if len(row) == 1:
-                for body, sign in ((force.body, 1.0), (force.reaction, -1.0)):
-                    if index[body] < len(linkage.bodies):
-                        power += sign * row[0] * v[:, 3 * index[body] + 2]
-    return power
-
-
 def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     """Force (N) and moment (N m) of every joint on its first body, at the joint's point.
 
@@ -173,28 +139,20 @@ def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     the joints is not unique.
     """
     linkage = mechanism.linkage
-    names = list(mechanism.file.joints)
-    bodies = linkage.assembly.tables.forms.bodies
-    owner = np.array(linkage.assembly.row_joint)
-    out = {f"{n}_{c}": np.zeros(len(trajectory.time)) for n in names for c in ("x_N", "y_N", "moment_N_m")}
-    q = trajectory.q[:, : linkage.size]
-    for i, multipliers in enumerate(trajectory.multipliers):
-        G = linkage.gradients(q[i])
-        for j, name in enumerate(names):
-            joint = linkage.joints[j]
-            body = linkage.body_index[getattr(joint, "a", "") or getattr(joint, "body", "")]
-            wrench = np.zeros(3)
-            for r in np.flatnonzero(owner == j):
-                side = 0 if bodies[r, 0] == body else 1
-                wrench -= multipliers[r] * G[r, side]
-            at = getattr(joint, "point_a", getattr(joint, "point", (0.0, 0.0)))
-            centre = linkage.assembly.centre[body]
-            angle = q[i, 3 * body + 2] if body < len(linkage.bodies) else 0.0
-            c, s = np.cos(angle), np.sin(angle)
-            dx, dy = at[0] - centre[0], at[1] - centre[1]
-            arm = c * dx - s * dy, s * dx + c * dy
-            out[f"{name}_x_N"][i], out[f"{name}_y_N"][i] = wrench[:2]
-            out[f"{name}_moment_N_m"][i] = wrench[2] - (arm[0] * wrench[1] - arm[1] * wrench[0])
+    bodies, owner = linkage.assembly.tables.forms.bodies, np.array(linkage.assembly.row_joint)
+    q, out = trajectory.q[:, : linkage.size], {}
+    pulls = -trajectory.multipliers[:, : linkage.rows, None, None] * linkage.gradients(q)
+    for j, (name, joint) in enumerate(zip(mechanism.file.joints, linkage.joints, strict=True)):
+        body = linkage.body_index[getattr(joint, "a", "") or getattr(joint, "body", "")]
+        rows = np.flatnonzero(owner == j)
+        wrench = pulls[:, rows, np.where(bodies[rows, 0] == body, 0, 1)].sum(axis=1)
+        at = getattr(joint, "point_a", getattr(joint, "point", (0.0, 0.0)))
+        dx, dy = np.asarray(at) - linkage.assembly.centre[body]
+        angle = q[:, 3 * body + 2] if body < len(linkage.bodies) else np.zeros(len(q))
+        c, s = np.cos(angle), np.sin(angle)
+        out[f"{name}_x_N"], out[f"{name}_y_N"] = wrench[:, :2].T
+        arm = c * dx - s * dy, s * dx + c * dy
+        out[f"{name}_moment_N_m"] = wrench[:, 2] - (arm[0] * wrench[:, 1] - arm[1] * wrench[:, 0])
     return out
 
 

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,9 +36,9 @@ class ValueTable:
     y: Array
     kind: str = "cubic"
 
-    def covers(self, x: float) -> bool:
-        """Whether it has a value at x."""
-        return self.kind == "periodic" or bool(self.x[0] <= x <= self.x[-1])
+    def covers(self, x: Any) -> Any:
+        """Where it has a value."""
+        return (self.kind == "periodic") | ((self.x[0] <= x) & (x <= self.x[-1]))
 
     @cached_property
     def _pieces(self) -> Array:
@@ -72,41 +73,38 @@ class ValueTable:
         rows = tuple(tuple(float(c) for c in row[::-1]) for row in self._pieces.T)
         return TimeFunction(starts, tuple(float(t) for t in self.x[:-1]), rows)
 
-    def piece(self, x: float) -> int:
-        """Number of the piece that holds x."""
+    def _at(self, x: Any) -> tuple[Any, Any]:
+        """Distances from the knots below, and numbers of the pieces."""
         if self.kind == "periodic":
-            x = float(self.x[0] + (x - self.x[0]) % (self.x[-1] - self.x[0]))
-        return min(max(int(np.searchsorted(self.x, x, side="right")) - 1, 0), len(self.x) - 2)
+            x = self.x[0] + (x - self.x[0]) % self.period
+        k = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, len(self.x) - 2)
+        return x - self.x[k], k
 
-    def place(self, x: float) -> int | None:
+    def piece(self, x: float) -> int | None:
         """Number of the piece that holds x; None beyond the table."""
-        return self.piece(x) if self.covers(x) else None
-
-    def _at(self, x: float) -> tuple[float, Array]:
-        k = self.piece(x)
-        if self.kind == "periodic":
-            x = float(self.x[0] + (x - self.x[0]) % (self.x[-1] - self.x[0]))
-        return x - float(self.x[k]), self._pieces[:, k]
+        return int(self._at(x)[1]) if self.covers(x) else None
 
     def __call__(self, x: Array) -> Array:
-        """y at many x, not-a-number beyond the table."""
-        flat = [self.value(float(a)) if self.covers(float(a)) else np.nan for a in np.ravel(x)]
-        return np.reshape(flat, np.shape(x))
+        """y at x, not-a-number beyond the table."""
+        return np.where(self.covers(x), self.value(x), np.nan)
 
-    def value(self, x: float) -> float:
+    def value(self, x: Array) -> Any:
         """y at x."""
-        h, c = self._at(x)
-        return float(((c[0] * h + c[1]) * h + c[2]) * h + c[3])
+        h, k = self._at(x)
+        c = self._pieces[:, k]
+        return ((c[0] * h + c[1]) * h + c[2]) * h + c[3]
 
-    def slope(self, x: float) -> float:
+    def slope(self, x: Array) -> Any:
         """dy/dx at x."""
-        h, c = self._at(x)
-        return float((3.0 * c[0] * h + 2.0 * c[1]) * h + c[2])
+        h, k = self._at(x)
+        c = self._pieces[:, k]
+        return (3.0 * c[0] * h + 2.0 * c[1]) * h + c[2]
 
-    def bend(self, x: float) -> float:
+    def bend(self, x: Array) -> Any:
         """Second derivative at x."""
-        h, c = self._at(x)
-        return float(6.0 * c[0] * h + 2.0 * c[1])
+        h, k = self._at(x)
+        c = self._pieces[:, k]
+        return 6.0 * c[0] * h + 2.0 * c[1]
 
 
 def read_table(name: str, table: ValueTableTable, folder: Path) -> ValueTable:

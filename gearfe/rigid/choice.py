@@ -36,7 +36,7 @@ SHARE, EARLY = 0.75, 0.1
 FASTER, WRONG = 1.5, 2.0
 #: The shortest trial must cost less than this part of what the running way has left.
 WORTH = 0.2
-#: Steps do not grow when the second half of them comes no further than this many times the first.
+#: Steps do not grow when those of the second half are no longer than this many times those of the first.
 GROWTH = 1.2
 #: Steps after which a pace counts: the first ones grow from a careful guess, by a factor of five or six each.
 LEAST_STEPS = 8
@@ -111,13 +111,15 @@ class Pace:
     def __init__(self, end: float, clock: Callable[[], float]) -> None:
         self.end, self.clock = end, clock
         self.reports: list[tuple[float, float]] = []
+        self.steps: list[int] = []
         self.away = 0.0  # seconds that others took meanwhile
 
-    def at(self, t: float) -> tuple[float, float]:
-        """(seconds spent, seconds left) at the time t of the motion."""
+    def at(self, t: float, steps: int) -> tuple[float, float]:
+        """(seconds spent, seconds left) at the time t of the motion, after so many steps."""
         now = self.clock() - self.away
         if not self.reports or t != self.reports[-1][1]:  # else the step was not accepted
             self.reports.append((now, t))
+            self.steps.append(steps)
         then = self.reports[-1 - min(len(self.reports) - 1, max(1, len(self.reports) // RECENT))]
         passed = abs(t - then[1])
         left = (now - then[0]) * abs(self.end - t) / passed if passed > 0.0 else math.inf
@@ -131,10 +133,10 @@ class Pace:
 
     @property
     def grows(self) -> bool:
-        """Whether the second half of the progress told came further than the first."""
-        times = [t for _, t in self.reports]
-        first, middle, last = times[0], times[len(times) // 2], times[-1]
-        return len(times) < 2 * LEAST_STEPS or abs(last - middle) > GROWTH * abs(middle - first)
+        """Whether the steps in the second half of the progress told are longer than those in the first."""
+        first, middle, last = ((self.reports[k][1], self.steps[k]) for k in (0, len(self.steps) // 2, -1))
+        early, late = ((abs(b[0] - a[0]) / max(1, b[1] - a[1])) for a, b in ((first, middle), (middle, last)))
+        return last[1] < 2 * LEAST_STEPS or late > GROWTH * early
 
 
 class Choice:
@@ -181,7 +183,7 @@ class Choice:
 
         def watch(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
             nonlocal trial, lost, predicted, rest, whole, shown
-            elapsed, left = pace.at(t)
+            elapsed, left = pace.at(t, steps)
             count(abs(t - self.start.time), abs(float(self.times[-1]) - self.start.time), way.method)
             if trial is None and not shown and min(elapsed, left) > SILENT:
                 shown = True

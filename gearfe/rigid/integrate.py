@@ -141,7 +141,7 @@ def integrate(
     kept = output_times if status is Status.DONE else output_times[sign * output_times <= reached]
     if status is Status.DONE and not _dropped_rows_hold(system, start, dense, tolerance):
         status = Status.REDUNDANT_NOT_MET
-    if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE, Status.NOT_SOLVED) and len(dense.times) > 1:
+    if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE, Status.NOT_SOLVED, Status.ENDLESS) and len(dense.times) > 1:
         last = dense.times[-6:]  # the very last ones may be beyond all numbers
         end, (q, v, a) = float(last[-1]), (dense(last[-1:], k)[0] for k in range(3))
         system.blame(end, q, v)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from ..errors import InputError
+from ..typing import Array
 from .forms import GROUND, Form, Frames, Point
 from .timefunctions import TimeFunction
 
@@ -20,15 +21,15 @@ if TYPE_CHECKING:
 
 
 class Profile(Protocol):
-    """A function of an angle with two derivatives, which are steady."""
+    """A function of angles, shape (...), with two derivatives, which are steady."""
 
-    def value(self, x: float) -> float:
+    def value(self, x: Array) -> Array:
         """s(x)."""
 
-    def slope(self, x: float) -> float:
+    def slope(self, x: Array) -> Array:
         """s'(x)."""
 
-    def bend(self, x: float) -> float:
+    def bend(self, x: Array) -> Array:
         """s''(x)."""
 
     def write(self, tape: Tape, coordinate: int) -> int:

@@ -16,15 +16,12 @@ from .contract import Element
 from .forces import Force
 from .forms import Frames
 from .joints import Joint
-from .planar import Body, body_numbers, over, turned, with_ground
+from .linkage_tape import write_linkage
+from .planar import Body, add_at, body_numbers, turned, with_ground
 from .tables import Assembly, assemble
 
 if TYPE_CHECKING:
     from .tape import Tape
-
-
-#: A load beyond this value (N, N m) where a run ends has a pole there.
-POLE = 1e7
 
 
 class Pose(NamedTuple):
@@ -69,13 +66,18 @@ class Linkage(Element):
         self.rows = len(self.assembly.row_label)
         self.row_names = self.assembly.row_label
         self.breaks = self.assembly.breaks
-        self._forms = self.assembly.tables.forms
-        self._vectors = self.assembly.tables.vectors
-        self._forces = self.assembly.tables.forces
+        self._forms, self._vectors, self._forces = self.assembly.tables
         #: Constraints with a profile: row, which of its bodies, number of that, profile.
         self._profiles = [(r, k, int(self._forms.bodies[r, k]), p) for r, k, p in self.assembly.profiles]
         self._loaded = bool(len(self._forces.spring) or len(self._forces.along))
         self._lawful = np.isin(np.arange(len(self._forces.spring)), [i for i, _ in self.assembly.tension_laws])
+        loads = [self.assembly.functions[k] if k >= 0 else None for k in self._forms.motion[self.rows :]]
+        #: Values of constant loads; whether others, or dampers, give or take energy; whether joints prescribe motions.
+        self._steady = np.array([float(f(0.0)) if f is not None and f.steady else 0.0 for f in loads])
+        lossy = self._forces.spring[:, 1].any() or self._forces.along[:, 1].any()
+        varying = self.assembly.state_loads or self.assembly.tension_laws
+        self.powered = bool(lossy or varying) or any(f is not None and not f.steady for f in loads)
+        self.driven = bool((self._forms.motion[: self.rows] >= 0).any())
         self._known: tuple[Array, Pose] | None = None
 
     def mass(self) -> Array:
@@ -101,13 +103,6 @@ class Linkage(Element):
         """Whether loads have corners."""
         return bool(self.pieces(0.0, *self.start()))
 
-    def blame(self, t: float, q: Array, v: Array) -> None:
-        """Let the largest load say that it has a pole there."""
-        loads = [(abs(load.value(t, q, v)), load) for _, load in self.assembly.state_loads]
-        value, largest = max(loads, key=lambda pair: pair[0], default=(0.0, None))
-        if largest is not None and value > POLE:
-            largest.complaint = largest.complaint or largest.pole(t, value)
-
     def pieces(self, t: float, q: Array, v: Array) -> tuple[int | None, ...]:
         """Numbers of the smooth pieces that loads and laws of springs are on."""
         found = [piece for _, load in self.assembly.state_loads for piece in load.pieces(t, q, v)]
@@ -122,14 +117,7 @@ class Linkage(Element):
 
     def write(self, tape: Tape, places: IntArray) -> bool:
         """The linkage on a tape, see `gearfe.rigid.contract`."""
-        from .linkage_tape import write_linkage
-
         return write_linkage(self, tape, places)
-
-    @property
-    def driven(self) -> bool:
-        """Whether a joint prescribes a motion."""
-        return bool((self._forms.motion[: self.rows] >= 0).any())
 
     def pose(self, q: Array) -> Pose:
         """Bodies and vectors at the coordinates q; those of the last ones are remembered."""
@@ -153,13 +141,12 @@ class Linkage(Element):
         return Rates(row, ends.sum(axis=-2), spin)
 
     def _vector_jacobian(self, pose: Pose) -> Array:
-        """J_V = dV/d(x, y, theta) of both bodies, shape (v, 2 components, 2 bodies, 3)."""
-        J = np.zeros((len(pose.vector), 2, 2, 3))
-        J[:, 0, :, 0] = J[:, 1, :, 1] = self._vectors.end[:, :, 0]
-        J[:, :, :, 2] = np.swapaxes(turned(pose.arm), 1, 2)
+        """J_V = dV/d(x, y, theta) of both bodies, shape (..., v, 2 components, 2 bodies, 3)."""
+        J = np.zeros((*pose.vector.shape, 2, 3))
+        J[..., 0, :, 0] = J[..., 1, :, 1] = self._vectors.end[:, :, 0]
+        J[..., 2] = np.swapaxes(turned(pose.arm), -1, -2)
         return J
 
-    # constraints ------------------------------------------------------------------------------------------------
     def _times(self, t: float | Array, derivative: int) -> Array:
         """Motions of the constraints."""
         out = np.zeros((*np.shape(t), self.rows))
@@ -167,10 +154,10 @@ class Linkage(Element):
             out[..., r] = self.assembly.functions[self._forms.motion[r]](t, derivative)
         return out
 
-    def _affine(self, pose: Pose) -> Array:
-        """Values of the affine parts of all forms."""
-        at = pose.row[..., self._forms.bodies, :]
-        return np.einsum("rbk,...rbk->...r", self._forms.factor, at) + self._forms.constant
+    def _affine(self, pose: Pose, first: int = 0) -> Array:
+        """Values of the affine parts of the forms from number `first` on."""
+        at = pose.row[..., self._forms.bodies[first:], :]
+        return np.einsum("rbk,...rbk->...r", self._forms.factor[first:], at) + self._forms.constant[first:]
 
     def _affine_gradients(self, pose: Pose) -> Array:
         """Gradients of the affine parts of all forms, shape (r, 2, 3)."""
@@ -180,27 +167,28 @@ class Linkage(Element):
         return out
 
     def _affine_bend(self, pose: Pose) -> Array:
-        """Second derivatives of all forms by the two angles, their products left out; shape (r, 2)."""
+        """Second derivatives of all forms by the two angles, their products left out, shape (r, 2)."""
         factor, at = self._forms.factor, pose.row[self._forms.bodies]
         return -(factor[:, :, 3] * at[:, :, 3] + factor[:, :, 4] * at[:, :, 4])
 
-    def residual(self, t: float, q: Array) -> Array:
-        """Values of all rows."""
+    def residual(self, t: float | Array, q: Array) -> Array:
+        """Values of all rows in states (..., size)."""
         pose = self.pose(q)
-        g = self._affine(pose)[: self.rows] - self._times(t, 0)
+        g = self._affine(pose)[..., : self.rows] - self._times(t, 0)
         row, one, two = self._forms.product.T
         if len(row):
-            np.add.at(g, row, (pose.vector[one] * pose.vector[two]).sum(axis=1))
+            add_at(g, (pose.vector[..., one, :] * pose.vector[..., two, :]).sum(axis=-1), row)
         for r, _, body, profile in self._profiles:
-            g[r] -= profile.value(pose.row[body, 2])
+            g[..., r] -= profile.value(pose.row[..., body, 2])
         return g
 
-    def jacobian(self, t: float, q: Array) -> Array:  # noqa: ARG002
-        """G of all rows."""
-        full = np.zeros((self.rows, self.size + 3))
-        columns = 3 * self._forms.bodies[: self.rows, :, None] + np.arange(3)
-        np.add.at(full, (np.arange(self.rows)[:, None, None], columns), self.gradients(q))
-        return full[:, : self.size]
+    def jacobian(self, t: float | Array, q: Array) -> Array:  # noqa: ARG002
+        """G of all rows in states (..., size)."""
+        full, rows = np.zeros((*q.shape[:-1], self.rows, self.size + 3)), np.arange(self.rows)[:, None]
+        gradients = self.gradients(q)
+        for side in range(2):
+            full[..., rows, 3 * self._forms.bodies[: self.rows, side, None] + np.arange(3)] += gradients[..., side, :]
+        return full[..., : self.size]
 
     def rate(self, t: float | Array, q: Array) -> Array:  # noqa: ARG002
         """Minus the rates of the prescribed motions."""
@@ -224,15 +212,17 @@ class Linkage(Element):
         return out
 
     def gradients(self, q: Array) -> Array:
-        """Gradients (rows, 2, 3) of all rows with respect to the poses of both bodies."""
+        """Gradients (..., rows, 2, 3) of all rows with respect to the poses of both bodies."""
         pose = self.pose(q)
-        out = self._affine_gradients(pose)[: self.rows]
+        out = self._affine_gradients(pose)[..., : self.rows, :, :]
         for r, side, body, profile in self._profiles:
-            out[r, side, 2] -= profile.slope(pose.row[body, 2])
+            out[..., r, side, 2] -= profile.slope(pose.row[..., body, 2])
         row, one, two = self._forms.product.T
         if len(row):
             J, V = self._vector_jacobian(pose), pose.vector
-            np.add.at(out, row, np.einsum("pcbk,pc->pbk", J[one], V[two]) + np.einsum("pcbk,pc->pbk", J[two], V[one]))
+            for a, b in ((one, two), (two, one)):
+                part = np.einsum("...pcbk,...pc->...pbk", J[..., a, :, :, :], V[..., b, :])
+                add_at(out, part, row, slice(None), slice(None))
         return out
 
     def curvature(self, q: Array, multipliers: Array) -> Array:
@@ -260,28 +250,24 @@ class Linkage(Element):
         """Numbers of the six coordinates that vectors depend on, the ground's past the end."""
         return (3 * self._vectors.bodies[vectors][:, :, None] + np.arange(3)).reshape(-1, 6)
 
-    # forces -----------------------------------------------------------------------------------------------------
-    def force(self, t: float, q: Array, v: Array) -> Array:
-        """All applied forces on the bodies."""
-        if not self._loaded:
-            return self._forces.weight[: self.size].copy()
-        pose = self.pose(q)
-        motion = self._motion(pose, v)
-        total = self._forces.weight.copy()
-        springs = self._springs(t, pose, motion)
-        J = self._vector_jacobian(pose)[: len(springs.length)]
-        places = self._places(np.arange(len(J)))
-        np.add.at(total, places, -np.einsum("scbk,sc->sbk", J, springs.pull[:, None] * springs.span).reshape(-1, 6))
-        along = self._along(t, pose, motion)
-        np.add.at(total, along.places, (along.value + along.given)[:, None] * along.gradient)
-        return total[: self.size]
+    def force(self, t: float | Array, q: Array, v: Array) -> Array:
+        """All applied forces on the bodies in states (..., size)."""
+        total = np.broadcast_to(self._forces.weight, (*q.shape[:-1], self.size + 3)).copy()
+        if self._loaded:
+            pose = self.pose(q)
+            motion = self._motion(pose, v)
+            springs, along = self._springs(t, pose, motion), self._along(t, pose, motion)
+            J = self._vector_jacobian(pose)[..., : springs.length.shape[-1], :, :, :]
+            pulls = np.einsum("...scbk,...sc->...sbk", J, springs.pull[..., None] * springs.span)
+            places = self._places(np.arange(J.shape[-4]))
+            add_at(total, -pulls.reshape(*pulls.shape[:-2], 6), places)
+            add_at(total, (along.value + along.given)[..., None] * along.gradient, along.places)
+        return total[..., : self.size]
 
     def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Derivatives of the forces by q and v in closed form."""
         n = self.size
         by_q, by_v = np.zeros((n + 3, n + 3)), np.zeros((n + 3, n + 3))
-        if not self._loaded:
-            return by_q[:n, :n], by_v[:n, :n]
         pose = self.pose(q)
         motion = self._motion(pose, v)
         springs = self._springs(t, pose, motion)
@@ -296,9 +282,7 @@ class Linkage(Element):
         drift = np.zeros_like(J)  # d(rate of the span)/d(poses)
         drift[:, :, [2, 5]] = -np.swapaxes(motion.spin[: len(J), :, None] * pose.arm[: len(J)], 1, 2)
         turn = np.einsum("sc,scd->sd", motion.vector[: len(J)], across)
-        turn *= np.where(springs.length > 0.0, damping / np.where(springs.length > 0.0, springs.length, 1.0), 0.0)[
-            :, None
-        ]
+        turn *= (damping / (springs.length + (springs.length == 0.0)))[:, None]
         stretch = np.einsum("sc,sci->si", unit, J)
         tension = k[:, None] * stretch + np.einsum("sc,sci->si", turn, J)
         tension += damping[:, None] * np.einsum("sc,sci->si", unit, drift)
@@ -329,19 +313,24 @@ class Linkage(Element):
         return by_q[:n, :n], by_v[:n, :n]
 
     def power(self, t: Array, q: Array, v: Array) -> Array:
-        """Power of applied moments and point forces less the loss in dampers (W), at times (k,) of states (k, n)."""
+        """Power of the loads that vary less the loss in dampers (W), at times (k,) of states (k, n)."""
         pose = self._pose(q)
         motion = self._motion(pose, v)
         springs, along = self._springs(t, pose, motion), self._along(t, pose, motion)
         losses = springs.rate**2 @ self._forces.spring[:, 1] + along.rate**2 @ self._forces.along[:, 1]
-        return (along.given * along.rate).sum(axis=-1) - (springs.given * springs.rate).sum(axis=-1) - losses
+        given = ((along.given - self._steady) * along.rate).sum(axis=-1)
+        return np.asarray(given - (springs.given * springs.rate).sum(axis=-1) - losses)
+
+    def steady_work(self, q: Array) -> Array:
+        """Work of the constant loads (J), but for a constant, in states (..., size)."""
+        return np.asarray(self._affine(self.pose(q), self.rows) @ self._steady)
 
     def potential(self, q: Array) -> Array:
         """Energy of gravity (datum x = y = 0) and of all springs (J) in states (..., size)."""
-        pose = self._pose(q)
+        pose = self.pose(q)
         span = pose.vector[..., : len(self._forces.spring), :]
         stretch = np.hypot(span[..., 0], span[..., 1]) - self._forces.spring[:, 2]
-        moved = self._affine(pose)[..., self.rows :]
+        moved = self._affine(pose, self.rows)
         elastic = 0.5 * (stretch**2 @ self._forces.spring[:, 0] + moved**2 @ self._forces.along[:, 0])
         return np.asarray(elastic - q @ self._forces.weight[: self.size])
 
@@ -358,8 +347,8 @@ class Linkage(Element):
                 given[..., i] = self.assembly.functions[k](t)
         q, v = (x[..., :-1, :3].reshape(*lead, -1) for x in (pose.row, motion.row))
         for k, load in self.assembly.state_loads:
-            given[..., k] = over(load.value, t, q, v)
-        value = -stiffness * self._affine(pose)[..., self.rows :] - damping * rate
+            given[..., k] = load.values(t, q, v)
+        value = -stiffness * self._affine(pose, self.rows) - damping * rate
         return _Along(gradient, places, rate, value, given)
 
     def _springs(self, t: float | Array, pose: Pose, motion: Rates) -> _Springs:
@@ -378,7 +367,7 @@ class Linkage(Element):
         rate = (unit * speed).sum(axis=-1)
         given = np.zeros(rate.shape)
         for i, law in self.assembly.tension_laws:
-            given[..., i] = over(law.value, t, length[..., i], rate[..., i])
+            given[..., i] = law.values(t, length[..., i], rate[..., i])
         pull = stiffness * (1.0 - np.where(free > 0.0, free / divisor, 0.0)) + (damping * rate + given) / divisor
         return _Springs(span, length, unit, rate, given, pull)
 

@@ -164,7 +164,7 @@ class SeriesRun:
         def state() -> tuple[Array, Array]:
             return modal.origin + modal.T @ work.state[:n], modal.T @ work.state[n:]
 
-        status, _ = run_in_pieces(fill, t0, state, room=512, largest=20_000, most=most, watch=watch)
+        status, _ = run_in_pieces(fill, (t0, t1), state, room=512, largest=20_000, most=most, watch=watch)
         return np.concatenate(ends), np.vstack(states), found[: counts[1]], status, orders[0]
 
 

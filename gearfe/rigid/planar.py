@@ -7,7 +7,6 @@ the position of the frame's origin and its angle. The ground is the body named `
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -112,11 +111,9 @@ def with_ground(x: Array) -> Array:
     return np.concatenate([x, np.zeros((*x.shape[:-1], 3))], axis=-1).reshape(*x.shape[:-1], -1, 3)
 
 
-def over(value: Callable[..., float], t: float | Array, *states: Array) -> Any:
-    """A function of a state, or of those at several times; its numbers are `float`, whose divisions by zero raise."""
-    if np.ndim(t) == 0:
-        return value(t, *(x if np.ndim(x) else float(x) for x in states))
-    return [over(value, *one) for one in zip(np.asarray(t), *states, strict=True)]
+def add_at(total: Array, values: Array, *places: Any) -> None:
+    """total[..., places] += values, also where places repeat."""
+    np.add.at(total, (..., *places), values)
 
 
 def turned(vectors: Array) -> Array:

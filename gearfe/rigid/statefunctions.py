@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..typing import Array
 
@@ -25,6 +28,10 @@ class StateFunction(ABC):
     @abstractmethod
     def value(self, t: float, q: Array, v: Array) -> float:
         """f."""
+
+    def values(self, t: float | Array, q: Array, v: Array) -> Any:
+        """f at a state, or at times (k,) of states (k, n)."""
+        return over(self.value, t, q, v)
 
     @abstractmethod
     def slopes(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
@@ -52,6 +59,10 @@ class SpanFunction(ABC):
     def value(self, t: float, length: float, rate: float) -> float:
         """T (N), positive where it pulls."""
 
+    def values(self, t: float | Array, length: Any, rate: Any) -> Any:
+        """T in a state, or in many."""
+        return over(self.value, t, length, rate)
+
     @abstractmethod
     def slopes(self, t: float, length: float, rate: float) -> tuple[float, float]:
         """(dT/dL, dT/dL')."""
@@ -63,3 +74,10 @@ class SpanFunction(ABC):
     def write(self, tape: Tape, length: int, rate: int) -> int | None:  # noqa: ARG002
         """Its register by those of length and rate; None where it cannot be written."""
         return None
+
+
+def over(value: Callable[..., float], t: float | Array, *states: Array) -> Any:
+    """A function of a state, or of those at several times; its numbers are `float`, whose divisions by zero raise."""
+    if np.ndim(t) == 0:
+        return value(t, *(x if np.ndim(x) else float(x) for x in states))
+    return [over(value, *one) for one in zip(np.asarray(t), *states, strict=True)]

@@ -30,6 +30,8 @@ CUT = 0.01
 #: Steps below this share of the time, or of the run's length, are rounding; steps below the second whose errors have no
 #: size end the run.
 ROUNDING, NO_SIZE = 1e-14, 1e-12
+#: Steps between two looks at the pace, and how many times the steps allowed the rest may take by it.
+PACE, ENDLESS = 4096, 100.0
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,11 @@ class StepLaw:
     least_error: float
     predictive: bool = False
     steady: bool = False
+
+
+def endless(passed: float, left: float, steps: int, most: int) -> bool:
+    """Whether so many steps over the time `passed` (s) leave the rest hopelessly many: a load grows without bound."""
+    return steps >= PACE and abs(left) * steps > ENDLESS * most * abs(passed)
 
 
 class StepControl:
@@ -97,6 +104,7 @@ class StepControl:
         self.status = Status.DONE
         self.accepted = self.rejected = 0
         self._step, self._cut, self._before = 0.0, False, 0.0
+        self._looked = self.t, 0  # time and steps of the last look at the pace
         self._added = False  # whether the first goal is one of `end_at`
 
     def next_step(self, state: Callable[[], tuple[Array, Array]]) -> float | None:
@@ -107,6 +115,12 @@ class StepControl:
         if self.accepted >= self.most:
             self.status = Status.MOST_STEPS
             return None
+        if self.accepted >= self._looked[1] + PACE:
+            passed, steps = self.t - self._looked[0], self.accepted - self._looked[1]
+            if endless(passed, self.end - self.t, steps, self.most):
+                self.status = Status.ENDLESS
+                return None
+            self._looked = self.t, self.accepted
         if self.watch is not None and not self.watch(self.t, self.accepted, state):
             self.status = Status.STOPPED
             return None
@@ -159,7 +173,7 @@ class StepControl:
 
 def run_in_pieces(
     fill: Callable[[int], tuple[int, float, int]],
-    begin: float,
+    span: tuple[float, float],
     state: Callable[[], tuple[Array, Array]],
     *,
     room: int,
@@ -173,8 +187,8 @@ def run_in_pieces(
     ----------
     fill
         Goes on by at most so many steps and keeps its output; (status, time reached, steps made).
-    begin, state
-        Time of the start (s), and the state reached.
+    span, state
+        Begin and end (s), and the state reached.
     room, largest
         Steps of the first piece; the next ones have twice as many, up to this.
     most
@@ -182,14 +196,17 @@ def run_in_pieces(
     watch
         See `Watch`; it looks between two pieces.
     """
-    done = 0
+    done, before = 0, span[0]
     if watch is not None:
-        watch(begin, 0, state)
+        watch(before, 0, state)
     while done < most:
         status, t, count = fill(min(room, most - done))
         done += count
         if status != Status.MOST_STEPS:
             return Status(status), done
+        if endless(t - before, span[1] - t, count, most):
+            return Status.ENDLESS, done
+        before = t
         if done < most and watch is not None and not watch(t, done, state):
             return Status.STOPPED, done
         room = min(2 * room, max(largest, room))
@@ -219,6 +236,7 @@ class Status(IntEnum):
     NOT_SOLVED = 5
     SINGULAR_START = 6
     REDUNDANT_NOT_MET = 7
+    ENDLESS = 8
 
     @property
     def message(self) -> str:
@@ -238,5 +256,6 @@ _MESSAGES = {
     Status.NOT_FINITE: "the state is not finite",
     Status.NOT_SOLVED: "the equations could not be solved in a step",
     Status.SINGULAR_START: "the start is beside a singular position",
+    Status.ENDLESS: "the steps became so short that the rest would take more than can be made",
     Status.REDUNDANT_NOT_MET: "constraints that were taken for redundant at the start are not met by the motion",
 }

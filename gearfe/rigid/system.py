@@ -12,6 +12,11 @@ from ..errors import InputError
 from ..typing import Array
 from .contract import Element
 from .linkage import Linkage
+from .planar import add_at
+from .statefunctions import StateFunction
+
+#: A load beyond this value (N, N m) where a run ends has a pole there.
+POLE = 1e7
 
 
 class System:
@@ -111,11 +116,12 @@ class System:
         """Numbers of the coordinates that `element` owns."""
         return self.index[self.elements.index(element)][: element.size]
 
-    def force(self, t: float, q: Array, v: Array, *, stressed: bool = True) -> Array:
-        """All applied forces, the linear parts included, with those of `stressed` elements or without; (size,)."""
-        total = -(self.damping @ v + self.stiffness @ q) if self.linear else np.zeros(self.size)
+    def force(self, t: float | Array, q: Array, v: Array, *, stressed: bool = True) -> Array:
+        """All applied forces, the linear parts included, with those of `stressed` elements or without, in states
+        (..., size)."""
+        total = -(v @ self.damping.T + q @ self.stiffness.T) if self.linear else np.zeros(q.shape)
         for element, index in self.forces if stressed else self._others:
-            np.add.at(total, index, element.force(t, q[index], v[index]))
+            add_at(total, in_states(element, element.force, t, q[..., index], v[..., index]), index)
         return total
 
     def force_jacobian(self, t: float, q: Array, v: Array, *, stressed: bool = True) -> tuple[Array, Array]:
@@ -138,17 +144,28 @@ class System:
         parts = [e.assembly for e in self.elements if isinstance(e, Linkage)]
         return [law for part in parts for _, law in (*part.state_loads, *part.tension_laws)]
 
+    @cached_property
+    def _loads(self) -> list[tuple[StateFunction, np.ndarray]]:
+        return [(load, i) for e, i in self.forces if isinstance(e, Linkage) for _, load in e.assembly.state_loads]
+
     def forget_complaints(self) -> None:
         """Before a state is tried of which they shall speak."""
         for law in self._laws:
             law.complaint = ""
 
     def blame(self, t: float, q: Array, v: Array) -> None:
-        """Let loads that are not finite there, or have a pole, say so."""
-        for element, index in self.forces:
-            if isinstance(element, Linkage):
-                element.force(t, q[index], v[index])
-                element.blame(t, q[index], v[index])
+        """Let loads that are not finite there, and the largest if it has a pole, say so."""
+        self.force(t, q, v)
+        sizes = [abs(load.value(t, q[index], v[index])) for load, index in self._loads]
+        if max(sizes, default=0.0) > POLE:
+            largest = self._loads[int(np.argmax(sizes))][0]
+            largest.complaint = largest.complaint or largest.pole(t, max(sizes))
+
+    def blame_between(self, one: tuple[float, Array, Array], two: tuple[float, Array, Array]) -> None:
+        """Let the load that has a pole between two states (t, q, v) say so."""
+        for load, index in self._loads:
+            if load.pieces(one[0], *(x[index] for x in one[1:])) != load.pieces(two[0], *(x[index] for x in two[1:])):
+                load.complaint = load.pole(one[0], abs(load.value(one[0], *(x[index] for x in one[1:]))))
 
     @cached_property
     def pieced(self) -> bool:
@@ -160,8 +177,8 @@ class System:
         parts = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if getattr(e, "pieced", False)]
         return tuple(piece for e, i in parts for piece in e.pieces(t, q[i], v[i]))  # type: ignore[attr-defined]
 
-    def residual(self, t: float, q: Array) -> Array:
-        """g, shape (rows,)."""
+    def residual(self, t: float | Array, q: Array) -> Array:
+        """g, shape (..., rows)."""
         return self._stack("residual", t, q)
 
     def rate(self, t: float, q: Array) -> Array:
@@ -173,12 +190,13 @@ class System:
         parts = [e.velocity_terms(t, q[i], v[i]) for e, i in self.joints]
         return np.concatenate(parts) if parts else np.zeros(0)
 
-    def jacobian(self, t: float, q: Array) -> Array:
-        """G, shape (rows, size)."""
-        full = np.zeros((self.rows, self.size))
+    def jacobian(self, t: float | Array, q: Array) -> Array:
+        """G, shape (..., rows, size)."""
+        full = np.zeros((*q.shape[:-1], self.rows, self.size))
         at = 0
         for element, index in self.joints:
-            full[at : at + element.rows, index] += element.jacobian(t, q[index])  # type: ignore[attr-defined]
+            own: Any = element
+            full[..., at : at + element.rows, index] += in_states(element, own.jacobian, t, q[..., index])
             at += element.rows
         return full
 
@@ -238,9 +256,16 @@ class System:
                 potential = potential + own(q[..., index])
         return kinetic, potential
 
-    def _stack(self, name: str, t: float, q: Array) -> Array:
-        parts = [getattr(e, name)(t, q[i]) for e, i in self.joints]
-        return np.concatenate(parts) if parts else np.zeros(0)
+    def _stack(self, name: str, t: float | Array, q: Array) -> Array:
+        parts = [in_states(e, getattr(e, name), t, q[..., i]) for e, i in self.joints]
+        return np.concatenate(parts, axis=-1) if parts else np.zeros((*q.shape[:-1], 0))
+
+
+def in_states(element: Element, function: Any, t: float | Array, *states: Array) -> Array:
+    """A function of an element in one state, or in those at several times."""
+    if np.ndim(t) == 0 or isinstance(element, Linkage):
+        return np.asarray(function(t, *states), dtype=float)
+    return np.array([function(*one) for one in zip(np.asarray(t), *states, strict=True)])
 
 
 def own_motion(answers: Array, light: np.ndarray) -> tuple[Array, Array]:
@@ -259,14 +284,18 @@ def solve_semidefinite(S: Array, right: Array) -> Array:
     """Solution of S x = right; the one of least norm where S has lost rank."""
     if len(S) == 0:
         return np.zeros_like(right)
+    return (
+        np.asarray(np.linalg.solve(S, right), dtype=float) if regular(S, 1e-7) else least_norm_solution(S, right, 1e-12)
+    )
+
+
+def regular(S: Array, least: float) -> bool:
+    """Whether the pivots of all matrices S (..., m, m) are above the share `least` of their diagonals' roots."""
     try:
-        factor = np.linalg.cholesky(S)
-        scale = np.sqrt(np.abs(np.diagonal(S)))
-        if (np.diagonal(factor) > 1e-7 * scale).all():
-            return np.asarray(np.linalg.solve(S, right), dtype=float)
+        pivots = np.diagonal(np.linalg.cholesky(S), axis1=-2, axis2=-1)
     except np.linalg.LinAlgError:
-        pass
-    return least_norm_solution(S, right, 1e-12)
+        return False
+    return bool((pivots > least * np.sqrt(np.abs(np.diagonal(S, axis1=-2, axis2=-1)))).all())
 
 
 def least_norm_solution(S: Array, right: Array, least: float) -> Array:

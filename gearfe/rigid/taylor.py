@@ -50,6 +50,8 @@ KERNELS = compiled.Kernels(
 )
 #: Steps between two looks at the clock at first: plain ones, compiled ones; at most coefficients in a piece.
 FIRST_STEPS, FIRST_COMPILED, MOST_NUMBERS = 8, 64, 2_000_000
+#: Distance from a pole, as a share of the way to it, at which loads are asked for their side of it.
+NEAR_POLE = 1e-6
 
 
 class Border(NamedTuple):
@@ -245,11 +247,11 @@ def run_taylor(
 
     with np.errstate(all="ignore"):
         status, done = run_in_pieces(
-            fill, t0, lambda: (w.q, w.v), room=FIRST_COMPILED if jit else FIRST_STEPS,
+            fill, (t0, end), lambda: (w.q, w.v), room=FIRST_COMPILED if jit else FIRST_STEPS,
             largest=max(FIRST_COMPILED, MOST_NUMBERS // ((order + 1) * width)), most=most, watch=look,
         )  # fmt: skip
     if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE):
-        status = _because_of_loads(system, w, float(state[kernel_run.TIME]), sign * abs(end - t0), status)
+        status = _because_of_loads(shared, run, float(state[kernel_run.TIME]), status)
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
     series = np.concatenate([p[1] for p in parts]) if len(parts) > 1 else parts[0][1]
     dense = Polynomials(ends, series, sampler if jit else None, t0)
@@ -264,15 +266,26 @@ def run_taylor(
     return dense, status, statistics
 
 
-def _because_of_loads(system: System, w: Work, t: float, span: float, status: Status) -> Status:
-    """Why a run ended at the state in w: not finite where loads have no value there, or just beyond; they say so."""
+def _because_of_loads(shared: Prepared, run: kernel_steps.Run, t: float, status: Status) -> Status:
+    """Why a run ended at the state in the work space: not finite where loads have no value there, or just beyond, or a
+    pole within the step; they say so."""
+    system, tables, order, _, w, _ = shared
+    plain, span = KERNELS.plain, run.end - run.begin
     system.forget_complaints()
-    for ahead in (0.0, 1e-9, 1e-6):
-        d = ahead * span
-        with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):
+        for ahead in (0.0, 1e-9, 1e-6):
+            d = ahead * span
             system.blame(t + d, w.q + d * w.v, w.v + 2.0 * d * w.Z[: len(w.q), 2])
-        if system.complaint:
-            return Status.NOT_FINITE
+            if system.complaint:
+                return Status.NOT_FINITE
+        size = run.sign * plain.step_length(tables, w, run)
+        h, where = plain.leaves(tables.program, w.R, w.pieces, order - 1, size)
+        if status == Status.NOT_FINITE and where >= 0:
+            states = []
+            for place in (h * (1.0 - NEAR_POLE), h * (1.0 + NEAR_POLE)):
+                plain.evaluate(w.Z, order, place, w.qn, w.vn)
+                states.append((t + place, w.qn.copy(), w.vn.copy()))
+            system.blame_between(*states)
     return status
 
 

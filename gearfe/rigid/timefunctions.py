@@ -79,6 +79,11 @@ class TimeFunction:
         return self.starts[1:]
 
     @property
+    def steady(self) -> bool:
+        """Whether it is constant."""
+        return self.ends and not self.breaks
+
+    @property
     def ends(self) -> bool:
         """Whether it is constant in the end."""
         return not self.sines and not any(self.coefficients[-1][1:])

@@ -15,7 +15,10 @@ from .contract import Element
 from .dense import Dense
 from .start import Start
 from .steps import Status
-from .system import System, least_norm_solution
+from .system import System, least_norm_solution, regular
+
+#: Numbers of the gradients that are held at once; pivots of matrices that are solved as they are.
+MOST_NUMBERS, REGULAR = 1_000_000, 1e-4
 
 
 class IntegrationError(RuntimeError):
@@ -173,22 +176,25 @@ class Trajectory(Shown):
         stages = getattr(self.dense, "forces", None)
         if stages is not None:
             return np.asarray(stages(times)[:, : self.system.rows], dtype=float)
-        excess = self.start.excess
+        size = max(1, MOST_NUMBERS // max(1, self.system.rows * self.system.size))
+        parts = [self._multipliers(times[k : k + size]) for k in range(0, len(times), size)]
+        return np.concatenate([np.zeros((0, self.system.rows)), *parts])
+
+    def _multipliers(self, times: Array) -> Array:
+        """The same of so many times as matrices may be held of at once."""
+        excess, keep = self.start.excess, self.start.active
         inverse, light = self.system.inverse_of(excess), np.flatnonzero(excess)
-        states = [self.dense(times, k) for k in range(3)]
+        q, v, a = (self.dense(times, k) for k in range(3))
         out = np.zeros((len(times), self.system.rows))
-        keep = self.start.active
         if not keep.any():
             return out
-        for i, t in enumerate(times):
-            q, v, a = (s[i] for s in states)
-            G = self.system.jacobian(t, q)[keep]
-            force = self.system.force(t, q, v)
-            force[light] += excess[light] * a[light]
-            right = G @ (inverse @ force - a)
-            S = G @ inverse @ G.T
-            if not np.isfinite(right).all():  # forces so large that sums of them overflow
-                out[i] = np.nan
-                continue
-            out[i, keep] = least_norm_solution(S, right, 1e-14)
+        G = self.system.jacobian(times, q)[:, keep]
+        force = self.system.force(times, q, v)
+        force[:, light] += excess[light] * a[:, light]
+        right = G @ (force @ inverse.T - a)[..., None]
+        S = G @ inverse @ G.transpose(0, 2, 1)
+        if regular(S, REGULAR):
+            out[:, keep] = np.linalg.solve(S, right)[..., 0]
+        else:
+            out[:, keep] = [least_norm_solution(*one, 1e-14)[:, 0] for one in zip(S, right, strict=True)]
         return out

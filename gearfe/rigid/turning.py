@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -46,9 +46,11 @@ class Coriolis(StateFunction):
     def __init__(self, place: int, factor: float) -> None:
         self.place, self.factor = place, factor
 
-    def value(self, t: float, q: Array, v: Array) -> float:  # noqa: ARG002
-        """Factor times velocity."""
-        return self.factor * float(v[self.place])
+    def value(self, t: float | Array, q: Array, v: Array) -> Any:  # noqa: ARG002
+        """Factor times velocity, in one state or in many."""
+        return self.factor * v[..., self.place]
+
+    values = value
 
     def slopes(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:  # noqa: ARG002
         """The factor."""
