@@ -145,6 +145,8 @@ body = "motor"
 moment_N_m = 1.3
 """
 
+GEAR = '"gear"\nbody = "motor"\nto = "load"\nratio = -0.5'
+
 
 def write(folder: Path, text: str) -> Path:
     path = folder / "mechanism.toml"
@@ -165,9 +167,15 @@ def test_a_file_with_gears_and_its_reaction(tmp_path: Path) -> None:
     [
         ("ratio = -0.5\n", "", "ratio: is required"),
         ('to = "load"\n', "", "name the other body"),
-        ("ratio = -0.5", "ratio = 0.0", "must be finite and not 0"),
+        ("ratio = -0.5", "ratio = 0.0", r"joints\.pair\.ratio = 0.*must be finite and not 0"),
         ("ratio = -0.5", "ratio = -0.5\nradius_m = 1.0", "does not belong"),
         ('type = "gear"', 'type = "belt"', "does not belong|is required"),
+        (
+            GEAR,
+            '"belt"\nbody = "motor"\nto = "load"\nradius_m = -0.1\nto_radius_m = 0.2',
+            r"joints\.pair\.radius_m = -0\.1: must",
+        ),
+        (GEAR, '"rack"\nbody = "motor"\nto = "load"\nradius_m = 0.0', r"joints\.pair\.radius_m = 0"),
     ],
 )
 def test_wrong_couplings(tmp_path: Path, old: str, new: str, text: str) -> None:
@@ -178,7 +186,7 @@ def test_wrong_couplings(tmp_path: Path, old: str, new: str, text: str) -> None:
 def test_couplings_that_contradict_each_other_are_told(tmp_path: Path) -> None:
     """Two gear pairs of different ratios hold both shafts: nothing is free, and a speed contradicts them."""
     second = TRAIN + '[joints.other]\ntype = "gear"\nbody = "motor"\nto = "load"\nratio = -0.4\n'
-    with pytest.raises(InputError, match="nothing is free to move"):
+    with pytest.raises(InputError, match=r"nothing is free to move .*, without 'pair' or 'other' something would be"):
         load_mechanism(write(tmp_path, second)).start()
     driven = second + '[joints.speed]\ntype = "prescribed"\nbody = "motor"\ncoordinate = "rate"\nmotion = 3.0\n'
     with pytest.raises(InputError, match="velocities cannot meet it"):

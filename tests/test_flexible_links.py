@@ -173,6 +173,7 @@ moment_N_m = 0.0
         ),
         ("deflection(arm.tip)", "deflection(arm.top)", "top"),
         ("deflection(arm.tip)", "deflection(crank.tip)", "crank"),
+        ("[bodies.arm]", "[bodies.arm]\nflexible = false", r"deflection.*'arm' is taken as rigid \(flexible = false\)"),
         ("largest_edge_stress(arm)", "largest_von_mises(arm)", "is a beam"),
         ('body = "arm"\npoint = "tip"', 'body = "arm.tip"\npoint = "tip"', "has a point already"),
         ('body = "arm"\npoint = "tip"', 'body = "arm.end"', "arm.end"),

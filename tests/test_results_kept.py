@@ -116,6 +116,28 @@ def test_a_mechanism_without_a_folder_goes_to_out(tmp_path, monkeypatch, capsys)
     assert (tmp_path / "out/crank/mechanism/trajectory.csv").exists()
 
 
+def test_a_quiet_mechanism_says_that_its_run_stopped(tmp_path, capsys):
+    told(capsys, "new", "mechanism", str(tmp_path / "crank.toml"))
+    text = (tmp_path / "crank.toml").read_text(encoding="utf-8")
+    load = '\n[forces.pole]\ntype = "moment"\nbody = "crank"\nmoment_N_m = "1/(time - 0.01)"\n'
+    (tmp_path / "crank.toml").write_text(text + load, encoding="utf-8")
+    line = [
+        "mechanism",
+        str(tmp_path / "crank.toml"),
+        "--out",
+        str(tmp_path),
+        "--until",
+        "0.1",
+        "--no-pictures",
+        "--no-estimate",
+    ]
+    assert main([*line, "-q"]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "the run stopped at 0.0" in err
+    assert "division by zero" in err
+
+
 def test_quiet_and_verbose(tmp_path, capsys):
     line = ["gear", JOB, "--out", str(tmp_path)]
     assert told(capsys, *line, "-q") == ("", "")

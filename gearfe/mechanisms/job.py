@@ -39,6 +39,7 @@ class Outcome:
     text: str
     summary: dict[str, Any]
     warnings: tuple[str, ...] = ()
+    stopped: str = ""  # why, and when, a run ended before its end
 
 
 def run_mechanism(
@@ -114,7 +115,9 @@ def run_mechanism(
         summary = summarise(mechanism, start, results, tolerance, timings, error)
         summary["warnings"] = list(warnings)
         write_json(made / "summary.json", summary)
-    return Outcome(trajectory.status == 0 and not warnings, _text(summary), summary, warnings)
+    done = trajectory.status == 0
+    stopped = "" if done else f"the run stopped at {trajectory.reached:g} s of {end:g} s: {trajectory.message}"
+    return Outcome(done and not warnings, _text(summary), summary, warnings, stopped)
 
 
 def output_times(end: float, step: float) -> np.ndarray:

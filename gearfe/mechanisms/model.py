@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError, given, unknown_name
 from ..rigid import GROUND, Forced, Linkage, Start, System, consistent_start
+from ..rigid.carried import free_motions
 from ..tables.kinds import FORCES, JOINTS
 from ..tables.mechanism import FigureTable, MechanismFile, read_mechanism_file
 from ..typing import Array
@@ -152,6 +153,9 @@ class Mechanism:
 
     def _of_link(self, kind: str, what: str, q: Any, v: Any, sections: Any) -> Any:
         name, _, point = what.partition(".")
+        if name not in self.elastic and name in self.file.bodies and self.file.bodies[name].shape is not None:
+            problem = f"link {name!r} is taken as rigid (flexible = false)"
+            raise InputError(f"expression {kind}({what})", None, problem, "take it as flexible, or leave this out")
         if name not in self.elastic:
             raise unknown_name(f"expression {kind}({what}): flexible links", name, self.elastic)
         if kind == "elastic_energy":
@@ -221,9 +225,20 @@ class Mechanism:
         self._check_loads(made)
         if made.freedoms.net <= 0 and not self.linkage.driven:
             count = f"{made.freedoms.coordinates} coordinates, {made.freedoms.constraints} constraints"
-            cure = "remove a joint, or prescribe a motion"
-            raise InputError("joints", None, f"nothing is free to move ({count})", cure)
+            freeing = " or ".join(map(repr, self._freeing(made)))
+            without = f", without {freeing} something would be" if freeing else ""
+            problem = f"nothing is free to move ({count}){without}"
+            raise InputError("joints", None, problem, "remove a joint, or prescribe a motion")
         return made
+
+    def _freeing(self, start: Start) -> list[str]:
+        """Joints without which something could move: of those, the ones that hold least."""
+        owner = np.array(self.linkage.assembly.row_joint)
+        G = self.system.jacobian(start.time, start.q) * self.system.units / self.system.row_units[:, None]
+        names = list(self.file.joints)
+        found = [j for j in range(len(names)) if free_motions(G[owner != j]).shape[1]]
+        least = min(((owner == j).sum() for j in found), default=0)
+        return [names[j] for j in found if (owner == j).sum() == least]
 
     def _bent_start(self, time: float) -> Start:
         """Flexible links start straight, with the velocities of the same mechanism with rigid ones."""
