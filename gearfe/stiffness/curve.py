@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, fields
 from decimal import Context, Decimal
 from pathlib import Path
 from typing import Any
@@ -42,7 +43,7 @@ _FACTORS: dict[str, Decimal] = {
 }
 
 
-def factor_of(column: str) -> Decimal:
+def _factor(column: str) -> Decimal:
     """Factor from SI to the unit in a column's name."""
     return next((f for suffix, f in _FACTORS.items() if column.endswith(suffix)), Decimal(1))
 
@@ -51,89 +52,44 @@ def to_text(value: float, column: str) -> str:
     """Decimal text of an SI value in the column's unit: `from_text` gives the same double back."""
     if not np.isfinite(value):
         return "nan"
-    exact = _EXACT.multiply(Decimal(float(value)), factor_of(column))
-    short = _plain(Context(prec=15).plus(exact).normalize())  # where 15 digits are enough: 0.5 reads 0.5
-    return short if from_text(short, column) == value else _plain(Context(prec=17).plus(exact))
-
-
-def _plain(number: Decimal) -> str:
-    """Without an exponent for numbers of everyday size."""
-    return f"{number:f}" if -5 <= number.adjusted() < 17 else f"{number:e}"
+    exact = _EXACT.multiply(Decimal(float(value)), _factor(column))
+    short = f"{float(exact):.15g}"  # where 15 digits are enough: 0.5 reads 0.5
+    return short if from_text(short, column) == value else f"{exact:.17g}"
 
 
 def from_text(text: str, column: str) -> float:
-    """SI value of a cell; an empty cell is not a number.
-
-    Raises
-    ------
-    ValueError
-        When the cell holds no number.
-    """
-    text = text.strip()
-    if text.lower() in ("", "nan"):
-        return float("nan")
-    try:
-        value = float(_EXACT.divide(Decimal(text), factor_of(column)))
-    except (ArithmeticError, ValueError) as error:
-        raise ValueError(text) from error
-    if not math.isfinite(value):
-        raise ValueError(text)
-    return value
+    """SI value of a cell, an `ArithmeticError` where it holds no number; an empty cell is not a number."""
+    return float(_EXACT.divide(Decimal(text.strip() or "nan"), _factor(column)))
 
 
 def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -> Array:
     """Column `name` in SI; all not-a-number where the file has no such column."""
-    if name not in columns:
-        return np.full(len(next(iter(columns.values()))), np.nan)
-    try:
-        return np.array([from_text(cell, name) for cell in columns[name]])
-    except ValueError as error:
-        problem = f"column {name} holds {shown(str(error))}, which is no finite number"
-        raise InputError("stiffness curve", str(path), problem, "write a number, or leave the cell empty") from None
+    made = np.full(len(next(iter(columns.values()))), np.nan)
+    for row, cell in enumerate(columns.get(name, ())):
+        with suppress(ArithmeticError):
+            made[row] = from_text(cell, name)
+            if not math.isinf(made[row]):
+                continue
+        problem = f"column {name} holds {shown(cell.strip())}, which is no finite number"
+        raise InputError("stiffness curve", str(path), problem, "write a number, or leave the cell empty")
+    return made
 
 
 #: Statuses that stand for a result; every other one marks a failed position, whose numbers are not-a-number.
 SOLVED = ("converged", "no_contact")
 
-#: Column that a table has where there are estimates.
-ESTIMATE = "k_mesh_relative_error"
-#: Column of the CSV file -> field, in order; a field of whole numbers has -1 where the file has ``nan``.
-COLUMNS: dict[str, str] = {
-    "pinion_angle_deg": "pinion_angle",
-    "wheel_angle_deg": "wheel_angle",
-    "twist_deg": "twist",
-    "torque_wheel_Nm": "torque_wheel",
-    "torque_pinion_Nm": "torque_pinion",
-    "k_torsional_Nm_per_rad": "k_torsional",
-    "k_mesh_N_per_m": "k_mesh",
-    "transmission_error_um": "transmission_error",
-    "teeth_in_contact": "teeth_in_contact",
-    "peak_pressure_MPa": "peak_pressure",
-    "iterations": "iterations",
-    "status": "status",
-    "k_tangent_N_per_m": "k_tangent",
-    "transmission_error_unloaded_um": "transmission_error_unloaded",
-    "torque_wheel_reaction_Nm": "torque_wheel_reaction",
-    "leading_pair": "leading_pair",
-    "law": "law",
-    "peak_pressure_relative_error": "peak_pressure_error",
-    "edge_pressure_MPa": "edge_pressure",
-    "edge": "edge",
-    "beyond_validity": "beyond_validity",
-    ESTIMATE: "relative_error",
-}
-#: Constants of the curve, repeated on every row so that the file stands alone.
-CONSTANTS: dict[str, str] = {
-    "mesh_cycle_deg": "mesh_cycle",
-    "wheel_base_radius_mm": "base_radius",
-    "lost_motion_deg": "lost_motion",
-}
-#: Columns of words.
-WORDS = ("status", "law", "edge")
-#: Numbers that a curve need not have.
-UNKNOWN = ("peak_pressure_error", "edge_pressure", "relative_error")
-WHOLE = ("teeth_in_contact", "iterations", "beyond_validity")
-SHARE = "load_share_"
+#: Column that a table has where there are estimates, and those of the pairs' shares.
+ESTIMATE, SHARE = "k_mesh_relative_error", "load_share_"
+
+
+def _column(name: str, unknown: float | str = math.nan) -> Any:
+    """Field with an entry for each position, of numbers, whole numbers or words as `unknown` is, and its column."""
+    return field(default=(), metadata={"column": name, "unknown": unknown})
+
+
+def _constant(name: str, unknown: float | str = math.nan) -> Any:
+    """Field of the whole curve; its column repeats it on every row, so that the file stands alone."""
+    return field(default=unknown, metadata={"constant": name, "unknown": unknown})
 
 
 #: Largest estimate of a curve's positions -> its worst error: 97 % of 78 curves of random pairs were within it (94 %
@@ -141,9 +97,11 @@ SHARE = "load_share_"
 OUTLIER = 2.0
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, kw_only=True)
 class StiffnessCurve(ShownTable):
     """Mesh stiffness of a gear pair over the pinion's rotation; all arrays have one entry per position, shape (n,).
+
+    What is not given is unknown: not-a-number, -1 or an empty word.
 
     Attributes
     ----------
@@ -203,40 +161,39 @@ class StiffnessCurve(ShownTable):
         `gearfe.stiffness.curve_error`; not-a-number where there is none.
     """
 
-    pinion_angle: Array
-    wheel_angle: Array
-    twist: Array
-    torque_wheel: Array
-    torque_pinion: Array
-    torque_wheel_reaction: Array
-    k_torsional: Array
-    k_mesh: Array
-    k_tangent: Array
-    transmission_error: Array
-    transmission_error_unloaded: Array
-    leading_pair: Array
-    load_share: Array
-    teeth_in_contact: IntArray
-    peak_pressure: Array
-    iterations: IntArray
-    status: NDArray[np.str_]
-    mesh_cycle: float
-    base_radius: float
-    lost_motion: float = 0.0
-    contact_law: str = ""
+    pinion_angle: Array = _column("pinion_angle_deg")
+    wheel_angle: Array = _column("wheel_angle_deg")
+    twist: Array = _column("twist_deg")
+    torque_wheel: Array = _column("torque_wheel_Nm")
+    torque_pinion: Array = _column("torque_pinion_Nm")
+    k_torsional: Array = _column("k_torsional_Nm_per_rad")
+    k_mesh: Array = _column("k_mesh_N_per_m")
+    transmission_error: Array = _column("transmission_error_um")
+    teeth_in_contact: IntArray = _column("teeth_in_contact", -1)
+    peak_pressure: Array = _column("peak_pressure_MPa")
+    iterations: IntArray = _column("iterations", -1)
+    status: NDArray[np.str_] = _column("status", "")
+    k_tangent: Array = _column("k_tangent_N_per_m")
+    transmission_error_unloaded: Array = _column("transmission_error_unloaded_um")
+    torque_wheel_reaction: Array = _column("torque_wheel_reaction_Nm")
+    leading_pair: Array = _column("leading_pair")
+    law: NDArray[np.str_] = _column("law", "")
+    peak_pressure_error: Array = _column("peak_pressure_relative_error")
+    edge_pressure: Array = _column("edge_pressure_MPa")
+    edge: NDArray[np.str_] = _column("edge", "")
+    beyond_validity: IntArray = _column("beyond_validity", -1)
+    relative_error: Array = _column(ESTIMATE)
+    load_share: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    mesh_cycle: float = _constant("mesh_cycle_deg")
+    base_radius: float = _constant("wheel_base_radius_mm")
+    lost_motion: float = _constant("lost_motion_deg", 0.0)
+    contact_law: str = _constant("contact_law", "")
     timings: Mapping[str, float] = field(default_factory=dict)
-    law: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
-    peak_pressure_error: Array = field(default_factory=lambda: np.zeros(0))
-    edge_pressure: Array = field(default_factory=lambda: np.zeros(0))
-    edge: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=np.str_))
-    beyond_validity: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    relative_error: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        unknown = {"law": "", "edge": "", "beyond_validity": -1}
-        for name, value in {**unknown, **dict.fromkeys(UNKNOWN, np.nan)}.items():
-            if len(getattr(self, name)) != len(self.pinion_angle):
-                object.__setattr__(self, name, np.full(len(self.pinion_angle), value))
+        for own, (_, unknown) in COLUMNS.items():
+            if len(getattr(self, own)) != len(self):
+                object.__setattr__(self, own, np.full(len(self), unknown))
 
     def __len__(self) -> int:
         return len(self.pinion_angle)
@@ -273,7 +230,7 @@ class StiffnessCurve(ShownTable):
         InputError
             When the solved positions do not cover the mesh cycle.
         """
-        per_position = [c for c in COLUMNS.values() if c not in (*WORDS, *WHOLE)]
+        per_position = [own for own, (_, unknown) in COLUMNS.items() if isinstance(unknown, float)]
         if quantity not in per_position:
             raise unknown_name("quantity", quantity, per_position)
         return periodic_interpolant(self.pinion_angle, getattr(self, quantity), self.mesh_cycle, method=method)
@@ -303,23 +260,14 @@ class StiffnessCurve(ShownTable):
 
     def columns(self) -> dict[str, list[str]]:
         """Columns of the CSV file as text."""
-        columns = {name: self._cells(name, attribute) for name, attribute in COLUMNS.items()}
+        columns = {name: _cells(getattr(self, own), name) for own, (name, _) in COLUMNS.items()}
         if math.isnan(self.worst_error):
             del columns[ESTIMATE]
         for j in range(self.load_share.shape[1]):
-            columns[f"{SHARE}{j + 1}"] = [to_text(v, SHARE) for v in self.load_share[:, j]]
-        for name, attribute in CONSTANTS.items():
-            columns[name] = [to_text(getattr(self, attribute), name)] * len(self)
-        columns["contact_law"] = [self.contact_law] * len(self)
+            columns[f"{SHARE}{j + 1}"] = _cells(self.load_share[:, j], SHARE)
+        for own, (name, _) in CONSTANTS.items():
+            columns[name] = _cells([getattr(self, own)], name) * len(self)
         return columns
-
-    def _cells(self, name: str, attribute: str) -> list[str]:
-        values = getattr(self, attribute)
-        if attribute in WORDS:
-            return [str(v) for v in values]
-        if attribute in WHOLE:
-            return [str(int(v)) if v >= 0 else "nan" for v in values]
-        return [to_text(v, name) for v in values]
 
     def to_csv(self, path: str | Path) -> None:
         """Write the table; `from_csv` gives back every number exactly."""
@@ -356,25 +304,46 @@ class StiffnessCurve(ShownTable):
         for needed in ("pinion_angle_deg", "k_mesh_N_per_m"):
             if needed not in columns:
                 raise InputError("stiffness curve", str(path), f"has no column {needed}", "add it")
-        given: dict[str, Any] = {"mesh_cycle": mesh_cycle, "base_radius": base_radius, "lost_motion": None}
-        values: dict[str, Any] = {}
-        for name, attribute in CONSTANTS.items():
-            stored = float(numbers(columns, name, path)[0])
-            values[attribute] = stored if given[attribute] is None else float(given[attribute])
-        if not (np.isfinite(values["mesh_cycle"]) and values["mesh_cycle"] > 0):
+        given = {"mesh_cycle": mesh_cycle, "base_radius": base_radius}
+        values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        for own, (name, unknown) in CONSTANTS.items():
+            if name in columns:
+                values.setdefault(own, _values(columns, name, unknown, path)[0])
+        if not (math.isfinite(values.get("mesh_cycle", math.nan)) and values["mesh_cycle"] > 0):
             cure = "add a column mesh_cycle_deg (360 deg/pinion teeth), or give mesh_cycle"
             raise InputError("stiffness curve", str(path), "does not tell the mesh cycle", cure)
-        values["lost_motion"] = np.nan_to_num(values["lost_motion"])
-        rows = len(columns["k_mesh_N_per_m"])
-        for name, attribute in COLUMNS.items():
-            if attribute in WORDS:
-                values[attribute] = np.array([cell.strip() for cell in columns.get(name, [""] * rows)])
-                continue
-            found = numbers(columns, name, path)
-            values[attribute] = np.nan_to_num(found, nan=-1).astype(np.int64) if attribute in WHOLE else found
+        for own, (name, unknown) in COLUMNS.items():
+            if name in columns:
+                values[own] = _values(columns, name, unknown, path)
+        values.setdefault("status", np.where(np.isfinite(values["k_mesh"]), "converged", "missing"))
         shares = [numbers(columns, name, path) for name in columns if name.startswith(SHARE)]
-        values["load_share"] = np.stack(shares, axis=1) if shares else np.zeros((rows, 0))
-        values["contact_law"] = columns.get("contact_law", [""])[0].strip()
-        if "status" not in columns:
-            values["status"] = np.where(np.isfinite(values["k_mesh"]), "converged", "missing")
+        values["load_share"] = np.stack(shares, axis=1) if shares else np.zeros((len(values["k_mesh"]), 0))
         return cls(**values)
+
+
+def _marked(kind: str) -> dict[str, tuple[str, Any]]:
+    """Field -> its column and what stands for unknown, in the order of the table."""
+    found = {own.name: own.metadata for own in fields(StiffnessCurve)}
+    return {own: (data[kind], data["unknown"]) for own, data in found.items() if kind in data}
+
+
+COLUMNS, CONSTANTS = _marked("column"), _marked("constant")
+
+
+def _cells(values: Any, name: str) -> list[str]:
+    """Text of the values of a column; whole numbers below 0 are unknown."""
+    values = np.asarray(values)
+    if values.dtype.kind == "U":
+        return [str(v) for v in values]
+    if values.dtype.kind == "i":
+        return [str(v) if v >= 0 else "nan" for v in values]
+    return [to_text(v, name) for v in values]
+
+
+def _values(columns: Mapping[str, Sequence[str]], name: str, unknown: Any, path: str | Path) -> Any:
+    """Values of a column in SI, of the type of `unknown`."""
+    if isinstance(unknown, str):
+        return np.array([cell.strip() for cell in columns[name]])
+    found = numbers(columns, name, path)
+    made = np.where(np.isnan(found), unknown, found)
+    return made.astype(np.int64) if isinstance(unknown, int) else made
