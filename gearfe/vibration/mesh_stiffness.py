@@ -107,19 +107,19 @@ def _computed_curve(job: TrainJob, train: GearTrain, number: int, progress: Any,
     model = replace(tables.model, materials=_materials(job, mesh), deviations=deviations)
     if job.table.curves.load in (None, "stiffness"):
         with stage(mesh.name):
-            return cached_curve(pair, model, tables.sweep, progress=progress, estimate_error=estimate)
+            return cached_curve(pair, model, progress=progress, estimate_error=estimate, **tables.sweep)
     torque = _carried_torque(train, number)
     if not torque > 0.0:
         problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
         raise InputError(f"mesh {mesh.name!r}", None, problem, 'add a load, or write load = "stiffness"')
     count = job.table.curves.positions or POSITIONS
-    sweep = {
+    sweep: dict[str, Any] = {
         "torque": torque,
         "angles": pair.mesh_cycle * np.arange(count) / count,
         "kinematics": job.stiffness.kinematics,
     }
     with stage(mesh.name):
-        return cached_curve(pair, model, sweep, progress=progress, estimate_error=estimate)
+        return cached_curve(pair, model, progress=progress, estimate_error=estimate, **sweep)
 
 
 def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> MeshLaw:
@@ -155,8 +155,8 @@ def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) 
         if not estimate:
             return law
         angles = pair.mesh_cycle * np.arange(ESTIMATED) / ESTIMATED
-        sweep = {"torque": most / ROOM, "angles": angles, "kinematics": "small"}
-        curve = cached_curve(pair, model, sweep, estimate_error=True)
+        sweep: dict[str, Any] = {"torque": most / ROOM, "angles": angles, "kinematics": "small"}
+        curve = cached_curve(pair, model, estimate_error=True, **sweep)
     fit = max(side.error for side in law.sides)
     return replace(law, error=fit + curve.worst_error)
 
