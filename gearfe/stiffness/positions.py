@@ -32,11 +32,10 @@ from ..gear.touching import Touching
 from ..gear.validity import MOST_YIELD
 from ..typing import Array, IntArray
 
-#: Solutions of a position, and failed ones among them, after which it is given up.
-MAX_SOLUTIONS, MAX_FAILURES = 40, 3
-#: Between a twist that is too little and one that is too much, the torque jumps past its goal where it differs by so
-#: many times what the tangent has for that interval, and the interval is relatively no wider than the other number.
-STEEP, JUMP = 10.0, 1e-3
+#: Solutions of a position in search of its torque; random pairs, laws and torques took three at most.
+MAX_SOLUTIONS = 12
+#: Relative miss of a torque from which one step leads to it.
+NEARLY = 1e-4
 #: Status of a position whose torque was not found although single solutions converged.
 NOT_REACHED = "torque_not_reached"
 
@@ -49,68 +48,36 @@ def newton_twist(twist: Array, touching: Array, torque: Array, tangent: Array, g
 
 
 def twists_for_torque(
-    solve: Callable[[IntArray, Array], Positions],
-    goal: Array,
-    *,
-    touching: Array,
-    first: Array,
-    most: float,
-    tolerance: float = 1e-10,
+    solve: Callable[[IntArray, Array], Positions], found: Positions, goal: Array, *, touching: Array, most: float
 ) -> Positions:
-    """Find the twist of each position.
+    """Bring positions nearly (`NEARLY`) to the torques `goal`, shape (n,), > 0 (N m); iterations are those of all.
 
     Parameters
     ----------
     solve
         ``solve(numbers, twists)`` gives the positions of these numbers.
-    goal : ndarray, shape (n,)
-        Torques at the wheel's hub, > 0 (N m).
-    touching, first : ndarray, shape (n,)
-        Twists (rad) at which the rigid flanks touch, and first guesses above them.
+    found
+        Solutions at first guesses of the twist.
+    touching : ndarray, shape (n,)
+        Twists (rad) at which the rigid flanks touch.
     most
         Largest twist tried (rad).
-    tolerance
-        Relative accuracy of the torque.
-
-    Returns
-    -------
-    Positions
-        The last solutions, with the iterations of all.
     """
-    low, high, twist = touching.copy(), np.full(len(goal), np.inf), np.minimum(first, most)
-    little, much = np.zeros(len(goal)), np.full(len(goal), np.nan)  # torques there
-    iterations, failures = np.zeros((2, len(goal)), dtype=np.int64)
-    reached = np.zeros(len(goal), dtype=bool)
-    open_ = np.arange(len(goal))
-    found = made = solve(open_, twist)
-    for count in range(1, MAX_SOLUTIONS + 1):
-        at, touch, target = twist[open_], touching[open_], goal[open_]
-        torque, tangent = made.torque_wheel, np.nan_to_num(made.tangent)
-        solved, failed, clear = (made.status == s for s in ("converged", "not_converged", "no_contact"))
-        iterations[open_] += made.iterations
-        failures[open_] += failed
-        reached[open_] = solved & (np.abs(torque - target) <= np.maximum(tolerance * target, ANGLE_ROUNDING * tangent))
-        less = (solved | clear) & (torque < target)
-        more = np.where(failed, little[open_] > 0, solved & ~less)  # before, first guesses are low rather than high
-        low[open_[less]], little[open_[less]] = at[less], torque[less]
-        high[open_[more]], much[open_[more]] = at[more], torque[more]
-        below, above = low[open_], high[open_]
-        tried = newton_twist(at, touch, torque, tangent, target)
-        halved = np.where(np.isfinite(above), 0.5 * (below + above), 2 * at - touch)
-        tried = np.where(solved & (below < tried) & (tried < above), tried, halved)
-        twist[open_] = np.minimum(tried, most)
-        width = np.where(np.isfinite(above), above - below, 1.0)
-        jumps = (width <= JUMP * at) & ((much - little)[open_] > STEEP * tangent * width)
-        narrow = width <= 1e-14 * at
-        goes_on = ~reached[open_] & (solved | failed | clear) & (failures[open_] < MAX_FAILURES) & ~jumps & ~narrow
-        open_ = open_[goes_on & (tried != at) & (at < most)]
-        if len(open_) == 0 or count == MAX_SOLUTIONS:
+    low, high = touching.copy(), np.full(len(goal), np.inf)
+    for solutions in range(MAX_SOLUTIONS + 1):
+        twist, torque = found.twist, found.torque_wheel
+        miss, seen = torque - goal, np.nan_to_num(ANGLE_ROUNDING * found.tangent)
+        open_ = np.flatnonzero(np.abs(miss) > np.maximum(NEARLY * goal, seen))  # none that failed
+        if len(open_) == 0 or solutions == MAX_SOLUTIONS:
             break
-        made = solve(open_, twist[open_])
-        found = found.replaced(open_, made)
-    given_up = ~reached & np.isin(found.status, ("converged", "no_contact"))
-    status = np.where(given_up, NOT_REACHED, found.status)
-    return replace(found.with_status(status), iterations=iterations)
+        low, high = np.where(miss < 0, twist, low), np.where(miss > 0, twist, high)
+        step = newton_twist(twist, touching, torque, found.tangent, goal)
+        between = np.where(np.isfinite(high), 0.5 * (low + high), np.clip(2 * twist - touching, twist, most))
+        step = np.where((low < step) & (step < high), np.minimum(step, most), between)
+        made = solve(open_, step[open_])
+        found = found.replaced(open_, replace(made, iterations=made.iterations + found.iterations[open_]))
+    status = np.where(np.isin(np.arange(len(goal)), open_), NOT_REACHED, found.status)
+    return found.with_status(status) if len(open_) else found
 
 
 NONE: IntArray = np.zeros(0, dtype=np.int64)
@@ -233,8 +200,6 @@ Progress = Callable[[int, int, str], None]
 
 #: Positions handed to the solver at once: enough to work side by side, few enough to stay small in memory.
 BATCH = 128
-#: Relative miss of a torque from which one step leads to it.
-NEARLY = 1e-4
 
 
 def in_batches(
@@ -291,35 +256,23 @@ def at_torques(
         Numbers of the positions with loads; all have them where finite strain counts.
     """
     kept = np.arange(len(angles)) if finite else kept
-    touching = solver.touching_twists(angles)
+    touching, most = solver.touching_twists(angles), math.pi / solver.pair.wheel.teeth
 
-    def search(goal: Array, first: Array, among: IntArray) -> Positions:
-        def solve(numbers: IntArray, twists: Array) -> Positions:
-            if progress is not None:
-                progress(len(angles) - len(numbers), len(angles), "positions")
-            of = among[numbers]
-            return in_batches(solver, angles[of], twists, np.flatnonzero(np.isin(of, kept)))
-
-        most = math.pi / solver.pair.wheel.teeth
-        own = touching[among]
-        return twists_for_torque(solve, goal, touching=own, first=first, most=most, tolerance=NEARLY)
+    def solve(numbers: IntArray, twists: Array) -> Positions:
+        if progress is not None:
+            progress(len(angles) - len(numbers), len(angles), "positions")
+        return in_batches(solver, angles[numbers], twists, np.flatnonzero(np.isin(numbers, kept)))
 
     if isinstance(solver, ElementSolver):
         first = at_torques(solver.half_plane, angles, torques).twist
     else:
         first = expected_twists(solver.law, torques, solver.touching(angles))
-    found = search(torques, first, np.arange(len(angles)))
+    found = solve(np.arange(len(angles)), np.minimum(first, most))
+    found = twists_for_torque(solve, found, torques, touching=touching, most=most)
     if finite:
         share = finite_strain_shares(solver.elastic, found)
         share = share / (1 + share)
-        small = torques / (1 + share)
-        start = newton_twist(found.twist, touching, found.torque_wheel, found.tangent, small)
-        with np.errstate(invalid="ignore"):
-            off = np.abs(found.torque_wheel - small) > NEARLY * small
-        again = np.flatnonzero((found.status == "converged") & off)  # what was not reached is not asked for once more
-        if len(again):
-            more = search(small[again], start[again], again)
-            found = found.replaced(again, replace(more, iterations=more.iterations + found.iterations[again]))
+        found = twists_for_torque(solve, found, torques / (1 + share), touching=touching, most=most)
         found = with_shares(found, share)
     if progress is not None:
         progress(len(angles), len(angles), "positions")
