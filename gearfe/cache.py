@@ -18,9 +18,10 @@ import sys
 import zipfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar
+
+from .versions import versions
 
 T = TypeVar("T")
 
@@ -61,7 +62,6 @@ def kept(
     read: Callable[[Path], T | None],
     make: Callable[[], T],
     write: Callable[[T, Path], None],
-    suffix: str = ".npz",
     folder: Path | None = None,
 ) -> T:
     """What is kept under a key, else what `make` makes, which is kept from then on.
@@ -74,15 +74,13 @@ def kept(
         Reads a file; None for one that is not to be trusted.
     write
         Writes one; a thing that is not to be kept is not written.
-    suffix
-        Of the file.
     folder
         Folder to use instead of `cache_folder()`.
     """
     folder = cache_folder() if folder is None else folder
     if folder is None:
         return make()
-    path = folder / f"{kind}-{key[:32]}{suffix}"
+    path = folder / f"{kind}-{key[:32]}.npz"
     found = read(path) if path.exists() else None
     if found is not None:
         with suppress(OSError):
@@ -137,7 +135,7 @@ def cache_key(kind: str, recipe: object) -> str:
         All that decides it, as plain data: frozen dataclasses, mappings, sequences, arrays, numbers, texts. Put a
         recipe number in it and raise that number whenever the code changes. Floats enter with all their digits.
     """
-    content = {"kind": kind, "recipe": _plain(recipe), "gmsh": _gmsh()}
+    content = {"kind": kind, "recipe": _plain(recipe), "gmsh": versions(("gmsh",))["gmsh"]}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
@@ -149,14 +147,6 @@ def source_hash(*names: str) -> str:
         for file in sorted((package / name).glob("*.py")) or [package / f"{name}.py"]:
             text.update(file.name.encode() + file.read_bytes())
     return text.hexdigest()
-
-
-@functools.cache
-def _gmsh() -> str:
-    try:
-        return metadata.version("gmsh")
-    except metadata.PackageNotFoundError:
-        return ""
 
 
 def _plain(value: Any) -> Any:

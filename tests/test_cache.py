@@ -113,7 +113,7 @@ def test_a_new_entry_keeps_the_size_below_the_limit(tmp_path: Path, monkeypatch:
     keys = [f"{number * LOOK:08x}" + "0" * 24 for number in range(1, 20)]  # each looks at the size
     for key in keys:
         kept(
-            "text", key, read=Path.read_text, make=lambda: "x" * 5000, suffix=".txt", folder=tmp_path,
+            "text", key, read=Path.read_text, make=lambda: "x" * 5000, folder=tmp_path,
             write=lambda text, path: path.write_text(text),
         )  # fmt: skip
     assert sum(entry.size for entry in entries(tmp_path)) <= 50_000

@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
     # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness", "microgeometry"))
     tables["stiffness"] = overridden(tables.get("stiffness", StiffnessTable()), args)
-    chosen = None if args.fields is None else _field_angles(args.fields)
+    chosen = _field_angles(args.fields or [])
     if args.animation is not None and not 2 <= args.animation <= 1000:
         raise InputError("--animation", args.animation, "must be >= 2 and <= 1000 frames", "40 are usual")
 
@@ -93,25 +93,25 @@ def run(args: argparse.Namespace) -> int:
     with watch.stage("geometry"):
         job = stiffness_job(tables, Path(args.job).parent, pair)
         sweep, model = job.sweep, job.model
-        if isinstance(chosen, list):
+        if chosen is not None:
             from ..stiffness.fields_output import angle_numbers
 
             angle_numbers(np.degrees(sweep["angles"]), chosen)
     folder = output_folder(args.out)
     elastic = elastic_pair(job.pair, model, watch=watch)
-    if chosen is not None:
+    if args.fields is not None:
         from ..stiffness.fields_output import size_note
 
-        announce(size_note(elastic, np.degrees(sweep["angles"]), None if isinstance(chosen, str) else chosen))
+        announce(size_note(elastic, np.degrees(sweep["angles"]), chosen))
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, progress=count, **sweep)
     for stage, seconds in curve.timings.items():
         watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
     with whole_set(folder, ("stiffness.png", "fields.vtkhdf", "stress_*deg.png")) as made:
         with watch.stage("table"):
             curve.to_csv(made / "stiffness.csv")
-        if chosen is not None:
+        if args.fields is not None:
             with watch.stage("fields"):
-                _fields(made, job, elastic, curve, None if isinstance(chosen, str) else chosen, args.range)
+                _fields(made, job, elastic, curve, chosen, args.range)
         if args.animation is not None:
             with watch.stage("animation"):
                 from ..figures.stress import stress_animation
@@ -150,13 +150,14 @@ def field_angle(text: str) -> str | float:
     return text if text == "all" else float(text)
 
 
-def _field_angles(given: list[str | float]) -> str | list[float]:
+def _field_angles(given: list[str | float]) -> list[float] | None:
+    """Angles of the fields (deg); None: all."""
     from ..errors import InputError
 
     angles = [value for value in given if not isinstance(value, str)]
     if angles and len(angles) < len(given):
         raise InputError("--fields", given, "must be 'all' or pinion angles (deg), not both")
-    return angles or "all"
+    return angles or None
 
 
 def overridden(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:

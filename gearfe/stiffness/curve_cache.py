@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..cache import cache_key, cached_arrays, source_hash
 from ..contact.laws import PairModel
 from ..gear.pair import GearPair
+from ..versions import versions
 from .curve import StiffnessCurve
 
 #: Rooms and modules whose text decides a curve.
@@ -39,16 +39,8 @@ def cached_curve(pair: GearPair, model: PairModel, *, progress: Any = None, **sw
 
 def curve_key(pair: GearPair, model: PairModel, sweep: dict[str, Any]) -> str:
     """Hash (hex) of all that decides a curve."""
-    import scipy
-
     law, text = type(model.law), ""
     with suppress(OSError, TypeError):  # laws of other packages have no version here, those without a file no text
         text = inspect.getsource(sys.modules[law.__module__])
-    versions = {
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "gearfe": __version__,
-        "source": source_hash(*ROOMS),
-        "law": [law.__module__, law.__qualname__, text],
-    }
-    return cache_key("curve", {"pair": pair, "model": model, "sweep": sweep, "versions": versions})
+    code = [law.__module__, law.__qualname__, text, source_hash(*ROOMS), versions()]
+    return cache_key("curve", {"pair": pair, "model": model, "sweep": sweep, "code": code})

@@ -220,42 +220,39 @@ def assembled_curve(
     """
     pair, law = solver.pair, solver.elastic.law
     radius, lost = pair.wheel.base_radius, pair.contact_twist
-    solved = checked_contact(solver, solved)
+    solved = checked_contact(solver, solved).take(source)
     failed = ~np.isin(solved.status, SOLVED)
     total = np.where(failed & searched, np.nan, solved.twist)
     twist, torque = total - lost, solved.torque_wheel
     deflection = total - solver.first_touch(solved.pinion_angle)
     stiffness = np.divide(torque, deflection, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
-    cycles = np.round((requested - solved.pinion_angle[source]) / pair.mesh_cycle).astype(np.int64)
+    cycles = np.round((requested - solved.pinion_angle) / pair.mesh_cycle)
     leading, shares = load_shares(solved)
     pressures = contact_pressures(solver, solved)
     edge = np.where(failed, 0, pressures.pop("edge"))
-    of_solved: dict[str, Any] = {
-        "twist": twist,
-        "torque_wheel": torque,
-        "torque_pinion": solved.torque_pinion,
-        "torque_wheel_reaction": solved.torque_wheel_reaction,
-        "k_torsional": stiffness,
-        "k_mesh": stiffness / radius**2,
-        "k_tangent": solved.tangent / radius**2,
-        "transmission_error": twist * radius,
-        "transmission_error_unloaded": (solver.touching_twists(solved.pinion_angle) - lost) * radius,
-        "load_share": shares,
-        "teeth_in_contact": np.where(failed, -1, (shares > 0).sum(axis=1)),
-        "edge": np.array(EDGES)[edge],
-        "iterations": solved.iterations,
-        "status": solved.status,
-        "beyond_validity": np.where(np.isnan(twist), -1, overlaps(pair, twist) > MOST_OVERLAP),
-        **pressures,
-    }
     return StiffnessCurve(
         pinion_angle=requested,
-        wheel_angle=pair.wheel_angle_at(requested, total[source]),
-        leading_pair=leading[source] - cycles,
+        wheel_angle=pair.wheel_angle_at(requested, total),
+        twist=twist,
+        torque_wheel=torque,
+        torque_pinion=solved.torque_pinion,
+        torque_wheel_reaction=solved.torque_wheel_reaction,
+        k_torsional=stiffness,
+        k_mesh=stiffness / radius**2,
+        k_tangent=solved.tangent / radius**2,
+        transmission_error=twist * radius,
+        transmission_error_unloaded=(solver.touching_twists(solved.pinion_angle) - lost) * radius,
+        leading_pair=leading - cycles,
+        load_share=shares,
+        teeth_in_contact=np.where(failed, -1, (shares > 0).sum(axis=1)),
+        edge=np.array(EDGES)[edge],
+        iterations=solved.iterations,
+        status=solved.status,
         law=np.full(len(source), law.name),
         contact_law=law_text(law),
+        beyond_validity=np.where(np.isnan(twist), -1, overlaps(pair, twist) > MOST_OVERLAP),
         mesh_cycle=pair.mesh_cycle,
         base_radius=radius,
         lost_motion=lost,
-        **{name: values[source] for name, values in of_solved.items()},
+        **pressures,
     )
