@@ -41,7 +41,7 @@ CAPABILITIES = {
     """,
     "own housings, exchange, reports, analyses of records": """
         housing/own_mesh.py housing/nastran_files.py housing/superelement.py housing/dmig.py housing/modal_*.py
-        housing/bisection.py housing/refinement.py meshing/nastran.py gear/drawing_values.py meshing/mesh_file.py
+        housing/bisection.py housing/refinement.py meshing/nastran.py meshing/mesh_file.py
         meshing/deck.py meshing/gear_solid.py gear/outline.py output/formats.py
         output/report_page.py output/dxf.py shown.py figures/results.py
         */short_time.py commands/completion.py vibration/analysis.py

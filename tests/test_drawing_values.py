@@ -9,7 +9,6 @@ import pytest
 from gearfe.config import build
 from gearfe.errors import InputError
 from gearfe.gear.derived import derived_geometry
-from gearfe.gear.drawing_values import span_size, span_teeth
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.tables.pair import PairTable
 
@@ -34,13 +33,13 @@ def made(**pinion: float) -> GearPair:
 def test_span_sizes_of_handbooks(teeth, spanned, size) -> None:
     """Module 1, 20 deg, no profile shift: the tables of W_k in handbooks, four decimals."""
     gear = Gear(teeth, 1e-3, math.radians(20.0), 10e-3, 4e-3)
-    assert 1e3 * span_size(gear, spanned) == pytest.approx(size, abs=6e-5)
+    assert 1e3 * gear.span_size(spanned) == pytest.approx(size, abs=6e-5)
 
 
 def test_the_span_touches_the_flanks_near_the_middle() -> None:
     for teeth, x in ((17, 0.0), (24, 0.35), (61, -0.18), (120, 0.5)):
         gear = Gear(teeth, 3e-3, math.radians(20.0), 10e-3, 10e-3, profile_shift=x)
-        size = span_size(gear, span_teeth(gear))
+        size = gear.span_size(gear.span_teeth)
         touched = math.hypot(gear.base_radius, 0.5 * size)  # plates are tangents of the base circle
         assert gear.form_radius < touched < gear.tip_radius
 
@@ -49,12 +48,12 @@ def test_drawing_values_are_the_gears() -> None:
     pair = made(tip_diameter_mm=79.9, root_diameter_mm=66.5, span_mm=23.6, span_teeth=3)
     assert 2e3 * pair.pinion.tip_radius == pytest.approx(79.9, abs=1e-12)
     assert 2e3 * pair.pinion.root_radius == pytest.approx(66.5, abs=1e-12)
-    assert 1e3 * span_size(pair.pinion, 3) == pytest.approx(23.6, abs=1e-12)
+    assert 1e3 * pair.pinion.span_size(3) == pytest.approx(23.6, abs=1e-12)
     assert derived_geometry(pair, (3, None))["pinion"]["span_mm"] == pytest.approx(23.6, abs=1e-12)
     assert pair.wheel.addendum == 1.1
     # thinner teeth by what the span lacks, seen along the base tangent
     whole = made()
-    lacking = span_size(whole.pinion, 3) - 23.6e-3
+    lacking = whole.pinion.span_size(3) - 23.6e-3
     assert pair.normal_backlash - whole.normal_backlash == pytest.approx(lacking, rel=1e-9)
 
 

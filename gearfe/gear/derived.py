@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..typing import Array
-from .drawing_values import span_size, span_teeth
 from .iso6336 import mesh_stiffness, single_stiffness
 from .pair import GearPair
 from .spur_gear import Gear
@@ -51,7 +50,7 @@ def derived_geometry(pair: GearPair, spans: tuple[int | None, int | None] = (Non
 
 
 def _of_gear(gear: Gear, working_radius: float, span: int | None) -> dict[str, Any]:
-    spanned = span_teeth(gear) if span is None else span
+    spanned = gear.span_teeth if span is None else span
     return {
         "teeth": gear.teeth,
         "module_mm": 1e3 * gear.module,
@@ -65,7 +64,7 @@ def _of_gear(gear: Gear, working_radius: float, span: int | None) -> dict[str, A
         "tip_thickness_mm": 1e3 * gear.tip_thickness,
         "profile_shift": gear.profile_shift,
         "span_teeth": spanned,
-        "span_mm": 1e3 * span_size(gear, spanned),
+        "span_mm": 1e3 * gear.span_size(spanned),
         "undercut": gear.undercut,
     }
 

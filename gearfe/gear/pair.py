@@ -21,10 +21,9 @@ from ..errors import InputError, given
 from ..shown import Shown
 from ..tables.pair import INSTEAD, GearTable, PairTable
 from ..typing import Array
-from .drawing_values import coefficients
 from .involute import inv, inverse_inv, least_shift
 from .mesh_geometry import MeshGeometry, PathPoint
-from .spur_gear import Gear, TipRelief
+from .spur_gear import Gear, TipRelief, nominal_span
 
 __all__ = ["Gear", "GearPair", "PathPoint", "TipRelief"]
 
@@ -137,28 +136,6 @@ def _check_interference(pair: MeshGeometry, name: str, gear: Gear, mate: Gear, m
         raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure)
 
 
-def pair_warnings(pair: MeshGeometry) -> tuple[str, ...]:
-    """What is legal but deserves a look, one sentence each."""
-    said = []
-    for name, lost in _lost_to_form_points(pair).items():
-        gear: Gear = getattr(pair, name)
-        if not gear.undercut:
-            continue
-        if lost > 0.0:
-            said.append(
-                f"the {name} is undercut and loses {1e3 * lost:.4g} mm of the path of contact: contact ratio "
-                f"{pair.contact_ratio_active:.4g} instead of {_tips_ratio(pair, rounded=True):.4g}"
-            )
-        else:
-            said.append(f"the {name} is undercut below its active flank; the path of contact is whole")
-    if pair.contact_ratio_effective < 1.0:
-        said.append(
-            f"tip relief leaves a contact ratio of {pair.contact_ratio_effective:.4g} on the unrelieved flanks: "
-            "unloaded, the teeth hand over on the relieved part"
-        )
-    return tuple(said)
-
-
 #: Penetrations below this many modules are taken for the discretisation of the outlines.
 TOLERANCE = 1e-4
 #: Rotations through the engagement of one tooth at which tips are looked at.
@@ -233,18 +210,18 @@ def _tip_outline(gear: Gear) -> Array:
     return np.concatenate([made, np.conj(made)])
 
 
-#: Argument of `Gear` or `GearPair` -> its key in a job file and the factor from SI to the key's unit.
+#: Argument of `Gear` or `GearPair` -> its key in a job file and the key's unit in SI.
 KEYS: dict[str, tuple[str, float]] = {
-    "module": ("module_mm", 1e3),
-    "pressure_angle": ("pressure_angle_deg", 180.0 / math.pi),
-    "face_width": ("face_width_mm", 1e3),
-    "bore_diameter": ("bore_diameter_mm", 1e3),
-    "tip_round": ("tip_round_mm", 1e3),
-    "tip_relief.amount": ("tip_relief_amount_um", 1e6),
-    "tip_relief.length": ("tip_relief_length_mm", 1e3),
+    "module": ("module_mm", 1e-3),
+    "pressure_angle": ("pressure_angle_deg", math.pi / 180.0),
+    "face_width": ("face_width_mm", 1e-3),
+    "bore_diameter": ("bore_diameter_mm", 1e-3),
+    "tip_round": ("tip_round_mm", 1e-3),
+    "tip_relief.amount": ("tip_relief_amount_um", 1e-6),
+    "tip_relief.length": ("tip_relief_length_mm", 1e-3),
     "tip_relief.exponent": ("tip_relief_exponent", 1.0),
-    "tooth_thinning": ("tooth_thinning_um", 1e6),
-    "centre_distance": ("centre_distance_mm", 1e3),
+    "tooth_thinning": ("tooth_thinning_um", 1e-6),
+    "centre_distance": ("centre_distance_mm", 1e-3),
 }
 
 
@@ -282,7 +259,24 @@ class GearPair(MeshGeometry, Shown):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What is legal but deserves a look, one sentence each."""
-        return pair_warnings(self)
+        said = []
+        for name, lost in _lost_to_form_points(self).items():
+            gear: Gear = getattr(self, name)
+            if not gear.undercut:
+                continue
+            if lost > 0.0:
+                said.append(
+                    f"the {name} is undercut and loses {1e3 * lost:.4g} mm of the path of contact: contact ratio "
+                    f"{self.contact_ratio_active:.4g} instead of {_tips_ratio(self, rounded=True):.4g}"
+                )
+            else:
+                said.append(f"the {name} is undercut below its active flank; the path of contact is whole")
+        if self.contact_ratio_effective < 1.0:
+            said.append(
+                f"tip relief leaves a contact ratio of {self.contact_ratio_effective:.4g} on the unrelieved flanks: "
+                "unloaded, the teeth hand over on the relieved part"
+            )
+        return tuple(said)
 
     @classmethod
     def from_table(cls, table: PairTable) -> GearPair:
@@ -298,58 +292,64 @@ class GearPair(MeshGeometry, Shown):
 
 def _gear_from_table(table: PairTable, side: str) -> Gear:
     own: GearTable = getattr(table, side)
-    form, module_mm = table.tooth_form(side), table.module_mm_of(side)
-    form |= coefficients(own, module_mm, form, f"pair.{side}")
+    form = {**table.tooth_form(side), "module_mm": table.module_mm_of(side), "bore_diameter_mm": own.bore_diameter_mm}
+    form |= _of_drawing(own, form, f"pair.{side}")
     try:
-        return gear_of_form(own.teeth, module_mm, own.bore_diameter_mm, form)
+        return gear_of_form(own.teeth, form)
     except InputError as error:
         raise _renamed(error, table, side, error.field) from None
 
 
-def gear_of_form(teeth: int, module_mm: float, bore_mm: float, form: Mapping[str, Any]) -> Gear:
-    """Gear with a tooth form in everyday units, as `gearfe.tables.pair.tooth_form` gives it."""
-    relief = None
-    if form["tip_relief_amount_um"]:
-        length = 1e-3 * given(form["tip_relief_length_mm"], "tip_relief_length_mm")
-        relief = TipRelief(form["tip_relief_amount_um"] * 1e-6, length, form["tip_relief_exponent"])
-    return Gear(
-        teeth,
-        module_mm * 1e-3,
-        math.radians(form["pressure_angle_deg"]),
-        form["face_width_mm"] * 1e-3,
-        bore_mm * 1e-3,
-        profile_shift=form["profile_shift"],
-        addendum=form["addendum"],
-        dedendum=form["dedendum"],
-        rack_tip_radius=form["rack_tip_radius"],
-        tip_round=form["tip_round_mm"] * 1e-3,
-        tip_shortening=form["tip_shortening"],
-        tip_relief=relief,
-        tooth_thinning=form["tooth_thinning_um"] * 1e-6,
-    )
+def _of_drawing(own: GearTable, form: Mapping[str, Any], where: str) -> dict[str, float]:
+    """Keys of the tooth form that the drawing values of a gear stand for: tip and root diameters, the span size."""
+    module_mm, half, x = form["module_mm"], 0.5 * own.teeth, float(form["profile_shift"])
+    made: dict[str, float] = {}
+    if own.tip_diameter_mm is not None:
+        made |= {"addendum": 0.5 * own.tip_diameter_mm / module_mm - half - x, "tip_shortening": 0.0}
+    if own.root_diameter_mm is not None:
+        made["dedendum"] = half + x - 0.5 * own.root_diameter_mm / module_mm
+    if own.span_mm is not None and own.span_teeth is not None:
+        angle = math.radians(form["pressure_angle_deg"])
+        most = module_mm * nominal_span(own.teeth, x, angle, own.span_teeth)
+        if own.span_mm > most:
+            problem = f"must be <= {most:.6g} mm, the span over {own.span_teeth} teeth without backlash"
+            raise InputError(f"{where}.span_mm", own.span_mm, problem, "use more profile_shift, or another span_teeth")
+        made["tooth_thinning_um"] = 1e3 * (most - own.span_mm) / math.cos(angle)
+    return made
 
 
-def in_keys(error: InputError, where: str) -> InputError:
+def gear_of_form(teeth: int, form: Mapping[str, Any]) -> Gear:
+    """Gear with the keys of `gearfe.tables.pair.tooth_form`, ``module_mm`` and ``bore_diameter_mm``."""
+    made = dict(form)
+    for name, (key, unit) in KEYS.items():
+        if made.get(key) is not None:
+            made[name] = made.pop(key) * unit
+    amount, length, exponent = (made.pop(f"tip_relief.{name}", None) for name in ("amount", "length", "exponent"))
+    if amount:
+        made["tip_relief"] = TipRelief(amount, given(length, "tip_relief_length_mm"), exponent)
+    return Gear(teeth, **{name: made[name] for name in made if name != "tip_relief_length_mm"})
+
+
+def in_keys(error: InputError, where: str, *, key: str = "", unit: float = 0.0) -> InputError:
     """The error of an argument of `Gear` as that of its key in a table, in the key's unit."""
-    key, factor = KEYS.get(error.field, (error.field, 1.0))
-    value = float(f"{error.value * factor:.12g}") if isinstance(error.value, float) else error.value
-    return InputError(f"{where}.{key}", value, error.problem, error.cure)
+    named, own = KEYS.get(error.field, (error.field, 1.0))
+    value = float(f"{error.value / (unit or own):.12g}") if isinstance(error.value, float) else error.value
+    return InputError(f"{where}.{key or named}", value, error.problem, error.cure)
 
 
 def _renamed(error: InputError, table: PairTable, side: str, name: str) -> InputError:
     """The same error in the words of the job file: its key where it was given, its unit."""
-    key, factor = KEYS.get(name, (name, 1.0))
-    own: Any = getattr(table, side) if side else None
+    error = InputError(name, error.value, error.problem, error.cure)
+    key, unit = KEYS.get(name, (name, 1.0))
+    if not side:
+        return in_keys(error, "pair")
+    own: GearTable = getattr(table, side)
     for drawn, stands_for in INSTEAD.items():
-        if own is not None and key in stands_for and getattr(own, drawn) is not None:
-            number = error.value * factor if isinstance(error.value, float) else error.value
+        if key in stands_for and getattr(own, drawn) is not None:
+            number = error.value / unit if isinstance(error.value, float) else error.value
             problem = f"makes {key} {number:.6g}: {error.problem}"
             return InputError(f"pair.{side}.{drawn}", getattr(own, drawn), problem, error.cure)
     if name == "module" and own.pitch_diameter_mm is not None:
-        key, factor = "pitch_diameter_mm", 1e3 * own.teeth
-    shared = side and getattr(own, key, None) is None and getattr(table, key, None) is not None
-    field = f"pair.{key}" if shared or not side else f"pair.{side}.{key}"
-    value = error.value
-    if isinstance(value, float):
-        value = float(f"{value * factor:.12g}")
-    return InputError(field, value, error.problem, error.cure)
+        return in_keys(error, f"pair.{side}", key="pitch_diameter_mm", unit=1e-3 / own.teeth)
+    shared = getattr(own, key, None) is None and getattr(table, key, None) is not None
+    return in_keys(error, "pair" if shared else f"pair.{side}")

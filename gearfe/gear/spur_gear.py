@@ -177,6 +177,21 @@ class Gear:
         """Roll length of the involute at a radius >= r_b, sqrt(radius^2 - r_b^2) (m)."""
         return math.sqrt(max(0.0, (radius - self.base_radius) * (radius + self.base_radius)))
 
+    def span_size(self, teeth: int) -> float:
+        """Span size over k teeth less thinning s, W_k - s cos(alpha) (m), see `nominal_span`."""
+        nominal = self.module * nominal_span(self.teeth, self.profile_shift, self.pressure_angle, teeth)
+        return nominal - self.tooth_thinning * math.cos(self.pressure_angle)
+
+    @cached_property
+    def span_teeth(self) -> int:
+        """Number of teeth whose span touches the flanks nearest to the diameter d + 2 x m.
+
+        The plates touch where the roll length is half the span: W_k^2 = d_v^2 - d_b^2, solved for k.
+        """
+        diameter = self.pitch_diameter + 2.0 * self.profile_shift * self.module
+        span = math.sqrt(max(0.0, diameter**2 - (2.0 * self.base_radius) ** 2))
+        return max(2, round(1.0 + (span - self.span_size(1)) / self.base_pitch))
+
     def _check_numbers(self) -> None:
         check_teeth(self.teeth)
         ranges = {
@@ -199,6 +214,11 @@ class Gear:
             _check("tip_relief.amount", self.tip_relief.amount, 0.0, math.inf, True)
             _check("tip_relief.length", self.tip_relief.length, 0.0, math.inf, False)
             _check("tip_relief.exponent", self.tip_relief.exponent, 1.0, math.inf, True)
+
+
+def nominal_span(z: int, x: float, angle: float, k: int) -> float:
+    """Span size W_k/m = cos(alpha) [(k - 1/2) pi + z inv(alpha)] + 2 x sin(alpha) without thinning (times module)."""
+    return math.cos(angle) * ((k - 0.5) * math.pi + z * inv(angle)) + 2.0 * x * math.sin(angle)
 
 
 def _check(name: str, value: float, low: float, high: float, closed: bool) -> None:

@@ -183,7 +183,7 @@ def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:
     teeth, module_mm = given(table.teeth, f"{where}.teeth"), given(needed["module_mm"], f"{where}.module_mm")
     bore_mm = 0.2 * module_mm * teeth if table.bore_diameter_mm is None else table.bore_diameter_mm
     try:
-        return gear_of_form(teeth, module_mm, bore_mm, form)
+        return gear_of_form(teeth, {**form, "module_mm": module_mm, "bore_diameter_mm": bore_mm})
     except InputError as error:
         raise in_keys(error, where) from None
 
