@@ -15,9 +15,7 @@ from ..contact.laws import ContactLaw, PairModel, law_named
 from ..elasticity import Material
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations
-from ..gear.deviation_job import deviations_of
 from ..gear.pair import GearPair
-from ..tables.microgeometry import MicrogeometryTable
 from ..tables.pair import MaterialTable, PairTable
 from ..tables.stiffness import StiffnessTable
 from .curve import from_text
@@ -25,6 +23,7 @@ from .curve import from_text
 if TYPE_CHECKING:
     from ..contact.compliance import MeshingPair
     from ..progress import Stopwatch
+    from ..tables.microgeometry import MicrogeometryTable
 
 #: Gives what a function makes, or what was made under that name before.
 Keep = Callable[[str, Callable[[], Any]], Any]
@@ -71,7 +70,11 @@ class StiffnessJob:
     @property
     def deviations(self) -> tuple[ToothDeviations, ToothDeviations]:
         """Deviations of the driving flanks of pinion and wheel."""
-        return NOMINAL if self.microgeometry is None else deviations_of(self.microgeometry, self.pair, self.folder)
+        if self.microgeometry is None:
+            return NOMINAL
+        from ..gear.deviation_job import deviations_of
+
+        return deviations_of(self.microgeometry, self.pair, self.folder)
 
     @property
     def tables(self) -> dict[str, Any]:

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from ..contact.laws import COARSENING
 from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
-from ..gear.deviation_job import GEARS
-from ..gear.modifications import CHECKED, ends_of
 from ..gear.validity import overlap_warnings, overlaps
 from ..tables.stiffness import DEFAULT_LAW
 from ..versions import versions
@@ -80,6 +78,9 @@ def deviation_lines(job: StiffnessJob) -> list[str]:
     """A line about the deviations of the flanks, where there are any."""
     if job.microgeometry is None:
         return []
+    from ..gear.deviation_job import GEARS
+    from ..gear.modifications import CHECKED, ends_of
+
     most = []
     for gear, own in zip((job.pair.pinion, job.pair.wheel), job.model.deviations, strict=True):
         roll = np.linspace(*ends_of(gear), CHECKED)
