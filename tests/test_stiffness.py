@@ -11,6 +11,7 @@ from gearfe.loadmap.sweep import sweep_loads
 from gearfe.stiffness.positions import HalfPlaneSolver
 from gearfe.stiffness.sweep import elastic_pair
 
+from .counting import counted
 from .gears import pair
 from .solving import nodal, solve_position
 
@@ -385,6 +386,6 @@ def test_the_error_estimate_finds_the_error(gears, elastic):
 
 
 def test_progress_counts_up(gears, elastic):
-    seen = []
-    at(gears, np.radians([3.0, 12.0]), elastic, progress=lambda *a: seen.append(a))
+    with counted() as seen:
+        at(gears, np.radians([3.0, 12.0]), elastic)
     assert seen[-1] == (2, 2, "positions")

@@ -23,6 +23,7 @@ from gearfe.study.case import DIED
 from gearfe.study.job import read_study, run_study
 from gearfe.tables.text import toml_document
 
+from .counting import counted
 from .studies import JOBS, rows_of, written
 
 # --------------------------------------------------------------------------------------------- running, going on
@@ -48,10 +49,10 @@ def test_an_interrupted_study_goes_on(tmp_path):
     lines = (tmp_path / "study.csv").read_text().splitlines(keepends=True)
     kept = [lines[0], lines[5], lines[2], lines[7][:20]]
     (tmp_path / "study.csv").write_text("".join(kept))
-    told = []
-    run_study(study, tmp_path, jobs=1, progress=lambda done, total, _: told.append((done, total)))
+    with counted() as told:
+        run_study(study, tmp_path, jobs=1)
     assert rows_of(tmp_path) == whole
-    assert told == [(n, 8) for n in range(3, 9)]  # two were there
+    assert [one for one in told if one[2] == "cases"] == [(n, 8, "cases") for n in range(3, 9)]  # two were there
 
 
 def test_another_study_does_not_go_on_here(tmp_path):

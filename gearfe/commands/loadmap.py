@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..progress import count
 from ..tables.loadmap import LoadMapTable
 from ..tables.stiffness import StiffnessTable, check_law
 from .arguments import add_job, add_keys, add_removed, check_option, with_keys
@@ -57,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         job = stiffness_job(tables, Path(args.job).parent, pair)
         deviations = deviation_lines(job)  # impossible ones are refused before the folder is made
     folder = output_folder(args.out)
-    made_map = job_map(job, table, progress=count)
+    made_map = job_map(job, table)
     watch.seconds.update(made_map.timings)
     with whole_set(folder) as made:
         with watch.stage("table"):

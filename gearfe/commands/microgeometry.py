@@ -6,7 +6,6 @@ import argparse
 import time
 from pathlib import Path
 
-from ..progress import count
 from ..tables.microgeometry import MicrogeometryTable
 from ..tables.stiffness import StiffnessTable
 from .arguments import add_job, add_keys, with_keys
@@ -55,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     with watch.stage("deviations"):
         flanks = both_flanks(job, table)
     folder = output_folder(args.out)
-    made = solved(job, table, flanks, watch=watch, progress=count)
+    made = solved(job, table, flanks, watch=watch)
     with whole_set(folder, FILES) as place:
         with watch.stage("tables"):
             write_csvs(place, mesh_tables(made))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..config import check_range
-from ..progress import announce, count
+from ..progress import announce
 from ..tables.stiffness import StiffnessTable, check_law
 from .arguments import add_job, add_keys, add_removed, check_option, number, with_keys
 from .common import add_folder, print_results
@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
         from ..stiffness.fields_output import size_note
 
         announce(size_note(elastic, np.degrees(sweep["angles"]), chosen))
-    curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, progress=count, **sweep)
+    curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, **sweep)
     for stage, seconds in curve.timings.items():
         watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
     with whole_set(folder, ("stiffness.png", "fields.vtkhdf", "stress_*deg.png")) as made:
@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
             with watch.stage("animation"):
                 from ..figures.stress import stress_animation
 
-                stress_animation(made / "stress.gif", elastic, curve, args.animation, count)
+                stress_animation(made / "stress.gif", elastic, curve, args.animation)
         if not args.no_pictures:
             with watch.stage("picture"):
                 from ..figures.stiffness import stiffness_figure
@@ -140,7 +140,7 @@ def _fields(
     def draw(position: Any, fields: Any) -> None:
         stress_figure(folder, job.pair, position, fields, most)
 
-    pressures = write_fields(folder, elastic, curve, angles_deg, draw=draw, progress=count)
+    pressures = write_fields(folder, elastic, curve, angles_deg, draw=draw)
     if pressures:
         pressure_figure(folder / "pressure.png", job.pair, pressures)
 

@@ -10,7 +10,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from ..progress import count
 from .arguments import add_job
 from .common import add_folder, print_results
 
@@ -61,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         where: dict[str, Any] = {"jobs": args.jobs}
         if args.dask is not None:
             where = _cluster(args.dask, stack)
-        where |= {"restart": args.restart, "progress": count}
+        where["restart"] = args.restart
         if searched:
             best = optimum.optimum(stack.enter_context(Search(study, folder, **where)))
             made, summary, lines = best.result, best.summary(), optimum.report_lines

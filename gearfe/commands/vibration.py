@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ..progress import count
 from ..tables.spectrum import SpectrumTable
 from ..tables.train import TrainTable, value_text
 from .arguments import add_job, add_keys, with_keys
@@ -95,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
         bores = tuple(str(a) for s in job.table.shafts for a in s.attachments)
         check_choice(choice, job.times, bores)
         folder = output_folder(args.out)
-    planned = simulated(job, args.curve, watch=watch, progress=count, estimate=not args.no_estimate)
+    planned = simulated(job, args.curve, watch=watch, estimate=not args.no_estimate)
     if not args.no_floquet:
         from ..runup.train_stability import train_stability
 
@@ -112,7 +111,6 @@ def run(args: argparse.Namespace) -> int:
         watch=watch,
         draw=None if args.no_pictures else TrainPictures(title(job.table), args.band and tuple(args.band), args.range),
         beside=Analysis(job, train, every, start),
-        progress=count,
     )
     response = written.response
     print_results(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .. import progress
 from ..contact.compliance import MeshingPair
 from ..contact.position import Positions
 from ..gear.derived import zone
@@ -22,7 +23,6 @@ from ..threads import one_thread
 from ..typing import Array, IntArray
 from .style import new_figure, save, write_film
 
-Progress = Callable[[int, int, str], None]
 #: Points, shape (n, 2) (mm), straight triangles, shape (m, 3), and stress at the points (MPa) of one gear.
 Part = tuple[Array, IntArray, Array]
 #: What is drawn, in half widths of the picture; milliseconds a frame.
@@ -112,7 +112,7 @@ def _draw_rim(axes: Any, points: Array, triangles: IntArray) -> None:
     axes.plot(x, y, color="#111827", linewidth=0.7, solid_capstyle="round")
 
 
-def frames_of(elastic: MeshingPair, curve: StiffnessCurve, count: int, progress: Progress | None = None) -> list[Frame]:
+def frames_of(elastic: MeshingPair, curve: StiffnessCurve, count: int) -> list[Frame]:
     """Frames of `stress_animation`."""
     angles = np.arange(count) * curve.mesh_cycle / count
     twists = curve.interpolant("twist")(angles).value + curve.lost_motion
@@ -122,14 +122,11 @@ def frames_of(elastic: MeshingPair, curve: StiffnessCurve, count: int, progress:
         for position in solved_positions(solver, angles, twists):
             parts = [_cut_out(field, place) for field in recovered(position)]
             frames.append(Frame(math.degrees(position.pinion_angle), parts))
-            if progress is not None:
-                progress(len(frames), count, "frames solved")
+            progress.count(len(frames), count, "frames solved")
     return frames
 
 
-def stress_animation(
-    path: str | Path, elastic: MeshingPair, curve: StiffnessCurve, count: int, progress: Progress | None = None
-) -> None:
+def stress_animation(path: str | Path, elastic: MeshingPair, curve: StiffnessCurve, count: int) -> None:
     """Write the von Mises stress in the meshing zone over one mesh cycle as an endless GIF of `count` frames.
 
     The twists are the curve's own where it has them, interpolated between its positions otherwise. The file appears
@@ -142,7 +139,7 @@ def stress_animation(
     """
     from PIL import Image
 
-    pair, frames = elastic.gears, frames_of(elastic, curve, count, progress)
+    pair, frames = elastic.gears, frames_of(elastic, curve, count)
     if not frames:
         return
     zoom, top = zone(pair, modules=1.5), max(color_limit(frame.parts) for frame in frames)
@@ -162,8 +159,7 @@ def stress_animation(
             figure.set_layout_engine("none")  # no frame may move the axes
         figure.canvas.draw()
         pictures.append(np.asarray(figure.canvas.buffer_rgba())[..., :3].copy())
-        if progress is not None:
-            progress(done, len(frames), "frames drawn")
+        progress.count(done, len(frames), "frames drawn")
     palette = Image.new("P", (1, 1))
     palette.putpalette(_palette())
     write_film(path, pictures, palette, ms=FRAME_MS, dither=False)

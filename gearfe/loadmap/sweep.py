@@ -17,9 +17,9 @@ from ..contact.laws import DEFAULT_MODEL, PairModel
 from ..contact.position import Positions, joined, together
 from ..errors import InputError
 from ..gear.pair import GearPair
-from ..progress import Stopwatch
+from ..progress import Stopwatch, count, stage
 from ..stiffness.job import Keep, StiffnessJob
-from ..stiffness.positions import PositionSolver, Progress, at_torques, position_solver
+from ..stiffness.positions import PositionSolver, at_torques, position_solver
 from ..stiffness.sweep import assembled_curve, distinct_angles, elastic_pair, requested_angles
 from ..tables.loadmap import LoadMapTable
 from ..threads import one_thread
@@ -47,7 +47,6 @@ def sweep_loads(
     root_stress: bool = False,
     kinematics: Literal["small", "finite"] = "finite",
     elastic: MeshingPair | None = None,
-    progress: Progress | None = None,
     **changes: Any,
 ) -> LoadMap:
     """Stiffness, transmission error, load share, peak pressure and root stress over pinion angle and torque.
@@ -61,7 +60,7 @@ def sweep_loads(
         solved once.
     root_stress
         Also the tension at the tooth roots, on separate refined meshes, see `gearfe.loadmap.root_stress`.
-    model, kinematics, elastic, progress, changes
+    model, kinematics, elastic, changes
         See `gearfe.stiffness.sweep.sweep_stiffness`.
 
     Returns
@@ -92,7 +91,7 @@ def sweep_loads(
         with watch.stage("root meshes"), one_thread():
             roots = pair_roots(elastic)
     with watch.stage("cells"), one_thread():
-        found, at_roots = _cells(solver, solved_angles, goals, roots, progress, finite=finite)
+        found, at_roots = _cells(solver, solved_angles, goals, roots, finite=finite)
     n = len(solved_angles)
     levels = [found.take(slice(row * n, (row + 1) * n)) for row in range(len(goals))]
     curves = tuple(assembled_curve(solver, requested, source, level, searched=True) for level in levels)
@@ -118,9 +117,7 @@ def rising_torques(torques: ArrayLike) -> Array:
     return made
 
 
-def job_map(
-    job: StiffnessJob, table: LoadMapTable, *, keep: Keep | None = None, progress: Progress | None = None
-) -> LoadMap:
+def job_map(job: StiffnessJob, table: LoadMapTable, *, keep: Keep | None = None) -> LoadMap:
     """The map of a job file: torques and angles of [loadmap], the model of [stiffness]; see `StiffnessJob.elastic`."""
     watch = Stopwatch()
     made = sweep_loads(
@@ -130,7 +127,6 @@ def job_map(
         root_stress=table.root_stress,
         kinematics=job.table.kinematics,
         elastic=job.elastic(keep, watch),
-        progress=progress,
     )
     return replace(made, timings={**watch.seconds, **made.timings})
 
@@ -140,7 +136,6 @@ def _cells(
     angles: Array,
     goals: Array,
     roots: PairRoots | None,
-    progress: Progress | None,
     *,
     finite: bool,
 ) -> tuple[Positions, ToothRoots | None]:
@@ -149,11 +144,11 @@ def _cells(
     for rows in np.array_split(np.arange(len(goals)), max(1, math.ceil(len(goals) * n / TOGETHER))):
         torque = np.repeat(goals[rows], n)
         kept = np.arange(0 if roots is None else len(torque))
-        found = at_torques(solver, np.tile(angles, len(rows)), torque, kept=kept, finite=finite)
+        count(int(rows[0]) * n, len(goals) * n, "cells")
+        with stage("contacts"):
+            found = at_torques(solver, np.tile(angles, len(rows)), torque, kept=kept, finite=finite)
         if roots is not None:
             made = roots.at(found)
             at_roots.append(replace(made, position=rows[0] * n + made.position))
         parts.append(found.with_loads(np.zeros(len(torque), dtype=bool)))
-        if progress is not None:
-            progress((int(rows[-1]) + 1) * n, len(goals) * n, "cells")
     return together(parts), joined(at_roots) if at_roots else None

@@ -9,7 +9,6 @@ from ..gear.deviation_job import deviations_of
 from ..loadmap.root_stress import PairRoots, pair_roots
 from ..progress import Stopwatch
 from ..stiffness.job import Keep, StiffnessJob
-from ..stiffness.positions import Progress
 from ..tables.microgeometry import MicrogeometryTable
 from ..threads import one_thread
 from .loaded_mesh import LoadedMesh
@@ -44,7 +43,6 @@ def solved(
     *,
     watch: Stopwatch,
     keep: Keep | None = None,
-    progress: Progress | None = None,
 ) -> LoadedMesh:
     """The pair of a job with the deviations of `both_flanks` at the torques of [microgeometry]."""
     law, roots = condensed(job, root_stress=table.root_stress, watch=watch, keep=keep)
@@ -57,5 +55,4 @@ def solved(
             mesh_cycles=table.mesh_cycles,
             roots=roots,
             back=back,
-            progress=progress,
         )

@@ -14,8 +14,9 @@ from ..errors import InputError
 from ..gear.deviation import ToothDeviations
 from ..loadmap.root_stress import PairRoots
 from ..loadmap.sweep import rising_torques
+from ..progress import count, stage
 from ..stiffness.contact_pressure import BLUNTING, reached_marks
-from ..stiffness.positions import HalfPlaneSolver, Progress, at_torques, check_torque
+from ..stiffness.positions import HalfPlaneSolver, at_torques, check_torque
 from ..threads import one_thread
 from ..typing import Array, BoolArray, IntArray
 from .loaded_mesh import BACK, LoadedMesh, PairLoads, full_period
@@ -35,7 +36,6 @@ def load_mesh(
     angles: ArrayLike | None = None,
     roots: PairRoots | None = None,
     back: tuple[ToothDeviations, ToothDeviations] | None = None,
-    progress: Progress | None = None,
 ) -> LoadedMesh:
     """Solve a pair with its deviations over pinion angle and torque.
 
@@ -57,8 +57,6 @@ def load_mesh(
         Deviations of the back flanks of pinion and wheel, of the pair seen from the other side as
         `gearfe.gear.deviation_job.deviations_of` gives them, to know the room behind the teeth: positions without
         have the status `gearfe.microgeometry.loaded_mesh.BACK` and no numbers.
-    progress
-        Called with cells done, cells in all, and a name.
 
     Raises
     ------
@@ -77,7 +75,7 @@ def load_mesh(
     if back is not None:  # seen from the other side the pinion turns the other way
         behind = HalfPlaneSolver(law.deviated(back)).touching_twists(-place) - lost
     with one_thread():
-        cells, loads, stress = _solve_cells(solver, law, place, goals, roots, progress)
+        cells, loads, stress = _solve_cells(solver, law, place, goals, roots)
     cells["twist"], room = cells["twist"] - lost, None
     if behind is not None:
         room = pair.normal_backlash + pair.wheel.base_radius * (behind + cells["twist"])
@@ -116,23 +114,22 @@ def _solve_cells(
     place: Array,
     goals: Array,
     roots: PairRoots | None,
-    progress: Progress | None,
 ) -> tuple[dict[str, Array], PairLoads, Array | None]:
     """`CELL` of all torques and angles, shape (m, n), their loaded tooth pairs, and root stresses, shape (m, n, 2)."""
-    n, count = len(place), len(goals) * len(place)
-    stress = None if roots is None else np.full((count, 2), np.nan)
+    n, size = len(place), len(goals) * len(place)
+    stress = None if roots is None else np.full((size, 2), np.nan)
     cells: list[dict[str, Array]] = []
     pairs: list[PairLoads] = []
-    for start in range(0, count, AT_ONCE):
-        numbers = np.arange(start, min(start + AT_ONCE, count))
+    for start in range(0, size, AT_ONCE):
+        count(start, size, "cells")
+        numbers = np.arange(start, min(start + AT_ONCE, size))
         angle, goal = numbers % n, goals[numbers // n]
-        made = at_torques(solver, place[angle], goal, kept=np.arange(0 if roots is None else len(goal)))
+        with stage("contacts"):
+            made = at_torques(solver, place[angle], goal, kept=np.arange(0 if roots is None else len(goal)))
         if stress is not None and roots is not None:
             stress[numbers] = _root_stress(made, roots)
         pairs.append(_pair_loads(law, made, numbers, n))
         cells.append({name: getattr(made, name) for name in CELL})  # not the panels of the contacts
-        if progress is not None:
-            progress(int(numbers[-1]) + 1, count, "cells")
     shape = (len(goals), n)
     whole = {name: np.concatenate([one[name] for one in cells]).reshape(shape) for name in CELL}
     return whole, joined(pairs), None if stress is None else stress.reshape(*shape, 2)

@@ -13,12 +13,13 @@ method at that speed do, as long as each of its steps contracts; else the short 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from ..progress import count
 from ..typing import Array, ComplexArray
 from .balance import (
     CONTRACTS,
@@ -100,7 +101,6 @@ class _Place(NamedTuple):
 
 def follow(
     system: Oscillator, speeds: Sequence[float] | Array, start: Orbit, *, tolerance: float, highest: float,
-    progress: Callable[[int, int], None] | None = None,
 ) -> Curve:  # fmt: skip
     """Along the curve of solutions from an orbit at the first of the speeds, until it passes the first or the last one.
 
@@ -114,7 +114,7 @@ def follow(
         Angular frequency (rad/s) that the harmonics reach at least.
     """
     walk = _Walk(system, np.asarray(speeds, dtype=float), tolerance, highest)
-    return walk.run(start, progress)
+    return walk.run(start)
 
 
 @dataclass(eq=False)
@@ -135,7 +135,7 @@ class _Walk:
         self.step = FIRST  # along the curve, from one given speed to the next
         self.last: _Place | None = None  # before the orbit that it led to
 
-    def run(self, start: Orbit, progress: Callable[[int, int], None] | None) -> Curve:
+    def run(self, start: Orbit) -> Curve:
         orbit, note = self._kept(start), ""
         passed: set[tuple[int, int]] = set()
         while 0 <= self.number + self.heading < len(self.speeds):
@@ -143,8 +143,7 @@ class _Walk:
                 note = f"the direction of the curve is lost at {orbit.speed:.6g} rad/s"
                 break
             passed.add((len(self.turns), self.number))
-            if progress is not None:
-                progress(self.number, len(self.speeds) - 1)
+            count(self.number, len(self.speeds) - 1, "speeds")
             target = float(self.speeds[self.number + self.heading])
             made = self._onward(target) if self.heading > 0 else None
             passes = None if made is None else settled(self.system, *made, self.tolerance)

@@ -11,12 +11,13 @@ above 1, vibration grows by :math:`e^{\sigma t}`, :math:`\sigma = \ln|\mu|/T`: s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError
+from ..progress import count
 from ..threads import one_thread
 from ..train.forces import CurveFlank
 from ..typing import Array, ComplexArray
@@ -49,7 +50,6 @@ class InstabilityMap:
 
 def instability_map(
     train: CondensedTrain, speeds: Sequence[float] | Array, loads: Sequence[float] | Array,
-    progress: Callable[[int, int], None] | None = None,
 ) -> InstabilityMap:  # fmt: skip
     """Growth without damping over speeds (rad/s) and factors on the loads.
 
@@ -77,8 +77,7 @@ def instability_map(
             kept = strengths(system.linear, A) > REACHED
             for j, speed in enumerate(requested):
                 made[i, j] = around(system, float(speed), A, None, kept, span, damped=False)[0]
-                if progress is not None:
-                    progress(i * len(requested) + j + 1, made.size)
+                count(i * len(requested) + j + 1, made.size, "speeds")
     periods = 2.0 * math.pi * span.turns / np.abs(requested)
     return InstabilityMap(requested, factors, made, np.log(np.abs(made)) / periods)
 

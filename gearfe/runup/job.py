@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..progress import count, stage
+from ..progress import stage
 from ..rigid import constant
 from ..tables.runup import RunUpTable
 from ..train import build_train
@@ -30,7 +30,7 @@ def solved(
         Where no periodic motion was found at any of the speeds, and for what a train or a run-up refuses.
     """
     with watch.stage("curves"):
-        stiffness = train_curves(job, curves, progress=count)
+        stiffness = train_curves(job, curves)
     with watch.stage("housing"):
         body = train_body(job)
     with watch.stage("model"):
@@ -40,7 +40,7 @@ def solved(
     band = table.band_Hz or (5000.0 if job.housing is None else job.housing.reduction.band_Hz)
     with watch.stage("steady states"), stage("steady states"):
         options: dict[str, Any] = {"tolerance": table.tolerance, "band_hz": band, "stability": table.stability}
-        made = run_up(model, speeds, progress=_counted, **options)
+        made = run_up(model, speeds, **options)
     if not made.states:
         value = [table.speed_start_rad_per_s, table.speed_stop_rad_per_s]
         problem = "has no periodic motion that was found at any of the speeds"
@@ -48,14 +48,10 @@ def solved(
     unstable = None
     if table.instability_loads:
         with watch.stage("instability"), stage("instability"):
-            unstable = instability_map(made.train, speeds, table.instability_loads, progress=_counted)
+            unstable = instability_map(made.train, speeds, table.instability_loads)
     return made, unstable
 
 
 def described(job: TrainJob, table: RunUpTable) -> dict[str, Any]:
     """What was computed: entries of the summary."""
     return {"variant": job.table.variant, "job": {"runup": asdict(table), "train": asdict(job.table)}}
-
-
-def _counted(number: int, of: int) -> None:
-    count(number, of, "speeds")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..progress import count, stage
 from ..shown import ShownTable
 from ..threads import one_thread
 from ..train.kinematics import drive_sense
@@ -141,7 +142,7 @@ def steady_state(
 
 def run_up(
     model: TrainModel, speeds: ArrayLike, *, tolerance: float = 1e-3, band_hz: float = 5000.0, stability: bool = True,
-    executor: Executor | None = None, progress: Callable[[int, int], None] | None = None,
+    executor: Executor | None = None,
 ) -> RunUp:  # fmt: skip
     """Steady states of a train along a range of speeds, round the turning points of their curve.
 
@@ -153,8 +154,6 @@ def run_up(
         See `steady_state`.
     executor
         Computes multipliers beside each other; None: one after the other.
-    progress
-        Called with the number of the speed reached and of the last.
 
     Raises
     ------
@@ -169,15 +168,16 @@ def run_up(
     with one_thread():
         begin = 0
         while begin < len(given):
-            if progress is not None:
-                progress(begin, len(given) - 1)
-            start = first_motion(train.system, float(given[begin]), **options)
+            count(begin, len(given) - 1, "speeds")
+            with stage("first motion"):
+                start = first_motion(train.system, float(given[begin]), **options)
             if start is None:
                 lost.append(float(given[begin]))
                 begin += 1
                 continue
-            back = follow(train.system, given[begin::-1], start, **options) if begin else None
-            curve = follow(train.system, given[begin:], start, **options, progress=progress)
+            with stage("back"):
+                back = follow(train.system, given[begin::-1], start, **options) if begin else None
+            curve = follow(train.system, given[begin:], start, **options)
             made.join(back, curve, train.system.scale)
             passed = {o.speed for o in curve.orbits}
             reached = max(k for k in range(begin, len(given)) if given[k] in passed)

@@ -24,13 +24,13 @@ from .curve import StiffnessCurve
 ROOMS = ("elasticity", "contact", "gear", "meshing", "stiffness")
 
 
-def cached_curve(pair: GearPair, model: PairModel, *, progress: Any = None, **sweep: Any) -> StiffnessCurve:
+def cached_curve(pair: GearPair, model: PairModel, **sweep: Any) -> StiffnessCurve:
     """Curve of `gearfe.sweep_stiffness` with these arguments, from disk when it was computed before."""
 
     def made() -> dict[str, Any]:
         from .sweep import sweep_stiffness
 
-        curve = sweep_stiffness(pair, model, progress=progress, **sweep)
+        curve = sweep_stiffness(pair, model, **sweep)
         return {own.name: np.asarray(getattr(curve, own.name)) for own in fields(curve) if own.name != "timings"}
 
     found = cached_arrays("curve", curve_key(pair, model, sweep), made)

@@ -15,12 +15,13 @@ from ..errors import InputError
 from ..gear.pair import GearPair
 from ..output.files import write_csv
 from ..output.vtkhdf import VtkHdfSeries
+from ..progress import count
 from ..threads import one_thread
 from ..typing import Array, IntArray
 from .contact_pressure import FlankPressure, flank_pressures
 from .curve import StiffnessCurve
 from .fields import GearField, field_recovery
-from .positions import PositionSolver, Progress, position_solver
+from .positions import PositionSolver, position_solver
 
 GEARS = ("pinion", "wheel")
 #: Positions solved side by side.
@@ -65,7 +66,6 @@ def write_fields(
     angles_deg: Sequence[float] | None,
     *,
     draw: Callable[[Positions, tuple[GearField, GearField]], None] | None = None,
-    progress: Progress | None = None,
 ) -> list[tuple[float, list[FlankPressure]]]:
     """Write ``fields.vtkhdf`` (time: pinion angle in deg) and ``pressure.csv``.
 
@@ -102,8 +102,7 @@ def write_fields(
                 draw(position, fields)
             elif worst is None or peak > worst[0]:
                 worst = (peak, position, fields)
-            if progress is not None:
-                progress(done, len(chosen), "fields")
+            count(done, len(chosen), "fields")
     if draw is not None and worst is not None:
         draw(*worst[1:])
     write_csv(folder / "pressure.csv", pressure_table(elastic.gears, pressures))

@@ -30,6 +30,7 @@ from ..gear.deviation import NOMINAL
 from ..gear.iso6336 import mesh_stiffness
 from ..gear.touching import Touching
 from ..gear.validity import MOST_YIELD
+from ..progress import count
 from ..typing import Array, IntArray
 
 #: Solutions of a position in search of its torque; random pairs, laws and torques took three at most.
@@ -196,30 +197,23 @@ class ElementSolver:
 PositionSolver = HalfPlaneSolver | ElementSolver
 
 
-Progress = Callable[[int, int, str], None]
-
 #: Positions handed to the solver at once: enough to work side by side, few enough to stay small in memory.
 BATCH = 128
 
 
-def in_batches(
-    solver: PositionSolver, angles: Array, twists: Array, kept: IntArray = NONE, progress: Progress | None = None
-) -> Positions:
+def in_batches(solver: PositionSolver, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
     """Positions at pinion angles and twists, both of shape (n,) (rad); those numbered `kept` with loads."""
     made = []
     for start in range(0, max(1, len(angles)), BATCH):
         part = slice(start, start + BATCH)
         made.append(solver.solve(angles[part], twists[part], kept - start))
-        if progress is not None:
-            progress(min(start + BATCH, len(angles)), len(angles), "positions")
+        count(min(start + BATCH, len(angles)), len(angles), "positions")
     return together(made)
 
 
-def at_twists(
-    solver: PositionSolver, angles: Array, twists: Array, progress: Progress | None = None, *, finite: bool = False
-) -> Positions:
+def at_twists(solver: PositionSolver, angles: Array, twists: Array, *, finite: bool = False) -> Positions:
     """Positions at pinion angles and twists, both of shape (n,) (rad); with or without finite strain."""
-    found = in_batches(solver, angles, twists, np.arange(len(angles)) if finite else NONE, progress)
+    found = in_batches(solver, angles, twists, np.arange(len(angles)) if finite else NONE)
     return with_shares(found, finite_strain_shares(solver.elastic, found)) if finite else found
 
 
@@ -240,7 +234,6 @@ def at_torques(
     *,
     kept: IntArray = NONE,
     finite: bool = False,
-    progress: Progress | None = None,
 ) -> Positions:
     """Positions at pinion angles (rad) that carry torques (N m), both of shape (n,); with or without finite strain.
 
@@ -259,8 +252,6 @@ def at_torques(
     touching, most = solver.touching_twists(angles), math.pi / solver.pair.wheel.teeth
 
     def solve(numbers: IntArray, twists: Array) -> Positions:
-        if progress is not None:
-            progress(len(angles) - len(numbers), len(angles), "positions")
         return in_batches(solver, angles[numbers], twists, np.flatnonzero(np.isin(numbers, kept)))
 
     if isinstance(solver, ElementSolver):
@@ -274,8 +265,6 @@ def at_torques(
         share = share / (1 + share)
         found = twists_for_torque(solve, found, torques / (1 + share), touching=touching, most=most)
         found = with_shares(found, share)
-    if progress is not None:
-        progress(len(angles), len(angles), "positions")
     return closed(found, torques, touching)
 
 

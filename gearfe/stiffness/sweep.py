@@ -34,7 +34,6 @@ from .curve_error import curve_error
 from .periodic import wrapped_phase
 from .positions import (
     PositionSolver,
-    Progress,
     at_torques,
     at_twists,
     check_torque,
@@ -97,7 +96,6 @@ def sweep_stiffness(
     solve_all: bool = False,
     estimate_error: bool = False,
     elastic: MeshingPair | None = None,
-    progress: Progress | None = None,
     **changes: Any,
 ) -> StiffnessCurve:
     """Mesh stiffness over the rotation of the pinion, at a given twist or a given torque.
@@ -125,8 +123,6 @@ def sweep_stiffness(
         Estimate the discretisation error from coarser meshes.
     elastic
         The pair from `elastic_pair`, when it is there already; the model is not looked at then.
-    progress
-        Called with positions done, positions in all, and the stage's name.
 
     Returns
     -------
@@ -152,10 +148,10 @@ def sweep_stiffness(
         solver.touching(solved_angles)
     with watch.stage("positions"), one_thread():
         if torque is None:
-            solved = at_twists(solver, solved_angles, np.full(len(solved_angles), load), progress, finite=finite)
+            solved = at_twists(solver, solved_angles, np.full(len(solved_angles), load), finite=finite)
         else:
             goals = np.full(len(solved_angles), load)
-            solved = at_torques(solver, solved_angles, goals, finite=finite, progress=progress)
+            solved = at_torques(solver, solved_angles, goals, finite=finite)
     curve = assembled_curve(solver, requested, source, solved, searched=torque is not None)
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
@@ -228,7 +224,7 @@ def assembled_curve(
     stiffness = np.divide(torque, deflection, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
     cycles = np.round((requested - solved.pinion_angle) / pair.mesh_cycle)
     leading, shares = load_shares(solved)
-    pressures = contact_pressures(solver, solved)
+    pressures: dict[str, Any] = contact_pressures(solver, solved)
     edge = np.where(failed, 0, pressures.pop("edge"))
     return StiffnessCurve(
         pinion_angle=requested,

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..config import build, read_toml
 from ..errors import InputError
+from ..progress import count
 from ..tables.study import StudyTable
 from ..threads import one_thread
 from .case import DIED, ERROR, HERE, INVALID, Row, Task, evaluate, files_named
@@ -137,7 +138,6 @@ def run_study(
     workers: int | None = None,
     check: Callable[[], None] | None = None,
     restart: bool = False,
-    progress: Callable[[int, int, str], None] | None = None,
 ) -> StudyResult:
     """Solve the cases that are missing in the folder's table; the result does not depend on where they run.
 
@@ -155,8 +155,6 @@ def run_study(
         Called now and then while the executor works; raises when that will not answer any more.
     restart
         Begin anew, whatever the folder holds.
-    progress
-        Called with cases done, all cases, and a name.
 
     Raises
     ------
@@ -179,8 +177,7 @@ def run_study(
         cases = [(n, study.cases[n]) for n in missing]
         for group in solved_rows(study.task, cases, jobs, executor, workers, check):
             journal.append(group, study.cases)
-            if progress is not None:
-                progress(len(journal.done), len(study.cases), "cases")
+            count(len(journal.done), len(study.cases), "cases")
             for row in group:
                 hopeless = row.status in (INVALID, ERROR, DIED)
                 first = first or (row.message if hopeless else "")

@@ -20,6 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import InputError
+from ..progress import count
 from ..shown import Facts
 from ..typing import Array
 from .case import DIED, DONE, Row
@@ -69,8 +70,6 @@ class Search(Facts):
         Of ``study.csv`` and ``study.json``: a search that was interrupted finds its points there. None: kept in memory.
     jobs, executor, workers, check, restart
         As of `gearfe.study.job.run_study`.
-    progress
-        Called with points solved, requested points, and a name.
 
     Raises
     ------
@@ -88,10 +87,9 @@ class Search(Facts):
         workers: int | None = None,
         check: Callable[[], None] | None = None,
         restart: bool = False,
-        progress: Callable[[int, int, str], None] | None = None,
     ) -> None:
         self.study, self._base = study, check_outputs(study)
-        self._jobs, self._executor, self._progress = jobs or os.cpu_count() or 1, executor, progress
+        self._jobs, self._executor = jobs or os.cpu_count() or 1, executor
         self._workers, self._check = workers, check
         self._own: Executor | None = None
         self._case: dict[tuple[str, ...], int] = {}
@@ -193,8 +191,7 @@ class Search(Facts):
     def _keep(self, rows: Sequence[Row], values: Mapping[int, Sequence[Any]], total: int) -> None:
         if self._journal is not None:
             self._journal.append(rows, values)
-            if self._progress is not None:
-                self._progress(len(self._journal.done), total, "points")
+            count(len(self._journal.done), total, "points")
 
     def run(self, optimiser: Optimiser) -> Solution | None:
         """Ask, solve, tell, until the optimiser has no more points; then the best point."""

@@ -8,7 +8,7 @@ angle turned about the axis a and :math:`\theta` the small tilt, is at
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..gear.derived import gear_outline
 from ..gear.spur_gear import Gear
 from ..output.vtkhdf import VtkHdfSeries
+from ..progress import count
 from ..reduction.modal_body import ModalBody
 from ..train.gear_train import GearTrain, ShaftGear
 from ..train.kinematics import driving_senses, shaft_ratios
@@ -154,8 +155,6 @@ def write_housing(
     body: ModalBody,
     response: TrainResponse,
     steps: Sequence[int] | IntArray,
-    *,
-    progress: Callable[[int, int, str], None] | None = None,
 ) -> None:
     """VTKHDF series of the housing: displacement (m), acceleration along the outward normal (m/s2)."""
     position, acceleration = _coordinates(response)
@@ -174,8 +173,7 @@ def write_housing(
                     body.cells if start else None,
                     point_data=data,
                 )
-            if progress is not None:
-                progress(first + len(some), len(chosen), "fields")
+            count(first + len(some), len(chosen), "fields")
 
 
 def frames(

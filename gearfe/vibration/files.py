@@ -119,7 +119,6 @@ def write_run(
     watch: Stopwatch,
     draw: Pictures | None = None,
     beside: analysis.Analysis | None = None,
-    progress: Callable[[int, int, str], None] | None = None,
 ) -> Written:
     """Write ``response.csv``, ``spectrum.csv``, ``summary.json`` and what else is chosen while a run goes on.
 
@@ -158,7 +157,7 @@ def write_run(
             run = Run({**run.summary, **analysed}, spectra)
         if choice.fields and made.outputs:
             with watch.stage("fields"):
-                problems += _fields(target, train, made.kept, times[: made.outputs], choice, draw, progress)
+                problems += _fields(target, train, made.kept, times[: made.outputs], choice, draw)
         watch.seconds["total"] = time.perf_counter() - watch.begun
         summary = {**run.summary, "timings_s": dict(watch.seconds)}
         write_json(target / "summary.json", summary)
@@ -272,7 +271,6 @@ def _fields(
     times: Array,
     choice: OutputChoice,
     draw: Pictures | None,
-    progress: Callable[[int, int, str], None] | None,
 ) -> list[str]:
     """Write and draw the fields of the response at the output times of `field_steps`."""
     from .fields import write_gears, write_housing
@@ -281,7 +279,7 @@ def _fields(
     series, still, film = (np.searchsorted(steps, some) for some in _shown(times, choice))
     write_gears(target / "gears.vtkhdf", train, kept, series)
     if train.housing is not None and train.housing.has_mesh:
-        write_housing(target / "housing.vtkhdf", train.housing, kept, series, progress=progress)
+        write_housing(target / "housing.vtkhdf", train.housing, kept, series)
     if draw is None:
         return []
     problem = draw.fields(target / "fields.png", train, kept, still[None])

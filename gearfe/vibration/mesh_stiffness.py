@@ -36,7 +36,6 @@ def train_curves(
     job: TrainJob,
     files: Sequence[str | Path] = (),
     *,
-    progress: Any = None,
     estimate: bool = False,
 ) -> tuple[Stiffness, ...]:
     """Stiffness of each mesh: from `files`, from the file or number its table names, or computed (and cached).
@@ -45,8 +44,6 @@ def train_curves(
     ----------
     files
         CSV files, one for all meshes or one a mesh; they win over the job's.
-    progress
-        See `gearfe.stiffness.sweep.sweep_stiffness`.
     estimate
         Whether computed curves carry an estimate of their error.
     """
@@ -69,7 +66,7 @@ def train_curves(
         elif (mesh.law or job.table.curves.law) == "map":
             found.append(_computed_law(job, train, number, estimate))
         else:
-            curve = _computed_curve(job, train, number, progress, estimate)
+            curve = _computed_curve(job, train, number, estimate)
             linear = (mesh.law or job.table.curves.law) == "linear"
             found.append(curve.interpolant("k_mesh", method="cubic").mean if linear else curve)
     return tuple(found)
@@ -91,7 +88,7 @@ def _carried_torque(train: GearTrain, number: int) -> float:
     return abs(float(steady_forces(train)[number])) * driven.base_radius
 
 
-def _computed_curve(job: TrainJob, train: GearTrain, number: int, progress: Any, estimate: bool) -> StiffnessCurve:
+def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> StiffnessCurve:
     """Curve of a mesh with the driver as pinion, by [stiffness] or at the torque that the mesh carries."""
     from ..stiffness.curve_cache import cached_curve
     from ..stiffness.job import StiffnessJob
@@ -107,7 +104,7 @@ def _computed_curve(job: TrainJob, train: GearTrain, number: int, progress: Any,
     model = replace(tables.model, materials=_materials(job, mesh), deviations=deviations)
     if job.table.curves.load in (None, "stiffness"):
         with stage(mesh.name):
-            return cached_curve(pair, model, progress=progress, estimate_error=estimate, **tables.sweep)
+            return cached_curve(pair, model, estimate_error=estimate, **tables.sweep)
     torque = _carried_torque(train, number)
     if not torque > 0.0:
         problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
@@ -119,7 +116,7 @@ def _computed_curve(job: TrainJob, train: GearTrain, number: int, progress: Any,
         "kinematics": job.stiffness.kinematics,
     }
     with stage(mesh.name):
-        return cached_curve(pair, model, progress=progress, estimate_error=estimate, **sweep)
+        return cached_curve(pair, model, estimate_error=estimate, **sweep)
 
 
 def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> MeshLaw:

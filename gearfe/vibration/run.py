@@ -25,10 +25,10 @@ from .report import stiffness_ranges
 ROUGH = 1e-3
 
 
-def simulated(job: TrainJob, curves: Sequence[str], *, watch: Any, progress: Any = None, estimate: bool) -> TrainRun:
+def simulated(job: TrainJob, curves: Sequence[str], *, watch: Any, estimate: bool) -> TrainRun:
     """The run of a job, its curves and housing each from the cache where it can be."""
     with watch.stage("curves"):
-        stiffness = train_curves(job, curves, progress=progress, estimate=estimate)
+        stiffness = train_curves(job, curves, estimate=estimate)
     with watch.stage("housing"):
         body = train_body(job)
     with watch.stage("model"):
