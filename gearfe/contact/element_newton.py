@@ -85,9 +85,8 @@ class ProjectedPoints:
     normal : ndarray of complex, shape (k, 6)
         G: coefficients of the nodes' displacements in the gap, tooth axes.
     place, gap, area : ndarray, shape (k,)
-        Foot points on the mates' chains of edges, gaps (m), and areas as far as they face the mate (m2).
-    reached : ndarray of bool, shape (k,)
-        Whether the mate has a point that is closest.
+        Foot points on the mates' chains of edges, gaps (m), and areas as far as they face the mate (m2). Without a
+        closest point they are `gearfe.contact.flank.OFF_END` and none.
     trial : ndarray, shape (k,)
         Pressure that the law asks for (Pa).
     """
@@ -99,7 +98,6 @@ class ProjectedPoints:
     place: Array
     gap: Array
     area: Array
-    reached: BoolArray
     trial: Array
 
     def forces(self, pressure: Array, count: int) -> ComplexArray:
@@ -123,7 +121,6 @@ def projected(
     on_own = batch.slave_shapes[points] * (found.normal * turn[own].conj())[:, None]
     on_mate = -found.shapes * (found.normal * turn[mate].conj())[:, None]
     before_end = np.clip(0.5 + (batch.counts[mate] - found.place) / (2 * half_stretch), 0.0, 1.0)
-    trial = np.maximum(-batch.parameter[points] * found.gap - stress[points], 0.0)
     return ProjectedPoints(
         points=points,
         at=batch.position[own],
@@ -132,8 +129,7 @@ def projected(
         place=found.place,
         gap=found.gap,
         area=np.where(found.reached, batch.weight[points] * before_end, 0.0),
-        reached=found.reached,
-        trial=np.where(found.reached, trial, 0.0),
+        trial=np.maximum(-batch.parameter[points] * found.gap - stress[points], 0.0),
     )
 
 
@@ -158,11 +154,11 @@ class Equations:
     bears: BoolArray
     factor: tuple[Array, IntArray] | None = None
 
-    def solve(self, right: Array, reached: BoolArray) -> Array:
+    def solve(self, right: Array) -> Array:
         """Pressures p >= 0 (Pa) with M p >= q, complementary, for q = `right`, all of shape (c,).
 
         All points that are wrong change places at once (block principal pivoting: Judice & Pires, *Comput. Oper. Res.*
-        21, 1994). Those that have not `reached` a closest one on the mate do not bear.
+        21, 1994).
         """
         for _ in range(EXCHANGES):
             on = np.flatnonzero(self.bears)
@@ -172,7 +168,7 @@ class Equations:
             pressure = np.zeros(len(right))
             pressure[on] = dgetrs(*self.factor, right[on], trans=1)[0]
             open_ = self.matrix[:, on] @ pressure[on] - right
-            wrong = np.where(self.bears, (pressure < 0) | ~reached, (open_ < 0) & reached)
+            wrong = np.where(self.bears, pressure, open_) < 0
             if not wrong.any():
                 break
             self.bears, self.factor = self.bears ^ wrong, None
@@ -236,11 +232,11 @@ def solve(batch: Batch, start: State, turn: ComplexArray, equations: dict[int, E
             mine = np.flatnonzero(rows.at == b)
             known = equations[b].points if b in equations and (error[b] < CHORD or number == 0) else ()
             if not np.isin(rows.points[mine][asks[mine]], known).all():
-                may = mine[(np.convolve(asks[mine], np.ones(2 * BESIDE + 1))[BESIDE:-BESIDE] > 0) & rows.reached[mine]]
+                may = mine[np.convolve(asks[mine], np.ones(2 * BESIDE + 1))[BESIDE:-BESIDE] > 0]
                 equations[b] = equations_of(batch, b, taken(rows, may), p[may] > 0)
             own = equations[b]
             on = mine[np.searchsorted(rows.points[mine], own.points)]
-            new[on] = own.solve(off[on] + own.matrix @ p[on], rows.reached[on])
+            new[on] = own.solve(off[on] + own.matrix @ p[on])
         pressed, loads = np.zeros(len(pressure)), rows.forces(new, len(forces))
         pressed[rows.points] = new
         for b in np.flatnonzero(live).tolist():
