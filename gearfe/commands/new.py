@@ -5,16 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-KINDS = {
-    "stiffness": "mesh stiffness of a gear pair",
-    "loadmap": "stiffness and root stress over angle and torque",
-    "microgeometry": "reliefs and errors of micrometres",
-    "study": "many microgeometries of a pair: yield, sensitivities",
-    "vibration": "two shafts with a gear pair in a housing",
-    "runup": "that train over its speed: orders, critical speeds",
-    "housing": "a parametric housing: frequencies, modes, reduced body",
-    "mechanism": "a crank and a rod",
-}
+from ..tables.examples import JOBS, job_file
+
 #: Command that runs a job with these tables, the first one that is there.
 RUNS = {
     "bodies": "mechanism",
@@ -27,9 +19,7 @@ RUNS = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument(
-        "kind", nargs="?", metavar="KIND", help=f"{', '.join(KINDS)}, or a shipped job, as housing.toml"
-    )
+    parser.add_argument("kind", nargs="?", metavar="KIND", help=f"{', '.join(JOBS)}, or a shipped job, as housing.toml")
     parser.add_argument("file", nargs="?", metavar="FILE", help="file to write (default: KIND.toml)")
     parser.add_argument("--list", action="store_true", help="tell the kinds and the shipped jobs")
     parser.add_argument("--force", action="store_true", help="replace files that exist")
@@ -39,17 +29,16 @@ def run(args: argparse.Namespace) -> int:
     """Write the file."""
     from ..errors import InputError, unknown_name
     from ..output.files import whole_file
-    from ..tables.examples import job_file
 
     shipped = {path.name: path for folder in _folders() for path in sorted(folder.glob("*.toml"))}
     if args.list or args.kind is None:
-        for name, description in KINDS.items():
-            print(f"  {name:<26} {description}")
+        for name, (about, *_) in JOBS.items():
+            print(f"  {name:<26} {about}")
         for name, path in shipped.items():
             print(f"  {name:<26} {_first_line(path)}")
         return 0
-    if args.kind not in (*KINDS, *shipped):
-        raise unknown_name("kind of job", args.kind, (*KINDS, *shipped))
+    if args.kind not in (*JOBS, *shipped):
+        raise unknown_name("kind of job", args.kind, (*JOBS, *shipped))
     target = Path(args.file or (args.kind if args.kind in shipped else f"{args.kind}.toml"))
     if target.is_dir():
         raise InputError("file", str(target), "is a folder", f"name a file in it, as {target / args.kind}.toml")
@@ -80,7 +69,7 @@ def _command(kind: str, text: str) -> str:
     import tomllib
 
     tables = tomllib.loads(text)
-    return kind if kind in KINDS else next((RUNS[name] for name in RUNS if name in tables), "stiffness")
+    return kind if kind in JOBS else next((RUNS[name] for name in RUNS if name in tables), "stiffness")
 
 
 def _folders() -> list[Path]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 import textwrap
 from collections.abc import Mapping
 from typing import Any
 
 from ..config import table_class
+from .mechanism import MechanismFile
 from .text import table_text
 
 OPTIONAL_KEYS = "Keys behind a # are optional and stand with their defaults; those that are not set have none."
@@ -120,28 +120,18 @@ LOADMAP: dict[str, Any] = {"torques_Nm": [20.0, 50.0, 100.0, 200.0], "root_stres
 
 RUNUP: dict[str, Any] = {"speed_start_rad_per_s": 300.0, "speed_stop_rad_per_s": 1200.0, "speeds": 100}
 
-#: Kind -> what the file is about, and its tables.
-JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
-    "stiffness": (
-        "Mesh stiffness of a gear pair. Run it: gearfe stiffness FILE --out DIR. " + OPTIONAL_KEYS,
-        {"pair": PAIR, "stiffness": STIFFNESS},
-    ),
-    "loadmap": (
-        "Mesh stiffness and root stress of a gear pair over angle and torque. Run it: gearfe loadmap FILE --out DIR. "
-        + OPTIONAL_KEYS,
-        {"pair": PAIR, "loadmap": LOADMAP},
-    ),
-    "microgeometry": (
-        "Deviations of micrometres of a gear pair. Run it: gearfe microgeometry FILE --out DIR. " + OPTIONAL_KEYS,
-        {"pair": PAIR, "microgeometry": MICROGEOMETRY},
-    ),
+#: Kind, which is the command that runs it -> what the file is about, its tables, and what else its head says.
+JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
+    "stiffness": ("mesh stiffness of a gear pair", {"pair": PAIR, "stiffness": STIFFNESS}, ""),
+    "loadmap": ("stiffness and root stress over angle and torque", {"pair": PAIR, "loadmap": LOADMAP}, ""),
+    "microgeometry": ("reliefs and errors of micrometres", {"pair": PAIR, "microgeometry": MICROGEOMETRY}, ""),
     "study": (
-        "Many microgeometries of a gear pair. Run it: gearfe study FILE --out DIR. " + OPTIONAL_KEYS,
+        "many microgeometries of a pair: yield, sensitivities",
         {"pair": PAIR, "microgeometry": MICROGEOMETRY_OF_STUDY, "study": STUDY},
+        "",
     ),
     "vibration": (
-        "A gear train in its housing: two shafts with one gear pair. Run it: gearfe vibration FILE --out DIR, gearfe "
-        "runup FILE. Shafts run along y; speeds and torques count positive about +y. " + OPTIONAL_KEYS,
+        "two shafts with a gear pair in a housing",
         {
             "pair": PAIR,
             "stiffness": {"twist_deg": 0.05},
@@ -150,31 +140,32 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]]]] = {
             "spectrum": {},
             "runup": RUNUP,
         },
+        "Over its speed: gearfe runup FILE. Shafts run along y; speeds and torques count positive about +y. ",
     ),
     "runup": (
-        "Steady states of a gear train over the speed of its drive: waterfall, orders, critical speeds. Run it: gearfe "
-        "runup FILE --out DIR. " + OPTIONAL_KEYS,
+        "steady states of a gear train over its speed: waterfall, orders, critical speeds",
         {"pair": PAIR, "stiffness": {"twist_deg": 0.05}, "train": TRAIN, "housing": HOUSING, "runup": RUNUP},
+        "",
     ),
     "housing": (
-        "An elastic housing: frequencies, modes, a reduced body. Run it: gearfe housing FILE --out DIR. Your own mesh "
-        "instead: gearfe new box.toml. " + OPTIONAL_KEYS,
+        "an elastic housing: frequencies, modes, reduced body",
         {"housing": HOUSING},
+        "Your own mesh instead: gearfe new box.toml. ",
     ),
+    "mechanism": ("a planar mechanism: a crank and a rod", {"": MECHANISM}, ""),
 }
-
-MECHANISM_HEAD = "A planar mechanism. Run it: gearfe mechanism FILE --out DIR. " + OPTIONAL_KEYS
 
 
 def job_file(kind: str) -> str:
-    """Text of an example job file: a kind of `JOBS`, or ``mechanism``."""
-    if kind == "mechanism":
-        # this job is one table, the file itself; the title stands above the tables
-        cls = importlib.import_module("gearfe.tables.mechanism").MechanismFile
-        return _head(MECHANISM_HEAD) + table_text(cls, MECHANISM)
-    head, tables = JOBS[kind]
-    return _head(head) + "\n".join(table_text(table_class(name), tables[name], name) for name in tables)
-
-
-def _head(text: str) -> str:
-    return textwrap.fill(text, 118, initial_indent="# ", subsequent_indent="# ") + "\n\n"
+    """Text of an example job file: a kind of `JOBS`."""
+    about, tables, more = JOBS[kind]
+    head = f"{about[0].upper()}{about[1:]}. Run it: gearfe {kind} FILE --out DIR. {more}{OPTIONAL_KEYS}"
+    return (
+        textwrap.fill(head, 118, initial_indent="# ", subsequent_indent="# ")
+        + "\n\n"
+        + "\n".join(
+            # a mechanism is one table, the file itself
+            table_text(table_class(name) if name else MechanismFile, example, name)
+            for name, example in tables.items()
+        )
+    )
