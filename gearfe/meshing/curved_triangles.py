@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..elasticity import triangle_shapes
 from ..typing import Array, IntArray
 
 #: Places in a triangle at which its Jacobian is looked at (area coordinates): det is quadratic there.
@@ -25,13 +26,9 @@ def least_jacobian(points: Array, triangles: Array) -> Array:
         Corners counter-clockwise, then the nodes in the middle of edges 01, 12, 20.
     """
     place = points[triangles]
-    least = np.full(len(triangles), np.inf)
-    for a, b, c in _PLACES:
-        zero = 0 * a
-        along_b = np.array([1 - 4 * a, 4 * b - 1, zero, 4 * (a - b), 4 * c, -4 * c])
-        along_c = np.array([1 - 4 * a, zero, 4 * c - 1, -4 * b, 4 * b, 4 * (a - c)])
-        u, v = np.einsum("k,nkj->nj", along_b, place), np.einsum("k,nkj->nj", along_c, place)
-        least = np.minimum(least, u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    slopes = triangle_shapes(*_PLACES[:, 1:].T)[1]
+    (u, v), (r, s) = np.einsum("nki,pkj->ijnp", place, slopes, optimize=True)
+    least = (u * s - v * r).min(axis=1)
     u, v = place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         return least / np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])

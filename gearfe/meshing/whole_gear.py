@@ -12,50 +12,34 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..gear.pair import Gear, GearPair
-from ..typing import Array, IntArray
+from ..typing import IntArray
 from .export import MeshPart
 from .tooth_sector import SectorMesh, SectorRecipe, sector_mesh
 
 
 @dataclass(frozen=True)
-class WholeGear:
-    """Second-order triangles of a whole gear in the frame of its hub, which is that of tooth 0.
+class WholeGear(MeshPart):
+    """A whole gear in the frame of its hub, that of tooth 0: triangles tooth by tooth, boundaries of `OUTLINE`.
 
     Attributes
     ----------
-    points : ndarray, shape (n, 2)
-        Node positions (m).
-    triangles : ndarray, shape (m, 6)
-        Corner nodes counter-clockwise, then the nodes in the middle of edges 01, 12, 20; tooth by tooth.
-    boundaries : dict of str to ndarray, shape (k, 3)
-        Outline edges (start, middle, end node): ``bore``, ``root``, ``flank_right``, ``flank_left``, ``tip``.
-    contact : ndarray, shape (z, e, 3)
-        `SectorMesh.contact_edges` of each tooth.
-    numbers : ndarray, shape (z, s)
-        Node of the whole gear for each tooth and each node of the sector.
+    contact : ndarray of shape (e, 3) for each tooth
+        `SectorMesh.contact_edges`.
+    numbers : ndarray of shape (s,) for each tooth
+        Node of the whole gear for each node of the tooth's sector.
     """
 
-    points: Array
-    triangles: IntArray
-    boundaries: dict[str, IntArray]
-    contact: IntArray
-    numbers: IntArray
+    contact: Sequence[IntArray]
+    numbers: Sequence[IntArray]
 
 
 def whole_gear(mesh: SectorMesh) -> WholeGear:
     """Join `mesh.teeth` turned copies of a sector."""
-    sectors = [mesh] * mesh.teeth
-    points, joined = _joined(sectors)
-    numbers = np.array(joined)
-    contact = numbers[:, mesh.contact_edges()]
-    return WholeGear(points, numbers[:, mesh.triangles].reshape(-1, 6), _outline(sectors, joined), contact, numbers)
+    return _joined([mesh] * mesh.teeth)
 
 
-def _joined(sectors: Sequence[SectorMesh]) -> tuple[Array, list[IntArray]]:
-    """Points of a whole gear (m), and the node of each point of its sectors, tooth by tooth.
-
-    Neighbouring sectors have the same nodes on their common side.
-    """
+def _joined(sectors: Sequence[SectorMesh]) -> WholeGear:
+    """The gear of these sectors, tooth by tooth: neighbours have the same nodes on their common side."""
     own = [np.setdiff1d(np.arange(len(sector.points)), sector.cut_left) for sector in sectors]
     first = np.cumsum([0, *map(len, own)])
     numbers, points = [np.zeros(len(sector.points), dtype=np.int64) for sector in sectors], []
@@ -67,22 +51,17 @@ def _joined(sectors: Sequence[SectorMesh]) -> tuple[Array, list[IntArray]]:
     for k, sector in enumerate(sectors):  # the left side of a sector is the right side of the next one
         after = (k + 1) % len(sectors)
         numbers[k][sector.cut_left] = numbers[after][sectors[after].cut_right]
-    return np.concatenate(points), numbers
-
-
-def _outline(sectors: Sequence[SectorMesh], numbers: Sequence[IntArray]) -> dict[str, IntArray]:
-    """Boundaries of a whole gear by the names of `OUTLINE`, edges (k, 3)."""
-    made = {}
-    for name, parts in OUTLINE.items():
-        found = [
-            own[sector.boundaries[part]]
-            for sector, own in zip(sectors, numbers, strict=True)
-            for part in parts
-            if part in sector.boundaries
-        ]
-        if found:
-            made[name] = np.concatenate(found)
-    return made
+    numbered = list(zip(sectors, numbers, strict=True))
+    return WholeGear(
+        points=np.concatenate(points),
+        triangles=np.concatenate([own[sector.triangles] for sector, own in numbered]),
+        boundaries={
+            name: np.concatenate([own[sector.boundaries[part]] for sector, own in numbered for part in parts])
+            for name, parts in OUTLINE.items()
+        },
+        contact=[own[sector.contact_edges()] for sector, own in numbered],
+        numbers=numbers,
+    )
 
 
 #: Flank elements of the coarse teeth (modules): nothing touches them.
@@ -94,7 +73,7 @@ OUTLINE = {
 }  # fmt: skip
 
 
-def mixed_gear(gear: Gear, recipe: SectorRecipe, fine: Collection[int]) -> MeshPart:
+def mixed_gear(gear: Gear, recipe: SectorRecipe, fine: Collection[int]) -> WholeGear:
     """Whole gear whose teeth `fine` have the elements of `recipe`, the others the coarsest that fit.
 
     Parameters
@@ -104,17 +83,15 @@ def mixed_gear(gear: Gear, recipe: SectorRecipe, fine: Collection[int]) -> MeshP
 
     Returns
     -------
-    MeshPart
-        With the boundaries of `OUTLINE` round all teeth, and ``contact``: the driving flanks of the fine teeth with
-        their tip rounds and the upper half of the fillets, each edge (root side, middle, tip side).
+    WholeGear
+        With a boundary ``contact`` more: the driving flanks of the fine teeth with their tip rounds and the upper half
+        of the fillets, each edge (root side, middle, tip side).
     """
     mesh, numbered = sector_mesh(gear, recipe), {k % gear.teeth for k in fine}
     coarse = mesh if len(numbered) == gear.teeth else _coarse(gear, recipe, mesh)
-    sectors = [mesh if k in numbered else coarse for k in range(gear.teeth)]
-    points, numbers = _joined(sectors)
-    triangles = np.concatenate([own[sector.triangles] for sector, own in zip(sectors, numbers, strict=True)])
-    contact = np.concatenate([numbers[k][mesh.contact_edges()] for k in sorted(numbered)])
-    return MeshPart(points, triangles, {**_outline(sectors, numbers), "contact": contact})
+    made = _joined([mesh if k in numbered else coarse for k in range(gear.teeth)])
+    contact = np.concatenate([made.contact[k] for k in sorted(numbered)])
+    return replace(made, boundaries={**made.boundaries, "contact": contact})
 
 
 def in_mesh(pair: GearPair) -> tuple[float, float]:

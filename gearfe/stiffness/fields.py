@@ -195,6 +195,7 @@ class GearRecovery:
     def at(self, pair: MeshingPair, gear: int, position: Positions) -> GearField:
         """Fields at a converged position of the pair whose pinion (0) or wheel (1) it is."""
         body, whole = self.body, self.whole
+        numbers = np.array(whole.numbers)  # (z, s)
         angle = pair.tooth_angle(gear, 0, position.pinion_angle, position.twist)
         teeth = body.teeth
         every = np.arange(teeth)
@@ -203,24 +204,23 @@ class GearRecovery:
         c, s = np.cos(turns), np.sin(turns)
         x, y = local[:, 0], local[:, 1]
         displacement = np.empty((len(whole.points), 2))
-        displacement[whole.numbers.T] = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+        displacement[numbers.T] = np.stack([c * x - s * y, s * x + c * y], axis=-1)
         loads, beside = bumped(body, position, gear)
         if beside:
             local = sector_displacements(body, loads, np.zeros_like(every), every)
         sums = (self.stress_rows @ local.reshape(-1, teeth)).reshape(-1, 3, teeth)
-        counts = self.elements[whole.numbers]
+        counts = self.elements[numbers]
         for tooth, stress in beside:
             sums[:, :, tooth % teeth] += counts[tooth % teeth][:, None] * stress.T
         turned = _turned(sums.swapaxes(0, 1), c, s)
-        numbers = whole.numbers.T.ravel()
-        total = [np.bincount(numbers, part.ravel(), len(whole.points)) / self.elements for part in turned]
+        total = [np.bincount(numbers.T.ravel(), part.ravel(), len(whole.points)) / self.elements for part in turned]
         held = body.material.poisson_ratio if body.plane == "strain" else 0.0
         points = whole.points @ turn(angle).T + pair.centre(gear)
         stress = np.stack([total[0], total[1], held * (total[0] + total[1]), total[2]], axis=1)
         pressure = np.zeros(len(points))
         for one in flank_pressures(pair, position):
             if one.gear == gear:
-                nodes = whole.numbers[one.tooth % teeth][body.flank.nodes]
+                nodes = numbers[one.tooth % teeth][body.flank.nodes]
                 pressure[nodes] = np.maximum(pressure[nodes], one.at_nodes(len(nodes)))
         return GearField(points, whole.triangles, displacement, stress, pressure)
 
