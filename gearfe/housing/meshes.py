@@ -20,7 +20,7 @@ from ..typing import Array, BoolArray, IntArray
 from .mesh_checks import boundary_faces
 from .mesh_error import energy_lost, energy_lost_by_element
 from .prism_error import prism_energy_lost
-from .surface import Surface, SurfaceQuadrature, normal_velocity, surface_quadrature
+from .surface import FaceFunctions, Surface, normal_velocity, triangle_functions
 
 #: Which faces are outside, from their centres (f, 3) in m.
 Outer = Callable[[Array], BoolArray]
@@ -55,7 +55,7 @@ class Tetrahedra:
         """Surface but for faces that lie wholly within one of the sets of nodes, or are not `outer`."""
         faces = boundary_faces(self.cells)
         faces = faces[_chosen(self.nodes, faces, faces[:, :3], without, outer)]
-        return Surface(faces, normal_velocity(surface_quadrature(self.nodes, faces), faces, len(self.nodes)))
+        return Surface(faces, normal_velocity(triangle_functions(faces.shape[1]), self.nodes, faces))
 
     def energy_lost(self, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]) -> Array:
         """See `gearfe.housing.mesh_error.energy_lost`."""
@@ -108,14 +108,14 @@ class Prisms:
             edges = _outline(mesh.triangles[solid])
             sides.append((edges[..., None] * levels + own).reshape(len(edges), -1))
         triangles, velocities = [], []
-        for numbers, split, quadrature in (
-            (np.concatenate(ends), _SPLIT, _end_quadrature),
-            (np.concatenate(sides), _side_split(), _side_quadrature),
+        for numbers, split, functions in (
+            (np.concatenate(ends), _SPLIT, FaceFunctions(*triangle_rule()[1:])),
+            (np.concatenate(sides), _side_split(), _side_functions()),
         ):
             faces = self._renumbered(numbers)
             faces = faces[_chosen(self.nodes, faces, faces, without, outer)]
             triangles.append(faces[:, split].reshape(-1, 3))
-            velocities.append(normal_velocity(quadrature(self.nodes[faces]), faces, len(self.nodes)))
+            velocities.append(normal_velocity(functions, self.nodes, faces))
         return Surface(np.concatenate(triangles), sparse.csr_array(sparse.vstack(velocities)))
 
     def energy_lost(self, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]) -> Array:
@@ -170,15 +170,8 @@ def _side_split() -> IntArray:
     return np.array(made)
 
 
-def _end_quadrature(place: Array) -> SurfaceQuadrature:
-    """Functions and area vectors of plane triangles with nodes at `place` (f, 10, 3)."""
-    rule = triangle_rule()
-    one, two = (np.einsum("fak,ap->fpk", place, rule.slopes[..., axis]) for axis in range(2))
-    return SurfaceQuadrature(rule.values.T, np.cross(one, two) * rule.weights[:, None])
-
-
-def _side_quadrature(place: Array) -> SurfaceQuadrature:
-    """The same of faces (f, 16, 3) over an edge, its four nodes ends first, times four levels."""
+def _side_functions() -> FaceFunctions:
+    """Functions of a face over an edge, its four nodes ends first, times four levels."""
     x, w = np.polynomial.legendre.leggauss(ORDER + 1)
     line = lagrange()
     edge = [line[k] for k in (0, ORDER, 1, 2)]
@@ -188,7 +181,5 @@ def _side_quadrature(place: Array) -> SurfaceQuadrature:
     def product(one: Array, two: Array) -> Array:
         return np.einsum("as,bt->abst", one, two).reshape(len(one) * len(two), -1)
 
-    one, two = (
-        np.einsum("fak,ap->fpk", place, slopes) for slopes in (product(d_along, level), product(along, d_level))
-    )
-    return SurfaceQuadrature(product(along, level).T, np.cross(two, one) * np.outer(w, w).reshape(-1, 1))
+    slopes = np.stack([product(along, d_level), product(d_along, level)], axis=-1)
+    return FaceFunctions(product(along, level), slopes, np.outer(w, w).ravel())

@@ -6,6 +6,7 @@ r"""Outer surface of a body: faces, normals, and the integral of the squared nor
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -14,50 +15,56 @@ from scipy import sparse
 from ..typing import Array, IntArray
 
 
-class SurfaceQuadrature(NamedTuple):
-    """Values at the quadrature points of ``f`` faces, ``p`` points each."""
+class FaceFunctions(NamedTuple):
+    """Functions of the ``a`` nodes of a face, at the ``p`` points of a quadrature rule."""
 
-    #: (p, a) shape functions
+    #: (a, p)
     values: Array
-    #: (f, p, 3) outward normals times the area that belongs to the point (m2)
-    areas: Array
+    #: (a, p, 2) derivatives by two directions, anticlockwise seen from outside
+    slopes: Array
+    #: (p,)
+    weights: Array
+
+    def areas(self, place: Array) -> Array:
+        """(f, p, 3) outward normals times the points' areas (m2), of faces with nodes at `place` (f, a, 3) (m)."""
+        first, second = (np.einsum("fak,ap->fpk", place, self.slopes[..., axis]) for axis in range(2))
+        return np.asarray(np.cross(first, second) * self.weights[:, None])
 
 
-def surface_quadrature(nodes: Array, faces: IntArray) -> SurfaceQuadrature:
-    """Shape functions and area vectors of (f, 3) or (f, 6) faces, curved or flat; exact for squares on flat faces."""
+@cache
+def triangle_functions(a: int) -> FaceFunctions:
+    """Functions of triangles with 3 or 6 nodes; the rule is exact for squares on flat ones."""
     from skfem import ElementTriP1, ElementTriP2
     from skfem.quadrature import get_quadrature_tri
 
-    element, order = (ElementTriP1(), 2) if faces.shape[1] == 3 else (ElementTriP2(), 4)
+    element, order = (ElementTriP1(), 2) if a == 3 else (ElementTriP2(), 4)
     points, weights = get_quadrature_tri(order)
-    basis = [element.lbasis(points, k) for k in range(faces.shape[1])]
-    values = np.array([np.broadcast_to(v, weights.shape) for v, _ in basis]).T
-    slopes = np.array([np.broadcast_to(g, (2, len(weights))) for _, g in basis])
-    first, second = (np.einsum("fak,ap->fpk", nodes[faces], slopes[:, axis]) for axis in range(2))
-    return SurfaceQuadrature(values, np.cross(first, second) * weights[:, None])
+    basis = [element.lbasis(points, k) for k in range(a)]
+    values = np.array([np.broadcast_to(v, weights.shape) for v, _ in basis])
+    slopes = np.array([np.broadcast_to(g, (2, len(weights))).T for _, g in basis])
+    return FaceFunctions(values, slopes, weights)
 
 
 def nodal_normals(nodes: Array, faces: IntArray) -> Array:
     """(n, 3) outward unit normals at the nodes of the faces, weighted by area; zero at all other nodes."""
-    quadrature = surface_quadrature(nodes, faces)
-    total = np.zeros_like(nodes)
-    weight = np.abs(quadrature.values) / np.abs(quadrature.values).sum(axis=1, keepdims=True)
-    parts = np.einsum("pa,fpk->fak", weight, quadrature.areas)
+    functions, total = triangle_functions(faces.shape[1]), np.zeros_like(nodes)
+    weight = np.abs(functions.values) / np.abs(functions.values).sum(axis=0)
+    parts = np.einsum("ap,fpk->fak", weight, functions.areas(nodes[faces]))
     for axis in range(3):
         total[:, axis] = np.bincount(faces.ravel(), weights=parts[:, :, axis].ravel(), minlength=len(nodes))
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.divide(total, length, out=np.zeros_like(total), where=length > 0.0)
 
 
-def normal_velocity(quadrature: SurfaceQuadrature, faces: IntArray, n: int) -> sparse.csr_array:
+def normal_velocity(functions: FaceFunctions, nodes: Array, faces: IntArray) -> sparse.csr_array:
     """(f p, 3 n) matrix G with ``|G v|^2`` the integral of the squared normal velocity over the faces (m4/s2)."""
-    size = np.linalg.norm(quadrature.areas, axis=2)
-    scaled = quadrature.areas / np.sqrt(np.maximum(size, 1e-300))[..., None]
-    entries = np.einsum("pa,fpk->fpak", quadrature.values, scaled)
+    areas = functions.areas(nodes[faces])
+    scaled = areas / np.sqrt(np.maximum(np.linalg.norm(areas, axis=2), 1e-300))[..., None]
+    entries = np.einsum("ap,fpk->fpak", functions.values, scaled)
     f, p, a, _ = entries.shape
     columns = np.broadcast_to(3 * faces[:, None, :, None] + np.arange(3), entries.shape)
     starts = np.arange(0, f * p * a * 3 + 1, a * 3)
-    return sparse.csr_array((entries.ravel(), columns.ravel(), starts), shape=(f * p, 3 * n))
+    return sparse.csr_array((entries.ravel(), columns.ravel(), starts), shape=(f * p, 3 * len(nodes)))
 
 
 class Surface(NamedTuple):
