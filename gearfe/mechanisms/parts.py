@@ -112,10 +112,10 @@ def part_of(
     try:
         return getattr(importlib.import_module(module), cls)(**values, name=name)
     except InputError as error:  # of the class's field: the file has a key
-        key = next((key for key, of in kind.fields.items() if error.field.endswith(f" {of}")), None)
-        if key is None:
+        wrong = next((key for key, of in kind.fields.items() if error.field.endswith(f" {of}")), None)
+        if wrong is None:
             raise
-        raise InputError(f"{label}.{key}", error.value, error.problem, error.cure) from None
+        raise InputError(f"{label}.{wrong}", error.value, error.problem, error.cure) from None
 
 
 def _profile(name: str, tables: Mapping[str, ValueTable], label: str) -> ValueTable:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..typing import Array
+from . import kernel_stages, lanes
 from .explicit import on_constraints
 from .start import Start
 from .system import System
@@ -137,20 +138,6 @@ def defect(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
     return float(np.sqrt(np.mean((off / w.limit) ** 2)))
 
 
-def end_state(w: Stages, tab: Scheme) -> None:
-    """Coordinates and velocities at the step's end."""
-    h = w.now[1]
-    w.qn[:] = w.q + h * w.v + w.Z[:, :-1] @ tab.ends[0]
-    w.vn[:] = w.v + w.Z[:, :-1] @ tab.ends[1] / h
-
-
-def keep_path(w: Stages) -> None:
-    """What the dense output goes through."""
-    h = w.now[1]
-    w.known[0], w.known[1], w.known[-2], w.known[-1] = w.q, h * w.v, w.qn, h * w.vn
-    w.known[2:-2] = w.Q[:, : len(w.known) - 4].T
-
-
 def gap_between(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
     """Largest gap of a row between the stages, in its unit."""
     if not eq.active.any() or not np.isfinite(w.known).all():
@@ -223,7 +210,8 @@ def saddle_solver(
 
 
 FUNCTIONS = (
-    begin, stages, linearise, factorise, solve, change, defect, end_state, keep_path, gap_between, project,
+    begin, stages, linearise, factorise, solve, change, defect, kernel_stages.end_state, kernel_stages.keep_path,
+    gap_between, project,
 )  # fmt: skip
-NAMES = {"np": np, "math": math, "saddle_solver": saddle_solver, "joint_stiffness": joint_stiffness,
+NAMES = {**lanes.NAMES, "np": np, "math": math, "saddle_solver": saddle_solver, "joint_stiffness": joint_stiffness,
          "on_constraints": on_constraints}  # fmt: skip
