@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,6 @@ from scipy import sparse
 
 from .elasticity import Material
 from .typing import Array, BoolArray, IntArray
-
-MassRule = Literal["exact", "4-point"]
 
 #: Corner pairs of the edges in the order of the midside nodes (VTK, Abaqus, CalculiX; scikit-fem's too).
 EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
@@ -56,7 +54,7 @@ def expand_nodal(nodal: sparse.csr_array) -> sparse.csr_array:
     return sparse.kron(nodal, sparse.eye_array(3), format="csr")
 
 
-def assemble(nodes: Array, tets: IntArray, material: Material, *, mass_rule: MassRule = "exact") -> SolidMatrices:
+def assemble(nodes: Array, tets: IntArray, material: Material) -> SolidMatrices:
     """Stiffness and consistent mass of a tetrahedral mesh.
 
     Parameters
@@ -67,8 +65,6 @@ def assemble(nodes: Array, tets: IntArray, material: Material, *, mass_rule: Mas
         Node numbers, corners first, midside nodes in the order of `EDGES`.
     material
         The solid.
-    mass_rule
-        ``"exact"``, or ``"4-point"``: the under-integrated mass of second-order tetrahedra of CalculiX and others.
     """
     curved = curved_elements(nodes, tets)
     tets = np.concatenate([tets[~curved], tets[curved]])
@@ -76,8 +72,7 @@ def assemble(nodes: Array, tets: IntArray, material: Material, *, mass_rule: Mas
     parts = []
     for part, degrees in ((straight, (2, 6)), (bent, (CURVED_DEGREE, 7))):
         if len(part):
-            degree = 2 if mass_rule == "4-point" else degrees[1]
-            stiff, heavy = (shape_functions(tets.shape[1], one) for one in (degrees[0], degree))
+            stiff, heavy = (shape_functions(tets.shape[1], degree) for degree in degrees)
             parts.append(element_matrices(nodes, part, material, (stiff, stiff), (heavy, heavy)))
     pattern = _pattern(tets, len(nodes))
 

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+from scipy import sparse
 
+from gearfe.elasticity import Material
+from gearfe.housing.meshes import Tetrahedra
+from gearfe.housing.model import Housing
 from gearfe.housing.surface import triangle_functions
-from gearfe.solid import EDGES
+from gearfe.solid import EDGES, SolidMatrices, maps, shape_functions
+
+DATA = Path(__file__).parent / "data"
 
 #: Six tetrahedra that fill a cube, positive volume; corner k has the coordinates of k's three bits (x, y, z).
 _KUHN = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
@@ -49,3 +58,30 @@ def second_order(nodes: np.ndarray, tets: np.ndarray) -> tuple[np.ndarray, np.nd
 def surface_area(nodes: np.ndarray, faces: np.ndarray) -> float:
     """Area of faces (m2)."""
     return float(np.linalg.norm(triangle_functions(faces.shape[1]).areas(nodes[faces]), axis=2).sum())
+
+
+class FourPoint(Tetrahedra):
+    """Tetrahedra of the second order whose mass is integrated with 4 points, as CalculiX and others do."""
+
+    def assemble(self, material: Material) -> SolidMatrices:
+        own, exact = shape_functions(10, 2), super().assemble(material)
+        weights = material.density * maps(self.nodes, self.cells, own.slopes)[0] * own.weights
+        mass = np.einsum("ap,bp,ep->eab", own.values, own.values, weights)
+        at = (np.repeat(self.cells, 10, axis=1).ravel(), np.tile(self.cells, (1, 10)).ravel())
+        return exact._replace(nodal_mass=sparse.csr_array((mass.ravel(), at), shape=exact.nodal_mass.shape))
+
+
+def reference_housing(*, four_point: bool = False) -> Housing:
+    """The stored mesh with its six bores (odd on the +y wall) and its clamped feet."""
+    p = json.loads((DATA / "gearbox_housing.json").read_text(encoding="utf-8"))["params"]
+    with np.load(DATA / "gearbox_housing_mesh.npz") as stored:
+        nodes, tets = stored["points_p2"], stored["tets_p2"]
+    inner, outer = p["yin"] / 2, p["yin"] / 2 + p["tw"] + p["hb"]
+    bores = []
+    for x, z in zip(p["xs"], p["zs"], strict=True):
+        bores += [((x, 0.0, z), (0.0, 1.0, 0.0), p["rb"], side) for side in ((inner, outer), (-outer, -inner))]
+    # the base's underside lies in the same plane as the bottoms of the feet, which stand outboard of its ends
+    bottom = np.abs(nodes[:, 2] - (p["z0"] - p["tb"])) < 1e-9
+    feet = bottom & ((nodes[:, 0] < p["x0"] + 1e-9) | (nodes[:, 0] > p["x1"] - 1e-9))
+    made = Housing.from_arrays(nodes, tets, bores, feet, material=Material(p["E"], p["nu"], p["rho"]))
+    return replace(made, mesh=FourPoint(made.mesh.nodes, made.mesh.cells)) if four_point else made

@@ -232,8 +232,6 @@ def test_bad_attachments_and_supports_are_named() -> None:
     ):
         with pytest.raises(InputError, match=message):
             Housing.from_arrays(nodes, tets, [], fixed)
-    with pytest.raises(InputError, match="mass"):
-        Housing.from_arrays(nodes, tets, mass="lumped")  # type: ignore[arg-type]
 
 
 def test_folded_curved_elements_are_straightened_and_named() -> None:

@@ -14,35 +14,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.elasticity import Material
 from gearfe.housing.model import Housing
 
 from .full_model import full_model
+from .housing_meshes import reference_housing
 from .newmark import newmark, smooth_ramp
 
 DATA = Path(__file__).parent / "data"
 REFERENCE: dict[str, Any] = json.loads((DATA / "gearbox_housing.json").read_text())
 
 
-def reference_housing(mass: Any = "exact") -> Housing:
-    """The stored mesh with its six bores (odd on the +y wall) and its clamped feet."""
-    p = REFERENCE["params"]
-    with np.load(DATA / "gearbox_housing_mesh.npz") as stored:
-        nodes, tets = stored["points_p2"], stored["tets_p2"]
-    inner, outer = p["yin"] / 2, p["yin"] / 2 + p["tw"] + p["hb"]
-    bores = []
-    for x, z in zip(p["xs"], p["zs"], strict=True):
-        bores += [((x, 0.0, z), (0.0, 1.0, 0.0), p["rb"], side) for side in ((inner, outer), (-outer, -inner))]
-    # the base's underside lies in the same plane as the bottoms of the feet, which stand outboard of its ends
-    bottom = np.abs(nodes[:, 2] - (p["z0"] - p["tb"])) < 1e-9
-    feet = bottom & ((nodes[:, 0] < p["x0"] + 1e-9) | (nodes[:, 0] > p["x1"] - 1e-9))
-    material = Material(p["E"], p["nu"], p["rho"])
-    return Housing.from_arrays(nodes, tets, bores, feet, material=material, mass=mass)
-
-
 @pytest.fixture(scope="module")
 def four_point() -> Housing:
-    return reference_housing("4-point")
+    return reference_housing(four_point=True)
 
 
 @pytest.fixture(scope="module")

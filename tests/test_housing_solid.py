@@ -55,7 +55,7 @@ def skfem_mesh(nodes: np.ndarray, tets: np.ndarray) -> Any:
     return MeshTet2(locations, linear.t, validate=False)
 
 
-def general_element_matrices(nodes: np.ndarray, tets: np.ndarray, rule: str) -> tuple[np.ndarray, np.ndarray]:
+def general_element_matrices(nodes: np.ndarray, tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness (m, a, 3, a, 3) and mass of one axis (m, a, a) of any tetrahedra, curved or not, by scikit-fem's weak
     forms and isoparametric maps.
 
@@ -76,13 +76,13 @@ def general_element_matrices(nodes: np.ndarray, tets: np.ndarray, rule: str) -> 
     a = tets.shape[1]
     exact_order = 2 if a == 4 else 7
     k = stiffness.coo_data(Basis(mesh, ElementVector(scalar), intorder=1 if a == 4 else CURVED_DEGREE)).tolocal()
-    m = mass.coo_data(Basis(mesh, scalar, intorder=exact_order if rule == "exact" else 2)).tolocal()
+    m = mass.coo_data(Basis(mesh, scalar, intorder=exact_order)).tolocal()
     return k.reshape(len(tets), a, 3, a, 3), m
 
 
-def general_matrices(nodes: np.ndarray, tets: np.ndarray, rule: str) -> tuple[sparse.csr_array, sparse.csr_array]:
+def general_matrices(nodes: np.ndarray, tets: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
     """Matrices summed from scikit-fem's general vector forms, the independent route."""
-    stiffness, mass = general_element_matrices(nodes, tets, rule)
+    stiffness, mass = general_element_matrices(nodes, tets)
     a, n = tets.shape[1], len(nodes)
     rows = (3 * tets[:, :, None] + np.arange(3)).reshape(len(tets), -1)
     at = (np.repeat(rows, 3 * a, axis=1).ravel(), np.tile(rows, (1, 3 * a)).ravel())
@@ -91,14 +91,13 @@ def general_matrices(nodes: np.ndarray, tets: np.ndarray, rule: str) -> tuple[sp
     return k, sparse.csr_array((mass.ravel(), at), shape=(n, n))
 
 
-@pytest.mark.parametrize("rule", ["exact", "4-point"])
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("bent", [False, True])
-def test_blocks_equal_the_general_forms(rule: str, order: int, bent: bool) -> None:
+def test_blocks_equal_the_general_forms(order: int, bent: bool) -> None:
     nodes, tets = box((2, 2, 3), (1.0, 0.8, 1.1), order=order, mapped=wavy if bent else None)
     assert curved_elements(nodes, tets).any() == (bent and order == 2)
-    found = assemble(nodes, tets, STEEL, mass_rule=rule)  # type: ignore[arg-type]
-    k, m = general_matrices(nodes, tets, rule)
+    found = assemble(nodes, tets, STEEL)
+    k, m = general_matrices(nodes, tets)
     assert abs(found.stiffness - k).max() < 1e-13 * abs(k).max()
     assert abs(found.nodal_mass - m).max() < 1e-13 * abs(m).max()
     assert abs(found.mass - sparse.kron(m, np.eye(3))).max() < 1e-13 * abs(m).max()
@@ -110,7 +109,7 @@ def test_straight_and_curved_elements_mix() -> None:
     nodes[moved] += RNG.uniform(-0.01, 0.01, (len(moved), 3))
     assert 0 < curved_elements(nodes, tets).sum() < len(tets)
     found = assemble(nodes, tets, STEEL)
-    k, m = general_matrices(nodes, tets, "exact")
+    k, m = general_matrices(nodes, tets)
     assert abs(found.stiffness - k).max() < 1e-13 * abs(k).max()
     assert abs(found.nodal_mass - m).max() < 1e-13 * abs(m).max()
 

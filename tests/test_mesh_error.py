@@ -18,8 +18,8 @@ from gearfe.reduction.lanczos import lowest_modes
 from gearfe.reduction.sparse_solver import factorize
 from gearfe.solid import assemble
 from gearfe.tables.housing import FeetTable, HousingMeshTable, HousingTable, ShaftAxisTable
-from tests.housing_meshes import box
-from tests.test_housing_reference import REFERENCE, reference_housing
+from tests.housing_meshes import box, reference_housing
+from tests.test_housing_reference import REFERENCE
 
 STEEL = Material()
 

@@ -294,7 +294,7 @@ def test_a_rigid_housing_loads_no_finite_elements() -> None:
 @pytest.mark.slow
 def test_reduced_against_full_housing_in_the_coupled_transient() -> None:
     """Same Newmark steps on the whole finite-element model of the reference housing and on its default reduction."""
-    from .test_housing_reference import reference_housing
+    from .housing_meshes import reference_housing
     from .train_full import coupled_transient, low_pass
 
     housing = reference_housing()

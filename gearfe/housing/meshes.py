@@ -15,7 +15,7 @@ from scipy import sparse
 from ..elasticity import Material
 from ..meshing.housing_mesh import REVERSED, Extrusion
 from ..prisms import ORDER, assemble_prisms, lagrange, triangle_rule
-from ..solid import MassRule, SolidMatrices, assemble
+from ..solid import SolidMatrices, assemble
 from ..typing import Array, BoolArray, IntArray
 from .mesh_checks import boundary_faces
 from .mesh_error import energy_lost, energy_lost_by_element
@@ -39,17 +39,14 @@ class Tetrahedra:
         Coordinates (m).
     cells : (m, 4) or (m, 10)
         Elements, midside nodes in the order of `gearfe.solid.EDGES`.
-    mass_rule
-        Integration of the mass.
     """
 
     nodes: Array
     cells: IntArray
-    mass_rule: MassRule = "exact"
 
     def assemble(self, material: Material) -> SolidMatrices:
         """Stiffness and mass."""
-        return assemble(self.nodes, self.cells, material, mass_rule=self.mass_rule)
+        return assemble(self.nodes, self.cells, material)
 
     def surface(self, without: list[IntArray], outer: Outer | None = None) -> Surface:
         """Surface but for faces that lie wholly within one of the sets of nodes, or are not `outer`."""

@@ -15,7 +15,7 @@ from ..progress import stage
 from ..reduction.craig_bampton import Partition, partition, reduce_model
 from ..reduction.modal_body import ModalBody
 from ..shown import Facts
-from ..solid import MassRule, SolidMatrices
+from ..solid import SolidMatrices
 from ..typing import Array, IntArray
 from .attachments import (
     Attachment,
@@ -92,7 +92,6 @@ class Housing(Facts):
         *,
         material: Material = STEEL,
         attachments: Sequence[Attachment] = (),
-        mass: MassRule = "exact",
         outer: Outer | None = None,
     ) -> Housing:
         """Housing from a mesh of any origin (gmsh, meshio, arrays).
@@ -112,8 +111,6 @@ class Housing(Facts):
             Steel by default.
         attachments
             Further attachments with node numbers of their own, after the bores.
-        mass
-            ``"exact"`` or ``"4-point"``.
         outer
             Picks the outer surface (which radiates sound and is shown) from the surface without bores and held faces:
             a function of the faces' centres (f, 3) (m) that returns f flags. By default all of it.
@@ -123,8 +120,6 @@ class Housing(Facts):
         InputError
             Names what is wrong with the mesh, a bore, an attachment or the held nodes.
         """
-        if mass not in ("exact", "4-point"):
-            raise InputError("mass", mass, "must be 'exact' or '4-point'", "take 'exact'")
         mesh = checked_mesh(nodes, tets)
         new_number = np.full(len(np.asarray(nodes)), -1)
         new_number[mesh.original] = np.arange(len(mesh.original))
@@ -133,7 +128,7 @@ class Housing(Facts):
             for given in attachments
         ]
         housing = cls.of_mesh(
-            Tetrahedra(mesh.nodes, mesh.tets, mass),
+            Tetrahedra(mesh.nodes, mesh.tets),
             bores,
             _fixed_nodes(fixed, mesh.nodes, new_number),
             material=material,

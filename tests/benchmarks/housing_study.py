@@ -16,10 +16,11 @@ import numpy as np
 from gearfe.housing.model import Housing
 
 from ..full_model import full_model
+from ..housing_meshes import reference_housing
 from ..newmark import newmark, smooth_ramp
 from .peers.process import missing, run_python
 from .record import Record
-from .subject import DATA, given_file, housing_of
+from .subject import housing_of
 from .timing import measured
 
 #: Thicknesses of the elements at inner edges (mm), coarse to fine; the last one is the truth of all others.
@@ -131,24 +132,6 @@ def below(signal: np.ndarray, step: float, limit_hz: float) -> np.ndarray:
     return np.fft.irfft(spectrum, len(signal))
 
 
-def reference_housing(mass: Any = "4-point") -> Housing:
-    """The stored mesh of `tests/data/gearbox_housing_mesh.npz` with its six bores and clamped feet."""
-    import json
-
-    from gearfe.elasticity import Material
-
-    p = json.loads(given_file(DATA / "gearbox_housing.json").read_text(encoding="utf-8"))["params"]
-    with np.load(given_file(DATA / "gearbox_housing_mesh.npz")) as stored:
-        nodes, tets = stored["points_p2"], stored["tets_p2"]
-    inner, outer = p["yin"] / 2, p["yin"] / 2 + p["tw"] + p["hb"]
-    bores: list[Any] = []
-    for x, z in zip(p["xs"], p["zs"], strict=True):
-        bores += [((x, 0.0, z), (0.0, 1.0, 0.0), p["rb"], side) for side in ((inner, outer), (-outer, -inner))]
-    bottom = np.abs(nodes[:, 2] - (p["z0"] - p["tb"])) < 1e-9
-    feet = bottom & ((nodes[:, 0] < p["x0"] + 1e-9) | (nodes[:, 0] > p["x1"] - 1e-9))
-    return Housing.from_arrays(nodes, tets, bores, feet, material=Material(p["E"], p["nu"], p["rho"]), mass=mass)
-
-
 def others(record: Record) -> None:
     """Mesh to 40 modes with clamped bores on the stored mesh: this program, CalculiX, exudyn.
 
@@ -198,12 +181,12 @@ def others(record: Record) -> None:
 
 def reference_or_small(record: Record, mass: str) -> Housing:
     """The stored mesh, or a coarse one of the shipped housing for a smoke run."""
-    return small_housing() if record.quick else reference_housing(mass)
+    return small_housing() if record.quick else reference_housing(four_point=mass == "4-point")
 
 
 def small_housing() -> Housing:
     """The reference's own elements without their midside nodes, for a smoke run."""
-    whole = reference_housing()
+    whole = reference_housing(four_point=True)
     return Housing.from_arrays(
         whole.nodes, whole.mesh.cells[:, :4], attachments=whole.attachments, fixed=whole.fixed, material=whole.material
     )
