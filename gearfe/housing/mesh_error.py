@@ -125,6 +125,29 @@ def _taken(residual: Array, stiffness: Array, acting: BoolArray) -> tuple[IntArr
     return chosen, np.matmul(upright, residual[chosen])
 
 
+#: Values (p,) of a function and its derivatives (d, p) by the reference axes, at p points.
+Function = tuple[Array, Array]
+
+
+def barycentric(points: Array) -> list[Function]:
+    """The coordinates of a simplex's corners, the first at the origin, at points (d, p)."""
+    slopes = np.vstack([-np.ones(len(points)), np.eye(len(points))])[:, :, None] * np.ones(points.shape[1])
+    return list(zip([1.0 - points.sum(axis=0), *points], slopes, strict=True))
+
+
+def difference(one: Function, other: Function) -> Function:
+    """One function less another."""
+    return one[0] - other[0], one[1] - other[1]
+
+
+def product(*factors: Function) -> Function:
+    """Product of functions."""
+    value, slope = factors[0]
+    for other, rise in factors[1:]:
+        value, slope = value * other, slope * other + value * rise
+    return value, slope
+
+
 class _Functions(NamedTuple):
     """Functions that the next order adds (s of them), and the elements' own, at p quadrature points."""
 
@@ -139,21 +162,11 @@ def _functions(a: int) -> _Functions:
     from skfem.quadrature import get_quadrature_tet
 
     points, _ = get_quadrature_tet(_DEGREE)
-    corner = np.array([1.0 - points.sum(axis=0), *points])
-    slope = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])[:, :, None]
-    values, slopes = [], []
-    for one, two in EDGES:
-        x, y, dx, dy = corner[one], corner[two], slope[one], slope[two]
-        if a == 4:
-            values.append(x * y)
-            slopes.append(y * dx + x * dy)
-        else:
-            values.append(x * y * (x - y))
-            slopes.append((2.0 * x * y - y * y) * dx + (x * x - 2.0 * x * y) * dy)
-    for one, two, three in _FACES if a == 10 else ():
-        x, y, z = corner[one], corner[two], corner[three]
-        values.append(x * y * z)
-        slopes.append(y * z * slope[one] + x * z * slope[two] + x * y * slope[three])
+    corners = barycentric(points)
+    edges = [(corners[one], corners[two], difference(corners[one], corners[two])) for one, two in EDGES]
+    made = [product(*(factors[:2] if a == 4 else factors)) for factors in edges]
+    made += [product(*(corners[k] for k in face)) for face in _FACES] if a == 10 else []
+    values, slopes = (list(part) for part in zip(*made, strict=True))
     own = shape_functions(a, _DEGREE)
     added = Functions(np.array(values), np.array(slopes), own.weights)
     themselves = np.einsum("smp,snp,p->pmns", added.slopes, added.slopes, added.weights)

@@ -19,7 +19,7 @@ from ..elasticity import Material
 from ..meshing.housing_mesh import Extrusion
 from ..prisms import ORDER, isotropic_blocks, lagrange, plane_parts, triangle_maps, triangle_rule
 from ..typing import Array, IntArray
-from .mesh_error import add_up, energy_taken
+from .mesh_error import add_up, barycentric, difference, energy_taken, product
 
 #: Error over what the next order's functions take one by one.
 FACTOR = 4.0
@@ -134,28 +134,18 @@ def _plane(mesh: Extrusion) -> _Plane:
 @cache
 def _triangle_functions() -> tuple[Array, Array]:
     """Values (15, p), slopes (15, p, 2): edges and inside of degree 4, then corners, edges and inside below it."""
-    x, y = triangle_rule().points
-    corner = np.array([1.0 - x - y, x, y])
-    slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])[:, None, :]
-
-    def product(*factors: tuple[Array, Array]) -> tuple[Array, Array]:
-        value, gradient = np.ones_like(x), np.zeros((len(x), 2))
-        for one, d_one in factors:
-            value, gradient = value * one, gradient * one[:, None] + value[:, None] * d_one
-        return value, gradient
-
-    corners = [(corner[k], np.broadcast_to(slope[k], (len(x), 2))) for k in range(3)]
-    across = [(corner[a] - corner[b], np.broadcast_to(slope[a] - slope[b], (len(x), 2))) for a, b in _EDGES]
-    second = [(5.0 * t * t - 1.0, 10.0 * t[:, None] * dt) for t, dt in across]
-    inside = [(one - 1.0 / 3.0, d_one) for one, d_one in corners]
+    corners = barycentric(triangle_rule().points)
     pairs = [(corners[a], corners[b]) for a, b in _EDGES]
+    across = [difference(*pair) for pair in pairs]
+    second = [(5.0 * t * t - 1.0, 10.0 * t * dt) for t, dt in across]
+    inside = [(one - 1.0 / 3.0, d_one) for one, d_one in corners]
     made = [product(*pair, third) for pair, third in zip(pairs, second, strict=True)]
     made += [product(*corners, inside[0]), product(*corners, inside[1])]
     made += corners
     made += [product(*pair) for pair in pairs]
     made += [product(*pair, odd) for pair, odd in zip(pairs, across, strict=True)]
     made += [product(*corners)]
-    return np.array([value for value, _ in made]), np.array([gradient for _, gradient in made])
+    return np.array([value for value, _ in made]), np.array([slope.T for _, slope in made])
 
 
 class _Line(NamedTuple):
