@@ -98,7 +98,7 @@ def pressed(pair: MeshingPair, low: float, high: float, pressure: Callable[[Arra
     loads = []
     for gear, tooth in ((0, 0), (1, -1)):
         flank, axes = pair.bodies[gear].flank, turn(pair.tooth_angle(gear, tooth, 0.0, 0.0))
-        x = (flank.points @ axes.T + pair.centre(gear))[:, 0] - origin
+        x = (flank.points @ axes.T)[:, 0] + gear * pair.centre_distance - origin
         load = np.where((low < x) & (x < high), pressure(x), 0.0) * np.abs(np.gradient(x)) * pair.width
         force = (2 * gear - 1) * np.stack([0 * load, load], axis=1) @ axes
         loads.append(FlankLoads(zero, zero + tooth, force.reshape(1, -1), force.reshape(1, -1)))

@@ -231,10 +231,6 @@ class MeshingPair:
         """Angle (rad) of the frame of a tooth of the pinion (gear 0) or wheel (gear 1); numbers or arrays."""
         return self.gears.tooth_angle(gear, tooth, pinion_angle, twist)
 
-    def centre(self, gear: int) -> Array:
-        """Centre of the pinion (0) or wheel (1), shape (2,) (m)."""
-        return np.array([gear * self.centre_distance, 0.0])
-
 
 def turn(angle: float) -> Array:
     """Rotation matrix of `angle` (rad)."""

@@ -116,38 +116,20 @@ def normal_stress_rows(
     rows : ndarray, shape (e, q, 12)
         Coefficients (Pa/m).
     """
-    chain = mesh.contact_edges()
-    triangle, side, forward = _triangles_behind(mesh.triangles, chain)
-    xi, _ = gauss_rule(points_per_edge)
-    along = np.where(forward[:, None], xi, 1 - xi)  # position along the triangle's own edge direction
-    corner_r, corner_s = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    after = (side + 1) % 3
-    r = corner_r[side][:, None] * (1 - along) + corner_r[after][:, None] * along
-    s = corner_s[side][:, None] * (1 - along) + corner_s[after][:, None] * along
-    shape = r.shape
-    reference = triangle_shapes(r.ravel(), s.ravel())[1].reshape(*shape, 6, 2)
-    gradients, _ = physical_gradients(mesh.points[mesh.triangles[triangle]], reference)
-    _, first, _ = edge_shapes(xi)
-    tangent = np.einsum("qa,eai->eqi", first, mesh.points[chain])
-    tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
-    normal = np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1)
-    x, y = normal[..., 0], normal[..., 1]
-    rows = np.einsum(
-        "eqs,eqsai->eqai", np.stack([x * x, y * y, 2 * x * y], axis=-1), stress_rows(gradients, material, plane)
-    )
-    unknowns = 2 * mesh.triangles[triangle][:, :, None] + np.arange(2)
-    return unknowns.reshape(len(chain), 12), rows.reshape(*shape, 12)
-
-
-def _triangles_behind(triangles: IntArray, chain: IntArray) -> tuple[IntArray, IntArray, BoolArray]:
-    """Triangle that owns each edge, which of its sides it is, and whether both run the same way."""
-    slot = {int(node): k for k, node in enumerate(chain[:, 1])}
-    found_triangle, found_side = np.zeros(len(chain), dtype=np.int64), np.zeros(len(chain), dtype=np.int64)
-    number, side = np.nonzero(np.isin(triangles[:, 3:], chain[:, 1]))
-    for t, k in zip(number, side, strict=True):
-        edge = slot[int(triangles[t, 3 + k])]
-        found_triangle[edge], found_side[edge] = t, k
-    return found_triangle, found_side, triangles[found_triangle, found_side] == chain[:, 0]
+    chain, (xi, _) = mesh.contact_edges(), gauss_rule(points_per_edge)
+    behind = np.zeros(len(mesh.points), dtype=np.int64)
+    behind[mesh.triangles[:, 3:]] = np.arange(len(mesh.triangles))[:, None]
+    triangles = mesh.triangles[behind[chain[:, 1]]]
+    start, end = (np.eye(3)[(triangles[:, :3] == chain[:, [k]]).argmax(axis=1)][:, None] for k in (0, 2))
+    _, r, s = np.moveaxis(start + (end - start) * xi[:, None], -1, 0)
+    stresses = stress_rows(physical_gradients(mesh.points[triangles], triangle_shapes(r, s)[1])[0], material, plane)
+    tangent = np.einsum("qa,eai->eqi", edge_shapes(xi)[1], mesh.points[chain])
+    y, x = np.moveaxis(
+        tangent / np.linalg.norm(tangent, axis=-1, keepdims=True), -1, 0
+    )  # but for one's sign the normal
+    rows = np.einsum("seq,eqsai->eqai", np.stack([x * x, y * y, -2 * x * y]), stresses)
+    unknowns = 2 * triangles[:, :, None] + np.arange(2)
+    return unknowns.reshape(len(chain), 12), rows.reshape(*r.shape, 12)
 
 
 #: Gap (m) given to points whose projection runs off the end of the mate's surface: never in contact.

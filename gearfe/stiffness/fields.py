@@ -215,7 +215,7 @@ class GearRecovery:
         turned = _turned(sums.swapaxes(0, 1), c, s)
         total = [np.bincount(numbers.T.ravel(), part.ravel(), len(whole.points)) / self.elements for part in turned]
         held = body.material.poisson_ratio if body.plane == "strain" else 0.0
-        points = whole.points @ turn(angle).T + pair.centre(gear)
+        points = whole.points @ turn(angle).T + [gear * pair.centre_distance, 0.0]
         stress = np.stack([total[0], total[1], held * (total[0] + total[1]), total[2]], axis=1)
         pressure = np.zeros(len(points))
         for one in flank_pressures(pair, position):
