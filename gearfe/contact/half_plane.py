@@ -41,14 +41,8 @@ from numpy.typing import ArrayLike
 from ..gear.touching import Touching
 from ..typing import Array, BoolArray, IntArray
 from .half_plane_pair import HalfPlanePair, half_plane_pair
-from .half_plane_result import (
-    SUMS,
-    PairContacts,
-    contact_rates,
-    contacts_of,
-    pair_sums,
-)
-from .half_plane_step import WINDOW, Setting, State, Step, moved_on, reference_approach, smooth_influence, step
+from .half_plane_result import SUMS, PairContacts, contact_rates, contacts_of, pair_sums
+from .half_plane_step import SMALL, WINDOW, Setting, State, reference_approach, smooth_influence, step
 from .panels import PANELS, Couplings, unilateral
 from .position import STATUS, Positions, joined, of_positions, taken, together
 from .zones import completed
@@ -59,8 +53,6 @@ __all__ = ["HalfPlanePair", "PairContacts", "half_plane_pair", "solve_half_plane
 BATCH = 128
 #: Newton steps for the twist; rounds for the forces; sharpest edge (modules) that the curvature of a contact knows.
 TWIST_STEPS, FORCE_ROUNDS, SHARPEST = 10, 2, 0.02
-#: Force per width (N/m) that is none.
-SMALL = 1e-6
 
 
 def unloaded(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Setting, State]:
@@ -155,10 +147,6 @@ def expected_twists(law: HalfPlanePair, torques: Array, touching: Touching) -> A
 ROUNDS = 10
 #: Most steps each time; change of the forces, in units of their sum, from which on windows and bearing panels are held.
 STEPS, NEAR = 30, 2e-5
-#: What moves of contacts by their width count as changes of force: they are of second order there (see above).
-MOVED = 0.1
-#: Change from which on windows grow that cut a pressure: sooner, what a pressure reaches on its way would decide.
-WIDENED_BELOW = 1e-3
 #: Steps in which windows are searched for: where the pressure moves by what one panel makes of its end, a window that
 #: follows it might do so for ever.
 SEARCHES = 12
@@ -212,17 +200,6 @@ def _joined(parts: Sequence[tuple[Setting, State]]) -> tuple[Setting, State]:
     return Setting(settings[0].law, found, turn).take(order), taken(joined(states), order)
 
 
-def change(setting: Setting, state: State, made: Step) -> Array:
-    """What a step changed, shape (m,): the forces in units of their sum, and weighted by them the places and widths of
-    the contacts, in units of these.
-    """
-    new, variance, couples = made.force, made.variance, setting.couples
-    safe = np.where(variance > 0, variance, 1.0)
-    moved = (variance > 0) * (0.5 * np.abs(made.place) / np.sqrt(safe) + np.abs(1 - state.variance / safe))
-    all_ = np.abs(new - state.force) + MOVED * new * moved
-    return couples.total(all_) / np.maximum(couples.total(new), SMALL)
-
-
 def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> Positions:
     status, iterations = np.full(len(angles), "no_contact", dtype=STATUS), np.zeros(len(angles), dtype=np.int64)
     numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in (*SUMS, "tangent")}
@@ -256,12 +233,11 @@ def _approached(setting: Setting, state: State, iterations: IntArray) -> tuple[t
         couples = setting.couples
         made = step(setting, state, search=number < SEARCHES)
         iterations[setting.numbers] += 1
-        unsettled = couples.total(~made.settled | made.outgrown) > 0
-        changed = change(setting, state, made)
-        there = (changed <= NEAR) & ~unsettled & (number > 0)
-        state = moved_on(setting, state, made, near=(changed <= WIDENED_BELOW)[couples.position])
+        there = couples.total(~made.settled | made.outgrown | (made.changed > NEAR)) == 0
+        there &= number > 0
+        state = made.next
         if there.any():
-            near.append(_kept(setting, state, there & (couples.total(made.force) > 0)))
+            near.append(_kept(setting, state, there & (couples.total(state.force) > 0)))
             setting, state = _kept(setting, state, ~there)
         if len(setting.found) == 0:
             break
@@ -291,23 +267,22 @@ def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
     further = setting.turn * np.exp(1j * ahead[couples.position, None] * np.arange(2))
     later = replace(found, position=found.position + len(twists))
     both = Setting(setting.law, joined([found, later]), np.concatenate([setting.turn, further]))
-    state = after = joined([start, start])
+    after = joined([start, start])
     for _ in range(HELD_STEPS):
         state, made = after, step(both, after, search=False, held=True)
-        after = moved_on(both, state, made)
+        after = made.next
     here, on = slice(0, len(found)), slice(len(found), None)
-    changed, of_both = change(both, state, made)[: len(numbers)], pair_sums(both, state, made)
+    of_both = pair_sums(both, state, made)
     one, two = ((taken(state, part), taken(made, part)) for part in (here, on))
     of_pairs = {name: values[here] for name, values in of_both.items()}
     sums = {name: couples.total(of_pairs[name]) for name in SUMS}
     sums["tangent"] = couples.total(of_both["torque_wheel"][on] - of_pairs["torque_wheel"]) / ahead
-    right = couples.total(~one[1].settled) == 0
-    settled = right & (changed <= TOLERANCE) & (sums["tangent"] > 0)
+    settled = (couples.total(~one[1].settled | (one[1].changed > TOLERANCE)) == 0) & (sums["tangent"] > 0)
     known = contact_rates(setting.law, one, two, ahead[couples.position])
     known["torque_wheel"] = of_pairs["torque_wheel"]
     contacts = contacts_of(setting, *one, known)
     now, whole, lacking = completed(setting, *one)
-    rest = _joined([_kept(setting, taken(after, here), ~settled & ~lacking), _kept(now, whole, lacking)])
+    rest = _joined([_kept(setting, one[1].next, ~settled & ~lacking), _kept(now, whole, lacking)])
     settled &= ~lacking
     return _Ended(settled, sums, contacts, rest)
 

@@ -85,9 +85,9 @@ class PairContacts:
 
 def pair_sums(setting: Setting, state: State, made: Step) -> dict[str, Array]:
     """What each contact adds to the sums over its position (N m, N m, N m, J)."""
-    law, normal, centre = setting.law, state.normal, _centres(state, made)
-    force = made.force * law.width
-    wheel = setting.tables.at(_material(made)[:, :, None])[0][:, 1, 0] * setting.turn[:, 1]
+    law, normal, centre = setting.law, state.normal, made.next.centre
+    force = made.next.force * law.width
+    wheel = setting.tables.at(made.next.arc[:, :, None])[0][:, 1, 0] * setting.turn[:, 1]
     return {
         "torque_wheel": -force * cross(centre - law.hub[1], normal),
         "torque_pinion": force * cross(centre, normal),
@@ -96,30 +96,20 @@ def pair_sums(setting: Setting, state: State, made: Step) -> dict[str, Array]:
     }
 
 
-def _centres(state: State, made: Step) -> ComplexArray:
-    """Centres of pressure (m), global axes."""
-    return np.asarray(state.centre + state.normal * (made.height - 1j * made.place))
-
-
-def _material(made: Step) -> Array:
-    """Arc lengths (m) of the material there, shape (p, 2)."""
-    return made.arc + made.place[:, None] * WAY
-
-
 def contacts_of(setting: Setting, state: State, made: Step, known: dict[str, Array]) -> PairContacts:
     """The contacts of a step that carry load; `known`, of all: the wheel's torques, and what `contact_rates` gives."""
-    law, index = setting.law, np.flatnonzero(made.force > 0)
+    law, index = setting.law, np.flatnonzero(made.next.force > 0)
     if len(index) < len(setting.found):
         setting, state, made = setting.take(index), taken(state, index), taken(made, index)
     found = setting.found
     return PairContacts(
         position=found.position,
         pair=found.pair,
-        force=made.force * law.width,
-        point=_centres(state, made),
+        force=made.next.force * law.width,
+        point=made.next.centre,
         normal=state.normal,
-        arc=_material(made),
-        half_width=2 * np.sqrt(made.variance),
+        arc=made.next.arc,
+        half_width=2 * np.sqrt(made.next.variance),
         x=made.x - made.place[:, None],
         width=made.width,
         pressure=made.pressure,
@@ -132,13 +122,13 @@ def contact_rates(
     law: HalfPlanePair, here: tuple[State, Step], ahead: tuple[State, Step], by: Array
 ) -> dict[str, Array]:
     """Rates of `PairContacts` for all contacts, from the same step at twists larger by `by` (rad), shape (p,)."""
-    (state, one), (state_on, two) = here, ahead
+    one, two = here[1].next, ahead[1].next
     wider = np.divide(two.variance, one.variance, out=np.ones(len(by)), where=one.variance > 0)
     return {
         "force_rate": (two.force - one.force) * law.width / by,
-        "normal_rate": np.angle(state_on.normal / state.normal) / by,
+        "normal_rate": np.angle(ahead[0].normal / here[0].normal) / by,
         "growth": 0.5 * (wider - 1) / by,
-        "arc_rate": (_material(two) - _material(one)) / by[:, None],
+        "arc_rate": (two.arc - one.arc) / by[:, None],
     }
 
 

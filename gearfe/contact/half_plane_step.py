@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,6 +27,12 @@ from .position import taken
 #: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force, and what it grows by
 #: where the pressure reaches an end: beside edges contacts are wider.
 WINDOW, WIDER = 1.25, 1.6
+#: Change from which on windows grow that cut a pressure: sooner, what a pressure reaches on its way would decide.
+WIDENED_BELOW = 1e-3
+#: What moves of contacts by their width count as changes of force: they are of second order there (`.half_plane`).
+MOVED = 0.1
+#: Force per width (N/m) that is none.
+SMALL = 1e-6
 #: Force, of all pairs of a position, and half width in modules below which a window is not made smaller.
 LEAST_FORCE, LEAST_WIDTH = 1e-4, 1e-6
 #: Half width (modules) of Hertz's contacts whose approach first forces are made with: a length, as T in them is what
@@ -144,32 +150,30 @@ class Step:
 
     Attributes
     ----------
+    next
+        What the next step starts from: frames at the mean place of the pressure, along the mean normal under it.
     pressure : ndarray, shape (p, n)
         On the panels (Pa).
-    force : ndarray, shape (p,)
-        Force per width (N/m).
     settled : ndarray of bool, shape (p,)
         Whether it was found which panels of the position bear.
     low, high : ndarray, shape (p,)
         Ends of the windows (m).
     outgrown : ndarray of bool, shape (p,)
-        Contacts whose pressure reaches an end of its window beyond which both faces go on.
+        Contacts whose pressure reaches an end of its window beyond which both faces go on: the next one is wider.
     x, width : ndarray, shape (p, n)
         Panels' middles and widths (m).
     arcs : ndarray, shape (p, 2, n)
         Arc lengths of the panels' middles (m).
-    arc, height : ndarray, shape (p, 2), (p,)
-        The material at O, and the height of the faces' middle there (m).
-    place, variance : ndarray, shape (p,)
-        Mean place of the pressure (m) and its variance about it (m2).
-    slope : ndarray, shape (p,)
-        Mean slope of the deformed faces under the pressure (-).
+    place : ndarray, shape (p,)
+        Mean place of the pressure (m).
     energy : ndarray, shape (p,)
         Elastic energy of each contact per width (J/m); 0 while windows are searched for.
+    changed : ndarray, shape (p,)
+        What it changed in the contact's position, see `change`.
     """
 
+    next: State
     pressure: Array
-    force: Array
     settled: BoolArray
     low: Array
     high: Array
@@ -177,12 +181,9 @@ class Step:
     x: Array
     width: Array
     arcs: Array
-    arc: Array
-    height: Array
     place: Array
-    variance: Array
-    slope: Array
     energy: Array
+    changed: Array
 
 
 def cross(a: ComplexArray, b: ComplexArray) -> Array:
@@ -309,23 +310,33 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     else:
         place, slope = np.where(loaded, place, found.nearest), np.where(loaded, slope, found.mean_slope)
         outgrown = ((p[:, 0] > 0) & (low > reach[0])) | ((p[:, -1] > 0) & (high < reach[1]))
-    return Step(
-        p,
-        force,
-        settled[couples.position],
-        low,
-        high,
-        outgrown,
-        x,
-        width,
-        arcs,
-        arc,
-        height,
-        place,
-        variance,
-        slope,
-        energy,
+    turned = 1 + 1j * slope
+    following = State(
+        centre=state.centre + state.normal * (height - 1j * place),
+        normal=state.normal * turned / np.abs(turned),
+        arc=np.minimum(np.maximum(arc + place[:, None] * WAY, tables.low[:, :, 0]), tables.high[:, :, 0]),
+        ends=state.ends,
+        force=force,
+        variance=variance,
+        low=low - place,
+        high=high - place,
+        bearing=p > 0,
+        reach=state.reach,
     )
+    changed, settled = change(couples, state, following, place)[couples.position], settled[couples.position]
+    wider = outgrown & (changed <= WIDENED_BELOW)
+    following = replace(following, reach=np.where(wider, WIDER * state.reach, state.reach))
+    return Step(following, p, settled, low, high, outgrown, x, width, arcs, place, energy, changed)
+
+
+def change(couples: Couplings, state: State, new: State, place: Array) -> Array:
+    """What a step changed, shape (m,): the forces in units of their sum, and weighted by them the places and widths of
+    the contacts, in units of these.
+    """
+    safe = np.where(new.variance > 0, new.variance, 1.0)
+    moved = (new.variance > 0) * (0.5 * np.abs(place) / np.sqrt(safe) + np.abs(1 - state.variance / safe))
+    all_ = np.abs(new.force - state.force) + MOVED * new.force * moved
+    return couples.total(all_) / np.maximum(couples.total(new.force), SMALL)
 
 
 def _opened(setting: Setting, state: State, arcs: Array) -> Array:
@@ -355,25 +366,3 @@ def _distances(setting: Setting, arc: Array) -> tuple[Array, Array]:
     y = setting.distances(arc[:, :, None])[:, :, 0]
     near = 1 / y**2 + setting.law.undercut / np.maximum(np.abs(arc), LEAST_DISTANCE) ** 2
     return y, near[:, ::-1] / near.sum(axis=1, keepdims=True)
-
-
-def moved_on(setting: Setting, state: State, made: Step, *, near: BoolArray | bool = False) -> State:
-    """What the next step starts from: frames at the mean place of the pressure, along the mean normal under it.
-
-    Windows grow only `near` the solution, so that they do not depend on the way to it.
-    """
-    place = made.place
-    arc = made.arc + place[:, None] * WAY
-    turned = 1 + 1j * made.slope
-    return State(
-        centre=state.centre + state.normal * (made.height - 1j * place),
-        normal=state.normal * turned / np.abs(turned),
-        arc=np.minimum(np.maximum(arc, setting.tables.low[:, :, 0]), setting.tables.high[:, :, 0]),
-        ends=state.ends,
-        force=made.force,
-        variance=made.variance,
-        low=made.low - place,
-        high=made.high - place,
-        bearing=made.pressure > 0,
-        reach=np.where(made.outgrown & near, WIDER * state.reach, state.reach),
-    )
