@@ -103,31 +103,24 @@ class FlexibleLink:
         nodes = q[:, self.beam.places].reshape(len(q), -1, 3)
         return nodes if stations is None else np.einsum("sn,tnk->tsk", self.beam.shapes(stations)[0], nodes)
 
+    def _frame(self, q: Array) -> tuple[np.ndarray, np.ndarray]:
+        """Place of the start and direction of the link's own frame, complex, shape (times, 1)."""
+        ends = self.places(q)[:, [0, -1]]
+        at = ends[..., :1] + 1j * ends[..., 1:2]
+        return at[:, 0], np.exp(1j * (ends[:, 0, 2:] if self.clamped else np.angle(at[:, 1] - at[:, 0])))
+
     def offsets(self, q: Array, stations: Array | None = None) -> Array:
         """Displacements along and across in the link's own frame (m), shape (times, n, 2)."""
-        at = self.places(q, stations)
-        ends = self.places(q)
-        s = self.beam.link.stations if stations is None else stations
-        if self.clamped:
-            angle = ends[:, 0, 2]
-        else:
-            angle = np.arctan2(ends[:, -1, 1] - ends[:, 0, 1], ends[:, -1, 0] - ends[:, 0, 0])
-        c, sn = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        x, y = at[:, :, 0] - ends[:, :1, 0], at[:, :, 1] - ends[:, :1, 1]
-        return np.stack([c * x + sn * y - s, c * y - sn * x], axis=-1)
+        (origin, direction), at = self._frame(q), self.places(q, stations)
+        moved = (at[..., 0] + 1j * at[..., 1] - origin) / direction
+        moved = moved - (self.beam.link.stations if stations is None else stations)
+        return np.stack([moved.real, moved.imag], axis=-1)
 
     def exaggerated(self, q: Array, stations: Array, factor: float) -> Array:
         """Places with displacements in the link's own frame times a factor, shape (times, n, 2)."""
-        at, offset = self.places(q, stations), self.offsets(q, stations)
-        ends = self.places(q)
-        if self.clamped:
-            c, s = np.cos(ends[:, :1, 2]), np.sin(ends[:, :1, 2])
-        else:
-            chord = ends[:, -1, :2] - ends[:, 0, :2]
-            c, s = (chord / np.hypot(*chord.T)[:, None]).T[:, :, None]
-        more = (factor - 1.0) * offset
-        moved = np.stack([c * more[..., 0] - s * more[..., 1], s * more[..., 0] + c * more[..., 1]], axis=-1)
-        return np.asarray(at[:, :, :2] + moved, dtype=float)
+        offset = self.offsets(q, stations)
+        more = (factor - 1.0) * (offset[..., 0] + 1j * offset[..., 1]) * self._frame(q)[1]
+        return np.asarray(self.places(q, stations)[..., :2] + np.stack([more.real, more.imag], axis=-1), dtype=float)
 
     def edge_stress(self, resultants: Array, label: str) -> Array:
         """Largest normal stress |N|/A + |M| e/I over the section (Pa)."""

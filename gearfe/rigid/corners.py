@@ -23,6 +23,8 @@ LOOKS, HALVINGS, PASSING = 8, 45, 1e-3
 POLE, POLE_AT = 20.0, (1e-3, 1e-6, 1e-9)
 #: A run ends at this share of its length before a pole; until then steps go this part of the way.
 POLE_SHARE, POLE_NEARER = 1e-3, 0.7
+#: How far beyond the end of a run that stopped loads without a value are sought, as shares of the run's length.
+AHEAD = (1e-9, 1e-6, 1e-5)
 #: Steps with larger errors (over the tolerance) do not tell where corners are.
 TRUSTED = 1e3
 #: Rounding of the speed of a stage, relative to positions over the step: 1e-16 by the inverse of the stages' integrals.
@@ -109,18 +111,22 @@ def _pole(system: System, t: float, h: float, path: Path, x: float) -> bool:
     return True
 
 
-def blame_ahead(system: System, t: float, state: tuple[Array, Array, Array], reach: float) -> None:
-    """Let loads that have no value, or a pole, within `reach` (s) of the state (q, q', q'') at t say so."""
-    q, v, a = state
+def blame_ahead(system: System, t: float, state: tuple[Array, Array, Array], span: float) -> None:
+    """Let loads that have no value, or a pole, in the state (q, q', q'') at t or a share of `span` (s) ahead say so."""
     if not np.isfinite(state).all():
         return
+    q, v, a = state
+    with np.errstate(all="ignore"):
+        system.blame(t, q, v)
+        for reach in np.multiply(AHEAD, span):
 
-    def path(x: float) -> tuple[Array, Array]:
-        return q + x * reach * v, v + x * reach * a
+            def path(x: float, reach: float = float(reach)) -> tuple[Array, Array]:
+                return q + x * reach * v, v + x * reach * a
 
-    system.blame(t + reach, *path(1.0))
-    if not system.complaint and (found := _corner(system, t, reach, path)) is not None:
-        _pole(system, t, reach, path, found[0])
+            if not system.complaint:
+                system.blame(t + reach, *path(1.0))
+            if not system.complaint and (found := _corner(system, t, reach, path)) is not None:
+                _pole(system, t, reach, path, found[0])
 
 
 def quiet_speeds(c: Array, v: Array, V: Array, vn: Array, scale: Array) -> Array:

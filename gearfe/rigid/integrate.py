@@ -39,8 +39,6 @@ LOCAL_SHARE = 5e-4
 #: Seconds of the shortest trials that tell a pace (measured): ten steps of Radau IIA, and before these loading
 #: scipy.linalg once; eight steps of plain series or Runge-Kutta.
 IMPLICIT_TRIAL, LOADING_LINALG, PLAIN_TRIAL = 0.02, 0.25, 0.01
-#: How far beyond the end of a run that stopped loads without a value are sought, as shares of the run's length.
-AHEAD = (1e-9, 1e-6, 1e-5)
 #: Rates from which on steps of a series or of Runge-Kutta are below the rounding of the run's time.
 HOPELESS = 1e12
 #: How many times as fast as plain steps compiled ones are (measured: 170 with one body, 200 with seven).
@@ -144,11 +142,7 @@ def integrate(
     if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE, Status.NOT_SOLVED, Status.ENDLESS) and len(dense.times) > 1:
         last = dense.times[-6:]  # the very last ones may be beyond all numbers
         end, (q, v, a) = float(last[-1]), (dense(last[-1:], k)[0] for k in range(3))
-        system.blame(end, q, v)
-        for ahead in AHEAD:
-            if not system.complaint:
-                with np.errstate(all="ignore"):
-                    blame_ahead(system, end, (q, v, a), ahead * (float(output_times[-1]) - start.time))
+        blame_ahead(system, end, (q, v, a), float(output_times[-1]) - start.time)
         link = loose_link(system, last, dense(last, 0), dense(last, 1), start)
         statistics = statistics if link is None else {**statistics, "loose_link": link}
     if status is not Status.DONE and (why := system.complaint):

@@ -22,6 +22,7 @@ from . import (
     kernel_steps,
     kernel_tape,
 )
+from .corners import blame_ahead
 from .dense import Polynomials
 from .packed import Packed
 from .programs import tape_program
@@ -270,14 +271,12 @@ def _because_of_loads(shared: Prepared, run: kernel_steps.Run, t: float, status:
     """Why a run ended at the state in the work space: not finite where loads have no value there, or just beyond, or a
     pole within the step; they say so."""
     system, tables, order, _, w, _ = shared
-    plain, span = KERNELS.plain, run.end - run.begin
+    plain = KERNELS.plain
     system.forget_complaints()
+    blame_ahead(system, t, (w.q, w.v, 2.0 * w.Z[: len(w.q), 2]), run.end - run.begin)
+    if system.complaint:
+        return Status.NOT_FINITE
     with np.errstate(all="ignore"):
-        for ahead in (0.0, 1e-9, 1e-6):
-            d = ahead * span
-            system.blame(t + d, w.q + d * w.v, w.v + 2.0 * d * w.Z[: len(w.q), 2])
-            if system.complaint:
-                return Status.NOT_FINITE
         size = run.sign * plain.step_length(tables, w, run)
         h, where = plain.leaves(tables.program, w.R, w.pieces, order - 1, size)
         if status == Status.NOT_FINITE and where >= 0:
