@@ -66,10 +66,12 @@ def overlaps(pair: GearPair, twist: ArrayLike) -> Array:
     return np.asarray(twist, dtype=float) * pair.wheel.base_radius / pair.pinion.module
 
 
-def overlap_warnings(beyond: IntArray, largest: float) -> list[str]:
-    """What is said of the positions flagged as beyond validity, `largest` (modules) the largest of their overlaps."""
-    count = int(np.count_nonzero(beyond == 1))
-    if not count:
+def overlap_warnings(pair: GearPair, twist: Array, beyond: IntArray) -> list[str]:
+    """What is said of the positions flagged as beyond validity, at twists (rad) from where flanks touch."""
+    found = overlaps(pair, twist[beyond == 1])
+    if not found.size:
         return []
-    reason = f"the flanks overlap by up to {largest:.3g} modules, beyond the {MOST_OVERLAP:g} that the laws hold for"
-    return [f"{count} positions are beyond validity (column beyond_validity): {reason}; use less load"]
+    reason = (
+        f"the flanks overlap by up to {found.max():.3g} modules, beyond the {MOST_OVERLAP:g} that the laws hold for"
+    )
+    return [f"{found.size} positions are beyond validity (column beyond_validity): {reason}; use less load"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..gear.derived import derived_geometry
 from ..gear.deviation_job import GEARS
-from ..gear.validity import overlap_warnings, overlaps
+from ..gear.validity import overlap_warnings
 from ..stiffness.contact_pressure import largest_pressures
 from ..stiffness.job import StiffnessJob
 from ..stiffness.report import cure_of, pressure_lines
@@ -89,8 +89,7 @@ def report_lines(made: LoadMap) -> list[str]:
 def warnings(job: StiffnessJob, made: LoadMap) -> list[str]:
     """Sentences about what deserves a look."""
     said = list(job.pair.warnings)
-    beyond = made.quantity("beyond_validity")
-    said += overlap_warnings(beyond, overlaps(job.pair, made.quantity("twist")[beyond == 1]).max(initial=0.0))
+    said += overlap_warnings(job.pair, made.quantity("twist"), made.quantity("beyond_validity"))
     if made.failed.any():
         rows = np.flatnonzero(made.failed.any(axis=1))
         torques = ", ".join(f"{made.torque[row]:.4g}" for row in rows[:6]) + (" ..." if len(rows) > 6 else "")

@@ -13,7 +13,7 @@ from ..gear import pitch_errors
 from ..gear.deviation import ToothDeviations
 from ..gear.deviation_job import GEARS
 from ..gear.pair import GearPair
-from ..gear.validity import overlap_warnings, overlaps
+from ..gear.validity import overlap_warnings
 from ..stiffness.job import StiffnessJob
 from ..tables.microgeometry import MicrogeometryTable
 from ..typing import Array
@@ -181,8 +181,7 @@ def report_lines(made: LoadedMesh) -> list[str]:
 
 def warnings(pair: GearPair, made: LoadedMesh) -> list[str]:
     """Sentences about what deserves a look."""
-    said, beyond = list(pair.warnings), made.beyond_validity
-    said += overlap_warnings(beyond, overlaps(pair, made.twist[beyond == 1]).max(initial=0.0))
+    said = [*pair.warnings, *overlap_warnings(pair, made.twist, made.beyond_validity)]
     room, jammed = made.back_clearance, made.status == BACK
     if room is not None and jammed.any():
         i, j = np.unravel_index(int(np.nanargmin(room)), room.shape)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..contact.laws import COARSENING
 from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
-from ..gear.validity import overlap_warnings, overlaps
+from ..gear.validity import overlap_warnings
 from ..tables.stiffness import DEFAULT_LAW
 from ..versions import versions
 from .contact_pressure import largest_pressures
@@ -99,7 +99,15 @@ def report_lines(job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, A
     if curve.contact_law:
         lines.append(f"contact law: {curve.contact_law}")
     lines += deviation_lines(job)
-    lines += _load_lines(found["load"])
+    torque, given = found["load"]["torque_wheel_Nm"], found["load"]["prescribed_twist"]
+    if given is not None and given["lost_motion_in_it_deg"]:
+        lines.append(
+            f"twist {given['twist_deg']:.6g} deg from the centred position: {given['lost_motion_in_it_deg']:.6g} deg "
+            f"of lost motion (half the backlash) and {given['deflection_deg']:.6g} deg of deflection"
+        )
+    if torque is not None:
+        mean, low, high = (torque[key] for key in ("mean", "least", "largest"))
+        lines.append(f"torque at the wheel: mean {mean:.4g}, least {low:.4g}, largest {high:.4g} N m")
     if level is not None:
         mean, low, high = (1e-6 * level[key] for key in ("mean_N_per_m", "least_N_per_m", "largest_N_per_m"))
         lines.append(f"mesh stiffness: mean {mean:.4g}, least {low:.4g}, largest {high:.4g} N/um")
@@ -156,30 +164,20 @@ def pressure_lines(curve: StiffnessCurve) -> list[str]:
                 "linear elasticity goes on where the steel would not"
             )
         lines.append(line)
-    for kind, why in (
-        ("singular", "the pressure of linear elasticity is singular there"),
-        ("rounded", "the radius of the tip round decides the pressure there"),
+    for kind, edge, why in (
+        (
+            "singular",
+            "a sharp edge or the kink of a linear relief",
+            "the pressure of linear elasticity is singular there",
+        ),
+        ("rounded", "a rounded edge", "the radius of the tip round decides the pressure there"),
     ):
         if found[kind]:
             largest = 1e-6 * np.nanmax(curve.edge_pressure[curve.edge == kind])
-            edge = {"singular": "a sharp edge or the kink of a linear relief", "rounded": "a rounded edge"}[kind]
             lines.append(
                 f"{found[kind]} position{'s' if found[kind] > 1 else ''} with {edge} bearing: {why}; blunted by a "
                 f"hundredth of a module, up to {largest:.4g} MPa (column edge_pressure_MPa)"
             )
-    return lines
-
-
-def _load_lines(load: Mapping[str, Any]) -> list[str]:
-    lines, torque, given = [], load["torque_wheel_Nm"], load["prescribed_twist"]
-    if given is not None and given["lost_motion_in_it_deg"]:
-        lines.append(
-            f"twist {given['twist_deg']:.6g} deg from the centred position: {given['lost_motion_in_it_deg']:.6g} deg "
-            f"of lost motion (half the backlash) and {given['deflection_deg']:.6g} deg of deflection"
-        )
-    if torque is not None:
-        mean, low, high = (torque[key] for key in ("mean", "least", "largest"))
-        lines.append(f"torque at the wheel: mean {mean:.4g}, least {low:.4g}, largest {high:.4g} N m")
     return lines
 
 
@@ -202,8 +200,7 @@ def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
         centred = job.table.twist_from == "centred"
         cure = ' (twist_from = "contact" counts it from where the flanks touch)' if centred else ""
         said.append(sentence + cure)
-    beyond = curve.beyond_validity
-    said += overlap_warnings(beyond, overlaps(job.pair, curve.twist[beyond == 1]).max(initial=0.0))
+    said += overlap_warnings(job.pair, curve.twist, curve.beyond_validity)
     if curve.failed.any():
         angles = ", ".join(f"{a:.6g}" for a in np.degrees(curve.pinion_angle[curve.failed])[:8])
         more = " ..." if curve.failed.sum() > 8 else ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from gearfe.progress import count, stage
+from gearfe.progress import stage
 
 HELP = "random campaigns that look for crashes, hangs and wrong results"
 
@@ -45,9 +45,7 @@ def run(args: argparse.Namespace) -> int:
     failed = False
     for name in names:
         with stage(name):
-            ran = run_campaign(
-                name, folder, seed=args.seed, cases=args.cases, short=args.short, seconds=seconds, progress=count
-            )
+            ran = run_campaign(name, folder, seed=args.seed, cases=args.cases, short=args.short, seconds=seconds)
         counts = {kind: sum(row.outcome == kind for row in ran.outcomes) for kind in CLASSES}
         told = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
         rest = "" if ran.complete else f" (of {ran.asked}: the time is over; run again to go on)"

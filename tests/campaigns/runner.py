@@ -5,11 +5,13 @@ from __future__ import annotations
 import multiprocessing
 import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from gearfe.progress import count
 
 from .campaign import Campaign, campaign_named
 from .ledger import Ledger
@@ -19,8 +21,6 @@ from .worker import GRACE, WAITING, run_case, work
 
 #: Seconds that compiling the kernels may take, once.
 COMPILE = 600.0
-
-Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,6 @@ def run_campaign(
     short: bool = False,
     seconds: float | None = None,
     apart: bool = True,
-    progress: Progress | None = None,
 ) -> Ran:
     """Run cases 0, 1, ... of a campaign; those that the folder holds already are not run again.
 
@@ -67,8 +66,6 @@ def run_campaign(
         Time for all; what is not begun by then is left for another run.
     apart
         Run in a process of its own, which survives crashes and ends hangs; False: in this one, without limits.
-    progress
-        Called with cases done, cases in all, and a text.
     """
     campaign = campaign_named(name)
     wanted = campaign.short if short else range(campaign.full if cases is None else cases)
@@ -88,8 +85,7 @@ def run_campaign(
         for row in rows:
             ledger.add(row)
             bad += row.bad
-            if progress is not None:
-                progress(len(ledger.rows), len(wanted), f"cases, {bad} bad")
+            count(len(ledger.rows), len(wanted), f"cases, {bad} bad")
     finally:
         write_results(folder, campaign, seed, ledger.outcomes)
     return Ran(name, tuple(row for row in ledger.outcomes if row.case in wanted), len(wanted))
