@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from .. import __version__
-from ..cache import cached_arrays
+from ..cache import cache_key, kept
 from ..errors import InputError
 from ..meshing.housing_recipe import RECIPE
 from ..reduction.modal_body import FORMAT, ModalBody
@@ -34,12 +34,24 @@ def reduced_housing(table: HousingTable, folder: str | Path = ".") -> ModalBody:
 
         recipe.append(fingerprint(Path(folder) / table.mesh.file, "housing.mesh"))
 
-    def make() -> dict[str, Any]:
+    def read(path: Path) -> ModalBody | None:
+        with suppress(InputError):
+            return ModalBody.load(path)
+        return None
+
+    def make() -> ModalBody:
         from .build import housing_from_table, reduced
 
-        return reduced(housing_from_table(table, folder), table.reduction).arrays()
+        return reduced(housing_from_table(table, folder), table.reduction)
 
-    return damped(ModalBody.of_arrays(cached_arrays("body", recipe, make)), table)
+    body = kept(
+        "body",
+        cache_key("body", recipe),
+        read=read,
+        make=make,
+        write=lambda body, path: body.save(path),
+    )
+    return damped(body, table)
 
 
 def _loaded(path: Path) -> ModalBody:

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -230,11 +229,8 @@ class ModalBody(Reduction, Shown):
 
     def save(self, path: str | Path) -> None:
         """Write one file with everything; `load` gives an equal body back."""
-        save_arrays(path, {"format": np.array(FORMAT), **self.arrays()})
-
-    def arrays(self) -> dict[str, Array]:
-        """All fields as arrays, by name."""
-        return {f.name: np.asarray(getattr(self, f.name)) for f in dataclasses.fields(self)}
+        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        save_arrays(path, {"format": np.array(FORMAT)} | {name: np.asarray(value) for name, value in values.items()})
 
     @classmethod
     def load(cls, path: str | Path) -> ModalBody:
@@ -246,18 +242,12 @@ class ModalBody(Reduction, Shown):
             When the file is missing, damaged, or of another format.
         """
         stored = load_arrays(path)
+        made: dict[str, Any] = {}
         if int(stored.get("format", np.array(-1))) != FORMAT:
             raise InputError("reduced model", str(path), "was written by another version", "make it anew")
         for field in dataclasses.fields(cls):
             if field.name not in stored:
                 raise InputError("reduced model", str(path), f"has no entry {field.name!r}", "make it anew")
-        return cls.of_arrays(stored)
-
-    @classmethod
-    def of_arrays(cls, stored: Mapping[str, Array]) -> ModalBody:
-        """The body of what `arrays` gives."""
-        made: dict[str, Any] = {}
-        for field in dataclasses.fields(cls):
             value = stored[field.name]
             if field.type in ("int", "float", "bool", "str"):
                 made[field.name] = value.item()
