@@ -234,7 +234,7 @@ class ModalBody(Reduction, Shown):
 
     @classmethod
     def load(cls, path: str | Path) -> ModalBody:
-        """Read a saved body.
+        """Read a saved body; its large matrix stays on disk until it is used.
 
         Raises
         ------
