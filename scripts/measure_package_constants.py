@@ -181,8 +181,8 @@ def coarse_gears(law: Any) -> Any:
 ROOMS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
     "rigid": (mechanisms, ("backend", "choice", "packed", "LARGEST", "MOST_STEPS", "FIRST_")),
     "train": (trains, ("program",)),
-    "meshlaw": (laws, ("NANO", "NO_CONTACT")),
-    "runup": (run_ups, ("law_kernel.FORCE", "swinging", "report")),
+    "meshlaw": (laws, ("NANO", "NO_CONTACT", "kernel.FORCE")),
+    "runup": (run_ups, ("swinging", "report")),
     "housing": (housings, ("modal_test", "superelement", "_NEW", "_OLD", "_ALL", "_FOURTH")),
     "reduction": (housings, ("FORMAT",)),
     "solid": (housings, ()),

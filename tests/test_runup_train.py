@@ -17,7 +17,6 @@ from gearfe.figures.campbell import signal_of
 from gearfe.rigid import constant
 from gearfe.rigid.compiled import available
 from gearfe.runup.condensed import condense
-from gearfe.runup.law_kernel import BEND, CROSS, FORCE, MOMENT, TANGENT
 from gearfe.runup.modes import coupled_modes, crossings
 from gearfe.runup.run_up import run_up, steady_state
 from gearfe.runup.stability import multipliers
@@ -25,7 +24,7 @@ from gearfe.runup.swinging import mesh_modes, swinging, write_modes
 from gearfe.train import Damping, Load, build_train, simulate
 from gearfe.train.friction import Lubrication
 
-from .mesh_laws import hertzian_law
+from .mesh_laws import hertzian_law, numpy_law
 from .oscillators import analysis, rates, synthesis
 from .test_cli_vibration import SMALL
 from .trains import curve, elastic, train
@@ -146,31 +145,28 @@ def test_the_work_of_the_mesh_goes_into_damping():
     assert (forces * du).sum(axis=1).mean() == pytest.approx(taken, rel=1e-4)
 
 
-@needs_numba
-def test_the_jets_of_a_law_are_its_derivatives():
-    from gearfe.runup.law_kernel import RESULTS, ROWS, Jets, evaluate_law, law_tables
-
+def test_a_law_and_its_derivatives_are_those_of_its_potential():
     law = hertzian_law(relief=3e-6)
-    tables = law_tables(law)
     rng = np.random.default_rng(5)
     phase, approach = rng.uniform(-2.0, 2.0, 300), rng.uniform(-2e-6, 5e-5, 300)
 
-    def made(phase, begin=0.0):  # type: ignore[no-untyped-def]
-        out = np.zeros((300, RESULTS))
-        work, pairs = np.zeros((ROWS + 2 * law.slots, law.slots)), begin * rng.uniform(0.0, 2e3, (300, law.slots))
-        evaluate_law(tables, Jets(phase, approach, pairs, np.zeros((2, *pairs.shape)), work, out))
-        return out
-
-    out, true, h = made(phase), law(phase, approach), 1e-8
-    assert np.allclose(out[:, FORCE], true.force, rtol=1e-8, atol=1e-8)
-    assert np.allclose(out[:, MOMENT], true.moment, rtol=1e-8, atol=1e-10)
-    assert np.allclose(out[:, TANGENT], true.tangent, rtol=1e-7, atol=1.0)
-    assert np.allclose(made(phase, 1.0)[:, FORCE], true.force, rtol=1e-8, atol=1e-8)  # whatever it begins with
-    above, below = made(phase + h), made(phase - h)
-    for value, slope in ((FORCE, CROSS), (MOMENT, BEND)):
-        off = np.abs((above[:, value] - below[:, value]) / (2 * h) - out[:, slope])
-        assert np.median(off) < 1e-6 * np.abs(out[:, slope]).max()
-        assert (off < 1e-4 * np.abs(out[:, slope]).max()).mean() > 0.98  # beside the places where pairs come and go
+    shifts = rng.uniform(-1e-6, 1e-6, (300, law.slots))
+    made, h = law(phase, approach, shifts), 1e-8
+    force, moment, tangent, energy, pairs = numpy_law(law, phase, approach, shifts)
+    assert np.allclose(made.force, force, rtol=1e-8, atol=1e-8)
+    assert np.allclose(made.moment, moment, rtol=1e-8, atol=1e-10)
+    assert np.allclose(made.tangent, tangent, rtol=1e-7, atol=1.0)
+    assert np.allclose(made.energy, energy, rtol=1e-8, atol=1e-13)
+    assert np.allclose(made.pair_forces, pairs, rtol=1e-8, atol=1e-8)
+    begun = rng.uniform(0.0, 2e3, (300, law.slots))
+    assert np.allclose(law(phase, approach, shifts, begin=begun).force, force, rtol=1e-8, atol=1e-8)
+    assert np.allclose(begun, pairs, rtol=1e-8, atol=1e-8)  # whatever it begins with
+    above, below = law(phase + h, approach, shifts), law(phase - h, approach, shifts)
+    for value, slope in (("force", "cross"), ("moment", "bend")):
+        true = (getattr(above, value) - getattr(below, value)) / (2 * h)
+        off, size = np.abs(true - getattr(made, slope)), np.abs(getattr(made, slope)).max()
+        assert np.median(off) < 1e-6 * size
+        assert (off < 1e-4 * size).mean() > 0.98  # beside the places where pairs come and go
 
 
 def test_campbell_frequencies_are_those_of_the_whole_train():

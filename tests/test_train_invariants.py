@@ -131,7 +131,7 @@ def test_driven_rattle_balances_momentum_and_energy(friction: float) -> None:
         made = pushes.drag
         if made is not None and isinstance(flank, LawFlank) and flank.sliding is not None:
             columns = model.directions[spin[1], [flank.sliding.across, flank.sliding.spin]]
-            drag = drag + columns @ [made.across, made.turning]
+            drag = drag + made.value @ columns
     pull = line.row[spin[1]] * force + drag
     inertia = np.array([s.rotor.polar for s in model.shafts])
     lacks = inertia[1] * (rates[:, 1] - rates[0, 1]) - np.cumsum(share * (torque - pull))

@@ -34,44 +34,57 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..typing import Array, IntArray
+from ..rigid.packed import Packed
+from ..typing import Array, BoolArray, IntArray
+from . import kernel
 
 #: Approach (m) at which flanks touch that do not meet at all.
 NO_CONTACT = 1.0
-#: Newton steps for the pair forces, and their relative change in the last one.
-STEPS, CHANGE = 60, 1e-10
+#: Newton steps for the approach at a force.
+STEPS = 60
 
 
-@dataclass(frozen=True)
-class MeshForces:
+class MeshForces(NamedTuple):
     """The law at n places.
 
     Attributes
     ----------
     force : ndarray, shape (n,)
-        F (N), along the line of action.
+        F (N), along the line of action; not-a-number where pair forces with a beginning do not settle.
     moment : ndarray, shape (n,)
         M (N m), derivative of the energy with the pinion angle.
     tangent : ndarray, shape (n,)
         dF/d approach (N/m).
+    cross : ndarray, shape (n,)
+        dF/d angle (N/rad), and dM/d approach.
+    bend : ndarray, shape (n,)
+        dM/d angle (N m/rad).
     energy : ndarray, shape (n,)
         W (J).
+    beyond : ndarray of bool, shape (n,)
+        Farther than the law is known.
     pair_forces : ndarray, shape (n, slots)
         F_k (N); slot s holds the pair of psi between s and s + 1 mesh cycles from the law's first node.
+    pair_slopes : ndarray, shape (2, n, slots)
+        Their derivatives with approach and angle.
     """
 
     force: Array
     moment: Array
     tangent: Array
+    cross: Array
+    bend: Array
     energy: Array
+    beyond: BoolArray
     pair_forces: Array
+    pair_slopes: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,57 +185,28 @@ class MeshLaw:
         found: Array = (_powers(self.touch[:, cell], z[None])[0].T + np.asarray(shifts, dtype=float)).min(axis=1)
         return found
 
-    def __call__(self, angles: ArrayLike, approaches: ArrayLike, shifts: ArrayLike = 0.0) -> MeshForces:
+    def __call__(
+        self, angles: ArrayLike, approaches: ArrayLike, shifts: ArrayLike = 0.0, begin: Array | None = None
+    ) -> MeshForces:
         """Forces at pinion angles (rad) and approaches (m), both of shape (n,).
 
         Parameters
         ----------
         shifts : array_like, shape (n, slots)
             Further approach (m) at which each pair touches, such as its pitch error.
+        begin : ndarray, shape (n, slots)
+            Pair forces (N) to begin with, in which those that are found are left.
         """
-        angle, delta = np.broadcast_arrays(
-            np.atleast_1d(np.asarray(angles, dtype=float)), np.asarray(approaches, dtype=float)
-        )
-        _, cell, z = self.locate(angle)
-        t, slope = (x.T for x in _powers(self.touch[:, cell], z[None]))
-        gap = delta[:, None] - t - np.asarray(shifts, dtype=float)
-        C, C_slope = self._couplings(cell, z)
-        F = np.zeros_like(gap)
-        largest = np.zeros(len(angle))
-        for _ in range(STEPS):
-            compliance = _at(self, cell, z, F)
-            off = compliance.approach + _times(C, F) - gap
-            bears = (F > 0.0) | (off < 0.0)
-            J = np.where(bears[:, :, None] & bears[:, None, :], C, 0.0)
-            diagonal = np.arange(self.slots)
-            J[:, diagonal, diagonal] = np.where(bears, compliance.slope, 1.0)
-            step = np.linalg.solve(J, np.where(bears, -off, -F)[..., None])[..., 0]
-            new = np.maximum(F + step, 0.0)
-            largest = np.maximum(new.max(axis=1), 1e-300)
-            done = np.abs(new - F).max(axis=1) <= CHANGE * largest
-            F = new
-            if done.all():
-                break
-        else:
+        places = np.empty((2, max(np.size(angles), np.size(approaches))))
+        places[0], places[1] = angles, approaches
+        later = np.empty((places.shape[1], self.slots))
+        later[...] = shifts
+        pairs = np.zeros_like(later) if begin is None else begin
+        out, slopes = kernel.evaluate(_tables(self), places[0], places[1], later, pairs)
+        force, moment, tangent, cross, bend, energy, beyond = out.T
+        if begin is None and np.isnan(force).any():
             raise ArithmeticError("the pair forces of the mesh law do not settle")
-        made = _at(self, cell, z, F)
-        bears = F > 0.0
-        J = np.where(bears[:, :, None] & bears[:, None, :], C, 0.0)
-        J[:, diagonal, diagonal] = np.where(bears, made.slope, 1.0)
-        tangent = np.linalg.solve(J, bears[..., None].astype(float))[..., 0].sum(axis=1)
-        energy = (F * (gap - 0.5 * _times(C, F)) - made.energy).sum(axis=1)
-        moment = -(F * (slope + 0.5 * _times(C_slope, F)) + made.turn).sum(axis=1)
-        return MeshForces(F.sum(axis=1), moment, tangent, energy, F)
-
-    def _couplings(self, cell: IntArray, z: Array) -> tuple[Array, Array]:
-        """C between all slots and its slope, shape (n, s, s)."""
-        made = np.zeros((2, len(z), self.slots, self.slots))
-        for apart in range(1, self.slots):
-            for low in range(self.slots - apart):
-                found = _powers(self.coupling[apart - 1, low, cell], z)
-                for value, one in zip(made, found, strict=True):
-                    value[:, low, low + apart] = value[:, low + apart, low] = one
-        return made[0], made[1]
+        return MeshForces(force, moment, tangent, cross, bend, energy, beyond > 0.0, pairs, slopes)
 
     def approach(self, angles: ArrayLike, forces: ArrayLike, shifts: ArrayLike = 0.0) -> Array:
         """Approach (m) that makes a mesh force (N): static transmission error under load; `shifts` as in `__call__`.
@@ -254,42 +238,19 @@ class MeshLaw:
         return np.where(force > 0.0, delta, first)
 
 
-@dataclass(frozen=True)
-class _Pairs:
-    """A pair law and its derivatives, (n, slots): J, J/rad, m, m/N."""
-
-    energy: Array
-    turn: Array
-    approach: Array
-    slope: Array
-
-
-def _times(matrices: Array, vectors: Array) -> Array:
-    """(n, s, s) times (n, s)."""
-    made: Array = (matrices @ vectors[..., None])[..., 0]
-    return made
+@lru_cache(maxsize=64)
+def _tables(law: MeshLaw) -> kernel.LawTables | Packed:
+    """What the kernel gets of a law."""
+    energies = law.energies.swapaxes(3, 4)
+    found = (law.nodes, law.forces, law.touch, energies, law.coupling)
+    nodes, forces, touch, energies, coupling = (np.ascontiguousarray(x, dtype=float) for x in found)
+    return kernel.packed_tables(kernel.LawTables(nodes, forces, touch, energies, coupling, law.reach))
 
 
 def _powers(c: Array, z: Array) -> tuple[Array, Array]:
     """Value and slope of cubics at z."""
     value = c[..., 0] + z * (c[..., 1] + z * (c[..., 2] + z * c[..., 3]))
     return value, c[..., 1] + z * (2 * c[..., 2] + 3 * z * c[..., 3])
-
-
-def _at(law: MeshLaw, cell: IntArray, z: Array, F: Array) -> _Pairs:
-    """Complementary energy of all pairs and its derivatives at forces (n, slots)."""
-    part = np.clip(np.searchsorted(law.forces, F, side="right") - 1, 0, len(law.forces) - 2)
-    f = F - law.forces[part]
-    c = law.energies[np.arange(law.slots), cell[:, None], part]
-    value, turn = _powers(np.moveaxis(c, 3, 2), z[:, None, None])
-    e = [value[..., b] for b in range(5)]
-    g = [turn[..., b] for b in range(5)]
-    return _Pairs(
-        e[0] + f * (e[1] + f * (e[2] + f * (e[3] + f * e[4]))),
-        g[0] + f * (g[1] + f * (g[2] + f * (g[3] + f * g[4]))),
-        e[1] + f * (2 * e[2] + f * (3 * e[3] + f * 4 * e[4])),
-        2 * e[2] + f * (6 * e[3] + f * 12 * e[4]),
-    )
 
 
 class Laws(NamedTuple):

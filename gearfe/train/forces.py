@@ -28,7 +28,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ..meshlaw.law import MeshLaw
+from ..meshlaw.law import MeshForces, MeshLaw
 from ..rigid.timefunctions import TimeFunction
 from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array, BoolArray
@@ -36,21 +36,42 @@ from .friction import Sliding, smooth_sign
 
 
 class Drag(NamedTuple):
-    """Friction of a flank: force across the line of action (N), its moment about the pitch point (N m), the power that
-    it takes (W)."""
+    """Friction of a flank at n times, (n, 2) each: force across the line of action (N) and its moment about the pitch
+    point (N m), with their derivatives: with approach and phase, with the rates of approach, of the way across, and of
+    the turn. Last the power (W) that it takes, (n,).
+    """
 
-    across: Array
-    turning: Array
+    value: Array
+    by_approach: Array
+    by_phase: Array
+    by_rate: Array
+    by_across_rate: Array
+    by_turn_rate: Array
     power: Array
 
 
 class FlankForces(NamedTuple):
-    """Forces of a flank at n times, (n,) each: along the approach (N), damping included; of a law the moment on the
-    phase (N m), and its friction."""
+    """Forces of a flank at n times, (n,) each."""
 
-    force: Array
-    moment: Array | None = None
+    force: Array  # N along the approach, damping included
+    tangent: Array  # N/m
+    cross: Array  # N/rad: of the force with the phase
+    apart: BoolArray
+    beyond: BoolArray  # farther than the law is known
+    per_rate: Array | None = None  # N s/m
+    moment: Array | None = None  # N m on the phase
+    moment_by_approach: Array | None = None  # N m/m
+    bend: Array | None = None  # N m/rad: of the moment with the phase
     drag: Drag | None = None
+
+
+class Slip(NamedTuple):
+    """What friction and damping depend on: psi' (1/s), rates of approach, of the way across and of the turn (n, 3), and
+    the friction itself."""
+
+    rate: Array | float
+    rates: Array
+    sliding: Sliding | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +99,8 @@ class MeshFlank(ABC):
     gap: float
 
     @abstractmethod
-    def forces(self, angle: Array, rate: Array, u: Array, du: Array) -> FlankForces:
-        """Forces at rotations of the drive (rad) and their rates, (n,), u and du of shape (n, directions)."""
+    def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:
+        """Forces at phases (rad) and approaches beyond the gap (m), (n,); `begin` as of `MeshLaw`."""
 
     @abstractmethod
     def bears(self, phase: Array, approach: Array) -> BoolArray:
@@ -100,11 +121,12 @@ class CurveFlank(MeshFlank):
     curve: PeriodicInterpolant
     parts: bool
 
-    def forces(self, angle: Array, rate: Array, u: Array, du: Array) -> FlankForces:  # noqa: ARG002
-        """Forces at rotations of the drive (rad) and their rates, (n,), u and du of shape (n, directions)."""
-        phase, approach = self.phase_and_approach(angle, u)
-        force = self.curve(phase).value * approach
-        return FlankForces(np.maximum(force, 0.0) if self.parts else force)
+    def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:  # noqa: ARG002
+        """Forces at phases (rad) and approaches beyond the gap (m), (n,)."""
+        k, slope = self.curve(phase)
+        bears = self.bears(phase, approach)
+        force, tangent, cross = (np.where(bears, x, 0.0) for x in (k * approach, k, slope * approach))
+        return FlankForces(force, tangent, cross, ~bears, np.zeros(len(phase), dtype=bool))
 
     def bears(self, phase: Array, approach: Array) -> BoolArray:  # noqa: ARG002
         """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
@@ -130,23 +152,44 @@ class LawFlank(MeshFlank):
         return np.asarray(approach > self.law.touching(phase, self.shifts_at(phase)))
 
     def shifts_at(self, phase: Array) -> Array:
-        """Shifts (m) of the pairs in the law's slots at phases (n,), shape (n, slots)."""
+        """Shifts (m) of the pairs in the law's slots at phases (n,), shape (n, slots), or (1,) of all pairs."""
+        if len(self.shifts) == 1:
+            return self.shifts
         return np.asarray(self.shifts[self.law.pair_numbers(phase) % len(self.shifts)])
 
-    def forces(self, angle: Array, rate: Array, u: Array, du: Array) -> FlankForces:
-        """Forces at rotations of the drive (rad) and their rates, (n,), u and du of shape (n, directions)."""
-        phase, approach = self.phase_and_approach(angle, u)
-        made = self.law(phase, approach, self.shifts_at(phase))
-        presses = np.maximum(1.0 + self.damping * du[:, self.direction], 0.0)
-        one = self.sliding
-        if one is None:
-            return FlankForces(made.force * presses, made.moment)
-        e = one.radius * (self.law.pair_phases(phase) - one.pitch_phase)
-        spin = one.ratio * rate + du[:, one.spin]
-        speed = du[:, one.across, None] + e * spin[:, None]
-        drag = one.coefficient * made.pair_forces * presses[:, None] * smooth_sign(speed / one.speed)[0]
-        friction = Drag(*(np.asarray((drag * arm).sum(axis=1)) for arm in (1.0, e, speed)))
-        return FlankForces(made.force * presses, made.moment, friction)
+    def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:
+        """Forces at phases (rad) and approaches beyond the gap (m), (n,); `begin` as of `MeshLaw`."""
+        made = self.law(phase, approach, self.shifts_at(phase), begin)
+        push = 1.0 + self.damping * slip.rates[:, 0]
+        more = np.where(push > 0.0, self.damping, 0.0)
+        push = np.maximum(push, 0.0)
+        return FlankForces(
+            made.force * push, made.tangent * push, made.cross * push, made.force <= 0.0, made.beyond,
+            made.force * more if self.damping > 0.0 else None, made.moment, made.cross, made.bend,
+            None if slip.sliding is None else self._drag(phase, made, slip, slip.sliding, push, more),
+        )  # fmt: skip
+
+    def _drag(self, phase: Array, made: MeshForces, slip: Slip, one: Sliding, push: Array, more: Array) -> Drag:
+        """Friction of `gearfe.train.friction` with its derivatives."""
+        pairs, slopes = made.pair_forces, made.pair_slopes
+        arm = one.radius * (self.law.pair_phases(phase) - one.pitch_phase)
+        turning = (one.ratio * slip.rate + slip.rates[:, 2])[:, None]
+        speed = slip.rates[:, 1, None] + arm * turning
+        share, slope = smooth_sign(speed / one.speed)
+        steep = one.coefficient * pairs * push[:, None] * slope / one.speed
+        pulls = one.coefficient * share
+        drag = pulls * pairs * push[:, None]
+        arms = np.stack([np.ones_like(arm), arm])  # of the force and of its moment
+
+        def summed(x: Array) -> Array:
+            return np.asarray((arms * x).sum(axis=2).T)
+
+        by_phase = summed(pulls * slopes[1] * push[:, None] + steep * one.radius * turning)
+        by_phase[:, 1] += one.radius * drag.sum(axis=1)
+        return Drag(
+            summed(drag), summed(pulls * slopes[0] * push[:, None]), by_phase, summed(pulls * pairs * more[:, None]),
+            summed(steep), summed(steep * arm), (drag * speed).sum(axis=1),
+        )  # fmt: skip
 
 
 Flank = CurveFlank | LawFlank
@@ -183,8 +226,12 @@ class TrainForces:
 
     def of_flanks(self, t: Array, u: Array, du: Array) -> list[FlankForces]:
         """Forces of each flank at the times t (n,), u and du of shape (n, directions)."""
-        angle, rate = self.angle(t), self.angle(t, 1)
-        return [flank.forces(angle, rate, u, du) for flank in self.flanks]
+        angle, rate, made = self.angle(t), self.angle(t, 1), []
+        for flank in self.flanks:
+            one = flank.sliding
+            moves = [flank.direction, *((flank.direction, flank.turn) if one is None else (one.across, one.spin))]
+            made.append(flank.forces(*flank.phase_and_approach(angle, u), Slip(rate, du[:, moves], one)))
+        return made
 
     def __call__(self, t: Array, u: Array, du: Array, flanks: list[FlankForces] | None = None) -> Array:
         """Forces at the times t (n,), u and du of shape (n, directions); shape (n, directions).
@@ -199,8 +246,8 @@ class TrainForces:
             if made.moment is not None:
                 out[:, flank.turn] -= flank.sense * made.moment
             if flank.sliding is not None and made.drag is not None:
-                out[:, flank.sliding.across] -= made.drag.across
-                out[:, flank.sliding.spin] -= made.drag.turning
+                out[:, flank.sliding.across] -= made.drag.value[:, 0]
+                out[:, flank.sliding.spin] -= made.drag.value[:, 1]
         for gyro in self.gyros:
             d = gyro.direction
             momentum = gyro.polar * (gyro.ratio * rate + du[:, d + 2])

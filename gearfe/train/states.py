@@ -96,7 +96,7 @@ def contact_forces(
             out[:, i] += side * made.force
             apart[:, i] &= made.force == 0.0
             if line.sliding is not None and made.drag is not None:
-                torque[:, i] += line.sliding.arm * made.drag.across + made.drag.turning
+                torque[:, i] += made.drag.value @ np.array([line.sliding.arm, 1.0])
                 power[:, i] += made.drag.power
         if line.law is None:
             out[:, i] += line.damping * (v @ line.row)

@@ -16,29 +16,30 @@ from functools import lru_cache
 from types import SimpleNamespace
 from typing import NamedTuple
 
-from ..meshlaw.law import MeshLaw, stacked_laws
+import numpy as np
+
 from ..rigid import compiled
 from ..rigid.packed import Packed
 from ..typing import Array
 
 #: Newton steps for the pair forces, their relative change in the last one: what is left is of the order of its square.
 MOST, SETTLED = 60, 1e-7
-#: Columns of the results: F, M, dF/d approach, dF/d phase = dM/d approach, dM/d phase, 1 where beyond the reach.
-FORCE, MOMENT, TANGENT, CROSS, BEND, BEYOND, RESULTS = range(7)
+#: Columns of the results: F, M, dF/d approach, dF/d phase = dM/d approach, dM/d phase, W, 1 where beyond the reach.
+FORCE, MOMENT, TANGENT, CROSS, BEND, ENERGY, BEYOND, RESULTS = range(8)
 #: Rows of the work space, before those of the matrix and of C: gap, t', t'', Lambda and its derivative with the force,
-#: two of Phi and one of Lambda with the angle, whether a pair bears, two right sides that become solutions, g, cell of
-#: the force with Lambda's polynomial there.
-GAPS, TOUCH1, TOUCH2, LAMBDA, GIVES, TURN, TURN2, SHIFT, BEARS, RIGHT1, RIGHT2, BEFORE, PART = range(13)
+#: Phi, two of its derivatives and one of Lambda with the angle, whether a pair bears, two right sides that become
+#: solutions, g, cell of the force with Lambda's polynomial there.
+GAPS, TOUCH1, TOUCH2, LAMBDA, GIVES, PHI, TURN, TURN2, SHIFT, BEARS, RIGHT1, RIGHT2, BEFORE, PART = range(14)
 ROWS = PART + 5
 
 
 class LawTables(NamedTuple):
-    """A mesh law, see `gearfe.meshlaw.law.Laws`, and its reach (m)."""
+    """A mesh law, see `gearfe.meshlaw.law.MeshLaw`."""
 
     nodes: Array
     forces: Array
     touch: Array
-    energies: Array
+    energies: Array  # (s, n, m, 5, 4)
     coupling: Array
     reach: float
 
@@ -48,30 +49,26 @@ class Jets(NamedTuple):
 
     phase: Array  # (n,) (rad)
     approach: Array  # (n,) (m)
+    shifts: Array  # (n, s) further approach at which each pair touches (m)
     pairs: Array  # (n, s) pair forces to begin with, then found (N)
     slopes: Array  # (2, n, s) their derivatives with approach and phase
     work: Array  # scratch
     out: Array  # (n, RESULTS)
 
 
-def law_tables(law: MeshLaw) -> LawTables | Packed:
-    """What `law_jets` gets of a law, compiled or not."""
-    laws = stacked_laws([law])
-    made = LawTables(laws.nodes[0], laws.forces[0], laws.touch[0], laws.energies[0], laws.coupling[0], law.reach)
-    return Packed(made) if compiled.available() else made
-
-
 def law_jets(law: LawTables, at: Jets) -> int:
     """Forces, moments and their derivatives at phases and approaches; returns 0."""
-    phase, approach, pairs, slopes, work, out = (
-        at.phase, at.approach, at.pairs, at.slopes, at.work, at.out,
+    phase, approach, shifts, pairs, slopes, work, out = (
+        at.phase, at.approach, at.shifts, at.pairs, at.slopes, at.work, at.out,
     )  # fmt: skip
     nodes, forces, touch, energies, coupling = law.nodes, law.forces, law.touch, law.energies, law.coupling
     slots = touch.shape[0]
     cells = nodes.shape[0] - 1
     cycle = nodes[cells] - nodes[0]
     for i in range(phase.shape[0]):
-        x = phase[i] - math.floor((phase[i] - nodes[0]) / cycle) * cycle
+        x = phase[i]
+        if math.isfinite(x):
+            x -= math.floor((x - nodes[0]) / cycle) * cycle
         cell = 0
         top = cells
         while top - cell > 1:
@@ -84,7 +81,7 @@ def law_jets(law: LawTables, at: Jets) -> int:
         least = 1e300
         for k in range(slots):
             c = touch[k, cell]
-            t = c[0] + z * (c[1] + z * (c[2] + z * c[3]))
+            t = c[0] + z * (c[1] + z * (c[2] + z * c[3])) + shifts[i, k]
             least = min(least, t)
             work[GAPS, k] = approach[i] - t
             work[TOUCH1, k] = c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
@@ -102,7 +99,7 @@ def law_jets(law: LawTables, at: Jets) -> int:
             work[PART, k] = -1.0
             for j in range(slots):
                 if j != k:
-                    work[ROWS + slots + k, j] = coupled(coupling, k, j, slots, cell, z, 0)
+                    work[ROWS + slots + k, j] = coupled(coupling, k, j, cell, z, 0)
         settled = False
         for _ in range(MOST):
             compliances(forces, energies, cell, z, pairs[i], work)
@@ -140,6 +137,7 @@ def law_jets(law: LawTables, at: Jets) -> int:
         force = 0.0
         moment = 0.0
         bend = 0.0
+        energy = 0.0
         for k in range(slots):
             F = pairs[i, k]
             work[BEARS, k] = 1.0 if F > 0.0 else 0.0
@@ -147,12 +145,14 @@ def law_jets(law: LawTables, at: Jets) -> int:
             shift = work[TOUCH1, k] + work[SHIFT, k]
             moment -= F * work[TOUCH1, k] + work[TURN, k]
             bend -= F * work[TOUCH2, k] + work[TURN2, k]
+            energy += F * work[GAPS, k] - work[PHI, k]
             for j in range(slots):
                 if j != k:
-                    once = coupled(coupling, k, j, slots, cell, z, 1) * pairs[i, j]
+                    once = coupled(coupling, k, j, cell, z, 1) * pairs[i, j]
                     shift += once
                     moment -= 0.5 * once * F
-                    bend -= 0.5 * coupled(coupling, k, j, slots, cell, z, 2) * pairs[i, j] * F
+                    energy -= 0.5 * work[ROWS + slots + k, j] * pairs[i, j] * F
+                    bend -= 0.5 * coupled(coupling, k, j, cell, z, 2) * pairs[i, j] * F
             work[BEFORE, k] = shift
             work[RIGHT1, k] = 1.0 if F > 0.0 else 0.0
             work[RIGHT2, k] = -shift if F > 0.0 else 0.0
@@ -171,6 +171,7 @@ def law_jets(law: LawTables, at: Jets) -> int:
         out[i, TANGENT] = tangent
         out[i, CROSS] = cross
         out[i, BEND] = bend
+        out[i, ENERGY] = energy
     return 0
 
 
@@ -193,26 +194,29 @@ def compliances(forces: Array, energies: Array, cell: int, z: float, pairs: Arra
 
 
 def turning(forces: Array, energies: Array, cell: int, z: float, pairs: Array, work: Array) -> None:
-    """Phi's first and second derivative with the angle, and Lambda's."""
+    """Phi, its first and second derivative with the angle, and Lambda's."""
     for k in range(pairs.shape[0]):
         part = int(work[PART, k])
         f = pairs[k] - forces[part]
+        value = 0.0
         turn = 0.0
         turn2 = 0.0
         shift = 0.0
         for b in range(4, -1, -1):
             c = energies[k, cell, part, b]
             shift = shift * f + turn
+            value = value * f + c[0] + z * (c[1] + z * (c[2] + z * c[3]))
             turn = turn * f + c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
             turn2 = turn2 * f + 2.0 * c[2] + 6.0 * z * c[3]
+        work[PHI, k] = value
         work[TURN, k] = turn
         work[SHIFT, k] = shift
         work[TURN2, k] = turn2
 
 
-def coupled(coupling: Array, k: int, j: int, slots: int, cell: int, z: float, order: int) -> float:
+def coupled(coupling: Array, k: int, j: int, cell: int, z: float, order: int) -> float:
     """C between two slots, its slope or its second derivative with the angle."""
-    c = coupling[min(k, j) * slots + max(k, j), cell]
+    c = coupling[abs(k - j) - 1, min(k, j), cell]
     if order == 0:
         return c[0] + z * (c[1] + z * (c[2] + z * c[3]))
     if order == 1:
@@ -258,6 +262,17 @@ def _bound() -> SimpleNamespace:
     return compiled.bind(FUNCTIONS, NAMES, compiled=compiled.available(), entries=("law_jets",))
 
 
-def evaluate_law(tables: LawTables | Packed, at: Jets) -> None:
-    """`law_jets`, compiled where numba is installed."""
+def packed_tables(tables: LawTables) -> LawTables | Packed:
+    """What `evaluate` gets of a law, compiled or not."""
+    return Packed(tables) if compiled.available() else tables
+
+
+def evaluate(
+    tables: LawTables | Packed, phase: Array, approach: Array, shifts: Array, pairs: Array
+) -> tuple[Array, Array]:
+    """Results and slopes of `law_jets`, compiled where numba is installed; `pairs` become the pair forces found."""
+    count, slots = pairs.shape
+    out, slopes, work = np.zeros((count, RESULTS)), np.zeros((2, count, slots)), np.zeros((ROWS + 2 * slots, slots))
+    at = Jets(phase, approach, shifts, pairs, slopes, work, out)
     _bound().law_jets(tables, Packed(at) if isinstance(tables, Packed) else at)
+    return out, slopes
