@@ -33,7 +33,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,10 +41,10 @@ from numpy.typing import ArrayLike
 from ..gear.touching import Touching
 from ..typing import Array, BoolArray, IntArray
 from .half_plane_pair import HalfPlanePair, half_plane_pair
-from .half_plane_result import SUMS, PairContacts, contact_rates, contacts_of, pair_sums
+from .half_plane_result import PairContacts, contacts_of, moment_on_wheel, position_sums
 from .half_plane_step import SMALL, WINDOW, Setting, State, reference_approach, smooth_influence, step
 from .panels import PANELS, Couplings, unilateral
-from .position import STATUS, Positions, joined, of_positions, taken, together
+from .position import STATUS, TORQUES, Positions, joined, of_positions, taken, together
 from .zones import completed
 
 __all__ = ["HalfPlanePair", "PairContacts", "half_plane_pair", "solve_half_plane"]
@@ -202,33 +202,31 @@ def _joined(parts: Sequence[tuple[Setting, State]]) -> tuple[Setting, State]:
 
 def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> Positions:
     status, iterations = np.full(len(angles), "no_contact", dtype=STATUS), np.zeros(len(angles), dtype=np.int64)
-    numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in (*SUMS, "tangent")}
-    contacts: list[PairContacts] = []
+    numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in (*TORQUES, "energy")}
+    solved: list[PairContacts] = []
     open_ = first_state(law, twists, found)  # positions to be solved
     for _ in range(ROUNDS):
         near, open_ = _approached(*open_, iterations)
-        ended = _finished(*near, twists)
-        now, settled = near[0].numbers, ended.settled
-        iterations[now] += HELD_STEPS
-        status[now[settled]] = "converged"
-        for name, values in numbers.items():
-            values[now[settled]] = ended.sums[name][settled]
-        contacts.append(taken(ended.contacts, status[ended.contacts.position] == "converged"))
-        open_ = _joined([open_, ended.rest])
-        if settled.all():
+        iterations[near[0].numbers] += HELD_STEPS
+        done, again = _finished(*near, twists, numbers)
+        solved.append(done)
+        open_ = _joined([open_, again])
+        if len(again[0].found) == 0:
             break
-    status[open_[0].numbers] = "not_converged"
+    contacts = joined(solved)
+    if len(solved) > 1:
+        contacts = taken(contacts, np.lexsort((contacts.arc[:, 0], contacts.pair, contacts.position)))
+    status[contacts.position], status[open_[0].numbers] = "converged", "not_converged"
     for values in numbers.values():
         values[open_[0].numbers] = np.nan
-    every = joined(contacts)
-    if len(contacts) > 1:
-        every = taken(every, np.lexsort((every.arc[:, 0], every.pair, every.position)))
-    return Positions(pinion_angle=angles, twist=twists, status=status, iterations=iterations, contacts=every, **numbers)
+    return Positions(
+        pinion_angle=angles, twist=twists, status=status, iterations=iterations, contacts=contacts, **numbers
+    )
 
 
 def _approached(setting: Setting, state: State, iterations: IntArray) -> tuple[tuple[Setting, State], ...]:
     """Steps until positions are near their solution; those that are, and those that are not. Counts steps."""
-    near = [_kept(setting, state, np.zeros(len(setting.numbers), dtype=bool))]
+    near = []
     for number in range(STEPS):
         couples = setting.couples
         made = step(setting, state, search=number < SEARCHES)
@@ -241,24 +239,16 @@ def _approached(setting: Setting, state: State, iterations: IntArray) -> tuple[t
             setting, state = _kept(setting, state, ~there)
         if len(setting.found) == 0:
             break
-    return _joined(near), (setting, state)
+    return _joined(near or [_kept(setting, state, np.zeros(len(setting.numbers), dtype=bool))]), (setting, state)
 
 
-class _Ended(NamedTuple):
-    """Positions after their last steps: which are solved, sums over their contacts, and loaded contacts; and from where
-    the others go on.
-    """
-
-    settled: BoolArray
-    sums: dict[str, Array]
-    contacts: PairContacts
-    rest: tuple[Setting, State]
-
-
-def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
+def _finished(
+    setting: Setting, start: State, twists: Array, solved: dict[str, Array]
+) -> tuple[PairContacts, tuple[Setting, State]]:
     """Last steps of positions that are near their solution, there and at a slightly larger twist.
 
-    Windows and bearing panels are held, so that the differences are derivatives.
+    Windows and bearing panels are held, so that the differences are derivatives. Writes the numbers of those that are
+    solved; returns their loaded contacts, and from where the others go on.
     """
     found, couples, numbers = setting.found, setting.couples, setting.numbers
     touch = np.full(len(numbers), np.inf)
@@ -272,19 +262,17 @@ def _finished(setting: Setting, start: State, twists: Array) -> _Ended:
         state, made = after, step(both, after, search=False, held=True)
         after = made.next
     here, on = slice(0, len(found)), slice(len(found), None)
-    of_both = pair_sums(both, state, made)
     one, two = ((taken(state, part), taken(made, part)) for part in (here, on))
-    of_pairs = {name: values[here] for name, values in of_both.items()}
-    sums = {name: couples.total(of_pairs[name]) for name in SUMS}
-    sums["tangent"] = couples.total(of_both["torque_wheel"][on] - of_pairs["torque_wheel"]) / ahead
+    sums, moment = position_sums(setting, *one), couples.total(moment_on_wheel(setting.law, *two))
+    sums["tangent"] = (moment - sums["torque_wheel"]) / ahead
     settled = (couples.total(~one[1].settled | (one[1].changed > TOLERANCE)) == 0) & (sums["tangent"] > 0)
-    known = contact_rates(setting.law, one, two, ahead[couples.position])
-    known["torque_wheel"] = of_pairs["torque_wheel"]
-    contacts = contacts_of(setting, *one, known)
     now, whole, lacking = completed(setting, *one)
     rest = _joined([_kept(setting, one[1].next, ~settled & ~lacking), _kept(now, whole, lacking)])
     settled &= ~lacking
-    return _Ended(settled, sums, contacts, rest)
+    for name, values in sums.items():
+        solved[name][numbers[settled]] = values[settled]
+    contacts = contacts_of(setting, one, two, ahead[couples.position])
+    return taken(contacts, (contacts.force > 0) & settled[couples.position]), rest
 
 
 def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array) -> tuple[Array, IntArray, Array]:

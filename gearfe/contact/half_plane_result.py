@@ -12,10 +12,7 @@ from .compliance import MeshingPair
 from .flank import Flank, edge_shapes
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import Setting, State, Step, cross
-from .position import FlankLoads, PointPressures, taken
-
-#: Sums over the contacts of a position.
-SUMS = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "energy")
+from .position import FlankLoads, PointPressures
 
 
 @dataclass(frozen=True)
@@ -83,53 +80,48 @@ class PairContacts:
         )
 
 
-def pair_sums(setting: Setting, state: State, made: Step) -> dict[str, Array]:
-    """What each contact adds to the sums over its position (N m, N m, N m, J)."""
-    law, normal, centre = setting.law, state.normal, made.next.centre
-    force = made.next.force * law.width
+def moment_on_wheel(law: HalfPlanePair, state: State, made: Step) -> Array:
+    """Moments of the contacts' forces about the wheel's hub (N m), shape (p,)."""
+    return -made.next.force * law.width * cross(made.next.centre - law.hub[1], state.normal)
+
+
+def position_sums(setting: Setting, state: State, made: Step) -> dict[str, Array]:
+    """Torques (N m) and energies (J) of the positions, shape (m,)."""
+    law, couples, force = setting.law, setting.couples, made.next.force * setting.law.width
     wheel = setting.tables.at(made.next.arc[:, :, None])[0][:, 1, 0] * setting.turn[:, 1]
     return {
-        "torque_wheel": -force * cross(centre - law.hub[1], normal),
-        "torque_pinion": force * cross(centre, normal),
-        "torque_wheel_reaction": -force * cross(wheel, normal),
-        "energy": made.energy * law.width,
+        "torque_wheel": couples.total(moment_on_wheel(law, state, made)),
+        "torque_pinion": couples.total(force * cross(made.next.centre, state.normal)),
+        "torque_wheel_reaction": couples.total(-force * cross(wheel, state.normal)),
+        "energy": couples.total(made.energy * law.width),
     }
 
 
-def contacts_of(setting: Setting, state: State, made: Step, known: dict[str, Array]) -> PairContacts:
-    """The contacts of a step that carry load; `known`, of all: the wheel's torques, and what `contact_rates` gives."""
-    law, index = setting.law, np.flatnonzero(made.next.force > 0)
-    if len(index) < len(setting.found):
-        setting, state, made = setting.take(index), taken(state, index), taken(made, index)
-    found = setting.found
+def contacts_of(setting: Setting, here: tuple[State, Step], ahead: tuple[State, Step], by: Array) -> PairContacts:
+    """All contacts of a step, also those without load; their rates are from that at twists larger by `by` (rad), shape
+    (p,).
+    """
+    (state, made), width = here, setting.law.width
+    one, two = made.next, ahead[1].next
+    wider = np.divide(two.variance, one.variance, out=np.ones(len(by)), where=one.variance > 0)
     return PairContacts(
-        position=found.position,
-        pair=found.pair,
-        force=made.next.force * law.width,
-        point=made.next.centre,
+        position=setting.found.position,
+        pair=setting.found.pair,
+        force=one.force * width,
+        force_rate=(two.force - one.force) * width / by,
+        normal_rate=np.angle(ahead[0].normal / state.normal) / by,
+        growth=0.5 * (wider - 1) / by,
+        arc_rate=(two.arc - one.arc) / by[:, None],
+        torque_wheel=moment_on_wheel(setting.law, state, made),
+        point=one.centre,
         normal=state.normal,
-        arc=made.next.arc,
-        half_width=2 * np.sqrt(made.next.variance),
+        arc=one.arc,
+        half_width=2 * np.sqrt(one.variance),
         x=made.x - made.place[:, None],
         width=made.width,
         pressure=made.pressure,
         panel_arc=made.arcs,
-        **{name: values[index] for name, values in known.items()},
     )
-
-
-def contact_rates(
-    law: HalfPlanePair, here: tuple[State, Step], ahead: tuple[State, Step], by: Array
-) -> dict[str, Array]:
-    """Rates of `PairContacts` for all contacts, from the same step at twists larger by `by` (rad), shape (p,)."""
-    one, two = here[1].next, ahead[1].next
-    wider = np.divide(two.variance, one.variance, out=np.ones(len(by)), where=one.variance > 0)
-    return {
-        "force_rate": (two.force - one.force) * law.width / by,
-        "normal_rate": np.angle(ahead[0].normal / here[0].normal) / by,
-        "growth": 0.5 * (wider - 1) / by,
-        "arc_rate": (two.arc - one.arc) / by[:, None],
-    }
 
 
 def flank_loads(
