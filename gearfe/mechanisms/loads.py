@@ -76,14 +76,11 @@ class Formula:
         slopes, (register, program), plain = np.zeros(len(values)), self._program, KERNELS.plain
         if not math.isfinite(self.at(t, values)):
             return slopes
-        switches, Z = program.switches, np.zeros((len(values), 3))
-        R, pieces, before = np.zeros((len(program.code.op), 2)), np.zeros(len(switches.register), dtype=np.int64), None
-        Z[:, 0] = values
+        Z, R = np.zeros((len(values), 3)), np.zeros((len(program.code.op), 2))
+        Z[:, 0], pieces = values, np.zeros(len(program.switches.register), dtype=np.int64)
         with np.errstate(all="ignore"):
-            while before is None or not np.array_equal(pieces, before):  # each time one more is right for certain
-                before = pieces.copy()
-                plain.tape_order(program, Z, R, Z, pieces, 0)
-                pieces[:] = [plain.piece_at(switches, s, R[r, 0]) for s, r in enumerate(switches.register)]
+            plain.set_pieces(program, Z, R, Z, pieces)
+            plain.tape_order(program, Z, R, Z, pieces, 0)
             for k in range(len(values)):
                 Z[:, 1] = np.eye(len(values))[k]
                 plain.tape_order(program, Z, R, Z, pieces, 1)

@@ -14,7 +14,7 @@ from ..typing import Array, IntArray
 from .kernel_elastic import add_bar_tangents, add_bars, add_float_tangents, add_floats
 from .kernel_quadratic import gradients, row_orders
 from .kernel_rows import fill, time_series
-from .kernel_tape import curve_forces, curve_orders, piece_at, tape_order
+from .kernel_tape import curve_forces, curve_orders, piece_at, set_pieces, tape_order
 from .lanes import Lanes
 
 if TYPE_CHECKING:
@@ -94,23 +94,6 @@ class Equations(NamedTuple):
     band: Band
     own: Scratch
     wide: Wide
-
-
-def own_pieces(eq: Equations) -> bool:
-    """Pieces of all switches at the variables in P, of tables beyond their ends the nearest; whether none is beyond."""
-    tb, own = eq.program, eq.own
-    switches = tb.switches
-    covered = True
-    for s in range(own.pieces.shape[0]):
-        tape_order(tb, own.P, own.R, own.TF, own.pieces, 0)
-        x = own.R[switches.register[s], 0]
-        piece = piece_at(switches, s, x)
-        first = switches.first[s]
-        if switches.first[s + 1] > first and switches.period[s] == 0.0 and piece < 0:
-            covered = False
-            piece = 0 if x < switches.knot[first] else switches.first[s + 1] - first - 2
-        own.pieces[s] = piece
-    return covered
 
 
 def coordinate_pieces(eq: Equations, q: Array) -> None:
@@ -196,7 +179,7 @@ def add_registers(eq: Equations) -> float:
             own.P[z, 1] = P[z, 1, i]
         for f in range(TF.shape[0]):
             own.TF[f, 0] = TF[f, 0, i]
-        covered = own_pieces(eq)
+        covered = set_pieces(tb, own.P, own.R, own.TF, own.pieces)
         tape_order(tb, own.P, own.R, own.TF, own.pieces, 0)
         for p in range(code.push.shape[0]):
             H[code.push[p, 1], 0, i] += code.share[p] * own.R[code.push[p, 0], 0]
@@ -313,7 +296,7 @@ def add_register_tangents(eq: Equations, q: Array, v: Array) -> None:
     tb, own, band = eq.program, eq.own, eq.band
     P, R, F, curves = own.P, own.R, own.F, tb.curves
     n = q.shape[0]
-    own_pieces(eq)
+    set_pieces(tb, P, R, own.TF, own.pieces)
     tape_order(tb, P, R, own.TF, own.pieces, 0)
     for f in range(own.TF.shape[0]):
         own.TF[f, 1] = 0.0
@@ -349,6 +332,6 @@ def add_register_tangents(eq: Equations, q: Array, v: Array) -> None:
 
 
 FUNCTIONS = (
-    own_pieces, coordinate_pieces, variables, all_variables, registers_push, lane_times, add_registers, coordinate,
+    coordinate_pieces, variables, all_variables, registers_push, lane_times, add_registers, coordinate,
     turned, bend, add_register_tangents, stages, linearise,
 )  # fmt: skip

@@ -200,6 +200,23 @@ def piece_at(switches: Switches, s: int, x: float) -> int:
     return k + turns * count
 
 
+def set_pieces(tb: Program, Z: Array, R: Array, TF: Array, pieces: IntArray) -> bool:
+    """Pieces of all switches where the variables are Z[:, 0], of tables beyond their ends the nearest; whether none is
+    beyond."""
+    switches: Switches = tb.switches
+    covered = True
+    for s in range(pieces.shape[0]):
+        tape_order(tb, Z, R, TF, pieces, 0)
+        x = R[switches.register[s], 0]
+        piece = piece_at(switches, s, x)
+        first = switches.first[s]
+        if switches.first[s + 1] > first and switches.period[s] == 0.0 and piece < 0:
+            covered = False
+            piece = 0 if x < switches.knot[first] else switches.first[s + 1] - first - 2
+        pieces[s] = piece
+    return covered
+
+
 def margin(switches: Switches, s: int, piece: int, x: float) -> float:
     """How far inside of its piece a value lies, negative outside."""
     if switches.first[s + 1] == switches.first[s]:
@@ -288,7 +305,7 @@ def is_pole(switches: Switches, R: Array, s: int, last: int, h: float, size: flo
 
 FUNCTIONS = (
     is_pole, cauchy, weighted, curve_orders, curve_forces, tape_order,
-    own_piece, lower_knot, piece_at, margin, horner, largest, leaves, next_piece,
+    own_piece, lower_knot, piece_at, set_pieces, margin, horner, largest, leaves, next_piece,
 )  # fmt: skip
 NAMES = {
     "SUM": SUM, "LINEAR": LINEAR, "RATE": RATE, "FUNCTION": FUNCTION, "MUL": MUL, "DIV": DIV, "POWER": POWER,

@@ -167,16 +167,10 @@ def prepare(system: System, start: Start, order: int, jit: bool) -> Prepared:
 def first_pieces(tables: Equations, w: Work, t: float, forward: bool) -> bool:
     """Pieces of all switches at the state in w; whether every table has a value there."""
     plain, program = KERNELS.plain, tables.program
-    switches = program.switches
     plain.time_series(program.times, t, forward, 2, w.TF)
     plain.variables(tables, w, w.q)
     plain.rates(tables, w, w.v)
-    for s, register in enumerate(switches.register):
-        plain.tape_order(program, w.P, w.R0, w.TF, w.pieces, 0)
-        w.pieces[s] = piece = plain.piece_at(switches, s, w.R0[register, 0])
-        if switches.first[s + 1] > switches.first[s] and piece < 0 and not switches.period[s]:
-            return False
-    return True
+    return bool(plain.set_pieces(program, w.P, w.R0, w.TF, w.pieces))
 
 
 def load_kernels(prepared: Prepared, run: kernel_steps.Run) -> float:
