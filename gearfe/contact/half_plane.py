@@ -82,10 +82,9 @@ def smooth_compliance(setting: Setting, state: State) -> Array:
 def hertz(setting: Setting, state: State, force: Array) -> tuple[Array, Array]:
     """How contacts yield by themselves (m2/N) and half widths (m) for forces per width (N/m), all of shape (p,)."""
     law, normal = setting.law, state.normal[:, None] / setting.turn
-    tension, shear = law.wedge
     blunt = np.minimum(setting.found.curvature, 1 / (SHARPEST * law.pair.pinion.module))
     b = np.sqrt(2 * law.compliance * np.maximum(force, SMALL) / blunt)
-    along = law.inverse_modulus * (tension + (shear * normal.conj() ** 2).real)
+    along = law.inverse_modulus * (law.wedge(normal) * normal.conj()).real
     y = np.maximum(setting.distances(state.arc[:, :, None])[:, :, 0], b[:, None])
     return law.compliance * (0.5 - np.log(0.5 * b)) - (along * np.log(2 * y)).sum(axis=1), b
 

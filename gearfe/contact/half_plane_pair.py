@@ -101,10 +101,14 @@ class HalfPlanePair:
         return np.array([corner_of(curve)[0] for curve in self.curves])
 
     @cached_property
-    def wedge(self) -> tuple[Array, ComplexArray]:
-        """W of both gears as W v = a v + b conj(v), both of shape (2,) (-)."""
+    def _wedge(self) -> tuple[Array, ComplexArray]:
         W = np.array([side.wedge for side in self.sides])
         return 0.5 * (W[:, 0, 0] + W[:, 1, 1]), 0.5 * (W[:, 0, 0] - W[:, 1, 1]) + 1j * W[:, 0, 1]
+
+    def wedge(self, load: ComplexArray) -> ComplexArray:
+        """W of both gears times vectors, shape (..., 2)."""
+        mean, deviator = self._wedge
+        return np.asarray(mean * load + deviator * load.conj())
 
     @cached_property
     def undercut(self) -> Array:
@@ -203,9 +207,8 @@ def moved_beside(law: HalfPlanePair, couples: Couplings, normal: ComplexArray, a
         Arcs of the contacts and their distances from the corners (m).
     """
     i, j = couples.first, couples.second
-    tension, shear = law.wedge
     apart = np.maximum(np.abs(arc[i] - arc[j]), LEAST_DISTANCE)
-    wedge = (tension * normal[j] + shear * normal[j].conj()) * np.log(y[i] + y[j])
+    wedge = law.wedge(normal[j]) * np.log(y[i] + y[j])
     moved = -law.inverse_modulus * (2 / np.pi * np.log(apart) * normal[j] + wedge)
     return np.asarray(1j * normal[i] * (moved * normal[i].conj()).imag)
 
@@ -229,15 +232,13 @@ def panel_influence(
     """
     i, j = couples.first, couples.second
     (arcs, y), (panel_arcs, panel_y, widths) = places, panels
-    tension, shear = law.wedge
-    turned = (normal[i] * normal[j].conj()).real
-    across = -law.inverse_modulus * (tension * turned + (shear * (normal[i] * normal[j]).conj()).real)
-    factor = across[..., None, None] * widths[j][:, None, None]
+    along = -law.inverse_modulus * (law.wedge(normal[j]) * normal[i].conj()).real
+    factor = along[..., None, None] * widths[j][:, None, None]
     made: Array = np.log(y[i][..., None] + panel_y[j][:, :, None]) * factor
     other = np.flatnonzero(i != j)
     if len(other):
-        plane = -2 / np.pi * law.inverse_modulus * turned[other]
         i, j = i[other], j[other]
+        plane = -2 / np.pi * law.inverse_modulus * (normal[i] * normal[j].conj()).real
         half = 0.5 * widths[j][:, None, None]
         apart = arcs[i][..., None] - panel_arcs[j][:, :, None]
         made[other] += plane[..., None, None] * (log_integral(apart + half) - log_integral(apart - half))

@@ -120,8 +120,7 @@ def _gaps(setting: Setting, state: State) -> tuple[Array, Array, Array]:
     moved = law.shapes.along(couples.sums(each * load), arcs)
     beside, load = couples.beside, state.force[:, None] * SIGN * normal
     i, j = beside.first, beside.second
-    tension, shear = law.wedge
-    wedge = (tension * load + shear * load.conj())[j][:, :, None]
+    wedge = law.wedge(load)[j][:, :, None]
     y, at = setting.distances(arcs), setting.distances(state.arc[:, :, None])
     logs = mean_log(arcs[i] - state.arc[j][:, :, None], _half_widths(state)[j, None, None])
     local = 2 / np.pi * logs * load[j][:, :, None] + np.log(y[i] + at[j]) * wedge
