@@ -18,8 +18,6 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .housing.model import Housing
     from .loadmap.load_map import LoadMap
     from .loadmap.sweep import sweep_loads
-    from .microgeometry.loaded_mesh import LoadedMesh
-    from .microgeometry.solve import load_mesh
     from .reduction.modal_body import ModalBody
     from .runup.run_up import run_up, steady_state
     from .stiffness.curve import StiffnessCurve
@@ -38,7 +36,6 @@ _PUBLIC: dict[str, str] = {
     "Housing": "housing.model",
     "InputError": "errors",
     "LoadMap": "loadmap.load_map",
-    "LoadedMesh": "microgeometry.loaded_mesh",
     "Material": "elasticity",
     "ModalBody": "reduction.modal_body",
     "Search": "study.search",
@@ -48,7 +45,6 @@ _PUBLIC: dict[str, str] = {
     "GearTrain": "train",
     "build_train": "train",
     "housing_from_job": "housing.build",
-    "load_mesh": "microgeometry.solve",
     "read_study": "study.job",
     "run_study": "study.job",
     "run_up": "runup.run_up",
@@ -66,7 +62,6 @@ __all__ = [
     "Housing",
     "InputError",
     "LoadMap",
-    "LoadedMesh",
     "Material",
     "ModalBody",
     "Search",
@@ -76,7 +71,6 @@ __all__ = [
     "__version__",
     "build_train",
     "housing_from_job",
-    "load_mesh",
     "read_study",
     "run_study",
     "run_up",

@@ -17,8 +17,8 @@ PACKAGE = Path(__file__).parents[1] / "gearfe"
 #: Capability -> its modules.
 CAPABILITIES = {
     "microgeometry, deviations, relief": """
-        microgeometry/* gear/deviation* gear/modifications.py gear/pitch_errors.py
-        */microgeometry.py
+        gear/deviation* gear/modifications.py gear/pitch_errors.py
+        */microgeometry.py figures/flanks.py
     """,
     "mesh law, contact loss, friction": """
         meshlaw/* train/friction.py train/parting.py train/statics.py train/phases.py

@@ -5,9 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair
+from gearfe.contact.half_plane_result import PairContacts
 from gearfe.gear.pair import GearPair, TipRelief
+from gearfe.stiffness.contact_pressure import marks_met
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair
@@ -34,3 +37,16 @@ def law_of(name: str, flank_coarsen: float = 4.0) -> HalfPlanePair:
 
 def angles_of(pair: GearPair, count: int) -> np.ndarray:
     return (np.arange(count) + 0.37) * pair.mesh_cycle / count
+
+
+def reached_marks(law: HalfPlanePair, contacts: PairContacts) -> NDArray[np.str_]:
+    """The highest of the marks that the pressure of each contact reaches, or nothing, shape (m,).
+
+    A pressure ends within a panel beside the middle of its last one.
+    """
+    bears = (contacts.pressure > 0)[:, None]
+    low = np.where(bears, contacts.panel_arc - contacts.width[:, None], np.inf).min(axis=2, keepdims=True)
+    high = np.where(bears, contacts.panel_arc + contacts.width[:, None], -np.inf).max(axis=2, keepdims=True)
+    met = marks_met(law, law.teeth.flank(contacts.pair), low, high)
+    names = np.append("", law.marks[0])
+    return np.asarray(names[(met * np.arange(1, len(names))).max(axis=1)])

@@ -132,32 +132,40 @@ crowning_um = 2.0
 def test_the_command(tmp_path, capsys) -> None:
     job = tmp_path / "job.toml"
     job.write_text(JOB)
-    assert main(["microgeometry", str(job), "--out", str(tmp_path / "out")]) == 0
+    assert main(["loadmap", str(job), "--out", str(tmp_path / "out")]) == 0
     told = capsys.readouterr().out
     assert "2 torques x 12 positions over 2 mesh cycles: 24 converged" in told
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {
-        *(f"microgeometry{part}.csv" for part in ("", "_torques", "_pairs", "_orders")),
-        "microgeometry.png", "microgeometry_flanks.png", "microgeometry.json",
+        *(f"loadmap{part}.csv" for part in ("", "_torques", "_pairs", "_orders")),
+        "loadmap.png", "loadmap_flanks.png", "loadmap.json",
     }  # fmt: skip
-    with (tmp_path / "out" / "microgeometry.csv").open() as stream:
+    with (tmp_path / "out" / "loadmap.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 24
     assert all(float(row["load_share_1"]) + float(row["load_share_2"]) == pytest.approx(1) for row in rows)
     assert all(float(row["root_stress_pinion_MPa"]) > 20 for row in rows)
-    content = json.loads((tmp_path / "out" / "microgeometry.json").read_text())
+    content = json.loads((tmp_path / "out" / "loadmap.json").read_text())
     out = ["--out", str(tmp_path / "more")]
-    options = ["--torques-Nm", "70", "--positions", "4", "--mesh-cycles", "1", "--flank", "right", "--no-pictures"]
-    assert main(["microgeometry", str(job), *out, *options]) == 0
+    options = ["--torques-Nm", "70", "--positions", "4", "--mesh-cycles", "1", "--no-pictures"]
+    options += ["--set", "microgeometry.flank=right"]
+    assert main(["loadmap", str(job), *out, *options]) == 0
     assert "1 torques x 4 positions over 1 mesh cycle: 4 converged" in capsys.readouterr().out
     assert not list((tmp_path / "more").glob("*.png"))
     assert content["pitch"]["pinion"]["cumulative_pitch_deviation_um"] == pytest.approx(6.0, rel=1e-3)
 
 
+def test_what_was_the_microgeometry_command_names_the_load_map(capsys) -> None:
+    assert main(["microgeometry", "job.toml"]) == 2
+    assert "gearfe loadmap" in capsys.readouterr().err
+    assert main(["loadmap", "job.toml", "--flank", "right"]) == 2
+    assert "--set microgeometry.flank=right" in capsys.readouterr().err
+
+
 def test_the_command_tells_a_mistake_in_one_line(tmp_path, capsys) -> None:
     job = tmp_path / "job.toml"
     job.write_text(JOB.replace("tip_relief_um = 10.0", "tip_relief_um = 300.0"))
-    assert main(["microgeometry", str(job), "--out", str(tmp_path / "out")]) == 2
+    assert main(["loadmap", str(job), "--out", str(tmp_path / "out")]) == 2
     told = capsys.readouterr().err
     assert "microgeometry.pinion" in told
     assert told.count("\n") == 1

@@ -20,7 +20,6 @@ from gearfe.gear.deviation_job import deviations_of
 from gearfe.gear.modifications import FlankModification, Relief, tooth_deviations
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshlaw.make import mesh_law
-from gearfe.microgeometry.solve import load_mesh
 from gearfe.rigid import constant
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.train.statics import static_errors
@@ -70,22 +69,21 @@ def columns(path: Path) -> dict[str, np.ndarray]:
 
 
 def test_every_command_takes_the_same_deviations(tmp_path, capsys) -> None:
-    """Twist, its unloaded part and load shares of curve and map are those of gearfe microgeometry."""
+    """Twist, its unloaded part, load shares and pressures of the curve are those of the map."""
     job = tmp_path / "job.toml"
     job.write_text(JOB)
-    for command in ("stiffness", "loadmap", "microgeometry"):
+    for command in ("stiffness", "loadmap"):
         assert main([command, str(job), "--out", str(tmp_path / command), "--no-pictures"]) == 0
     # -12 + 2 um at the pinion's tip, a wave of 1 um besides; -5 - 6 um at the wheel's form circle
     told = re.findall(r"up to ([0-9.]+) um \(pinion\) and ([0-9.]+) um \(wheel\)", capsys.readouterr().out)
     assert len(told) == 2
     assert float(told[0][0]) == pytest.approx(10, abs=1)
     assert float(told[0][1]) == pytest.approx(11)
-    one, other, own = (columns(tmp_path / c / f"{c}.csv") for c in ("stiffness", "loadmap", "microgeometry"))
+    one, own = (columns(tmp_path / c / f"{c}.csv") for c in ("stiffness", "loadmap"))
     for name in ("twist_deg", "transmission_error_unloaded_um", "load_share_1"):
         expected = own[name].astype(float)
         close = 3e-4 if name == "load_share_1" else 1e-5  # shares are of a torque that a map accepts within 3e-4
         assert one[name].astype(float) == pytest.approx(expected, rel=close, abs=1e-9), name
-        assert other[name].astype(float) == pytest.approx(expected, rel=close, abs=1e-9), name
     assert np.ptp(own["transmission_error_unloaded_um"].astype(float)) > 1.0
     pressure, others = (t["peak_pressure_MPa"].astype(float) for t in (own, one))
     both = np.isfinite(pressure) & (one["edge"] == "none")
@@ -97,11 +95,11 @@ def test_a_mesh_law_has_the_transmission_error_of_its_flanks() -> None:
     """Approach under a force against contact solutions at that torque; a kink is a corner of the law."""
     start = PAIR.pinion.profile.tip_roll - 2.5e-3
     relieved = tooth_deviations(PAIR.pinion, FlankModification(tip_relief=Relief(15e-6, start)))
-    law = half_plane_pair(elastic_pair(PAIR, deviations=(relieved, NOMINAL[1]), coarsen=2.0))
-    made = mesh_law(law, 2000.0)
+    elastic = elastic_pair(PAIR, deviations=(relieved, NOMINAL[1]), coarsen=2.0)
+    made = mesh_law(half_plane_pair(elastic), 2000.0)
     torque, radius = 60.0, PAIR.wheel.base_radius
-    found = load_mesh(law, [torque], positions=40)
-    expected = found.transmission_error[0]
+    (found,) = sweep_loads(PAIR, [torque], positions=40, elastic=elastic, kinematics="small").curves
+    expected = found.transmission_error
     assert np.ptp(expected) > 2e-6
     approach = made.approach(found.pinion_angle, np.full(40, torque / radius))
     assert approach == pytest.approx(expected, abs=0.02e-6)
@@ -131,16 +129,15 @@ def test_material_that_stands_out_leaves_the_stiffness(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("keys", "told"),
     [
-        ("run_out_um = 3.0", "pinion.*stand unevenly.*gearfe microgeometry takes them"),
+        ("run_out_um = 3.0", "pinion.*stand unevenly.*gearfe loadmap takes them"),
         ("waviness = [{ amplitude_um = 1.0, waves = 11 }]", "pinion.*different flanks"),
     ],
 )
-@pytest.mark.parametrize("command", ["stiffness", "loadmap"])
-def test_teeth_that_differ_have_no_curve(keys, told, command, tmp_path, capsys) -> None:
+def test_teeth_that_differ_have_no_curve(keys, told, tmp_path, capsys) -> None:
     job = tmp_path / "job.toml"
     text = JOB.replace("waviness = [{ amplitude_um = 1.0, waves = 40 }]", keys)
     job.write_text(text)
-    assert main([command, str(job), "--out", str(tmp_path / "out")]) == 2
+    assert main(["stiffness", str(job), "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert re.search(told, error)
     assert not (tmp_path / "out").exists()
@@ -180,9 +177,10 @@ def test_a_train_takes_the_flanks_that_drive(tmp_path) -> None:
     torque = float(found["right"].torque_wheel[0])
     gear = PAIR.pinion
     own = tooth_deviations(gear, FlankModification(tip_relief=Relief(20e-6, gear.profile.tip_roll - 3e-3)))
-    law = half_plane_pair(elastic_pair(PAIR, coarsen=2.0)).deviated((own, NOMINAL[1]))
-    expected = load_mesh(law, [torque], positions=8)
-    assert found["right"].twist == pytest.approx(expected.twist[0], rel=1e-5)
+    (expected,) = sweep_loads(
+        PAIR, [torque], positions=8, kinematics="small", coarsen=2.0, deviations=(own, NOMINAL[1])
+    ).curves
+    assert found["right"].twist == pytest.approx(expected.twist, rel=1e-5)
     assert np.abs(found["right"].twist / found["none"].twist - 1).max() > 0.1
     assert math.isclose(found["right"].mesh_cycle, PAIR.mesh_cycle)
 
@@ -203,12 +201,11 @@ def test_a_train_takes_the_pitch_errors_of_its_teeth(sign, tmp_path) -> None:
     train = job_train(job, train_curves(job))
     assert job.microgeometry is not None
     side = "left" if sign > 0 else "right"
-    law = half_plane_pair(elastic_pair(PAIR, coarsen=2.0))
-    law = law.deviated(deviations_of(job.microgeometry, PAIR, tmp_path, flank=side))
-    found = load_mesh(law, [torque], positions=5)
+    own = deviations_of(job.microgeometry, PAIR, tmp_path, flank=side)
+    (found,) = sweep_loads(PAIR, [torque], positions=5, kinematics="small", coarsen=2.0, deviations=own).curves
     assert len(found.pinion_angle) == 5 * 60
     (static,) = static_errors(train, sign * found.pinion_angle)
-    expected = found.transmission_error[0]
+    expected = found.transmission_error
     assert np.ptp(expected) > 8e-6
     # an error turns its tooth by up to 2.4e-4 rad, too, which a shift of the touching curve leaves out: it shows where
     # a tooth comes in ahead of its path by its tip, and t is steep
@@ -229,15 +226,15 @@ def test_back_flanks_have_their_own_microgeometry(tmp_path) -> None:
     pair = replace(
         PAIR, pinion=replace(PAIR.pinion, tooth_thinning=50e-6), wheel=replace(PAIR.wheel, tooth_thinning=50e-6)
     )
-    law = half_plane_pair(elastic_pair(pair, coarsen=2.0))
+    elastic = elastic_pair(pair, coarsen=2.0)
     for load, side, sign in ((-torque, "right", 1.0), (torque, "left", -1.0)):  # drive and so load turn against y
         (one,) = train.loads
         assert job.microgeometry is not None
-        own = law.deviated(deviations_of(job.microgeometry, pair, tmp_path, flank=side))
-        found = load_mesh(own, [torque], positions=12)
+        own = elastic.deviated(deviations_of(job.microgeometry, pair, tmp_path, flank=side))
+        (found,) = sweep_loads(pair, [torque], positions=12, elastic=own, kinematics="small").curves
         now = replace(train, loads=(replace(one, torque=constant(load)),))
         (static,) = static_errors(now, -sign * found.pinion_angle)
-        expected = found.transmission_error[0]
+        expected = found.transmission_error
         assert np.ptp(expected) > 1e-6
         assert static == pytest.approx(expected if sign > 0.0 else -pair.normal_backlash - expected, abs=0.05e-6)
 

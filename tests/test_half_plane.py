@@ -12,12 +12,11 @@ from gearfe.contact.half_plane import NEAR, first_state, half_plane_pair, solve_
 from gearfe.contact.half_plane_step import change, step
 from gearfe.elasticity import Material
 from gearfe.gear.pair import GearPair
-from gearfe.stiffness.contact_pressure import reached_marks
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import gear
 from .gears import pair as gear_pair
-from .half_plane_pairs import KINKED, PAIRS, angles_of, law_of
+from .half_plane_pairs import KINKED, PAIRS, angles_of, law_of, reached_marks
 from .solving import solve_positions
 
 # ---- identities ----------------------------------------------------------------------------------------------------

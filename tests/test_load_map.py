@@ -159,12 +159,14 @@ def test_the_command(tmp_path, capsys):
     ]
     assert main(["loadmap", str(JOB), "--out", str(out), "--root-stress", *options]) == 0
     said = capsys.readouterr().out
-    assert "4 torques x 4 positions: 16 converged" in said
+    assert "4 torques x 4 positions over 1 mesh cycle: 16 converged" in said
     assert "root stress" in said
     assert sorted(p.name for p in out.iterdir()) == [
         "loadmap.csv",
         "loadmap.json",
         "loadmap.png",
+        "loadmap_orders.csv",
+        "loadmap_pairs.csv",
         "loadmap_torques.csv",
     ]
     mapped = LoadMap.from_csv(out / "loadmap.csv")

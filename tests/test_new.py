@@ -59,7 +59,7 @@ def test_every_key_of_the_tables_is_named(kind):
     text = job_file(kind)
     inside = {
         "mechanism": [RunTable, BodyTable],
-        "microgeometry": [GearMicrogeometryTable],
+        "loadmap": [GearMicrogeometryTable],
         "vibration": [TrainShaftTable],
     }
     for table in [*(table_class(name) for name in JOBS[kind][1] if name), *inside.get(kind, [])]:

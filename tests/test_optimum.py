@@ -149,7 +149,7 @@ def test_long_relief_designed_for_a_torque(tmp_path) -> None:
     error = best_relief(tmp_path)["outputs"]["error_um"]
     assert error["base"] / error["best"] >= 5
     options = ["--torque-range", "60", "140", "33", "--out", str(tmp_path / "map"), "--no-pictures"]
-    assert main(["microgeometry", str(tmp_path / "out" / "best.toml"), *options]) == 0
-    made = json.loads((tmp_path / "map" / "microgeometry.json").read_text())["by_torque"]
+    assert main(["loadmap", str(tmp_path / "out" / "best.toml"), *options]) == 0
+    made = json.loads((tmp_path / "map" / "loadmap.json").read_text())["by_torque"]
     least = int(np.argmin(made["transmission_error_peak_to_peak_um"]))
     assert made["torque_Nm"][least] == pytest.approx(100, rel=0.05)

@@ -14,14 +14,12 @@ from gearfe import (
     Search,
     build_train,
     housing_from_job,
-    load_mesh,
     read_study,
     run_study,
     run_up,
     simulate,
     sweep_loads,
 )
-from gearfe.contact.half_plane import half_plane_pair
 from gearfe.errors import MissingLibraryError
 from gearfe.figures.results import PICTURES
 from gearfe.mechanisms import load_mechanism
@@ -58,7 +56,6 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         pair,
         loads.curves[0],
         loads,
-        load_mesh(half_plane_pair(elastic), torques, positions=4),
         simulate(model, np.linspace(0.0, 1e-4, 5)),
         steady.housing,
         run_up(model, [500.0, 510.0, 520.0], tolerance=1e-2),

@@ -106,7 +106,7 @@ def test_a_file_that_the_job_names_is_a_part_of_the_study(tmp_path, capsys):
     text = "[pair]\nmodule_mm = 2.0\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"
     text += "[pair.pinion]\nteeth = 20\nbore_diameter_mm = 8.0\n[pair.wheel]\nteeth = 31\nbore_diameter_mm = 15.0\n"
     text += "[microgeometry]\ntorques_Nm = [40.0]\npositions = 3\nmesh_cycles = 1\n"
-    text += '[study]\njob = "microgeometry"\ndesign = "factorial"\n[study.parameters]\n'
+    text += '[study]\njob = "loadmap"\ndesign = "factorial"\n[study.parameters]\n'
     text += 'microgeometry.pinion.pitch_csv = ["pitch.csv"]\n[study.outputs]\nx = "mean(k_tangent_N_per_m)"\n'
     path.write_text(text)
     command = ["study", str(path), "--out", str(tmp_path / "out"), "--jobs", "1", "--no-pictures"]
@@ -170,7 +170,7 @@ def test_a_case_that_is_written_elsewhere_finds_its_files(tmp_path):
     (tmp_path / "pair.toml").write_text(text)
     (tmp_path / "pitch.csv").write_text("tooth,pitch_um\n" + "".join(f"{n},{n % 3}\n" for n in range(1, 21)))
     (tmp_path / "study.toml").write_text(
-        '[study]\njob = "microgeometry"\nbase = "pair.toml"\n[study.parameters]\n'
+        '[study]\njob = "loadmap"\nbase = "pair.toml"\n[study.parameters]\n'
         'microgeometry.wheel.slope_um = [1.0, 2.0]\n[study.outputs]\nx = "1"\n'
     )
     (tmp_path / "far" / "away").mkdir(parents=True)

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 LINES = """
 new stiffness pair.toml
 new loadmap map.toml
-new microgeometry micro.toml
+new relief.toml
 new study study.toml
 new vibration gearbox.toml
 new runup runup.toml
@@ -32,8 +32,7 @@ new box.toml
 gear pair.toml --export csv,step,brep
 stiffness pair.toml --fields 5 --angles 1 4 9 --coarsen 3 --report --format npz,h5,mat
 loadmap map.toml --positions 4 --set stiffness.coarsen=3 --set stiffness.torque_Nm=50
-microgeometry micro.toml --set stiffness.coarsen=3 --set microgeometry.torques_Nm=[50]
-new relief.toml
+loadmap relief.toml --set stiffness.coarsen=3 --torques-Nm 50
 study relief.toml --set study.cases=8 --set microgeometry.positions=4 --jobs 1 --no-pictures
 mesh pair.toml --deck --teeth 2 --coarsen 4
 mechanism crank.toml --until 0.2 --report

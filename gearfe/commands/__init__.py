@@ -12,12 +12,9 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "gearfe stiffness pair.toml --torque-Nm 100 --fields 5 --set pair.pinion.teeth=21",
     ),
     "loadmap": (
-        "stiffness, transmission error, load share, pressure, root stress over pinion angle and torque",
+        "stiffness, transmission error, orders, load share, pressure, root stress over angle and torque; with reliefs, "
+        "pitch errors, measured flanks",
         "gearfe loadmap pair.toml --torques-Nm 20 50 100 200 --root-stress",
-    ),
-    "microgeometry": (
-        "reliefs, pitch errors, measured flanks: transmission error, orders, load sharing, pressure against torque",
-        "gearfe microgeometry microgeometry.toml --torques-Nm 50 100 --report",
     ),
     "gear": (
         "derived geometry of a gear pair, and a drawing of it in mesh",

@@ -1,4 +1,4 @@
-"""``gearfe loadmap JOB.toml --out DIR``: a gear pair over pinion angle and torque."""
+"""``gearfe loadmap JOB.toml --out DIR``: a gear pair, with its deviations, over pinion angle and torque."""
 
 from __future__ import annotations
 
@@ -6,26 +6,35 @@ import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from ..tables.loadmap import LoadMapTable
+from ..tables.loadmap import LoadMapTable, loads_of
 from ..tables.stiffness import StiffnessTable, check_law
 from .arguments import add_job, add_keys, add_removed, check_option, with_keys
 from .common import add_folder, print_results
 
-Loads = TypeVar("Loads", bound=LoadMapTable)
-
-#: Keys of [stiffness] that options stand for.
+#: Keys of [stiffness], and of the table of loads, that options stand for.
 MODEL = ("law", "plane", "kinematics", "coarsen")
+LOADS = ("positions", "mesh_cycles", "root_stress")
+#: Files that a run can leave.
+FILES = ("loadmap*.csv", "loadmap*.png", "loadmap.json")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    add_job(parser, "job", "job file with the tables [pair], [stiffness] and [loadmap]")
+    add_job(parser, "job", "job file with the tables [pair], [stiffness], [loadmap] and [microgeometry]")
     add_folder(parser)
-    add_loads(parser)
+    load = parser.add_mutually_exclusive_group()
+    load.add_argument(
+        "--torques-Nm", type=float, nargs="+", metavar="T", dest="torques_Nm", help="torques at the wheel's hub (N m)"
+    )
+    load.add_argument(
+        "--torque-range", type=float, nargs=3, metavar=("START", "STOP", "COUNT"), help="a range of torques (N m)"
+    )
+    add_keys(parser, LoadMapTable, *LOADS, spacing="torque_spacing")
     add_keys(parser, StiffnessTable, *MODEL)
     add_removed(parser, StiffnessTable.REMOVED)
+    add_removed(parser, {"flank": ("is a key of [microgeometry]", "write --set microgeometry.flank=right")})
 
 
 def run(args: argparse.Namespace) -> int:
@@ -36,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness", "loadmap", "microgeometry"))
     tables["stiffness"] = _overridden_model(tables.get("stiffness", StiffnessTable()), args)
-    table = with_loads(args, tables.get("loadmap", LoadMapTable()))
+    table = _with_loads(args, loads_of(tables))
     table.torques()
 
     from ..gear.pair import GearPair
@@ -51,25 +60,28 @@ def run(args: argparse.Namespace) -> int:
     from ..stiffness.job import stiffness_job
     from ..stiffness.report import deviation_lines
 
-    watch = Stopwatch({"program start": time.perf_counter() - started})
+    watch, beside = Stopwatch({"program start": time.perf_counter() - started}), Path(args.job).parent
     with watch.stage("geometry"):
-        job = stiffness_job(tables, Path(args.job).parent, pair)
+        job = stiffness_job(tables, beside, pair)
         deviations = deviation_lines(job)  # impossible ones are refused before the folder is made
     folder = output_folder(args.out)
     made_map = job_map(job, table)
     watch.seconds.update(made_map.timings)
-    with whole_set(folder) as made:
-        with watch.stage("table"):
+    with whole_set(folder, FILES) as made:
+        with watch.stage("tables"):
             write_csvs(made, map_tables(made_map))
         if not args.no_pictures:
+            from ..figures.flanks import flank_picture
             from ..figures.load_map import load_map_picture
             from ..figures.style import save
 
-            with watch.stage("picture"):
-                title = (
-                    f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, plane {job.table.plane}, law {job.table.law}"
-                )
+            with watch.stage("pictures"):
+                gears = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}"
+                title = f"{gears}, {made_map.span}, plane {job.table.plane}, law {job.table.law}"
                 save(load_map_picture(made_map, title), made / "loadmap.png", dpi=110)
+                if job.microgeometry is not None:
+                    picture = flank_picture(job.microgeometry, pair, beside)
+                    save(picture, made / "loadmap_flanks.png", dpi=110)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
@@ -86,20 +98,8 @@ def _overridden_model(table: StiffnessTable, args: argparse.Namespace) -> Stiffn
     return made
 
 
-def add_loads(parser: argparse.ArgumentParser) -> None:
-    """Options that stand for the torques and positions of a table."""
-    load = parser.add_mutually_exclusive_group()
-    load.add_argument(
-        "--torques-Nm", type=float, nargs="+", metavar="T", dest="torques_Nm", help="torques at the wheel's hub (N m)"
-    )
-    load.add_argument(
-        "--torque-range", type=float, nargs=3, metavar=("START", "STOP", "COUNT"), help="a range of torques (N m)"
-    )
-    add_keys(parser, LoadMapTable, "positions", "root_stress", spacing="torque_spacing")
-
-
-def with_loads(args: argparse.Namespace, table: Loads) -> Loads:
-    """The table with the options of `add_loads` in place of the file's values, checked like these."""
+def _with_loads(args: argparse.Namespace, table: LoadMapTable) -> LoadMapTable:
+    """The table with the options of loads in place of the file's values, checked like these."""
     from ..errors import InputError
 
     more: dict[str, Any] = {}
@@ -115,6 +115,6 @@ def with_loads(args: argparse.Namespace, table: Loads) -> Loads:
         for key, value in ends.items():
             check_option("--torque-range", value, LoadMapTable, key)
         more |= {"torques_Nm": None, **ends}
-    made = with_keys(args, replace(table, **more), "positions", "root_stress", spacing="torque_spacing")
+    made = with_keys(args, replace(table, **more), *LOADS, spacing="torque_spacing")
     made.check(table.NAME)
     return made

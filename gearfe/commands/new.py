@@ -11,7 +11,7 @@ from ..tables.examples import JOBS, job_file
 RUNS = {
     "bodies": "mechanism",
     "study": "study",
-    "microgeometry": "microgeometry",
+    "microgeometry": "loadmap",
     "train": "vibration",
     "housing": "housing",
 }

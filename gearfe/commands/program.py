@@ -24,6 +24,7 @@ USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
 
 #: Commands that were, and where they went.
 MOVED = {
+    "microgeometry": "it is a load map of the same job file: gearfe loadmap, which takes [microgeometry]",
     "relief": "the best relief is a search of gearfe study: gearfe new relief.toml, gearfe study relief.toml",
     "benchmark": "in a copy of the repository: python scripts/benchmark.py",
     "stress": "in a copy of the repository: python scripts/stress.py",

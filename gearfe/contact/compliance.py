@@ -19,7 +19,7 @@ are the same at every position.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -221,6 +221,10 @@ class MeshingPair:
     def deviations(self) -> tuple[ToothDeviations, ToothDeviations]:
         """Deviations of the driving flanks of pinion and wheel."""
         return self.model.deviations
+
+    def deviated(self, deviations: tuple[ToothDeviations, ToothDeviations]) -> MeshingPair:
+        """The same elastic gears with other deviations of micrometres, which cost nothing."""
+        return replace(self, model=self.model.changed(deviations=deviations))
 
     @property
     def bodies(self) -> tuple[GearBody, GearBody]:

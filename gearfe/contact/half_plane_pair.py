@@ -14,6 +14,7 @@ wheel.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -62,6 +63,12 @@ class HalfPlanePair:
         """Exact flanks, f of them: the faces of `teeth`."""
         gears = (self.pair.pinion, self.pair.wheel)
         return tuple(flank_curve(gears[self.teeth.gear_of(i)], face) for i, face in enumerate(self.teeth.faces))
+
+    @property
+    def mesh_cycles(self) -> int:
+        """Mesh cycles after which the same teeth meet again: 1 where all teeth of each gear are alike."""
+        alike = all(one.alike for one in self.teeth.deviations)
+        return 1 if alike else math.lcm(self.pair.pinion.teeth, self.pair.wheel.teeth)
 
     @cached_property
     def tables(self) -> FlankTables:

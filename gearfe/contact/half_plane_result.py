@@ -67,6 +67,11 @@ class PairContacts:
     def __len__(self) -> int:
         return len(self.pair)
 
+    def without_panels(self) -> PairContacts:
+        """These without their panels, for many positions in little memory."""
+        panels = ("x", "width", "pressure", "panel_arc")
+        return replace(self, **{name: getattr(self, name)[..., :0] for name in panels})
+
     def moved(self, by: Array, factor: Array) -> PairContacts:  # noqa: ARG002 (laws on elements move by factors)
         """These at twists larger by `by` (rad), one number a position: forces and widths."""
         here = by[self.position]

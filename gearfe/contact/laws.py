@@ -182,17 +182,21 @@ def law_named(name: str, **parameters: Any) -> ContactLaw:
     return made
 
 
-def check_deviations(deviations: tuple[ToothDeviations, ToothDeviations], law: ContactLaw) -> None:
-    """Raise `InputError` for deviations that a law, or the one mesh cycle of a curve or map, cannot have."""
+def check_alike(deviations: tuple[ToothDeviations, ToothDeviations]) -> None:
+    """Raise `InputError` for teeth that differ, which the one mesh cycle of a curve or mesh law cannot have."""
     for name, own in zip(("pinion (driver)", "wheel (driven)"), deviations, strict=True):
         if not own.alike:
             what = "stand unevenly" if len(set(own.turn)) > 1 else "have different flanks"
-            problem = f"its teeth {what}: curves, load maps and mesh laws are of one mesh cycle that repeats"
+            problem = f"its teeth {what}: curves and mesh laws are of one mesh cycle that repeats"
             cure = (
                 "leave out pitch errors, measured teeth that differ, and waves that are no multiple of the teeth; "
-                'gearfe microgeometry takes them, and pitch errors also trains with law = "map"'
+                'gearfe loadmap takes them, and pitch errors also trains with law = "map"'
             )
             raise InputError(f"deviations of the {name}", None, problem, cure)
+
+
+def check_deviations(deviations: tuple[ToothDeviations, ToothDeviations], law: ContactLaw) -> None:
+    """Raise `InputError` for deviations that a law cannot have."""
     if deviations != NOMINAL and not isinstance(law, HalfPlane):
         problem = "takes flanks from meshes, which have no deviations of micrometres"
         raise InputError("law", law.name, problem, 'write law = "half_plane", or leave [microgeometry] out')
@@ -224,8 +228,7 @@ class PairModel:
     points_per_edge
         Contact points on each edge of a flank.
     deviations
-        Of micrometres, which no mesh has, of the driving flanks of pinion and wheel, all teeth alike; for the
-        half-plane law alone.
+        Of micrometres, which no mesh has, of the driving flanks of pinion and wheel; for the half-plane law alone.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Picture of a load map: what changes with the pinion angle, one line a torque, and what changes with the torque."""
+"""Picture of a load map: what changes with angle, place on the path of contact, order, and torque."""
 
 from __future__ import annotations
 
@@ -9,41 +9,50 @@ import numpy as np
 from ..gear.deviation_job import GEARS
 from ..loadmap.load_map import LoadMap
 from ..typing import Array
-from .style import BLUE, ORANGE, headed, labelled, new_figure, shades, some_of
+from .style import BLUE, ORANGE, RED, headed, labelled, new_figure, shades, some_of
 
 #: Lines of a panel; of more torques, so many are drawn.
 MOST_LINES = 24
 
 
 def load_map_picture(made: LoadMap, title: str = "") -> Any:
-    """Panels over the pinion angle coloured by torque, and mean stiffness and transmission error over the torque."""
-    angle, torque, panels = _over_the_cycle(made)
-    count = len(panels) + 2
+    """Panels coloured by torque over the pinion angle and along the path of contact, orders, and means over torque."""
+    angle, label, panels = _over_the_angle(made)
+    torque = made.torque
+    count = len(panels) + 2 + 2 * bool(made.pairs) + bool(made.mesh_cycles)
     columns = -(-count // 2)
     figure = new_figure(3.9 * columns + 0.9, 6.6)
     every: list[Any] = figure.subplots(2, columns, squeeze=False).ravel().tolist()
+    for axes in every[count:]:
+        axes.set_visible(False)
+    places = iter(every)
     logarithmic = len(torque) > 2 and torque[-1] / torque[0] > 10 and _is_geometric(torque)
     low, high = float(torque[0]), float(torque[-1] if len(torque) > 1 else 1.01 * torque[0])
     colour, scale = shades(low, high, logarithmic=logarithmic)
     shown = some_of(len(torque), MOST_LINES)
-    marker = "." if len(angle) < 60 else ""
-    for axes, (label, values) in zip(every, panels.items(), strict=False):
-        labelled(axes, label, "pinion angle (deg)")
+    style: dict[str, Any] = {"marker": "." if len(angle) < 60 else "", "markersize": 3, "linewidth": 1.1}
+    for (name, values), axes in zip(panels.items(), places, strict=False):
+        labelled(axes, name, label)
+        if name.startswith("transmission error"):  # Harris map
+            axes.plot(angle, _closed(1e6 * made.transmission_error_unloaded, angle), color=RED, label="rigid", **style)
+            axes.legend(fontsize=8, frameon=False)
         for row in shown:
-            axes.plot(angle, values[row], marker=marker, markersize=3, linewidth=1.1, color=colour(torque[row]))
+            axes.plot(angle, values[row], color=colour(torque[row]), **style)
         axes.set_xlim(angle[0], angle[-1])
+    if made.pairs:
+        _along_the_path(next(places), next(places), made, shown, colour)
+    if made.mesh_cycles:
+        _orders(next(places), made)
     over = {
-        "mean stiffness  (N/µm)": 1e-6 * made.quantity("k_mesh").mean(axis=1),
-        "transmission error, peak to peak  (µm)": 1e6 * made.peak_to_peak,
+        "mean stiffness  (N/µm)": (1e-6 * made.quantity("k_mesh").mean(axis=1), BLUE),
+        "transmission error, peak to peak  (µm)": (1e6 * made.peak_to_peak, ORANGE),
     }
-    for axes, (label, values), color in zip(every[len(panels) :], over.items(), (BLUE, ORANGE), strict=False):
-        labelled(axes, label, "torque at the wheel (N m)")
-        axes.plot(torque, values, "o-", color=color, markersize=3.5, linewidth=1.4)
+    for (name, (means, color)), axes in zip(over.items(), places, strict=False):
+        labelled(axes, name, "torque at the wheel (N m)")
+        axes.plot(torque, means, "o-", color=color, markersize=3.5, linewidth=1.4)
         if logarithmic:
             axes.set_xscale("log")
             _plain_ticks(axes.xaxis)
-    for axes in every[count:]:
-        axes.set_visible(False)
     bar = figure.colorbar(scale, ax=every, shrink=0.85, aspect=35, pad=0.015)
     if logarithmic:
         _plain_ticks(bar.ax.yaxis)
@@ -52,22 +61,57 @@ def load_map_picture(made: LoadMap, title: str = "") -> Any:
     return figure
 
 
-def _over_the_cycle(made: LoadMap) -> tuple[Array, Array, dict[str, Array]]:
-    """Pinion angles (deg), shape (n,), torques (N m), shape (m,), and label -> values, shape (m, n)."""
-    cycle, angle = np.degrees(made.mesh_cycle), np.degrees(made.pinion_angle)
-    inside = bool(len(angle) and np.isclose(angle[0], 0.0) and angle[-1] < cycle)
-    close = slice(0, 1 if inside else 0)  # the first position again at the end of the cycle
+def _over_the_angle(made: LoadMap) -> tuple[Array, str, dict[str, Array]]:
+    """Pinion angles (deg, or mesh cycles of several), shape (n,), their label, and label -> values, shape (m, n)."""
+    angle = np.degrees(made.pinion_angle)
+    cycle = float(np.degrees(made.curves[0].mesh_cycle))
+    if np.isclose(angle[0], 0.0) and made.mesh_cycles == 1 and angle[-1] < cycle:
+        angle = np.append(angle, cycle)  # the first position again at the end of the cycle
+    label = "pinion angle (deg)"
+    if made.mesh_cycles > 1 and made.pair is not None:
+        angle, label = angle / np.degrees(made.pair.mesh_cycle), "pinion angle (mesh cycles)"
     panels = {
         "mesh stiffness k  (N/µm)": 1e-6 * made.quantity("k_mesh"),
         "transmission error  (µm)": 1e6 * made.quantity("transmission_error"),
-        "largest load share of a pair  (–)": np.stack([c.load_share.max(axis=1) for c in made.curves]),
-        "Hertzian pressure  (MPa)": 1e-6 * made.quantity("peak_pressure"),
     }
+    if not made.pairs:
+        panels["largest load share of a pair  (–)"] = np.stack([c.load_share.max(axis=1) for c in made.curves])
+        panels["Hertzian pressure  (MPa)"] = 1e-6 * made.quantity("peak_pressure")
     if made.root is not None:
         for g, gear in enumerate(GEARS):
             panels[f"root stress, {gear}  (MPa)"] = 1e-6 * made.root.largest[:, :, g]
-    closed = {name: np.concatenate([values, values[:, close]], axis=1) for name, values in panels.items()}
-    return np.append(angle, [cycle] if inside else []), made.torque, closed
+    return angle, label, {name: _closed(values, angle) for name, values in panels.items()}
+
+
+def _closed(values: Array, angle: Array) -> Array:
+    """Values at the angles, the first ones again where there is one angle more."""
+    return values if values.shape[-1] == len(angle) else np.concatenate([values, values[..., :1]], axis=-1)
+
+
+def _along_the_path(share: Any, pressure: Any, made: LoadMap, shown: Any, colour: Any) -> None:
+    """Load share and pressure of the tooth pairs over the pinion's roll length."""
+    labelled(share, "load share of a tooth pair  (–)", "roll length of the pinion (mm)")
+    labelled(pressure, "pressure (MPa); x: beside an edge", "roll length of the pinion (mm)")
+    for row in shown:
+        own, color = made.pairs[row], colour(made.torque[row])
+        roll, sharp = 1e3 * own.roll[:, 0], own.edge > 0
+        share.plot(roll, own.share, ".", markersize=2.5, color=color)
+        for marker, size, these in ((".", 2.5, ~sharp), ("x", 4, sharp)):
+            pressure.plot(roll[these], 1e-6 * own.pressure[these], marker, markersize=size, color=color)
+
+
+def _orders(axes: Any, made: LoadMap) -> None:
+    """Orders of the transmission error up to the fourth of the mesh, unloaded and at the largest torque."""
+    order, free = made.spectrum(unloaded=True)
+    mesh_order = order[min(made.mesh_cycles, len(order) - 1)]
+    bars = slice(1, min(len(order), int(np.searchsorted(order, 4.5 * mesh_order)) + 1))
+    axes.vlines(order[bars], 0, 1e6 * free[bars], color=RED, linewidth=3, alpha=0.35, label="rigid")
+    loaded, label = 1e6 * made.spectrum()[1][-1], f"at {made.torque[-1]:.4g} N m"
+    axes.vlines(order[bars], 0, loaded[bars], color=BLUE, linewidth=1.3, label=label)
+    axes.set_xticks(mesh_order * np.arange(5))
+    axes.set_ylim(bottom=0)
+    axes.legend(fontsize=8, frameon=False)
+    labelled(axes, "orders of the transmission error (µm)", "order of the pinion's turn; grid: mesh")
 
 
 def _is_geometric(torque: Array) -> bool:

@@ -114,7 +114,6 @@ def body_plot(body: ModalBody) -> Any:
 PICTURES = {
     "GearPair": "gears:pair_picture",
     "LoadMap": "load_map:load_map_picture",
-    "LoadedMesh": "microgeometry:microgeometry_picture",
     "ModalBody": "results:body_plot",
     "RunUp": "runup:forces_picture",
     "Spectrum": "results:spectrum_plot",

@@ -1,10 +1,17 @@
-"""Stiffness, transmission error, load share, peak pressure and root stress over pinion angle and torque. SI units.
+r"""Stiffness, transmission error, load share, pressure and root stress over pinion angle and torque. SI units.
 
-A map holds one stiffness curve for each of its torques, all at the same angles.
+A map holds one stiffness curve for each of its torques, all at the same angles: over one mesh cycle, or where teeth
+differ over the full period, after which every tooth meets the same mate again.
+
+The transmission error is the wheel's lag on the line of action, :math:`r_{b2}` (twist - lost motion): unloaded that of
+the rigid flanks, :math:`\min_k t_k(\psi)`, loaded with what the teeth yield. Material out of the driving flanks makes
+the wheel lead, so it counts negative. An order is so many times a turn of the pinion; the mesh has the order
+:math:`z_1`.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,16 +20,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, given
 from ..gear.deviation_job import GEARS
+from ..gear.pair import GearPair
 from ..output.files import write_csv
 from ..shown import ShownTable
+from ..stiffness.contact_pressure import PairLoads
 from ..stiffness.curve import StiffnessCurve, numbers, to_text
 from ..textfile import read_csv
 from ..typing import Array, BoolArray
 
 #: Column of the torque that a row belongs to.
 TORQUE = "torque_Nm"
+#: Status of a cell whose back flanks would bear: gears that jam carry the torque on both flanks, which this is not for.
+BACK = "back_flanks_bear"
 
 
 @dataclass(frozen=True)
@@ -91,6 +102,16 @@ class LoadMap(ShownTable):
         The curve of each torque; all have the same angles, shape (n,).
     root
         Root stresses, where they were computed.
+    pairs
+        Loaded tooth pairs of each torque; their positions are numbers of the angles. Empty for a map from a file.
+    transmission_error_unloaded_back : ndarray, shape (n,), or None
+        Unloaded transmission error (m) of the back flanks, > 0 where they lie behind those without deviations.
+    back_clearance : ndarray, shape (m, n), or None
+        Normal clearance (m) of the back flanks, unloaded themselves; < 0 where they would bear.
+    mesh_cycles
+        Mesh cycles that the angles divide into equal steps; 0 where they do not.
+    pair
+        The gears; None for a map from a file.
     timings
         Seconds by stage; not in the CSV file.
     """
@@ -98,17 +119,17 @@ class LoadMap(ShownTable):
     torque: Array
     curves: tuple[StiffnessCurve, ...]
     root: RootMap | None = None
+    pairs: tuple[PairLoads, ...] = ()
+    transmission_error_unloaded_back: Array | None = None
+    back_clearance: Array | None = None
+    mesh_cycles: int = 0
+    pair: GearPair | None = None
     timings: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def pinion_angle(self) -> Array:
         """Pinion angles, shape (n,) (rad)."""
         return self.curves[0].pinion_angle
-
-    @property
-    def mesh_cycle(self) -> float:
-        """Pinion angle after which everything repeats (rad)."""
-        return self.curves[0].mesh_cycle
 
     @property
     def status(self) -> NDArray[np.str_]:
@@ -129,6 +150,39 @@ class LoadMap(ShownTable):
         """Peak-to-peak transmission error of each torque, shape (m,) (m); not-a-number where a position failed."""
         return np.ptp(self.quantity("transmission_error"), axis=1)
 
+    @property
+    def transmission_error_unloaded(self) -> Array:
+        """That of the rigid flanks, shape (n,) (m)."""
+        return self.curves[0].transmission_error_unloaded
+
+    @property
+    def statuses(self) -> dict[str, int]:
+        """How many cells have which status."""
+        return dict(Counter(map(str, self.status.ravel())))
+
+    @property
+    def span(self) -> str:
+        """What the angles run over, in words."""
+        known = {0: "given angles", 1: "1 mesh cycle"}
+        return known.get(self.mesh_cycles, f"{self.mesh_cycles} mesh cycles")
+
+    def spectrum(self, *, unloaded: bool = False) -> tuple[Array, Array]:
+        """Orders, shape (k,), and one-sided amplitudes (m) of the transmission error, shape (m, k) or (k,).
+
+        Raises
+        ------
+        InputError
+            Where the angles are no equal steps over whole mesh cycles.
+        """
+        if not self.mesh_cycles:
+            raise InputError("angles", None, "are no equal steps over whole mesh cycles", "leave angles out")
+        values = self.transmission_error_unloaded if unloaded else self.quantity("transmission_error")
+        count = len(self.pinion_angle)
+        made = np.abs(np.fft.rfft(values, axis=-1)) / count
+        made[..., 1 : (count + 1) // 2] *= 2
+        teeth = given(self.pair, "pair").pinion.teeth
+        return np.arange(made.shape[-1]) * (teeth / self.mesh_cycles), made
+
     # ---- tables ------------------------------------------------------------------------------------------------------
 
     AXES = (TORQUE, "pinion_angle_deg")
@@ -138,7 +192,7 @@ class LoadMap(ShownTable):
         k, error = 1e-6 * self.quantity("k_mesh").mean(axis=1), 1e6 * self.peak_to_peak
         return {
             "torques": f"{len(self.torque)}, {self.torque[0]:.4g} to {self.torque[-1]:.4g} N m at the wheel",
-            "pinion angles": f"{len(self.pinion_angle)}, {int(self.failed.sum())} cells failed",
+            "pinion angles": f"{len(self.pinion_angle)} over {self.span}, {int(self.failed.sum())} cells failed",
             "mean stiffness": f"{k[0]:.4g} to {k[-1]:.4g} N/um",
             "transmission error": f"peak to peak {error[0]:.3g} to {error[-1]:.3g} um",
             "root stress": "no" if self.root is None else f"up to {1e-6 * np.nanmax(self.root.largest):.4g} MPa",
@@ -155,9 +209,11 @@ class LoadMap(ShownTable):
             columns[TORQUE] += [to_text(torque, TORQUE)] * rows
             for name in names:
                 columns[name] += one.get(name, ["0"] * rows)  # a share of a pair that this torque does not know
-        if self.root is not None:
-            for name, values in root_columns(self.root).items():
-                columns[name] = [to_text(v, name) for v in values.ravel()]
+        more = {} if self.root is None else root_columns(self.root)
+        if self.transmission_error_unloaded_back is not None and self.back_clearance is not None:
+            error = np.broadcast_to(self.transmission_error_unloaded_back, self.back_clearance.shape)
+            more |= {"transmission_error_unloaded_back_um": error, "back_clearance_um": self.back_clearance}
+        columns |= {name: [to_text(v, name) for v in values.ravel()] for name, values in more.items()}
         return columns
 
     def to_csv(self, path: str | Path) -> None:

@@ -26,7 +26,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..contact.compliance import MeshingPair
 from ..contact.flank import Flank, edge_nodes, edge_shapes
@@ -49,8 +48,40 @@ BLUNTING = 0.01
 QUANTITIES = ("peak_pressure", "peak_pressure_error", "edge_pressure", "edge")
 
 
-def contact_pressures(solver: PositionSolver, found: Positions) -> dict[str, Array]:
-    """The `QUANTITIES` of n positions, each of shape (n,)."""
+@dataclass(frozen=True)
+class PairLoads:
+    """Tooth pairs that carry load, q of them over all positions, by position.
+
+    Attributes
+    ----------
+    position, pair : ndarray, shape (q,)
+        Number of the position; pair number k: pinion tooth k, wheel tooth -1 - k, counted on round the gears.
+    force : ndarray, shape (q,)
+        On the whole width (N).
+    share : ndarray, shape (q,)
+        Share of the wheel's torque (-).
+    roll : ndarray, shape (q, 2)
+        Roll lengths of the middle of the contact on pinion and wheel (m), without load for laws on elements;
+        not-a-number off the involutes.
+    half_width, pressure, error : ndarray, shape (q,)
+        Half width (m), pressure of the module's docstring (Pa), and how far the contact is from Hertz's (-).
+    edge : ndarray, shape (q,)
+        Which edge bears, the place in `EDGES`.
+    """
+
+    position: IntArray
+    pair: IntArray
+    force: Array
+    share: Array
+    roll: Array
+    half_width: Array
+    pressure: Array
+    error: Array
+    edge: IntArray
+
+
+def pair_loads(solver: PositionSolver, found: Positions) -> PairLoads:
+    """Loaded tooth pairs of positions."""
     elastic, contacts, touching = solver.elastic, found.contacts, solver.touching(found.pinion_angle)
     met, pairs = ((np.stack([one.position, one.pair], axis=1) @ [1 << 32, 1]) for one in (touching, contacts))
     k = np.minimum(np.searchsorted(met, pairs), len(met) - 1)
@@ -58,8 +89,9 @@ def contact_pressures(solver: PositionSolver, found: Positions) -> dict[str, Arr
     k, position, width = k[known], contacts.position[known], contacts.half_width[known]
     force = contacts.torque_wheel[known] / (touching.arm[k, 1] * elastic.width)
     curvature, flat = touching.curvature[k], np.isfinite(touching.curvature[k])
-    middle, half = solver.law.arc_at(touching.flank[k], touching.place[k])[:, :, None], width[:, None, None]
-    met = marks_met(solver.law, touching.flank[k], middle - half, middle + half)
+    flank, arc = touching.flank[k], solver.law.arc_at(touching.flank[k], touching.place[k])
+    middle, half = arc[:, :, None], width[:, None, None]
+    met = marks_met(solver.law, flank, middle - half, middle + half)
     rounded = solver.law.marks[0] == "round"
     bears = np.where(met[:, ~rounded].any(axis=1), _SINGULAR, np.where(met[:, rounded].any(axis=1), _ROUNDED, 0))
     several = np.unique(pairs[known], return_inverse=True, return_counts=True)
@@ -70,14 +102,40 @@ def contact_pressures(solver: PositionSolver, found: Positions) -> dict[str, Arr
     off = np.abs(width * math.pi * hertz / (2 * force) - 1)
     if elastic.deviations != NOMINAL:  # waves shorter than the contact say nothing of its pressure; its width does
         hertz = 2 * force / (math.pi * width)
+    return PairLoads(
+        position=position,
+        pair=contacts.pair[known],
+        force=force * elastic.width,
+        share=contacts.torque_wheel[known] / found.torque_wheel[position],
+        roll=_rolls(solver.law, flank, contacts.arc[known] if isinstance(contacts, PairContacts) else arc),
+        half_width=width,
+        pressure=np.where(bears > 0, blunted, hertz),
+        error=off,
+        edge=bears,
+    )
+
+
+def _rolls(law: HalfPlanePair, flank: IntArray, arc: Array) -> Array:
+    """Roll lengths (m) at arcs (m) of the flanks `flank`, all of shape (q, 2); not-a-number off the involutes."""
+    made = np.full(arc.shape, np.nan)
+    for i in np.unique(flank):
+        curve, here = law.curves[i], np.nonzero(flank == i)
+        u = curve.parameter_at(arc[here])
+        on = (u >= 0) & (u <= 1)
+        made[tuple(one[on] for one in here)] = curve.face.flank.roll(u[on])
+    return made
+
+
+def contact_pressures(found: Positions, loads: PairLoads) -> dict[str, Array]:
+    """The `QUANTITIES` of n positions, each of shape (n,), from their loaded pairs."""
     made = {name: np.where(found.status == "no_contact", 0.0, np.nan) for name in QUANTITIES[:2]}
     made["edge_pressure"], edge = np.full(len(found), np.nan), np.zeros(len(found), dtype=np.int64)
-    np.maximum.at(edge, position, bears)
-    np.fmax.at(made["edge_pressure"], position[bears > 0], blunted[bears > 0])
-    smooth = np.flatnonzero(bears == 0)
-    smooth = smooth[np.argsort(hertz[smooth], kind="stable")]  # the largest of a position comes last and stays
-    made["peak_pressure"][position[smooth]] = hertz[smooth]
-    made["peak_pressure_error"][position[smooth]] = off[smooth]
+    np.maximum.at(edge, loads.position, loads.edge)
+    sharp, smooth = np.flatnonzero(loads.edge > 0), np.flatnonzero(loads.edge == 0)
+    np.fmax.at(made["edge_pressure"], loads.position[sharp], loads.pressure[sharp])
+    smooth = smooth[np.argsort(loads.pressure[smooth], kind="stable")]  # the largest of a position comes last and stays
+    made["peak_pressure"][loads.position[smooth]] = loads.pressure[smooth]
+    made["peak_pressure_error"][loads.position[smooth]] = loads.error[smooth]
     return {**made, "edge": edge}
 
 
@@ -104,19 +162,6 @@ def marks_met(law: HalfPlanePair, flank: IntArray, low: Array, high: Array) -> B
     """
     _, of, (first, last) = law.marks
     return np.asarray(((flank[:, :, None] == of) & (low <= last) & (high >= first)).any(axis=1))
-
-
-def reached_marks(law: HalfPlanePair, contacts: PairContacts) -> NDArray[np.str_]:
-    """The highest of the marks that the pressure of each contact reaches, or nothing, shape (m,).
-
-    A pressure ends within a panel beside the middle of its last one.
-    """
-    bears = (contacts.pressure > 0)[:, None]
-    low = np.where(bears, contacts.panel_arc - contacts.width[:, None], np.inf).min(axis=2, keepdims=True)
-    high = np.where(bears, contacts.panel_arc + contacts.width[:, None], -np.inf).max(axis=2, keepdims=True)
-    met = marks_met(law, law.teeth.flank(contacts.pair), low, high)
-    names = np.append("", law.marks[0])
-    return np.asarray(names[(met * np.arange(1, len(names))).max(axis=1)])
 
 
 @dataclass(frozen=True)

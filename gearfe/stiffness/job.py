@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..config import load_job
-from ..contact.laws import ContactLaw, PairModel, law_named
+from ..contact.laws import ContactLaw, PairModel, check_alike, law_named
 from ..elasticity import Material
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations
@@ -77,6 +77,16 @@ class StiffnessJob:
         return deviations_of(self.microgeometry, self.pair, self.folder)
 
     @property
+    def back_deviations(self) -> tuple[ToothDeviations, ToothDeviations] | None:
+        """Those of the back flanks, of the pair seen from the other side; None without [microgeometry]."""
+        if self.microgeometry is None:
+            return None
+        from ..gear.deviation_job import deviations_of
+
+        other = {"left": "right", "right": "left"}[self.microgeometry.flank]
+        return deviations_of(self.microgeometry, self.pair, self.folder, flank=other)
+
+    @property
     def tables(self) -> dict[str, Any]:
         """The tables as plain data, for summaries."""
         made = {"pair": asdict(self.pair_table), "stiffness": asdict(self.table)}
@@ -108,8 +118,9 @@ class StiffnessJob:
         Raises
         ------
         InputError
-            When the job has neither a twist nor a torque.
+            When the job has neither a twist nor a torque, and for teeth that differ.
         """
+        check_alike(self.deviations)
         t = self.table
         if t.twist_deg is None and t.torque_Nm is None:
             cure = "add twist_deg or torque_Nm to [stiffness], or give --twist-deg or --torque-Nm"

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.compliance import MeshingPair, gear_body
-from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, law_text, uses_stress
+from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, check_alike, law_text, uses_stress
 from ..contact.position import Positions
 from ..errors import InputError
 from ..gear.pair import GearPair
@@ -28,7 +28,7 @@ from ..meshing.tooth_sector import sector_mesh, sector_recipes
 from ..progress import Stopwatch
 from ..threads import one_thread
 from ..typing import Array, IntArray
-from .contact_pressure import EDGES, contact_pressures
+from .contact_pressure import EDGES, PairLoads, contact_pressures, pair_loads
 from .curve import SOLVED, StiffnessCurve
 from .curve_error import curve_error
 from .periodic import wrapped_phase
@@ -138,6 +138,7 @@ def sweep_stiffness(
     requested, finite = requested_angles(pair, angles, ANGLES, kinematics)
     if elastic is None:
         elastic = elastic_pair(pair, model, watch=watch, **changes)
+    check_alike(elastic.deviations)
     solved_angles, source = (
         (requested, np.arange(len(requested))) if solve_all else distinct_angles(requested, pair.mesh_cycle)
     )
@@ -152,7 +153,7 @@ def sweep_stiffness(
         else:
             goals = np.full(len(solved_angles), load)
             solved = at_torques(solver, solved_angles, goals, finite=finite)
-    curve = assembled_curve(solver, requested, source, solved, searched=torque is not None)
+    curve, _ = assembled_curve(solver, requested, source, solved, searched=torque is not None)
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
             error = curve_error(solver, coarser(elastic), solved, finite=finite)
@@ -204,8 +205,8 @@ def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
 
 def assembled_curve(
     solver: PositionSolver, requested: Array, source: IntArray, solved: Positions, *, searched: bool
-) -> StiffnessCurve:
-    """The curve at all asked angles.
+) -> tuple[StiffnessCurve, PairLoads]:
+    """The curve at all asked angles, and the loaded pairs there.
 
     Parameters
     ----------
@@ -222,11 +223,12 @@ def assembled_curve(
     twist, torque = total - lost, solved.torque_wheel
     deflection = total - solver.first_touch(solved.pinion_angle)
     stiffness = np.divide(torque, deflection, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
-    cycles = np.round((requested - solved.pinion_angle) / pair.mesh_cycle)
+    cycles = np.round((requested - solved.pinion_angle) / pair.mesh_cycle).astype(np.int64)
     leading, shares = load_shares(solved)
-    pressures: dict[str, Any] = contact_pressures(solver, solved)
+    loads = pair_loads(solver, solved)
+    pressures: dict[str, Any] = contact_pressures(solved, loads)
     edge = np.where(failed, 0, pressures.pop("edge"))
-    return StiffnessCurve(
+    curve = StiffnessCurve(
         pinion_angle=requested,
         wheel_angle=pair.wheel_angle_at(requested, total),
         twist=twist,
@@ -247,8 +249,9 @@ def assembled_curve(
         law=np.full(len(source), law.name),
         contact_law=law_text(law),
         beyond_validity=np.where(np.isnan(twist), -1, overlaps(pair, twist) > MOST_OVERLAP),
-        mesh_cycle=pair.mesh_cycle,
+        mesh_cycle=pair.mesh_cycle * solver.law.mesh_cycles,
         base_radius=radius,
         lost_motion=lost,
         **pressures,
     )
+    return curve, replace(loads, pair=loads.pair - cycles[loads.position])

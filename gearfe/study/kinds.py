@@ -19,7 +19,7 @@ import numpy as np
 from ..config import build, job_tables
 from ..gear.deviation import NOMINAL
 from ..progress import Stopwatch
-from ..tables.loadmap import LoadMapTable
+from ..tables.loadmap import loads_of
 from ..textfile import read_csv
 from .expressions import Answer
 
@@ -85,20 +85,9 @@ def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
     from ..loadmap.sweep import job_map
 
     read = job_tables(raw, path, ("pair",), ("stiffness", "microgeometry", "loadmap"))
-    table, job = read.get("loadmap", LoadMapTable()), _pair_job(read, path)
+    table, job = loads_of(read), _pair_job(read, path)
     made = job_map(job, table, keep=_kept(job, shared))
     return Answer(tables(made), summary(job, table, made, {}), _positions(made.failed))
-
-
-def _microgeometry(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
-    from ..microgeometry.job import both_flanks, solved
-    from ..microgeometry.report import summary, tables
-
-    read = job_tables(raw, path, ("pair", "microgeometry"), ("stiffness",))
-    table, job = read["microgeometry"], _pair_job({**read, "microgeometry": None}, path)
-    flanks = both_flanks(job, table)
-    made = solved(job, table, flanks, watch=Stopwatch(), keep=_kept(job, shared, law="half_plane"))
-    return Answer(tables(made), summary(job, table, made, flanks[0], {}), _positions(made.failed))
 
 
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
@@ -164,9 +153,9 @@ def _pair_job(tables: dict[str, Any], path: Path) -> Any:
     return stiffness_job(tables, path.parent)
 
 
-def _kept(job: Any, shared: Shared, **changes: Any) -> Keep:
+def _kept(job: Any, shared: Shared) -> Keep:
     """What decides the condensed gears is the key of all that cases share."""
-    return partial(shared.get, repr((job.pair_table, replace(job.model.changed(**changes), deviations=NOMINAL))))
+    return partial(shared.get, repr((job.pair_table, replace(job.model, deviations=NOMINAL))))
 
 
 def _positions(failed: Any) -> str:
@@ -177,7 +166,6 @@ def _positions(failed: Any) -> str:
 _KINDS: dict[str, Callable[[Raw, Path, Shared, bool], Answer]] = {
     "stiffness": _stiffness,
     "loadmap": _loadmap,
-    "microgeometry": _microgeometry,
     "vibration": _vibration,
     "runup": _runup,
     "mechanism": _mechanism,

@@ -24,7 +24,6 @@ _OF_TRAINS = ("pair", "stiffness", "microgeometry", "housing", "train")
 READ = {
     "stiffness": ("pair", "stiffness", "microgeometry"),
     "loadmap": ("pair", "stiffness", "microgeometry", "loadmap"),
-    "microgeometry": ("pair", "stiffness", "microgeometry"),
     "vibration": (*_OF_TRAINS, "spectrum"),
     "runup": (*_OF_TRAINS, "runup"),
 }

@@ -26,20 +26,13 @@ PAIR: dict[str, Any] = {
 
 STIFFNESS: dict[str, Any] = {"torque_Nm": 100.0, "angle_start_deg": 1.0, "angle_step_deg": 1.0, "angle_stop_deg": 40.0}
 
-MICROGEOMETRY: dict[str, Any] = {
-    "torques_Nm": [50.0, 100.0, 150.0],
-    "pinion": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7, "run_out_um": 5.0},
-    "wheel": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7},
-}
-
-MICROGEOMETRY_OF_STUDY: dict[str, Any] = {
-    "torques_Nm": [100.0],
+RELIEFS: dict[str, Any] = {
     "pinion": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7},
     "wheel": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7},
 }
 
 STUDY: dict[str, Any] = {
-    "job": "microgeometry",
+    "job": "loadmap",
     "design": "sobol",
     "cases": 128,
     "parameters": {
@@ -123,11 +116,20 @@ RUNUP: dict[str, Any] = {"speed_start_rad_per_s": 300.0, "speed_stop_rad_per_s":
 #: Kind, which is the command that runs it -> what the file is about, its tables, and what else its head says.
 JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
     "stiffness": ("mesh stiffness of a gear pair", {"pair": PAIR, "stiffness": STIFFNESS}, ""),
-    "loadmap": ("stiffness and root stress over angle and torque", {"pair": PAIR, "loadmap": LOADMAP}, ""),
-    "microgeometry": ("reliefs and errors of micrometres", {"pair": PAIR, "microgeometry": MICROGEOMETRY}, ""),
+    "loadmap": (
+        "a pair with its reliefs over angle and torque: transmission error, load share, root stress",
+        {"pair": PAIR, "loadmap": LOADMAP, "microgeometry": RELIEFS},
+        "",
+    ),
     "study": (
         "many microgeometries of a pair: yield, sensitivities",
-        {"pair": PAIR, "microgeometry": MICROGEOMETRY_OF_STUDY, "study": STUDY},
+        {
+            "pair": PAIR,
+            "stiffness": {"torque_Nm": 100.0, "kinematics": "small"},
+            "loadmap": {"torques_Nm": [100.0]},
+            "microgeometry": RELIEFS,
+            "study": STUDY,
+        },
         "",
     ),
     "vibration": (

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ..config import quantity
 from ..errors import InputError
@@ -23,6 +25,9 @@ class LoadMapTable:
     torque_count: int = quantity(20, doc="number of torques from torque_start_Nm to torque_stop_Nm", low=2, high=10_000)
     torque_spacing: str = quantity("even", doc="how these torques are spaced: even or log", choices=("even", "log"))
     positions: int = quantity(18, doc="pinion angles in one mesh cycle", low=1, high=100_000)
+    mesh_cycles: int | None = quantity(
+        None, doc="mesh cycles; by default 1 where the teeth are alike, else the full period", low=1, high=100_000
+    )
     root_stress: bool = quantity(False, doc="true: also the tension at the tooth roots")
 
     def check(self, where: str) -> None:
@@ -60,3 +65,9 @@ class LoadMapTable:
             step = math.log(stop / start) / last
             return [start, *(start * math.exp(step * i) for i in range(1, last)), stop]
         return [start, *(start + (stop - start) * i / last for i in range(1, last)), stop]
+
+
+def loads_of(tables: Mapping[str, Any]) -> LoadMapTable:
+    """Torques and angles of a job: those of [loadmap], or without that table those of [microgeometry]."""
+    table: LoadMapTable = tables.get("loadmap") or tables.get("microgeometry") or LoadMapTable()
+    return table

@@ -101,14 +101,11 @@ class GearMicrogeometryTable(FlankTable):
 
 @dataclass(frozen=True)
 class MicrogeometryTable(LoadMapTable):
-    """Deviations of both gears, and torques and angles at which they are looked at; model and mesh as [stiffness]."""
+    """Deviations of both gears, and the torques and angles of their load map where there is no [loadmap]."""
 
     NAME = "microgeometry"
 
     flank: str = quantity("left", doc="the driving flanks of both gears: left or right", choices=("left", "right"))
-    mesh_cycles: int | None = quantity(
-        None, doc="mesh cycles; by default 1 where the teeth are alike, else the full period", low=1, high=100_000
-    )
     tolerance_class: int | None = quantity(
         None, doc="class of ISO 1328-1 whose profile tolerances the picture of the flanks shows", low=1, high=11
     )

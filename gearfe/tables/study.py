@@ -9,7 +9,7 @@ from ..config import quantity
 from ..errors import InputError, unknown_name
 
 #: Kinds of job that a study can vary.
-KINDS = ("stiffness", "loadmap", "microgeometry", "vibration", "runup", "mechanism")
+KINDS = ("stiffness", "loadmap", "vibration", "runup", "mechanism")
 DESIGNS = ("factorial", "latin_hypercube", "sobol", "saltelli", "morris", "rows", "search")
 
 
@@ -72,7 +72,7 @@ class LimitTable:
 class StudyTable:
     """Many cases of one job."""
 
-    job: str = quantity(choices=KINDS, doc="kind of job, the name of its command")
+    job: str = quantity(choices=KINDS, doc="kind of job, the name of its command (a microgeometry is a loadmap)")
     base: str | None = quantity(
         None, doc="job file that is varied, beside this one; left out: this file, whose other tables are the job"
     )

@@ -180,12 +180,13 @@ def _deviations(
     mapped = (job.table.meshes[number].law or job.table.curves.law) == "map"
     if mapped:  # pitch errors are the train's own
         driving, back = ((replace(a, turn=(0.0,)), replace(b, turn=(0.0,))) for a, b in (driving, back))
-    from ..contact.laws import check_deviations
+    from ..contact.laws import check_alike, check_deviations
 
-    check_deviations(driving, law)
     if mesh.backlash is None and not (mapped and pair.normal_backlash > 0.0):
         back = driving
-    check_deviations(back, law)
+    for one in (driving, back):
+        check_alike(one)
+        check_deviations(one, law)
     if back != driving and not mapped:
         problem = f"left and right flanks differ, but mesh {mesh.name!r} has one curve for both"
         raise InputError("microgeometry", None, problem, 'write law = "map", or give the mesh no backlash')
