@@ -99,6 +99,21 @@ def test_duffing_on_three_branches_and_its_turning_points():
         assert turn.speed == pytest.approx(exact, rel=1e-3)
 
 
+@pytest.mark.parametrize("beside", [1e-6, 1e-5, 1e-4, 3e-4, 1e-3])
+def test_a_given_speed_beside_a_turning_point_is_on_each_branch_once(beside):
+    """Where the orbit at a given speed is the one nearest to the turning point, too."""
+    system, speeds = duffing(0.05, 0.03, 0.2), np.arange(0.8, 1.4, 0.02)
+    up, down = (turn.speed for turn in curve(system.oscillator, speeds).turns)
+    speeds = np.sort(np.append(speeds, [up * (1.0 - beside), down * (1.0 + beside)]))
+    made = curve(system.oscillator, speeds)
+    assert made.note == ""
+    assert len(made.turns) == 2
+    met = [(b, o.speed) for o, b in zip(made.orbits, made.branch, strict=True) if o.speed in speeds]
+    assert len(met) == len(set(met))
+    for turn, speed in zip(made.turns, (up, down), strict=True):
+        assert made.orbits[turn.number].speed == pytest.approx(speed, rel=1e-2)
+
+
 def test_an_oscillator_with_backlash_on_both_branches_and_its_jumps():
     """k (1 + e cos) with parting teeth: amplitude and jumps against shooting with located touches."""
     system, together = meshing(0.1, 0.03, 1.0), meshing(0.1, 0.03, 1.0, gap=0.0)

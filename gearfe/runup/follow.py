@@ -223,8 +223,9 @@ class _Walk:
                 continue
             if turned:
                 nearest = min(place, new, key=lambda p: abs(p.rising)).orbit
-                self.orbits.append(nearest)
-                self.branch.append(len(self.turns))
+                if nearest is not self.orbits[-1]:  # a given speed may be the turning point
+                    self.orbits.append(nearest)
+                    self.branch.append(len(self.turns))
                 speed = _turning(place, new, step, self.unit)
                 self.turns.append(Turn(speed, len(self.orbits) - 1))
                 self.heading = -self.heading
