@@ -197,20 +197,20 @@ def unilateral(K: Array, gap: Array, bearing: BoolArray, *, held: bool = False) 
     settled : ndarray of bool, shape (m,)
         Whether the set of panels that bear was found.
     """
-    pressure, settled, bearing = np.zeros_like(gap), np.zeros(len(gap), dtype=bool), bearing.copy()
-    open_, eye = np.arange(len(gap)), np.eye(gap.shape[1])
+    pressure, settled, open_ = np.zeros_like(gap), np.zeros(len(gap), dtype=bool), np.arange(len(gap))
     for _ in range(1 if held else CHANGES):
-        on, own, g = bearing[open_], K[open_], gap[open_]
-        system = np.where(on[:, :, None] & on[:, None], own, eye)
-        p = np.linalg.solve(system, np.where(on, -g, 0.0)[..., None])
-        approach, p = (own @ p)[..., 0], p[..., 0]
+        used = np.flatnonzero(bearing.any(axis=0))
+        on, p = bearing[:, used], np.zeros_like(gap)
+        system = np.where(on[:, :, None] & on[:, None], K[:, used[:, None], used], np.eye(len(used)))
+        p[:, used] = np.linalg.solve(system, np.where(on, -gap[:, used], 0.0)[..., None])[..., 0]
+        approach = (K @ p[..., None])[..., 0]
         bound = ROUNDING * np.abs(approach).max(axis=1, keepdims=True)
-        now = np.where(on, p > 0, g + approach < -bound)
-        same = (now == on).all(axis=1)
-        pressure[open_], settled[open_], bearing[open_] = p, same, now
-        open_ = open_[~same]
-        if len(open_) == 0:
+        now = np.where(bearing, p > 0, gap + approach < -bound)
+        same = (now == bearing).all(axis=1)
+        pressure[open_], settled[open_] = p, same
+        if same.all():
             break
+        K, gap, bearing, open_ = K[~same], gap[~same], now[~same], open_[~same]
     return pressure, settled
 
 
