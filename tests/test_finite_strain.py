@@ -108,6 +108,13 @@ def test_torques_with_finite_strain_are_met(torque: float) -> None:
     assert np.abs(again.torque_wheel / torque - 1).max() < max(1e-7, float((share**2).max()))
 
 
+def test_energy_of_a_given_torque_is_that_of_its_twist() -> None:
+    pair = replace(meshing_pair(coarsen=2.0), model=PairModel())
+    solver, angles = position_solver(pair), np.linspace(0, pair.gears.mesh_cycle, 7)[:-1]
+    found = at_torques(solver, angles, np.full(6, 100.0))
+    np.testing.assert_allclose(found.energy, at_twists(solver, angles, found.twist).energy, rtol=1e-7)
+
+
 def test_against_a_finite_strain_program() -> None:
     """On the path, small strain plus its share meets the finite-strain curve of GetFEM within its trust and our mesh's
     0.1 %, at 0.05 deg and at ten times that load, where the share alone is ten times larger (about 1 %)."""

@@ -271,7 +271,7 @@ def at_torques(
 def closed(found: Positions, goal: Array, touching: Array) -> Positions:
     """Positions whose torques are nearly the goals, brought there by the last small step of their twists.
 
-    Moments change with the torque; loads and contacts of the half-plane law with their own rates.
+    Moments change with the torque, the energy by the work; loads and contacts of the half-plane law with their own rates.
     """
     good = found.status == "converged"
     factor = np.where(good, goal / np.where(good, found.torque_wheel, 1.0), 1.0)
@@ -280,12 +280,13 @@ def closed(found: Positions, goal: Array, touching: Array) -> Positions:
     twist = newton_twist(found.twist, touching, found.torque_wheel, found.tangent, goal)
     twist = np.where(good, twist, found.twist)
     by = twist - found.twist
+    energy = found.energy + 0.5 * (found.torque_wheel + moments["torque_wheel"]) * by
     loads = tuple(replace(one, force=one.force + by[one.position, None] * one.rate) for one in found.loads)
     contacts = found.contacts.moved(by, factor)
     whole = np.bincount(contacts.position, contacts.torque_wheel, len(found))  # but for what the step errs
     right = moments["torque_wheel"][contacts.position] / whole[contacts.position]
     contacts = replace(contacts, torque_wheel=contacts.torque_wheel * right)
-    return replace(found, twist=twist, contacts=contacts, loads=loads, **moments)
+    return replace(found, twist=twist, energy=energy, contacts=contacts, loads=loads, **moments)
 
 
 def checked_contact(solver: PositionSolver, found: Positions) -> Positions:
