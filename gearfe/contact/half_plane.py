@@ -49,8 +49,8 @@ from .zones import completed
 
 __all__ = ["HalfPlanePair", "PairContacts", "half_plane_pair", "solve_half_plane"]
 
-#: Positions solved side by side.
-BATCH = 128
+#: Positions solved side by side: their matrices hold some megabytes; larger ones cost the system more than calls do.
+BATCH = 40
 #: Newton steps for the twist; rounds for the forces; sharpest edge (modules) that the curvature of a contact knows.
 TWIST_STEPS, FORCE_ROUNDS, SHARPEST = 10, 2, 0.02
 
