@@ -271,7 +271,7 @@ def at_torques(
 def closed(found: Positions, goal: Array, touching: Array) -> Positions:
     """Positions whose torques are nearly the goals, brought there by the last small step of their twists.
 
-    Moments change with the torque, the energy by the work; loads and contacts of the half-plane law with their own rates.
+    Moments change with the torque, the energy by the work, loads and contacts of the half-plane law at their own rates.
     """
     good = found.status == "converged"
     factor = np.where(good, goal / np.where(good, found.torque_wheel, 1.0), 1.0)

@@ -21,6 +21,7 @@ from gearfe.rigid.kernel_rows import time_series
 from gearfe.rigid.packed import Packed
 from gearfe.rigid.tables import Times, time_arrays
 from gearfe.stiffness.periodic import Curves, curve_arrays
+from gearfe.train.forces import CurveFlank
 
 from ..subject import train_model, train_times
 from ..timing import measured
@@ -124,14 +125,14 @@ def compiled_rhs(modal: Any, forces: Any) -> Rhs:
 
 def law_parameters(forces: Any) -> Law:
     """Those of a train whose meshes have stiffness curves."""
-    if len(forces.curves) < len(forces.flanks):
+    if not all(isinstance(flank, CurveFlank) for flank in forces.flanks):
         raise PeerError("peers know stiffness curves only")
     names = ("direction", "turn", "ratio", "sense", "phase", "mean", "gap", "parts")
-    flanks = np.array([[getattr(flank, name) for name in names] for flank in forces.curves])
+    flanks = np.array([[getattr(flank, name) for name in names] for flank in forces.flanks])
     gyros = np.array([[g.direction, g.ratio, g.polar] for g in forces.gyros]).reshape(-1, 3)
     functions = [forces.angle, *(torque for _, torque in forces.torques)]
     torques = np.array([direction for direction, _ in forces.torques], dtype=np.int64)
-    curves = curve_arrays([flank.curve for flank in forces.curves])
+    curves = curve_arrays([flank.curve for flank in forces.flanks])
     return Law(time_arrays(functions), np.zeros((len(functions), 2)), torques, flanks, curves, gyros)
 
 
@@ -270,7 +271,7 @@ def _scipy(
 def _approaches(model: Any) -> list[Any]:
     """For each flank that may part a function of time and state whose zeros are where it meets and parts."""
     modal, made = model.modal, []
-    for flank in model.forces.curves:
+    for flank in model.forces.flanks:
         row = modal.T.T @ model.directions[:, flank.direction]
         rest = float(modal.origin @ model.directions[:, flank.direction]) - flank.gap
         if flank.parts:
