@@ -124,7 +124,7 @@ def housings() -> Answers:
 
 def gears() -> Answers:
     """Rigid touch of a relieved pair and one with an undercut, ISO's stiffness, area and inertia."""
-    from gearfe.gear.iso6336 import mesh_stiffness
+    from gearfe.gear.derived import mesh_stiffness
     from gearfe.gear.pair import Gear, GearPair
     from gearfe.gear.spur_gear import TipRelief
     from gearfe.train.elements import outline_moments
@@ -188,7 +188,7 @@ ROOMS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
     "solid": (housings, ()),
     "prisms": (housings, ()),
     "meshing.housing_mesh": (housings, ()),
-    "gear": (gears, ("pitch_errors", "modifications", "deviation", "flank_curve", "iso6336", "validity", "LARGEST")),
+    "gear": (gears, ("pitch_errors", "modifications", "deviation", "flank_curve", "derived", "validity", "LARGEST")),
     "gear.flank_curve": (curves, ()),
     "stiffness": (curves, ("SIDE_BY_SIDE", "report")),
     "loadmap": (curves, ("MOST_CELLS",)),

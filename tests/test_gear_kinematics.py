@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.gear.mesh_geometry import MeshGeometry
-from gearfe.gear.pair import Gear, GearPair, TipRelief, tip_penetration
+from gearfe.gear.pair import Gear, GearPair, MeshGeometry, TipRelief
+from gearfe.gear.validity import tip_penetration
 
 NM = 1e-12  # 1e-9 mm (m)
 

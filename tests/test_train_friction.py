@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.gear.mesh_geometry import MeshGeometry
+from gearfe.gear.pair import MeshGeometry
 from gearfe.rigid import TimeFunction, constant, smoothed_step
 from gearfe.rigid.compiled import available
 from gearfe.train import Bearing, Damping, Drive, Load, build_train, simulate

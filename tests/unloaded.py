@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gearfe.gear.mesh_geometry import MeshGeometry
+from gearfe.gear.pair import MeshGeometry
 from gearfe.gear.touching import ToothFlanks
 
 Array = NDArray[np.float64]

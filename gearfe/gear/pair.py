@@ -1,10 +1,13 @@
-"""Gear pairs: two spur gears, checked to run together. The front door of the geometry; SI units and radians.
+"""Gear pairs: how two spur gears mesh in the transverse plane (ISO 21771 names), and the pair of a job file.
 
-`Gear` and `TipRelief` describe one gear (`gearfe.gear.spur_gear`), `GearPair` two in mesh: its quantities are those of
-`gearfe.gear.mesh_geometry.MeshGeometry`, which also states the convention of angles and flanks.
+Convention of a pair: pinion centre at the origin, wheel centre at (a, 0). At pinion angle 0 a pinion tooth (tooth 0) is
+centred on the line of centres and a wheel space faces it. Angles are positive counter-clockwise; the wheel turns by
+-pinion angle * z1/z2 + twist. A positive twist presses the driving flanks together: the left (counter-clockwise) flanks
+of the pinion's teeth and the left flanks, in the wheel's own frame, of the wheel's teeth. Their line of action touches
+the pinion's base circle at polar angle -alpha_w; with s1 and s2 the roll lengths on pinion and wheel, s1 + s2 =
+a sin(alpha_w) along it, and a pinion flank passes s1 at the pinion angle s1/r_b1 - alpha_w - psi1 - inv(alpha).
 
-Can two gears run together? Errors for those that cannot, warnings for those that barely do. Whether tips enter the
-material of the mate is answered by rolling the pair.
+SI units and radians. Whether two gears can run together is checked by `gearfe.gear.validity`.
 """
 
 from __future__ import annotations
@@ -12,217 +15,201 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from numbers import Real
+from functools import cached_property
 from typing import Any
-
-import numpy as np
 
 from ..errors import InputError, given
 from ..shown import Shown
 from ..tables.pair import INSTEAD, GearTable, PairTable
-from ..typing import Array
-from .involute import inv, inverse_inv, least_shift
-from .mesh_geometry import MeshGeometry, PathPoint
+from .curves import inv, inverse_inv
 from .spur_gear import Gear, TipRelief, nominal_span
+from .validity import check_pair, pair_warnings
 
-__all__ = ["Gear", "GearPair", "PathPoint", "TipRelief"]
-
-
-def check_pair(pair: MeshGeometry) -> None:
-    """Raise `InputError` for gears that cannot run together."""
-    pinion, wheel = pair.pinion, pair.wheel
-    for name, what, unit in (("module", "module", 1e3), ("pressure_angle", "pressure angle", 180.0 / math.pi)):
-        value, other = getattr(wheel, name), getattr(pinion, name)
-        if abs(value - other) > 1e-9 * abs(other):
-            symbol = "mm" if name == "module" else "deg"
-            both = f"{unit * value:.9g} {symbol} and {unit * other:.9g} {symbol} (pinion)"
-            problem = f"gears that differ in {what}, {both}, do not mesh"
-            raise InputError(f"wheel.{name}", value, problem, f"give both the same {what}")
-    _check_distance(pair)
-    a = pair.working_centre_distance
-    for name, gear, mate in (("pinion", pinion, wheel), ("wheel", wheel, pinion)):
-        if gear.tip_radius + mate.root_radius >= a:
-            room = (a - mate.root_radius - gear.reference_radius) / gear.module
-            problem = "makes the tip circle hit the mate's root circle: addendum + profile_shift - tip_shortening must"
-            cure = "use more tip_shortening, less addendum, more dedendum or more centre distance"
-            raise InputError(f"{name}.addendum", gear.addendum, f"{problem} be < {room:.6g}", cure)
-    _check_ratio(pair)
-    for name, gear, mate, own in (("pinion", pinion, wheel, "wheel"), ("wheel", wheel, pinion, "pinion")):
-        _check_interference(pair, name, gear, mate, own)
+__all__ = ["Gear", "GearPair", "MeshGeometry", "PathPoint", "TipRelief"]
 
 
-def _check_distance(pair: MeshGeometry) -> None:
-    pinion, wheel = pair.pinion, pair.wheel
-    alpha, a0 = pinion.pressure_angle, pair.reference_centre_distance
-    free = pinion.base_radius + wheel.base_radius
-    involute = (
-        pinion.base_radius * pinion.base_angle + wheel.base_radius * wheel.base_angle - pair.base_pitch / 2
-    ) / free
-    if pair.centre_distance is None:
-        shift = pinion.profile_shift + wheel.profile_shift
-        least = -0.5 * (pinion.teeth + wheel.teeth) * inv(alpha) / math.tan(alpha)
-        if shift <= least:
-            problem = f"leaves no working pressure angle: the sum of both profile shifts must be > {least:.6g}"
-            raise InputError("pinion.profile_shift", pinion.profile_shift, problem, "use larger profile shifts")
-        return
-    a = pair.centre_distance
-    lowest = a0 * math.cos(alpha)
-    if isinstance(a, bool) or not isinstance(a, Real) or not math.isfinite(a) or a <= lowest:
-        problem = f"leaves no working pressure angle: must be finite and > {1e3 * lowest:.9g} mm"
-        raise InputError("centre_distance", a, problem, "use a larger centre distance, or leave it out")
-    if pair.normal_backlash < 0.0:
-        tight = lowest / math.cos(inverse_inv(involute))
-        problem = f"jams the teeth (backlash {1e3 * pair.backlash:.6g} mm): must be >= {1e3 * tight:.12g} mm"
-        cure = "use a larger centre distance, less profile shift or more tooth thinning, or leave it out"
-        raise InputError("centre_distance", a, problem, cure)
+@dataclass(frozen=True)
+class PathPoint:
+    """A point of the path of contact: roll lengths (m) on both gears and the pinion angle (rad) for tooth 0."""
+
+    name: str
+    pinion_roll: float
+    wheel_roll: float
+    pinion_angle: float
 
 
-def _tips_ratio(pair: MeshGeometry, *, rounded: bool) -> float:
-    """Contact ratio between the tips alone, as if no flank were undercut."""
-    rolls = [
-        (g.profile.round_roll if rounded and g.tip_round > 0.0 else g.profile.tip_roll)
-        for g in (pair.pinion, pair.wheel)
-    ]
-    return (sum(rolls) - pair.tangent_length) / pair.base_pitch
-
-
-def _check_ratio(pair: MeshGeometry) -> None:
-    nominal, active = _tips_ratio(pair, rounded=False), pair.contact_ratio_active
-    if nominal < 1.0:
-        problem = f"gives a contact ratio of {nominal:.4g}, must be >= 1"
-        if pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch:
-            raise InputError("centre_distance", pair.centre_distance, problem, "use a smaller centre distance")
-        cure = "use more addendum, less tip_shortening, more teeth or a smaller pressure angle"
-        raise InputError("pinion.addendum", pair.pinion.addendum, problem, cure)
-    if active >= 1.0:
-        return
-    rounded = _tips_ratio(pair, rounded=True)
-    if rounded < 1.0:
-        name = "pinion" if pair.pinion.tip_round >= pair.wheel.tip_round else "wheel"
-        problem = f"leaves a contact ratio of {rounded:.4g}, must be >= 1"
-        raise InputError(f"{name}.tip_round", getattr(pair, name).tip_round, problem, "use a smaller tip round")
-    cuts = {name: lost for name, lost in _lost_to_form_points(pair).items() if lost > 0.0}
-    name = max(cuts, key=cuts.__getitem__)
-    gear: Gear = getattr(pair, name)
-    problem = f"leaves an undercut root that eats the path of contact: contact ratio {active:.4g}, must be >= 1"
-    cure = f"use more profile shift (no undercut from {least_shift(gear):.4g} on), more teeth or less dedendum"
-    raise InputError(f"{name}.profile_shift", gear.profile_shift, problem, cure)
-
-
-def _lost_to_form_points(pair: MeshGeometry) -> dict[str, float]:
-    """Length (m) of path that the mate's active tip reaches below each gear's form point; <= 0 when there is none."""
-
-    def lost(gear: Gear, mate: Gear) -> float:
-        tip = min(mate.profile.round_roll, mate.profile.tip_roll)
-        return gear.form_roll - (pair.tangent_length - tip)
-
-    return {"pinion": lost(pair.pinion, pair.wheel), "wheel": lost(pair.wheel, pair.pinion)}
-
-
-def _check_interference(pair: MeshGeometry, name: str, gear: Gear, mate: Gear, mate_name: str) -> None:
-    cure = "use less addendum or more tip_shortening there, more dedendum or a smaller rack_tip_radius here"
-    lost = _lost_to_form_points(pair)[name]
-    if lost > 1e-7 * gear.module and not gear.undercut:
-        allowed = math.hypot(mate.base_radius, pair.tangent_length - gear.form_roll)
-        most = mate.addendum - (mate.tip_radius - allowed) / mate.module
-        problem = (
-            f"makes the tip reach {1e3 * lost:.4g} mm of roll length below the start of the {name}'s involute "
-            f"(form diameter {2e3 * gear.form_radius:.6g} mm), where the root is no involute: must be < {most:.5g}"
-        )
-        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure)
-    depth = tip_penetration(gear, mate, pair.working_centre_distance, 0.5 * pair.normal_backlash / mate.base_radius)
-    if depth > TOLERANCE * gear.module:
-        problem = f"makes the tip cut {1e3 * depth:.4g} mm into the {name}'s root"
-        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure)
-
-
-#: Penetrations below this many modules are taken for the discretisation of the outlines.
-TOLERANCE = 1e-4
-#: Rotations through the engagement of one tooth at which tips are looked at.
-POSITIONS = 241
-
-
-def tip_penetration(gear: Gear, mate: Gear, centre_distance: float, twist: float) -> float:
-    """Largest depth (m) by which tips of `mate` enter `gear` while the pair rolls with its left flanks in contact.
-
-    The mate's outline from the middle of its addendum outwards is followed through the space of the gear. In the
-    gear's frame the outline of its tooth is a single-valued polar angle over the radius, which separates inside from
-    outside; the depth of a point inside is its distance to that outline.
+@dataclass(frozen=True)
+class MeshGeometry:
+    """Two external spur gears in mesh, not yet checked; `GearPair` is the checked one.
 
     Parameters
     ----------
+    pinion, wheel
+        The gears; the pinion drives.
     centre_distance
-        Distance (m) between the axes; the gear is at the origin, the mate on +x.
-    twist
-        Turn (rad) of the mate that closes the backlash on the left flanks.
+        Centre distance a (m); None: without backlash for the unthinned teeth, from the profile shifts.
     """
-    outline, tip = _outline(gear), _tip_outline(mate)
-    reach = (centre_distance**2 + mate.tip_radius**2 - gear.tip_radius**2) / (2.0 * centre_distance * mate.tip_radius)
-    if reach >= 1.0:
-        return 0.0
-    widest = math.acos(max(reach, 0.0)) + mate.profile.tip_half_angle
-    swing = np.linspace(-widest, widest, POSITIONS)
-    gear_angle = -(swing - math.pi / mate.teeth - twist) * mate.teeth / gear.teeth
-    turn = np.exp(1j * (math.pi + swing))[:, None]
-    placed = (centre_distance + turn * tip) * np.exp(-1j * gear_angle)[:, None]
-    radius, angle = np.abs(placed), np.angle(placed)
-    pitch = 2.0 * math.pi / gear.teeth
-    angle = np.abs(angle - pitch * np.round(angle / pitch))
-    inside = angle < np.interp(radius, np.abs(outline), np.angle(outline), left=math.inf, right=-math.inf)
-    suspects = (radius * np.exp(1j * angle))[inside]
-    deepest = 0.0
-    for part in np.array_split(suspects, 1 + suspects.size // 2000):
-        if part.size:
-            deepest = max(deepest, float(_distance(part, outline).max()))
-    return deepest
 
+    pinion: Gear
+    wheel: Gear
+    centre_distance: float | None = None
 
-def _distance(points: Array, outline: Array) -> Array:
-    """Distance of complex points to the chords next to the nearest vertex of a complex polyline."""
-    nearest = np.abs(points[:, None] - outline).argmin(axis=1)
-    best = np.abs(points - outline[nearest])
-    for step in (-1, 0):
-        first = np.clip(nearest + step, 0, len(outline) - 2)
-        start, chord = outline[first], outline[first + 1] - outline[first]
-        along = np.clip(np.real((points - start) * np.conj(chord)) / np.abs(chord) ** 2, 0.0, 1.0)
-        best = np.minimum(best, np.abs(points - start - along * chord))
-    return best
+    @cached_property
+    def gear_ratio(self) -> float:
+        """Gear ratio z2/z1 (-)."""
+        return self.wheel.teeth / self.pinion.teeth
 
+    @cached_property
+    def reference_centre_distance(self) -> float:
+        """Reference centre distance a_0 = (r_1 + r_2) (m)."""
+        return self.pinion.reference_radius + self.wheel.reference_radius
 
-def _outline(gear: Gear) -> Array:
-    """Left half profile as complex numbers with growing radius."""
-    t = np.linspace(0.0, 1.0, 401)
-    pieces = [s.points(t) for s in gear.profile.segments if s.name != "tip"]
-    points = np.concatenate(pieces)
-    made = points[:, 0] + 1j * points[:, 1]
-    radius = np.abs(made)
-    return made[np.concatenate([[True], np.diff(np.maximum.accumulate(radius)) > 0.0])]
+    @cached_property
+    def working_pressure_angle(self) -> float:
+        """Working pressure angle alpha_w (rad): a_0 cos(alpha)/a = cos(alpha_w), or from the profile shifts,
+        inv(alpha_w) = inv(alpha) + 2 (x_1 + x_2) tan(alpha)/(z_1 + z_2)."""
+        alpha = self.pinion.pressure_angle
+        if self.centre_distance is not None:
+            return math.acos(self.reference_centre_distance * math.cos(alpha) / self.centre_distance)
+        shift = self.pinion.profile_shift + self.wheel.profile_shift
+        if shift == 0.0:
+            return alpha
+        return inverse_inv(inv(alpha) + 2.0 * shift * math.tan(alpha) / (self.pinion.teeth + self.wheel.teeth))
 
+    @cached_property
+    def working_centre_distance(self) -> float:
+        """Centre distance a = a_0 cos(alpha)/cos(alpha_w) (m)."""
+        if self.centre_distance is not None:
+            return self.centre_distance
+        if self.working_pressure_angle == self.pinion.pressure_angle:
+            return self.reference_centre_distance
+        ratio = math.cos(self.pinion.pressure_angle) / math.cos(self.working_pressure_angle)
+        return self.reference_centre_distance * ratio
 
-def _tip_outline(gear: Gear) -> Array:
-    """Both sides of a tooth from half the roll length above the form point outwards, as complex numbers."""
-    profile = gear.profile
-    t = np.linspace(0.0, 1.0, 17)
-    pieces = [profile.points_of_roll(0.5 * (profile.form_roll + profile.round_roll) * (1 - t) + profile.round_roll * t)]
-    pieces += [s.points(t) for s in profile.segments if s.name in ("tip_round", "tip")]
-    left = np.concatenate(pieces)
-    made = left[:, 0] + 1j * left[:, 1]
-    return np.concatenate([made, np.conj(made)])
+    @cached_property
+    def pinion_working_radius(self) -> float:
+        """Radius of the pinion's working pitch circle a/(1 + z2/z1) (m)."""
+        return self.working_centre_distance / (1.0 + self.gear_ratio)
 
+    @cached_property
+    def wheel_working_radius(self) -> float:
+        """Radius of the wheel's working pitch circle (m)."""
+        return self.working_centre_distance - self.pinion_working_radius
 
-#: Argument of `Gear` or `GearPair` -> its key in a job file and the key's unit in SI.
-KEYS: dict[str, tuple[str, float]] = {
-    "module": ("module_mm", 1e-3),
-    "pressure_angle": ("pressure_angle_deg", math.pi / 180.0),
-    "face_width": ("face_width_mm", 1e-3),
-    "bore_diameter": ("bore_diameter_mm", 1e-3),
-    "tip_round": ("tip_round_mm", 1e-3),
-    "tip_relief.amount": ("tip_relief_amount_um", 1e-6),
-    "tip_relief.length": ("tip_relief_length_mm", 1e-3),
-    "tip_relief.exponent": ("tip_relief_exponent", 1.0),
-    "tooth_thinning": ("tooth_thinning_um", 1e-6),
-    "centre_distance": ("centre_distance_mm", 1e-3),
-}
+    @cached_property
+    def base_pitch(self) -> float:
+        """Base pitch p_b (m)."""
+        return self.pinion.base_pitch
+
+    @cached_property
+    def normal_backlash(self) -> float:
+        """Backlash j_bn along the line of action (m): r_b1, r_b2 times the angles that the two teeth leave free."""
+        half = inv(self.working_pressure_angle)
+        pinion, wheel = self.pinion, self.wheel
+        tooth1 = 2.0 * pinion.base_radius * (pinion.base_angle - half)
+        tooth2 = 2.0 * wheel.base_radius * (wheel.base_angle - half)
+        gap = self.base_pitch - tooth1 - tooth2
+        return 0.0 if abs(gap) < 1e-12 else gap
+
+    @cached_property
+    def backlash(self) -> float:
+        """Circumferential backlash j_wt = j_bn/cos(alpha_w) at the working pitch circles (m)."""
+        return self.normal_backlash / math.cos(self.working_pressure_angle)
+
+    @cached_property
+    def contact_twist(self) -> float:
+        """Twist of the wheel (rad) at which rigid driving flanks just touch: half the backlash, j_bn/(2 r_b2)."""
+        return 0.5 * self.normal_backlash / self.wheel.base_radius
+
+    @cached_property
+    def mesh_cycle(self) -> float:
+        """Pinion angle from one tooth to the next, 2 pi/z1 (rad)."""
+        return 2.0 * math.pi / self.pinion.teeth
+
+    @cached_property
+    def tangent_length(self) -> float:
+        """Length a sin(alpha_w) of the line of action between the base circles (m): s1 + s2 on it."""
+        return self.working_centre_distance * math.sin(self.working_pressure_angle)
+
+    def pinion_angle_at(self, pinion_roll: float) -> float:
+        """Pinion angle (rad) at which the driving flank of tooth 0 passes the roll length `pinion_roll` (m)."""
+        pinion = self.pinion
+        return pinion_roll / pinion.base_radius - self.working_pressure_angle - pinion.base_angle
+
+    def pinion_roll_at(self, pinion_angle: float) -> float:
+        """Roll length (m) on the driving flank of tooth 0 on the line of action at a pinion angle (rad)."""
+        pinion = self.pinion
+        return pinion.base_radius * (pinion_angle + self.working_pressure_angle + pinion.base_angle)
+
+    def wheel_angle_at(self, pinion_angle: Any, twist: Any = 0.0) -> Any:
+        """Wheel angle (rad; a number or an array) from its meshing position, -pinion angle/ratio + twist."""
+        return twist - pinion_angle / self.gear_ratio
+
+    @cached_property
+    def wheel_phase(self) -> float:
+        """Angle pi + pi/z2 (rad) of the wheel's tooth frame at pinion angle 0: a space faces the pinion."""
+        return math.pi + math.pi / self.wheel.teeth
+
+    def tooth_angle(self, gear: int, tooth: Any, pinion_angle: Any, twist: Any) -> Any:
+        """Angle (rad) of the frame of a tooth of the pinion (gear 0) or wheel (gear 1); numbers or arrays."""
+        if gear == 0:
+            return pinion_angle + tooth * self.mesh_cycle
+        wheel = self.wheel_phase + 2.0 * math.pi * tooth / self.wheel.teeth
+        return wheel + self.wheel_angle_at(pinion_angle, twist)
+
+    def path_limits(self, *, rounded: bool = True, relieved: bool = False) -> tuple[float, float]:
+        """Pinion roll lengths (m) at which contact starts (wheel's tip) and ends (pinion's tip).
+
+        Tips end at the tip circle, with `rounded` where the tip round starts, with `relieved` where the relief starts
+        (if that is lower). No flank reaches below its form point.
+        """
+
+        def tip(gear: Gear) -> float:
+            profile = gear.profile
+            end = min(profile.round_roll, profile.tip_roll) if rounded else profile.tip_roll
+            return min(end, profile.relief_roll) if relieved else end
+
+        start = max(self.tangent_length - tip(self.wheel), self.pinion.form_roll)
+        end = min(tip(self.pinion), self.tangent_length - self.wheel.form_roll)
+        return start, end
+
+    @cached_property
+    def contact_ratio(self) -> float:
+        """Nominal transverse contact ratio eps_alpha (-): path between the tip circles (or form points, when they
+        cut it short) over the base pitch; tip rounds and relief do not count."""
+        start, end = self.path_limits(rounded=False)
+        return (end - start) / self.base_pitch
+
+    @cached_property
+    def contact_ratio_active(self) -> float:
+        """Contact ratio (-) of the path between the starts of the tip rounds; relief does not count."""
+        start, end = self.path_limits()
+        return (end - start) / self.base_pitch
+
+    @cached_property
+    def contact_ratio_effective(self) -> float:
+        """Contact ratio (-) of the full involute only: the path ends where a tip round or a tip relief starts. This is
+        what an unloaded pair has; under load, contact grows into the relieved part up to `contact_ratio_active`."""
+        start, end = self.path_limits(relieved=True)
+        return max(0.0, end - start) / self.base_pitch
+
+    @cached_property
+    def path_length(self) -> float:
+        """Length g_alpha of the nominal path of contact (m)."""
+        return self.contact_ratio * self.base_pitch
+
+    @cached_property
+    def path(self) -> dict[str, PathPoint]:
+        """Points A, B, C, D, E of the active path (tip rounds respected, relief not).
+
+        A: start of contact, at the wheel's tip; B = E - p_b: the tooth pair ahead leaves contact; C: pitch point;
+        D = A + p_b: the next pair comes into contact; E: end, at the pinion's tip. Between B and D one pair carries
+        when 1 <= contact ratio <= 2.
+        """
+        start, end = self.path_limits()
+        pitch_point = self.pinion.base_radius * math.tan(self.working_pressure_angle)
+        rolls = {"A": start, "B": end - self.base_pitch, "C": pitch_point, "D": start + self.base_pitch, "E": end}
+        return {n: PathPoint(n, s, self.tangent_length - s, self.pinion_angle_at(s)) for n, s in rolls.items()}
 
 
 @dataclass(frozen=True, repr=False)
@@ -259,24 +246,7 @@ class GearPair(MeshGeometry, Shown):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What is legal but deserves a look, one sentence each."""
-        said = []
-        for name, lost in _lost_to_form_points(self).items():
-            gear: Gear = getattr(self, name)
-            if not gear.undercut:
-                continue
-            if lost > 0.0:
-                said.append(
-                    f"the {name} is undercut and loses {1e3 * lost:.4g} mm of the path of contact: contact ratio "
-                    f"{self.contact_ratio_active:.4g} instead of {_tips_ratio(self, rounded=True):.4g}"
-                )
-            else:
-                said.append(f"the {name} is undercut below its active flank; the path of contact is whole")
-        if self.contact_ratio_effective < 1.0:
-            said.append(
-                f"tip relief leaves a contact ratio of {self.contact_ratio_effective:.4g} on the unrelieved flanks: "
-                "unloaded, the teeth hand over on the relieved part"
-            )
-        return tuple(said)
+        return tuple(pair_warnings(self))
 
     @classmethod
     def from_table(cls, table: PairTable) -> GearPair:
@@ -288,6 +258,21 @@ class GearPair(MeshGeometry, Shown):
         except InputError as error:
             side, _, name = error.field.rpartition(".") if error.field.startswith(("pinion", "wheel")) else ("", "", "")
             raise _renamed(error, table, side, name or error.field) from None
+
+
+#: Argument of `Gear` or `GearPair` -> its key in a job file and the key's unit in SI.
+KEYS: dict[str, tuple[str, float]] = {
+    "module": ("module_mm", 1e-3),
+    "pressure_angle": ("pressure_angle_deg", math.pi / 180.0),
+    "face_width": ("face_width_mm", 1e-3),
+    "bore_diameter": ("bore_diameter_mm", 1e-3),
+    "tip_round": ("tip_round_mm", 1e-3),
+    "tip_relief.amount": ("tip_relief_amount_um", 1e-6),
+    "tip_relief.length": ("tip_relief_length_mm", 1e-3),
+    "tip_relief.exponent": ("tip_relief_exponent", 1.0),
+    "tooth_thinning": ("tooth_thinning_um", 1e-6),
+    "centre_distance": ("centre_distance_mm", 1e-3),
+}
 
 
 def _gear_from_table(table: PairTable, side: str) -> Gear:

@@ -8,16 +8,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from numbers import Real
 
-from ..errors import InputError
-from .involute import ToothProfile, inv, tooth_profile
-from .validity import check_rim, check_teeth
-
-#: Least tip round that is not a sharp corner, times module: meshers need seconds for less, and elements degenerate.
-LEAST_ROUND = 1e-6
-#: Modules and face widths beyond it (m) are mistakes, and large ones overflow.
-LARGEST = 1e4
+from .curves import inv
+from .involute import ToothProfile, tooth_profile
+from .validity import check_gear
 
 
 @dataclass(frozen=True)
@@ -86,18 +80,7 @@ class Gear:
     tooth_thinning: float = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
-        self._check_numbers()
-        if self.half_thickness_angle <= 0.0:
-            name = "tooth_thinning" if self.tooth_thinning > 0.0 else "profile_shift"
-            problem = "leaves no tooth thickness at the reference circle"
-            raise InputError(name, getattr(self, name), problem, "use less thinning or more profile shift")
-        check_rim(self)
-        if 0.0 < self.tip_round < LEAST_ROUND * self.module:
-            problem = f"must be 0 or >= {1e3 * LEAST_ROUND * self.module:.6g} mm, {LEAST_ROUND:g} module"
-            raise InputError("tip_round", self.tip_round, problem, "write 0 for a sharp corner")
-        if self.tip_round > self.module:
-            problem = f"must be <= {1e3 * self.module:.6g} mm, one module"
-            raise InputError("tip_round", self.tip_round, problem, "use a smaller tip round")
+        check_gear(self)
         _ = self.profile
 
     @cached_property
@@ -192,39 +175,7 @@ class Gear:
         span = math.sqrt(max(0.0, diameter**2 - (2.0 * self.base_radius) ** 2))
         return max(2, round(1.0 + (span - self.span_size(1)) / self.base_pitch))
 
-    def _check_numbers(self) -> None:
-        check_teeth(self.teeth)
-        ranges = {
-            "module": (0.0, LARGEST, False),
-            "pressure_angle": (math.radians(5.0), math.radians(45.0), True),
-            "face_width": (0.0, LARGEST, False),
-            "bore_diameter": (0.0, math.inf, False),
-            # -teeth/2 moves the reference line to the axis, and teeth are pointed long before teeth/2
-            "profile_shift": (-0.5 * self.teeth, 0.5 * self.teeth, True),
-            "addendum": (0.0, math.inf, False),
-            "dedendum": (0.0, math.inf, False),
-            "rack_tip_radius": (0.0, math.inf, True),
-            "tip_round": (0.0, math.inf, True),
-            "tip_shortening": (0.0, math.inf, True),
-            "tooth_thinning": (0.0, math.inf, True),
-        }
-        for name, (low, high, closed) in ranges.items():
-            _check(name, getattr(self, name), low, high, closed)
-        if self.tip_relief is not None:
-            _check("tip_relief.amount", self.tip_relief.amount, 0.0, math.inf, True)
-            _check("tip_relief.length", self.tip_relief.length, 0.0, math.inf, False)
-            _check("tip_relief.exponent", self.tip_relief.exponent, 1.0, math.inf, True)
-
 
 def nominal_span(z: int, x: float, angle: float, k: int) -> float:
     """Span size W_k/m = cos(alpha) [(k - 1/2) pi + z inv(alpha)] + 2 x sin(alpha) without thinning (times module)."""
     return math.cos(angle) * ((k - 0.5) * math.pi + z * inv(angle)) + 2.0 * x * math.sin(angle)
-
-
-def _check(name: str, value: float, low: float, high: float, closed: bool) -> None:
-    number = not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
-    if number and (low <= value <= high if closed else low < value < high):
-        return
-    signs = (">=", "<=") if closed else (">", "<")
-    limits = [f"{sign} {limit:g}" for sign, limit in zip(signs, (low, high), strict=True) if math.isfinite(limit)]
-    raise InputError(name, value, "must be a finite number" + "".join(f", {limit}" for limit in limits), "correct it")

@@ -24,7 +24,7 @@ import numpy as np
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .deviation import NOMINAL, ToothDeviations
 from .face import AT_AN_END, Face, face_of
-from .mesh_geometry import MeshGeometry
+from .pair import MeshGeometry
 
 #: Points of the first search along a flank and of each closer look, and how often it looks closer at most; points
 #: besides for each piece of a deviation, whose waves may be short.

@@ -1,7 +1,9 @@
-"""What the elastic pair is meant for: gears beyond it are refused, loads beyond it are flagged.
+"""What gears and pairs are meant for: what lies beyond is refused, loads beyond it are flagged. The one check of it.
 
 - *Teeth*: 8 and more. Fewer are undercut so far that their flanks end within the path of contact.
 - *Rim*: a quarter of a module between bore and root circle, and a bore that holds the gear.
+- *Pair*: gears that run together, with a contact ratio of 1 and more; whether tips enter the material of the mate is
+  answered by rolling the pair.
 - *Overlap* r_b times twist, by which rigid flanks would overlap along the line of action: up to 0.12 modules. That is
   how far the contact laws were held against each other (0.5 deg of twist of the 20/30 pair, docs/contact_laws.md). Each
   tooth, 2.25 modules high and 1.8 thick at its root, then yields by d = 0.06 modules: as a cantilever it has the strain
@@ -11,7 +13,8 @@
 
 from __future__ import annotations
 
-from numbers import Integral
+import math
+from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,12 +22,19 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..typing import Array, IntArray
+from .curves import inv, inverse_inv
+from .involute import least_shift
 
 if TYPE_CHECKING:
-    from .pair import GearPair
+    from .pair import MeshGeometry
+    from .spur_gear import Gear
 
 #: Numbers of teeth.
 LEAST_TEETH, MOST_TEETH = 8, 1000
+#: Modules and face widths beyond it (m) are mistakes, and large ones overflow.
+LARGEST = 1e4
+#: Least tip round that is not a sharp corner, times module: meshers need seconds for less, and elements degenerate.
+LEAST_ROUND = 1e-6
 #: Least rim between bore and root circle, times module.
 LEAST_RIM = 0.25
 #: Least bore, times module: plane elasticity gives a point no stiffness, and a bore of a hundredth tears loose.
@@ -33,17 +43,62 @@ LEAST_BORE = 0.05
 MOST_OVERLAP = 0.12
 #: Largest yield of a tooth pair (modules) by the standard's stiffness under a given torque.
 MOST_YIELD = 0.25
+#: Penetrations below this many modules are taken for the discretisation of the outlines.
+TOLERANCE = 1e-4
+#: Rotations through the engagement of one tooth at which tips are looked at.
+POSITIONS = 241
 
 
-def check_teeth(teeth: Any) -> None:
-    """Raise `InputError` for a number of teeth that gears here do not have."""
+def check_gear(gear: Gear) -> None:
+    """Raise `InputError` for data that no gear here has; the profile, which is made of them, has checks of its own."""
+    teeth: Any = gear.teeth
     if isinstance(teeth, bool) or not isinstance(teeth, Integral) or not LEAST_TEETH <= int(teeth) <= MOST_TEETH:
         problem = f"must be a whole number >= {LEAST_TEETH} and <= {MOST_TEETH}"
         raise InputError("teeth", teeth, problem, "use another number of teeth")
+    ranges = {
+        "module": (0.0, LARGEST, False),
+        "pressure_angle": (math.radians(5.0), math.radians(45.0), True),
+        "face_width": (0.0, LARGEST, False),
+        "bore_diameter": (0.0, math.inf, False),
+        # -teeth/2 moves the reference line to the axis, and teeth are pointed long before teeth/2
+        "profile_shift": (-0.5 * gear.teeth, 0.5 * gear.teeth, True),
+        "addendum": (0.0, math.inf, False),
+        "dedendum": (0.0, math.inf, False),
+        "rack_tip_radius": (0.0, math.inf, True),
+        "tip_round": (0.0, math.inf, True),
+        "tip_shortening": (0.0, math.inf, True),
+        "tooth_thinning": (0.0, math.inf, True),
+    }
+    for name, (low, high, closed) in ranges.items():
+        _check(name, getattr(gear, name), low, high, closed)
+    if gear.tip_relief is not None:
+        _check("tip_relief.amount", gear.tip_relief.amount, 0.0, math.inf, True)
+        _check("tip_relief.length", gear.tip_relief.length, 0.0, math.inf, False)
+        _check("tip_relief.exponent", gear.tip_relief.exponent, 1.0, math.inf, True)
+    if gear.half_thickness_angle <= 0.0:
+        name = "tooth_thinning" if gear.tooth_thinning > 0.0 else "profile_shift"
+        problem = "leaves no tooth thickness at the reference circle"
+        raise InputError(name, getattr(gear, name), problem, "use less thinning or more profile shift")
+    _check_rim(gear)
+    if 0.0 < gear.tip_round < LEAST_ROUND * gear.module:
+        problem = f"must be 0 or >= {1e3 * LEAST_ROUND * gear.module:.6g} mm, {LEAST_ROUND:g} module"
+        raise InputError("tip_round", gear.tip_round, problem, "write 0 for a sharp corner")
+    if gear.tip_round > gear.module:
+        problem = f"must be <= {1e3 * gear.module:.6g} mm, one module"
+        raise InputError("tip_round", gear.tip_round, problem, "use a smaller tip round")
 
 
-def check_rim(gear: Any) -> None:
-    """Raise `InputError` unless a `gearfe.gear.spur_gear.Gear` has a bore that holds it and a rim around it."""
+def _check(name: str, value: float, low: float, high: float, closed: bool) -> None:
+    number = not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
+    if number and (low <= value <= high if closed else low < value < high):
+        return
+    signs = (">=", "<=") if closed else (">", "<")
+    limits = [f"{sign} {limit:g}" for sign, limit in zip(signs, (low, high), strict=True) if math.isfinite(limit)]
+    raise InputError(name, value, "must be a finite number" + "".join(f", {limit}" for limit in limits), "correct it")
+
+
+def _check_rim(gear: Gear) -> None:
+    """Raise `InputError` unless the gear has a bore that holds it and a rim around it."""
     if gear.root_radius <= LEAST_RIM * gear.module:
         most = gear.teeth / 2 + gear.profile_shift - LEAST_RIM
         problem = f"leaves no material inside the root circle: must be < {most:.6g}"
@@ -61,12 +116,207 @@ def check_rim(gear: Any) -> None:
         raise InputError("bore_diameter", gear.bore_diameter, problem, "use a smaller bore")
 
 
-def overlaps(pair: GearPair, twist: ArrayLike) -> Array:
+def check_pair(pair: MeshGeometry) -> None:
+    """Raise `InputError` for gears that cannot run together."""
+    pinion, wheel = pair.pinion, pair.wheel
+    for name, what, unit in (("module", "module", 1e3), ("pressure_angle", "pressure angle", 180.0 / math.pi)):
+        value, other = getattr(wheel, name), getattr(pinion, name)
+        if abs(value - other) > 1e-9 * abs(other):
+            symbol = "mm" if name == "module" else "deg"
+            both = f"{unit * value:.9g} {symbol} and {unit * other:.9g} {symbol} (pinion)"
+            problem = f"gears that differ in {what}, {both}, do not mesh"
+            raise InputError(f"wheel.{name}", value, problem, f"give both the same {what}")
+    _check_distance(pair)
+    a = pair.working_centre_distance
+    for name, gear, mate in (("pinion", pinion, wheel), ("wheel", wheel, pinion)):
+        if gear.tip_radius + mate.root_radius >= a:
+            room = (a - mate.root_radius - gear.reference_radius) / gear.module
+            problem = "makes the tip circle hit the mate's root circle: addendum + profile_shift - tip_shortening must"
+            cure = "use more tip_shortening, less addendum, more dedendum or more centre distance"
+            raise InputError(f"{name}.addendum", gear.addendum, f"{problem} be < {room:.6g}", cure)
+    _check_ratio(pair)
+    for name, mate_name in (("pinion", "wheel"), ("wheel", "pinion")):
+        _check_interference(pair, name, mate_name)
+
+
+def _check_distance(pair: MeshGeometry) -> None:
+    pinion, wheel = pair.pinion, pair.wheel
+    alpha, lowest = pinion.pressure_angle, pinion.base_radius + wheel.base_radius
+    if pair.centre_distance is None:
+        shift = pinion.profile_shift + wheel.profile_shift
+        least = -0.5 * (pinion.teeth + wheel.teeth) * inv(alpha) / math.tan(alpha)
+        if shift <= least:
+            problem = f"leaves no working pressure angle: the sum of both profile shifts must be > {least:.6g}"
+            raise InputError("pinion.profile_shift", pinion.profile_shift, problem, "use larger profile shifts")
+        return
+    a = pair.centre_distance
+    if isinstance(a, bool) or not isinstance(a, Real) or not math.isfinite(a) or a <= lowest:
+        problem = f"leaves no working pressure angle: must be finite and > {1e3 * lowest:.9g} mm"
+        raise InputError("centre_distance", a, problem, "use a larger centre distance, or leave it out")
+    if pair.normal_backlash < 0.0:
+        angles = pinion.base_radius * pinion.base_angle + wheel.base_radius * wheel.base_angle - pair.base_pitch / 2
+        tight = lowest / math.cos(inverse_inv(angles / lowest))
+        problem = f"jams the teeth (backlash {1e3 * pair.backlash:.6g} mm): must be >= {1e3 * tight:.12g} mm"
+        cure = "use a larger centre distance, less profile shift or more tooth thinning, or leave it out"
+        raise InputError("centre_distance", a, problem, cure)
+
+
+def _tips_ratio(pair: MeshGeometry, *, rounded: bool) -> float:
+    """Contact ratio between the tips alone, as if no flank were undercut."""
+    rolls = [
+        (g.profile.round_roll if rounded and g.tip_round > 0.0 else g.profile.tip_roll)
+        for g in (pair.pinion, pair.wheel)
+    ]
+    return (sum(rolls) - pair.tangent_length) / pair.base_pitch
+
+
+def _check_ratio(pair: MeshGeometry) -> None:
+    nominal, active = _tips_ratio(pair, rounded=False), pair.contact_ratio_active
+    if nominal < 1.0:
+        problem = f"gives a contact ratio of {nominal:.4g}, must be >= 1"
+        if pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch:
+            raise InputError("centre_distance", pair.centre_distance, problem, "use a smaller centre distance")
+        cure = "use more addendum, less tip_shortening, more teeth or a smaller pressure angle"
+        raise InputError("pinion.addendum", pair.pinion.addendum, problem, cure)
+    if active >= 1.0:
+        return
+    rounded = _tips_ratio(pair, rounded=True)
+    if rounded < 1.0:
+        name = "pinion" if pair.pinion.tip_round >= pair.wheel.tip_round else "wheel"
+        problem = f"leaves a contact ratio of {rounded:.4g}, must be >= 1"
+        raise InputError(f"{name}.tip_round", getattr(pair, name).tip_round, problem, "use a smaller tip round")
+    cuts = {name: lost for name, lost in _lost_to_form_points(pair).items() if lost > 0.0}
+    name = max(cuts, key=cuts.__getitem__)
+    gear: Gear = getattr(pair, name)
+    problem = f"leaves an undercut root that eats the path of contact: contact ratio {active:.4g}, must be >= 1"
+    cure = f"use more profile shift (no undercut from {least_shift(gear):.4g} on), more teeth or less dedendum"
+    raise InputError(f"{name}.profile_shift", gear.profile_shift, problem, cure)
+
+
+def _lost_to_form_points(pair: MeshGeometry) -> dict[str, float]:
+    """Length (m) of path that the mate's active tip reaches below each gear's form point; <= 0 when there is none."""
+
+    def lost(gear: Gear, mate: Gear) -> float:
+        tip = min(mate.profile.round_roll, mate.profile.tip_roll)
+        return gear.form_roll - (pair.tangent_length - tip)
+
+    return {"pinion": lost(pair.pinion, pair.wheel), "wheel": lost(pair.wheel, pair.pinion)}
+
+
+def _check_interference(pair: MeshGeometry, name: str, mate_name: str) -> None:
+    gear, mate = getattr(pair, name), getattr(pair, mate_name)
+    cure = "use less addendum or more tip_shortening there, more dedendum or a smaller rack_tip_radius here"
+    lost = _lost_to_form_points(pair)[name]
+    if lost > 1e-7 * gear.module and not gear.undercut:
+        allowed = math.hypot(mate.base_radius, pair.tangent_length - gear.form_roll)
+        most = mate.addendum - (mate.tip_radius - allowed) / mate.module
+        problem = (
+            f"makes the tip reach {1e3 * lost:.4g} mm of roll length below the start of the {name}'s involute "
+            f"(form diameter {2e3 * gear.form_radius:.6g} mm), where the root is no involute: must be < {most:.5g}"
+        )
+        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure)
+    depth = tip_penetration(gear, mate, pair.working_centre_distance, 0.5 * pair.normal_backlash / mate.base_radius)
+    if depth > TOLERANCE * gear.module:
+        problem = f"makes the tip cut {1e3 * depth:.4g} mm into the {name}'s root"
+        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure)
+
+
+def tip_penetration(gear: Gear, mate: Gear, centre_distance: float, twist: float) -> float:
+    """Largest depth (m) by which tips of `mate` enter `gear` while the pair rolls with its left flanks in contact.
+
+    The mate's outline from the middle of its addendum outwards is followed through the space of the gear. In the
+    gear's frame the outline of its tooth is a single-valued polar angle over the radius, which separates inside from
+    outside; the depth of a point inside is its distance to that outline.
+
+    Parameters
+    ----------
+    centre_distance
+        Distance (m) between the axes; the gear is at the origin, the mate on +x.
+    twist
+        Turn (rad) of the mate that closes the backlash on the left flanks.
+    """
+    outline, tip = _outline(gear), _tip_outline(mate)
+    reach = (centre_distance**2 + mate.tip_radius**2 - gear.tip_radius**2) / (2.0 * centre_distance * mate.tip_radius)
+    if reach >= 1.0:
+        return 0.0
+    widest = math.acos(max(reach, 0.0)) + mate.profile.tip_half_angle
+    swing = np.linspace(-widest, widest, POSITIONS)
+    gear_angle = -(swing - math.pi / mate.teeth - twist) * mate.teeth / gear.teeth
+    turn = np.exp(1j * (math.pi + swing))[:, None]
+    placed = (centre_distance + turn * tip) * np.exp(-1j * gear_angle)[:, None]
+    radius, angle = np.abs(placed), np.angle(placed)
+    pitch = 2.0 * math.pi / gear.teeth
+    angle = np.abs(angle - pitch * np.round(angle / pitch))
+    inside = angle < np.interp(radius, np.abs(outline), np.angle(outline), left=math.inf, right=-math.inf)
+    suspects = (radius * np.exp(1j * angle))[inside]
+    deepest = 0.0
+    for part in np.array_split(suspects, 1 + suspects.size // 2000):
+        if part.size:
+            deepest = max(deepest, float(_distance(part, outline).max()))
+    return deepest
+
+
+def _distance(points: Array, outline: Array) -> Array:
+    """Distance of complex points to the chords next to the nearest vertex of a complex polyline."""
+    nearest = np.abs(points[:, None] - outline).argmin(axis=1)
+    best = np.abs(points - outline[nearest])
+    for step in (-1, 0):
+        first = np.clip(nearest + step, 0, len(outline) - 2)
+        start, chord = outline[first], outline[first + 1] - outline[first]
+        along = np.clip(np.real((points - start) * np.conj(chord)) / np.abs(chord) ** 2, 0.0, 1.0)
+        best = np.minimum(best, np.abs(points - start - along * chord))
+    return best
+
+
+def _outline(gear: Gear) -> Array:
+    """Left half profile as complex numbers with growing radius."""
+    t = np.linspace(0.0, 1.0, 401)
+    pieces = [s.points(t) for s in gear.profile.segments if s.name != "tip"]
+    points = np.concatenate(pieces)
+    made = points[:, 0] + 1j * points[:, 1]
+    radius = np.abs(made)
+    return made[np.concatenate([[True], np.diff(np.maximum.accumulate(radius)) > 0.0])]
+
+
+def _tip_outline(gear: Gear) -> Array:
+    """Both sides of a tooth from half the roll length above the form point outwards, as complex numbers."""
+    profile = gear.profile
+    t = np.linspace(0.0, 1.0, 17)
+    pieces = [profile.points_of_roll(0.5 * (profile.form_roll + profile.round_roll) * (1 - t) + profile.round_roll * t)]
+    pieces += [s.points(t) for s in profile.segments if s.name in ("tip_round", "tip")]
+    left = np.concatenate(pieces)
+    made = left[:, 0] + 1j * left[:, 1]
+    return np.concatenate([made, np.conj(made)])
+
+
+def pair_warnings(pair: MeshGeometry) -> list[str]:
+    """What is legal but deserves a look, one sentence each."""
+    said = []
+    for name, lost in _lost_to_form_points(pair).items():
+        gear: Gear = getattr(pair, name)
+        if not gear.undercut:
+            continue
+        if lost > 0.0:
+            said.append(
+                f"the {name} is undercut and loses {1e3 * lost:.4g} mm of the path of contact: contact ratio "
+                f"{pair.contact_ratio_active:.4g} instead of {_tips_ratio(pair, rounded=True):.4g}"
+            )
+        else:
+            said.append(f"the {name} is undercut below its active flank; the path of contact is whole")
+    if pair.contact_ratio_effective < 1.0:
+        said.append(
+            f"tip relief leaves a contact ratio of {pair.contact_ratio_effective:.4g} on the unrelieved flanks: "
+            "unloaded, the teeth hand over on the relieved part"
+        )
+    return said
+
+
+def overlaps(pair: MeshGeometry, twist: ArrayLike) -> Array:
     """Overlaps (modules) of the rigid flanks at twists (rad) from where they touch."""
     return np.asarray(twist, dtype=float) * pair.wheel.base_radius / pair.pinion.module
 
 
-def overlap_warnings(pair: GearPair, twist: Array, beyond: IntArray) -> list[str]:
+def overlap_warnings(pair: MeshGeometry, twist: Array, beyond: IntArray) -> list[str]:
     """What is said of the positions flagged as beyond validity, at twists (rad) from where flanks touch."""
     found = overlaps(pair, twist[beyond == 1])
     if not found.size:

@@ -11,7 +11,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from ..errors import InputError
-from ..gear.mesh_geometry import MeshGeometry
+from ..gear.pair import MeshGeometry
 from ..train.forces import Flank
 from ..train.friction import Lubrication
 from ..train.kinematics import drive_sense, fastest, mesh_phases, steady_forces

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..gear.iso6336 import dynamic_factor
-from ..gear.mesh_geometry import MeshGeometry
+from ..gear.derived import dynamic_factor
+from ..gear.pair import MeshGeometry
 from ..typing import Array, IntArray
 from ..vibration.radiation import power_level
 from . import torus

@@ -26,8 +26,8 @@ from ..contact.half_plane_result import flank_loads, panel_pressures
 from ..contact.laws import HalfPlane
 from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, joined, of_positions, taken, together
 from ..errors import InputError
+from ..gear.derived import mesh_stiffness
 from ..gear.deviation import NOMINAL
-from ..gear.iso6336 import mesh_stiffness
 from ..gear.touching import Touching
 from ..gear.validity import MOST_YIELD
 from ..progress import count

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..gear.mesh_geometry import MeshGeometry
+from ..gear.pair import MeshGeometry
 from ..typing import Array, IntArray
 
 #: Largest coefficient that is no slip of the pen.

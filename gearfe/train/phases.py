@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..gear.mesh_geometry import MeshGeometry
+from ..gear.pair import MeshGeometry
 from ..typing import Array
 from .gear_train import GearMesh, GearTrain
 

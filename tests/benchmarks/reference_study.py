@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearfe.gear.iso6336 import mesh_stiffness, single_stiffness
+from gearfe.gear.derived import mesh_stiffness, single_stiffness
 from gearfe.rigid import integrate
 from gearfe.stiffness.sweep import sweep_stiffness
 
