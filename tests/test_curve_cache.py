@@ -8,7 +8,7 @@ import pytest
 
 from gearfe.contact.laws import HalfPlane, Nitsche, PairModel, Penalty
 from gearfe.elasticity import Material
-from gearfe.stiffness.curve_cache import cached_curve, curve_key
+from gearfe.stiffness.job import cached_curve, curve_key
 
 from .gears import pair
 

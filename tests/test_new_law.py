@@ -15,8 +15,7 @@ from gearfe import InputError, sweep_stiffness
 from gearfe.cli import main
 from gearfe.contact.laws import PairModel, Penalty, law_named
 from gearfe.stiffness.curve import StiffnessCurve
-from gearfe.stiffness.curve_cache import curve_key
-from gearfe.stiffness.job import read_stiffness_job
+from gearfe.stiffness.job import curve_key, read_stiffness_job
 
 from .gears import pair as gear_pair
 

@@ -1,4 +1,4 @@
-"""The curve as a table: exact round trips, foreign files, mistakes."""
+"""The curve as a table: round trips to 15 digits, foreign files, mistakes."""
 
 import csv
 import math
@@ -8,7 +8,7 @@ import pytest
 
 from gearfe import StiffnessCurve
 from gearfe.errors import InputError
-from gearfe.stiffness.curve import from_text, to_text
+from gearfe.stiffness.curve import as_text, numbers
 
 #: The first columns of the file, in the order that is promised to readers.
 PROMISED = (
@@ -52,16 +52,23 @@ def invented(n=20, failed=()):
     )
 
 
+#: What a rounding to 15 digits changes at most, and two roundings of doubles with it.
+DIGITS = 5e-15 * 1.1
+
+
 def same(one, two):
     for name in StiffnessCurve.__dataclass_fields__:
         if name in ("timings", "error"):
             continue
         a, b = getattr(one, name), getattr(two, name)
-        np.testing.assert_array_equal(a, b, err_msg=name, strict=name in ("teeth_in_contact", "iterations"))
+        if np.asarray(a).dtype.kind == "f":
+            np.testing.assert_allclose(b, a, rtol=DIGITS, err_msg=name)
+        else:
+            np.testing.assert_array_equal(a, b, err_msg=name, strict=name in ("teeth_in_contact", "iterations"))
 
 
 @pytest.mark.parametrize("failed", [(), (3, 11)])
-def test_csv_round_trip_is_exact(tmp_path, failed):
+def test_a_table_read_and_written_is_the_same_text(tmp_path, failed):
     curve = invented(failed=failed)
     curve.to_csv(tmp_path / "curve.csv")
     back = StiffnessCurve.from_csv(tmp_path / "curve.csv")
@@ -84,18 +91,22 @@ def test_promised_columns_come_first(tmp_path):
 
 
 @pytest.mark.parametrize("column", ["angle_deg", "error_um", "radius_mm", "pressure_MPa", "torque_Nm"])
-def test_any_double_survives_its_unit(column):
+def test_any_double_keeps_15_digits_and_its_text(column):
     rng = np.random.default_rng(3)
-    for x in np.concatenate([rng.uniform(-1, 1, 300) * 10.0 ** rng.integers(-12, 12, 300), [0.0, math.radians(0.5)]]):
-        text = to_text(x, column)
-        assert from_text(text, column) == x
-        assert len(text.strip("-0.").split("e")[0].replace(".", "")) <= 17
+    values = rng.uniform(-1, 1, 5000) * 10.0 ** rng.integers(-12, 12, 5000)
+    values = np.concatenate([values, [0.0, math.radians(0.5), math.nan]])
+    text = as_text(values, column)
+    again = numbers({column: text}, column, "a file")
+    np.testing.assert_allclose(again, values, rtol=DIGITS)
+    assert as_text(again, column) == text
+    assert max(len(cell.strip("-0.").split("e")[0].replace(".", "")) for cell in text) == 15
 
 
 def test_everyday_numbers_read_as_such():
-    assert to_text(math.radians(0.5), "twist_deg") == "0.5"
-    assert to_text(math.radians(17.0), "pinion_angle_deg") == "17"
-    assert to_text(25e-6, "error_um") == "25"
+    assert as_text([math.radians(0.5)], "twist_deg") == ["0.5"]
+    for whole in range(360):
+        assert as_text([math.radians(whole)], "pinion_angle_deg") == [str(whole)]
+    assert as_text([25e-6, math.inf], "error_um") == ["25", "nan"]
 
 
 def test_a_foreign_table(tmp_path):

@@ -26,7 +26,7 @@ from ..gear.pair import GearPair
 from ..output.files import write_csv
 from ..shown import ShownTable
 from ..stiffness.contact_pressure import PairLoads
-from ..stiffness.curve import StiffnessCurve, numbers, to_text
+from ..stiffness.curve import StiffnessCurve, as_text, numbers
 from ..textfile import read_csv
 from ..typing import Array, BoolArray
 
@@ -206,18 +206,18 @@ class LoadMap(ShownTable):
         columns: dict[str, list[str]] = {TORQUE: []}
         columns.update({name: [] for name in names})
         for torque, one in zip(self.torque, tables, strict=True):
-            columns[TORQUE] += [to_text(torque, TORQUE)] * rows
+            columns[TORQUE] += as_text([torque], TORQUE) * rows
             for name in names:
                 columns[name] += one.get(name, ["0"] * rows)  # a share of a pair that this torque does not know
         more = {} if self.root is None else root_columns(self.root)
         if self.transmission_error_unloaded_back is not None and self.back_clearance is not None:
             error = np.broadcast_to(self.transmission_error_unloaded_back, self.back_clearance.shape)
             more |= {"transmission_error_unloaded_back_um": error, "back_clearance_um": self.back_clearance}
-        columns |= {name: [to_text(v, name) for v in values.ravel()] for name, values in more.items()}
+        columns |= {name: as_text(values.ravel(), name) for name, values in more.items()}
         return columns
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the table; `from_csv` gives back every number exactly."""
+        """Write the table; `from_csv` gives back every number to 15 digits."""
         write_csv(path, self.columns())
 
     @classmethod

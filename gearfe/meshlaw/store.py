@@ -19,7 +19,7 @@ from ..gear.pair import GearPair
 from ..output.arrays import load_arrays, save_arrays
 from ..output.files import write_csv
 from ..progress import stage
-from ..stiffness.curve_cache import curve_key
+from ..stiffness.job import curve_key
 from ..typing import Array
 from .law import NO_CONTACT, MeshLaw
 

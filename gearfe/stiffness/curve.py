@@ -7,8 +7,7 @@ d cos(alpha)/2),
     k_\mathrm{torsional} = T/\vartheta, \quad k_\mathrm{mesh} = T/(\vartheta r_b^2), \quad
     k_\mathrm{tangent} = (dT/d\vartheta)/r_b^2, \quad \mathrm{TE} = \vartheta r_b .
 
-Tables hold units of their columns' names. Numbers are scaled in decimal arithmetic, so 17 significant digits in the
-file's unit bring back the same double in SI.
+Tables hold units of their columns' names, to 15 digits: a table read and written again is the same text.
 """
 
 from __future__ import annotations
@@ -17,9 +16,8 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
-from decimal import Context, Decimal
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,48 +29,36 @@ from ..textfile import read_csv
 from ..typing import Array, BoolArray, IntArray
 from .periodic import PeriodicInterpolant, ValueAndSlope, periodic_interpolant
 
-#: Far more digits than any double needs, so that a product is rounded once.
-_EXACT = Context(prec=50)
-_PI = Decimal("3.14159265358979323846264338327950288419716939937510582")
 #: Suffix of a column name -> factor from SI to that unit; other columns are in SI.
-_FACTORS: dict[str, Decimal] = {
-    "_deg": _EXACT.divide(Decimal(180), _PI),
-    "_um": Decimal(10) ** 6,
-    "_mm": Decimal(10) ** 3,
-    "_MPa": Decimal(10) ** -6,
-}
+_FACTORS = {"_deg": 180.0 / math.pi, "_um": 1e6, "_mm": 1e3, "_MPa": 1e-6}
 
 
-def _factor(column: str) -> Decimal:
+def _factor(column: str) -> float:
     """Factor from SI to the unit in a column's name."""
-    return next((f for suffix, f in _FACTORS.items() if column.endswith(suffix)), Decimal(1))
+    return next((factor for suffix, factor in _FACTORS.items() if column.endswith(suffix)), 1.0)
 
 
-def to_text(value: float, column: str) -> str:
-    """Decimal text of an SI value in the column's unit: `from_text` gives the same double back."""
-    if not np.isfinite(value):
-        return "nan"
-    exact = _EXACT.multiply(Decimal(float(value)), _factor(column))
-    short = f"{float(exact):.15g}"  # where 15 digits are enough: 0.5 reads 0.5
-    return short if from_text(short, column) == value else f"{exact:.17g}"
-
-
-def from_text(text: str, column: str) -> float:
-    """SI value of a cell, an `ArithmeticError` where it holds no number; an empty cell is not a number."""
-    return float(_EXACT.divide(Decimal(text.strip() or "nan"), _factor(column)))
+def as_text(values: ArrayLike, column: str) -> list[str]:
+    """SI values as the cells of a column, in its unit to 15 digits; whole numbers below 0 are unknown."""
+    values = np.asarray(values)
+    if values.dtype.kind == "U":
+        return [str(v) for v in values]
+    if values.dtype.kind == "i":
+        return [str(v) if v >= 0 else "nan" for v in values]
+    return [f"{v:.15g}" if math.isfinite(v) else "nan" for v in (values * _factor(column)).tolist()]
 
 
 def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -> Array:
-    """Column `name` in SI; all not-a-number where the file has no such column."""
+    """Column `name` in SI; not-a-number where a cell is empty, or the file has no such column."""
     made = np.full(len(next(iter(columns.values()))), np.nan)
     for row, cell in enumerate(columns.get(name, ())):
-        with suppress(ArithmeticError):
-            made[row] = from_text(cell, name)
+        with suppress(ValueError):
+            made[row] = float(cell.strip() or "nan")
             if not math.isinf(made[row]):
                 continue
         problem = f"column {name} holds {shown(cell.strip())}, which is no finite number"
         raise InputError("stiffness curve", str(path), problem, "write a number, or leave the cell empty")
-    return made
+    return made / _factor(name)
 
 
 #: Statuses that stand for a result; every other one marks a failed position, whose numbers are not-a-number.
@@ -82,14 +68,17 @@ SOLVED = ("converged", "no_contact")
 ESTIMATE, SHARE = "k_mesh_relative_error", "load_share_"
 
 
-def _column(name: str, unknown: float | str = math.nan) -> Any:
-    """Field with an entry for each position, of numbers, whole numbers or words as `unknown` is, and its column."""
-    return field(default=(), metadata={"column": name, "unknown": unknown})
+class Column(NamedTuple):
+    """Column of a field, and what stands where nothing is known; one of a `constant` repeats it on every row."""
+
+    name: str
+    unknown: float | str
+    constant: bool
 
 
-def _constant(name: str, unknown: float | str = math.nan) -> Any:
-    """Field of the whole curve; its column repeats it on every row, so that the file stands alone."""
-    return field(default=unknown, metadata={"constant": name, "unknown": unknown})
+def _column(name: str, unknown: float | str = math.nan, *, constant: bool = False) -> Any:
+    """Field of numbers, whole numbers or words as `unknown` is: for each position, or one constant of the curve."""
+    return field(default=unknown if constant else (), metadata={"column": Column(name, unknown, constant)})
 
 
 #: Largest estimate of a curve's positions -> its worst error: 97 % of 78 curves of random pairs were within it (94 %
@@ -184,16 +173,16 @@ class StiffnessCurve(ShownTable):
     beyond_validity: IntArray = _column("beyond_validity", -1)
     relative_error: Array = _column(ESTIMATE)
     load_share: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    mesh_cycle: float = _constant("mesh_cycle_deg")
-    base_radius: float = _constant("wheel_base_radius_mm")
-    lost_motion: float = _constant("lost_motion_deg", 0.0)
-    contact_law: str = _constant("contact_law", "")
+    mesh_cycle: float = _column("mesh_cycle_deg", constant=True)
+    base_radius: float = _column("wheel_base_radius_mm", constant=True)
+    lost_motion: float = _column("lost_motion_deg", 0.0, constant=True)
+    contact_law: str = _column("contact_law", "", constant=True)
     timings: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for own, (_, unknown) in COLUMNS.items():
-            if len(getattr(self, own)) != len(self):
-                object.__setattr__(self, own, np.full(len(self), unknown))
+        for own, column in COLUMNS.items():
+            if not column.constant and len(getattr(self, own)) != len(self):
+                object.__setattr__(self, own, np.full(len(self), column.unknown))
 
     def __len__(self) -> int:
         return len(self.pinion_angle)
@@ -230,9 +219,9 @@ class StiffnessCurve(ShownTable):
         InputError
             When the solved positions do not cover the mesh cycle.
         """
-        per_position = [own for own, (_, unknown) in COLUMNS.items() if isinstance(unknown, float)]
-        if quantity not in per_position:
-            raise unknown_name("quantity", quantity, per_position)
+        known = [own for own, column in COLUMNS.items() if isinstance(column.unknown, float) and not column.constant]
+        if quantity not in known:
+            raise unknown_name("quantity", quantity, known)
         return periodic_interpolant(self.pinion_angle, getattr(self, quantity), self.mesh_cycle, method=method)
 
     def interpolate(self, phase: ArrayLike, quantity: str = "k_mesh", *, method: str = "cubic") -> ValueAndSlope:
@@ -260,17 +249,16 @@ class StiffnessCurve(ShownTable):
 
     def columns(self) -> dict[str, list[str]]:
         """Columns of the CSV file as text."""
-        columns = {name: _cells(getattr(self, own), name) for own, (name, _) in COLUMNS.items()}
+        own = {column: getattr(self, name) for name, column in COLUMNS.items()}
+        each = {column.name: values for column, values in own.items() if not column.constant}
         if math.isnan(self.worst_error):
-            del columns[ESTIMATE]
-        for j in range(self.load_share.shape[1]):
-            columns[f"{SHARE}{j + 1}"] = _cells(self.load_share[:, j], SHARE)
-        for own, (name, _) in CONSTANTS.items():
-            columns[name] = _cells([getattr(self, own)], name) * len(self)
-        return columns
+            del each[ESTIMATE]
+        shares = {f"{SHARE}{j + 1}": share for j, share in enumerate(self.load_share.T)}
+        whole = {column.name: np.full(len(self), value) for column, value in own.items() if column.constant}
+        return {name: as_text(values, name) for name, values in (each | shares | whole).items()}
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the table; `from_csv` gives back every number exactly."""
+        """Write the table; `from_csv` gives back every number to 15 digits."""
         write_csv(path, self.columns())
 
     @classmethod
@@ -293,57 +281,33 @@ class StiffnessCurve(ShownTable):
 
     @classmethod
     def from_columns(
-        cls,
-        columns: Mapping[str, Sequence[str]],
-        path: str | Path,
-        *,
-        mesh_cycle: float | None = None,
-        base_radius: float | None = None,
+        cls, columns: Mapping[str, Sequence[str]], path: str | Path, **constants: float | None
     ) -> StiffnessCurve:
         """The curve that a table's columns hold as text; `path` is named in messages, see `from_csv`."""
         for needed in ("pinion_angle_deg", "k_mesh_N_per_m"):
             if needed not in columns:
                 raise InputError("stiffness curve", str(path), f"has no column {needed}", "add it")
-        given = {"mesh_cycle": mesh_cycle, "base_radius": base_radius}
-        values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-        for own, (name, unknown) in CONSTANTS.items():
-            if name in columns:
-                values.setdefault(own, _values(columns, name, unknown, path)[0])
+        values: dict[str, Any] = {own: value for own, value in constants.items() if value is not None}
+        for own, column in COLUMNS.items():
+            if column.name in columns and own not in values:
+                found = _values(columns, column, path)
+                values[own] = found[0] if column.constant else found
         if not (math.isfinite(values.get("mesh_cycle", math.nan)) and values["mesh_cycle"] > 0):
             cure = "add a column mesh_cycle_deg (360 deg/pinion teeth), or give mesh_cycle"
             raise InputError("stiffness curve", str(path), "does not tell the mesh cycle", cure)
-        for own, (name, unknown) in COLUMNS.items():
-            if name in columns:
-                values[own] = _values(columns, name, unknown, path)
         values.setdefault("status", np.where(np.isfinite(values["k_mesh"]), "converged", "missing"))
         shares = [numbers(columns, name, path) for name in columns if name.startswith(SHARE)]
         values["load_share"] = np.stack(shares, axis=1) if shares else np.zeros((len(values["k_mesh"]), 0))
         return cls(**values)
 
 
-def _marked(kind: str) -> dict[str, tuple[str, Any]]:
-    """Field -> its column and what stands for unknown, in the order of the table."""
-    found = {own.name: own.metadata for own in fields(StiffnessCurve)}
-    return {own: (data[kind], data["unknown"]) for own, data in found.items() if kind in data}
+#: Field -> its column, in the order of the table but for the shares.
+COLUMNS: dict[str, Column] = {own.name: own.metadata["column"] for own in fields(StiffnessCurve) if own.metadata}
 
 
-COLUMNS, CONSTANTS = _marked("column"), _marked("constant")
-
-
-def _cells(values: Any, name: str) -> list[str]:
-    """Text of the values of a column; whole numbers below 0 are unknown."""
-    values = np.asarray(values)
-    if values.dtype.kind == "U":
-        return [str(v) for v in values]
-    if values.dtype.kind == "i":
-        return [str(v) if v >= 0 else "nan" for v in values]
-    return [to_text(v, name) for v in values]
-
-
-def _values(columns: Mapping[str, Sequence[str]], name: str, unknown: Any, path: str | Path) -> Any:
-    """Values of a column in SI, of the type of `unknown`."""
-    if isinstance(unknown, str):
-        return np.array([cell.strip() for cell in columns[name]])
-    found = numbers(columns, name, path)
-    made = np.where(np.isnan(found), unknown, found)
-    return made.astype(np.int64) if isinstance(unknown, int) else made
+def _values(columns: Mapping[str, Sequence[str]], column: Column, path: str | Path) -> Any:
+    """Values of a column in SI, of the type of what is unknown."""
+    if isinstance(column.unknown, str):
+        return np.array([cell.strip() for cell in columns[column.name]])
+    found = numbers(columns, column.name, path)
+    return np.where(np.isnan(found), column.unknown, found).astype(type(column.unknown))

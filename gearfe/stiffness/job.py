@@ -1,15 +1,25 @@
-"""From the [pair] and [stiffness] tables of a job file to the arguments of `gearfe.stiffness.sweep.sweep_stiffness`."""
+"""From the [pair] and [stiffness] tables of a job file to the arguments of `gearfe.stiffness.sweep.sweep_stiffness`.
+
+Curves are kept on disk: a second run with the same gears, load and mesh sizes reads its curve.
+
+A stored curve is named by a hash of all that decides it: the pair, materials, contact law, sizes and positions, the
+versions of numpy, scipy and gmsh, and the text of this package's own rooms that compute it.
+"""
 
 from __future__ import annotations
 
+import inspect
 import math
+import sys
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..cache import cache_key, cached_arrays, source_hash
 from ..config import load_job
 from ..contact.laws import ContactLaw, PairModel, check_alike, law_named
 from ..elasticity import Material
@@ -18,13 +28,16 @@ from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
 from ..tables.pair import MaterialTable, PairTable
 from ..tables.stiffness import StiffnessTable
-from .curve import from_text
+from ..versions import versions
+from .curve import StiffnessCurve
 
 if TYPE_CHECKING:
     from ..contact.compliance import MeshingPair
     from ..progress import Stopwatch
     from ..tables.microgeometry import MicrogeometryTable
 
+#: Rooms and modules whose text decides a curve.
+ROOMS = ("elasticity", "contact", "gear", "meshing", "stiffness")
 #: Gives what a function makes, or what was made under that name before.
 Keep = Callable[[str, Callable[[], Any]], Any]
 
@@ -70,21 +83,20 @@ class StiffnessJob:
     @property
     def deviations(self) -> tuple[ToothDeviations, ToothDeviations]:
         """Deviations of the driving flanks of pinion and wheel."""
-        if self.microgeometry is None:
-            return NOMINAL
-        from ..gear.deviation_job import deviations_of
-
-        return deviations_of(self.microgeometry, self.pair, self.folder)
+        return self._flanks() or NOMINAL
 
     @property
     def back_deviations(self) -> tuple[ToothDeviations, ToothDeviations] | None:
         """Those of the back flanks, of the pair seen from the other side; None without [microgeometry]."""
+        return self._flanks(back=True)
+
+    def _flanks(self, *, back: bool = False) -> tuple[ToothDeviations, ToothDeviations] | None:
         if self.microgeometry is None:
             return None
         from ..gear.deviation_job import deviations_of
 
         other = {"left": "right", "right": "left"}[self.microgeometry.flank]
-        return deviations_of(self.microgeometry, self.pair, self.folder, flank=other)
+        return deviations_of(self.microgeometry, self.pair, self.folder, flank=other if back else None)
 
     @property
     def tables(self) -> dict[str, Any]:
@@ -132,18 +144,13 @@ class StiffnessJob:
                 problem = f"must be < {most:.6g} deg, half a pitch of the wheel"
                 raise InputError("stiffness.twist_deg", t.twist_deg, problem, "0.01 to 0.5 deg is usual")
         return {
-            "twist": None if t.twist_deg is None else _radians(t.twist_deg),
+            "twist": None if t.twist_deg is None else math.radians(t.twist_deg),
             "torque": t.torque_Nm,
-            "angles": np.array([_radians(angle) for angle in t.angles_deg(math.degrees(self.pair.mesh_cycle))]),
+            "angles": np.radians(t.angles_deg(math.degrees(self.pair.mesh_cycle))),
             "kinematics": t.kinematics,
             "twist_from": t.twist_from,
             "solve_all": t.solve_all,
         }
-
-
-def _radians(degrees: float) -> float:
-    """Angle rounded once, so that the table shows 15 deg as 15."""
-    return from_text(repr(degrees), "_deg")
 
 
 def material_of(table: MaterialTable) -> Material:
@@ -173,3 +180,25 @@ def read_stiffness_job(path: str | Path) -> StiffnessJob:
         For every mistake in the file, and for gears that cannot run together.
     """
     return stiffness_job(load_job(path, ("pair",), ("stiffness", "microgeometry")), Path(path).parent)
+
+
+def cached_curve(pair: GearPair, model: PairModel, **sweep: Any) -> StiffnessCurve:
+    """Curve of `gearfe.sweep_stiffness` with these arguments, from disk when it was computed before."""
+
+    def made() -> dict[str, Any]:
+        from .sweep import sweep_stiffness
+
+        curve = sweep_stiffness(pair, model, **sweep)
+        return {own.name: np.asarray(getattr(curve, own.name)) for own in fields(curve) if own.name != "timings"}
+
+    found = cached_arrays("curve", curve_key(pair, model, sweep), made)
+    return StiffnessCurve(**{name: values if values.ndim else values.item() for name, values in found.items()})
+
+
+def curve_key(pair: GearPair, model: PairModel, sweep: dict[str, Any]) -> str:
+    """Hash (hex) of all that decides a curve."""
+    law, text = type(model.law), ""
+    with suppress(OSError, TypeError):  # laws of other packages have no version here, those without a file no text
+        text = inspect.getsource(sys.modules[law.__module__])
+    code = [law.__module__, law.__qualname__, text, source_hash(*ROOMS), versions()]
+    return cache_key("curve", {"pair": pair, "model": model, "sweep": sweep, "code": code})

@@ -90,8 +90,7 @@ def _carried_torque(train: GearTrain, number: int) -> float:
 
 def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> StiffnessCurve:
     """Curve of a mesh with the driver as pinion, by [stiffness] or at the torque that the mesh carries."""
-    from ..stiffness.curve_cache import cached_curve
-    from ..stiffness.job import StiffnessJob
+    from ..stiffness.job import StiffnessJob, cached_curve
 
     mesh = train.meshes[number]
     one, two = train.gear(mesh.driver).gear, train.gear(mesh.driven).gear
@@ -123,8 +122,7 @@ def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) 
     """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
     from ..contact.laws import HalfPlane
     from ..meshlaw.store import cached_law
-    from ..stiffness.curve_cache import cached_curve
-    from ..stiffness.job import StiffnessJob
+    from ..stiffness.job import StiffnessJob, cached_curve
 
     def gears(mesh: GearMesh) -> tuple[Any, ...]:
         materials = None if job.pair is None else _materials(job, mesh)
