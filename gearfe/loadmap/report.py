@@ -13,9 +13,9 @@ from ..gear import pitch_errors
 from ..gear.derived import derived_geometry
 from ..gear.deviation_job import GEARS
 from ..gear.validity import overlap_warnings
-from ..stiffness.contact_pressure import EDGES, largest_pressures
+from ..stiffness.contact_pressure import EDGES
 from ..stiffness.job import StiffnessJob
-from ..stiffness.report import cure_of, pressure_lines
+from ..stiffness.report import cure_of, largest_pressures, pressure_lines
 from ..tables.loadmap import LoadMapTable
 from ..typing import Array
 from ..versions import versions
@@ -41,10 +41,13 @@ def torque_table(made: LoadMap) -> dict[str, list[float]]:
             if h * made.mesh_cycles < len(order):
                 table[f"mesh_order_{h}_um"] = 1e6 * amplitude[:, h * made.mesh_cycles]
     found = [largest_pressures(curve) for curve in made.curves]
-    for name, key in (("peak_pressure_largest_MPa", "path"), ("edge_pressure_largest_MPa", "edge")):
-        table[name] = 1e-6 * np.array([one[key] for one in found])
-    for name in ("rounded", "singular"):
-        table[f"positions_with_{name}_edge"] = np.array([one[name] for one in found])
+    for name, key in (
+        ("peak_pressure_largest_MPa", "largest_hertzian_MPa"),
+        ("edge_pressure_largest_MPa", "largest_at_edges_MPa"),
+        ("positions_with_rounded_edge", "positions_with_a_rounded_edge_bearing"),
+        ("positions_with_singular_edge", "positions_with_a_singular_edge_bearing"),
+    ):
+        table[name] = np.array([one[key] for one in found])
     if made.root is not None:
         for g, gear in enumerate(GEARS):
             table[f"root_stress_largest_{gear}_MPa"] = 1e-6 * made.root.largest[:, :, g].max(axis=1)

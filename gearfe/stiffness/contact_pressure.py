@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -137,23 +136,6 @@ def contact_pressures(found: Positions, loads: PairLoads) -> dict[str, Array]:
     made["peak_pressure"][loads.position[smooth]] = loads.pressure[smooth]
     made["peak_pressure_error"][loads.position[smooth]] = loads.error[smooth]
     return {**made, "edge": edge}
-
-
-def largest_pressures(curve: Any) -> dict[str, Any]:
-    """Largest pressures of a curve's positions (Pa), with the error of the first: what summaries tell."""
-
-    def largest(values: Array) -> float:
-        return float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
-
-    path = curve.peak_pressure
-    at = int(np.nanargmax(path)) if np.isfinite(path).any() else None
-    return {
-        "path": largest(path),
-        "path_error": math.nan if at is None else float(curve.peak_pressure_error[at]),
-        "edge": largest(curve.edge_pressure),
-        "singular": int(np.count_nonzero(curve.edge == "singular")),
-        "rounded": int(np.count_nonzero(curve.edge == "rounded")),
-    }
 
 
 def marks_met(law: HalfPlanePair, flank: IntArray, low: Array, high: Array) -> BoolArray:

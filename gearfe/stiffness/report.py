@@ -15,14 +15,21 @@ from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
 from ..gear.validity import overlap_warnings
 from ..tables.stiffness import DEFAULT_LAW
+from ..typing import Array
 from ..versions import versions
-from .contact_pressure import largest_pressures
+from .contact_pressure import EDGES
 from .curve import StiffnessCurve
 from .curve_error import ORDER
 from .job import StiffnessJob
 
-#: Allowable contact stress of case-hardened steel for unlimited life (Pa): ISO 6336-5, material quality MQ.
-ALLOWABLE_STRESS = 1500e6
+#: Allowable contact stress of case-hardened steel for unlimited life (MPa): ISO 6336-5, material quality MQ.
+ALLOWABLE_MPA = 1500.0
+
+
+def _levels(values: Array, unit: str = "") -> dict[str, float]:
+    """Mean, least and largest of some values; `unit` ends their names."""
+    found = {"mean": values.mean(), "least": values.min(), "largest": values.max()}
+    return {name + unit: float(value) for name, value in found.items()}
 
 
 def cycle_statistics(curve: StiffnessCurve, method: str) -> dict[str, float] | None:
@@ -31,44 +38,61 @@ def cycle_statistics(curve: StiffnessCurve, method: str) -> dict[str, float] | N
         interpolant = curve.interpolant(method=method)
     except InputError:
         return None
-    k = interpolant(np.arange(2000) * curve.mesh_cycle / 2000).value
-    return {"mean_N_per_m": float(k.mean()), "least_N_per_m": float(k.min()), "largest_N_per_m": float(k.max())}
+    return _levels(interpolant(np.arange(2000) * curve.mesh_cycle / 2000).value, "_N_per_m")
 
 
-def load_statistics(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, Any]:
-    """Torque at the wheel over the solved positions (N m), and where a prescribed twist counts from (deg)."""
-    torque = curve.torque_wheel[~curve.failed]
-    lost = math.degrees(curve.lost_motion)
-    given = None
-    if job.table.twist_deg is not None:
-        inside = lost if job.table.twist_from == "centred" else 0.0
-        given = {
-            "twist_deg": job.table.twist_deg,
-            "counted_from": job.table.twist_from,
-            "lost_motion_in_it_deg": inside,
-            "deflection_deg": job.table.twist_deg - inside,
-        }
-    known = {"mean": torque.mean(), "least": torque.min(), "largest": torque.max()} if len(torque) else None
-    return {"torque_wheel_Nm": known, "lost_motion_deg": lost, "prescribed_twist": given}
+def largest_pressures(curve: StiffnessCurve) -> dict[str, Any]:
+    """Largest pressures of a curve's positions, with the error of the first, and how many an edge bears at."""
+    path, edge = curve.peak_pressure, curve.edge_pressure
+    at = int(np.nanargmax(path)) if np.isfinite(path).any() else None
+    return {
+        "largest_hertzian_MPa": math.nan if at is None else 1e-6 * float(path[at]),
+        "its_relative_error": math.nan if at is None else float(curve.peak_pressure_error[at]),
+        "largest_at_edges_MPa": 1e-6 * float(np.nanmax(edge)) if np.isfinite(edge).any() else math.nan,
+        **{f"positions_with_a_{kind}_edge_bearing": int((curve.edge == kind).sum()) for kind in EDGES[1:]},
+    }
 
 
 def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, float]) -> dict[str, Any]:
     """Content of summary.json."""
-    moduli = [material.youngs_modulus for material in job.materials]
-    failed = np.degrees(curve.pinion_angle[curve.failed])
+    table, moduli = job.table, [material.youngs_modulus for material in job.materials]
+    torque, lost = curve.torque_wheel[~curve.failed], math.degrees(curve.lost_motion)
+    twist = error = None
+    if table.twist_deg is not None:
+        inside = lost if table.twist_from == "centred" else 0.0
+        twist = {
+            "twist_deg": table.twist_deg,
+            "counted_from": table.twist_from,
+            "lost_motion_in_it_deg": inside,
+            "deflection_deg": table.twist_deg - inside,
+        }
+    if math.isfinite(curve.worst_error):
+        known = np.isfinite(curve.relative_error)
+        error = {
+            "typical_relative": curve.typical_error,
+            "worst_relative": curve.worst_error,
+            "mesh_coarsening": COARSENING,
+            "assumed_order": ORDER,
+            "pinion_angle_deg": np.degrees(curve.pinion_angle[known]),
+            "relative": curve.relative_error[known],
+        }
     return {
         "job": job.tables,
         "versions": versions(),
         "derived_geometry": derived_geometry(job.pair),
         "warnings": list(job.pair.warnings),
         "iso_6336": iso_values(job.pair, moduli[0], moduli[1]),
-        "mesh_stiffness": cycle_statistics(curve, job.table.interpolation),
-        "error_estimate": _error_summary(curve),
-        "load": load_statistics(job, curve),
-        "contact_pressure": _pressure_summary(curve),
+        "mesh_stiffness": cycle_statistics(curve, table.interpolation),
+        "error_estimate": error,
+        "load": {
+            "torque_wheel_Nm": _levels(torque) if len(torque) else None,
+            "lost_motion_deg": lost,
+            "prescribed_twist": twist,
+        },
+        "contact_pressure": {**largest_pressures(curve), "usual_steel_MPa": ALLOWABLE_MPA},
         "contact_law": curve.contact_law,
         "statuses": dict(Counter(map(str, curve.status))),
-        "failed_pinion_angles_deg": failed,
+        "failed_pinion_angles_deg": np.degrees(curve.pinion_angle[curve.failed]),
         "positions_beyond_validity": int(np.count_nonzero(curve.beyond_validity == 1)),
         "timings_s": dict(timings),
     }
@@ -93,89 +117,67 @@ def deviation_lines(job: StiffnessJob) -> list[str]:
 
 def report_lines(job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, Any]) -> list[str]:
     """Lines to print; `found` is the `summary`."""
-    iso, level = found["iso_6336"], found["mesh_stiffness"]
     statuses = ", ".join(f"{n} {status}" for status, n in found["statuses"].items())
     lines = [f"{len(curve)} positions: {statuses}"]
     if curve.contact_law:
         lines.append(f"contact law: {curve.contact_law}")
     lines += deviation_lines(job)
-    torque, given = found["load"]["torque_wheel_Nm"], found["load"]["prescribed_twist"]
+    given, iso, error = found["load"]["prescribed_twist"], found["iso_6336"], found["error_estimate"]
     if given is not None and given["lost_motion_in_it_deg"]:
         lines.append(
             f"twist {given['twist_deg']:.6g} deg from the centred position: {given['lost_motion_in_it_deg']:.6g} deg "
             f"of lost motion (half the backlash) and {given['deflection_deg']:.6g} deg of deflection"
         )
-    if torque is not None:
-        mean, low, high = (torque[key] for key in ("mean", "least", "largest"))
-        lines.append(f"torque at the wheel: mean {mean:.4g}, least {low:.4g}, largest {high:.4g} N m")
-    if level is not None:
-        mean, low, high = (1e-6 * level[key] for key in ("mean_N_per_m", "least_N_per_m", "largest_N_per_m"))
-        lines.append(f"mesh stiffness: mean {mean:.4g}, least {low:.4g}, largest {high:.4g} N/um")
+    for name, levels, factor, unit in (
+        ("torque at the wheel", found["load"]["torque_wheel_Nm"], 1.0, "N m"),
+        ("mesh stiffness", found["mesh_stiffness"], 1e-6, "N/um"),
+    ):
+        if levels is not None:
+            mean, least, largest = (factor * level for level in levels.values())
+            lines.append(f"{name}: mean {mean:.4g}, least {least:.4g}, largest {largest:.4g} {unit}")
     lines.append(
         f"ISO 6336 method B, for comparison: c' = {iso['c_prime_N_per_mm_um']:.3g}, "
         f"c_gamma = {iso['c_gamma_N_per_mm_um']:.3g} N/(mm um); "
         f"c_gamma times width = {1e-6 * iso['c_gamma_times_width_N_per_m']:.4g} N/um"
     )
     lines += pressure_lines(curve)
-    if math.isfinite(curve.worst_error):
+    if error is not None:
         against = "" if job.law.name == DEFAULT_LAW else "the half-plane law and "
         lines.append(
             f"discretisation error, estimated by {against}meshes {COARSENING:g} times coarser (order {ORDER:g} "
-            f"assumed): typically {100 * curve.typical_error:.2g} %, at worst {100 * curve.worst_error:.2g} %"
+            f"assumed): typically {100 * error['typical_relative']:.2g} %, at worst {100 * error['worst_relative']:.2g} %"
         )
     return lines
 
 
-def _error_summary(curve: StiffnessCurve) -> dict[str, Any] | None:
-    if math.isnan(curve.worst_error):
-        return None
-    known = np.isfinite(curve.relative_error)
-    return {
-        "typical_relative": curve.typical_error,
-        "worst_relative": curve.worst_error,
-        "mesh_coarsening": COARSENING,
-        "assumed_order": ORDER,
-        "pinion_angle_deg": np.degrees(curve.pinion_angle[known]),
-        "relative": curve.relative_error[known],
-    }
-
-
-def _pressure_summary(curve: StiffnessCurve) -> dict[str, Any]:
-    found = largest_pressures(curve)
-    return {
-        "largest_hertzian_MPa": 1e-6 * found["path"],
-        "its_relative_error": found["path_error"],
-        "largest_at_edges_MPa": 1e-6 * found["edge"],
-        "positions_with_a_rounded_edge_bearing": found["rounded"],
-        "positions_with_a_singular_edge_bearing": found["singular"],
-        "usual_steel_MPa": 1e-6 * ALLOWABLE_STRESS,
-    }
+#: What bears at an edge, and why the pressure there is a figure to compare with alone.
+EDGE_WORDS = {
+    "singular": (
+        "a sharp edge or the kink of a linear relief",
+        "the pressure of linear elasticity is singular there",
+    ),
+    "rounded": ("a rounded edge", "the radius of the tip round decides the pressure there"),
+}
 
 
 def pressure_lines(curve: StiffnessCurve) -> list[str]:
     """Lines about the contact pressure: on smooth flanks, apart from it at edges, and whether steel bears it."""
     found, lines = largest_pressures(curve), []
-    if found["path"] > 0:
-        line = f"Hertzian pressure on the flanks: largest {1e-6 * found['path']:.4g} MPa"
-        line += f" (the computed contact is {100 * found['path_error']:.2g} % off Hertz's)"
-        if found["path"] > ALLOWABLE_STRESS:
+    if found["largest_hertzian_MPa"] > 0:
+        line = f"Hertzian pressure on the flanks: largest {found['largest_hertzian_MPa']:.4g} MPa"
+        line += f" (the computed contact is {100 * found['its_relative_error']:.2g} % off Hertz's)"
+        if found["largest_hertzian_MPa"] > ALLOWABLE_MPA:
             line += (
-                f", beyond the {1e-6 * ALLOWABLE_STRESS:.0f} MPa that case-hardened steel bears for long (ISO 6336-5): "
+                f", beyond the {ALLOWABLE_MPA:.0f} MPa that case-hardened steel bears for long (ISO 6336-5): "
                 "linear elasticity goes on where the steel would not"
             )
         lines.append(line)
-    for kind, edge, why in (
-        (
-            "singular",
-            "a sharp edge or the kink of a linear relief",
-            "the pressure of linear elasticity is singular there",
-        ),
-        ("rounded", "a rounded edge", "the radius of the tip round decides the pressure there"),
-    ):
-        if found[kind]:
+    for kind, (edge, why) in EDGE_WORDS.items():
+        count = found[f"positions_with_a_{kind}_edge_bearing"]
+        if count:
             largest = 1e-6 * np.nanmax(curve.edge_pressure[curve.edge == kind])
             lines.append(
-                f"{found[kind]} position{'s' if found[kind] > 1 else ''} with {edge} bearing: {why}; blunted by a "
+                f"{count} position{'s' if count > 1 else ''} with {edge} bearing: {why}; blunted by a "
                 f"hundredth of a module, up to {largest:.4g} MPa (column edge_pressure_MPa)"
             )
     return lines
