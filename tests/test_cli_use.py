@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
+from gearfe.cli import CLOSED, main
 from gearfe.commands.arguments import CommandParser
-from gearfe.commands.program import CLOSED
 from gearfe.errors import InputError, NotFiniteWarning, shown
 from gearfe.output.files import csv_table, write_csv
 from gearfe.tables.examples import job_file
@@ -88,7 +87,7 @@ dataclasses._create_fn = interrupted
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("when", [FOUND.format("commands.program"), FOUND.format("config"), EXECUTED])
+@pytest.mark.parametrize("when", [FOUND.format("commands.common"), FOUND.format("config"), EXECUTED])
 def test_an_interruption_while_the_program_loads_is_told_as_later(when: str) -> None:
     # a shell's job in the background ignores interruptions, and so would what it starts
     listening = "import os, signal, sys\nsignal.signal(signal.SIGINT, signal.default_int_handler)"

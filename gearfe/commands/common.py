@@ -1,22 +1,25 @@
-"""Options that commands share: what is printed, and in which forms the results of a run are kept besides."""
+"""Commands are run here, with the options that they share: what is printed, and in which forms results are kept."""
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import io
 import json
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import redirect_stdout
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TextIO
 
 from ..config import JobFile
-from ..errors import InputError, MissingLibraryError
+from ..errors import InputError, MissingLibraryError, NotFiniteWarning
 from ..progress import shown
+from .arguments import CommandParser, with_changes
 
 #: Formats of ``--format`` beside CSV; their writers are in `gearfe.output.formats`.
 FORMATS = ("npz", "h5", "mat", "uff")
@@ -51,14 +54,62 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
 
 
-def add_verbosity(parser: argparse.ArgumentParser) -> None:
+def command_module(name: str) -> Any:
+    """Module of a command (its contract is in `gearfe.commands`)."""
+    return importlib.import_module(f".{name}", __package__)
+
+
+def parser_of(module: Any, name: str, summary: str, example: str) -> CommandParser:
+    """Parser of a command module, called by `name`, with the options that all commands have."""
+    parser = CommandParser(prog=name, description=summary, example=example)
+    module.add_arguments(parser)
+    _add_verbosity(parser)
+    return parser
+
+
+def run_command(module: Any, name: str, summary: str, example: str, arguments: list[str]) -> int:
+    """Run a command module (its contract is in `gearfe.commands`), called by `name`, with these arguments."""
+    parser = parser_of(module, name, summary, example)
+    parsed = _with_folder(with_changes(parser.parse_args(arguments)))
+    with _tables_watched() as messages:
+        code = _run_and_keep(module.run, parsed, [*name.split()[1:], *arguments])
+        return code or int(bool(messages))
+
+
+@contextmanager
+def _tables_watched() -> Iterator[list[str]]:
+    """Print what the writer of tables warns of, and yield these sentences: such a table is no success."""
+    messages: list[str] = []
+    with warnings.catch_warnings():
+        other = warnings.showwarning
+
+        def show(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
+            if not issubclass(category, NotFiniteWarning):
+                other(message, category, filename, lineno, file, line)
+                return
+            messages.append(str(message))
+            print(f"gearfe: warning: {message}", file=sys.stderr)
+
+        warnings.simplefilter("always", NotFiniteWarning)
+        warnings.showwarning = show
+        yield messages
+
+
+def _add_verbosity(parser: argparse.ArgumentParser) -> None:
     """``-q`` and ``-v``."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument("-q", "--quiet", action="store_true", help="print warnings and errors only")
     group.add_argument("-v", "--verbose", action="store_true", help="tell each stage of the work as it begins")
 
 
-def with_folder(parsed: argparse.Namespace) -> argparse.Namespace:
+def _with_folder(parsed: argparse.Namespace) -> argparse.Namespace:
     """The arguments, their ``--out`` by default ``out/JOB/COMMAND``: no command writes over another's summary."""
     if getattr(parsed, "folder_of", None) and parsed.out is None:
         job = next(value for value in vars(parsed).values() if isinstance(value, JobFile))
@@ -66,7 +117,7 @@ def with_folder(parsed: argparse.Namespace) -> argparse.Namespace:
     return parsed
 
 
-def run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Namespace, line: list[str]) -> int:
+def _run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Namespace, line: list[str]) -> int:
     """Run a command, print as its options say, and keep the results in the requested forms."""
     formats = _formats(getattr(parsed, "format", "csv"))
     as_json, report = getattr(parsed, "json", False), getattr(parsed, "report", False)
