@@ -13,18 +13,22 @@ import functools
 import hashlib
 import json
 import os
+import platform
 import shutil
 import sys
 import zipfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .versions import versions
+from . import __version__
 
 T = TypeVar("T")
 
+#: Packages whose versions decide the numbers.
+PACKAGES = ("numpy", "scipy", "gmsh")
 #: Environment variables that name the folder (``off`` keeps nothing) and the largest size of all entries (MB).
 CACHE_VARIABLE, LIMIT_VARIABLE = "GEARFE_CACHE", "GEARFE_CACHE_LIMIT_MB"
 #: That size where none is named (bytes), and the share of it that is left after the oldest went.
@@ -105,7 +109,7 @@ def cached_arrays(
     """Name -> array that `recipe` describes, from disk when they are there, else made and kept; see `kept`."""
     import numpy as np
 
-    from .output.files import whole_file
+    from .files import whole_file
 
     key = cache_key(kind, recipe)
 
@@ -137,6 +141,20 @@ def cache_key(kind: str, recipe: object) -> str:
     """
     content = {"kind": kind, "recipe": _plain(recipe), "gmsh": versions(("gmsh",))["gmsh"]}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def versions(packages: tuple[str, ...] = PACKAGES) -> dict[str, str]:
+    """Versions of this program, of Python and of packages, by default those that decide the numbers."""
+    found = {"gearfe": __version__, "python": platform.python_version()}
+    return found | {name: _version(name) for name in packages}
+
+
+@functools.cache  # looks through all packages
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "absent"
 
 
 @functools.cache

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from .errors import InputError, nearest, unknown_name
-from .textfile import read_text
+from .files import read_text
 
 T = TypeVar("T")
 

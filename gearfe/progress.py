@@ -1,4 +1,6 @@
-"""Progress of a long run on stderr: a line that is rewritten on a terminal, a line for each stage elsewhere.
+"""A long run: its progress on stderr, the seconds of its stages, its threads.
+
+Progress is a line that is rewritten on a terminal, a line for each stage elsewhere.
 
 Work that may take long names itself with `stage` and counts with `count`. Both do nothing until a program
 opens `shown`, so a library call stays silent. The first two seconds of a run stay silent too.
@@ -230,3 +232,16 @@ class Stopwatch:
                 yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Hold the BLAS libraries of this process at one thread, and give them back their number afterwards.
+
+    The fronts of a tooth sector have a few hundred unknowns: there, the threads of a BLAS library wait for one another
+    more than they work (measured on two busy cores: 25 times slower than one thread).
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 
-from gearfe.output.files import output_folder, write_csv
+from gearfe.files import output_folder, write_csv
 from gearfe.record_spectrum import finer
 from gearfe.train import build_train, simulate
 from gearfe.vibration.follow import RunningMean

@@ -36,7 +36,7 @@ CAPABILITIES = {
         rigid/numpy_equations.py rigid/lanes.py rigid/lanes_type.py
     """,
     "extruded housing meshes, compiled kernels kept": """
-        prisms.py housing/prism_error.py housing/meshes.py rigid/packed* rigid/parts.py rigid/native.py versions.py
+        prisms.py housing/prism_error.py housing/meshes.py rigid/packed* rigid/parts.py rigid/native.py
         meshing/housing_recipe.py housing/body.py
     """,
     "own housings, exchange, reports, analyses of records": """

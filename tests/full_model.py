@@ -11,10 +11,10 @@ from scipy import sparse
 
 from gearfe.errors import InputError
 from gearfe.housing.model import Housing
+from gearfe.progress import one_thread
 from gearfe.reduction.craig_bampton import rigid_shift
 from gearfe.reduction.lanczos import lowest_modes
 from gearfe.reduction.sparse_solver import factorize
-from gearfe.threads import one_thread
 from gearfe.typing import Array
 
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from gearfe.progress import one_thread
 from gearfe.reduction.sparse_solver import factorize
-from gearfe.threads import one_thread
 from gearfe.typing import Array
 
 

@@ -13,7 +13,7 @@ import pytest
 from gearfe.cli import CLOSED, main
 from gearfe.commands.arguments import CommandParser
 from gearfe.errors import InputError, NotFiniteWarning, shown
-from gearfe.output.files import csv_table, write_csv
+from gearfe.files import csv_table, write_csv
 from gearfe.tables.examples import job_file
 
 JOB = Path(__file__).parents[1] / "geometry" / "gear_train.toml"

@@ -11,7 +11,7 @@ import pytest
 
 from gearfe.config import build, load_job, quantity, read_toml
 from gearfe.errors import InputError
-from gearfe.textfile import read_csv, read_numbers
+from gearfe.files import read_csv, read_numbers
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from scipy.io import loadmat
 
 from gearfe.cli import main
 from gearfe.commands import COMMANDS
-from gearfe.output.files import write_csv
+from gearfe.files import write_csv
 from gearfe.output.formats import read_csv, write_tables
 
 JOB = str(Path(__file__).parents[1] / "geometry" / "gear_train.toml")

@@ -9,10 +9,10 @@ import pytest
 
 from gearfe import sweep_stiffness
 from gearfe.cli import main
+from gearfe.elasticity import least_jacobian
 from gearfe.errors import InputError
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshing import tooth_sector
-from gearfe.meshing.curved_triangles import least_jacobian
 from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 
 from .gears import pair

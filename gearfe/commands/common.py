@@ -125,7 +125,7 @@ def _run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Nam
         with shown(verbose=parsed.verbose):
             return int(run(parsed))
 
-    from ..output.files import recorded
+    from ..files import recorded
 
     said = io.StringIO()
     with redirect_stdout(_Both(said, None if parsed.quiet or as_json else sys.stdout)):
@@ -196,7 +196,7 @@ def _keep(
     """Write the tables in other formats and the report; those of an earlier run that this one does not replace go."""
     if not formats and line is None:
         return []
-    from ..output.files import whole_set
+    from ..files import whole_set
     from ..output.formats import read_csv, write_tables
     from ..output.report_page import PICTURES, Report, report_page
 

@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
 
     from ..figures.gears import pair_picture
     from ..figures.style import save
+    from ..files import output_folder, whole_set, write_json
     from ..gear.derived import derived_geometry, iso_values
-    from ..output.files import output_folder, whole_set, write_json
     from ..stiffness.job import StiffnessJob
 
     job = StiffnessJob(tables["pair"], tables.get("stiffness", StiffnessTable()), pair)
@@ -96,10 +96,10 @@ def _export(path: Path, pair: GearPair, table: MicrogeometryTable | None, folder
     """A gear in the form that the suffix names; its deviations are looked for in `folder`."""
     import numpy as np
 
+    from ..files import write_csv
     from ..gear.outline import outline_columns, whole_outline
     from ..meshing.gear_solid import write_solid
     from ..output.dxf import write_dxf
-    from ..output.files import write_csv
 
     gear = pair.pinion if path.stem == "pinion" else pair.wheel
     sides = _deviations(pair, path.stem, table, folder)

@@ -48,8 +48,8 @@ def run(args: argparse.Namespace) -> int:
 
     import numpy as np
 
+    from ..files import output_folder, whole_set
     from ..housing.body import reduced_housing
-    from ..output.files import output_folder, whole_set
     from ..reduction.error import mesh_error, reduction_error
 
     test = None
@@ -128,8 +128,8 @@ def _report(body: ModalBody, errors: dict[str, Any], response: dict[str, float])
 
 def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:
     """Tell and write the modes of a test beside the body's."""
+    from ..files import write_csv
     from ..housing.modal_points import point_columns, point_lines
-    from ..output.files import write_csv
 
     columns = made.columns()
     write_csv(folder / "comparison.csv", columns)
@@ -160,8 +160,8 @@ def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:
 def _write(folder: Path, body: ModalBody, fields: Any, errors: dict[str, Any], response: dict[str, float]) -> None:
     import numpy as np
 
+    from ..files import write_csv, write_json
     from ..housing.superelement import write_matrix
-    from ..output.files import write_csv, write_json
     from ..output.vtkhdf import write_vtkhdf
 
     body.save(folder / "housing.npz")

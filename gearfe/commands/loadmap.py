@@ -52,10 +52,10 @@ def run(args: argparse.Namespace) -> int:
 
     pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
 
+    from ..files import output_folder, whole_set, write_csvs, write_json
     from ..loadmap.report import report_lines, summary, warnings
     from ..loadmap.report import tables as map_tables
     from ..loadmap.sweep import job_map
-    from ..output.files import output_folder, whole_set, write_csvs, write_json
     from ..progress import Stopwatch
     from ..stiffness.job import stiffness_job
     from ..stiffness.report import deviation_lines

@@ -48,9 +48,9 @@ def run(args: argparse.Namespace) -> int:
         file = replace(file, run=replace(file.run, sensitivities=tuple(args.sensitivity)))
     file.run.check("run")
 
+    from ..files import recorded
     from ..mechanisms.job import run_mechanism
     from ..mechanisms.model import make_mechanism
-    from ..output.files import recorded
 
     mechanism = make_mechanism(file, Path(args.file))
     run: Callable[..., Outcome]

@@ -71,8 +71,8 @@ def run(args: argparse.Namespace) -> int:
 
     pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
 
+    from ..files import output_folder
     from ..meshing.export import export_mesh, format_of, group_sizes
-    from ..output.files import output_folder
     from ..stiffness.job import StiffnessJob
 
     format_of(args.out)

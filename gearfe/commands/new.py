@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the file."""
     from ..errors import InputError, unknown_name
-    from ..output.files import whole_file
+    from ..files import whole_file
 
     shipped = {path.name: path for folder in _folders() for path in sorted(folder.glob("*.toml"))}
     if args.list or args.kind is None:

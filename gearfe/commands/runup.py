@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
         table = replace(table, stability=False)
 
     from ..figures.runup import RunUpPictures
-    from ..output.files import output_folder
+    from ..files import output_folder
     from ..progress import Stopwatch
     from ..runup.files import RunUpChoice, write_runup
     from ..runup.job import described, solved

@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from ..output.files import output_folder, whole_set, write_json
+    from ..files import output_folder, whole_set, write_json
     from ..progress import Stopwatch
     from ..stiffness.job import stiffness_job
     from ..stiffness.report import report_lines, summary, warnings

@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     if args.row is not None:
         return _write_row(study, args.row, Path(args.write))
 
-    from ..output.files import output_folder, whole_set, write_json
+    from ..files import output_folder, whole_set, write_json
     from ..progress import Stopwatch
     from ..study import optimum, statistics
     from ..study.search import Search
@@ -134,7 +134,7 @@ def _write_row(study: Any, number: int, path: Path) -> int:
 
 def _write_case(study: Any, number: int, values: Sequence[Any], path: Path, folder: Path) -> None:
     """The job file of a case; it finds the files that it names from `folder`."""
-    from ..output.files import whole_file
+    from ..files import whole_file
     from ..study.case import job_beside
     from ..tables.text import toml_document
 

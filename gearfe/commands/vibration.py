@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--band", args.band, "must be two rising frequencies >= 0", "as --band 200 4000")
 
     from ..figures.train import TrainPictures
-    from ..output.files import output_folder
+    from ..files import output_folder
     from ..progress import Stopwatch
     from ..vibration.analysis import Analysis, record_start
     from ..vibration.files import OutputChoice, check_choice, write_run

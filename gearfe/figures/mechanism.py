@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..files import whole_file
 from ..mechanisms.model import Mechanism
 from ..mechanisms.results import Results, reference_table
-from ..output.files import whole_file
 from ..progress import count, stage
 from ..rigid import Trajectory
 from ..rigid.modes import Modes

@@ -15,11 +15,11 @@ from ..contact.compliance import MeshingPair
 from ..contact.position import Positions
 from ..gear.derived import zone
 from ..gear.pair import GearPair
+from ..progress import one_thread
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.fields import GearField, field_recovery, straight_triangles
 from ..stiffness.fields_output import solved_positions
 from ..stiffness.positions import position_solver
-from ..threads import one_thread
 from ..typing import Array, IntArray
 from .style import new_figure, save, write_film
 

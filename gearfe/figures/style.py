@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..output.files import whole_file
+from ..files import whole_file
 from ..typing import Array, IntArray
 
 BLUE, ORANGE, GREEN, RED, GREY = "#1f5a99", "#d9730d", "#3a8c5c", "#b3261e", "#6b7280"

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..files import whole_file
 from ..output.arrays import load_arrays
-from ..output.files import whole_file
 from ..typing import Array, IntArray
 from .offscreen import corner_triangles, draw_all, draw_apart, vtk_cells
 from .style import write_film

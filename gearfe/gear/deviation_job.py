@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..files import read_numbers
 from ..tables.microgeometry import ENDS, STARTS, FlankTable, MicrogeometryTable
-from ..textfile import read_numbers
 from ..typing import Array, IntArray
 from . import pitch_errors
 from .deviation import Deviation, ToothDeviations

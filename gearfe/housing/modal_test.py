@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, MissingLibraryError
+from ..files import read_text
 from ..reduction.modal_body import ModalBody
-from ..textfile import read_text
 from ..typing import Array, IntArray
 
 #: Columns of a table of shapes: a row for each mode and measured direction.

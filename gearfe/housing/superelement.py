@@ -19,10 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..output.files import whole_file
+from ..files import read_text, whole_file
 from ..reduction.modal_body import ModalBody
 from ..tables.housing import FORCES, UNITS, AttachmentTable, SuperelementTable
-from ..textfile import read_text
 from ..typing import Array, IntArray
 from .attachments import rigid_motions
 from .dmig import Entries, Label, read_dmig

@@ -21,13 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, given
+from ..files import read_csv, write_csv
 from ..gear.deviation_job import GEARS
 from ..gear.pair import GearPair
-from ..output.files import write_csv
 from ..shown import ShownTable
 from ..stiffness.contact_pressure import PairLoads
 from ..stiffness.curve import StiffnessCurve, as_text, numbers
-from ..textfile import read_csv
 from ..typing import Array, BoolArray
 
 #: Column of the torque that a row belongs to.

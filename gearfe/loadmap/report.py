@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..cache import versions
 from ..errors import given
 from ..gear import pitch_errors
 from ..gear.derived import derived_geometry
@@ -18,7 +19,6 @@ from ..stiffness.job import StiffnessJob
 from ..stiffness.report import cure_of, largest_pressures, pressure_lines
 from ..tables.loadmap import LoadMapTable
 from ..typing import Array
-from ..versions import versions
 from .load_map import BACK, LoadMap
 
 #: Harmonics of the mesh order in the table by torque.

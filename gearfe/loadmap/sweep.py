@@ -19,12 +19,11 @@ from ..contact.position import Positions, joined, taken, together
 from ..errors import InputError
 from ..gear.deviation import ToothDeviations
 from ..gear.pair import GearPair
-from ..progress import Stopwatch, count, stage
+from ..progress import Stopwatch, count, one_thread, stage
 from ..stiffness.job import Keep, StiffnessJob
 from ..stiffness.positions import HalfPlaneSolver, PositionSolver, at_torques, position_solver
 from ..stiffness.sweep import assembled_curve, distinct_angles, elastic_pair, requested_angles
 from ..tables.loadmap import LoadMapTable
-from ..threads import one_thread
 from ..typing import Array, IntArray
 from .load_map import BACK, LoadMap
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..output.files import output_folder, whole_set, write_csv, write_json
+from ..files import output_folder, whole_set, write_csv, write_json
 from ..progress import stage
 from ..rigid import Start, Trajectory, integrate
 from ..rigid.inverse import prescribed_motion

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..output.files import csv_table
+from ..files import csv_table
 from ..output.vtkhdf import VtkHdfSeries
 from ..progress import stage
 from ..rigid import Trajectory

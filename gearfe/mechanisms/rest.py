@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..output.files import output_folder, whole_set, write_csv, write_json
+from ..files import output_folder, whole_set, write_csv, write_json
 from ..progress import stage
 from ..rigid import Start, Status, Trajectory
 from ..rigid.dense import Polynomials

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import InputError
+from ..files import read_text
 from ..progress import stage
 from ..rigid import Trajectory
-from ..textfile import read_text
 from ..typing import Array
 from .expressions import PLAIN, compute, quantities
 from .model import Mechanism

@@ -12,8 +12,8 @@ from typing import Any
 
 from ..config import build, read_toml, set_key
 from ..errors import InputError
+from ..progress import one_thread
 from ..tables.mechanism import MechanismFile, RunTable
-from ..threads import one_thread
 from ..typing import Array
 from .model import make_mechanism
 from .solve import solve

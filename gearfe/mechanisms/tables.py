@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..files import read_text
 from ..rigid import TimeFunction
 from ..rigid.tape import Tape
 from ..tables.mechanism import ValueTableTable
-from ..textfile import read_text
 from ..typing import Array
 
 

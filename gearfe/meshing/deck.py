@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..output.files import whole_file
+from ..files import whole_file
 from ..typing import Array
 from .export import MeshPart, abaqus_mesh
 

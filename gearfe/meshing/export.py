@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, MissingLibraryError
-from ..output.files import whole_file
+from ..files import whole_file
 from ..typing import Array, IntArray
 
 #: File suffix -> meshio's format. Version 2.2 of .msh keeps groups without CAD entities; newer ones do not.

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError, nearest
-from ..textfile import read_text
+from ..files import read_text
 from ..typing import Array, IntArray
 from .nastran import read_bulk_mesh
 from .session import gmsh_session

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..elasticity import least_jacobian, second_order
 from ..errors import InputError
 from ..typing import Array, IntArray
-from .curved_triangles import least_jacobian, second_order
 from .mesh_file import _read
 from .session import gmsh_session
 

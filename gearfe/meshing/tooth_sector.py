@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cache import cached_arrays
+from ..elasticity import least_jacobian, second_order
 from ..errors import InputError
 from ..gear.involute import tooth_profile
 from ..gear.pair import Gear, GearPair
 from ..typing import Array, IntArray
-from .curved_triangles import least_jacobian, second_order
 from .session import gmsh_session
 
 #: Raised whenever the recipe's meaning changes, so that stored meshes are not mistaken for new ones.

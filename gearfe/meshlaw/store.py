@@ -15,9 +15,9 @@ import numpy as np
 from ..cache import cached_arrays, source_hash
 from ..contact.laws import HalfPlane, PairModel
 from ..errors import InputError
+from ..files import write_csv
 from ..gear.pair import GearPair
 from ..output.arrays import load_arrays, save_arrays
-from ..output.files import write_csv
 from ..progress import stage
 from ..stiffness.job import curve_key
 from ..typing import Array

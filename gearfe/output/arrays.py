@@ -12,8 +12,8 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ..errors import InputError
+from ..files import whole_file
 from ..typing import Array
-from .files import whole_file
 
 #: Arrays of more bytes than this are mapped.
 LARGE = 1 << 20

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..files import whole_file
 from ..typing import Array
-from .files import whole_file
 
 #: VTK's numbers of the cell types used here, and how many points each has.
 CELL_TYPES: dict[str, tuple[int, int]] = {

@@ -37,8 +37,7 @@ import numpy as np
 from scipy import sparse
 
 from ..errors import InputError
-from ..progress import stage
-from ..threads import one_thread
+from ..progress import one_thread, stage
 from ..typing import Array, IntArray
 from .lanczos import lowest_modes
 from .modal_body import Reduction

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from ..files import whole_set, write_csv, write_json
 from ..output.arrays import save_arrays
-from ..output.files import whole_set, write_csv, write_json
 from ..vibration.report import attachment_to_draw
 from . import report
 from .instability import InstabilityMap

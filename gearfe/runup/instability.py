@@ -17,8 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..progress import count
-from ..threads import one_thread
+from ..progress import count, one_thread
 from ..train.forces import CurveFlank
 from ..typing import Array, ComplexArray
 from .condensed import CondensedTrain

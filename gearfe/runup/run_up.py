@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..progress import count, stage
+from ..progress import count, one_thread, stage
 from ..shown import ShownTable
-from ..threads import one_thread
 from ..train.kinematics import drive_sense
 from ..train.model import TrainModel
 from ..typing import Array, ComplexArray

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..threads import one_thread
+from ..progress import one_thread
 from ..train.model import TrainModel
 from ..vibration.follow import Stability
 from .condensed import condense

@@ -23,9 +23,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, shown, unknown_name
-from ..output.files import write_csv
+from ..files import read_csv, write_csv
 from ..shown import ShownTable
-from ..textfile import read_csv
 from ..typing import Array, BoolArray, IntArray
 from .periodic import PeriodicInterpolant, ValueAndSlope, periodic_interpolant
 

@@ -12,11 +12,10 @@ import numpy as np
 from ..contact.compliance import MeshingPair
 from ..contact.position import Positions
 from ..errors import InputError
+from ..files import write_csv
 from ..gear.pair import GearPair
-from ..output.files import write_csv
 from ..output.vtkhdf import VtkHdfSeries
-from ..progress import count
-from ..threads import one_thread
+from ..progress import count, one_thread
 from ..typing import Array, IntArray
 from .contact_pressure import FlankPressure, flank_pressures
 from .curve import StiffnessCurve

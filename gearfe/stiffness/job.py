@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..cache import cache_key, cached_arrays, source_hash
+from ..cache import cache_key, cached_arrays, source_hash, versions
 from ..config import load_job
 from ..contact.laws import ContactLaw, PairModel, check_alike, law_named
 from ..elasticity import Material
@@ -28,7 +28,6 @@ from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
 from ..tables.pair import MaterialTable, PairTable
 from ..tables.stiffness import StiffnessTable
-from ..versions import versions
 from .curve import StiffnessCurve
 
 if TYPE_CHECKING:

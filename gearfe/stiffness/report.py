@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cache import versions
 from ..contact.laws import COARSENING
 from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
 from ..gear.validity import overlap_warnings
 from ..tables.stiffness import DEFAULT_LAW
 from ..typing import Array
-from ..versions import versions
 from .contact_pressure import EDGES
 from .curve import StiffnessCurve
 from .curve_error import ORDER

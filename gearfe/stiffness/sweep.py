@@ -25,8 +25,7 @@ from ..errors import InputError
 from ..gear.pair import GearPair
 from ..gear.validity import MOST_OVERLAP, overlaps
 from ..meshing.tooth_sector import sector_mesh, sector_recipes
-from ..progress import Stopwatch
-from ..threads import one_thread
+from ..progress import Stopwatch, one_thread
 from ..typing import Array, IntArray
 from .contact_pressure import EDGES, PairLoads, contact_pressures, pair_loads
 from .curve import SOLVED, StiffnessCurve

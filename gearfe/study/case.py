@@ -17,7 +17,7 @@ from typing import Any
 from ..config import set_key
 from ..errors import InputError
 from ..expressions import syntax
-from ..threads import one_thread
+from ..progress import one_thread
 from .expressions import Answer, value_of
 from .kinds import Shared, solve
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, given
+from ..files import read_csv
 from ..tables.study import StudyTable
-from ..textfile import read_csv
 from ..typing import Array
 from .parameters import Parameter, key_hint, read_parameters
 

@@ -12,9 +12,8 @@ from typing import Any
 
 from ..config import build, read_toml
 from ..errors import InputError
-from ..progress import count
+from ..progress import count, one_thread
 from ..tables.study import StudyTable
-from ..threads import one_thread
 from .case import DIED, ERROR, HERE, INVALID, Row, Task, evaluate, files_named
 from .design import Cases, study_cases
 from .journal import Journal, only_writer
@@ -162,7 +161,7 @@ def run_study(
         Outputs that the job does not give, a folder with another study or that another program writes, a study whose
         first cases all have no answer, or whose cases are not known beforehand.
     """
-    from ..versions import versions
+    from ..cache import versions
 
     if study.table.design == "search":
         raise InputError("study.design", "search", "has no cases beforehand", "gearfe study runs it; or gearfe.Search")

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..output.files import whole_file, write_json
+from ..files import whole_file, write_json
 from .case import Row
 
 try:

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..config import build, job_tables
+from ..files import read_csv
 from ..gear.deviation import NOMINAL
 from ..progress import Stopwatch
 from ..tables.loadmap import loads_of
-from ..textfile import read_csv
 from .expressions import Answer
 
 if TYPE_CHECKING:

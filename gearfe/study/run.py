@@ -19,7 +19,7 @@ from multiprocessing import connection, get_context, parent_process
 from typing import Any
 
 from ..errors import InputError
-from ..threads import one_thread
+from ..progress import one_thread
 from .case import DIED, HERE, Row, Task, solve_case, solve_group
 
 #: Seconds of a group of cases, and groups that wait for each worker.

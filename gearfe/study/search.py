@@ -106,7 +106,7 @@ class Search(Facts):
 
     def _known(self, folder: Path, restart: bool) -> Journal:
         """The points that stand in the folder, from now on with those of this search."""
-        from ..versions import versions
+        from ..cache import versions
 
         names, outputs = self.study.task.names, tuple(self.study.table.outputs)
         journal = Journal(folder, {**self.study.head, "search": True}, versions(), names, outputs, restart=restart)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..output.files import whole_file
+from ..files import whole_file
 from ..shown import ShownTable, as_numbers, library
 from ..tables.study import LimitTable, StudyTable
 from ..typing import Array, BoolArray, IntArray

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..output.files import write_csv
+from ..files import write_csv
 from ..spectrum import Waterfall
 from ..train import build_train
 from ..train.gear_train import GearTrain

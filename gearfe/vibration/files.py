@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import InputError, given
-from ..output.files import whole_set, write_csv, write_json
+from ..files import whole_set, write_csv, write_json
 from ..progress import Stopwatch
 from ..train.gear_train import GearTrain
 from ..train.model import TrainModel

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..output.files import csv_table
+from ..files import csv_table
 from ..train.model import TrainModel
 from ..train.response import TrainResponse, joined
 from ..typing import Array, ComplexArray, IntArray

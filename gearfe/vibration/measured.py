@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, unknown_name
+from ..files import read_numbers, read_text
 from ..spectrum import amplitude_spectrum, uniform_step
 from ..tables.spectrum import MeasuredTable
-from ..textfile import read_numbers, read_text
 from ..typing import Array
 from .job import TrainJob
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from ..cache import versions
 from ..record_spectrum import finer, subdivided
 from ..train import build_train
 from ..train.gear_train import GearTrain
@@ -15,7 +16,6 @@ from ..train.model import TrainModel
 from ..train.phases import tooth_places
 from ..train.response import TrainResponse
 from ..train.simulate import simulate_in_pieces
-from ..versions import versions
 from .follow import TrainRun
 from .job import TrainJob, job_train, train_body
 from .mesh_stiffness import train_curves

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from ..errors import InputError
+from ..files import read_numbers
 from ..rigid import TimeFunction, constant, sine, smoothed_step
 from ..tables.timefunction import TrainFunctionTable, check_rising
-from ..textfile import read_numbers
 from ..typing import Array
 
 #: Degree of a piece, its error in parts of the largest value, the same at kinks, halvings, and pieces at most.

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfe.errors import InputError
-from gearfe.output.files import whole_file
+from gearfe.files import whole_file
 
 from .pictures import PICTURES, draw_all, exponent
 from .record import Row, read_rows

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.output.files import whole_file
+from gearfe.files import whole_file
 
 from .record import Row, read_rows
 

@@ -70,7 +70,7 @@ def test_interrupted_while_writing_the_old_table_stays(tmp_path, monkeypatch):
     def interrupted(value):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gearfe.output.files._cell", interrupted)
+    monkeypatch.setattr("gearfe.files._cell", interrupted)
     with pytest.raises(KeyboardInterrupt):
         record.row(table, {"value": 2}, lambda: {"x": 2.0})
     assert (tmp_path / "numbers.csv").read_text() == before

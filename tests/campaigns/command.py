@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run; 1 when a case crashed, hung, ended with a traceback or gave a wrong result."""
     from gearfe.errors import InputError
-    from gearfe.output.files import output_folder
+    from gearfe.files import output_folder
 
     from .campaign import CAMPAIGNS, campaign_named
     from .outcome import CLASSES

@@ -190,7 +190,7 @@ def closed_run(case: Case, folder: Path) -> Finding:
     place = places[int(case.data["choice"]) % len(places)]
     if "\x00" in place:  # no process can be given that: the library is asked
         from gearfe.errors import InputError
-        from gearfe.output.files import output_folder
+        from gearfe.files import output_folder
 
         try:
             output_folder(place)

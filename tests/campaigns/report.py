@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.output.files import whole_file, write_csv
+from gearfe.files import whole_file, write_csv
 
 from .campaign import Campaign
 from .outcome import CLASSES, Outcome

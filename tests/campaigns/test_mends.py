@@ -15,9 +15,9 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.errors import InputError
+from gearfe.files import whole_set
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import trajectory_error
-from gearfe.output.files import whole_set
 from gearfe.rigid import integrate
 from gearfe.rigid.timefunctions import smoothed_step
 
