@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair
 from gearfe.contact.half_plane_result import PairContacts
 from gearfe.gear.pair import GearPair, TipRelief
-from gearfe.stiffness.contact_pressure import marks_met
-from gearfe.stiffness.sweep import elastic_pair
+from gearfe.stiffness.sweep import elastic_pair, marks_met
 
 from .gears import pair as gear_pair
 

@@ -17,8 +17,7 @@ from gearfe.figures import stress
 from gearfe.figures.stress import color_limit
 from gearfe.gear.derived import path_place
 from gearfe.meshing.whole_gear import whole_gear
-from gearfe.stiffness.contact_pressure import flank_pressures
-from gearfe.stiffness.fields import GearRecovery, field_recovery, straight_triangles
+from gearfe.stiffness.fields import GearRecovery, field_recovery, flank_pressures, straight_triangles
 from gearfe.stiffness.fields_output import chosen_positions, fields_size, size_note, write_fields
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 

@@ -5,20 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..gear.derived import iso_values, single_pair_stretches
 from ..gear.pair import GearPair
-from ..stiffness.contact_pressure import FlankPressure
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.job import StiffnessJob
 from ..stiffness.periodic import wrapped_phase
 from ..stiffness.report import cycle_statistics
 from ..typing import Array, IntArray
 from .style import BLUE, GREEN, GREY, ORANGE, RED, headed, new_figure, save, shades, some_of, tidy
+
+if TYPE_CHECKING:
+    from ..stiffness.fields import FlankPressure
 
 #: Positions in the picture of the pressures at most.
 MOST_LINES = 12

@@ -25,8 +25,8 @@ from ..files import read_csv, write_csv
 from ..gear.deviation_job import GEARS
 from ..gear.pair import GearPair
 from ..shown import ShownTable
-from ..stiffness.contact_pressure import PairLoads
 from ..stiffness.curve import StiffnessCurve, as_text, numbers
+from ..stiffness.sweep import PairLoads
 from ..typing import Array, BoolArray
 
 #: Column of the torque that a row belongs to.

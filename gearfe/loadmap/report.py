@@ -14,7 +14,7 @@ from ..gear import pitch_errors
 from ..gear.derived import derived_geometry
 from ..gear.deviation_job import GEARS
 from ..gear.validity import overlap_warnings
-from ..stiffness.contact_pressure import EDGES
+from ..stiffness.curve import EDGES
 from ..stiffness.job import StiffnessJob
 from ..stiffness.report import cure_of, largest_pressures, pressure_lines
 from ..tables.loadmap import LoadMapTable

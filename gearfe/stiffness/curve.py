@@ -63,6 +63,11 @@ def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -
 #: Statuses that stand for a result; every other one marks a failed position, whose numbers are not-a-number.
 SOLVED = ("converged", "no_contact")
 
+#: What bears besides smooth flanks: nothing; a rounded tip edge; a sharp edge, under which the pressure of linear
+#: elasticity is singular. Then the places of the last two.
+EDGES = ("none", "rounded", "singular")
+ROUNDED, SINGULAR = 1, 2
+
 #: Column that a table has where there are estimates, and those of the pairs' shares.
 ESTIMATE, SHARE = "k_mesh_relative_error", "load_share_"
 
@@ -118,7 +123,7 @@ class StiffnessCurve(ShownTable):
         Tooth pairs that carry load; -1 where the position failed.
     peak_pressure, peak_pressure_error
         Largest Hertzian pressure of the tooth pairs that bear on smooth flanks (Pa), and how far the computed contacts
-        are from Hertz's (-), see `gearfe.stiffness.contact_pressure`; not-a-number where none does.
+        are from Hertz's (-), see `gearfe.stiffness.sweep`; not-a-number where none does.
     edge_pressure
         The like where an edge bears (Pa), blunted by a hundredth of a module; not-a-number where none bears.
     edge

@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 
 from ..contact.compliance import GearBody, MeshingPair, sector_displacements, turn
-from ..contact.flank import edge_nodes, edge_shapes
+from ..contact.flank import Flank, edge_nodes, edge_shapes
 from ..contact.flank_compliance import BUMP_ELEMENTS, bumps
 from ..contact.half_plane_result import PairContacts
 from ..contact.panels import EDGES
@@ -41,7 +41,6 @@ from ..contact.position import FlankLoads, Positions
 from ..elasticity import physical_gradients, principal_stresses, stress_rows, triangle_shapes, von_mises
 from ..meshing.whole_gear import WholeGear, whole_gear
 from ..typing import Array, IntArray
-from .contact_pressure import flank_pressures
 
 #: Shares of an elliptic pressure on the panels `EDGES`.
 _SHARES = np.diff(EDGES * np.sqrt(1 - EDGES**2) + np.arcsin(EDGES)) / np.pi
@@ -123,6 +122,66 @@ def _turned(stress: Array, c: Array | float, s: Array | float) -> Array:
     xx, yy, xy = stress
     one, other = c * c * xx + s * s * yy - 2 * c * s * xy, s * s * xx + c * c * yy + 2 * c * s * xy
     return np.stack([one, other, c * s * (xx - yy) + (c * c - s * s) * xy])
+
+
+@dataclass(frozen=True)
+class FlankPressure:
+    """Pressure along one tooth's contact surface; arrays have one entry per contact point or panel, from root to tip.
+
+    Attributes
+    ----------
+    gear
+        0 pinion, 1 wheel.
+    pair, tooth
+        Number of the tooth pair, and of the tooth.
+    place : ndarray, shape (q,)
+        Edge number plus position in the edge, along the tooth's whole contact surface.
+    radius : ndarray, shape (q,)
+        Distance of the undeformed point from the gear's centre (m).
+    pressure : ndarray, shape (q,)
+        Pa.
+    """
+
+    gear: int
+    pair: int
+    tooth: int
+    place: Array
+    radius: Array
+    pressure: Array
+
+    @property
+    def shown(self) -> IntArray:
+        """Contact points with pressure and one neighbour on either side."""
+        carries = self.pressure > 0
+        near = carries.copy()
+        near[1:] |= carries[:-1]
+        near[:-1] |= carries[1:]
+        return np.flatnonzero(near)
+
+    def at_nodes(self, count: int) -> Array:
+        """Pressure (Pa) at the `count` nodes of the tooth's contact surface, linear between the contact points."""
+        return np.asarray(np.interp(0.5 * np.arange(count), self.place, self.pressure, left=0.0, right=0.0))
+
+
+def flank_pressures(pair: MeshingPair, position: Positions) -> list[FlankPressure]:
+    """Pressure on each loaded flank of one solved position."""
+    made: list[FlankPressure] = []
+    points = position.points
+    assert points is not None
+    for gear, number in dict.fromkeys(zip(points.gear.tolist(), points.pair.tolist(), strict=True)):
+        mine = np.flatnonzero((points.gear == gear) & (points.pair == number))
+        mine = mine[np.argsort(points.place[mine], kind="stable")]
+        radius = np.linalg.norm(_points(pair.bodies[gear].flank, points.place[mine]), axis=1)
+        tooth = number if gear == 0 else -1 - number
+        made.append(FlankPressure(gear, number, tooth, points.place[mine], radius, points.pressure[mine]))
+    return made
+
+
+def _points(flank: Flank, place: Array) -> Array:
+    """Points (m) of a tooth's contact surface, shape (q, 2)."""
+    edge = np.clip(place.astype(np.int64), 0, flank.edges - 1)
+    shapes = edge_shapes(place - edge)[0]
+    return np.asarray(np.einsum("qa,qai->qi", shapes, flank.points[edge_nodes(edge)]))
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,8 @@ from ..gear.pair import GearPair
 from ..output.vtkhdf import VtkHdfSeries
 from ..progress import count, one_thread
 from ..typing import Array, IntArray
-from .contact_pressure import FlankPressure, flank_pressures
 from .curve import StiffnessCurve
-from .fields import GearField, field_recovery
+from .fields import FlankPressure, GearField, field_recovery, flank_pressures
 from .positions import PositionSolver, position_solver
 
 GEARS = ("pinion", "wheel")

@@ -17,8 +17,7 @@ from ..gear.derived import derived_geometry, iso_values
 from ..gear.validity import overlap_warnings
 from ..tables.stiffness import DEFAULT_LAW
 from ..typing import Array
-from .contact_pressure import EDGES
-from .curve import StiffnessCurve
+from .curve import EDGES, StiffnessCurve
 from .curve_error import ORDER
 from .job import StiffnessJob
 
@@ -122,7 +121,7 @@ def report_lines(job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, A
     if curve.contact_law:
         lines.append(f"contact law: {curve.contact_law}")
     lines += deviation_lines(job)
-    given, iso, error = found["load"]["prescribed_twist"], found["iso_6336"], found["error_estimate"]
+    given, iso = found["load"]["prescribed_twist"], found["iso_6336"]
     if given is not None and given["lost_motion_in_it_deg"]:
         lines.append(
             f"twist {given['twist_deg']:.6g} deg from the centred position: {given['lost_motion_in_it_deg']:.6g} deg "
@@ -141,11 +140,11 @@ def report_lines(job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, A
         f"c_gamma times width = {1e-6 * iso['c_gamma_times_width_N_per_m']:.4g} N/um"
     )
     lines += pressure_lines(curve)
-    if error is not None:
+    if found["error_estimate"] is not None:
         against = "" if job.law.name == DEFAULT_LAW else "the half-plane law and "
         lines.append(
             f"discretisation error, estimated by {against}meshes {COARSENING:g} times coarser (order {ORDER:g} "
-            f"assumed): typically {100 * error['typical_relative']:.2g} %, at worst {100 * error['worst_relative']:.2g} %"
+            f"assumed): typically {100 * curve.typical_error:.2g} %, at worst {100 * curve.worst_error:.2g} %"
         )
     return lines
 

@@ -1,9 +1,28 @@
-"""Rotation sweep: from a gear pair to its mesh-stiffness curve.
+r"""Rotation sweep: from a gear pair to its mesh-stiffness curve.
 
 Conventions: pinion centre at the origin, wheel at +x; at pinion angle 0 a pinion tooth stands on the line of centres
 and a wheel space faces it; angles are counter-clockwise; wheel angle = -pinion angle z1/z2 + lost motion + twist. The
 lost motion is half the backlash: it brings unmodified driving flanks to touch, and a positive twist presses them
 together.
+
+Pressures are Hertz's on smooth flanks, and apart from it where an edge bears. A tooth pair that carries the force F
+over the width w, on flanks of relative curvature :math:`1/\rho` where they touch, has Hertz's peak pressure (Johnson,
+*Contact Mechanics*, 1985, eq. 4.45)
+
+.. math:: p_H = \sqrt{\frac{F E^*}{\pi\rho w}} = \frac{2F}{\pi b_H w} .
+
+The computed pressure has a half width b of its own, by its second moment (`gearfe.contact.elements.half_widths`), so
+:math:`|b/b_H - 1|` tells how far from Hertz's the contact is: the discretisation, flanks whose curvature changes along
+the contact, teeth that are no half-planes. On flanks with deviations of micrometres, whose curvature where they touch
+may be that of a wave shorter than the contact, :math:`2F/(\pi b w)` itself stands for the pressure.
+
+Where the contact reaches an edge of a face, the pressure of linear elasticity has no bound (a sharp tip, the kink where
+a linear relief starts, the edge of an undercut), or the radius of a tip round decides it. What stands for it there is
+
+.. math:: p_e = \frac{2F}{\pi w \sqrt{b^2 + \epsilon^2}}, \qquad \epsilon = 0.01\,m,
+
+the peak of a Hertzian contact with the same force and second moment, blunted by a hundredth of a module: a figure to
+compare designs with, which neither the mesh nor a contact of some micrometres decides. It is no stress of the material.
 
     >>> curve = sweep_stiffness(pair, twist=math.radians(0.05))   # one mesh cycle in 20 positions
     >>> k, slope = curve.interpolate(math.radians(7.3))           # N/m and N/(m rad)
@@ -12,23 +31,25 @@ together.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.compliance import MeshingPair, gear_body
+from ..contact.half_plane_pair import HalfPlanePair
+from ..contact.half_plane_result import PairContacts
 from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, check_alike, law_text, uses_stress
 from ..contact.position import Positions
 from ..errors import InputError
+from ..gear.deviation import NOMINAL
 from ..gear.pair import GearPair
 from ..gear.validity import MOST_OVERLAP, overlaps
 from ..meshing.tooth_sector import sector_mesh, sector_recipes
 from ..progress import Stopwatch, one_thread
-from ..typing import Array, IntArray
-from .contact_pressure import EDGES, PairLoads, contact_pressures, pair_loads
-from .curve import SOLVED, StiffnessCurve
+from ..typing import Array, BoolArray, IntArray
+from .curve import EDGES, ROUNDED, SINGULAR, SOLVED, StiffnessCurve
 from .curve_error import curve_error
 from .periodic import wrapped_phase
 from .positions import (
@@ -46,6 +67,8 @@ __all__ = ["StiffnessCurve", "elastic_pair", "sweep_stiffness"]
 
 #: Positions in one mesh cycle where no angles are given.
 ANGLES = 20
+#: Blunting length of edges (modules).
+BLUNTING = 0.01
 
 
 def elastic_pair(
@@ -225,8 +248,6 @@ def assembled_curve(
     cycles = np.round((requested - solved.pinion_angle) / pair.mesh_cycle).astype(np.int64)
     leading, shares = load_shares(solved)
     loads = pair_loads(solver, solved)
-    pressures: dict[str, Any] = contact_pressures(solved, loads)
-    edge = np.where(failed, 0, pressures.pop("edge"))
     curve = StiffnessCurve(
         pinion_angle=requested,
         wheel_angle=pair.wheel_angle_at(requested, total),
@@ -242,7 +263,6 @@ def assembled_curve(
         leading_pair=leading - cycles,
         load_share=shares,
         teeth_in_contact=np.where(failed, -1, (shares > 0).sum(axis=1)),
-        edge=np.array(EDGES)[edge],
         iterations=solved.iterations,
         status=solved.status,
         law=np.full(len(source), law.name),
@@ -251,6 +271,105 @@ def assembled_curve(
         mesh_cycle=pair.mesh_cycle * solver.law.mesh_cycles,
         base_radius=radius,
         lost_motion=lost,
-        **pressures,
+        **contact_pressures(solved, loads),
     )
     return curve, replace(loads, pair=loads.pair - cycles[loads.position])
+
+
+@dataclass(frozen=True)
+class PairLoads:
+    """Tooth pairs that carry load, q of them over all positions, by position.
+
+    Attributes
+    ----------
+    position, pair : ndarray, shape (q,)
+        Number of the position; pair number k: pinion tooth k, wheel tooth -1 - k, counted on round the gears.
+    force : ndarray, shape (q,)
+        On the whole width (N).
+    share : ndarray, shape (q,)
+        Share of the wheel's torque (-).
+    roll : ndarray, shape (q, 2)
+        Roll lengths of the middle of the contact on pinion and wheel (m), without load for laws on elements;
+        not-a-number off the involutes.
+    half_width, pressure, error : ndarray, shape (q,)
+        Half width (m), pressure above (Pa), and how far the contact is from Hertz's (-).
+    edge : ndarray, shape (q,)
+        Which edge bears, the place in `EDGES`.
+    """
+
+    position: IntArray
+    pair: IntArray
+    force: Array
+    share: Array
+    roll: Array
+    half_width: Array
+    pressure: Array
+    error: Array
+    edge: IntArray
+
+
+def pair_loads(solver: PositionSolver, found: Positions) -> PairLoads:
+    """Loaded tooth pairs of positions."""
+    elastic, contacts, touching = solver.elastic, found.contacts, solver.touching(found.pinion_angle)
+    met, pairs = ((np.stack([one.position, one.pair], axis=1) @ [1 << 32, 1]) for one in (touching, contacts))
+    k = np.minimum(np.searchsorted(met, pairs), len(met) - 1)
+    known = np.flatnonzero((contacts.torque_wheel > 0) & (met[k] == pairs))
+    k, position, width = k[known], contacts.position[known], contacts.half_width[known]
+    force = contacts.torque_wheel[known] / (touching.arm[k, 1] * elastic.width)
+    curvature, flat = touching.curvature[k], np.isfinite(touching.curvature[k])
+    flank, arc = touching.flank[k], solver.law.arc_at(touching.flank[k], touching.place[k])
+    middle, half = arc[:, :, None], width[:, None, None]
+    met = marks_met(solver.law, flank, middle - half, middle + half)
+    rounded = solver.law.marks[0] == "round"
+    bears = np.where(met[:, ~rounded].any(axis=1), SINGULAR, np.where(met[:, rounded].any(axis=1), ROUNDED, 0))
+    several = np.unique(pairs[known], return_inverse=True, return_counts=True)
+    bears[several[2][several[1]] > 1] = ROUNDED  # not where the rigid flanks touch first, nor with one ellipse
+    bears[~flat] = SINGULAR  # it touches at the corner itself, however narrow the contact
+    hertz = np.sqrt(force / solver.law.inverse_modulus.sum() * np.where(flat, curvature, 0.0) / math.pi)
+    blunted = 2 * force / (math.pi * np.hypot(width, BLUNTING * solver.pair.pinion.module))
+    off = np.abs(width * math.pi * hertz / (2 * force) - 1)
+    if elastic.deviations != NOMINAL:  # waves shorter than the contact say nothing of its pressure; its width does
+        hertz = 2 * force / (math.pi * width)
+    return PairLoads(
+        position=position,
+        pair=contacts.pair[known],
+        force=force * elastic.width,
+        share=contacts.torque_wheel[known] / found.torque_wheel[position],
+        roll=_rolls(solver.law, flank, contacts.arc[known] if isinstance(contacts, PairContacts) else arc),
+        half_width=width,
+        pressure=np.where(bears > 0, blunted, hertz),
+        error=off,
+        edge=bears,
+    )
+
+
+def _rolls(law: HalfPlanePair, flank: IntArray, arc: Array) -> Array:
+    """Roll lengths (m) at arcs (m) of the flanks `flank`, all of shape (q, 2); not-a-number off the involutes."""
+    made = np.full(arc.shape, np.nan)
+    for i in np.unique(flank):
+        curve, here = law.curves[i], np.nonzero(flank == i)
+        u = curve.parameter_at(arc[here])
+        on = (u >= 0) & (u <= 1)
+        made[tuple(one[on] for one in here)] = curve.face.flank.roll(u[on])
+    return made
+
+
+def marks_met(law: HalfPlanePair, flank: IntArray, low: Array, high: Array) -> BoolArray:
+    """Which of `HalfPlanePair.marks` lie between the arcs low and high (m), shape (m, 2, 1), of contacts on the flanks
+    `flank`, shape (m, 2): shape (m, k).
+    """
+    _, of, (first, last) = law.marks
+    return np.asarray(((flank[:, :, None] == of) & (low <= last) & (high >= first)).any(axis=1))
+
+
+def contact_pressures(found: Positions, loads: PairLoads) -> dict[str, Any]:
+    """The fields of a `StiffnessCurve` that tell what bears at n positions, from their loaded pairs."""
+    edge, at_edges = np.zeros(len(found), dtype=np.int64), np.full(len(found), np.nan)
+    pressure, error = np.where(found.status == "no_contact", 0.0, np.full((2, len(found)), np.nan))
+    np.maximum.at(edge, loads.position, loads.edge)
+    sharp, smooth = np.flatnonzero(loads.edge > 0), np.flatnonzero(loads.edge == 0)
+    np.fmax.at(at_edges, loads.position[sharp], loads.pressure[sharp])
+    smooth = smooth[np.argsort(loads.pressure[smooth], kind="stable")]  # the largest of a position comes last and stays
+    pressure[loads.position[smooth]], error[loads.position[smooth]] = loads.pressure[smooth], loads.error[smooth]
+    words = np.array(EDGES)[np.where(np.isin(found.status, SOLVED), edge, 0)]
+    return {"peak_pressure": pressure, "peak_pressure_error": error, "edge_pressure": at_edges, "edge": words}
