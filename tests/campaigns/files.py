@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from .campaign import Campaign, Case
-from .disturbed import closed_run, disk_run, full_run, killed_run, read_only_run, shared_run
+from .faults import closed_run, disk_run, full_run, killed_run, read_only_run, shared_run
 from .in_process import mutated_run
 from .mutations import base_jobs, mutated
 from .outcome import Finding

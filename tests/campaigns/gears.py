@@ -38,11 +38,11 @@ from .pairs import (
     TORQUES,
     borne_torque,
     chosen,
+    invalid,
     log_uniform,
     random_pair,
     rounded,
     running_pair,
-    spoiled,
     twist_of_overlap,
 )
 from .toml_text import toml_text
@@ -82,13 +82,13 @@ def draw(random: np.random.Generator, number: int) -> Case:
     else:
         sweep["torque_Nm"] = rounded(log_uniform(random, *TORQUES) * borne_torque(pair))
     tables = {"pair": pair, "stiffness": sweep}
-    kind = "drawn"
+    kind = "random"
     if random.random() < 0.125:
-        kind = "spoiled"
+        kind = "invalid"
         if random.random() < 0.7:
-            tables["pair"] = spoiled(random, pair)
+            tables["pair"] = invalid(random, pair)
         else:
-            tables["stiffness"] = spoiled(random, {k: v for k, v in sweep.items() if v is not None})
+            tables["stiffness"] = invalid(random, {k: v for k, v in sweep.items() if v is not None})
     return Case(number, kind, {"job.toml": toml_text(tables)}, "gearfe stiffness job.toml --out out --no-estimate")
 
 

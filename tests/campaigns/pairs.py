@@ -123,7 +123,7 @@ def borne_torque(table: Table) -> float:
     return float(force * 0.5e-3 * table["wheel"]["teeth"] * table["module_mm"])
 
 
-def spoiled(random: np.random.Generator, table: Table) -> Table:
+def invalid(random: np.random.Generator, table: Table) -> Table:
     """The same tables with one value that makes little sense."""
     made = {k: dict(v) if isinstance(v, dict) else v for k, v in table.items()}
     places = [(made, k) for k, v in made.items() if not isinstance(v, dict)]

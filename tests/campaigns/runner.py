@@ -14,8 +14,8 @@ from typing import Any
 from gearfe.progress import count
 
 from .campaign import Campaign, campaign_named
-from .ledger import Ledger
 from .outcome import Outcome
+from .record import CampaignRecord
 from .report import write_results
 from .worker import GRACE, WAITING, run_case, work
 
@@ -57,7 +57,7 @@ def run_campaign(
     Parameters
     ----------
     folder
-        Takes the ledger, the tables and the kept cases.
+        Takes the record, the tables and the kept cases.
     cases
         How many; None: the full form.
     short
@@ -69,8 +69,8 @@ def run_campaign(
     """
     campaign = campaign_named(name)
     wanted = campaign.short if short else range(campaign.full if cases is None else cases)
-    ledger = Ledger(folder, name, seed)
-    left = [number for number in wanted if number not in ledger.rows]
+    record = CampaignRecord(folder, name, seed)
+    left = [number for number in wanted if number not in record.rows]
     end = None if seconds is None else time.monotonic() + seconds
 
     def numbers() -> Iterable[int]:
@@ -79,16 +79,16 @@ def run_campaign(
                 return
             yield number
 
-    bad = sum(row.bad for row in ledger.rows.values())
+    bad = sum(row.bad for row in record.rows.values())
     rows = _apart(campaign, seed, numbers()) if apart else (run_case(campaign, seed, n) for n in numbers())
     try:
         for row in rows:
-            ledger.add(row)
+            record.add(row)
             bad += row.bad
-            count(len(ledger.rows), len(wanted), f"cases, {bad} bad")
+            count(len(record.rows), len(wanted), f"cases, {bad} bad")
     finally:
-        write_results(folder, campaign, seed, ledger.outcomes)
-    return Ran(name, tuple(row for row in ledger.outcomes if row.case in wanted), len(wanted))
+        write_results(folder, campaign, seed, record.outcomes)
+    return Ran(name, tuple(row for row in record.outcomes if row.case in wanted), len(wanted))
 
 
 def _apart(campaign: Campaign, seed: int, numbers: Iterable[int]) -> Iterable[Outcome]:

@@ -65,12 +65,12 @@ def test_both_contradicting_values_are_named(tmp_path: Path, capsys: pytest.Capt
 
 def test_a_campaign_is_taken_up_where_it_ended(tmp_path: Path) -> None:
     one = run_campaign("gears", tmp_path, seed=3, cases=2, apart=False)
-    ledger = tmp_path / "gears.jsonl"
-    cut = ledger.read_text(encoding="utf-8") + '{"case": 2, "kind": "dra'  # killed while it wrote
-    ledger.write_text(cut, encoding="utf-8")
+    record = tmp_path / "gears.jsonl"
+    cut = record.read_text(encoding="utf-8") + '{"case": 2, "kind": "dra'  # killed while it wrote
+    record.write_text(cut, encoding="utf-8")
     two = run_campaign("gears", tmp_path, seed=3, cases=3, apart=False)
     assert two.outcomes[:2] == one.outcomes
-    assert len(ledger.read_text(encoding="utf-8").splitlines()) == 1 + 3
+    assert len(record.read_text(encoding="utf-8").splitlines()) == 1 + 3
     assert run_campaign("gears", tmp_path, seed=3, cases=3, seconds=0.0, apart=False).complete
     assert not run_campaign("gears", tmp_path, seed=3, cases=4, seconds=0.0, apart=False).complete
     with pytest.raises(InputError, match="seed 3, not 4"):

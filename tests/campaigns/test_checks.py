@@ -13,7 +13,7 @@ from gearfe.train import Bearing, Damping, build_train, simulate
 
 from ..trains import changed, train
 from .campaign import Case, campaign_named
-from .disturbed import disk_run, read_only_run
+from .faults import disk_run, read_only_run
 from .frames import symmetric_frame
 from .trains import _order, _settled, _symmetry
 

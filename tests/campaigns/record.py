@@ -11,7 +11,7 @@ from gearfe.errors import InputError
 from .outcome import Outcome
 
 
-class Ledger:
+class CampaignRecord:
     """Outcomes of one campaign in a folder.
 
     The first line says which campaign and seed it is. A last line that was cut short by a killed process is dropped.
