@@ -31,7 +31,7 @@ LARGEST = 1e75
 #: Table name in a job file -> "module:class" of the dataclass that describes it. Each module is light (no numpy).
 TABLES: dict[str, str] = {
     "pair": "gearfe.tables.pair:PairTable",
-    "stiffness": "gearfe.tables.stiffness:StiffnessTable",
+    "stiffness": "gearfe.tables.pair:StiffnessTable",
     "loadmap": "gearfe.tables.loadmap:LoadMapTable",
     "microgeometry": "gearfe.tables.microgeometry:MicrogeometryTable",
     "housing": "gearfe.tables.housing:HousingTable",

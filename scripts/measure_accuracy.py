@@ -23,7 +23,7 @@ from gearfe import GearPair, sweep_stiffness
 from gearfe.contact.laws import DEFAULT_MODEL
 from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 from gearfe.stiffness.job import read_stiffness_job
-from gearfe.tables.stiffness import LAWS
+from gearfe.tables.pair import LAWS
 
 ROOT = Path(__file__).resolve().parents[1]
 SIZES = (2.0, 1.5, 1.0, 0.7)

@@ -12,8 +12,7 @@ from gearfe.gear.pair import GearPair
 from gearfe.stiffness.job import StiffnessJob
 from gearfe.stiffness.positions import twists_for_torque
 from gearfe.stiffness.sweep import sweep_stiffness
-from gearfe.tables.pair import PairTable
-from gearfe.tables.stiffness import StiffnessTable
+from gearfe.tables.pair import PairTable, StiffnessTable
 
 ROOT = Path(__file__).parents[1]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..tables.loadmap import LoadMapTable, loads_of
-from ..tables.stiffness import StiffnessTable, check_law
+from ..tables.pair import StiffnessTable, check_law
 from .arguments import add_job, add_keys, add_removed, check_option, with_keys
 from .common import add_folder, print_results
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..progress import stage
-from ..tables.stiffness import StiffnessTable
+from ..tables.pair import StiffnessTable
 from .arguments import add_job, add_keys, check_option, with_keys
 from .common import add_json, add_pictures
 

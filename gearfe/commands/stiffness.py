@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..config import check_range
 from ..progress import announce
-from ..tables.stiffness import StiffnessTable, check_law
+from ..tables.pair import StiffnessTable, check_law
 from .arguments import add_job, add_keys, add_removed, check_option, number, with_keys
 from .common import add_folder, print_results
 

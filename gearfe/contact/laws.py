@@ -14,7 +14,7 @@ tests' whole-gear route alone (`tests.verification.laws`).
 
 **On half-planes** (half_plane): `gearfe.contact.half_plane`, without contact elements.
 
-A law is a frozen dataclass whose fields are its parameters, and a line that names it (`gearfe.tables.stiffness`; for
+A law is a frozen dataclass whose fields are its parameters, and a line that names it (`gearfe.tables.pair`; for
 another package an entry point); nothing else needs to be touched to add it. It has a ``name``, the text that selects
 it. One that derives from `HalfPlane` is solved as that is. One on the elements (`ElementLaw`) provides besides:
 
@@ -38,7 +38,7 @@ from ..config import fields_of
 from ..elasticity import Material, Plane
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations
-from ..tables.stiffness import check_flank_coarsen, law_class
+from ..tables.pair import check_flank_coarsen, law_class
 from ..typing import Array, BoolArray
 
 Sides = Literal["both", "pinion", "wheel", "tip"]
@@ -170,7 +170,7 @@ class HalfPlane:
 
 
 def law_named(name: str, **parameters: Any) -> ContactLaw:
-    """The law called `name` (`gearfe.tables.stiffness`) with the parameters given, the others by default."""
+    """The law called `name` (`gearfe.tables.pair`) with the parameters given, the others by default."""
     kind = law_class(name)
     known = list(fields_of(kind))
     for key, value in parameters.items():

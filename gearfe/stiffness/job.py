@@ -26,8 +26,7 @@ from ..elasticity import Material
 from ..errors import InputError
 from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
-from ..tables.pair import MaterialTable, PairTable
-from ..tables.stiffness import StiffnessTable
+from ..tables.pair import MaterialTable, PairTable, StiffnessTable
 from .curve import StiffnessCurve
 
 if TYPE_CHECKING:

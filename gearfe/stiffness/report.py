@@ -15,7 +15,7 @@ from ..contact.laws import COARSENING
 from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
 from ..gear.validity import overlap_warnings
-from ..tables.stiffness import DEFAULT_LAW
+from ..tables.pair import DEFAULT_LAW
 from ..typing import Array
 from .curve import EDGES, StiffnessCurve
 from .curve_error import ORDER

@@ -23,9 +23,8 @@ from ..rigid import TimeFunction, smoothed_step
 from ..stiffness.curve import StiffnessCurve
 from ..tables.housing import HousingTable
 from ..tables.microgeometry import MicrogeometryTable
-from ..tables.pair import REQUIRED, PairTable, tooth_form
+from ..tables.pair import REQUIRED, PairTable, StiffnessTable, tooth_form
 from ..tables.spectrum import SpectrumTable
-from ..tables.stiffness import StiffnessTable
 from ..tables.timefunction import TrainFunctionTable
 from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable, read_train_tables
 from ..train.friction import Lubrication

@@ -18,7 +18,7 @@ from gearfe.gear.pair import GearPair
 from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
-from gearfe.tables.stiffness import DEFAULT_LAW, LAWS
+from gearfe.tables.pair import DEFAULT_LAW, LAWS
 
 from .record import Record
 from .subject import off_changes, shipped_pair

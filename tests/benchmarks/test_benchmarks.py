@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearfe.rigid.compiled import available
-from gearfe.tables.stiffness import LAWS
+from gearfe.tables.pair import LAWS
 
 from ..script import answered
 from . import command

@@ -22,7 +22,7 @@ import numpy as np
 
 from gearfe.config import load_job
 from gearfe.tables.housing import HousingMeshTable
-from gearfe.tables.stiffness import LAWS
+from gearfe.tables.pair import LAWS
 
 from .campaign import Campaign, Case, Columns
 from .linkages import linkage

@@ -29,7 +29,7 @@ from gearfe.stiffness.curve import SOLVED
 from gearfe.stiffness.job import read_stiffness_job
 from gearfe.stiffness.positions import ANGLE_ROUNDING, PositionSolver, position_solver
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
-from gearfe.tables.stiffness import DEFAULT_LAW, LAWS
+from gearfe.tables.pair import DEFAULT_LAW, LAWS
 
 from .campaign import Campaign, Case
 from .outcome import Check, Finding
