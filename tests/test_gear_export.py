@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gearfe.cli import main
+from gearfe.gear.curves import coordinates
 from gearfe.gear.deviation import Deviation, ToothDeviations
 from gearfe.gear.outline import tooth_outline, whole_outline
 from gearfe.gear.pair import Gear
@@ -118,7 +119,7 @@ def test_deviations_stand_in_the_table(tmp_path, capsys):
 
 def displaced(made: Gear, roll: np.ndarray, own: ToothDeviations, tooth: int) -> np.ndarray:
     """Points (m) of a left flank: the involute's, moved by h along its normal (s e_r + r_b e_phi)/r, and turned."""
-    points = made.profile.points_of_roll(roll)
+    points = coordinates(made.profile.flank.at(roll))
     out = points / np.hypot(*points.T)[:, None]
     round_ = np.column_stack([-out[:, 1], out[:, 0]])
     normal = (roll[:, None] * out + made.base_radius * round_) / np.hypot(roll, made.base_radius)[:, None]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
+from gearfe.gear.curves import coordinates
 from gearfe.gear.pair import Gear, GearPair, MeshGeometry, TipRelief
 from gearfe.gear.validity import tip_penetration
 
@@ -108,15 +109,18 @@ def test_flanks_touch_on_the_line_of_action(mesh):
     for s1 in np.linspace(start, end, 12):
         angle = mesh.pinion_angle_at(s1)
         at1, at2 = np.array([s1]), np.array([mesh.tangent_length - s1])
-        one, two = mesh.pinion.profile, mesh.wheel.profile
+        one, two = mesh.pinion.profile.flank, mesh.wheel.profile.flank
         turn = mesh.wheel_phase + mesh.wheel_angle_at(angle, mesh.contact_twist)
         # pinion tooth 0 meets the wheel tooth above it, which is one of those one pitch apart
         turn += 2 * math.pi / mesh.wheel.teeth * np.arange(-2, 3)
-        point1, normal1 = turned(one.points_of_roll(at1), angle)[0], turned(one.normals_of_roll(at1), angle)[0]
-        points2 = [turned(two.points_of_roll(at2), t, mesh.working_centre_distance)[0] for t in turn]
+        point1, normal1 = (
+            turned(coordinates(one.at(at1)), angle)[0],
+            turned(coordinates(one.normal_at(at1)), angle)[0],
+        )
+        points2 = [turned(coordinates(two.at(at2)), t, mesh.working_centre_distance)[0] for t in turn]
         nearest = int(np.argmin([np.hypot(*(p - point1)) for p in points2]))
         np.testing.assert_allclose(points2[nearest], point1, atol=NM)
-        np.testing.assert_allclose(turned(two.normals_of_roll(at2), turn[nearest])[0], -normal1, atol=1e-12)
+        np.testing.assert_allclose(turned(coordinates(two.normal_at(at2)), turn[nearest])[0], -normal1, atol=1e-12)
         # on the line through the pitch point, at the working pressure angle: the driving flank pushes upwards
         assert normal1 == pytest.approx([math.sin(mesh.working_pressure_angle), math.cos(mesh.working_pressure_angle)])
         from_pitch_point = point1 - [mesh.pinion_working_radius, 0.0]
@@ -129,8 +133,8 @@ def test_positive_twist_presses_the_left_flanks(mesh):
     """A wheel point of the line of action moves against the pinion's normal when the wheel turns counter-clockwise."""
     angle = mesh.path["C"].pinion_angle
     s1 = np.array([mesh.path["C"].pinion_roll])
-    point = turned(mesh.pinion.profile.points_of_roll(s1), angle)[0]
-    normal = turned(mesh.pinion.profile.normals_of_roll(s1), angle)[0]
+    point = turned(coordinates(mesh.pinion.profile.flank.at(s1)), angle)[0]
+    normal = turned(coordinates(mesh.pinion.profile.flank.normal_at(s1)), angle)[0]
     arm = point - [mesh.working_centre_distance, 0.0]
     velocity = np.array([-arm[1], arm[0]])
     assert velocity @ normal == pytest.approx(-mesh.wheel.base_radius)

@@ -103,11 +103,11 @@ def test_hertz_at_the_pitch_point(name: str, degrees: float) -> None:
     roll = pair.pinion.base_radius * math.tan(pair.working_pressure_angle)
     angles = np.linspace(0, pair.mesh_cycle, 400, endpoint=False)
     touching = law.teeth.touching(angles)
-    face = law.sides[0].curve.face
+    face = law.sides[0].face
     u = (roll - face.flank.start) / (face.flank.end - face.flank.start)
     angle = touching.angle[np.argmin(np.abs(touching.place[:, 0] - u))]
     contacts = solve_half_plane(law, angle, math.radians(degrees)).contacts
-    k = int(np.argmin(np.abs(law.sides[0].curve.parameter_at(contacts.arc[:, 0]) - u)))
+    k = int(np.argmin(np.abs(law.sides[0].face.parameter_at(contacts.arc[:, 0]) - u)))
     one, two = (one.base_radius * math.tan(pair.working_pressure_angle) for one in (pair.pinion, pair.wheel))
     radius = one * two / (one + two)
     steel = Material()
@@ -176,7 +176,7 @@ def test_marks_are_told() -> None:
     for name, mark in (("sharp", "tip"), ("rounded", "round")):
         law = law_of(name)
         contacts = solve_half_plane(law, angles_of(law.pair, 30), math.radians(0.2)).contacts
-        u = np.stack([law.sides[g].curve.parameter_at(contacts.arc[:, g]) for g in (0, 1)], axis=1)
+        u = np.stack([law.sides[g].face.parameter_at(contacts.arc[:, g]) for g in (0, 1)], axis=1)
         marks, ends = reached_marks(law, contacts), np.abs(u - 1.0).min(axis=1) < 1e-6
         assert set(marks) == {"", mark}
         if name == "sharp":
@@ -256,7 +256,7 @@ def test_windows_hold_the_pressure_beside_edges() -> None:
     found = solve_half_plane(law, np.radians([0.0, 9.5, 12.0, 16.0]), math.radians(0.5))
     assert set(found.status) == {"converged"}
     c = found.contacts
-    at_tip = np.stack([c.panel_arc[:, g] > law.curves[g].high - 2 * c.width for g in (0, 1)]).any(axis=0)
+    at_tip = np.stack([c.panel_arc[:, g] > law.teeth.faces[g].arc[-1] - 2 * c.width for g in (0, 1)]).any(axis=0)
     cut = (c.pressure[:, [0, -1]] > 0) & ~at_tip[:, [0, -1]]
     assert not cut.any()
 

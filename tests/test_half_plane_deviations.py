@@ -10,8 +10,8 @@ import pytest
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gear.deviation import Deviation, ToothDeviations
 from gearfe.gear.face import face_of
-from gearfe.gear.flank_curve import Faces
 from gearfe.gear.pair import TipRelief
+from gearfe.gear.touching import Faces
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair

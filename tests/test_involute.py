@@ -94,7 +94,7 @@ def test_involute_normals_touch_the_base_circle(one):
     profile = one.profile
     end = min(profile.round_roll, profile.relief_roll)
     s = np.linspace(profile.form_roll, end, 50)
-    points, normals = profile.points_of_roll(s), profile.normals_of_roll(s)
+    points, normals = coordinates(profile.flank.at(s)), coordinates(profile.flank.normal_at(s))
     lever = points[:, 0] * normals[:, 1] - points[:, 1] * normals[:, 0]
     np.testing.assert_allclose(lever, one.base_radius, rtol=1e-13)
     # the tangent from the base circle has the length s, and unrolls from the base circle
@@ -109,7 +109,7 @@ def test_tooth_thickness_on_any_circle(one):
     """s_y = 2 r_y [(pi/2 + 2 x tan(alpha))/z + inv(alpha) - inv(alpha_y)] less the thinning (ISO 21771, 5.5.2)."""
     alpha, z = one.pressure_angle, one.teeth
     s = np.linspace(one.form_roll, min(one.profile.round_roll, one.profile.relief_roll), 20)
-    x, y = one.profile.points_of_roll(s).T
+    x, y = coordinates(one.profile.flank.at(s)).T
     alpha_y = np.arccos(np.minimum(1.0, one.base_radius / np.hypot(x, y)))
     half = (math.pi / 2 + 2 * one.profile_shift * math.tan(alpha)) / z + inv(alpha) - (np.tan(alpha_y) - alpha_y)
     half -= one.tooth_thinning / one.pitch_diameter
@@ -148,7 +148,7 @@ def test_root_and_flank_are_what_a_rack_leaves(one):
     points = np.concatenate([s.points(t) for s in profile.segments if s.name in ("root_circle", "trochoid")])
     rolls = np.linspace(profile.form_roll, profile.round_roll, 33)
     unrelieved = rolls[rolls <= profile.relief_roll]
-    points = np.concatenate([points, profile.points_of_roll(unrelieved)])
+    points = np.concatenate([points, coordinates(profile.flank.at(unrelieved))])
     width = 9.0 * one.module
     centre = np.zeros((len(points), 1))
     for _ in range(6):  # refined scans of the rack's travel, 401 positions each
@@ -188,10 +188,10 @@ def test_roll_lengths_and_parameters():
     assert profile.tip_roll == pytest.approx(math.sqrt(one.tip_radius**2 - one.base_radius**2), rel=1e-14)
     assert profile.relief_roll == pytest.approx(profile.tip_roll - 2e-3, rel=1e-14)
     s = np.linspace(profile.form_roll, profile.round_roll, 9)
-    t = profile.parameter_of_roll(s)
+    t = profile.flank.parameter(s)
     np.testing.assert_allclose(profile.flank.roll(t), s, rtol=1e-14)
-    np.testing.assert_allclose(flank.points(t), profile.points_of_roll(s), atol=NM)
-    assert flank.breaks == pytest.approx([float(profile.parameter_of_roll(profile.relief_roll))])
+    np.testing.assert_allclose(flank.points(t), coordinates(profile.flank.at(s)), atol=NM)
+    assert flank.breaks == pytest.approx([float(profile.flank.parameter(profile.relief_roll))])
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0, 3.0])
@@ -201,8 +201,8 @@ def test_tip_relief_is_taken_off_along_the_involute_normal(exponent):
     relieved = gear(30, 25.0, tip_relief=TipRelief(amount, length, exponent))
     tip = plain.profile.tip_roll
     s = np.linspace(tip - 1.5 * length, tip, 31)
-    moved = relieved.profile.points_of_roll(s) - plain.profile.points_of_roll(s)
-    normal = plain.profile.normals_of_roll(s)
+    moved = coordinates(relieved.profile.flank.at(s)) - coordinates(plain.profile.flank.at(s))
+    normal = coordinates(plain.profile.flank.normal_at(s))
     expected = amount * np.maximum(0.0, (s - (tip - length)) / length) ** exponent
     np.testing.assert_allclose(moved, -expected[:, None] * normal, atol=1e-17)
     assert expected[-1] == pytest.approx(amount)

@@ -64,13 +64,13 @@ def test_waves_do_not_stretch_the_material() -> None:
     """A flank with waves has the arc lengths of the involute, so that loads act on the same material: those between
     the roll lengths s_0 and s are (s^2 - s_0^2)/(2 r_b).
     """
-    curve = law_of(200, 1e-5).curves[0]
-    face, knots = curve.face, (curve.parameter >= 0) & (curve.parameter <= 1)
-    roll = face.flank.roll(curve.parameter[knots])
+    face = law_of(200, 1e-5).teeth.faces[0]
+    knots = (face.knots >= 0) & (face.knots <= 1)
+    roll = face.flank.roll(face.knots[knots])
     expected = (roll**2 - face.flank.start**2) / (2 * PAIR.pinion.base_radius)
-    assert curve.arc[knots] == pytest.approx(expected, abs=1e-12)
+    assert face.arc[knots] == pytest.approx(expected, abs=1e-12)
     u = np.linspace(0.02, 0.98, 301)
-    point, tangent = curve.at(curve.arc_at(u))
+    point, tangent = face.at(face.arc_at(u))
     # arcs are linear in u between the knots: the points are on the curve, but nanometres further on
     assert np.abs(((point - face.points(u)) * tangent.conj()).imag).max() < 3e-10
 

@@ -32,6 +32,6 @@ def waved(pair: GearPair, elastic: MeshingPair, pinion: ToothDeviations) -> Mesh
     points = body.flank.points @ np.array([1, 1j])
     roll = np.sqrt(np.maximum(np.abs(points) ** 2 - face.flank.base_radius**2, 0.0))
     at = np.clip(roll, face.flank.start, face.flank.end)
-    moved = points + deviation.at(at)[0] * face.normals(face.parameter(at))
+    moved = points + deviation.at(at)[0] * face.normals(face.flank.parameter(at))
     flank = replace(body.flank, points=np.stack([moved.real, moved.imag], axis=1))
     return replace(elastic, pinion=replace(body, flank=flank))

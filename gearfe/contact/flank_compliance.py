@@ -31,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..gear.flank_curve import FlankCurve, flank_curve
+from ..gear.face import Face, face_of
 from ..gear.spur_gear import Gear
 from ..typing import Array, ComplexArray
 from .compliance import GearBody
@@ -52,7 +52,7 @@ class FlankCompliance:
 
     Attributes
     ----------
-    curve
+    face
         The exact flank.
     inverse_modulus
         1/E' (1/Pa) per width of the contact.
@@ -66,7 +66,7 @@ class FlankCompliance:
         Step -> H between the stations of teeth so many steps apart, tooth axes, xy by station (m/N).
     """
 
-    curve: FlankCurve
+    face: Face
     inverse_modulus: float
     corner: complex
     wedge: Array
@@ -76,8 +76,8 @@ class FlankCompliance:
 
     def distance(self, s: Array) -> Array:
         """Distance y (m) of the flank at arc lengths s (m) from the corner."""
-        here = np.maximum(s, self.curve.low)
-        return np.maximum(np.abs(self.curve.at(here)[0] - self.corner), LEAST_DISTANCE) + (here - s)
+        here = np.maximum(s, self.face.arc[0])
+        return np.maximum(np.abs(self.face.at(here)[0] - self.corner), LEAST_DISTANCE) + (here - s)
 
 
 @dataclass(frozen=True)
@@ -171,20 +171,19 @@ def cubic_spline(at: Array) -> Array:
 
 def flank_compliance(gear: Gear, body: GearBody) -> FlankCompliance:
     """Reduce the finite-element flank of a gear to its stations."""
-    curve, inverse_modulus, module = flank_curve(gear), body.contact_compliance, gear.module
-    corner, wedge = corner_of(curve)
-    stations, bumps, nodal = _stations(body.flank, curve.low, module)
+    face, inverse_modulus, module = face_of(gear), body.contact_compliance, gear.module
+    corner, wedge = corner_of(face)
+    stations, bumps, nodal = _stations(body.flank, float(face.arc[0]), module)
     loads = np.kron(nodal, np.eye(2))
     sides = loads @ body.interface
     smooth = {step: sides @ body.coupling[step % body.teeth] @ sides.T for step in range(-REACH, REACH + 1)}
-    made = FlankCompliance(curve, inverse_modulus, corner, wedge, stations, bumps, smooth)
+    made = FlankCompliance(face, inverse_modulus, corner, wedge, stations, bumps, smooth)
     smooth[0] = smooth[0] + loads @ body.own @ loads.T + inverse_modulus / body.width * _local(made)
     return made
 
 
-def corner_of(curve: FlankCurve) -> tuple[complex, Array]:
+def corner_of(face: Face) -> tuple[complex, Array]:
     """Corner (m) of flank and tip circle, and the tensor W of the wedge there in the tooth's axes."""
-    face = curve.face
     end = np.array(1.0)
     point, normal = complex(face.points(end)), complex(face.normals(end))
     tangent, tip = -1j * normal, abs(complex(face.points(np.array(face.end))))

@@ -7,7 +7,7 @@ finite-element and a half-space solution at a depth below the contact; here they
 **One position.** Every contact has a centre O with the common normal n, and panels at x along the tangent over the
 window in which the gap may close; a tooth pair has as many contacts as it bears on stretches of its flanks (`.zones`;
 `.half_plane_pair` has their mutual terms). With the pressure p, its force per width :math:`F=\int p`, the gap g
-between the faces as moved by the loads :math:`F_0` of the step before (`gearfe.gear.flank_curve`),
+between the faces as moved by the loads :math:`F_0` of the step before (`gearfe.gear.touching`),
 
 .. math::
     p \ge 0,\qquad g(x) + \frac{2}{\pi}\Big(\frac1{E_1'}+\frac1{E_2'}\Big)\int -\ln|x-\xi|\,p\,d\xi

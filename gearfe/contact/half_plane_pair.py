@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gear.deviation import ToothDeviations
-from ..gear.flank_curve import FlankCurve, FlankTables, flank_curve, flank_tables
+from ..gear.face import FlankTables, flank_tables
 from ..gear.pair import GearPair
 from ..gear.touching import ToothFlanks
 from ..typing import Array, ComplexArray, IntArray
@@ -58,12 +58,6 @@ class HalfPlanePair:
     sides: tuple[FlankCompliance, FlankCompliance]
     width: float
 
-    @cached_property
-    def curves(self) -> tuple[FlankCurve, ...]:
-        """Exact flanks, f of them: the faces of `teeth`."""
-        gears = (self.pair.pinion, self.pair.wheel)
-        return tuple(flank_curve(gears[self.teeth.gear_of(i)], face) for i, face in enumerate(self.teeth.faces))
-
     @property
     def mesh_cycles(self) -> int:
         """Mesh cycles after which the same teeth meet again: 1 where all teeth of each gear are alike."""
@@ -72,14 +66,14 @@ class HalfPlanePair:
 
     @cached_property
     def tables(self) -> FlankTables:
-        """These in one table."""
-        return flank_tables(self.curves)
+        """The exact flanks, f of them, in one table: the faces of `teeth`."""
+        return flank_tables(self.teeth.faces)
 
     def arc_at(self, flank: IntArray, parameter: Array) -> Array:
         """Arc lengths (m) of parameters u on the flanks `flank`, both of shape (p, 2)."""
         made = np.empty(np.shape(parameter))
         for i in np.unique(flank):
-            made[flank == i] = self.curves[i].arc_at(parameter[flank == i])
+            made[flank == i] = self.teeth.faces[i].arc_at(parameter[flank == i])
         return made
 
     @cached_property
@@ -105,7 +99,7 @@ class HalfPlanePair:
     @cached_property
     def corner(self) -> ComplexArray:
         """Corners of flanks and tip circles (m), shape (f,)."""
-        return np.array([corner_of(curve)[0] for curve in self.curves])
+        return np.array([corner_of(face)[0] for face in self.teeth.faces])
 
     @cached_property
     def _wedge(self) -> tuple[Array, ComplexArray]:
@@ -120,7 +114,7 @@ class HalfPlanePair:
     @cached_property
     def undercut(self) -> Array:
         """1 where the working flank starts with the edge of an undercut, shape (2,)."""
-        return np.array([float(side.curve.face.undercut) for side in self.sides])
+        return np.array([float(side.face.undercut) for side in self.sides])
 
     @cached_property
     def marks(self) -> tuple[NDArray[np.str_], IntArray, Array]:
@@ -132,8 +126,7 @@ class HalfPlanePair:
         """
         found = []
         for name in ("undercut", "relief", "round", "tip"):
-            for flank, curve in enumerate(self.curves):
-                face = curve.face
+            for flank, face in enumerate(self.teeth.faces):
                 places = {
                     "undercut": [0.0] if face.undercut else [],
                     "relief": face.kinks.tolist(),
@@ -150,11 +143,11 @@ class HalfPlanePair:
         """Arc lengths (m) of the kinks of each flank, the edge of an undercut among them, and by how much its normal
         turns away there (rad), both of shape (f, k); no kink lies at infinity.
         """
-        places = [curve.arc_at([*([0.0] if curve.face.undercut else []), *curve.face.kinks]) for curve in self.curves]
+        places = [face.arc_at([*([0.0] if face.undercut else []), *face.kinks]) for face in self.teeth.faces]
         arcs, angles = np.zeros((2, len(places), max(map(len, places))))
         arcs[:] = np.inf
-        for i, (curve, at) in enumerate(zip(self.curves, places, strict=True)):
-            before, after = (curve.at(at + side)[1] for side in (-BESIDE, BESIDE))
+        for i, (face, at) in enumerate(zip(self.teeth.faces, places, strict=True)):
+            before, after = (face.at(at + side)[1] for side in (-BESIDE, BESIDE))
             arcs[i, : len(at)], angles[i, : len(at)] = at, np.angle(before / after)
         return arcs, angles
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..gear.flank_curve import WAY
+from ..gear.touching import WAY
 from ..typing import Array, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .flank import Flank, edge_shapes

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..gear.flank_curve import LOOK, WAY, Faces, FlankTables, windows
-from ..gear.touching import Touching
+from ..gear.face import FlankTables
+from ..gear.touching import LOOK, WAY, Faces, Touching, windows
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair, moved_beside, panel_influence
 from .panels import (

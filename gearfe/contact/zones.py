@@ -13,7 +13,7 @@ Contacts of one pair act on each other exactly as the panels of one window do (`
 or less is another discretisation of the same pressure, and no other answer.
 
 **The gap of the deformed faces** over all of their length, seen from a contact's centre along its normal n, is that of
-the rigid faces (`gearfe.gear.flank_curve`) and :math:`n\cdot(u_2-u_1)`: u by the smooth influence of all pairs of the
+the rigid faces (`gearfe.gear.touching`) and :math:`n\cdot(u_2-u_1)`: u by the smooth influence of all pairs of the
 position, by the half-planes and wedges of the pair's own contacts. It is of the first order in the
 displacements, which is enough to look with: a contact that is added by mistake carries no force.
 """
@@ -24,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..gear.flank_curve import WAY, Faces
+from ..gear.touching import WAY, Faces
 from ..typing import Array, BoolArray, IntArray
 from .half_plane_pair import HalfPlanePair
 from .half_plane_step import SIGN, WIDER, WINDOW, Setting, State, Step, answers, reference_approach

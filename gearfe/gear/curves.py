@@ -17,6 +17,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,8 @@ from .deviation import Deviation
 Point = tuple[float, float]
 
 _PANELS = 24
+#: Most steps of Newton's method for a roll length, and its moves that are rounding, in parts of the longest.
+NEWTON, ROLL_ROUNDING = 12, 1e-15
 
 
 @cache
@@ -187,6 +190,22 @@ class Involute:
     def roll(self, t: Array) -> Array:
         """Roll length (m) at the parameter t."""
         return self.start + t * (self.end - self.start)
+
+    def parameter(self, roll: Any) -> Any:
+        """Parameter t at a roll length (m)."""
+        return (roll - self.start) / (self.end - self.start)
+
+    def roll_at(self, radius: Any) -> Array:
+        """Roll lengths (m) of the points at radii r (m), from the base circle on: s - delta(s) = sqrt(r^2 - r_b^2)."""
+        forward = np.sqrt(np.maximum(0.0, (radius - self.base_radius) * (radius + self.base_radius)))
+        s = forward
+        for _ in range(NEWTON if self.modified else 0):
+            depth, slope = self.relief(s)
+            move = (s - depth - forward) / (1.0 - slope)
+            s = s - move
+            if (np.abs(move) <= ROLL_ROUNDING * self.end).all():
+                break
+        return np.asarray(s)
 
     def point(self, t: Array) -> ComplexArray:
         return self.at(self.roll(t))

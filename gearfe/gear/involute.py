@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Array
-from .curves import Arc, Involute, Point, Segment, Trochoid, bisect, coordinates, inv, inverse_inv
+from .curves import Arc, Involute, Segment, Trochoid, bisect, inv, inverse_inv
 from .deviation import Deviation
 
 if TYPE_CHECKING:
@@ -109,12 +109,11 @@ class ToothProfile:
     segments
         In order root_circle, trochoid, involute, tip_round, tip; a piece of zero length is left out.
     flank
-        The involute with its relief, as a function of the roll length.
-    form_roll, round_roll, tip_roll
-        Roll lengths (m) of the form point (start of the involute), of the start of the tip round (end of the involute
-        segment) and of the tip circle on the unrelieved involute.
-    relief_roll
-        Roll length (m) where the relief starts; `tip_roll` without relief.
+        The involute with its relief, from the form point to the start of the tip round.
+    root, round_
+        The curves before and behind it, or None.
+    tip_roll
+        Roll length (m) of the tip circle on the unrelieved involute.
     undercut
         True when trochoid and involute cross instead of touching.
     tip_half_angle
@@ -123,12 +122,26 @@ class ToothProfile:
 
     segments: tuple[Segment, ...]
     flank: Involute
-    form_roll: float
-    relief_roll: float
-    round_roll: float
+    root: Trochoid | None
+    round_: Arc | None
     tip_roll: float
     undercut: bool
     tip_half_angle: float
+
+    @property
+    def form_roll(self) -> float:
+        """Roll length (m) of the form point, where the involute starts."""
+        return self.flank.start
+
+    @property
+    def round_roll(self) -> float:
+        """Roll length (m) where the tip round starts, and the involute ends."""
+        return self.flank.end
+
+    @property
+    def relief_roll(self) -> float:
+        """Roll length (m) where the relief starts; `tip_roll` without relief."""
+        return min(self.flank.relief_start, self.tip_roll)
 
     def segment(self, name: str) -> Segment:
         """The segment called `name`; KeyError when the profile has none."""
@@ -136,18 +149,6 @@ class ToothProfile:
             if segment.name == name:
                 return segment
         raise KeyError(name)
-
-    def parameter_of_roll(self, s: Array) -> Array:
-        """Parameter t on the involute segment at roll lengths s (m)."""
-        return (np.asarray(s, dtype=float) - self.form_roll) / (self.round_roll - self.form_roll)
-
-    def points_of_roll(self, s: Array) -> Array:
-        """Flank points (m) at roll lengths s (m), shape (n, 2)."""
-        return coordinates(self.flank.at(np.asarray(s, dtype=float)))
-
-    def normals_of_roll(self, s: Array) -> Array:
-        """Outward unit normals of the flank at roll lengths s (m), shape (n, 2)."""
-        return coordinates(self.flank.normal_at(np.asarray(s, dtype=float)))
 
     def polyline(self, per_segment: int = 40) -> Array:
         """Points (m) of the half profile, equally spaced in arc length on each segment, shape (n, 2)."""
@@ -168,8 +169,8 @@ def tooth_profile(gear: Gear) -> ToothProfile:
     """
     root, form_roll, undercut = tooth_root(gear)
     flank, tip_roll = _flank(gear, form_roll)
-    end_roll = bisect(lambda s: _radius(flank, s) - gear.tip_radius, tip_roll, tip_roll + 2.0 * flank.amount)
-    tip_half_angle = _angle(flank, end_roll)
+    end_roll = float(flank.roll_at(gear.tip_radius))
+    tip_half_angle = cmath.phase(flank.at(np.array(end_roll)))
     if tip_half_angle <= 0.0:
         peak = flank.base_radius / math.cos(inverse_inv(flank.base_angle))
         problem = f"the tooth is pointed below its tip circle: must be < {_addendum_to(gear, peak):.5g}"
@@ -179,37 +180,22 @@ def tooth_profile(gear: Gear) -> ToothProfile:
     flank = replace(flank, end=round_roll)
 
     pieces: list[tuple[str, Arc | Trochoid | Involute]] = []
-    space = math.pi / gear.teeth
+    space, land, round_ = math.pi / gear.teeth, tip_half_angle, None
     land_angle = root.offset / root.reference_radius
+    fillet = root if root.radius > 0.0 or root.depth != 0.0 else None
+    if gear.tip_round > 0.0:
+        round_ = _tip_arc(gear, flank)
+        land = round_.end_angle
     if land_angle > 0.0:
         pieces.append(("root_circle", Arc((0.0, 0.0), gear.root_radius, space, space - land_angle)))
-    if root.radius > 0.0 or root.depth != 0.0:
-        pieces.append(("trochoid", root))
+    if fillet is not None:
+        pieces.append(("trochoid", fillet))
     pieces.append(("involute", flank))
-    land = tip_half_angle
-    if gear.tip_round > 0.0:
-        arc, land = _tip_arc(gear, flank, round_roll)
-        pieces.append(("tip_round", arc))
+    if round_ is not None:
+        pieces.append(("tip_round", round_))
     if land > NIL_ANGLE:
         pieces.append(("tip", Arc((0.0, 0.0), gear.tip_radius, land, 0.0)))
-    return ToothProfile(
-        segments=_joined(pieces, flank),
-        flank=flank,
-        form_roll=form_roll,
-        relief_roll=min(flank.relief_start, tip_roll),
-        round_roll=round_roll,
-        tip_roll=tip_roll,
-        undercut=undercut,
-        tip_half_angle=tip_half_angle,
-    )
-
-
-def _radius(flank: Involute, s: float) -> float:
-    return math.hypot(flank.base_radius, s - float(flank.relief(np.array(s))[0]))
-
-
-def _angle(flank: Involute, s: float) -> float:
-    return cmath.phase(flank.at(np.array(s)))
+    return ToothProfile(_joined(pieces), flank, fillet, round_, tip_roll, undercut, tip_half_angle)
 
 
 def _flank(gear: Gear, form_roll: float) -> tuple[Involute, float]:
@@ -237,10 +223,9 @@ def _flank(gear: Gear, form_roll: float) -> tuple[Involute, float]:
     return flank, tip_roll
 
 
-def _round_centre(gear: Gear, flank: Involute, s: float) -> Point:
+def _round_centre(gear: Gear, flank: Involute, s: float) -> complex:
     at = np.array(s)
-    centre = complex(flank.at(at) - gear.tip_round * flank.normal_at(at))
-    return centre.real, centre.imag
+    return complex(flank.at(at) - gear.tip_round * flank.normal_at(at))
 
 
 def _round_start(gear: Gear, flank: Involute, tip_roll: float, end_roll: float) -> float:
@@ -259,8 +244,8 @@ def _round_start(gear: Gear, flank: Involute, tip_roll: float, end_roll: float) 
             problem = f"lies wholly inside the tip round: must be > {1e3 * (tip_roll - start):.6g} mm of roll length"
             raise InputError("tip_relief.length", flank.length, problem, "use a longer relief or a smaller tip round")
         above = np.nextafter(flank.relief_start, math.inf)
-        start = bisect(lambda s: math.hypot(*_round_centre(gear, flank, s)) - inner, float(above), end_roll)
-    if math.atan2(*reversed(_round_centre(gear, flank, start))) < -NIL_ANGLE:
+        start = bisect(lambda s: abs(_round_centre(gear, flank, s)) - inner, float(above), end_roll)
+    if cmath.phase(_round_centre(gear, flank, start)) < -NIL_ANGLE:
         limit = 1e3 * _largest_round(gear, flank)
         problem = f"does not fit the tip, the rounds of both flanks overlap: must be < {limit:.5g} mm"
         raise InputError("tip_round", rho, problem, "use a smaller tip round, less addendum or less profile shift")
@@ -279,31 +264,24 @@ def _largest_round(gear: Gear, flank: Involute) -> float:
     return bisect(too_large, 0.0, tip - base)
 
 
-def deviated(gear: Gear, profile: ToothProfile, deviation: Deviation) -> tuple[Involute, Arc | None]:
-    """Flank of a profile with a deviation of micrometres, and its tip round fitted anew.
+def deviated(gear: Gear, deviation: Deviation) -> tuple[Involute, Arc | None]:
+    """Flank of a gear with a deviation of micrometres, and its tip round fitted anew.
 
     The flank starts at the same radius and ends on the same tip circle; its round is tangent to both as before.
     """
+    nominal, tip, rho = gear.profile.flank, gear.tip_radius, gear.tip_round
+    flank, reach = replace(nominal, deviation=deviation), 2 * (deviation.most + nominal.amount) + 1e-12
+    if flank.start > reach:  # twice as far as any point moves
+        flank = replace(flank, start=float(flank.roll_at(abs(nominal.at(np.array(nominal.start))))))
+    if rho == 0.0:
+        return replace(flank, end=float(flank.roll_at(tip))), None
     from scipy.optimize import brentq  # only flanks with deviations need it
 
-    flank, tip, rho = replace(profile.flank, deviation=deviation), gear.tip_radius, gear.tip_round
-
-    def roll_at(radius: float) -> float:
-        forward = math.sqrt((radius - flank.base_radius) * (radius + flank.base_radius))
-        return float(brentq(lambda s: s - flank.relief(s)[0] - forward, forward - reach, forward + reach, xtol=ROLL))
-
-    # twice as far as any point moves
-    reach = 2 * (deviation.most + flank.amount) + 1e-12
-    start = roll_at(_radius(profile.flank, flank.start)) if flank.start > reach else flank.start
-    if rho == 0.0:
-        return replace(flank, start=start, end=roll_at(tip)), None
-    inner = tip - rho
-    slope = float(np.abs(profile.flank.relief(np.linspace(start, flank.end, 65))[1]).max()) + deviation.steepest
-    reach += 2 * rho * slope
-    low, high = flank.end - reach, flank.end + reach
-    end = float(brentq(lambda s: math.hypot(*_round_centre(gear, flank, s)) - inner, low, high, xtol=ROLL))
-    flank = replace(flank, start=start, end=end)
-    return flank, _tip_arc(gear, flank, end)[0]
+    slope = float(np.abs(nominal.relief(np.linspace(flank.start, flank.end, 65))[1]).max()) + deviation.steepest
+    low, high = (flank.end + way * (reach + 2 * rho * slope) for way in (-1, 1))
+    end = brentq(lambda s: abs(_round_centre(gear, flank, s)) - (tip - rho), low, high, xtol=ROLL)
+    flank = replace(flank, end=float(end))
+    return flank, _tip_arc(gear, flank)
 
 
 def _addendum_to(gear: Gear, radius: float) -> float:
@@ -311,20 +289,20 @@ def _addendum_to(gear: Gear, radius: float) -> float:
     return radius / gear.module - gear.teeth / 2 - gear.profile_shift + gear.tip_shortening
 
 
-def _tip_arc(gear: Gear, flank: Involute, round_roll: float) -> tuple[Arc, float]:
-    """Tip round and the half angle (rad) of the tip land that it leaves."""
-    centre = _round_centre(gear, flank, round_roll)
-    land = math.atan2(centre[1], centre[0])
-    return Arc(centre, gear.tip_round, cmath.phase(flank.normal_at(np.array(round_roll))), land), land
+def _tip_arc(gear: Gear, flank: Involute) -> Arc:
+    """Tip round from the end of the flank to the tip land, whose half angle is that of its end."""
+    centre = _round_centre(gear, flank, flank.end)
+    start = cmath.phase(flank.normal_at(np.array(flank.end)))
+    return Arc((centre.real, centre.imag), gear.tip_round, start, cmath.phase(centre))
 
 
-def _joined(pieces: list[tuple[str, Arc | Trochoid | Involute]], flank: Involute) -> tuple[Segment, ...]:
+def _joined(pieces: list[tuple[str, Arc | Trochoid | Involute]]) -> tuple[Segment, ...]:
     """Segments that share their end points: each inner joint is where the later piece starts."""
     ends = [complex(curve.point(np.array(0.0))) for _, curve in pieces]
     ends.append(complex(pieces[-1][1].point(np.array(1.0))))
-    kink = (flank.relief_start - flank.start) / (flank.end - flank.start)
     made = []
     for (name, curve), (start, end) in zip(pieces, itertools.pairwise(ends), strict=True):
-        breaks = (kink,) if name == "involute" and 0.0 < kink < 1.0 else ()
+        kink = curve.parameter(curve.relief_start) if isinstance(curve, Involute) else 0.0
+        breaks = (kink,) if 0.0 < kink < 1.0 else ()
         made.append(Segment(name, curve, (start.real, start.imag), (end.real, end.imag), breaks))
     return tuple(made)

@@ -48,7 +48,7 @@ def tooth_outline(gear: Gear, per_piece: int = 48, kinks: Iterable[float] = ()) 
     for segment in gear.profile.segments:
         breaks = {0.0, *segment.breaks, 1.0}
         if isinstance(flank := segment.curve, Involute):  # its parameter is linear in the roll length
-            breaks |= {(s - flank.start) / (flank.end - flank.start) for s in kinks if flank.start < s < flank.end}
+            breaks |= {flank.parameter(s) for s in kinks if flank.start < s < flank.end}
         for low, high in itertools.pairwise(sorted(breaks)):
             # even in the curve's own parameter: an involute curves sharply near its base circle, where its arc length
             # goes with the square of the roll length

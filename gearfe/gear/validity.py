@@ -271,9 +271,7 @@ def _distance(points: Array, outline: Array) -> Array:
 def _outline(gear: Gear) -> Array:
     """Left half profile as complex numbers with growing radius."""
     t = np.linspace(0.0, 1.0, 401)
-    pieces = [s.points(t) for s in gear.profile.segments if s.name != "tip"]
-    points = np.concatenate(pieces)
-    made = points[:, 0] + 1j * points[:, 1]
+    made = np.concatenate([s.curve.point(t) for s in gear.profile.segments if s.name != "tip"])
     radius = np.abs(made)
     return made[np.concatenate([[True], np.diff(np.maximum.accumulate(radius)) > 0.0])]
 
@@ -282,10 +280,9 @@ def _tip_outline(gear: Gear) -> Array:
     """Both sides of a tooth from half the roll length above the form point outwards, as complex numbers."""
     profile = gear.profile
     t = np.linspace(0.0, 1.0, 17)
-    pieces = [profile.points_of_roll(0.5 * (profile.form_roll + profile.round_roll) * (1 - t) + profile.round_roll * t)]
-    pieces += [s.points(t) for s in profile.segments if s.name in ("tip_round", "tip")]
-    left = np.concatenate(pieces)
-    made = left[:, 0] + 1j * left[:, 1]
+    pieces = [profile.flank.point(0.5 * (1 + t))]
+    pieces += [s.curve.point(t) for s in profile.segments if s.name in ("tip_round", "tip")]
+    made = np.concatenate(pieces)
     return np.concatenate([made, np.conj(made)])
 
 

@@ -225,7 +225,7 @@ def _half_profile(gear: Gear, recipe: SectorRecipe, *, fine: bool) -> dict[str, 
     size[place > high] = recipe.back
     size[on_flank] = recipe.flank if fine else recipe.back
     if fine:
-        start = low + float(involute.arc_length_at(profile.parameter_of_roll(np.array(recipe.active_start))))
+        start = low + float(involute.arc_length_at(profile.flank.parameter(recipe.active_start)))
         near_start = abs(place - start) <= recipe.strip_length
         near_tip = on_flank & (place >= high - recipe.strip_length)
         size[(near_start & on_flank) | near_tip] = recipe.strip

@@ -347,10 +347,10 @@ def _rolls(law: HalfPlanePair, flank: IntArray, arc: Array) -> Array:
     """Roll lengths (m) at arcs (m) of the flanks `flank`, all of shape (q, 2); not-a-number off the involutes."""
     made = np.full(arc.shape, np.nan)
     for i in np.unique(flank):
-        curve, here = law.curves[i], np.nonzero(flank == i)
-        u = curve.parameter_at(arc[here])
+        face, here = law.teeth.faces[i], np.nonzero(flank == i)
+        u = face.parameter_at(arc[here])
         on = (u >= 0) & (u <= 1)
-        made[tuple(one[on] for one in here)] = curve.face.flank.roll(u[on])
+        made[tuple(one[on] for one in here)] = face.flank.roll(u[on])
     return made
 
 
