@@ -14,7 +14,7 @@ from ..gear.derived import iso_values, single_pair_stretches
 from ..gear.pair import GearPair
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.job import StiffnessJob
-from ..stiffness.periodic import wrapped_phase
+from ..stiffness.periodic import distinct_phases
 from ..stiffness.report import cycle_statistics
 from ..typing import Array, IntArray
 from .style import BLUE, GREEN, GREY, ORANGE, RED, headed, new_figure, save, shades, some_of, tidy
@@ -29,7 +29,8 @@ MOST_LINES = 12
 def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve) -> None:
     """Stiffness along the line of action and load sharing against the pinion angle, two mesh cycles from angle 0."""
     table, pair, cycle = job.table, job.pair, curve.mesh_cycle
-    wrapped, first = np.unique(np.round(wrapped_phase(curve.pinion_angle, cycle), 12), return_index=True)
+    wrapped, source = distinct_phases(curve.pinion_angle, cycle)
+    first = np.unique(source, return_index=True)[1]
     angles = np.concatenate([wrapped, wrapped + cycle, [2 * cycle] if len(wrapped) and wrapped[0] == 0 else []])
     pick = np.concatenate([first, first, first[:1] if len(angles) % 2 else []]).astype(int)
     solved, line = curve.k_mesh[pick], (angles, curve.k_mesh[pick])

@@ -17,9 +17,7 @@ from ..gear.derived import zone
 from ..gear.pair import GearPair
 from ..progress import one_thread
 from ..stiffness.curve import StiffnessCurve
-from ..stiffness.fields import GearField, field_recovery, straight_triangles
-from ..stiffness.fields_output import solved_positions
-from ..stiffness.positions import position_solver
+from ..stiffness.fields import GearField, solved_fields, straight_triangles
 from ..typing import Array, IntArray
 from .style import new_figure, save, write_film
 
@@ -116,11 +114,11 @@ def frames_of(elastic: MeshingPair, curve: StiffnessCurve, count: int) -> list[F
     """Frames of `stress_animation`."""
     angles = np.arange(count) * curve.mesh_cycle / count
     twists = curve.interpolant("twist")(angles).value + curve.lost_motion
-    recovered, solver, place = field_recovery(elastic), position_solver(elastic), zone(elastic.gears, modules=1.5)
+    place = zone(elastic.gears, modules=1.5)
     frames: list[Frame] = []
     with one_thread():
-        for position in solved_positions(solver, angles, twists):
-            parts = [_cut_out(field, place) for field in recovered(position)]
+        for position, fields in solved_fields(elastic, angles, twists):
+            parts = [_cut_out(field, place) for field in fields]
             frames.append(Frame(math.degrees(position.pinion_angle), parts))
             progress.count(len(frames), count, "frames solved")
     return frames

@@ -21,8 +21,9 @@ from ..gear.deviation import ToothDeviations
 from ..gear.pair import GearPair
 from ..progress import Stopwatch, count, one_thread, stage
 from ..stiffness.job import Keep, StiffnessJob
+from ..stiffness.periodic import distinct_phases
 from ..stiffness.positions import HalfPlaneSolver, PositionSolver, at_torques, position_solver
-from ..stiffness.sweep import assembled_curve, distinct_angles, elastic_pair, requested_angles
+from ..stiffness.sweep import assembled_curve, elastic_pair, requested_angles
 from ..tables.loadmap import LoadMapTable
 from ..typing import Array, IntArray
 from .load_map import BACK, LoadMap
@@ -91,7 +92,7 @@ def sweep_loads(
         cycles = solver.law.mesh_cycles if mesh_cycles is None else mesh_cycles
         angles = np.arange(positions * cycles) * pair.mesh_cycle / positions
     requested, finite = requested_angles(pair, angles, ANGLES, kinematics)
-    solved_angles, source = distinct_angles(requested, pair.mesh_cycle * solver.law.mesh_cycles)
+    solved_angles, source = distinct_phases(requested, pair.mesh_cycle * solver.law.mesh_cycles)
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"
         raise InputError("torques", len(goals), problem, "use fewer torques or positions, or state mesh_cycles")

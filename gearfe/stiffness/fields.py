@@ -25,7 +25,7 @@ changed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -41,7 +41,10 @@ from ..contact.position import FlankLoads, Positions
 from ..elasticity import physical_gradients, principal_stresses, stress_rows, triangle_shapes, von_mises
 from ..meshing.whole_gear import WholeGear, whole_gear
 from ..typing import Array, IntArray
+from .positions import position_solver
 
+#: Positions solved side by side.
+SIDE_BY_SIDE = 8
 #: Shares of an elliptic pressure on the panels `EDGES`.
 _SHARES = np.diff(EDGES * np.sqrt(1 - EDGES**2) + np.arcsin(EDGES)) / np.pi
 
@@ -288,6 +291,18 @@ def field_recovery(pair: MeshingPair) -> Callable[[Positions], tuple[GearField, 
     """What gives the fields of pinion and wheel at a converged position."""
     pinion, wheel = (GearRecovery(body) for body in pair.bodies)
     return lambda position: (pinion.at(pair, 0, position), wheel.at(pair, 1, position))
+
+
+def solved_fields(
+    pair: MeshingPair, angles: Array, twists: Array
+) -> Iterator[tuple[Positions, tuple[GearField, GearField]]]:
+    """Positions at pinion angles and twists (rad) with their fields; one that does not converge is left out."""
+    solver, fields = position_solver(pair), field_recovery(pair)
+    for first in range(0, len(angles), SIDE_BY_SIDE):
+        part = slice(first, first + SIDE_BY_SIDE)
+        for position in solver.solve(angles[part], twists[part], kept=np.arange(SIDE_BY_SIDE)):
+            if position.status == "converged":
+                yield position, fields(position)
 
 
 def straight_triangles(triangles: IntArray) -> IntArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,9 @@ from ..output.vtkhdf import VtkHdfSeries
 from ..progress import count, one_thread
 from ..typing import Array, IntArray
 from .curve import StiffnessCurve
-from .fields import FlankPressure, GearField, field_recovery, flank_pressures
-from .positions import PositionSolver, position_solver
+from .fields import FlankPressure, GearField, flank_pressures, solved_fields
 
 GEARS = ("pinion", "wheel")
-#: Positions solved side by side.
-SIDE_BY_SIDE = 8
 
 
 def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) -> IntArray:
@@ -47,14 +44,12 @@ def angle_numbers(known_deg: Array, angles_deg: Sequence[float]) -> IntArray:
     InputError
         For an angle that is none of them.
     """
-    found = []
-    for angle in angles_deg:
-        nearest = int(np.argmin(np.abs(known_deg - angle)))
-        if not abs(known_deg[nearest] - angle) <= 1e-6:
-            problem = f"is none of the sweep's angles; the nearest is {known_deg[nearest]:.6g} deg"
+    found = np.abs(known_deg - np.reshape(angles_deg, (-1, 1))).argmin(axis=1)
+    for angle, nearest in zip(angles_deg, known_deg[found], strict=True):
+        if not abs(nearest - angle) <= 1e-6:
+            problem = f"is none of the sweep's angles; the nearest is {nearest:.6g} deg"
             raise InputError("--fields", angle, problem, "choose one of them, or change --angles")
-        found.append(nearest)
-    return np.array(found, dtype=np.int64)
+    return found
 
 
 def write_fields(
@@ -86,13 +81,12 @@ def write_fields(
     chosen = chosen_positions(curve, angles_deg)
     if len(chosen) == 0:
         return []
-    recovered, solver = field_recovery(elastic), position_solver(elastic)
     worst: tuple[float, Positions, tuple[GearField, GearField]] | None = None
     pressures: list[tuple[float, list[FlankPressure]]] = []
     with VtkHdfSeries(folder / "fields.vtkhdf") as series, one_thread():
         places = curve.pinion_angle[chosen], curve.twist[chosen] + curve.lost_motion
-        for done, position in enumerate(solved_positions(solver, *places), start=1):
-            angle, fields = math.degrees(position.pinion_angle), recovered(position)
+        for done, (position, fields) in enumerate(solved_fields(elastic, *places), start=1):
+            angle = math.degrees(position.pinion_angle)
             pressures.append((angle, flank_pressures(elastic, position)))
             _add(series, angle, fields, first=done == 1)
             peak = max(float(f.von_mises.max()) for f in fields)
@@ -134,15 +128,6 @@ def size_note(elastic: MeshingPair, known_deg: Array, angles_deg: Sequence[float
         f"{text}; less: --fields {known_deg[0]:.6g} ... {known_deg[first - 1]:.6g}, the {first} angles of one mesh "
         f"cycle, take {less:.3g} MB, a single angle {fields_size(elastic, 1) / 1e6:.3g} MB"
     )
-
-
-def solved_positions(solver: PositionSolver, angles: Array, twists: Array) -> Iterator[Positions]:
-    """Positions at pinion angles and twists (rad), a few side by side; one that does not converge is left out."""
-    for first in range(0, len(angles), SIDE_BY_SIDE):
-        part = slice(first, first + SIDE_BY_SIDE)
-        for position in solver.solve(angles[part], twists[part], kept=np.arange(SIDE_BY_SIDE)):
-            if position.status == "converged":
-                yield position
 
 
 def _add(series: VtkHdfSeries, time: float, fields: tuple[GearField, GearField], *, first: bool) -> None:

@@ -111,14 +111,8 @@ def periodic_interpolant(
     if method not in METHODS:
         raise InputError("interpolation", method, "must be one of " + ", ".join(METHODS))
     phase, values = np.asarray(phase, dtype=float), np.asarray(values, dtype=float)
-    wrapped = wrapped_phase(phase, period)
-    known = np.isfinite(values)
-    order = np.flatnonzero(known)[np.argsort(wrapped[known], kind="stable")]
-    nodes = wrapped[order]
-    if len(nodes):
-        starts = np.flatnonzero(np.concatenate([[True], np.diff(nodes) > 1e-9 * period]))
-        order = np.minimum.reduceat(order, starts)
-        nodes = wrapped[order]
+    known = np.flatnonzero(np.isfinite(values))
+    nodes, source = distinct_phases(phase[known], period)
     gaps = np.diff(np.append(nodes, nodes[0] + period)) if len(nodes) else np.array([period])
     k = int(np.argmax(gaps))
     if gaps[k] > widest_gap * period * (1 + 1e-9):
@@ -128,7 +122,7 @@ def periodic_interpolant(
             f"{np.degrees(start + gaps[k]):.6g} deg of a cycle of {np.degrees(period):.6g} deg"
         )
         raise InputError("stiffness curve", None, problem, "ask for angles over a whole cycle, or for smaller steps")
-    at = values[order]
+    at = values[known[np.unique(source, return_index=True)[1]]]
     secant, bends = (np.roll(at, -1) - at) / gaps, np.zeros((2, len(at)))
     slopes = secant
     if method == "cubic":
@@ -138,11 +132,15 @@ def periodic_interpolant(
     return PeriodicInterpolant(period, np.append(nodes, nodes[0] + period), np.stack([at, slopes, *bends], axis=1))
 
 
-def wrapped_phase(phase: Array, period: float) -> Array:
-    """Phases reduced to [0, period); a rounding error below a whole number of periods counts as that number."""
+def distinct_phases(phase: Array, period: float) -> tuple[Array, IntArray]:
+    """Rising phases in [0, period) that differ by more than rounding, and for each given one the number of its own."""
     wrapped = np.mod(phase, period)
     wrapped[wrapped > period * (1 - 1e-9)] = 0.0
-    return wrapped
+    order = np.argsort(wrapped, kind="stable")
+    new = np.diff(wrapped[order], prepend=-period) > 1e-9 * period
+    source = np.empty(len(wrapped), dtype=np.int64)
+    source[order] = np.cumsum(new) - 1
+    return wrapped[order][new], source
 
 
 def _monotone_slopes(intervals: Array, secants: Array) -> Array:

@@ -51,7 +51,7 @@ from ..progress import Stopwatch, one_thread
 from ..typing import Array, BoolArray, IntArray
 from .curve import EDGES, ROUNDED, SINGULAR, SOLVED, StiffnessCurve
 from .curve_error import curve_error
-from .periodic import wrapped_phase
+from .periodic import distinct_phases
 from .positions import (
     PositionSolver,
     at_torques,
@@ -162,7 +162,7 @@ def sweep_stiffness(
         elastic = elastic_pair(pair, model, watch=watch, **changes)
     check_alike(elastic.deviations)
     solved_angles, source = (
-        (requested, np.arange(len(requested))) if solve_all else distinct_angles(requested, pair.mesh_cycle)
+        (requested, np.arange(len(requested))) if solve_all else distinct_phases(requested, pair.mesh_cycle)
     )
     solver = position_solver(elastic)
     if torque is not None:
@@ -213,16 +213,6 @@ def _checked_load(pair: GearPair, twist: float | None, torque: float | None, twi
         problem = f"must be > 0 and < {most:.6g} rad ({math.degrees(most):.6g} deg, half a pitch of the wheel)"
         raise InputError("twist", twist, problem, "0.01 to 0.5 deg is usual")
     return float(twist) + lost
-
-
-def distinct_angles(angles: Array, cycle: float) -> tuple[Array, IntArray]:
-    """Angles within one cycle that have to be solved, and for each asked angle the number of its own."""
-    wrapped = wrapped_phase(angles, cycle)
-    order = np.argsort(wrapped, kind="stable")
-    new = np.concatenate([[True], np.diff(wrapped[order]) > 1e-9 * cycle])
-    source = np.empty(len(angles), dtype=np.int64)
-    source[order] = np.cumsum(new) - 1
-    return wrapped[order][new], source
 
 
 def assembled_curve(
