@@ -6,17 +6,13 @@ import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..config import check_range
 from ..progress import announce
 from ..tables.pair import StiffnessTable, check_law
 from .arguments import add_job, add_keys, add_removed, check_option, number, with_keys
 from .common import add_folder, print_results
-
-if TYPE_CHECKING:
-    from ..stiffness.job import StiffnessJob
-
 
 #: Keys of the [stiffness] table that options stand for, beside the load and the angles.
 KEYS = (
@@ -73,7 +69,10 @@ def run(args: argparse.Namespace) -> int:
     # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness", "microgeometry"))
     tables["stiffness"] = overridden(tables.get("stiffness", StiffnessTable()), args)
-    chosen = _field_angles(args.fields or [])
+    given = args.fields or []
+    chosen = [value for value in given if value != "all"] or None  # pinion angles (deg); None: all
+    if chosen and len(chosen) < len(given):
+        raise InputError("--fields", given, "must be 'all' or pinion angles (deg), not both")
     if args.animation is not None and not 2 <= args.animation <= 1000:
         raise InputError("--animation", args.animation, "must be >= 2 and <= 1000 frames", "40 are usual")
 
@@ -111,7 +110,16 @@ def run(args: argparse.Namespace) -> int:
             curve.to_csv(made / "stiffness.csv")
         if args.fields is not None:
             with watch.stage("fields"):
-                _fields(made, job, elastic, curve, chosen, args.range)
+                from ..figures.stiffness import pressure_figure
+                from ..figures.stress import stress_figure
+                from ..stiffness.fields_output import write_fields
+
+                def draw(position: Any, fields: Any) -> None:
+                    stress_figure(made, job.pair, position, fields, args.range)
+
+                pressures = write_fields(made, elastic, curve, chosen, draw=draw)
+                if pressures:
+                    pressure_figure(made / "pressure.png", job.pair, pressures)
         if args.animation is not None:
             with watch.stage("animation"):
                 from ..figures.stress import stress_animation
@@ -130,34 +138,9 @@ def run(args: argparse.Namespace) -> int:
     return 1 if curve.failed.any() else 0
 
 
-def _fields(
-    folder: Path, job: StiffnessJob, elastic: Any, curve: Any, angles_deg: list[float] | None, most: float | None
-) -> None:
-    from ..figures.stiffness import pressure_figure
-    from ..figures.stress import stress_figure
-    from ..stiffness.fields_output import write_fields
-
-    def draw(position: Any, fields: Any) -> None:
-        stress_figure(folder, job.pair, position, fields, most)
-
-    pressures = write_fields(folder, elastic, curve, angles_deg, draw=draw)
-    if pressures:
-        pressure_figure(folder / "pressure.png", job.pair, pressures)
-
-
 def field_angle(text: str) -> str | float:
     """A value of ``--fields``: all, or a pinion angle (deg)."""
     return text if text == "all" else float(text)
-
-
-def _field_angles(given: list[str | float]) -> list[float] | None:
-    """Angles of the fields (deg); None: all."""
-    from ..errors import InputError
-
-    angles = [value for value in given if not isinstance(value, str)]
-    if angles and len(angles) < len(given):
-        raise InputError("--fields", given, "must be 'all' or pinion angles (deg), not both")
-    return angles or None
 
 
 def overridden(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:

@@ -170,11 +170,8 @@ def sweep_stiffness(
     with watch.stage("unloaded flanks"):
         solver.touching(solved_angles)
     with watch.stage("positions"), one_thread():
-        if torque is None:
-            solved = at_twists(solver, solved_angles, np.full(len(solved_angles), load), finite=finite)
-        else:
-            goals = np.full(len(solved_angles), load)
-            solved = at_torques(solver, solved_angles, goals, finite=finite)
+        solve = at_twists if torque is None else at_torques
+        solved = solve(solver, solved_angles, np.full(len(solved_angles), load), finite=finite)
     curve, _ = assembled_curve(solver, requested, source, solved, searched=torque is not None)
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
