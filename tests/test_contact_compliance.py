@@ -6,10 +6,11 @@ from scipy.sparse import coo_matrix, csc_matrix
 from scipy.sparse.linalg import splu, spsolve
 
 from gearfe.contact.compliance import GearBody
-from gearfe.contact.dissection import condense
 from gearfe.contact.flank import flank_of, normal_stress_rows
 from gearfe.elasticity import element_stiffness
 from gearfe.meshing.whole_gear import whole_gear
+from gearfe.multifrontal import condense
+from gearfe.reduction.sparse_solver import factorize
 
 from .contact_cases import IRON, STEEL, WIDTH, bodies, meshes
 
@@ -54,6 +55,28 @@ def test_dissection_is_the_schur_complement_of_a_sparse_solve() -> None:
     for few in (drop[:2], drop[-3:], np.append(drop[:1], found.retained[:2])):  # forms that look into few fronts
         form = found.on_retained(np.ones((1, len(few))), few[None])
         np.testing.assert_allclose(form @ values, field[few].sum(axis=0)[None], rtol=0, atol=1e-12)
+
+
+def test_fronts_of_elements_and_of_the_sparse_matrix_solve_alike() -> None:
+    """Nothing retained: bisection of the elements and the elimination tree of METIS' order are two ways to fronts."""
+    mesh = meshes("modified", COARSE)[1]
+    fixed, corners = np.unique(mesh.boundaries["bore"]), mesh.points[mesh.triangles]
+    found = condense(
+        mesh.triangles,
+        element_stiffness(corners, STEEL, "stress", WIDTH),
+        corners[:, :3].mean(axis=1),
+        nodes=len(mesh.points),
+        retained=np.zeros(0, dtype=np.int64),
+        fixed=fixed,
+    )
+    free = np.setdiff1d(np.arange(2 * len(mesh.points)), _unknowns(fixed))
+    np.testing.assert_array_equal(np.sort(found.order), free)
+    loads = np.random.default_rng(4).normal(size=(2 * len(mesh.points), 2))
+    other = factorize(_sparse(mesh.points, mesh.triangles, STEEL, "stress")[free][:, free], block=2)
+    expected = other.solve(loads[free])
+    field = found.solve(loads)
+    np.testing.assert_allclose(field[free], expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+    assert (field[_unknowns(fixed)] == 0).all()
 
 
 @pytest.mark.parametrize("gear", [0, 1])

@@ -11,8 +11,7 @@ from scipy import sparse
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
 from gearfe.reduction.lanczos import lowest_modes
-from gearfe.reduction.multifrontal import multifrontal
-from gearfe.reduction.sparse_solver import elimination_order, factorize, node_graph
+from gearfe.reduction.sparse_solver import elimination_order, factorize, multifrontal, node_graph
 from gearfe.solid import assemble
 from tests.housing_meshes import box
 

@@ -31,8 +31,8 @@ from ..errors import InputError
 from ..gear.deviation import ToothDeviations
 from ..gear.pair import GearPair
 from ..meshing.tooth_sector import SectorMesh
+from ..multifrontal import Factor, condense
 from ..typing import Array, IntArray
-from .dissection import Condensed, condense
 from .flank import Flank, flank_of, normal_stress_rows
 from .laws import DEFAULT_MODEL, ContactLaw, PairModel
 from .position import FlankLoads
@@ -74,7 +74,7 @@ class GearBody:
     coupling: Array
     stress_own: Array
     stress_interface: Array
-    condensed: Condensed
+    condensed: Factor
     width: float
 
     @property

@@ -37,11 +37,11 @@ import numpy as np
 from scipy import sparse
 
 from ..errors import InputError
+from ..multifrontal import Factor
 from ..progress import one_thread, stage
 from ..typing import Array, IntArray
 from .lanczos import lowest_modes
 from .modal_body import Reduction
-from .multifrontal import MultifrontalFactor
 from .sparse_solver import factorize
 
 #: Part of its own size below which a correction vector counts as contained in the others.
@@ -174,9 +174,7 @@ def reduce_model(
     )
 
 
-def _corrections(
-    factor: MultifrontalFactor, m_ii: Any, modes: Array, coupling: Array, levels: int
-) -> tuple[Array, Array]:
+def _corrections(factor: Factor, m_ii: Any, modes: Array, coupling: Array, levels: int) -> tuple[Array, Array]:
     """M-orthonormal correction vectors, and ``V^T M K^-1 M V`` of the last level's.
 
     ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. Without corrections ``X_1^T b`` comes second.

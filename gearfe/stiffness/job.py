@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ..tables.microgeometry import MicrogeometryTable
 
 #: Rooms and modules whose text decides a curve.
-ROOMS = ("elasticity", "contact", "gear", "meshing", "stiffness")
+ROOMS = ("elasticity", "multifrontal", "contact", "gear", "meshing", "stiffness")
 #: Gives what a function makes, or what was made under that name before.
 Keep = Callable[[str, Callable[[], Any]], Any]
 
