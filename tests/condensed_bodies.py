@@ -17,6 +17,7 @@ from gearfe.contact.flank import flank_of, normal_stress_rows
 from gearfe.contact.laws import ContactLaw, PairModel
 from gearfe.contact.position import FlankLoads, Positions
 
+from .solving import given_positions
 from .verification.bodies import Bodies, ElasticBody
 
 Array = NDArray[Any]
@@ -102,4 +103,4 @@ def pressed(pair: MeshingPair, low: float, high: float, pressure: Callable[[Arra
         load = np.where((low < x) & (x < high), pressure(x), 0.0) * np.abs(np.gradient(x)) * pair.width
         force = (2 * gear - 1) * np.stack([0 * load, load], axis=1) @ axes
         loads.append(FlankLoads(zero, zero + tooth, force.reshape(1, -1), force.reshape(1, -1)))
-    return solve_elements(pair, np.zeros(1), np.zeros(1), tuple(loads))[0]
+    return solve_elements(pair, given_positions(np.zeros(1), tuple(loads)))[0]

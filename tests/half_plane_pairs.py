@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair
-from gearfe.contact.half_plane_result import PairContacts
+from gearfe.contact.position import Contacts
 from gearfe.gear.pair import GearPair, TipRelief
 from gearfe.stiffness.sweep import elastic_pair, marks_met
 
@@ -38,7 +38,7 @@ def angles_of(pair: GearPair, count: int) -> np.ndarray:
     return (np.arange(count) + 0.37) * pair.mesh_cycle / count
 
 
-def reached_marks(law: HalfPlanePair, contacts: PairContacts) -> NDArray[np.str_]:
+def reached_marks(law: HalfPlanePair, contacts: Contacts) -> NDArray[np.str_]:
     """The highest of the marks that the pressure of each contact reaches, or nothing, shape (m,).
 
     A pressure ends within a panel beside the middle of its last one.

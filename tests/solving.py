@@ -7,7 +7,7 @@ import numpy as np
 from gearfe.contact.compliance import MeshingPair
 from gearfe.contact.elements import solve_elements
 from gearfe.contact.laws import HalfPlane
-from gearfe.contact.position import Positions
+from gearfe.contact.position import STATUS, TORQUES, Contacts, FlankLoads, Positions
 from gearfe.stiffness.positions import position_solver
 
 
@@ -17,8 +17,25 @@ def solve_positions(elastic: MeshingPair, angles, twists) -> Positions:
     solver, twists = position_solver(elastic), np.broadcast_to(twists, angles.shape)
     if isinstance(elastic.law, HalfPlane):
         return solver.solve(angles, twists, kept=np.arange(len(angles)))
-    return solve_elements(
-        elastic, angles, twists, solver.half_plane.solve(angles, twists, np.arange(len(angles))).loads
+    return solve_elements(elastic, solver.half_plane.solve(angles, twists, np.arange(len(angles))))
+
+
+def given_positions(twists, loads: tuple[FlankLoads, ...] = ()) -> Positions:
+    """Positions at pinion angle 0 that count as solved, without numbers and contacts."""
+    n, none, panels = len(twists), np.zeros(0), np.zeros((0, 0))
+    pairs = np.zeros((0, 2))
+    contacts = Contacts(
+        np.zeros(0, int), np.zeros(0, int), none, none, none + 0j, none + 0j, pairs, none, none, none, none, pairs,
+        panels, panels, panels, np.zeros((0, 2, 0)),
+    )  # fmt: skip
+    return Positions(
+        pinion_angle=np.zeros(n),
+        twist=twists,
+        status=np.full(n, "converged", dtype=STATUS),
+        **dict.fromkeys((*TORQUES, "energy"), np.full(n, np.nan)),
+        iterations=np.zeros(n, int),
+        contacts=contacts,
+        loads=loads,
     )
 
 

@@ -148,9 +148,10 @@ for step in range(2):
 
 
 def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatch):
-    def weak(pair, angles, twists, first):
-        made = solve_elements(pair, angles, twists, first)
-        return made.with_status(np.where(np.abs(angles - math.radians(4)) < 1e-9, "not_converged", made.status))
+    def weak(pair, first):
+        made = solve_elements(pair, first)
+        bad = np.abs(made.pinion_angle - math.radians(4)) < 1e-9
+        return made.with_status(np.where(bad, "not_converged", made.status))
 
     monkeypatch.setattr("gearfe.stiffness.positions.solve_elements", weak)
     code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.3", *QUICK, "--law", "nitsche"])
@@ -339,9 +340,9 @@ def test_the_estimate_reaches_beyond_the_coarsest_mesh(tmp_path, capsys):
 def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
     """Angles are sorted; one without a solution is left out of the series, and the table has its status."""
 
-    def one_fails(pair, angles, twists, first):
-        made = solve_elements(pair, angles, twists, first)
-        bad = np.isclose(np.degrees(angles), 6.0)
+    def one_fails(pair, first):
+        made = solve_elements(pair, first)
+        bad = np.isclose(np.degrees(made.pinion_angle), 6.0)
         return made.with_status(np.where(bad, "not_converged", made.status))
 
     monkeypatch.setattr("gearfe.stiffness.positions.solve_elements", one_fails)

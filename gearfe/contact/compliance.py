@@ -30,12 +30,13 @@ from ..elasticity import Material, Plane, element_stiffness
 from ..errors import InputError
 from ..gear.deviation import ToothDeviations
 from ..gear.pair import GearPair
+from ..gear.touching import WAY
 from ..meshing.tooth_sector import SectorMesh
 from ..multifrontal import Factor, condense
 from ..typing import Array, IntArray
-from .flank import Flank, flank_of, normal_stress_rows
+from .flank import Flank, edge_shapes, flank_of, normal_stress_rows
 from .laws import DEFAULT_MODEL, ContactLaw, PairModel
-from .position import FlankLoads
+from .position import Contacts, FlankLoads, PointPressures
 
 
 @dataclass(frozen=True)
@@ -270,3 +271,57 @@ def sector_displacements(
                 np.add.at(flank, of[here], force[load[here]] @ body.own)
         parts.append(np.concatenate([flank + sides @ body.interface.T, sides], axis=1))
     return body.condensed.recover(np.concatenate(parts).T).reshape(-1, 2, sum(len(part) for part in parts))
+
+
+def flank_loads(
+    elastic: MeshingPair, contacts: Contacts, angles: Array, twists: Array
+) -> tuple[FlankLoads, FlankLoads]:
+    """Loads on the flanks of pinion and wheel: for fields, root stress and finite strain.
+
+    They are the consistent ones of the pressures on the panels, at their places on the deformed flanks and along the
+    common normal. Displacements recovered from them are those of the teeth; nearer to a contact than an element or two
+    they show what the coarse flank makes of the pressure. Stresses there: `gearfe.stiffness.fields`.
+
+    Parameters
+    ----------
+    contacts
+        m loaded pairs.
+    angles, twists : ndarray, shape (n,)
+        Pinion angles and twists from the centred position (rad) of the positions that they are of.
+    """
+    place = angles[contacts.position], twists[contacts.position]
+    made = []
+    for g, tooth in enumerate((contacts.pair, -1 - contacts.pair)):
+        shares, moved = _nodal(elastic.bodies[g].flank, contacts, g)
+        along = (2 * g - 1) * contacts.normal * np.exp(-1j * elastic.tooth_angle(g, tooth, *place))
+        # the wheel's axes turn on with the twist
+        rate = contacts.force_rate + 1j * (contacts.normal_rate - g) * contacts.force
+        force = (contacts.force * along)[:, None] * shares
+        change = along[:, None] * (rate[:, None] * shares + contacts.force[:, None] * moved)
+        made.append(FlankLoads(contacts.position, tooth, force.view(float), change.view(float)))
+    return made[0], made[1]
+
+
+def panel_pressures(elastic: MeshingPair, contacts: Contacts) -> PointPressures:
+    """Pressures on the panels of loaded pairs, at their places on both flanks."""
+    places = [np.add(*body.flank.place(contacts.panel_arc[:, g])) for g, body in enumerate(elastic.bodies)]
+    place, panels = np.stack(places, axis=1), contacts.pressure.shape[1]  # (m, 2, n)
+    position, pair = (np.repeat(one, 2 * panels) for one in (contacts.position, contacts.pair))
+    gear = np.tile(np.repeat([0, 1], panels), len(contacts))
+    return PointPressures(position, gear, pair, place.ravel(), np.repeat(contacts.pressure, 2, axis=0).ravel())
+
+
+def _nodal(flank: Flank, contacts: Contacts, gear: int) -> tuple[Array, Array]:
+    """Of each pair the shares of the force on the nodes of the flank, which add up to 1, and their rates with the twist
+    (1/rad) as the pressure moves along the flank and widens, both of shape (m, nodes).
+    """
+    load = contacts.pressure * contacts.width
+    edge, xi = flank.place(contacts.panel_arc[:, gear])
+    value, slope, _ = edge_shapes(xi)
+    share = load / load.sum(axis=1, keepdims=True)
+    moves = contacts.arc_rate[:, gear, None] + WAY[gear] * contacts.x * contacts.growth[:, None]
+    shape = len(load), len(flank.nodes)
+    at = (np.arange(shape[0])[:, None] * shape[1] + 2 * edge)[:, :, None] + np.arange(3)
+    weights = value * share[:, :, None], slope * (moves / flank.sizes[edge] * share)[:, :, None]
+    shares, moved = (np.bincount(at.ravel(), w.ravel(), shape[0] * shape[1]).reshape(shape) for w in weights)
+    return shares, moved

@@ -7,6 +7,7 @@ pieces of mesh in which the contact is solved, and Newton's method starts there.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .element_batch import Batch, batch_of
 from .element_newton import Equations, State, first_state, solve
-from .position import Contacts, FlankLoads, PointPressures, Positions, no_contact, of_positions
+from .position import Contacts, FlankLoads, PointPressures, Positions, taken
 
 #: What the twist is ahead for derivatives, as a share of the gears' deformation.
 AHEAD = 1e-4
@@ -25,26 +26,24 @@ REACHES = ((0.2, 2), (1.0, 6))
 SIDE_BY_SIDE = 16
 
 
-def solve_elements(elastic: MeshingPair, angles: Array, twists: Array, loads: tuple[FlankLoads, ...]) -> Positions:
+def solve_elements(elastic: MeshingPair, expected: Positions) -> Positions:
     """Solve the contact of several positions on the mesh.
 
     Parameters
     ----------
-    angles, twists : ndarray, shape (n,)
-        Pinion angles and twists (rad).
-    loads
-        On the flanks of pinion and wheel, to start from: row by row they face each other. Positions without any have
-        ``no_contact``.
+    expected
+        Solutions to start from, with loads: row by row those of pinion and wheel face each other. Those that have not
+        converged stay as they are.
     """
-    made = no_contact(angles, twists, [len(body.own) for body in elastic.bodies])
-    pinion, wheel = (_of_teeth(one) for one in loads)
-    open_ = np.unique(pinion.position)
+    made = expected = replace(expected, contacts=expected.contacts.without_panels())
+    open_ = np.flatnonzero(expected.status == "converged")
     for reach in REACHES:
         for start in range(0, len(open_), SIDE_BY_SIDE):
             chosen = open_[start : start + SIDE_BY_SIDE]
-            first = of_positions(pinion, chosen), of_positions(wheel, chosen)
-            batch, forces = batch_of(elastic, first, angles[chosen], twists[chosen], reach)
-            made = made.replaced(chosen, _positions(batch, first_state(batch, forces), made.take(chosen)))
+            places = expected.take(chosen)
+            pinion, wheel = (_of_teeth(one) for one in places.loads)
+            batch, forces = batch_of(elastic, (pinion, wheel), places.pinion_angle, places.twist, reach)
+            made = made.replaced(chosen, _positions(batch, first_state(batch, forces), places))
         open_ = open_[made.status[open_] == "not_converged"]
     return made
 
@@ -72,23 +71,21 @@ def _at_rims(batch: Batch, state: State) -> BoolArray:
 def _positions(batch: Batch, start: State, places: Positions) -> Positions:
     """The solved positions, with derivatives by the same equations at a slightly larger twist."""
     equations: dict[int, Equations] = {}
-    here, of = solve(batch, start, batch.turn, equations), batch.node_position
-    one, of_windows = _torques(batch, here, batch.turn)
-    work = np.bincount(of, (here.forces.conj() * here.displacement).real, batch.size)
+    here = solve(batch, start, batch.turn, equations)
+    one, contacts = _felt(batch, here, batch.turn)
+    work = np.bincount(batch.node_position, (here.forces.conj() * here.displacement).real, batch.size)
     ahead = AHEAD * np.divide(work, one["torque_wheel"], out=np.ones(batch.size), where=one["torque_wheel"] > 0)
     turn = batch.turn * np.exp(1j * batch.gear * ahead[batch.position])
     there = solve(batch, here, turn, equations)
-    tangent = (_torques(batch, there, turn)[0]["torque_wheel"] - one["torque_wheel"]) / ahead
-    pinion, wheel = (np.flatnonzero(batch.gear == g) for g in (0, 1))
-    x = batch.slaves(batch.placed(here.displacement, batch.turn), np.arange(len(batch.owner)))
-    load = batch.weight * np.maximum(here.pressure, 0.0)
-    widths = half_widths(batch.owner % len(wheel), x, load, len(wheel))
+    two, later = _felt(batch, there, turn)
+    tangent = (two["torque_wheel"] - one["torque_wheel"]) / ahead
+    contacts = contacts.with_rates(later, ahead[contacts.position])
     solved = here.converged & there.converged & (tangent > 0) & ~_at_rims(batch, here)
     made = replace(
         places,
         iterations=here.iterations,
-        contacts=Contacts(batch.position[wheel], batch.tooth[pinion], of_windows[wheel], widths),
-        loads=tuple(_loads(batch, own, here, there, ahead) for own in (pinion, wheel)),
+        contacts=taken(contacts, contacts.force > 0),
+        loads=tuple(_loads(batch, np.flatnonzero(batch.gear == g), here, there, ahead) for g in (0, 1)),
         points=_points(batch, here),
         tangent=tangent,
         energy=0.5 * work,
@@ -107,16 +104,21 @@ def _loads(batch: Batch, windows: IntArray, here: State, there: State, ahead: Ar
     return FlankLoads(batch.position[windows], batch.tooth[windows], *made.view(float))
 
 
+def _places(batch: Batch, state: State) -> Array:
+    """Places of all contact points on the flanks of pinion and wheel, shape (2, q): edge number plus place in it."""
+    own, mate = batch.owner, batch.mate[batch.owner]
+    on_own, on_mate = batch.slave_place + batch.first_edge[own], state.place + batch.first_edge[mate]
+    return np.where(batch.gear[own] == np.array([[0], [1]]), on_own, on_mate)
+
+
 def _points(batch: Batch, state: State) -> PointPressures:
     """Pressures on every loaded flank, by its own contact points or by those of its mate."""
-    facing = batch.mate[batch.owner]
-    mates = np.flatnonzero(~np.isin(facing, batch.owner))
-    window = np.concatenate([batch.owner, facing[mates]])
-    place = np.concatenate([batch.slave_place, state.place[mates]]) + batch.first_edge[window]
-    pressure = np.maximum(np.concatenate([state.pressure, state.pressure[mates]]), 0.0)
-    pair, gear = batch.tooth[window % (len(batch.gear) // 2)], batch.gear[window]
-    order = np.argsort(batch.position[window], kind="stable")
-    return PointPressures(batch.position[window][order], gear[order], pair[order], place[order], pressure[order])
+    alone = ~np.isin(batch.mate[batch.owner], batch.owner)
+    gear, k = np.nonzero((batch.gear[batch.owner] == np.array([[0], [1]])) | alone)
+    order = np.argsort(batch.at[k], kind="stable")
+    gear, k = gear[order], k[order]
+    pair, place = batch.tooth[batch.owner[k] % (len(batch.gear) // 2)], _places(batch, state)[gear, k]
+    return PointPressures(batch.at[k], gear, pair, place, np.maximum(state.pressure[k], 0.0))
 
 
 def half_widths(pair: IntArray, place: ComplexArray, load: Array, count: int) -> Array:
@@ -132,30 +134,54 @@ def half_widths(pair: IntArray, place: ComplexArray, load: Array, count: int) ->
         Of each point the contact, the place (m), and pressure times area (N). The contact is nearly straight, so the
         largest principal variance is that along it.
     """
-    total = np.bincount(pair, load, count)
-    total = np.where(total > 0, total, np.nan)
-
-    def mean(values: Array) -> Array:
-        return np.bincount(pair, load * values, count) / total
-
-    off = place - (mean(place.real) + 1j * mean(place.imag))[pair]
+    off = place - _means(pair, place, load, count)[pair]
     square = off * off  # its mean's size is the difference of the principal variances, the mean of |off|^2 their sum
-    return np.sqrt(2 * (mean(np.abs(square)) + np.abs(mean(square.real) + 1j * mean(square.imag))))
+    sums = np.abs(_means(pair, np.abs(square), load, count)) + np.abs(_means(pair, square, load, count))
+    return np.asarray(np.sqrt(2 * sums))
 
 
-def _torques(batch: Batch, state: State, turn: ComplexArray) -> tuple[dict[str, Array], Array]:
-    """Moments that the hubs need (N m): shape (B,), and of each window about its own hub, shape (W,)."""
-    hub = (batch.gear * batch.elastic.centre_distance)[batch.window]
-    force, wheel = turn[batch.window] * state.forces, batch.gear[batch.window] == 1
-    placed, still = (batch.placed(u, turn) - hub for u in (state.displacement, np.zeros_like(force)))
-    moment, reaction = (-(arm.conj() * force).imag for arm in (placed, still))
+def _means(pair: IntArray, values: Any, load: Array, count: int) -> Any:
+    """Means of values at points by their loads, shape (count,)."""
+    total, real, imag = (np.bincount(pair, load * part, count) for part in (1.0, values.real, values.imag))
+    with np.errstate(invalid="ignore"):
+        return (real + 1j * imag) / total
 
-    def total(values: Array, chosen: BoolArray) -> Array:
-        return np.bincount(batch.node_position, np.where(chosen, values, 0.0), batch.size)
+
+def _felt(batch: Batch, state: State, turn: ComplexArray) -> tuple[dict[str, Array], Contacts]:
+    """Moments that the hubs need (N m), shape (B,), and the contact of each tooth pair, without its rates."""
+    pairs, gear = len(batch.gear) // 2, batch.gear[batch.window]
+    force, hub = turn[batch.window] * state.forces, gear * batch.elastic.centre_distance
+    placed, still = (batch.placed(u, turn) for u in (state.displacement, np.zeros_like(force)))
+    moment, reaction = (-((places - hub).conj() * force).imag for places in (placed, still))
+
+    def total(values: Array, g: int) -> Array:
+        return np.bincount(batch.node_position, np.where(gear == g, values, 0.0), batch.size)
 
     torques = {
-        "torque_wheel": total(moment, wheel),
-        "torque_pinion": total(moment, ~wheel),
-        "torque_wheel_reaction": total(reaction, wheel),
+        "torque_wheel": total(moment, 1),
+        "torque_pinion": total(moment, 0),
+        "torque_wheel_reaction": total(reaction, 1),
     }
-    return torques, np.bincount(batch.window, moment, len(batch.gear))
+    on_wheel, x, y = (np.bincount(batch.window, v, 2 * pairs)[pairs:] for v in (moment, force.real, force.imag))
+    pair, load = batch.owner % pairs, batch.weight * np.maximum(state.pressure, 0.0)
+    at = batch.slaves(placed, np.arange(len(batch.owner)))
+    arcs = [body.flank.arc(own) for body, own in zip(batch.elastic.bodies, _places(batch, state), strict=True)]
+    size, unknown, none = np.hypot(x, y), np.full(pairs, np.nan), np.zeros((pairs, 0))
+    return torques, Contacts(
+        position=batch.position[pairs:],
+        pair=batch.tooth[:pairs],
+        force=size,
+        torque_wheel=on_wheel,
+        point=_means(pair, at, load, pairs),
+        normal=np.exp(1j * np.arctan2(y, x)),
+        arc=np.stack([_means(pair, arc, load, pairs).real for arc in arcs], axis=1),
+        half_width=half_widths(pair, at, load, pairs),
+        force_rate=unknown,
+        normal_rate=unknown,
+        growth=unknown,
+        arc_rate=np.full((pairs, 2), np.nan),
+        x=none,
+        width=none,
+        pressure=none,
+        panel_arc=np.zeros((pairs, 2, 0)),
+    )

@@ -76,6 +76,10 @@ class Flank:
         edge = np.clip(np.searchsorted(self.ends, arc, side="right") - 1, 0, self.edges - 1)
         return edge, np.clip((arc - self.ends[edge]) / self.sizes[edge], 0.0, 1.0)
 
+    def arc(self, place: Array) -> Array:
+        """Arc lengths (m) at places: edge numbers plus positions in them."""
+        return np.interp(place, np.arange(self.edges + 1), self.ends)
+
 
 def flank_of(mesh: SectorMesh, points_per_edge: int) -> Flank:
     """Contact surface of a meshed tooth with a Gauss-Legendre rule on each edge."""

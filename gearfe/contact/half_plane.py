@@ -41,13 +41,12 @@ from numpy.typing import ArrayLike
 from ..gear.touching import Touching
 from ..typing import Array, BoolArray, IntArray
 from .half_plane_pair import HalfPlanePair, half_plane_pair
-from .half_plane_result import PairContacts, contacts_of, moment_on_wheel, position_sums
-from .half_plane_step import SMALL, WINDOW, Setting, State, reference_approach, smooth_influence, step
+from .half_plane_step import SMALL, WINDOW, Setting, State, Step, cross, reference_approach, smooth_influence, step
 from .panels import PANELS, Couplings, unilateral
-from .position import STATUS, TORQUES, Positions, joined, of_positions, taken, together
+from .position import STATUS, TORQUES, Contacts, Positions, joined, of_positions, taken, together
 from .zones import completed
 
-__all__ = ["HalfPlanePair", "PairContacts", "half_plane_pair", "solve_half_plane"]
+__all__ = ["HalfPlanePair", "half_plane_pair", "solve_half_plane"]
 
 #: Positions solved side by side: their matrices hold some megabytes; larger ones cost the system more than calls do.
 BATCH = 40
@@ -202,7 +201,7 @@ def _joined(parts: Sequence[tuple[Setting, State]]) -> tuple[Setting, State]:
 def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> Positions:
     status, iterations = np.full(len(angles), "no_contact", dtype=STATUS), np.zeros(len(angles), dtype=np.int64)
     numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in (*TORQUES, "energy")}
-    solved: list[PairContacts] = []
+    solved: list[Contacts] = []
     open_ = first_state(law, twists, found)  # positions to be solved
     for _ in range(ROUNDS):
         near, open_ = _approached(*open_, iterations)
@@ -243,7 +242,7 @@ def _approached(setting: Setting, state: State, iterations: IntArray) -> tuple[t
 
 def _finished(
     setting: Setting, start: State, twists: Array, solved: dict[str, Array]
-) -> tuple[PairContacts, tuple[Setting, State]]:
+) -> tuple[Contacts, tuple[Setting, State]]:
     """Last steps of positions that are near their solution, there and at a slightly larger twist.
 
     Windows and bearing panels are held, so that the differences are derivatives. Writes the numbers of those that are
@@ -260,18 +259,55 @@ def _finished(
     for _ in range(HELD_STEPS):
         state, made = after, step(both, after, search=False, held=True)
         after = made.next
-    here, on = slice(0, len(found)), slice(len(found), None)
-    one, two = ((taken(state, part), taken(made, part)) for part in (here, on))
-    sums, moment = position_sums(setting, *one), couples.total(moment_on_wheel(setting.law, *two))
-    sums["tangent"] = (moment - sums["torque_wheel"]) / ahead
+    parts = slice(0, len(found)), slice(len(found), None)
+    one, two = ((taken(state, part), taken(made, part)) for part in parts)
+    here, there = (_contacts(setting, *at) for at in (one, two))
+    sums = _sums(setting, here, one[1].energy)
+    sums["tangent"] = (couples.total(there.torque_wheel) - sums["torque_wheel"]) / ahead
     settled = (couples.total(~one[1].settled | (one[1].changed > TOLERANCE)) == 0) & (sums["tangent"] > 0)
     now, whole, lacking = completed(setting, *one)
     rest = _joined([_kept(setting, one[1].next, ~settled & ~lacking), _kept(now, whole, lacking)])
     settled &= ~lacking
     for name, values in sums.items():
         solved[name][numbers[settled]] = values[settled]
-    contacts = contacts_of(setting, one, two, ahead[couples.position])
+    contacts = here.with_rates(there, ahead[couples.position])
     return taken(contacts, (contacts.force > 0) & settled[couples.position]), rest
+
+
+def _contacts(setting: Setting, state: State, made: Step) -> Contacts:
+    """All contacts of a step, also those without load; their rates are not known yet."""
+    law, one = setting.law, made.next
+    force, unknown = one.force * law.width, np.full(len(one.force), np.nan)
+    return Contacts(
+        position=setting.found.position,
+        pair=setting.found.pair,
+        force=force,
+        torque_wheel=-force * cross(one.centre - law.hub[1], state.normal),
+        point=one.centre,
+        normal=state.normal,
+        arc=one.arc,
+        half_width=2 * np.sqrt(one.variance),
+        force_rate=unknown,
+        normal_rate=unknown,
+        growth=unknown,
+        arc_rate=np.full_like(one.arc, np.nan),
+        x=made.x - made.place[:, None],
+        width=made.width,
+        pressure=made.pressure,
+        panel_arc=made.arcs,
+    )
+
+
+def _sums(setting: Setting, contacts: Contacts, energy: Array) -> dict[str, Array]:
+    """Torques (N m) and energies (J) of the positions, shape (m,), from energies of contacts per width (J/m)."""
+    couples, force, normal = setting.couples, contacts.force, contacts.normal
+    wheel = setting.tables.at(contacts.arc[:, :, None])[0][:, 1, 0] * setting.turn[:, 1]
+    return {
+        "torque_wheel": couples.total(contacts.torque_wheel),
+        "torque_pinion": couples.total(force * cross(contacts.point, normal)),
+        "torque_wheel_reaction": couples.total(-force * cross(wheel, normal)),
+        "energy": couples.total(energy * setting.law.width),
+    }
 
 
 def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array) -> tuple[Array, IntArray, Array]:

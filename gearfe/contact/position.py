@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..typing import Array, BoolArray, Dataclass, IntArray
+from ..typing import Array, BoolArray, ComplexArray, Dataclass, IntArray
 
 
 @cache
@@ -53,28 +53,85 @@ def ranges(starts: IntArray, lengths: IntArray) -> IntArray:
 
 @dataclass(frozen=True)
 class Contacts:
-    """Loaded tooth pairs of laws on the mesh, m of them; the half-plane law says more of its `PairContacts`, in which a
-    tooth pair may have several contacts.
+    """Loaded contacts, m of them over all positions, by position, pair number and place on the pinion's flank.
+
+    By the half-plane law a tooth pair has one for each stretch of its flanks on which it bears; by laws on the mesh it
+    has one, without panels.
 
     Attributes
     ----------
-    position, pair : ndarray, shape (m,)
-        Number of the position, and of the pair: pair k joins pinion tooth k and wheel tooth -1 - k.
+    position : ndarray, shape (m,)
+        Number of the position.
+    pair : ndarray, shape (m,)
+        Pair number k: pinion tooth k, wheel tooth -1 - k.
+    force : ndarray, shape (m,)
+        Contact force on the whole width (N).
     torque_wheel : ndarray, shape (m,)
-        Share in the position's `torque_wheel` (N m).
+        Moment of the force about the wheel's hub (N m), at the deformed place: share in the position's `torque_wheel`.
+    point, normal : ndarray of complex, shape (m,)
+        Centre of pressure (m) and direction of the force on the wheel, global axes.
+    arc : ndarray, shape (m, 2)
+        The material there on pinion and wheel: arc length from the start of the working flank (m).
     half_width : ndarray, shape (m,)
-        By the second moment of the pressure (m), see `gearfe.contact.elements.half_widths`.
+        b = 2 sqrt(variance of the pressure about its mean) (m): Hertz's where the pressure is elliptic.
+    force_rate, normal_rate, growth : ndarray, shape (m,)
+        d force/d twist (N/rad), the normal's rotation per twist (-), and d ln b/d twist (1/rad).
+    arc_rate : ndarray, shape (m, 2)
+        d arc/d twist (m/rad).
+    x, width, pressure : ndarray, shape (m, n)
+        Panels: middles along the tangent -i n from the centre of pressure, widths (m), and pressures (Pa).
+    panel_arc : ndarray, shape (m, 2, n)
+        Arc lengths of the panels' middles on both faces (m).
     """
 
     position: IntArray
     pair: IntArray
+    force: Array
     torque_wheel: Array
+    point: ComplexArray
+    normal: ComplexArray
+    arc: Array
     half_width: Array
+    force_rate: Array
+    normal_rate: Array
+    growth: Array
+    arc_rate: Array
+    x: Array
+    width: Array
+    pressure: Array
+    panel_arc: Array
 
-    def moved(self, by: Array, factor: Array) -> Contacts:  # noqa: ARG002 (the half-plane law's move by twists)
-        """These with torques larger by `factor`, one number a position: widths change with the root."""
-        own = factor[self.position]
-        return replace(self, torque_wheel=self.torque_wheel * own, half_width=self.half_width * np.sqrt(own))
+    def __len__(self) -> int:
+        return len(self.pair)
+
+    def with_rates(self, ahead: Contacts, by: Array) -> Contacts:
+        """These with the rates that lead to the same ones `ahead`, at twists larger by `by` (rad), shape (m,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):  # contacts without load have no width
+            growth = 0.5 * ((ahead.half_width / self.half_width) ** 2 - 1) / by
+        return replace(
+            self,
+            force_rate=(ahead.force - self.force) / by,
+            normal_rate=np.angle(ahead.normal / self.normal) / by,
+            growth=growth,
+            arc_rate=(ahead.arc - self.arc) / by[:, None],
+        )
+
+    def without_panels(self) -> Contacts:
+        """These without their panels, for many positions in little memory."""
+        panels = ("x", "width", "pressure", "panel_arc")
+        return replace(self, **{name: getattr(self, name)[..., :0] for name in panels})
+
+    def moved(self, by: Array) -> Contacts:
+        """These at twists larger by `by` (rad), one number a position: forces and widths."""
+        here = by[self.position]
+        force = np.maximum(self.force + self.force_rate * here, 0.0)
+        scale = np.divide(force, self.force, out=np.ones(len(force)), where=self.force > 0)
+        return replace(
+            self,
+            force=force,
+            torque_wheel=self.torque_wheel * scale,
+            half_width=self.half_width * np.exp(self.growth * here),
+        )
 
 
 @dataclass(frozen=True)
@@ -149,7 +206,7 @@ class Positions:
     energy : ndarray, shape (n,)
         Elastic energy (J): the work of the contact forces.
     contacts
-        Loaded tooth pairs: `Contacts`, or `gearfe.contact.half_plane_result.PairContacts`.
+        That carry load.
     loads
         What fields need, of pinion and wheel, at the positions where it was asked for; none at all otherwise.
     points
@@ -165,7 +222,7 @@ class Positions:
     tangent: Array
     energy: Array
     iterations: IntArray
-    contacts: Any
+    contacts: Contacts
     loads: tuple[FlankLoads, ...] = ()
     points: PointPressures | None = None
 
@@ -247,20 +304,3 @@ def together(parts: Sequence[Positions]) -> Positions:
         else:
             made[field.name] = moved(values)
     return Positions(**made)
-
-
-def no_contact(angles: Array, twists: Array, sizes: Sequence[int]) -> Positions:
-    """Positions of a law on the mesh without contact; `sizes` are the unknowns of the flanks of pinion and wheel."""
-    none, count = np.zeros(0, dtype=np.int64), len(angles)
-    pinion, wheel = (FlankLoads(none, none, np.zeros((0, f)), np.zeros((0, f))) for f in sizes)
-    return Positions(
-        pinion_angle=angles,
-        twist=twists,
-        status=np.full(count, "no_contact", dtype=STATUS),
-        iterations=np.zeros(count, dtype=np.int64),
-        contacts=Contacts(none, none, np.zeros(0), np.zeros(0)),
-        loads=(pinion, wheel),
-        points=PointPressures(none, none, none, np.zeros(0), np.zeros(0)),
-        energy=np.zeros(count),
-        **{name: np.zeros(count) for name in TORQUES},
-    )

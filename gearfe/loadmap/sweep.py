@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..contact.compliance import MeshingPair
-from ..contact.half_plane_result import PairContacts
 from ..contact.laws import DEFAULT_MODEL, PairModel
 from ..contact.position import Positions, joined, taken, together
 from ..errors import InputError
@@ -174,8 +173,7 @@ def _cells(
         if roots is not None:
             made = roots.at(found)
             at_roots.append(replace(made, position=numbers[0] + made.position))
-        if isinstance(found.contacts, PairContacts):
-            found = replace(found, contacts=found.contacts.without_panels())
+        found = replace(found, contacts=found.contacts.without_panels())
         parts.append(found.with_loads(np.zeros(len(numbers), dtype=bool)))
     return together(parts), joined(at_roots) if at_roots else None
 

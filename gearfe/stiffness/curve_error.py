@@ -36,7 +36,6 @@ import numpy as np
 
 from ..contact.compliance import MeshingPair
 from ..contact.half_plane_pair import HalfPlanePair, half_plane_pair
-from ..contact.half_plane_result import PairContacts
 from ..contact.half_plane_step import smooth_influence
 from ..contact.laws import COARSENING
 from ..contact.panels import Couplings, couplings
@@ -80,7 +79,6 @@ def torque_changes(law: HalfPlanePair, other: HalfPlanePair, found: Positions) -
         Positions solved with `law`; not-a-number where there is no contact.
     """
     c = found.contacts
-    assert isinstance(c, PairContacts)
     frames = law.teeth.frames(found.pinion_angle[c.position], c.pair, found.twist[c.position])
     normal = c.normal[:, None] * np.exp(-1j * frames)
     couples = couplings(c.position, c.pair, len(found))

@@ -35,7 +35,6 @@ import numpy as np
 from ..contact.compliance import GearBody, MeshingPair, sector_displacements, turn
 from ..contact.flank import Flank, edge_nodes, edge_shapes
 from ..contact.flank_compliance import BUMP_ELEMENTS, bumps
-from ..contact.half_plane_result import PairContacts
 from ..contact.panels import EDGES
 from ..contact.position import FlankLoads, Positions
 from ..elasticity import physical_gradients, principal_stresses, stress_rows, triangle_shapes, von_mises
@@ -77,10 +76,8 @@ def bumped(body: GearBody, position: Positions, gear: int) -> tuple[FlankLoads, 
     """
     loads, contacts = position.loads[gear], position.contacts
     local: list[tuple[int, Array]] = []
-    if not isinstance(contacts, PairContacts):
-        return loads, local
     force = loads.force.copy()
-    for k in range(len(contacts)):
+    for k in range(len(contacts) if contacts.x.size else 0):  # contacts on the mesh are resolved by it
         flank, load = body.flank, contacts.pressure[k] * contacts.width[k]
         centre = float(contacts.panel_arc[k, gear] @ load / load.sum())
         edge = int(flank.place(np.array(centre))[0])

@@ -18,11 +18,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..contact.compliance import MeshingPair
+from ..contact.compliance import MeshingPair, flank_loads, panel_pressures
 from ..contact.elements import solve_elements
 from ..contact.finite_strain import finite_strain_shares, with_shares
 from ..contact.half_plane import HalfPlanePair, expected_twists, half_plane_pair, solve_half_plane
-from ..contact.half_plane_result import flank_loads, panel_pressures
 from ..contact.laws import HalfPlane
 from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, joined, of_positions, taken, together
 from ..errors import InputError
@@ -171,14 +170,9 @@ class ElementSolver:
     def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
         """Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads."""
         expected = self.half_plane.solve(angles, twists, kept=np.arange(len(angles)))
-        loaded = expected.status == "converged"
-        thin = loaded & (self.elements_per_contact(expected) < 1.0)
-        found = solve_elements(self.elastic, angles, twists, expected.with_loads(~thin).loads)
-        status = np.where(thin, "under_resolved", np.where(loaded, found.status, expected.status))
-        iterations = np.where(loaded & ~thin, found.iterations, expected.iterations)
-        return replace(found.with_status(status), iterations=iterations).with_loads(
-            np.isin(np.arange(len(found)), kept)
-        )
+        thin = (expected.status == "converged") & (self.elements_per_contact(expected) < 1.0)
+        expected = expected.with_status(np.where(thin, "under_resolved", expected.status))
+        return solve_elements(self.elastic, expected).with_loads(np.isin(np.arange(len(angles)), kept))
 
     def elements_per_contact(self, found: Positions) -> Array:
         """Elements that see the contact of positions of `half_plane`, shape (n,): harmonic means, by force, over their
@@ -282,7 +276,7 @@ def closed(found: Positions, goal: Array, touching: Array) -> Positions:
     by = twist - found.twist
     energy = found.energy + 0.5 * (found.torque_wheel + moments["torque_wheel"]) * by
     loads = tuple(replace(one, force=one.force + by[one.position, None] * one.rate) for one in found.loads)
-    contacts = found.contacts.moved(by, factor)
+    contacts = found.contacts.moved(by)
     whole = np.bincount(contacts.position, contacts.torque_wheel, len(found))  # but for what the step errs
     right = moments["torque_wheel"][contacts.position] / whole[contacts.position]
     contacts = replace(contacts, torque_wheel=contacts.torque_wheel * right)

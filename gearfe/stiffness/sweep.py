@@ -39,7 +39,6 @@ from numpy.typing import ArrayLike
 
 from ..contact.compliance import MeshingPair, gear_body
 from ..contact.half_plane_pair import HalfPlanePair
-from ..contact.half_plane_result import PairContacts
 from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, check_alike, law_text, uses_stress
 from ..contact.position import Positions
 from ..errors import InputError
@@ -276,8 +275,7 @@ class PairLoads:
     share : ndarray, shape (q,)
         Share of the wheel's torque (-).
     roll : ndarray, shape (q, 2)
-        Roll lengths of the middle of the contact on pinion and wheel (m), without load for laws on elements;
-        not-a-number off the involutes.
+        Roll lengths of the middle of the contact on pinion and wheel (m); not-a-number off the involutes.
     half_width, pressure, error : ndarray, shape (q,)
         Half width (m), pressure above (Pa), and how far the contact is from Hertz's (-).
     edge : ndarray, shape (q,)
@@ -304,11 +302,12 @@ def pair_loads(solver: PositionSolver, found: Positions) -> PairLoads:
     k, position, width = k[known], contacts.position[known], contacts.half_width[known]
     force = contacts.torque_wheel[known] / (touching.arm[k, 1] * elastic.width)
     curvature, flat = touching.curvature[k], np.isfinite(touching.curvature[k])
-    flank, arc = touching.flank[k], solver.law.arc_at(touching.flank[k], touching.place[k])
-    middle, half = arc[:, :, None], width[:, None, None]
-    met = marks_met(solver.law, flank, middle - half, middle + half)
+    flank, half = touching.flank[k], width[:, None, None]
+    middle = solver.law.arc_at(flank, touching.place[k])[:, :, None]
+    reached = marks_met(solver.law, flank, middle - half, middle + half)
     rounded = solver.law.marks[0] == "round"
-    bears = np.where(met[:, ~rounded].any(axis=1), SINGULAR, np.where(met[:, rounded].any(axis=1), ROUNDED, 0))
+    bears = np.where(reached[:, rounded].any(axis=1), ROUNDED, 0)
+    bears[reached[:, ~rounded].any(axis=1)] = SINGULAR
     several = np.unique(pairs[known], return_inverse=True, return_counts=True)
     bears[several[2][several[1]] > 1] = ROUNDED  # not where the rigid flanks touch first, nor with one ellipse
     bears[~flat] = SINGULAR  # it touches at the corner itself, however narrow the contact
@@ -322,7 +321,7 @@ def pair_loads(solver: PositionSolver, found: Positions) -> PairLoads:
         pair=contacts.pair[known],
         force=force * elastic.width,
         share=contacts.torque_wheel[known] / found.torque_wheel[position],
-        roll=_rolls(solver.law, flank, contacts.arc[known] if isinstance(contacts, PairContacts) else arc),
+        roll=_rolls(solver.law, flank, contacts.arc[known]),
         half_width=width,
         pressure=np.where(bears > 0, blunted, hertz),
         error=off,

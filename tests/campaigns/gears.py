@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from gearfe.contact.compliance import MeshingPair
-from gearfe.contact.half_plane_result import PairContacts
+from gearfe.contact.laws import HalfPlane
 from gearfe.contact.position import Positions
 from gearfe.gear.pair import GearPair
 from gearfe.stiffness.curve import SOLVED
@@ -139,7 +139,7 @@ def _rounding(found: Positions) -> float:
 
 def balance(elastic: MeshingPair, found: Positions, angle: float, twist: float) -> Check | None:
     """Resultants of the contact forces on both gears; the half-plane law has one force for both."""
-    if isinstance(found.contacts, PairContacts):
+    if isinstance(elastic.law, HalfPlane):
         return None
     resultant, on_wheel, moment = 0.0 + 0.0j, 0.0 + 0.0j, 0.0
     for gear, loads in enumerate(found.loads):
