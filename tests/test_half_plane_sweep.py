@@ -90,14 +90,32 @@ def test_nodal_loads_have_the_moments_of_the_contacts() -> None:
         assert wheel == pytest.approx(position.torque_wheel_reaction, rel=1e-6)
 
 
-def test_rates_are_those_of_differences() -> None:
-    solver = position_solver(elastic_of("half_plane"))
+@pytest.mark.parametrize("law", ["half_plane", "nitsche"])
+def test_rates_are_those_of_differences(law: str) -> None:
+    solver = position_solver(elastic_of(law))
     twist, step = 3e-3, 1e-5
     low, middle, high = (solver.solve(ANGLES, np.full(5, twist + k * step), np.arange(5)) for k in (-1, 0, 1))
     for one, two, three in zip(low, middle, high, strict=True):
         rate = (three.contacts.force - one.contacts.force) / (2 * step)
         assert two.contacts.force_rate == pytest.approx(rate, rel=1e-2)
+        turned = np.angle(three.contacts.normal / one.contacts.normal) / (2 * step)
+        if law == "nitsche":  # a normal by panels is not smooth where a tip begins to bear
+            assert two.contacts.normal_rate == pytest.approx(turned, abs=0.02)
         assert two.tangent == pytest.approx((three.torque_wheel - one.torque_wheel) / (2 * step), rel=3e-3)
+
+
+def test_contacts_on_the_mesh_are_those_of_half_planes() -> None:
+    """Force, place, material and normal of every contact, by another formulation of it."""
+    twists = np.full(5, math.radians(0.2))
+    found, other = (
+        position_solver(elastic_of(law)).solve(ANGLES, twists).contacts for law in ("nitsche", "half_plane")
+    )
+    assert np.array_equal(found.pair, other.pair)
+    assert found.force == pytest.approx(other.force, rel=4e-3)
+    assert np.abs(found.normal / other.normal - 1).max() < 1e-3
+    assert (np.abs(found.point - other.point) / other.half_width).max() < 0.1
+    assert (np.abs(found.arc - other.arc) / other.half_width[:, None]).max() < 0.1
+    assert found.half_width == pytest.approx(other.half_width, rel=0.03)
 
 
 def test_given_torque() -> None:
