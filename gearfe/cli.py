@@ -1,4 +1,4 @@
-"""The ``gearfe`` program: finds the command and runs it, turns user mistakes into one line and a code of 2.
+"""The ``gearfe`` program: runs a command, prints and keeps results as its options say; mistakes are a line and a 2.
 
 It listens to Ctrl-C from its first lines on; what takes time is imported after that, and help and version need nothing.
 """
@@ -11,8 +11,11 @@ import sys
 
 TYPE_CHECKING = False  # `typing` itself would be a third of the program's start
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Callable, Sequence
+    from pathlib import Path
     from types import FrameType
+    from typing import Any, TextIO
 
 USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
 
@@ -133,9 +136,134 @@ def _run(arguments: list[str]) -> int:
         raise InputError("command", None, f"unknown name {arguments[0]!r}", MOVED[arguments[0]])
     if arguments[0] not in COMMANDS:
         raise unknown_name("command", arguments[0], COMMANDS)
-    from .commands.common import command_module, run_command
+    from .commands.arguments import command_module
 
     return run_command(command_module(arguments[0]), f"gearfe {arguments[0]}", *COMMANDS[arguments[0]], arguments[1:])
+
+
+def run_command(module: Any, name: str, summary: str, example: str, arguments: list[str]) -> int:
+    """Run a command module (its contract is in `gearfe.commands`), called by `name`, with these arguments."""
+    import warnings
+
+    from .commands.arguments import completed, parser_of
+
+    parsed = completed(parser_of(module, name, summary, example).parse_args(arguments))
+    with warnings.catch_warnings():
+        messages = _watch_tables()
+        code = _run_and_keep(module.run, parsed, [*name.split()[1:], *arguments])
+        return code or int(bool(messages))
+
+
+def _watch_tables() -> list[str]:
+    """Print from now on what the writer of tables warns of, which is no success; the list gets these sentences."""
+    import warnings
+
+    from .errors import NotFiniteWarning
+
+    messages: list[str] = []
+    other = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *place: Any, **options: Any) -> None:
+        if not issubclass(category, NotFiniteWarning):
+            other(message, category, *place, **options)
+            return
+        messages.append(str(message))
+        print(f"gearfe: warning: {message}", file=sys.stderr)
+
+    warnings.simplefilter("always", NotFiniteWarning)
+    warnings.showwarning = show
+    return messages
+
+
+def _run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Namespace, line: list[str]) -> int:
+    """Run a command, print as its options say, and keep the results in the requested forms."""
+    from .progress import shown
+
+    as_json, report = getattr(parsed, "json", False), getattr(parsed, "report", False)
+    if not (parsed.format or as_json or report or parsed.quiet):
+        with shown(verbose=parsed.verbose):
+            return int(run(parsed))
+
+    import json
+    from contextlib import redirect_stdout
+
+    from .files import recorded
+
+    said = io.StringIO()
+    with redirect_stdout(_Both(said, None if parsed.quiet or as_json else sys.stdout)):
+        with recorded() as folders, shown(io.StringIO() if parsed.quiet else None, verbose=parsed.verbose):
+            code = int(run(parsed))
+        for folder, names in folders:
+            kept = _keep(folder, names, parsed, said.getvalue(), line if report else None)
+            if kept:
+                print(f"also written: {', '.join(kept)}")
+    if as_json:
+        entries = getattr(parsed, "summary", {})
+        if folders and not entries:
+            entries = {"folder": str(folders[-1][0]), **_summary(*folders[-1])}
+        print(json.dumps({"exit_code": code, **entries}, indent=2))
+    return code
+
+
+class _Both(io.TextIOBase):
+    """Text for a buffer and, where there is one, another stream."""
+
+    def __init__(self, kept: io.StringIO, shown_on: TextIO | None) -> None:
+        self._kept, self._shown = kept, shown_on
+
+    def write(self, text: str) -> int:
+        """Write to both."""
+        if self._shown is not None:
+            self._shown.write(text)
+        return self._kept.write(text)
+
+    def flush(self) -> None:
+        """Flush what is seen."""
+        if self._shown is not None:
+            self._shown.flush()
+
+
+def _keep(folder: Path, names: list[str], parsed: argparse.Namespace, said: str, line: list[str] | None) -> list[str]:
+    """Write the tables in other formats and the report; those of an earlier run that this one does not replace go."""
+    if not parsed.format and line is None:
+        return []
+    import shlex
+    import time
+    from pathlib import Path
+
+    from .commands.arguments import REPORT, job_of
+    from .files import whole_set
+    from .output.formats import read_csv, write_tables
+    from .output.report_page import PICTURES, Report, report_page
+
+    tables = {Path(name).stem: read_csv(folder / name) for name in names if name.endswith(".csv")}
+    with whole_set(folder) as made:
+        if parsed.format and tables:
+            write_tables(made, tables, parsed.format)
+        if line is not None:
+            job = job_of(parsed)
+            page = Report(
+                title=f"gearfe {line[0]}" + ("" if job is None else f": {Path(job).name}"),
+                command=shlex.join(["gearfe", *line]),
+                said=said,
+                summary=_summary(folder, names),
+                tables=tables,
+                pictures=[folder / name for name in names if Path(name).suffix in PICTURES],
+                job=("", "") if job is None else (str(job), Path(job).read_text(encoding="utf-8-sig")),
+            )
+            text = report_page(page, time.strftime("%Y-%m-%d %H:%M"))
+            (made / REPORT).write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+        return sorted(path.name for path in made.iterdir())
+
+
+def _summary(folder: Path, names: list[str]) -> dict[str, Any]:
+    """What the run left as JSON: its summary, or the one file that it wrote."""
+    import json
+
+    found = [name for name in names if name.endswith(".json")]
+    chosen = "summary.json" if "summary.json" in found else next(iter(found), None)
+    made: dict[str, Any] = {"files": names}
+    return made if chosen is None else {**made, **json.loads((folder / chosen).read_text(encoding="utf-8"))}
 
 
 def _drop_output() -> None:

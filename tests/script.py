@@ -6,8 +6,7 @@ import sys
 from functools import partial
 from types import ModuleType
 
-from gearfe.cli import INTERRUPTED, answer
-from gearfe.commands.common import run_command
+from gearfe.cli import INTERRUPTED, answer, run_command
 
 
 def answered(module: ModuleType, name: str, arguments: list[str] | None = None) -> int:

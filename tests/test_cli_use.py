@@ -87,7 +87,7 @@ dataclasses._create_fn = interrupted
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("when", [FOUND.format("commands.common"), FOUND.format("config"), EXECUTED])
+@pytest.mark.parametrize("when", [FOUND.format("commands.arguments"), FOUND.format("config"), EXECUTED])
 def test_an_interruption_while_the_program_loads_is_told_as_later(when: str) -> None:
     # a shell's job in the background ignores interruptions, and so would what it starts
     listening = "import os, signal, sys\nsignal.signal(signal.SIGINT, signal.default_int_handler)"

@@ -16,7 +16,7 @@ import pytest
 import gearfe
 from gearfe import Material, build_train
 from gearfe.commands import COMMANDS
-from gearfe.commands.common import command_module, parser_of
+from gearfe.commands.arguments import command_module, parser_of
 from gearfe.errors import InputError
 
 from . import gears, trains

@@ -1,4 +1,4 @@
-"""The argument parser of the commands: what follows an option belongs to it only where it can.
+"""What commands share: their parser, options, and what they print. What follows an option belongs to it where it can.
 
 ``argparse`` hands everything up to the next option to one that takes any number of values, so that
 ``--fields JOB.toml`` leaves no job. Here such an option takes the values that its type accepts; one that takes any text
@@ -8,14 +8,18 @@ gives the last ones back while a positional argument is missing.
 from __future__ import annotations
 
 import argparse
+import importlib
 import re
+import sys
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..config import JobFile, check_range, fields_of, type_hints
-from ..errors import InputError, nearest, unknown_name
+from ..errors import InputError, MissingLibraryError, nearest, unknown_name
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -25,6 +29,9 @@ Table = TypeVar("Table", bound="DataclassInstance")
 METAVARS = {float: "X", int: "N", str: "NAME"}
 #: What a help calls a job file.
 METAVARS_OF_FILES = {"job": "JOB.toml", "study": "STUDY.toml"}
+#: Formats of ``--format`` beside CSV; their writers are in `gearfe.output.formats`.
+FORMATS = ("npz", "h5", "mat", "uff")
+REPORT = "report.html"
 
 _NUMBER = re.compile(r"-(\d|\.\d|inf|nan)", re.IGNORECASE)
 
@@ -168,12 +175,76 @@ def add_job(parser: argparse.ArgumentParser, dest: str, help_: str) -> None:
     )
 
 
-def with_changes(parsed: argparse.Namespace) -> argparse.Namespace:
-    """The arguments, their job file with the changes of ``--set``."""
+def add_folder(parser: argparse.ArgumentParser) -> None:
+    """``--out``, and how the results in that folder are kept and printed."""
+    command = parser.prog.split()[-1]
+    parser.add_argument("--out", metavar="DIR", default=None, help=f"output folder (default: out/JOB/{command})")
+    parser.set_defaults(folder_of=command)
+    parser.add_argument(
+        "--format",
+        metavar="NAME",
+        default="csv",
+        help=f"tables also as tables.NAME: {', '.join(FORMATS)}, or several, as mat,h5 (default: csv alone)",
+    )
+    parser.add_argument(
+        "--report", action="store_true", help=f"pictures, figures, tables and job in one page, {REPORT}"
+    )
+    add_json(parser)
+    add_pictures(parser)
+
+
+def add_pictures(parser: argparse.ArgumentParser) -> None:
+    """``--no-pictures``."""
+    parser.add_argument("--no-pictures", action="store_true", help="leave out the pictures")
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """``--json``: the summary in the output folder, or what a command that has none leaves in ``args.summary``."""
+    parser.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
+
+
+def command_module(name: str) -> Any:
+    """Module of a command (its contract is in `gearfe.commands`)."""
+    return importlib.import_module(f".{name}", __package__)
+
+
+def parser_of(module: Any, name: str, summary: str, example: str) -> CommandParser:
+    """Parser of a command module, called by `name`, with the options that all commands have."""
+    parser = CommandParser(prog=name, description=summary, example=example)
+    module.add_arguments(parser)
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument("-q", "--quiet", action="store_true", help="print warnings and errors only")
+    group.add_argument("-v", "--verbose", action="store_true", help="tell each stage of the work as it begins")
+    return parser
+
+
+def job_of(parsed: argparse.Namespace) -> JobFile | None:
+    """The job file among the arguments, if any."""
+    return next((value for value in vars(parsed).values() if isinstance(value, JobFile)), None)
+
+
+def completed(parsed: argparse.Namespace) -> argparse.Namespace:
+    """The arguments, the job file with the changes of ``--set``, ``--format`` as the names beside CSV; ``--out`` is by
+    default ``out/JOB/COMMAND``, so that no command writes over another's summary.
+    """
     for dest, value in vars(parsed).items():
         if isinstance(value, JobFile):
             setattr(parsed, dest, JobFile(value, parsed.changes))
+    if getattr(parsed, "folder_of", None) and parsed.out is None:
+        parsed.out = str(Path("out") / Path(str(job_of(parsed))).stem / parsed.folder_of)
+    parsed.format = _formats(getattr(parsed, "format", "csv"))
     return parsed
+
+
+def _formats(text: str) -> tuple[str, ...]:
+    """Formats beside CSV that a value of ``--format`` names."""
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if name not in ("csv", *FORMATS):
+            raise InputError("--format", text, "must name formats of " + ", ".join(("csv", *FORMATS)), "as mat,h5")
+    if "uff" in names and find_spec("pyuff") is None:  # refused before the work, not after it
+        raise MissingLibraryError("universal files need pyuff: pip install 'gearfe[exchange]'")
+    return tuple(dict.fromkeys(name for name in names if name != "csv"))
 
 
 def with_keys(args: argparse.Namespace, table: Table, *keys: str, **renamed: str) -> Table:
@@ -214,3 +285,16 @@ def number(option: str, text: str) -> float:
         return float(text)
     except ValueError:
         raise InputError(option, text, "must be a number", "write it as 1e-3 or 2") from None
+
+
+def print_results(
+    lines: Iterable[str], folder: Path, names: Iterable[str], seconds: Mapping[str, float], warnings: Iterable[str]
+) -> None:
+    """Print what a command found, the names of its files, the seconds of its stages; warnings to standard error."""
+    for line in lines:
+        print(line)
+    print(f"written to {folder}: " + ", ".join(names))
+    if seconds:
+        print("seconds: " + ", ".join(f"{name} {value:.2f}" for name, value in seconds.items()))
+    for sentence in warnings:
+        print(f"gearfe: warning: {sentence}", file=sys.stderr)

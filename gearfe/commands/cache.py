@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from .common import add_json
+from .arguments import add_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

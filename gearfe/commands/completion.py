@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
 def _commands() -> dict[str, tuple[str, list[Any]]]:
     """Command -> its one line, and its options."""
     from . import COMMANDS
-    from .common import command_module, parser_of
+    from .arguments import command_module, parser_of
 
     found = {}
     for name, texts in COMMANDS.items():

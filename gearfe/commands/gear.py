@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..progress import stage
-from .arguments import add_job, check_option
-from .common import add_folder, print_results
+from .arguments import add_folder, add_job, check_option, print_results
 
 if TYPE_CHECKING:
     from ..gear.deviation import ToothDeviations

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..progress import stage
-from .arguments import add_job
-from .common import add_folder, print_results
+from .arguments import add_folder, add_job, print_results
 
 if TYPE_CHECKING:
     from ..housing.modal_test import Comparison

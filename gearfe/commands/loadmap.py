@@ -10,8 +10,7 @@ from typing import Any
 
 from ..tables.loadmap import LoadMapTable, loads_of
 from ..tables.pair import StiffnessTable, check_law
-from .arguments import add_job, add_keys, add_removed, check_option, with_keys
-from .common import add_folder, print_results
+from .arguments import add_folder, add_job, add_keys, add_removed, check_option, print_results, with_keys
 
 #: Keys of [stiffness], and of the table of loads, that options stand for.
 MODEL = ("law", "plane", "kinematics", "coarsen")

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..tables.mechanism import RunTable, read_mechanism_file
-from .arguments import add_job, add_keys, with_keys
-from .common import add_folder, print_results
+from .arguments import add_folder, add_job, add_keys, print_results, with_keys
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..progress import stage
 from ..tables.pair import StiffnessTable
-from .arguments import add_job, add_keys, check_option, with_keys
-from .common import add_json, add_pictures
+from .arguments import add_job, add_json, add_keys, add_pictures, check_option, with_keys
 
 if TYPE_CHECKING:
     from ..meshing.export import MeshPart

@@ -8,8 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..tables.runup import RunUpTable
-from .arguments import with_keys
-from .common import print_results
+from .arguments import print_results, with_keys
 from .vibration import add_train, title
 
 #: Keys of [runup] that options stand for.

@@ -11,8 +11,7 @@ from typing import Any
 from ..config import check_range
 from ..progress import announce
 from ..tables.pair import StiffnessTable, check_law
-from .arguments import add_job, add_keys, add_removed, check_option, number, with_keys
-from .common import add_folder, print_results
+from .arguments import add_folder, add_job, add_keys, add_removed, check_option, number, print_results, with_keys
 
 #: Keys of the [stiffness] table that options stand for, beside the load and the angles.
 KEYS = (

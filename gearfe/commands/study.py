@@ -10,8 +10,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from .arguments import add_job
-from .common import add_folder, print_results
+from .arguments import add_folder, add_job, print_results
 
 #: Seconds that a scheduler has to answer.
 TIMEOUT_S = 20

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..tables.spectrum import SpectrumTable
 from ..tables.train import TrainTable, value_text
-from .arguments import add_job, add_keys, with_keys
-from .common import add_folder, print_results
+from .arguments import add_folder, add_job, add_keys, print_results, with_keys
 
 if TYPE_CHECKING:
     from ..train.gear_train import GearTrain
