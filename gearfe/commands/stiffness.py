@@ -85,18 +85,18 @@ def run(args: argparse.Namespace) -> int:
     from ..progress import Stopwatch
     from ..stiffness.job import stiffness_job
     from ..stiffness.report import report_lines, summary, warnings
-    from ..stiffness.sweep import elastic_pair, sweep_stiffness
+    from ..stiffness.sweep import sweep_stiffness
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
         job = stiffness_job(tables, Path(args.job).parent, pair)
-        sweep, model = job.sweep, job.model
+        sweep = job.sweep
         if chosen is not None:
             from ..stiffness.fields_output import angle_numbers
 
             angle_numbers(np.degrees(sweep["angles"]), chosen)
     folder = output_folder(args.out)
-    elastic = elastic_pair(job.pair, model, watch=watch)
+    elastic = job.elastic(watch=watch)
     if args.fields is not None:
         from ..stiffness.fields_output import size_note
 
@@ -104,6 +104,7 @@ def run(args: argparse.Namespace) -> int:
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, **sweep)
     for stage, seconds in curve.timings.items():
         watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
+    found = summary(job, curve, watch.seconds)
     with whole_set(folder, ("stiffness.png", "fields.vtkhdf", "stress_*deg.png")) as made:
         with watch.stage("table"):
             curve.to_csv(made / "stiffness.csv")
@@ -128,9 +129,8 @@ def run(args: argparse.Namespace) -> int:
             with watch.stage("picture"):
                 from ..figures.stiffness import stiffness_figure
 
-                stiffness_figure(made / "stiffness.png", job, curve)
+                stiffness_figure(made / "stiffness.png", job, curve, found)
         watch.seconds["total"] = time.perf_counter() - started
-        found = summary(job, curve, watch.seconds)
         write_json(made / "summary.json", found)
         names = sorted(path.name for path in made.iterdir())
     print_results(report_lines(job, curve, found), folder, names, watch.seconds, warnings(job, curve))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..gear.derived import iso_values, single_pair_stretches
+from ..gear.derived import single_pair_stretches
 from ..gear.pair import GearPair
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.job import StiffnessJob
 from ..stiffness.periodic import distinct_phases
-from ..stiffness.report import cycle_statistics
 from ..typing import Array, IntArray
 from .style import BLUE, GREEN, GREY, ORANGE, RED, headed, new_figure, save, shades, some_of, tidy
 
@@ -26,8 +25,10 @@ if TYPE_CHECKING:
 MOST_LINES = 12
 
 
-def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve) -> None:
-    """Stiffness along the line of action and load sharing against the pinion angle, two mesh cycles from angle 0."""
+def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, Any]) -> None:
+    """Stiffness along the line of action and load sharing over the pinion angle, two mesh cycles from angle 0, beside
+    levels of the summary `found`.
+    """
     table, pair, cycle = job.table, job.pair, curve.mesh_cycle
     wrapped, source = distinct_phases(curve.pinion_angle, cycle)
     first = np.unique(source, return_index=True)[1]
@@ -45,7 +46,10 @@ def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve)
     for number, ends in enumerate(np.degrees(single_pair_stretches(pair, 0.0, 2 * cycle))):
         axes.axvspan(*ends, color="#f3f4f6", zorder=0, label=None if number else "single-pair contact (rigid)")
     low, high = 1e-6 * np.nanmin(solved, initial=np.inf), 1e-6 * np.nanmax(solved, initial=-np.inf)
-    for (label, level), dashes in zip(_levels(job, curve).items(), ((6, 3), (2, 2), (6, 2, 2, 2)), strict=False):
+    levels = {r"ISO 6336 $c_\gamma b$": 1e-6 * found["iso_6336"]["c_gamma_times_width_N_per_m"]}
+    if found["mesh_stiffness"] is not None:
+        levels = {"mean over the cycle": 1e-6 * found["mesh_stiffness"]["mean_N_per_m"], **levels}
+    for (label, level), dashes in zip(levels.items(), ((6, 3), (2, 2)), strict=False):
         if low - (high - low) <= level <= high + (high - low):
             axes.axhline(level, color=GREY, linewidth=1.1, dashes=dashes, label=f"{label}: {level:.4g}")
         else:
@@ -90,14 +94,6 @@ def _twist(twist_deg: float, curve: StiffnessCurve) -> str:
     torques = curve.torque_wheel[np.isfinite(curve.torque_wheel)]
     load_text = f" (wheel torque {torques.min():.4g} to {torques.max():.4g} N m)" if len(torques) else ""
     return f"twist {twist_deg:g}°{load_text}"
-
-
-def _levels(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, float]:
-    """Horizontal lines to compare with: label -> stiffness (N/um)."""
-    moduli = [material.youngs_modulus for material in job.materials]
-    found = {r"ISO 6336 $c_\gamma b$": 1e-6 * iso_values(job.pair, moduli[0], moduli[1])["c_gamma_times_width_N_per_m"]}
-    level = cycle_statistics(curve, job.table.interpolation)
-    return found if level is None else {"mean over the cycle": 1e-6 * level["mean_N_per_m"], **found}
 
 
 def _shares(curve: StiffnessCurve, angles: Array, pick: IntArray) -> list[tuple[Array, Array]]:

@@ -13,14 +13,13 @@ from ..contact.compliance import MeshingPair
 from ..contact.position import Positions
 from ..errors import InputError
 from ..files import write_csv
+from ..gear.deviation_job import GEARS
 from ..gear.pair import GearPair
 from ..output.vtkhdf import VtkHdfSeries
 from ..progress import count, one_thread
 from ..typing import Array, IntArray
 from .curve import StiffnessCurve
 from .fields import FlankPressure, GearField, flank_pressures, solved_fields
-
-GEARS = ("pinion", "wheel")
 
 
 def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) -> IntArray:
@@ -58,7 +57,7 @@ def write_fields(
     curve: StiffnessCurve,
     angles_deg: Sequence[float] | None,
     *,
-    draw: Callable[[Positions, tuple[GearField, GearField]], None] | None = None,
+    draw: Callable[[Positions, tuple[GearField, GearField]], None],
 ) -> list[tuple[float, list[FlankPressure]]]:
     """Write ``fields.vtkhdf`` (time: pinion angle in deg) and ``pressure.csv``.
 
@@ -81,7 +80,7 @@ def write_fields(
     chosen = chosen_positions(curve, angles_deg)
     if len(chosen) == 0:
         return []
-    worst: tuple[float, Positions, tuple[GearField, GearField]] | None = None
+    peak, worst = -math.inf, None
     pressures: list[tuple[float, list[FlankPressure]]] = []
     with VtkHdfSeries(folder / "fields.vtkhdf") as series, one_thread():
         places = curve.pinion_angle[chosen], curve.twist[chosen] + curve.lost_motion
@@ -89,14 +88,14 @@ def write_fields(
             angle = math.degrees(position.pinion_angle)
             pressures.append((angle, flank_pressures(elastic, position)))
             _add(series, angle, fields, first=done == 1)
-            peak = max(float(f.von_mises.max()) for f in fields)
-            if draw is not None and angles_deg is not None:
+            most = max(float(field.von_mises.max()) for field in fields)
+            if angles_deg is not None:
                 draw(position, fields)
-            elif worst is None or peak > worst[0]:
-                worst = (peak, position, fields)
+            elif most > peak:
+                peak, worst = most, (position, fields)
             count(done, len(chosen), "fields")
-    if draw is not None and worst is not None:
-        draw(*worst[1:])
+    if worst is not None:
+        draw(*worst)
     write_csv(folder / "pressure.csv", pressure_table(elastic.gears, pressures))
     return pressures
 

@@ -109,11 +109,11 @@ class StiffnessJob:
         sizes = t.coarsen, t.flank_coarsen, t.points_per_edge
         return PairModel(self.materials, t.plane, self.law, *sizes, self.deviations)
 
-    def elastic(self, keep: Keep | None = None, watch: Stopwatch | None = None, **changes: Any) -> MeshingPair:
-        """The condensed gears, some fields of the model changed; kept without deviations, which cost nothing."""
+    def elastic(self, keep: Keep | None = None, watch: Stopwatch | None = None) -> MeshingPair:
+        """The condensed gears, kept without deviations, which cost nothing."""
         from .sweep import elastic_pair
 
-        model = self.model.changed(**changes)
+        model = self.model
 
         def make() -> MeshingPair:
             return elastic_pair(self.pair, replace(model, deviations=NOMINAL), watch=watch)

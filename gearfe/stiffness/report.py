@@ -53,7 +53,7 @@ def largest_pressures(curve: StiffnessCurve) -> dict[str, Any]:
 
 
 def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, float]) -> dict[str, Any]:
-    """Content of summary.json."""
+    """Content of summary.json; stages that follow may still come to the timings."""
     table, moduli = job.table, [material.youngs_modulus for material in job.materials]
     torque, lost = curve.torque_wheel[~curve.failed], math.degrees(curve.lost_motion)
     twist = error = None
@@ -93,7 +93,7 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
         "statuses": dict(Counter(map(str, curve.status))),
         "failed_pinion_angles_deg": np.degrees(curve.pinion_angle[curve.failed]),
         "positions_beyond_validity": int(np.count_nonzero(curve.beyond_validity == 1)),
-        "timings_s": dict(timings),
+        "timings_s": timings,
     }
 
 
