@@ -3,15 +3,15 @@ r"""Plane linear elasticity of second-order triangles.
 Find :math:`u` with :math:`-\nabla\cdot\sigma(u) = 0`,
 :math:`\sigma = \lambda\,\mathrm{tr}(\varepsilon) I + 2\mu\,\varepsilon`,
 :math:`\varepsilon = \tfrac12(\nabla u + \nabla u^T)`, where in plane stress :math:`\lambda` is replaced by
-:math:`2\lambda\mu/(\lambda+2\mu)` (Zienkiewicz, Taylor & Zhu, *The Finite Element Method*, sec. 2.2). The weak
-form is a plain scikit-fem form; `element_stiffness` is the same in one batch of dense products, for the sweep.
+:math:`2\lambda\mu/(\lambda+2\mu)` (Zienkiewicz, Taylor & Zhu, *The Finite Element Method*, sec. 2.2). The weak form,
+:math:`w\int\sigma(u):\varepsilon(v)`, is assembled by `element_stiffness` in one batch of dense products.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -222,19 +222,3 @@ def principal_stresses(stresses: Array) -> tuple[Array, Array, Array]:
     high, low = middle + radius, middle - radius
     first, third = np.maximum(high, zz), np.minimum(low, zz)
     return first, np.maximum(low, np.minimum(high, zz)), third
-
-
-# ---- the same as scikit-fem forms ------------------------------------------------------------------------------------
-
-
-def stiffness_form(material: Material, plane: Plane, thickness: float) -> Any:
-    """scikit-fem bilinear form w int sigma(u) : eps(v)."""
-    from skfem import BilinearForm
-    from skfem.helpers import ddot, eye, sym_grad, trace
-
-    lam, mu = material.lame(plane)
-
-    def sigma(u: Any) -> Any:
-        return lam * eye(trace(sym_grad(u)), 2) + 2 * mu * sym_grad(u)
-
-    return BilinearForm(lambda u, v, _: thickness * ddot(sigma(u), sym_grad(v)))

@@ -93,11 +93,10 @@ class Face:
 
     def _of_curves(self, what: str, u: Array) -> Any:
         """A quantity of the curve that each parameter lies on."""
-        made = getattr(self.flank, what)(np.minimum(np.maximum(u, 0.0), 1.0))
-        if self.round_ is not None:
-            made = np.where(u > 1.0, getattr(self.round_, what)(u - 1.0), made)
-        if self.root is not None and (u < 0.0).any():
-            made = np.where(u < 0.0, getattr(self.root, what)(1.0 + np.minimum(u, 0.0)), made)
+        made = np.array(getattr(self.flank, what)(np.minimum(np.maximum(u, 0.0), 1.0)))
+        for curve, there, start in ((self.round_, u > 1.0, 1.0), (self.root, u < 0.0, -1.0)):
+            if curve is not None and there.any():
+                made[there] = getattr(curve, what)(u[there] - start)
         return made
 
     @cached_property

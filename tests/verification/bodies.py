@@ -9,15 +9,26 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from skfem import CellBasis, ElementTriP2, ElementVector, MeshTri2
+from skfem import BilinearForm, CellBasis, ElementTriP2, ElementVector, MeshTri2
+from skfem.helpers import ddot, eye, sym_grad, trace
 
 from gearfe.contact.flank import edge_shapes, gauss_rule
-from gearfe.elasticity import Material, Plane, stiffness_form, triangle_rule
+from gearfe.elasticity import Material, Plane, triangle_rule
 from gearfe.errors import InputError, unknown_name
 from gearfe.typing import Array, IntArray
 
 #: A prescribed displacement (m) or traction (Pa): a number, or a function of places, shape (n, 2), with values (n,).
 Value = float | Callable[[Array], Array]
+
+
+def stiffness_form(material: Material, plane: Plane, thickness: float) -> Any:
+    """scikit-fem bilinear form w int sigma(u) : eps(v)."""
+    lam, mu = material.lame(plane)
+
+    def sigma(u: Any) -> Any:
+        return lam * eye(trace(sym_grad(u)), 2) + 2 * mu * sym_grad(u)
+
+    return BilinearForm(lambda u, v, _: thickness * ddot(sigma(u), sym_grad(v)))
 
 
 @dataclass(frozen=True)
