@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfe.contact.compliance import MeshingPair, gear_body
+from gearfe.contact.compliance import MeshingPair, finite_strain_shares, gear_body
 from gearfe.contact.elements import solve_elements
-from gearfe.contact.finite_strain import finite_strain_shares
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.contact.laws import ContactLaw, Nitsche, PairModel, Penalty
 from gearfe.contact.position import Positions

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.contact import finite_strain
-from gearfe.contact.compliance import MeshingPair, gear_body, sector_displacements
+from gearfe.contact.compliance import MeshingPair, finite_strain_shares, gear_body, sector_displacements
 from gearfe.contact.laws import Nitsche, PairModel
 from gearfe.contact.position import Positions
 from gearfe.elasticity import Material, physical_gradients, triangle_shapes
@@ -67,7 +66,7 @@ def test_share_is_the_rate_of_the_extra_energy(angle_deg: float) -> None:
     step = 0.02 * twist
     energies = [extra_energy(pair, solve_position(pair, angle, twist + sign * step)) for sign in (-1, 1)]
     found = solve_positions(pair, [angle], twist)
-    share = finite_strain.finite_strain_shares(pair, found, neighbours=15)
+    share = finite_strain_shares(pair, found, neighbours=15)
     assert share * found.torque_wheel == pytest.approx((energies[1] - energies[0]) / (2 * step), rel=3e-3)
 
 
@@ -75,8 +74,8 @@ def test_few_neighbours_suffice() -> None:
     """The effect is cubic in the strain: the loaded teeth and their neighbours carry all but a few parts in 1e5."""
     pair = meshing_pair(coarsen=2.0)
     found = solve_positions(pair, [math.radians(13)], math.radians(0.05))
-    near = finite_strain.finite_strain_shares(pair, found)
-    assert near == pytest.approx(finite_strain.finite_strain_shares(pair, found, neighbours=15), abs=5e-5)
+    near = finite_strain_shares(pair, found)
+    assert near == pytest.approx(finite_strain_shares(pair, found, neighbours=15), abs=5e-5)
 
 
 @pytest.mark.parametrize("law", ["half_plane", "nitsche"])
@@ -86,7 +85,7 @@ def test_curves_take_the_share_of_every_position(law: str) -> None:
     if law == "half_plane":
         pair = replace(pair, model=PairModel())
     angles, twist = np.linspace(0, pair.gears.mesh_cycle, 25)[:-1], math.radians(0.5)
-    shares = finite_strain.finite_strain_shares(pair, solve_positions(pair, angles, twist))
+    shares = finite_strain_shares(pair, solve_positions(pair, angles, twist))
     small, finite = (
         sweep_stiffness(pair.gears, elastic=pair, twist=twist, angles=angles, kinematics=kinematics)
         for kinematics in ("small", "finite")
@@ -103,7 +102,7 @@ def test_torques_with_finite_strain_are_met(torque: float) -> None:
     pair = replace(pair, model=PairModel())
     solver, angles = position_solver(pair), np.linspace(0, pair.gears.mesh_cycle, 7)[:-1]
     found = at_torques(solver, angles, np.full(6, torque), finite=True)
-    share = finite_strain.finite_strain_shares(pair, solve_positions(pair, angles, found.twist))
+    share = finite_strain_shares(pair, solve_positions(pair, angles, found.twist))
     again = at_twists(solver, angles, found.twist, finite=True)
     assert np.abs(again.torque_wheel / torque - 1).max() < max(1e-7, float((share**2).max()))
 
@@ -124,7 +123,7 @@ def test_against_a_finite_strain_program() -> None:
         expected = {float(r["pinion_angle_deg"]): r for r in rows if float(r["twist_deg"]) == twist_deg}
         twist = math.radians(twist_deg)
         positions = solve_positions(pair, np.radians(angles), twist)
-        shares = finite_strain.finite_strain_shares(pair, positions)
+        shares = finite_strain_shares(pair, positions)
         for angle, position, share in zip(angles, positions, shares, strict=True):
             stiffness = position.torque_wheel * (1 + share) / twist / pair.gears.wheel.base_radius**2
             trust = float(expected[angle]["trust_percent"]) / 100

@@ -11,8 +11,7 @@ import pytest
 
 from gearfe import InputError
 from gearfe.cli import main
-from gearfe.contact.compliance import MeshingPair
-from gearfe.contact.finite_strain import finite_strain_shares
+from gearfe.contact.compliance import MeshingPair, finite_strain_shares
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.contact.laws import HalfPlane, on_elements
 from gearfe.loadmap.sweep import sweep_loads

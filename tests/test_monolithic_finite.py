@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from gearfe.contact import laws
-from gearfe.contact.compliance import MeshingPair, gear_body
-from gearfe.contact.finite_strain import NEIGHBOURS, finite_strain_shares
+from gearfe.contact.compliance import NEIGHBOURS, MeshingPair, finite_strain_shares, gear_body
 from gearfe.contact.laws import PairModel
 from gearfe.elasticity import Material
 from gearfe.gear.pair import Gear, GearPair

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
-from ..elasticity import Material, Plane, element_stiffness
+from ..elasticity import Material, Plane, element_stiffness, finite_strain_rates
 from ..errors import InputError
 from ..gear.deviation import ToothDeviations
 from ..gear.pair import GearPair
@@ -36,7 +36,13 @@ from ..multifrontal import Factor, condense
 from ..typing import Array, IntArray
 from .flank import Flank, edge_shapes, flank_of, normal_stress_rows
 from .laws import DEFAULT_MODEL, ContactLaw, PairModel
-from .position import Contacts, FlankLoads, PointPressures
+from .position import Contacts, FlankLoads, PointPressures, Positions
+
+#: Sectors on either side of a loaded tooth whose finite strain counts: the effect is cubic in the strain. Six instead
+#: of one change the torque of the shipped pair by 2.4e-4 at 0.5 deg, and by less than 5e-5 at 0.05 deg.
+NEIGHBOURS = 1
+#: Positions whose fields are in memory together for it.
+TOGETHER = 24
 
 
 @dataclass(frozen=True)
@@ -271,6 +277,33 @@ def sector_displacements(
                 np.add.at(flank, of[here], force[load[here]] @ body.own)
         parts.append(np.concatenate([flank + sides @ body.interface.T, sides], axis=1))
     return body.condensed.recover(np.concatenate(parts).T).reshape(-1, 2, sum(len(part) for part in parts))
+
+
+def finite_strain_shares(pair: MeshingPair, found: Positions, neighbours: int = NEIGHBOURS) -> Array:
+    """First-order effect of finite strain on the torque: Delta T / T, shape (n,), from loads; 0 where there are none.
+
+    The equilibrium minimises the energy, so by the envelope theorem the energy at given twist changes by what finite
+    strain adds to that of the small-strain solution, and the torque by its derivative with the twist
+    (`gearfe.elasticity.finite_strain_rates`). So many `neighbours` of a loaded tooth on either side take part.
+    """
+    shares = np.zeros(len(found))
+    loaded = np.unique(found.loads[0].position)
+    for first in range(0, len(loaded), TOGETHER):
+        mine = loaded[first : first + TOGETHER]
+        part = found.take(mine)
+        shares[mine] = sum(_extra_torques(pair, gear, part, neighbours) for gear in (0, 1)) / part.torque_wheel
+    return shares
+
+
+def _extra_torques(pair: MeshingPair, gear: int, found: Positions, neighbours: int) -> Array:
+    """Delta T from one gear (N m), shape (n,)."""
+    body, loads = pair.bodies[gear], found.loads[gear]
+    near = (loads.tooth[:, None] + np.arange(-neighbours, neighbours + 1)) % body.teeth
+    sectors = np.unique(loads.position[:, None] * body.teeth + near)
+    position, tooth = np.divmod(sectors, body.teeth)
+    fields, mesh = sector_displacements(body, loads, position, tooth, rates=True), body.mesh
+    energy = finite_strain_rates(mesh.points, mesh.triangles, fields, body.material, body.plane, body.thickness)
+    return np.bincount(position, energy, len(found))
 
 
 def flank_loads(

@@ -265,6 +265,19 @@ class Positions:
         numbers: dict[str, Any] = {name: np.where(good, getattr(self, name), none) for name in names}
         return replace(self.with_loads(good), status=status, contacts=_of_kept(self.contacts, good), **numbers)
 
+    def raised(self, share: Array) -> Positions:
+        """These with torques raised by the shares c = Delta T / T of finite strain, shape (n,).
+
+        Both hubs' torques and the loads take the same factor: the force changes, not its line. The share grows with the
+        twist about as the torque does, so the tangent takes 1 + 2 c.
+        """
+        made = {name: getattr(self, name) * (1 + share) for name in TORQUES}
+        made["tangent"] = self.tangent * (1 + 2 * share)
+        contacts = replace(self.contacts, torque_wheel=self.contacts.torque_wheel * (1 + share)[self.contacts.position])
+        factors = [(1 + share)[one.position, None] for one in self.loads]
+        loads = tuple(replace(o, force=o.force * f, rate=o.rate * f) for o, f in zip(self.loads, factors, strict=True))
+        return replace(self, contacts=contacts, loads=loads, **made)
+
     def with_loads(self, kept: BoolArray) -> Positions:
         """These with loads and point pressures of some alone, shape (n,)."""
         points = None if self.points is None else _of_kept(self.points, kept)

@@ -18,9 +18,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..contact.compliance import MeshingPair, flank_loads, panel_pressures
+from ..contact.compliance import MeshingPair, finite_strain_shares, flank_loads, panel_pressures
 from ..contact.elements import solve_elements
-from ..contact.finite_strain import finite_strain_shares, with_shares
 from ..contact.half_plane import HalfPlanePair, expected_twists, half_plane_pair, solve_half_plane
 from ..contact.laws import HalfPlane
 from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, joined, of_positions, taken, together
@@ -208,7 +207,7 @@ def in_batches(solver: PositionSolver, angles: Array, twists: Array, kept: IntAr
 def at_twists(solver: PositionSolver, angles: Array, twists: Array, *, finite: bool = False) -> Positions:
     """Positions at pinion angles and twists, both of shape (n,) (rad); with or without finite strain."""
     found = in_batches(solver, angles, twists, np.arange(len(angles)) if finite else NONE)
-    return with_shares(found, finite_strain_shares(solver.elastic, found)) if finite else found
+    return found.raised(finite_strain_shares(solver.elastic, found)) if finite else found
 
 
 def check_torque(law: HalfPlanePair, torque: float, name: str = "torque") -> None:
@@ -258,7 +257,7 @@ def at_torques(
         share = finite_strain_shares(solver.elastic, found)
         share = share / (1 + share)
         found = twists_for_torque(solve, found, torques / (1 + share), touching=touching, most=most)
-        found = with_shares(found, share)
+        found = found.raised(share)
     return closed(found, torques, touching)
 
 

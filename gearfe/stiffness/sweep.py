@@ -134,7 +134,7 @@ def sweep_stiffness(
         solved once.
     kinematics
         ``small``: small strain in each hub's frame; ``finite`` (default) adds the first-order effect of finite strain
-        on the torque, see `gearfe.contact.finite_strain`.
+        on the torque, see `gearfe.contact.compliance.finite_strain_shares`.
     twist_from
         Where the given `twist` counts from: ``contact``, where unmodified flanks touch; ``centred``, where a wheel
         space faces the pinion tooth, half the backlash before. Results count from contact in either case.
