@@ -20,6 +20,15 @@ from .test_train_job import BORES, SMALL, written
 from .trains import SHIPPED, base_radius, braking, changed, train
 
 BASE = train(SHIPPED)
+PAIR = """
+[pair]
+module_mm = 2.0
+pressure_angle_deg = 20.0
+face_width_mm = 12.0
+tooth_thinning_um = 20.0
+pinion = { teeth = 18, bore_diameter_mm = 9.0 }
+wheel = { teeth = 27, bore_diameter_mm = 9.0 }
+"""
 
 
 def loaded(*torques: TimeFunction | float, shafts: tuple[str, ...] = ("s2",), **changes: object):  # type: ignore[no-untyped-def]
@@ -39,6 +48,26 @@ def test_a_load_of_the_wrong_sign_says_so(tmp_path: Path) -> None:
         train_curves(job)
     with pytest.raises(InputError, match="drives the train"):
         build_train(job_train(job, [1e8], None))
+
+
+def test_a_load_that_drives_works_on_back_flanks_that_are_known(tmp_path: Path) -> None:
+    """By the backlash of the mesh, or with a mesh law that of the gears; a stiffness without backlash has none."""
+    wrong = SMALL.replace("torque_Nm = -30.0", "torque_Nm = 30.0") + BORES
+    force = 30.0 / (0.027 * math.cos(math.radians(20.0)))
+    job = read_train_job(written(tmp_path, wrong.replace("= 2e8", "= 2e8\nbacklash_um = 20.0")))
+    made = simulate(build_train(job_train(job, train_curves(job))), job.times, tolerance=job.table.tolerance)
+    assert made.contact_force[-1, 0] == pytest.approx(-force, rel=0.2)
+    mapped = wrong.replace("stiffness_N_per_m = 2e8", "") + PAIR
+    assert steady_forces(job_train(read_train_job(written(tmp_path, mapped)))) == pytest.approx([-force])
+    for change in (("thinning_um = 20.0", "thinning_um = 0.0"), ('driven = "b"', 'driven = "b"\nlaw = "curve"')):
+        with pytest.raises(InputError, match="drives the train"):
+            job_train(read_train_job(written(tmp_path, mapped.replace(*change))))
+
+
+def test_a_load_beyond_every_contact_names_the_mesh(tmp_path: Path) -> None:
+    text = SMALL.replace("stiffness_N_per_m = 2e8", "").replace("torque_Nm = -30.0", "torque_Nm = -3e5") + BORES + PAIR
+    with pytest.raises(InputError, match=r"mesh 'a-b' law_torque_Nm = 1500000.*no contact solution.*smaller load"):
+        train_curves(read_train_job(written(tmp_path, text)))
 
 
 @pytest.mark.parametrize("speed", [600.0, -600.0])

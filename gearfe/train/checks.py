@@ -8,14 +8,14 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import InputError, unknown_name
-from ..gear.pair import GearPair
+from ..gear.pair import GearPair, in_keys
 from ..meshlaw.law import MeshLaw
 from ..stiffness.periodic import PeriodicInterpolant
 from .friction import check_friction
 from .gear_train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from .kinematics import driving_senses
 from .phases import tooth_places
-from .statics import check_flanks
+from .statics import check_flanks, one_sided
 
 #: Agreement of lengths and angles that count as equal (relative).
 SAME = 1e-6
@@ -25,6 +25,12 @@ WIDEST_GAP = 0.15
 
 def check_train(train: GearTrain) -> None:
     """Raise `InputError` for the first mistake."""
+    check_layout(train)
+    check_flanks(train, one_sided(train))
+
+
+def check_layout(train: GearTrain) -> None:
+    """Raise `InputError` for the first mistake but loads that press flanks of which nothing is known."""
     _names("shaft", [s.name for s in train.shafts])
     _names("gear", [g.name for g in train.gears])
     _names("mesh", [m.name for m in train.meshes])
@@ -37,7 +43,6 @@ def check_train(train: GearTrain) -> None:
         _check_mesh(train, mesh)
     _check_room(train)
     _check_damping(train)
-    check_flanks(train)
     tooth_places(train, driving_senses(train))
 
 
@@ -93,6 +98,10 @@ def _check_bore(train: GearTrain, shaft: Shaft, bore: str, a: np.ndarray) -> Non
         problem = f"lies {1e3 * off:.6g} mm off the axis of shaft {shaft.name!r}"
         cure = "name the bores on that axis, or move the shaft (x_mm, z_mm): it runs along y"
         raise InputError(f"attachment {bore!r}", None, problem, f"{cure} (housing.mesh.axes turns a mesh)")
+    beyond = abs(float(arm @ a)) - 0.5 * shaft.length
+    if beyond > SAME * shaft.length:
+        problem = f"lies {1e3 * beyond:.6g} mm beyond the end of shaft {shaft.name!r}"
+        raise InputError(f"attachment {bore!r}", None, problem, "lengthen the shaft (length_mm), or move it (y_mm)")
     if train.housing is not None:
         own = train.housing.attachment_axes[train.housing.attachment_names.index(bore)]
         if abs(abs(float(own @ a)) - 1.0) > SAME:
@@ -139,7 +148,9 @@ def _check_mesh(train: GearTrain, mesh: GearMesh) -> None:
     try:
         expected = GearPair(one.gear, two.gear, mesh.centre_distance).working_centre_distance
     except InputError as error:
-        raise InputError(label, error.value, f"{error.field}: {error.problem}", error.cure) from None
+        side, _, name = error.field.rpartition(".")
+        error = InputError(name, error.value, error.problem, error.cure)
+        raise in_keys(error, f"{label} {side}".rstrip()) from None
     distance = shaft_distance(train, one.shaft, two.shaft)
     if abs(distance - expected) > SAME * expected:
         apart = f"shafts {one.shaft!r} and {two.shaft!r} are {1e3 * distance:.9g} mm apart"

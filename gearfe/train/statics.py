@@ -36,8 +36,10 @@ SAMPLES = 64
 ROUND_OFF = 1e-9
 
 
-def check_flanks(train: GearTrain) -> None:
-    """Raise `InputError` where the loads press the back flanks of a mesh, at whatever time.
+def check_flanks(train: GearTrain, single: BoolArray) -> None:
+    """Raise `InputError` where the loads press the back flanks of a mesh, at whatever time, of which nothing is known.
+
+    `single` are the meshes, shape (meshes,), of whose back flanks nothing is known.
 
     Oscillating parts of loads are left out: what matters is the torque about which they swing. Inertia alone is no
     mistake: a drive that slows down lets teeth part for a while, of which the run warns.
@@ -49,7 +51,7 @@ def check_flanks(train: GearTrain) -> None:
     loads = balanced_forces(train, senses, load_torques(train, times))
     whole = loads + balanced_forces(train, senses, _inertia(train, times))
     least = -ROUND_OFF * float(np.abs(loads).max())
-    wrong = (loads < least) & (whole < least) & one_sided(train)[:, None]
+    wrong = (loads < least) & (whole < least) & single[:, None]
     if wrong.any():
         at = int(np.argmin(np.where(wrong, loads, np.inf).min(axis=0)))
         mesh = int(np.argmin(np.where(wrong[:, at], loads[:, at], np.inf)))

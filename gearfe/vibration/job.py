@@ -156,10 +156,23 @@ def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
         damping,
     )
     if curves is None:
-        from ..train.checks import check_train
+        from ..train.checks import check_flanks, check_layout
 
-        check_train(replace(train, meshes=tuple(replace(mesh, backlash=None, damping=0.0) for mesh in meshes)))
+        bare = replace(train, meshes=tuple(replace(mesh, backlash=None, damping=0.0) for mesh in meshes))
+        check_layout(bare)
+        check_flanks(bare, np.array([not back_flanks(job, train, i) for i in range(len(meshes))], dtype=bool))
     return train
+
+
+def back_flanks(job: TrainJob, train: GearTrain, number: int) -> bool:
+    """Whether a mesh has back flanks: behind its given backlash, or with a mesh law behind that of its gears."""
+    table, mesh = job.table.meshes[number], train.meshes[number]
+    if table.backlash_um is not None:
+        return True
+    if table.rigid or table.curve or table.stiffness_N_per_m or (table.law or job.table.curves.law) != "map":
+        return False
+    pair = GearPair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
+    return pair.normal_backlash > 0.0
 
 
 def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:

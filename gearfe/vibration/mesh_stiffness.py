@@ -19,7 +19,7 @@ from ..progress import stage
 from ..stiffness.curve import StiffnessCurve
 from ..train.gear_train import GearMesh, GearTrain
 from ..train.kinematics import driving_senses, steady_forces
-from .job import Stiffness, TrainJob, job_train
+from .job import Stiffness, TrainJob, back_flanks, job_train
 
 if TYPE_CHECKING:
     from ..contact.laws import ContactLaw
@@ -144,9 +144,17 @@ def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) 
     deviations, back = _deviations(job, train, number, pair, HalfPlane())
     model = replace(tables.model, materials=materials, law=HalfPlane(), deviations=deviations)
     with stage(mesh.name):
-        law = cached_law(pair, model, most / pair.wheel.base_radius)
-        if back != deviations:
-            law = replace(law, back=cached_law(pair, replace(model, deviations=back), most / pair.wheel.base_radius))
+        try:
+            law = cached_law(pair, model, most / pair.wheel.base_radius)
+            if back != deviations:
+                other = replace(model, deviations=back)
+                law = replace(law, back=cached_law(pair, other, most / pair.wheel.base_radius))
+        except InputError as error:
+            if error.field != "force":
+                raise
+            problem = f"is the largest of its law ({ROOM:g} times the steady one where none is given): {error.problem}"
+            label = f"mesh {mesh.name!r} law_torque_Nm"
+            raise InputError(label, float(f"{most:.6g}"), problem, "give a smaller load, or law_torque_Nm") from None
         if not estimate:
             return law
         angles = pair.mesh_cycle * np.arange(ESTIMATED) / ESTIMATED
@@ -180,7 +188,7 @@ def _deviations(
         driving, back = ((replace(a, turn=(0.0,)), replace(b, turn=(0.0,))) for a, b in (driving, back))
     from ..contact.laws import check_alike, check_deviations
 
-    if mesh.backlash is None and not (mapped and pair.normal_backlash > 0.0):
+    if not back_flanks(job, train, number):
         back = driving
     for one in (driving, back):
         check_alike(one)
