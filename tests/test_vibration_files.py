@@ -29,6 +29,7 @@ from gearfe.vibration.fields import (
 )
 from gearfe.vibration.files import OutputChoice, write_run
 from gearfe.vibration.follow import RunningMean, Stability, TrainRun
+from gearfe.vibration.report import lines_of
 from gearfe.vibration.spectra import response_columns, spectra
 
 from .gears import pair
@@ -137,6 +138,18 @@ def test_summary_of_a_known_response(tmp_path, train):
     assert summary["status"] == "done"
     assert summary["mesh_frequencies_Hz"] == pytest.approx([1909.859, 1273.240], abs=1e-3)
     assert summary["error_estimates"] == {"integration": 1e-7}
+
+
+def test_curves_of_a_long_run_have_the_lines_of_its_meshes():
+    """They are the least and largest values of parts, of which the last may be one sample: two rows at one time."""
+    whole = made_up()
+    rows = np.append(np.arange(COUNT), COUNT - 1)
+    envelope = made_up(time=whole.time[rows], drive_angle=whole.drive_angle[rows])
+    lines = lines_of(envelope, 5000.0)
+    assert [line.frequency for line in lines] == [line.frequency for line in lines_of(whole, 5000.0)]
+    assert lines[0].frequency == pytest.approx(20 * 400.0 / (2 * math.pi), rel=1e-12)  # of mesh 2, the lower one
+    speeding = made_up(time=whole.time[rows], drive_angle=whole.time[rows] ** 2)
+    assert lines_of(speeding, 5000.0) == ()
 
 
 def test_a_mean_without_a_period():

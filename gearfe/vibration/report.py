@@ -33,7 +33,8 @@ def fundamentals(response: TrainResponse) -> dict[str, float]:
 def settled(response: TrainResponse) -> bool:
     """Whether the drive turns at one speed in the second half of the run: else a spectrum has no lines of orders."""
     half = len(response.time) // 2
-    rate = np.diff(response.drive_angle[half:]) / np.diff(response.time[half:])
+    turn, step = np.diff(response.drive_angle[half:]), np.diff(response.time[half:])
+    rate = turn[step > 0.0] / step[step > 0.0]  # the last part of an envelope may be one sample, twice
     return bool(np.ptp(rate) <= 1e-6 * np.abs(rate).max()) if len(rate) else True
 
 
