@@ -18,8 +18,8 @@ from ..runup.run_up import RunUp
 from ..typing import Array
 from .style import BLUE, COLOURS, GREY, RANGE_DB, RED, REFERENCE, level, new_figure, on_white, save, single
 
-#: Width of an order's name, in parts of the axis.
-ROOM = 0.045
+#: Width and height of an order's name, in parts of the axes.
+ROOM, TALL = 0.045, 0.035
 
 
 class OrderLine(NamedTuple):
@@ -158,15 +158,20 @@ def _label_orders(
 ) -> None:
     """Names of orders where their lines leave the picture.
 
-    One that would stand on another's, or left of the picture, is left out.
+    At the right end one that would stand on another's goes back along its line; at the top that one, and one that would
+    stand left of the picture, is left out.
     """
     taken = low  # no label leaves the picture
+    before, back = math.inf, 0.0
     for line in sorted(lines, key=lambda line: -line.slope):
         end, above = min(high, highest / line.slope), line.slope * high > highest
         if end <= low or (above and end < taken + ROOM * (high - low)):
             continue
         taken = end if above else taken
-        y = 0.985 * highest if above else line.slope * (high - 0.01 * (high - low))
+        if not above:
+            back = back + ROOM if before - line.slope * high < TALL * highest else 0.0
+            before = line.slope * high
+        y = 0.985 * highest if above else line.slope * (high - (0.01 + back) * (high - low))
         axes.annotate(
             line.label, (y / line.slope, y), (-4, 0) if above else (0, 3), textcoords="offset points",
             fontsize=7.5, color=colours[line.mesh], ha="right", va="top" if above else "bottom",
