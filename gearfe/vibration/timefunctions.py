@@ -7,6 +7,7 @@ a kink, at which halving would not end, stays within `KINK` of the largest value
 
 from __future__ import annotations
 
+import ast
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from ..errors import InputError
+from ..errors import InputError, unknown_name
+from ..expressions import syntax
 from ..files import read_numbers
 from ..rigid import TimeFunction, constant, sine, smoothed_step
 from ..tables.timefunction import TrainFunctionTable, check_rising
@@ -89,13 +91,13 @@ def _table(name: str, where: str, folder: Path) -> Array:
 
 def _of_expression(text: str, where: str, end: float) -> TimeFunction:
     """Pieces of polynomials that are the expression of `time` from 0 to the end."""
-    from ..mechanisms.expressions import compute, parse, quantities  # few jobs have expressions
+    from ..mechanisms.expressions import FUNCTIONS, compute, parse  # few jobs have expressions
 
+    known = ("time", "pi", *FUNCTIONS)
+    for name in (node.id for node in ast.walk(syntax(text, where)) if isinstance(node, ast.Name)):
+        if name not in known:
+            raise unknown_name(f"{where} = {text!r}", name, known)
     tree = parse(text, where)
-    other = sorted(name for name, _ in quantities(tree) if name != "time")
-    if other:
-        problem = f"names {other[0]}: only time is known here"
-        raise InputError(where, text, problem, "write arithmetic on time (s), pi and functions")
 
     def at(time: Array) -> Array:
         value = np.broadcast_to(np.asarray(compute(tree, {("time", None): time}), dtype=float), time.shape)
