@@ -54,6 +54,7 @@ MECHANISM = job_file("mechanism")
             "meshes[0].driven: unknown name 'whel'",
         ),
         ("housing", HOUSING, "[housing.material]", "[housing.material]\ndensity_kg_per_m3 = 1e-300", ">= 1e-09"),
+        ("housing", HOUSING, "[housing.material]", "[housing.material]\nyoungs_modulus_GPa = 210000.0", "<= 2000"),
         ("mechanism", MECHANISM, 'point = "A"', "point = [1, 2, 3]", "must have 2 entries"),
         ("mechanism", MECHANISM, '"vx(rod.B)" = -4.0', '"vx(rod.B)" = "fast"', "must be a number"),
         (

@@ -197,6 +197,7 @@ def test_a_position_without_contact_is_told(tmp_path, capsys):
         ({"angle_step_deg": 0.0}, "angle_step_deg = 0.0: must be finite and > 0"),
         ({"angle_stop_deg": -3.0}, "must be >= angle_start_deg = 1"),
         ({"angle_step_deg": 1e-6}, "more than 100000 positions"),
+        ({"angle_step_deg": 1e-6, "angle_stop_deg": None}, "angle_step_deg = 1e-06: makes more than 100000 positions"),
         ({"coarsen": 50.0}, "coarsen = 50.0: must be finite and >= 0.2 and <= 5"),
         ({"interpolation": '"spline"'}, "must be one of cubic, linear"),
         ({"twist_deg": 8.0}, "half a pitch of the wheel"),

@@ -52,7 +52,7 @@ class FeetTable:
 class HousingMaterialTable:
     """The housing's material."""
 
-    youngs_modulus_GPa: float = quantity(200.0, low=1e-9, high=1e9, doc="Young's modulus (GPa)")
+    youngs_modulus_GPa: float = quantity(200.0, low=1e-9, high=2000.0, doc="Young's modulus (GPa)")
     poisson_ratio: float = quantity(0.3, above=-1.0, below=0.5, doc="Poisson's ratio")
     density_kg_per_m3: float = quantity(7850.0, low=1e-9, high=1e9, doc="density (kg/m3)")
 

@@ -43,7 +43,7 @@ OPTIONAL = ("tip_relief_length_mm",)
 class MaterialTable:
     """Isotropic linear elastic material; without any key, structural steel."""
 
-    youngs_modulus_GPa: float = quantity(200.0, doc="Young's modulus (GPa)", low=1e-9, high=1e9)
+    youngs_modulus_GPa: float = quantity(200.0, doc="Young's modulus (GPa)", low=1e-9, high=2000.0)
     poisson_ratio: float = quantity(0.30, doc="Poisson's ratio (-)", low=0.0, below=0.5)
     density_kg_per_m3: float = quantity(7850.0, doc="density (kg/m3)", above=0.0)
 
@@ -302,18 +302,22 @@ class StiffnessTable:
             raise InputError(f"{where}.torque_Nm", self.torque_Nm, "stands beside twist_deg", "leave one of them out")
         check_flank_coarsen(self.coarsen, self.flank_coarsen, f"{where}.flank_coarsen")
         check_law(f"{where}.law", self.law)
-        if self.angle_stop_deg is None:
-            return
-        if self.angle_stop_deg < self.angle_start_deg:
+        if self.angle_stop_deg is not None and self.angle_stop_deg < self.angle_start_deg:
             problem = f"must be >= angle_start_deg = {self.angle_start_deg:g}"
             raise InputError(f"{where}.angle_stop_deg", self.angle_stop_deg, problem, "swap them")
-        if (self.angle_stop_deg - self.angle_start_deg) / self.angle_step_deg > MOST_POSITIONS:
-            problem = f"makes more than {MOST_POSITIONS} positions"
-            raise InputError(f"{where}.angle_step_deg", self.angle_step_deg, problem, "use a larger step")
 
     def angles_deg(self, mesh_cycle_deg: float) -> list[float]:
-        """Pinion angles (deg), the last one included."""
+        """Pinion angles (deg), the last one included.
+
+        Raises
+        ------
+        InputError
+            For steps that make more than `MOST_POSITIONS`.
+        """
         start, step, stop = self.angle_start_deg, self.angle_step_deg, self.angle_stop_deg
+        if (mesh_cycle_deg if stop is None else stop - start) / step > MOST_POSITIONS:
+            problem = f"makes more than {MOST_POSITIONS} positions"
+            raise InputError("stiffness.angle_step_deg", step, problem, "use a larger step")
         if stop is None:
             count = max(1, round(mesh_cycle_deg / step))
             return [start + mesh_cycle_deg * i / count for i in range(count)]
