@@ -157,6 +157,11 @@ def _duration(seconds: float) -> str:
 _displays: list[Display] = []
 
 
+def _display() -> Display | None:
+    """What shows the work of this thread."""
+    return _displays[-1] if _displays and threading.current_thread() is threading.main_thread() else None
+
+
 @contextmanager
 def shown(stream: TextIO | None = None, *, verbose: bool = False) -> Iterator[None]:
     """Show stages inside on `stream` (stderr): as one line that is rewritten where it is a terminal.
@@ -179,8 +184,8 @@ def shown(stream: TextIO | None = None, *, verbose: bool = False) -> Iterator[No
 @contextmanager
 def stage(name: str) -> Iterator[None]:
     """Name the work inside for the display; also as a decorator."""
-    display = _displays[-1] if _displays else None
-    if display is None or threading.current_thread() is not threading.main_thread():
+    display = _display()
+    if display is None:
         yield
         return
     display.enter(name)
@@ -192,8 +197,8 @@ def stage(name: str) -> Iterator[None]:
 
 def count(done: float, total: float, what: str = "") -> None:
     """Report how far the stage is: whole numbers of a whole number of things, or as floats a share."""
-    if _displays and threading.current_thread() is threading.main_thread():
-        _displays[-1].count(done, total, what)
+    if display := _display():
+        display.count(done, total, what)
 
 
 def announce(text: str) -> None:
@@ -206,8 +211,8 @@ def announce(text: str) -> None:
 
 def say(text: str) -> None:
     """Print a line that stays."""
-    if _displays and threading.current_thread() is threading.main_thread():
-        _displays[-1].say(text)
+    if display := _display():
+        display.say(text)
 
 
 @dataclass

@@ -12,7 +12,7 @@ import pytest
 
 from gearfe.errors import InputError
 from gearfe.gear import derived
-from gearfe.gear.involute import inv
+from gearfe.gear.curves import inv
 from gearfe.gear.pair import Gear, GearPair, TipRelief
 
 

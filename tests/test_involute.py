@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.gear.curves import coordinates
-from gearfe.gear.involute import inv, inverse_inv, tooth_profile
+from gearfe.gear.curves import coordinates, inv, inverse_inv
+from gearfe.gear.involute import tooth_profile
 from gearfe.gear.pair import Gear, TipRelief
 
 NM = 1e-12  # 1e-9 mm, the accuracy that profile points must have (m)

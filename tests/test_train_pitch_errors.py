@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.gear.involute import inv
+from gearfe.gear.curves import inv
 from gearfe.rigid import constant, smoothed_step
 from gearfe.rigid.compiled import available
 from gearfe.train import Damping, GearTrain, build_train, simulate

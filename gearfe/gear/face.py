@@ -105,19 +105,13 @@ class Face:
         return self.flank.parameter(np.array(self.flank.kinks))
 
     @cached_property
-    def radii(self) -> tuple[float, float, float]:
-        """Radii (m) of the start, of the end of the involute and of the end."""
-        low, middle, high = np.abs(self.points(np.array([0.0, 1.0, self.end])))
-        return float(low), float(middle), float(high)
-
-    @cached_property
-    def reach(self) -> tuple[float, float]:
-        """Radii (m) between which it lies."""
-        return float(np.abs(self.points(np.array(self.start)))), self.radii[2]
+    def radii(self) -> tuple[float, ...]:
+        """Radii (m) of where it starts, of both ends of the involute, and of its end."""
+        return tuple(np.abs(self.points(np.array([self.start, 0.0, 1.0, self.end]))).tolist())
 
     def at_radius(self, radius: Array) -> Array:
         """Parameter u of the points at given radii (m) within the range."""
-        above, low = self._above_root(radius), radius < self.radii[0]
+        above, low = self._above_root(radius), radius < self.radii[1]
         if self.root is None or not (self.undercut and low.any()):
             return above
         return np.where(low, self._in_root(self.root, radius), above)
@@ -143,7 +137,7 @@ class Face:
         # the round is passed clockwise from the flank to the tip, on the left of its centre's ray
         angle = math.atan2(centre.imag, centre.real) + np.arccos(np.clip(cosine, -1.0, 1.0))
         along = np.clip((angle - arc.start_angle) / (arc.end_angle - arc.start_angle), 0.0, 1.0)
-        return np.where(radius > self.radii[1], 1.0 + along, u)
+        return np.where(radius > self.radii[2], 1.0 + along, u)
 
     def corners(self, u: Array) -> BoolArray:
         """Whether the face has a corner at u: a sharp tip, an undercut's edge, a kink (where a linear relief starts).

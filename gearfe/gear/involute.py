@@ -18,13 +18,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Array
-from .curves import Arc, Involute, Segment, Trochoid, bisect, inv, inverse_inv
+from .curves import Arc, Involute, Segment, Trochoid, bisect, inverse_inv
 from .deviation import Deviation
 
 if TYPE_CHECKING:
     from .spur_gear import Gear
-
-__all__ = ["Segment", "ToothProfile", "inv", "inverse_inv", "tooth_profile"]
 
 #: Arcs of a smaller polar angle (rad) are taken for none: below 1e-9 mm on a gear of 1 m radius.
 NIL_ANGLE = 1e-12

@@ -177,7 +177,7 @@ def _met_at(pinion: Face, wheel: Face, a: float, frames: Array, u: Array) -> Arr
     """
     turn = np.exp(1j * frames)
     seen = pinion.points(u) * turn[:, :1] - a
-    radius, (low, high) = np.abs(seen), wheel.reach
+    radius, (low, *_, high) = np.abs(seen), wheel.radii
     mate = wheel.points(wheel.at_radius(radius)) * turn[:, 1:]
     return np.where((radius >= low) & (radius <= high * (1 + 1e-15)), np.angle(seen / mate), np.inf)
 

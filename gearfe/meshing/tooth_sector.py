@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from ..cache import cached_arrays
 from ..elasticity import least_jacobian, second_order
 from ..errors import InputError
-from ..gear.involute import tooth_profile
 from ..gear.pair import Gear, GearPair
 from ..typing import Array, IntArray
 from .session import gmsh_session
@@ -214,7 +213,7 @@ def _polar_chain(radii: Array, angle: float) -> _Chain:
 
 def _half_profile(gear: Gear, recipe: SectorRecipe, *, fine: bool) -> dict[str, _Chain]:
     """Root, flank and tip of the left half, from the middle of the space to the tip's centreline."""
-    profile = tooth_profile(gear)
+    profile = gear.profile
     segments, involute = profile.segments, profile.segment("involute")
     starts = np.cumsum([0.0, *(s.length for s in segments)])
     place = np.unique(np.concatenate([np.linspace(a, b, 200) for a, b in itertools.pairwise(starts)]))
