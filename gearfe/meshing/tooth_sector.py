@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from ..cache import cached_arrays
 from ..elasticity import least_jacobian, second_order
 from ..errors import InputError
+from ..gear.curves import coordinates
 from ..gear.pair import Gear, GearPair
-from ..typing import Array, IntArray
+from ..typing import Array, ComplexArray, IntArray
 from .session import gmsh_session
 
 #: Raised whenever the recipe's meaning changes, so that stored meshes are not mistaken for new ones.
@@ -33,6 +34,9 @@ SIZES = {
     "flank_left": ("flank", "strip"), "flank_right": ("back",), "root_left": ("root",), "root_right": ("root",),
     "tip": ("back",), "bore": ("bore",),
 }  # fmt: skip
+
+#: Boundary of the pieces of a half profile that are no flank.
+GROUPS = {"root_circle": "root", "trochoid": "root", "tip": "tip"}
 
 #: Fewer second-order edges round the whole bore stiffen the gear measurably (0.3 % with seven).
 MINIMUM_BORE_EDGES = 24
@@ -158,60 +162,47 @@ def _cut_nodes(edges: IntArray, *, reverse: bool) -> IntArray:
 # ---- outline ---------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Chain:
-    """Consecutive outline edges: end points, shape (k + 1, 2), and middle points, shape (k, 2), in metres."""
-
-    ends: Array
-    middles: Array
-
-    def reversed(self) -> _Chain:
-        return _Chain(self.ends[::-1], self.middles[::-1])
-
-    def mirrored(self) -> _Chain:
-        """Mirror image at the tooth's centreline, in the same order of points."""
-        flip = np.array([1.0, -1.0])
-        return _Chain(self.ends * flip, self.middles * flip)
-
-
-def _join(chains: list[_Chain]) -> _Chain:
-    ends = [chains[0].ends, *(c.ends[1:] for c in chains[1:])]
-    return _Chain(np.concatenate(ends), np.concatenate([c.middles for c in chains]))
-
-
-def _outline(gear: Gear, recipe: SectorRecipe) -> dict[str, _Chain]:
-    """Outline of the sector by boundary name, counter-clockwise from the bore end of the right cut."""
+def _outline(gear: Gear, recipe: SectorRecipe) -> dict[str, ComplexArray]:
+    """Outline of the sector by boundary name, counter-clockwise from the bore end of the right cut: nodes of its edges,
+    end, middle, end, ..., end, as complex numbers (m).
+    """
     left = _half_profile(gear, recipe, fine=True)
     right = _half_profile(gear, recipe, fine=False)
     half, inner = np.pi / gear.teeth, gear.bore_diameter / 2
     edges = max(1, round(2 * half * inner / recipe.bore), int(np.ceil(MINIMUM_BORE_EDGES / gear.teeth)))
-    angles = np.linspace(half, -half, 2 * edges + 1)
     depth = gear.root_radius - inner
     place = np.linspace(0, depth, 400)
     size = np.minimum(recipe.body + recipe.deepening * place, depth)
     size[0], size[-1] = min(recipe.root, depth), min(recipe.bore, 2 * half * inner / edges, depth)
-    cut = _polar_chain(gear.root_radius - _nodes(place, _limited(place, size, 2 * recipe.growth)), half)
+    radii = gear.root_radius - _nodes(place, _limited(place, size, 2 * recipe.growth))
+    cut = _polar(_interleaved(radii, _middles(radii)), half)
     return {
-        "cut_right": cut.mirrored().reversed(),
-        "root_right": right["root"].mirrored(),
-        "flank_right": right["flank"].mirrored(),
-        "tip": _join([right["tip"].mirrored(), left["tip"].reversed()]),
-        "flank_left": left["flank"].reversed(),
-        "root_left": left["root"].reversed(),
+        "cut_right": cut[::-1].conj(),
+        "root_right": right["root"].conj(),
+        "flank_right": right["flank"].conj(),
+        "tip": np.concatenate([right["tip"].conj(), left["tip"][-2::-1]]),
+        "flank_left": left["flank"][::-1],
+        "root_left": left["root"][::-1],
         "cut_left": cut,
-        "bore": _Chain(_polar(inner, angles[::2]), _polar(inner, angles[1::2])),
+        "bore": _polar(inner, np.linspace(half, -half, 2 * edges + 1)),
     }
 
 
-def _polar(radius: Array | float, angle: Array | float) -> Array:
-    return np.stack(np.broadcast_arrays(radius * np.cos(angle), radius * np.sin(angle)), axis=-1)
+def _polar(radius: Array | float, angle: Array | float) -> ComplexArray:
+    return np.asarray(radius * np.cos(angle) + 1j * (radius * np.sin(angle)))
 
 
-def _polar_chain(radii: Array, angle: float) -> _Chain:
-    return _Chain(_polar(radii, angle), _polar(0.5 * (radii[1:] + radii[:-1]), angle))
+def _middles(ends: Array) -> Array:
+    return 0.5 * (ends[1:] + ends[:-1])
 
 
-def _half_profile(gear: Gear, recipe: SectorRecipe, *, fine: bool) -> dict[str, _Chain]:
+def _interleaved(ends: Array, middles: Array) -> Array:
+    made = np.empty(len(ends) + len(middles), dtype=ends.dtype)
+    made[::2], made[1::2] = ends, middles
+    return made
+
+
+def _half_profile(gear: Gear, recipe: SectorRecipe, *, fine: bool) -> dict[str, ComplexArray]:
     """Root, flank and tip of the left half, from the middle of the space to the tip's centreline."""
     profile = gear.profile
     segments, involute = profile.segments, profile.segment("involute")
@@ -229,16 +220,15 @@ def _half_profile(gear: Gear, recipe: SectorRecipe, *, fine: bool) -> dict[str, 
         near_tip = on_flank & (place >= high - recipe.strip_length)
         size[(near_start & on_flank) | near_tip] = recipe.strip
     size = _limited(place, size, recipe.growth)
-    chains: dict[str, list[_Chain]] = {"root": [], "flank": [], "tip": []}
+    chains: dict[str, ComplexArray] = {}
     for segment, a, b in zip(segments, starts, starts[1:], strict=False):
         inside = (place >= a) & (place <= b)
         arc = _nodes(place[inside] - a, size[inside])
         arc[-1] = segment.length
-        ends = segment.points(segment.parameter_at(arc))
-        middles = segment.points(segment.parameter_at(0.5 * (arc[1:] + arc[:-1])))
-        group = {"root_circle": "root", "trochoid": "root", "tip": "tip"}.get(segment.name, "flank")
-        chains[group].append(_Chain(ends, middles))
-    return {name: _join(parts) for name, parts in chains.items() if parts}
+        ends, middles = (segment.points(segment.parameter_at(s)) @ [1, 1j] for s in (arc, _middles(arc)))
+        group, nodes = GROUPS.get(segment.name, "flank"), _interleaved(ends, middles)
+        chains[group] = np.concatenate([chains[group], nodes[1:]]) if group in chains else nodes
+    return chains
 
 
 def _limited(place: Array, size: Array, growth: float) -> Array:
@@ -289,19 +279,19 @@ def _make(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:
 
 def _filled(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:
     chains = _outline(gear, recipe)
-    ring = np.concatenate([c.ends[:-1] for c in chains.values()])
+    ring = coordinates(np.concatenate([nodes[:-1:2] for nodes in chains.values()]))
     corners, triangles = _fill(ring, recipe.body + recipe.deepening * (gear.root_radius - gear.bore_diameter / 2))
     points, quadratic, edges = second_order(corners, triangles)
     keys = edges[:, 0] * len(corners) + edges[:, 1]
     arrays: dict[str, NDArray[np.generic]] = {}
     first = 0
-    for name, chain in chains.items():
-        count = len(chain.middles)
+    for name, nodes in chains.items():
+        count = len(nodes) // 2
         start = np.arange(first, first + count)
         end = (start + 1) % len(ring)
         key = np.minimum(start, end) * len(corners) + np.maximum(start, end)
         middle = len(corners) + np.searchsorted(keys, key)
-        points[middle] = chain.middles
+        points[middle] = coordinates(nodes[1::2])
         arrays["on_" + name] = np.stack([start, middle, end], axis=1)
         first += count
     return {"points": points, "triangles": quadratic, **arrays}
