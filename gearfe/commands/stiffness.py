@@ -102,8 +102,7 @@ def run(args: argparse.Namespace) -> int:
 
         announce(size_note(elastic, np.degrees(sweep["angles"]), chosen))
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, **sweep)
-    for stage, seconds in curve.timings.items():
-        watch.seconds[stage] = watch.seconds.get(stage, 0.0) + seconds
+    watch.seconds.update(curve.timings)
     found = summary(job, curve, watch.seconds)
     with whole_set(folder, ("stiffness.png", "fields.vtkhdf", "stress_*deg.png")) as made:
         with watch.stage("table"):

@@ -113,6 +113,8 @@ def periodic_interpolant(
     phase, values = np.asarray(phase, dtype=float), np.asarray(values, dtype=float)
     known = np.flatnonzero(np.isfinite(values))
     nodes, source = distinct_phases(phase[known], period)
+    at = np.empty(len(nodes))
+    at[source[::-1]] = values[known[::-1]]  # the first come of a phase is written last
     gaps = np.diff(np.append(nodes, nodes[0] + period)) if len(nodes) else np.array([period])
     k = int(np.argmax(gaps))
     if gaps[k] > widest_gap * period * (1 + 1e-9):
@@ -122,7 +124,6 @@ def periodic_interpolant(
             f"{np.degrees(start + gaps[k]):.6g} deg of a cycle of {np.degrees(period):.6g} deg"
         )
         raise InputError("stiffness curve", None, problem, "ask for angles over a whole cycle, or for smaller steps")
-    at = values[known[np.unique(source, return_index=True)[1]]]
     secant, bends = (np.roll(at, -1) - at) / gaps, np.zeros((2, len(at)))
     slopes = secant
     if method == "cubic":
@@ -137,10 +138,11 @@ def distinct_phases(phase: Array, period: float) -> tuple[Array, IntArray]:
     wrapped = np.mod(phase, period)
     wrapped[wrapped > period * (1 - 1e-9)] = 0.0
     order = np.argsort(wrapped, kind="stable")
-    new = np.diff(wrapped[order], prepend=-period) > 1e-9 * period
-    source = np.empty(len(wrapped), dtype=np.int64)
+    rising, new = wrapped[order], np.ones(len(order), dtype=bool)
+    new[1:] = rising[1:] - rising[:-1] > 1e-9 * period
+    source = np.empty(len(order), dtype=np.int64)
     source[order] = np.cumsum(new) - 1
-    return wrapped[order][new], source
+    return rising[new], source
 
 
 def _monotone_slopes(intervals: Array, secants: Array) -> Array:
