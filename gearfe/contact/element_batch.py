@@ -17,9 +17,9 @@ import numpy as np
 
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .compliance import GearBody, MeshingPair
-from .flank import Flank
+from .flank import Flank, project
 from .laws import carrying, on_elements, uses_stress
-from .position import FlankLoads, ranges
+from .position import FlankLoads, Positions, ranges
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,8 @@ class Batch:
         Of each window: its position, gear and tooth, the window that it faces, and its edges.
     turn : ndarray of complex, shape (W,)
         Unit number that turns tooth axes to global ones.
-    window : ndarray, shape (n,)
-        Of each node.
+    window, node : ndarray, shape (n,)
+        Of each node its window, and its number on the flank.
     points : ndarray of complex, shape (n,)
         Undeformed nodes, tooth axes (m).
     owner : ndarray, shape (q,)
@@ -87,6 +87,7 @@ class Batch:
     counts: IntArray
     turn: ComplexArray
     window: IntArray
+    node: IntArray
     points: ComplexArray
     owner: IntArray
     slave_place: Array
@@ -96,6 +97,11 @@ class Batch:
     end_weighting: Array
     parameter: Array
     blocks: list[Block]
+
+    @property
+    def pairs(self) -> int:
+        """Number of windows of one gear: window w of the pinion and w + pairs of the wheel face each other."""
+        return len(self.gear) // 2
 
     @property
     def at(self) -> IntArray:
@@ -131,20 +137,17 @@ class Batch:
         return np.asarray((self.slave_shapes[points] * placed[self.slave_nodes[points]]).sum(axis=1))
 
 
-def batch_of(
-    elastic: MeshingPair, loads: tuple[FlankLoads, FlankLoads], angles: Array, twists: Array, reach: tuple[float, int]
-) -> tuple[Batch, ComplexArray]:
+def batch_of(elastic: MeshingPair, expected: Positions, reach: tuple[float, int]) -> tuple[Batch, ComplexArray]:
     """Lay positions side by side, in windows about the nodes that are loaded; and the forces on their nodes (N).
 
     Parameters
     ----------
-    loads
-        On pinion and wheel; the flanks of each row face each other.
-    angles, twists : ndarray, shape (B,)
-        Pinion angles and twists of the positions (rad); every position has a load.
+    expected
+        B positions with loads, all of them; row by row those of pinion and wheel face each other.
     reach
         How far windows go beyond their loaded nodes: share of those edges, and edges.
     """
+    loads, angles, twists = [_of_teeth(one) for one in expected.loads], expected.pinion_angle, expected.twist
     m, law = len(loads[0].tooth), on_elements(elastic.law)
     gear, position = np.repeat([0, 1], m), np.tile(loads[0].position, 2)
     tooth, mate = np.concatenate([one.tooth for one in loads]), np.roll(np.arange(2 * m), m)
@@ -158,14 +161,14 @@ def batch_of(
     for g, (flank, load) in enumerate(of_gears):
         own, q = np.flatnonzero(gear == g), len(flank.shapes)
         node, row = ranges(2 * low[own], nodes[own]), np.repeat(np.arange(m), nodes[own])
-        of_nodes.append((flank.points[node] @ [1, 1j], load.force.view(complex)[row, node]))
+        of_nodes.append((node, flank.points[node] @ [1, 1j], load.force.view(complex)[row, node]))
         number = np.where(bears, q * counts, 0)[own]
         point, owner = ranges(q * low[own], number), np.repeat(own, number)
         edge, shapes, length = point // q, flank.shapes[point % q], flank.weights.ravel()[point]
         place, parameter = edge - low[owner], law.parameter(elastic.bodies[g].surface_modulus, flank.sizes)[edge]
         end_weighting = 0.5 * length / last_edge[mate[owner]]
         of_points.append((owner, place, shapes, length, end_weighting, parameter))
-    points, forces = (np.concatenate(part) for part in zip(*of_nodes, strict=True))
+    node, points, forces = (np.concatenate(part) for part in zip(*of_nodes, strict=True))
     owner, edge, shapes, length, end_weighting, parameter = map(np.concatenate, zip(*of_points, strict=True))
     turned = [elastic.tooth_angle(g, tooth, angles[position], twists[position]) for g in (0, 1)]
     made = Batch(
@@ -179,6 +182,7 @@ def batch_of(
         counts=counts,
         turn=np.exp(1j * np.where(gear == 0, *turned)),
         window=np.repeat(np.arange(2 * m), nodes),
+        node=node,
         points=points,
         owner=owner,
         slave_place=edge + shapes @ [0.0, 0.5, 1.0],
@@ -241,3 +245,90 @@ def _response(
         line[i] += own[row, columns[i]]
         parts.append(line)
     return np.block(parts)
+
+
+def _of_teeth(loads: FlankLoads) -> FlankLoads:
+    """One load a tooth: where it bears in several places, their sum."""
+    first = np.flatnonzero((np.diff(loads.position, prepend=-1) != 0) | (np.diff(loads.tooth, prepend=0) != 0))
+    force = np.add.reduceat(loads.force, first) if len(first) else loads.force
+    return FlankLoads(loads.position[first], loads.tooth[first], force, force)
+
+
+@dataclass(frozen=True)
+class ProjectedPoints:
+    """Contact points of some positions as they lie to their mates in a state.
+
+    Attributes
+    ----------
+    points, at : ndarray, shape (k,)
+        Numbers of the contact points, and of their positions.
+    nodes : ndarray, shape (k, 6)
+        Nodes of each point's own edge and of the edge that it faces.
+    normal : ndarray of complex, shape (k, 6)
+        G: coefficients of the nodes' displacements in the gap, tooth axes.
+    place, gap, area : ndarray, shape (k,)
+        Foot points on the mates' chains of edges, gaps (m), and areas as far as they face the mate (m2). Without a
+        closest point they are `gearfe.contact.flank.OFF_END` and none.
+    trial : ndarray, shape (k,)
+        Pressure that the law asks for (Pa).
+    """
+
+    points: IntArray
+    at: IntArray
+    nodes: IntArray
+    normal: ComplexArray
+    place: Array
+    gap: Array
+    area: Array
+    trial: Array
+
+    def forces(self, pressure: Array, count: int) -> ComplexArray:
+        """G^T W p (N), shape (n,), for pressures (Pa), shape (k,)."""
+        loads, nodes = self.normal * (self.area * pressure)[:, None], self.nodes.ravel()
+        x, y = (np.bincount(nodes, part.ravel(), count) for part in (loads.real, loads.imag))
+        return np.asarray(x + 1j * y)
+
+    def closing(self, displacement: ComplexArray) -> Array:
+        """G u (m), shape (k,)."""
+        return np.asarray((self.normal.conj() * displacement[self.nodes]).real.sum(axis=1))
+
+
+def projected(
+    batch: Batch, turn: ComplexArray, displacement: ComplexArray, stress: Array, place: Array, points: IntArray
+) -> ProjectedPoints:
+    """The contact points `points` from starting places, with windows turned by `turn` and nodes displaced."""
+    placed, own = batch.placed(displacement, turn), batch.owner[points]
+    mate, half_stretch = batch.mate[own], batch.end_weighting[points]
+    found = project(batch.slaves(placed, points), placed, batch.counts, mate, place[points], half_stretch)
+    on_own = batch.slave_shapes[points] * (found.normal * turn[own].conj())[:, None]
+    on_mate = -found.shapes * (found.normal * turn[mate].conj())[:, None]
+    before_end = np.clip(0.5 + (batch.counts[mate] - found.place) / (2 * half_stretch), 0.0, 1.0)
+    return ProjectedPoints(
+        points=points,
+        at=batch.position[own],
+        nodes=np.concatenate([batch.slave_nodes[points], found.edge[:, None] + np.arange(3)], axis=1),
+        normal=np.concatenate([on_own, on_mate], axis=1),
+        place=found.place,
+        gap=found.gap,
+        area=np.where(found.reached, batch.weight[points] * before_end, 0.0),
+        trial=np.maximum(-batch.parameter[points] * found.gap - stress[points], 0.0),
+    )
+
+
+def at_rims(batch: Batch, pressure: Array, place: Array) -> BoolArray:
+    """Whether a contact has come to the rim of a window beyond which the flank goes on, shape (B,).
+
+    Parameters
+    ----------
+    pressure, place : ndarray, shape (q,)
+        Pressures at the contact points (Pa), and their foot points on the mates' chains of edges.
+    """
+    edges = np.array([body.flank.edges for body in batch.elastic.bodies])[batch.gear]
+    low, high = batch.first_edge > 0, batch.first_edge + batch.counts < edges
+    bears = np.flatnonzero(pressure > 0)
+    rim = np.zeros(len(bears), dtype=bool)
+    # on the last edge of the mate's window the normal is not blended into its neighbour's
+    for window, places in ((batch.owner, batch.slave_place), (batch.mate[batch.owner], place)):
+        own, at = window[bears], places[bears]
+        rim |= (low[own] & (at < 1)) | (high[own] & (at > batch.counts[own] - 1))
+    return np.bincount(batch.at[bears[rim]], minlength=batch.size) > 0
