@@ -7,7 +7,7 @@ import numpy as np
 from gearfe.contact.compliance import MeshingPair
 from gearfe.contact.elements import solve_elements
 from gearfe.contact.laws import HalfPlane
-from gearfe.contact.position import STATUS, TORQUES, Contacts, FlankLoads, Positions
+from gearfe.contact.position import NO_LOADS, STATUS, TORQUES, Contacts, FlankLoads, Positions
 from gearfe.stiffness.positions import position_solver
 
 
@@ -20,7 +20,7 @@ def solve_positions(elastic: MeshingPair, angles, twists) -> Positions:
     return solve_elements(elastic, solver.half_plane.solve(angles, twists, np.arange(len(angles))))
 
 
-def given_positions(twists, loads: tuple[FlankLoads, ...] = ()) -> Positions:
+def given_positions(twists, loads: tuple[FlankLoads, ...] = (NO_LOADS, NO_LOADS)) -> Positions:
     """Positions at pinion angle 0 that count as solved, without numbers and contacts."""
     n, none, panels = len(twists), np.zeros(0), np.zeros((0, 0))
     pairs = np.zeros((0, 2))

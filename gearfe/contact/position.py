@@ -6,8 +6,7 @@ its own, sorted by the number of the position that they are of.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any
@@ -184,6 +183,11 @@ class PointPressures:
     pressure: Array
 
 
+#: Where nothing was asked for.
+NO_LOADS = FlankLoads(*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0, 0)))
+NO_POINTS = PointPressures(*np.zeros((3, 0), dtype=np.int64), *np.zeros((2, 0)))
+
+
 @dataclass(frozen=True)
 class Positions:
     """Solutions of n positions. `positions[i]` is one of them, with numbers in place of arrays of shape (n,).
@@ -207,10 +211,9 @@ class Positions:
         Elastic energy (J): the work of the contact forces.
     contacts
         That carry load.
-    loads
-        What fields need, of pinion and wheel, at the positions where it was asked for; none at all otherwise.
-    points
-        Pressures along the flanks at the same positions; None where nothing was asked for.
+    loads, points
+        What fields need, loads of pinion and wheel and pressures along the flanks, at the positions where it was asked
+        for.
     """
 
     pinion_angle: Array
@@ -223,33 +226,22 @@ class Positions:
     energy: Array
     iterations: IntArray
     contacts: Contacts
-    loads: tuple[FlankLoads, ...] = ()
-    points: PointPressures | None = None
+    loads: tuple[FlankLoads, ...] = (NO_LOADS, NO_LOADS)
+    points: PointPressures = NO_POINTS
 
     def __len__(self) -> int:
         return len(self.twist)
 
     def __getitem__(self, i: int) -> Positions:
-        return self._of(np.arange(len(self))[[i]], i)
+        return self.take(i)
 
     def __iter__(self) -> Iterator[Positions]:
         return (self[i] for i in range(len(self)))
 
-    def take(self, chosen: IntArray | slice) -> Positions:
+    def take(self, chosen: int | IntArray | slice) -> Positions:
         """The positions `chosen`."""
-        return self._of(np.arange(len(self))[chosen], chosen)
-
-    def _of(self, numbers: IntArray, index: Any) -> Positions:
-        made: dict[str, Any] = {}
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, np.ndarray):
-                made[field.name] = value[index]
-            elif isinstance(value, tuple):
-                made[field.name] = tuple(of_positions(one, numbers) for one in value)
-            else:
-                made[field.name] = None if value is None else of_positions(value, numbers)
-        return Positions(**made)
+        numbers = np.atleast_1d(np.arange(len(self))[chosen])
+        return _by_field([self], lambda own: own[0][chosen], lambda own: of_positions(own[0], numbers))
 
     def replaced(self, places: IntArray, others: Positions) -> Positions:
         """These with `others` at the numbers `places`."""
@@ -263,7 +255,8 @@ class Positions:
         none = np.where(status == "no_contact", 0.0, np.nan)
         names = (*TORQUES, "energy")
         numbers: dict[str, Any] = {name: np.where(good, getattr(self, name), none) for name in names}
-        return replace(self.with_loads(good), status=status, contacts=_of_kept(self.contacts, good), **numbers)
+        contacts = taken(self.contacts, good[self.contacts.position])
+        return replace(self.with_loads(good), status=status, contacts=contacts, **numbers)
 
     def raised(self, share: Array) -> Positions:
         """These with torques raised by the shares c = Delta T / T of finite strain, shape (n,).
@@ -280,8 +273,8 @@ class Positions:
 
     def with_loads(self, kept: BoolArray) -> Positions:
         """These with loads and point pressures of some alone, shape (n,)."""
-        points = None if self.points is None else _of_kept(self.points, kept)
-        return replace(self, loads=tuple(_of_kept(one, kept) for one in self.loads), points=points)
+        loads = tuple(taken(one, kept[one.position]) for one in self.loads)
+        return replace(self, loads=loads, points=taken(self.points, kept[self.points.position]))
 
 
 #: Rounding of the gears' angles (rad) below which no twist can be told apart.
@@ -292,28 +285,25 @@ STATUS = "<U18"
 TORQUES = ("torque_wheel", "torque_pinion", "torque_wheel_reaction", "tangent")
 
 
-def _of_kept(record: Any, kept: BoolArray) -> Any:
-    """The entries of the positions that are kept, shape (n,)."""
-    return taken(record, kept[record.position])
+def _by_field(parts: Sequence[Positions], of_arrays: Callable[..., Any], of_records: Callable[..., Any]) -> Positions:
+    """Positions whose fields are made of those of `parts` that have the same name."""
+
+    def made(own: Sequence[Any]) -> Any:
+        if isinstance(own[0], tuple):
+            return tuple(made(one) for one in zip(*own, strict=True))
+        return of_arrays(own) if isinstance(own[0], np.ndarray) else of_records(own)
+
+    return Positions(*(made([getattr(part, name) for part in parts]) for name in _names(Positions)))
 
 
 def together(parts: Sequence[Positions]) -> Positions:
     """Positions one after the other; parts without loads join those that have them."""
     if len(parts) == 1:
         return parts[0]
-    starts = np.cumsum([0, *(len(part) for part in parts)]).tolist()
+    starts = np.cumsum([0, *(len(part) for part in parts[:-1])])
 
     def moved(records: Sequence[Any]) -> Any:
-        own = [(record, start) for record, start in zip(records, starts, strict=False) if record is not None]
-        return joined([replace(record, position=record.position + start) for record, start in own]) if own else None
+        own = [replace(one, position=one.position + start) for one, start in zip(records, starts, strict=True)]
+        return joined([one for one in own if len(one.position)] or own[:1])
 
-    made: dict[str, Any] = {}
-    for field in fields(Positions):
-        values = [getattr(part, field.name) for part in parts]
-        if isinstance(values[0], np.ndarray):
-            made[field.name] = np.concatenate(values)
-        elif isinstance(values[0], tuple):
-            made[field.name] = tuple(moved(one) for one in itertools.zip_longest(*values))
-        else:
-            made[field.name] = moved(values)
-    return Positions(**made)
+    return _by_field(parts, np.concatenate, moved)

@@ -167,7 +167,6 @@ def flank_pressures(pair: MeshingPair, position: Positions) -> list[FlankPressur
     """Pressure on each loaded flank of one solved position."""
     made: list[FlankPressure] = []
     points = position.points
-    assert points is not None
     for gear, number in dict.fromkeys(zip(points.gear.tolist(), points.pair.tolist(), strict=True)):
         mine = np.flatnonzero((points.gear == gear) & (points.pair == number))
         mine = mine[np.argsort(points.place[mine], kind="stable")]
