@@ -9,7 +9,8 @@ import pytest
 
 from gearfe import InputError
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
-from gearfe.gear.deviation import NOMINAL, Deviation, ToothDeviations, total
+from gearfe.gear.deviation import Deviation, total
+from gearfe.gear.face import NOMINAL, ToothDeviations
 from gearfe.gear.touching import ToothFlanks, touching_curve
 from gearfe.stiffness.sweep import elastic_pair
 

@@ -15,8 +15,8 @@ from gearfe import InputError
 from gearfe.cli import main
 from gearfe.contact.half_plane import half_plane_pair
 from gearfe.gear import pitch_errors
-from gearfe.gear.deviation import NOMINAL
 from gearfe.gear.deviation_job import deviations_of
+from gearfe.gear.face import NOMINAL
 from gearfe.gear.modifications import FlankModification, Relief, tooth_deviations
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshlaw.make import mesh_law

@@ -11,7 +11,8 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.gear.curves import coordinates
-from gearfe.gear.deviation import Deviation, ToothDeviations
+from gearfe.gear.deviation import Deviation
+from gearfe.gear.face import ToothDeviations
 from gearfe.gear.outline import tooth_outline, whole_outline
 from gearfe.gear.pair import Gear
 from gearfe.meshing.gear_solid import write_solid

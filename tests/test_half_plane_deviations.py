@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
-from gearfe.gear.deviation import Deviation, ToothDeviations
-from gearfe.gear.face import face_of
+from gearfe.gear.deviation import Deviation
+from gearfe.gear.face import ToothDeviations, face_of
 from gearfe.gear.pair import TipRelief
 from gearfe.gear.touching import Faces
 from gearfe.stiffness.sweep import elastic_pair

@@ -12,8 +12,8 @@ from gearfe.config import build
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.elasticity import Material
 from gearfe.gear import pitch_errors
-from gearfe.gear.deviation import NOMINAL, ToothDeviations
 from gearfe.gear.deviation_job import deviations_of
+from gearfe.gear.face import NOMINAL, ToothDeviations
 from gearfe.gear.modifications import FlankModification, Relief, Waviness, tooth_deviations
 from gearfe.gear.pair import GearPair, TipRelief
 from gearfe.loadmap.load_map import BACK, LoadMap

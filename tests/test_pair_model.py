@@ -5,7 +5,7 @@ import pytest
 from gearfe.contact.laws import HalfPlane, Nitsche, PairModel
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
-from gearfe.gear.deviation import NOMINAL, ToothDeviations
+from gearfe.gear.face import NOMINAL, ToothDeviations
 
 BRONZE = Material(110e9, 0.34)
 

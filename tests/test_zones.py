@@ -15,7 +15,7 @@ from gearfe.contact.elements import solve_elements
 from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
 from gearfe.contact.panels import MIDDLES, PANELS, WIDTHS, influence, log_integral, unilateral
 from gearfe.contact.position import Positions
-from gearfe.gear.deviation import ToothDeviations
+from gearfe.gear.face import ToothDeviations
 from gearfe.stiffness.job import read_stiffness_job
 from gearfe.stiffness.sweep import elastic_pair
 

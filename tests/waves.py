@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from gearfe.contact.compliance import MeshingPair
-from gearfe.gear.deviation import Deviation, ToothDeviations
-from gearfe.gear.face import face_of
+from gearfe.gear.deviation import Deviation
+from gearfe.gear.face import ToothDeviations, face_of
 from gearfe.gear.pair import GearPair
 from gearfe.gear.spur_gear import Gear
 

@@ -11,7 +11,7 @@ from ..progress import stage
 from .arguments import add_folder, add_job, check_option, print_results
 
 if TYPE_CHECKING:
-    from ..gear.deviation import ToothDeviations
+    from ..gear.face import ToothDeviations
     from ..gear.pair import Gear, GearPair
     from ..tables.microgeometry import MicrogeometryTable
 
@@ -119,8 +119,8 @@ def _deviations(
     pair: GearPair, name: str, table: MicrogeometryTable | None, folder: Path
 ) -> tuple[ToothDeviations, ToothDeviations]:
     """Deviations of the left and the right flanks of a gear."""
-    from ..gear.deviation import NOMINAL
     from ..gear.deviation_job import GEARS, FlankOf, flank_deviations
+    from ..gear.face import NOMINAL
 
     if table is None:
         return NOMINAL

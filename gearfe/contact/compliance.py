@@ -28,7 +28,7 @@ from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
 from ..elasticity import Material, Plane, element_stiffness, finite_strain_rates
 from ..errors import InputError
-from ..gear.deviation import ToothDeviations
+from ..gear.face import ToothDeviations
 from ..gear.pair import GearPair
 from ..gear.touching import WAY
 from ..meshing.tooth_sector import SectorMesh

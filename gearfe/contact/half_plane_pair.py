@@ -21,8 +21,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gear.deviation import ToothDeviations
-from ..gear.face import FlankTables, flank_tables
+from ..gear.face import FlankTables, ToothDeviations, flank_tables
 from ..gear.pair import GearPair
 from ..gear.touching import ToothFlanks
 from ..typing import Array, ComplexArray, IntArray

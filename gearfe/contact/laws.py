@@ -37,7 +37,7 @@ import numpy as np
 from ..config import fields_of
 from ..elasticity import Material, Plane
 from ..errors import InputError
-from ..gear.deviation import NOMINAL, ToothDeviations
+from ..gear.face import NOMINAL, ToothDeviations
 from ..tables.pair import check_flank_coarsen, law_class
 from ..typing import Array, BoolArray
 

@@ -1,4 +1,4 @@
-"""Deviations of micrometres of the flanks of a gear: one profile each, and which tooth has which, and where it stands.
+"""Deviations of micrometres of the flank of a tooth.
 
 A deviation is a length along the normal of the involute, over its roll length: more material where it is positive. Its
 cubic pieces hold the usual modifications exactly, kinks included (a linear relief, a K-chart's corners).
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..typing import Array, IntArray
+from ..typing import Array
 
 #: Jump of the slope (-) from which on a break is a kink.
 KINK = 1e-9
@@ -139,51 +139,3 @@ def total(parts: Sequence[Deviation]) -> Deviation | None:
         constant[0] = part.at(start + 0.5 * h)[0]
         made += np.where(on, moved, constant)
     return _made(breaks, made)
-
-
-@dataclass(frozen=True)
-class ToothDeviations:
-    """Deviations of the working flanks of a gear's teeth.
-
-    Attributes
-    ----------
-    profiles : tuple of Deviation or None
-        The distinct profiles; None: the involute as the gear has it.
-    profile : tuple of int
-        Number of each tooth's profile, one entry a tooth, or one for all.
-    turn : tuple of float
-        Pitch errors as the turn (rad) of each tooth's flank about the gear's centre, > 0 counter-clockwise: out of the
-        material of the driving flanks, which then touch earlier. One entry a tooth, or one for all.
-    """
-
-    profiles: tuple[Deviation | None, ...] = (None,)
-    profile: tuple[int, ...] = (0,)
-    turn: tuple[float, ...] = (0.0,)
-
-    def __post_init__(self) -> None:
-        if not self.profiles or min(self.profile) < 0 or max(self.profile) >= len(self.profiles):
-            raise InputError("profile", self.profile, f"must be numbers of the {len(self.profiles)} profiles")
-
-    def check(self, teeth: int) -> None:
-        """Raise `InputError` for a list that has neither one entry nor one a tooth."""
-        for name in ("profile", "turn"):
-            if len(getattr(self, name)) not in (1, teeth):
-                problem = f"must have one entry, or one for each of the {teeth} teeth"
-                raise InputError(name, len(getattr(self, name)), problem, "give as many as the gear has teeth")
-
-    @property
-    def alike(self) -> bool:
-        """Whether all teeth are the same."""
-        return len(set(self.profile)) == 1 and len(set(self.turn)) == 1
-
-    def profile_of(self, tooth: IntArray) -> IntArray:
-        """Numbers of the profiles of teeth, which count on round the gear."""
-        return np.asarray(np.array(self.profile, dtype=np.int64)[tooth % len(self.profile)])
-
-    def turn_of(self, tooth: IntArray) -> Array:
-        """Their turns (rad)."""
-        return np.asarray(np.array(self.turn, dtype=float)[tooth % len(self.turn)])
-
-
-#: Gears as their geometry says.
-NOMINAL = (ToothDeviations(), ToothDeviations())

@@ -15,7 +15,8 @@ from ..files import read_numbers
 from ..tables.microgeometry import ENDS, STARTS, FlankTable, MicrogeometryTable
 from ..typing import Array, IntArray
 from . import pitch_errors
-from .deviation import Deviation, ToothDeviations
+from .deviation import Deviation
+from .face import ToothDeviations
 from .modifications import FlankModification, Relief, Waviness, tooth_deviations
 from .pair import Gear, GearPair
 

@@ -1,4 +1,5 @@
-r"""The working flank of a tooth, root, involute with its relief, and tip round, by a parameter and by its arc length.
+r"""The working flank of a tooth, root, involute with its relief, and tip round, by a parameter and by its arc length;
+and which flanks the teeth of a gear have.
 
 Roots take no part in the touching of rigid flanks, but where one is undercut: the involute then starts with an edge,
 which can bear as a sharp tip does, and the mate's tip passes so close below it that the root may be touched first.
@@ -22,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .curves import Arc, Involute, Trochoid
 from .deviation import Deviation
@@ -321,3 +323,51 @@ def flank_tables(faces: Sequence[Face]) -> FlankTables:
         cubic=np.concatenate([face.cubic for face in faces], axis=1),
         steps=steps,
     )
+
+
+@dataclass(frozen=True)
+class ToothDeviations:
+    """Deviations of the working flanks of a gear's teeth.
+
+    Attributes
+    ----------
+    profiles : tuple of Deviation or None
+        The distinct profiles; None: the involute as the gear has it.
+    profile : tuple of int
+        Number of each tooth's profile, one entry a tooth, or one for all.
+    turn : tuple of float
+        Pitch errors as the turn (rad) of each tooth's flank about the gear's centre, > 0 counter-clockwise: out of the
+        material of the driving flanks, which then touch earlier. One entry a tooth, or one for all.
+    """
+
+    profiles: tuple[Deviation | None, ...] = (None,)
+    profile: tuple[int, ...] = (0,)
+    turn: tuple[float, ...] = (0.0,)
+
+    def __post_init__(self) -> None:
+        if not self.profiles or min(self.profile) < 0 or max(self.profile) >= len(self.profiles):
+            raise InputError("profile", self.profile, f"must be numbers of the {len(self.profiles)} profiles")
+
+    def check(self, teeth: int) -> None:
+        """Raise `InputError` for a list that has neither one entry nor one a tooth."""
+        for name in ("profile", "turn"):
+            if len(getattr(self, name)) not in (1, teeth):
+                problem = f"must have one entry, or one for each of the {teeth} teeth"
+                raise InputError(name, len(getattr(self, name)), problem, "give as many as the gear has teeth")
+
+    @property
+    def alike(self) -> bool:
+        """Whether all teeth are the same."""
+        return len(set(self.profile)) == 1 and len(set(self.turn)) == 1
+
+    def profile_of(self, tooth: IntArray) -> IntArray:
+        """Numbers of the profiles of teeth, which count on round the gear."""
+        return np.asarray(np.array(self.profile, dtype=np.int64)[tooth % len(self.profile)])
+
+    def turn_of(self, tooth: IntArray) -> Array:
+        """Their turns (rad)."""
+        return np.asarray(np.array(self.turn, dtype=float)[tooth % len(self.turn)])
+
+
+#: Gears as their geometry says.
+NOMINAL = (ToothDeviations(), ToothDeviations())

@@ -22,7 +22,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Array
-from .deviation import Deviation, ToothDeviations, total
+from .deviation import Deviation, total
+from .face import ToothDeviations
 from .spur_gear import Gear
 
 Shape = Literal["linear", "arc", "parabolic"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..typing import Array
 from .curves import Arc, Involute
-from .deviation import NOMINAL, ToothDeviations
+from .face import NOMINAL, ToothDeviations
 from .spur_gear import Gear
 
 #: Rounds of h(s' - h) for a point at s' = s + h(s): each leaves of the last error the flank's slope, at most 0.2.

@@ -32,8 +32,7 @@ from typing import Any
 import numpy as np
 
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from .deviation import NOMINAL, ToothDeviations
-from .face import AT_AN_END, Face, FlankTables, face_of
+from .face import AT_AN_END, NOMINAL, Face, FlankTables, ToothDeviations, face_of
 from .pair import MeshGeometry
 
 #: Points of the first search along a flank and of each closer look, and how often it looks closer at most; points

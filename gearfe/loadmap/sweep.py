@@ -16,7 +16,7 @@ from ..contact.compliance import MeshingPair
 from ..contact.laws import DEFAULT_MODEL, PairModel
 from ..contact.position import Positions, joined, taken, together
 from ..errors import InputError
-from ..gear.deviation import ToothDeviations
+from ..gear.face import ToothDeviations
 from ..gear.pair import GearPair
 from ..progress import Stopwatch, count, one_thread, stage
 from ..stiffness.job import Keep, StiffnessJob

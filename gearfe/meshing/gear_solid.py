@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..gear.deviation import NOMINAL, ToothDeviations
+from ..gear.face import NOMINAL, ToothDeviations
 from ..gear.outline import Piece, whole_outline
 from ..gear.pair import Gear
 from .session import gmsh_session

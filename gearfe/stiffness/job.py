@@ -24,7 +24,7 @@ from ..config import load_job
 from ..contact.laws import ContactLaw, PairModel, check_alike, law_named
 from ..elasticity import Material
 from ..errors import InputError
-from ..gear.deviation import NOMINAL, ToothDeviations
+from ..gear.face import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
 from ..tables.pair import MaterialTable, PairTable, StiffnessTable
 from .curve import StiffnessCurve

@@ -25,7 +25,7 @@ from ..contact.laws import HalfPlane
 from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, joined, of_positions, taken, together
 from ..errors import InputError
 from ..gear.derived import mesh_stiffness
-from ..gear.deviation import NOMINAL
+from ..gear.face import NOMINAL
 from ..gear.touching import Touching
 from ..gear.validity import MOST_YIELD
 from ..progress import count

@@ -42,7 +42,7 @@ from ..contact.half_plane_pair import HalfPlanePair
 from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, check_alike, law_text, uses_stress
 from ..contact.position import Positions
 from ..errors import InputError
-from ..gear.deviation import NOMINAL
+from ..gear.face import NOMINAL
 from ..gear.pair import GearPair
 from ..gear.validity import MOST_OVERLAP, overlaps
 from ..meshing.tooth_sector import sector_mesh, sector_recipes

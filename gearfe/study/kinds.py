@@ -18,7 +18,7 @@ import numpy as np
 
 from ..config import build, job_tables
 from ..files import read_csv
-from ..gear.deviation import NOMINAL
+from ..gear.face import NOMINAL
 from ..progress import Stopwatch
 from ..tables.loadmap import loads_of
 from .expressions import Answer

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, given
-from ..gear.deviation import NOMINAL, ToothDeviations
 from ..gear.deviation_job import deviations_of
+from ..gear.face import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
 from ..meshlaw.law import MeshLaw
 from ..progress import stage
