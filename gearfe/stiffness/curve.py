@@ -49,15 +49,15 @@ def as_text(values: ArrayLike, column: str) -> list[str]:
 
 def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -> Array:
     """Column `name` in SI; not-a-number where a cell is empty, or the file has no such column."""
-    made = np.full(len(next(iter(columns.values()))), np.nan)
+    made, factor = np.full(len(next(iter(columns.values()))), np.nan), _factor(name)
     for row, cell in enumerate(columns.get(name, ())):
         with suppress(ValueError):
-            made[row] = float(cell.strip() or "nan")
+            made[row] = float(cell.strip() or "nan") / factor
             if not math.isinf(made[row]):
                 continue
         problem = f"column {name} holds {shown(cell.strip())}, which is no finite number"
         raise InputError("stiffness curve", str(path), problem, "write a number, or leave the cell empty")
-    return made / _factor(name)
+    return made
 
 
 #: Statuses that stand for a result; every other one marks a failed position, whose numbers are not-a-number.
