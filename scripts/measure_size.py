@@ -26,11 +26,11 @@ CAPABILITIES = {
     """,
     "run-up, steady states": "runup/* */runup.py figures/campbell.py",
     "flexible links, couplings, loads, analyses of mechanisms": """
-        rigid/beam* rigid/belt.py rigid/cam.py rigid/gear_ratio.py rigid/rack.py rigid/rolling.py rigid/turning.py
-        rigid/equilibrium.py rigid/inverse.py rigid/modes.py rigid/statefunctions.py rigid/collocation.py
-        rigid/*tape* rigid/*quadratic* rigid/programs.py rigid/corners.py mechanisms/load_series.py
+        rigid/beam* rigid/couplings.py rigid/turning.py
+        rigid/equilibrium.py rigid/inverse.py rigid/modes.py rigid/collocation.py
+        rigid/*tape* rigid/quadratic.py rigid/written.py rigid/corners.py
         mechanisms/link* mechanisms/loads.py mechanisms/rest.py mechanisms/sensitivity.py mechanisms/solve.py
-        mechanisms/sweep.py mechanisms/tables.py tables/beam.py
+        mechanisms/tables.py tables/beam.py
         mechanisms/plate* meshing/plate_mesh.py tables/plate.py rigid/floating.py rigid/kernel_elastic.py
         rigid/kernel_collocation.py rigid/kernel_equations.py rigid/kernel_matrices.py rigid/kernel_stages.py
         rigid/numpy_equations.py rigid/lanes.py rigid/lanes_type.py

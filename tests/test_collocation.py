@@ -25,13 +25,12 @@ from gearfe.rigid import (
 )
 from gearfe.rigid.beam import Beam
 from gearfe.rigid.beam_link import BeamLink, Section
-from gearfe.rigid.cam import Cam
 from gearfe.rigid.collocation import GAUSS, RADAU, path_matrix, scheme
+from gearfe.rigid.couplings import Cam
 from gearfe.rigid.floating import Floating, FloatingBody, frame_joint
 from gearfe.rigid.implicit import KERNELS, Stepper, equations, narrow_band
 from gearfe.rigid.lanes import as_lanes, lanes
 from gearfe.rigid.ordering import narrow_order
-from gearfe.rigid.programs import without_redundant, written
 from gearfe.rigid.start import Start
 from gearfe.rigid.steps import Status, StepControl, StepLaw
 from gearfe.rigid.turning import TurningFrame
@@ -182,9 +181,9 @@ def test_kernels_step_as_numpy_does(make: Any, family: str) -> None:
     start: Start = consistent_start(system, 0.02)
     tab = scheme(family, 3)
     one, two = Stepper(system, start, tab), Stepper(system, start, tab)
-    program = written(system)
+    program = system.program
     assert program is not None
-    held = without_redundant(program, start.active)
+    held = program.without_redundant(start.active)
     eq = equations(held, narrow_band(held), 3, len(one.w.S))
     two._step = lambda: KERNELS.plain.collocation_step(eq, two.w, tab)
     q, v, limit = start.q, start.v, np.full(system.size, 1e-9)

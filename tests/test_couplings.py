@@ -23,10 +23,8 @@ from gearfe.rigid import (
     constant,
     integrate,
 )
-from gearfe.rigid.belt import Belt
-from gearfe.rigid.gear_ratio import GearRatio
-from gearfe.rigid.rack import Rack
-from gearfe.rigid.rolling import Rolling
+from gearfe.rigid.couplings import Belt, GearRatio, Rack
+from gearfe.rigid.joints import Rolling
 
 TIMES = np.linspace(0.0, 0.8, 5)
 METHODS = [("taylor", 1e-11), ("explicit", 1e-10), ("implicit", 1e-6)]

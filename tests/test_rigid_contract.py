@@ -26,7 +26,7 @@ from gearfe.rigid import (
 from gearfe.rigid.collocation import GAUSS, RADAU, scheme
 from gearfe.rigid.compiled import available
 from gearfe.rigid.implicit import Stepper
-from gearfe.rigid.stiffness_estimate import fastest_rate
+from gearfe.rigid.modes import fastest_rate
 
 from .rigid_cases import pendulum
 

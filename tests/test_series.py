@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from gearfe.mechanisms import load_mechanism
 from gearfe.mechanisms.expressions import compute, parse
-from gearfe.mechanisms.load_series import write_expression
+from gearfe.mechanisms.loads import write_expression
 from gearfe.rigid import (
     Body,
     Gravity,

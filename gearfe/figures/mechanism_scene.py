@@ -12,7 +12,7 @@ from ..mechanisms.links import FlexibleLink
 from ..mechanisms.model import Mechanism
 from ..mechanisms.plates import PlateLink
 from ..rigid import GROUND, Prismatic, Slot, Spring
-from ..rigid.distance import Distance
+from ..rigid.joints import Distance
 from ..typing import Array, ComplexArray
 from .style import COLOURS, GREY
 

@@ -3,8 +3,7 @@
 from .model import Mechanism, load_mechanism
 from .results import Results, evaluate
 from .sensitivity import Sensitivities, sensitivities
-from .solve import Solution, solve
-from .sweep import Case, sweep
+from .solve import Case, Solution, solve, sweep
 
 __all__ = [
     "Case",

@@ -243,14 +243,13 @@ def _of_elements(mechanism: Mechanism, results: Results, name: str) -> dict[str,
 
 def write_elastic(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -> None:
     """Files of flexible links, where there are some."""
-    if mechanism.links:
-        from .link_files import write_links
+    if mechanism.elastic:
+        from .link_files import write_links, write_plates
 
-        write_links(folder, mechanism, trajectory)
-    if mechanism.plates:
-        from .plate_files import write_plates
-
-        write_plates(folder, mechanism, trajectory)
+        if mechanism.links:
+            write_links(folder, mechanism, trajectory)
+        if mechanism.plates:
+            write_plates(folder, mechanism, trajectory)
 
 
 def _error_line(error: dict[str, Any]) -> str:

@@ -255,7 +255,8 @@ class Mechanism:
         for _, load in self.linkage.assembly.state_loads:
             if not math.isfinite(load.value(start.time, start.q, start.v)):
                 raise InputError("forces", None, f"have no value at the start: {load.complaint}", "mend the expression")
-        force = self.linkage.force(start.time, start.q, start.v)
+        q, v = start.q[: self.linkage.size], start.v[: self.linkage.size]
+        force = self.linkage.force(start.time, q, v)
         for _, law in self.linkage.assembly.tension_laws:
             if law.complaint and not np.isfinite(force).all():
                 raise InputError("forces", None, f"have no value at the start: {law.complaint}", "mend the expression")

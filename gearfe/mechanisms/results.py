@@ -5,19 +5,22 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from ..errors import InputError
 from ..files import read_text
 from ..progress import stage
-from ..rigid import Trajectory
+from ..rigid import Linkage, Trajectory
 from ..typing import Array
 from .expressions import PLAIN, compute, quantities
 from .model import Mechanism
 
 #: States that are evaluated at once: links of some dozen points take 6 kB each for their strains.
 BLOCK = 4096
+#: Numbers of the gradients that are held at once.
+LARGEST = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -68,9 +71,10 @@ def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
     return Results(trajectory, outputs, energy, sections)
 
 
-def in_blocks(function: Callable[..., Array], *states: Array) -> Array:
+def in_blocks(function: Callable[..., Array], *states: Array, size: int = BLOCK) -> Array:
     """A function of many states (times, ...) by blocks of times, which bounds the memory that it needs."""
-    parts = [function(*(x[k : k + BLOCK] for x in states)) for k in range(0, len(states[0]), BLOCK)]
+    size = max(1, size)
+    parts = [function(*(x[k : k + size] for x in states)) for k in range(0, len(states[0]), size)]
     return np.concatenate(parts)
 
 
@@ -138,22 +142,33 @@ def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     the share of
     the joints is not unique.
     """
-    linkage = mechanism.linkage
-    bodies, owner = linkage.assembly.tables.forms.bodies, np.array(linkage.assembly.row_joint)
-    q, out = trajectory.q[:, : linkage.size], {}
-    pulls = -trajectory.multipliers[:, : linkage.rows, None, None] * linkage.gradients(q)
+    linkage, out = mechanism.linkage, {}
+    q, multipliers = trajectory.q[:, : linkage.size], trajectory.multipliers[:, : linkage.rows]
+    pulls = in_blocks(partial(_pulls, linkage), q, multipliers, size=LARGEST // (1 + linkage.rows * linkage.size))
     for j, (name, joint) in enumerate(zip(mechanism.file.joints, linkage.joints, strict=True)):
         body = linkage.body_index[getattr(joint, "a", "") or getattr(joint, "body", "")]
-        rows = np.flatnonzero(owner == j)
-        wrench = pulls[:, rows, np.where(bodies[rows, 0] == body, 0, 1)].sum(axis=1)
+        x, y, moment = pulls[:, j, body].T
         at = getattr(joint, "point_a", getattr(joint, "point", (0.0, 0.0)))
         dx, dy = np.asarray(at) - linkage.assembly.centre[body]
         angle = q[:, 3 * body + 2] if body < len(linkage.bodies) else np.zeros(len(q))
         c, s = np.cos(angle), np.sin(angle)
-        out[f"{name}_x_N"], out[f"{name}_y_N"] = wrench[:, :2].T
-        arm = c * dx - s * dy, s * dx + c * dy
-        out[f"{name}_moment_N_m"] = wrench[:, 2] - (arm[0] * wrench[:, 1] - arm[1] * wrench[:, 0])
+        out[f"{name}_x_N"], out[f"{name}_y_N"] = x, y
+        out[f"{name}_moment_N_m"] = moment - (c * dx - s * dy) * y + (s * dx + c * dy) * x
     return out
+
+
+def _pulls(linkage: Linkage, q: Array, multipliers: Array) -> Array:
+    """Forces and moments of the joints on the bodies at their centres, on the ground at its origin.
+
+    Shape (times, joints, bodies + 1, 3).
+    """
+    held = np.array(linkage.assembly.row_joint)[:, None] == np.arange(len(linkage.joints))
+    made = -np.einsum("tr,rj,trq->tjq", multipliers, held, linkage.jacobian(0.0, q))
+    on = made.reshape(len(q), len(linkage.joints), -1, 3)
+    place = q.reshape(len(q), 1, -1, 3)
+    about = on[..., 2] + place[..., 0] * on[..., 1] - place[..., 1] * on[..., 0]  # what the ground has to balance
+    ground = -np.concatenate([on[..., :2], about[..., None]], axis=-1).sum(axis=2, keepdims=True)
+    return np.concatenate([on, ground], axis=2)
 
 
 def reference_table(mechanism: Mechanism) -> dict[str, Array] | None:

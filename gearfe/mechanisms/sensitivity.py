@@ -30,7 +30,7 @@ from ..tables.mechanism import RunTable
 from ..typing import Array
 from .error_estimate import LEAST_TOLERANCE, SHARPER
 from .model import load_mechanism
-from .sweep import Case, sweep
+from .solve import Case, sweep
 
 #: Largest step as a share of the value, and how many steps there are, each half of the one before.
 LARGEST, STEPS = 1e-2, 5

@@ -80,10 +80,6 @@ class ValueTable:
         k = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, len(self.x) - 2)
         return x - self.x[k], k
 
-    def piece(self, x: float) -> int | None:
-        """Number of the piece that holds x; None beyond the table."""
-        return int(self._at(x)[1]) if self.covers(x) else None
-
     def __call__(self, x: Array) -> Array:
         """y at x, not-a-number beyond the table."""
         return np.where(self.covers(x), self.value(x), np.nan)
@@ -93,18 +89,6 @@ class ValueTable:
         h, k = self._at(x)
         c = self._pieces[:, k]
         return ((c[0] * h + c[1]) * h + c[2]) * h + c[3]
-
-    def slope(self, x: Array) -> Any:
-        """dy/dx at x."""
-        h, k = self._at(x)
-        c = self._pieces[:, k]
-        return (3.0 * c[0] * h + 2.0 * c[1]) * h + c[2]
-
-    def bend(self, x: Array) -> Any:
-        """Second derivative at x."""
-        h, k = self._at(x)
-        c = self._pieces[:, k]
-        return 6.0 * c[0] * h + 2.0 * c[1]
 
 
 def read_table(name: str, table: ValueTableTable, folder: Path) -> ValueTable:

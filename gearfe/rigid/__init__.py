@@ -4,16 +4,14 @@ Nothing here knows which mechanism it runs. The component contract is in `gearfe
 """
 
 from .contract import Element, LinearJoint, LocalForce, ModalBlocks, SeriesLaw
-from .distance import Distance
-from .forces import CoordinateSpring, Gravity, Moment, PointForce, Spring
+from .forces import CoordinateSpring, Gravity, Moment, PointForce, SpanFunction, Spring, StateFunction
 from .forms import GROUND
 from .integrate import integrate
-from .joints import Fixed, Hinge, Prescribed, Prismatic, Slot
+from .joints import Distance, Fixed, Hinge, Prescribed, Prismatic, Slot
 from .linkage import Linkage
 from .planar import Body
 from .quadratic import QuadraticJoint
 from .start import Forced, Freedoms, Start, consistent_start, count_freedoms
-from .statefunctions import SpanFunction, StateFunction
 from .steps import Status
 from .system import System
 from .timefunctions import TimeFunction, constant, polynomial, sine, smoothed_step

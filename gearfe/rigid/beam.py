@@ -27,9 +27,8 @@ import numpy as np
 from ..typing import Array, IntArray
 from .beam_link import NODES, BeamLink
 from .contract import Element
-from .forces import Weight
 from .linkage import Linkage
-from .turning import TurningFrame
+from .turning import field_and_rate
 
 if TYPE_CHECKING:
     from .tape import Tape
@@ -75,15 +74,8 @@ class Beam(Element):
         own = self._own_mass()
         self._mass = np.zeros((self._size, self._size))
         self._mass[np.ix_(self.places, self.places)] = own
-        frames = linkage.frames
-        parts = [part for force in linkage.forces for part in force.parts(frames) if isinstance(part, Weight)]
-        field = np.sum([part.acceleration for part in parts], axis=0) if parts else np.zeros(2)
+        field, self._rate = field_and_rate(linkage)
         self._weight = own @ np.tile([*field, 0.0], len(link.stations))
-        rate = sum(f.rate for f in linkage.forces if isinstance(f, TurningFrame))
-        places = own * np.tile([1.0, 1.0, 0.0], len(link.stations))
-        quarter = np.kron(np.eye(len(link.stations)), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
-        #: Centrifugal and Coriolis forces by coordinates and velocities.
-        self._turning = (rate**2 * places, 2.0 * rate * own @ quarter) if rate else None
 
     def shapes(self, s: Array) -> tuple[Array, Array]:
         """Shape functions and their derivatives by the arc length at the places s; shapes (places, nodes)."""
@@ -111,6 +103,15 @@ class Beam(Element):
         """Mass on the coordinates of the linkage, constant."""
         return self._mass
 
+    def blocks(self) -> tuple[Array, Array] | None:
+        """Centrifugal and Coriolis forces of a turning frame."""
+        if not self._rate:
+            return None
+        along, ahead = np.diag([1.0, 1.0, 0.0]), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+        nodes = np.eye(self._size // 3)
+        damping, stiffness = -2.0 * self._rate * np.kron(nodes, ahead), -(self._rate**2) * np.kron(nodes, along)
+        return self._mass @ damping, self._mass @ stiffness
+
     def strains(self, z: Array) -> Strains:
         """Strains at points with z = (x', y', theta, theta'), shape (points, 4)."""
         dx, dy, c, s = z[:, 0], z[:, 1], np.cos(z[:, 2]), np.sin(z[:, 2])
@@ -129,7 +130,7 @@ class Beam(Element):
         z, dz = self._at_points(q), self._at_points(v)
         e = self.strains(z)
         stress = self._stress(e, dz)
-        return self._force(np.einsum("pi,pij->pj", stress, e.slope), q, v)
+        return self._force(np.einsum("pi,pij->pj", stress, e.slope))
 
     def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:  # noqa: ARG002
         """Its derivatives by q and v."""
@@ -144,19 +145,12 @@ class Beam(Element):
         weighted = self.weights[:, None, None] * e.slope.transpose(0, 2, 1)
         by_q = weighted @ (law + tau * self.stiffness[:, None] * np.einsum("pijk,pk->pij", e.bend, dz))
         by_q += np.einsum("pi,pijk->pjk", stress * self.weights[:, None], e.bend)
-        whole = self._spread(-by_q), self._spread(-tau * (weighted @ law))
-        if self._turning is not None:
-            for total, part in zip(whole, self._turning, strict=True):
-                total[np.ix_(self.places, self.places)] += part
-        return Tangent(self, law, *whole)
+        return Tangent(self, law, self._spread(-by_q), self._spread(-tau * (weighted @ law)))
 
     def write(self, tape: Tape, places: IntArray) -> bool:
-        """Its points, weight and turning frame on a tape."""
+        """Its points and weight on a tape."""
         own = places[self.places]
         tape.constant[own] += self._weight
-        if self._turning is not None:
-            tape.blocks[1][np.ix_(own, own)] -= self._turning[0]
-            tape.blocks[0][np.ix_(own, own)] -= self._turning[1]
         N, D = self.shapes(self.points)
         nodes = 3 * np.repeat(np.arange(len(self.link.ends) - 1), len(GAUSS))[:, None] + np.arange(4)
         shape, slope = (np.take_along_axis(values, nodes, axis=1) for values in (N, D))
@@ -189,9 +183,7 @@ class Beam(Element):
 
     def potential(self, q: Array) -> Array:
         """Elastic energy and that of the weight (J) in states (..., n)."""
-        x = q[..., self.places]
-        turning = 0.0 if self._turning is None else 0.5 * ((x @ self._turning[0]) * x).sum(axis=-1)
-        return np.asarray(self.elastic_energy(q) - x @ self._weight - turning)
+        return np.asarray(self.elastic_energy(q) - q[..., self.places] @ self._weight)
 
     def elastic_energy(self, q: Array) -> Array:
         """1/2 int EA Gamma^2 + GA gamma^2 + EI kappa^2 ds (J) in states (..., n)."""
@@ -207,13 +199,11 @@ class Beam(Element):
         rates = np.einsum("pij,pj->pi", e.slope, dz) if self.link.damping else 0.0
         return (e.value + self.link.damping * rates) * self.stiffness
 
-    def _force(self, pull: Array, q: Array, v: Array) -> Array:
-        """Weight, and forces of a turning frame, less P^T of the pull (points, 4) of the stresses."""
+    def _force(self, pull: Array) -> Array:
+        """Weight less P^T of the pull (points, 4) of the stresses."""
         out = np.zeros(self._size)
         weighted = (pull * self.weights[:, None]).ravel()
         out[self.places] = self._weight - weighted @ self._to_points.reshape(-1, len(self.places))
-        if self._turning is not None:
-            out[self.places] += self._turning[0] @ q[self.places] + self._turning[1] @ v[self.places]
         return out
 
     def _at_points(self, q: Array) -> Array:
@@ -250,7 +240,7 @@ class Tangent:
         e = beam.strains(beam._at_points(q))
         gap = beam._stress(e, dz) - stress
         pull = np.einsum("pi,pij->pj", stress, e.slope) + np.einsum("pi,pij->pj", gap / beam.stiffness, self.law)
-        return beam._force(pull, q, v), gap
+        return beam._force(pull), gap
 
     def change(self, q: Array, v: Array) -> Array:
         """Change of the stress with changes of coordinates and velocities."""

@@ -99,7 +99,7 @@ def _carried(system: System, G: Array) -> Array:
     free = free_motions(G)
     carried = np.full(len(bodies), own.max() or 1.0)
     if free.shape[1]:
-        triangle = np.linalg.qr(system.mass_root() * system.units @ free)[1]
+        triangle = np.linalg.qr(system.mass_root * system.units @ free)[1]
         answers = np.linalg.lstsq(triangle.T, free[bodies.ravel()].T, rcond=0.0)[0].T.reshape(len(bodies), 3, -1)
         with np.errstate(divide="ignore"):
             carried = np.minimum(carried, 1.0 / np.linalg.norm(answers, 2, axis=(1, 2)) ** 2)

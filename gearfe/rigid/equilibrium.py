@@ -17,7 +17,6 @@ import numpy as np
 from ..errors import InputError
 from ..typing import Array
 from .carried import free_motions
-from .numpy_equations import joint_stiffness
 from .start import Start
 from .system import System
 
@@ -107,7 +106,7 @@ def check_rests(system: System, t: float, q: Array) -> None:
 
 def stiffness_at(system: System, t: float, q: Array, multipliers: Array) -> Array:
     """K = -df/dq + d(G^T lambda)/dq at rest, shape (size, size)."""
-    return joint_stiffness(system, t, q, multipliers) - system.force_jacobian(t, q, np.zeros(system.size))[0]
+    return system.curvature(t, q, multipliers) - system.force_jacobian(t, q, np.zeros(system.size))[0]
 
 
 def _downhill(K: Array, force: Array) -> tuple[Array, bool]:

@@ -16,12 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..typing import Array
-from .carried import RANK
 from .corners import TRUSTED, Corners, Path
 from .dense import Polynomials, within_run
-from .start import Start
+from .start import Start, on_constraints
 from .steps import Status, StepControl, StepLaw, Watch, first_step
-from .system import System, own_motion
+from .system import System
 
 SCHEME = "Runge-Kutta of order 8"
 LAW = StepLaw(exponent=1 / 8, growth=6.0, least_error=1e-12)
@@ -99,7 +98,7 @@ def run_explicit(
         return np.concatenate([y[n:], system.acceleration(t, y[:n], y[n:], active, excess)[0]])
 
     def project(t: float, y: Array) -> Array:
-        return on_constraints(system, t, y[:n], y[n:], active, excess)
+        return np.concatenate(on_constraints(system, t, y[:n], y[n:], active))
 
     def expand(t: float, y: Array, derivative: int) -> Array:
         return y[derivative * n : (derivative + 1) * n] if derivative < 2 else rhs(t, y)[n:]
@@ -108,39 +107,6 @@ def run_explicit(
     y0 = np.concatenate([start.q, start.v])
     options: dict[str, Any] = {"breaks": system.breaks, "longest": longest, "most": most, "watch": watch}
     return run_problem(problem, (start.time, float(times[-1])), y0, tolerance, **options)
-
-
-def on_constraints(
-    system: System, t: float, q: Array, v: Array, active: np.ndarray, excess: Array | None = None
-) -> Array:
-    """State projected onto g = 0 and G v = -dg/dt; rows that are redundant follow by themselves.
-
-    By the least changes in the mass norm; `excess` as in `System.acceleration`.
-    """
-    if system.rows == 0:
-        return np.concatenate([q, v])
-    sizes = system.row_units[active]
-    extra = np.zeros(system.size) if excess is None or not excess.any() else excess
-    inverse, light = system.inverse_of(extra) if extra.any() else system.inverse_mass, np.flatnonzero(extra)
-    root = np.sqrt(inverse) if system.diagonal_mass else np.linalg.cholesky(inverse)
-
-    def change(G: Array, gap: Array) -> Array:
-        """Not-a-number where rows or gaps are not finite: the callers look at what comes back."""
-        if not (np.isfinite(G).all() and np.isfinite(gap).all()):
-            return np.full(system.size, np.nan)
-        free = np.column_stack([np.zeros(system.size), (inverse * extra)[:, light]])
-        right = G @ free
-        right[:, 0] -= gap
-        made = free - root @ np.linalg.lstsq(G @ root / sizes[:, None], right / sizes[:, None], rcond=RANK)[0]
-        return own_motion(made, light)[0]
-
-    for _ in range(5):
-        gap = system.residual(t, q)[active]
-        if np.abs(gap / sizes).max(initial=0.0) < 1e-14:
-            break
-        q = q - change(system.jacobian(t, q)[active], gap)
-    G = system.jacobian(t, q)[active]
-    return np.concatenate([q, v - change(G, G @ v + system.rate(t, q)[active])])
 
 
 def run_problem(

@@ -28,10 +28,9 @@ import numpy as np
 
 from ..typing import Array, IntArray
 from .contract import Element
-from .forces import Weight
 from .linkage import Linkage
 from .quadratic import QuadraticJoint
-from .turning import TurningFrame
+from .turning import field_and_rate
 
 if TYPE_CHECKING:
     from .tape import Tape
@@ -94,17 +93,19 @@ class Floating(Element):
         self.pose, self.speed = tuple(pose), tuple(speed)
         real, imaginary = np.real(body.mass), np.imag(body.mass)
         self._mass = np.kron(real, np.eye(2)) + np.kron(imaginary, np.array([[0.0, -1.0], [1.0, 0.0]]))
-        parts = [part for force in linkage.forces for part in force.parts(linkage.frames) if isinstance(part, Weight)]
-        field_ = np.sum([part.acceleration for part in parts], axis=0) if parts else np.zeros(2)
-        self._weight = self._mass[:, :2] @ field_
-        rate = sum(f.rate for f in linkage.forces if isinstance(f, TurningFrame))
-        quarter = np.kron(np.eye(len(body.mass)), np.array([[0.0, 1.0], [-1.0, 0.0]]))
-        #: Centrifugal and Coriolis forces by coordinates and velocities.
-        self._turning = (rate**2 * self._mass, 2.0 * rate * self._mass @ quarter) if rate else None
+        acceleration, self._rate = field_and_rate(linkage)
+        self._weight = self._mass[:, :2] @ acceleration
 
     def mass(self) -> Array:
         """Constant."""
         return self._mass
+
+    def blocks(self) -> tuple[Array, Array] | None:
+        """Centrifugal and Coriolis forces of a turning frame."""
+        if not self._rate:
+            return None
+        ahead = np.kron(np.eye(len(self.body.mass)), np.array([[0.0, 1.0], [-1.0, 0.0]]))
+        return -2.0 * self._rate * self._mass @ ahead, -(self._rate**2) * self._mass
 
     def start(self) -> tuple[Array, Array]:
         """Undeformed."""
@@ -151,11 +152,8 @@ class Floating(Element):
         return (self.body.linear + 0.5 * bent) @ eta, (self.body.linear + bent) @ self._slope(q)
 
     def write(self, tape: Tape, places: IntArray) -> bool:
-        """Its strains, weight and turning frame on a tape."""
+        """Its strains and weight on a tape."""
         tape.constant[places] += self._weight
-        if self._turning is not None:
-            tape.blocks[1][np.ix_(places, places)] -= self._turning[0]
-            tape.blocks[0][np.ix_(places, places)] -= self._turning[1]
         tape.floating(int(places[0]), self.body.linear, self.body.quadratic, self.body.damping)
         return True
 
@@ -167,7 +165,7 @@ class Floating(Element):
     def force(self, t: float, q: Array, v: Array) -> Array:  # noqa: ARG002
         """Forces of the strains and their rates, and the weight."""
         e, slope = self._strains(q)
-        return self._force((e + self.body.damping * (slope @ v)) @ slope, q, v)
+        return self._weight - (e + self.body.damping * (slope @ v)) @ slope
 
     def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:  # noqa: ARG002
         """Its derivatives by q and v."""
@@ -182,8 +180,6 @@ class Floating(Element):
         by_q = -slope.T @ slope - self._bend(q, stress)
         if tau:
             by_q -= tau * slope.T @ self._drift(q, v)
-        if self._turning is not None:
-            by_q, by_v = by_q + self._turning[0], by_v + self._turning[1]
         return Tangent(self, slope, by_q, by_v)
 
     def _bend(self, q: Array, stress: Array) -> Array:
@@ -204,14 +200,9 @@ class Floating(Element):
         bent = self.body.quadratic @ self.shares(q)
         return np.asarray(self.body.quadratic @ (slope @ v) @ slope + (self.body.linear + bent) @ swing, dtype=float)
 
-    def _force(self, pull: Array, q: Array, v: Array) -> Array:
-        out = self._weight - pull
-        return out if self._turning is None else out + self._turning[0] @ q + self._turning[1] @ v
-
     def potential(self, q: Array) -> Array:
         """Elastic energy and that of the weight (J) in states (..., size)."""
-        turning = 0.0 if self._turning is None else 0.5 * ((q @ self._turning[0]) * q).sum(axis=-1)
-        return np.asarray(self.elastic_energy(q) - q @ self._weight - turning)
+        return np.asarray(self.elastic_energy(q) - q @ self._weight)
 
     def elastic_energy(self, q: Array) -> Array:
         """1/2 e . e (J) in states (..., size)."""
@@ -239,7 +230,7 @@ class Tangent:
         """The force that Newton's method sees, and what the stress lacks, e + tau e' - S."""
         e, slope = self.element._strains(q)
         gap = e + self.element.body.damping * (slope @ v) - stress
-        return self.element._force(stress @ slope + gap @ self.law, q, v), gap
+        return self.element._weight - stress @ slope - gap @ self.law, gap
 
     def change(self, q: Array, v: Array) -> Array:
         """Change of the stress with changes of coordinates and velocities."""

@@ -8,12 +8,52 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InputError
+from ..typing import Array
 from .forms import GROUND, Form, Frames, Point, Vector
-from .statefunctions import SpanFunction, StateFunction
 from .timefunctions import TimeFunction, constant
+
+if TYPE_CHECKING:
+    from .linkage import BodyVariables
+    from .tape import Tape
+
+
+class StateFunction(ABC):
+    """A load f(t, q, v) of the coordinates and velocities of a whole linkage.
+
+    Values, slopes and corners follow from its registers on a tape. Where it has no value, a step is made shorter and
+    the run ends at last; `value` is not-a-number there, and sets `complaint`, which says why.
+    """
+
+    complaint: str = ""
+
+    @abstractmethod
+    def write(self, bodies: BodyVariables) -> int:
+        """Its register on the tape of the bodies' variables."""
+
+    @abstractmethod
+    def value(self, t: float, q: Array, v: Array) -> float:
+        """f at a state, for messages."""
+
+    def pole(self, t: float, value: float) -> str:
+        """What is to be said where it grows beyond all bounds."""
+        return f"a load grows beyond {value:.1g} at {t:.6g} s"
+
+
+class SpanFunction(ABC):
+    """A tension T(t, L, L') between two points by their distance L (m) and its rate L' (m/s); as `StateFunction`."""
+
+    complaint: str = ""
+
+    @abstractmethod
+    def write(self, tape: Tape, length: int, rate: int) -> int:
+        """Its register by those of length and rate."""
+
+    @abstractmethod
+    def value(self, t: float, length: float, rate: float) -> float:
+        """T (N), positive where it pulls, for messages."""
 
 
 class Along(NamedTuple):
@@ -44,7 +84,7 @@ class Weight(NamedTuple):
 class Force(ABC):
     """What acts on bodies: a frozen dataclass with a `name` and the names of its bodies.
 
-    A force MUST provide `parts`. Its forms depend on two bodies at most. Fields called ``a``, ``b``, ``body``,
+    A force MUST provide `parts`. Fields called ``a``, ``b``, ``body``,
     ``relative_to``, ``reaction`` name bodies, others are numbers, points (m, in the frame of a body), functions of
     time.
     """

@@ -5,7 +5,7 @@
 
 Both are closed under sums and multiples; the product U . V of two vectors is a form, and an affine one where one of the
 vectors stands still. Values, gradients, time derivatives and Taylor coefficients of every form follow from these
-few numbers (`gearfe.rigid.tables`), so a joint or a force says nothing more than which form it holds or acts along.
+few numbers (`gearfe.rigid.linkage`), so a joint or a force says nothing more than which form it holds or acts along.
 """
 
 from __future__ import annotations

@@ -23,7 +23,6 @@ from .dense import Dense
 from .elimination import is_linear, modal_coordinates
 from .linkage import Linkage
 from .modal import series_force
-from .programs import tape_program, without_redundant, written
 from .start import Start, consistent_start
 from .steps import Status, Watch
 from .system import System
@@ -202,7 +201,7 @@ def _series_ways(
     if is_linear(system) and not any(isinstance(e, Linkage) for e in system.elements):
         modal = Way("taylor", "", partial(_modal_taylor, system, backend, options), PLAIN_TRIAL)
         return [explicit] if auto and (series_force(system) is None or not use_compiled(backend)) else [modal]
-    if tape_program(system) is None:
+    if system.series is None:
         if auto:
             return [explicit]
         problem = "needs rows and forces that can be written on a tape (gearfe.rigid.contract)"
@@ -222,7 +221,7 @@ def _cure(system: System, backend: str) -> str:
     """What to tell where compiled series could run, were numba there."""
     if backend != "auto" or compiled.available():
         return ""
-    able = series_force(system) is not None or tape_program(system) is not None
+    able = series_force(system) is not None or system.series is not None
     return MISSING_NUMBA if able else ""
 
 
@@ -233,7 +232,7 @@ def _hopeless(system: System, start: Start, times: Array) -> bool:
 
 def _rate(system: System, start: Start) -> float:
     """Fastest rate (1/s) of springs and dampers in a state; that of the last one asked for is remembered."""
-    from .stiffness_estimate import fastest_rate
+    from .modes import fastest_rate
 
     known: tuple[Start, float] | None = system.__dict__.get("_rate")
     if known is None or known[0] is not start:
@@ -269,7 +268,7 @@ def _modal_taylor(
 
 def _implicit_ways(system: System, backend: str, options: dict[str, Any], plain: Way, runs: float) -> list[Way]:
     """The implicit method plain, compiled, or the first and the second where that must be compiled now."""
-    if not use_compiled(backend) or written(system) is None:
+    if not use_compiled(backend) or system.program is None:
         return [replace(plain, backend="")]
     from .implicit import KERNELS
 
@@ -287,8 +286,8 @@ def _implicit(
 ) -> Run:
     from .implicit import run_implicit
 
-    program = written(system) if jit else None
-    held = None if program is None else without_redundant(program, start.active)
+    program = system.program if jit else None
+    held = None if program is None else program.without_redundant(start.active)
     return run_implicit(system, start, times, most=most, watch=watch, program=held, **options)
 
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from ..errors import InputError
-from ..typing import Array
 from .forms import GROUND, Form, Frames, Point
 from .timefunctions import TimeFunction
 
@@ -21,16 +20,7 @@ if TYPE_CHECKING:
 
 
 class Profile(Protocol):
-    """A function of angles, shape (...), with two derivatives, which are steady."""
-
-    def value(self, x: Array) -> Array:
-        """s(x)."""
-
-    def slope(self, x: Array) -> Array:
-        """s'(x)."""
-
-    def bend(self, x: Array) -> Array:
-        """s''(x)."""
+    """A function of an angle with a steady curvature."""
 
     def write(self, tape: Tape, coordinate: int) -> int:
         """Variable of the tape that is s of a coordinate."""
@@ -48,7 +38,7 @@ class Row(NamedTuple):
 class Joint(ABC):
     """What joins two bodies: a frozen dataclass with a `name` and the names of its bodies.
 
-    A joint MUST provide `rows`. Each of its forms depends on two bodies at most. Fields called ``a``, ``b``, ``body``,
+    A joint MUST provide `rows`. Fields called ``a``, ``b``, ``body``,
     ``line``, ``relative_to`` name bodies, others are numbers, points (m, in the frame of a body), functions of time.
     """
 
@@ -131,6 +121,70 @@ class Fixed(Joint):
         held = frames.start_angle(self.a) - frames.start_angle(self.b)
         hinge = Hinge(self.a, self.b, (0.0, 0.0), at_b)
         return [*hinge.rows(frames), Row("angle", frames.angle(self.a) - frames.angle(self.b) - held)]
+
+
+@dataclass(frozen=True)
+class Distance(Joint):
+    """Points `point_a` of body `a` and `point_b` of body `b` stay `length` (m) apart: one constraint.
+
+    ``None`` keeps the distance that they start with. The multiplier is the tension of the rod (N).
+    """
+
+    a: str
+    b: str
+    point_a: Point = (0.0, 0.0)
+    point_b: Point = (0.0, 0.0)
+    length: float | None = None
+    name: str = ""
+
+    def rows(self, frames: Frames) -> list[Row]:
+        """(D . D - L^2) / (2 L) = 0 with the span D: its gradient is a unit force along the rod."""
+        span = frames.point(self.a, self.point_a) - frames.point(self.b, self.point_b)
+        length = self.length
+        if length is None:
+            length = math.dist(frames.start_place(self.a, self.point_a), frames.start_place(self.b, self.point_b))
+        if not length > 0.0:
+            cure = "give it a length, or join the points by a hinge"
+            raise InputError(f"distance {self.name!r} length", length, "must be > 0 m", cure)
+        return [Row("distance", span.dot(0.5 / length * span) - 0.5 * length)]
+
+
+@dataclass(frozen=True)
+class Rolling(Joint):
+    """A wheel of the radius `radius` (m) about `point` of `body` rolls on a line of body `line`: two constraints.
+
+    It stays on the side of the line on which it starts. The multipliers are the normal force, which may pull, and the
+    friction that rolling needs (N).
+    """
+
+    body: str
+    line: str
+    radius: float
+    point: Point = (0.0, 0.0)
+    origin: Point = (0.0, 0.0)
+    direction: Point = (1.0, 0.0)
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.radius) and self.radius > 0.0):
+            cure = "give the wheel's radius in m"
+            raise InputError(f"rolling {self.name!r} radius", self.radius, "must be finite and > 0 m", cure)
+
+    def rows(self, frames: Frames) -> list[Row]:
+        """n . (P - O) = side r, and t . (P - O) + side r (theta - theta_line) keeps what it starts with."""
+        length = math.hypot(*self.direction)
+        x, y = self.direction[0] / length, self.direction[1] / length
+        at = frames.start_seen_from(self.line, frames.start_place(self.body, self.point))
+        start = at[0] - self.origin[0], at[1] - self.origin[1]
+        side = math.copysign(self.radius, x * start[1] - y * start[0])
+        gap = frames.point(self.body, self.point) - frames.point(self.line, self.origin)
+        across = frames.direction(self.line, (-y, x)).dot(gap) - side
+        turned = frames.start_angle(self.body) - frames.start_angle(self.line)
+        along = frames.direction(self.line, (x, y)).dot(gap) - (x * start[0] + y * start[1] + side * turned)
+        return [
+            Row("across the line", across),
+            Row("rolling", along + side * (frames.angle(self.body) - frames.angle(self.line))),
+        ]
 
 
 @dataclass(frozen=True)

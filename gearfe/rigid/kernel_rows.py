@@ -16,8 +16,8 @@ from .kernel_tape import curve_orders
 
 if TYPE_CHECKING:
     from .row_tables import Equations
-    from .tables import Times
     from .taylor import Work
+    from .timefunctions import Times
 
 
 def fill(x: Array, value: float) -> None:

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .kernel_elastic import bar_changes, float_changes
-from .kernel_equations import all_variables, lane_times, stages, variables
+from .kernel_equations import all_variables, gradients, lane_times, row_orders, stages, variables
 from .kernel_matrices import across, factorise_mass, solve_mass, solve_systems
-from .kernel_quadratic import gradients, row_orders
 from .kernel_rows import fill, time_series
 
 if TYPE_CHECKING:

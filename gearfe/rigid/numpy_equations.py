@@ -10,8 +10,7 @@ import numpy as np
 
 from ..typing import Array
 from . import kernel_stages, lanes
-from .explicit import on_constraints
-from .start import Start
+from .start import Start, on_constraints
 from .system import System
 
 if TYPE_CHECKING:
@@ -23,7 +22,7 @@ class SystemEquations:
     """A system with the matrices of one stage and their factors."""
 
     def __init__(self, system: System, start: Start) -> None:
-        self.system, self.active, self.excess = system, start.active, start.excess
+        self.system, self.active = system, start.active
         self.tangents: list[Any] = []
         self.solves: list[Any] = []
         self.by_q = self.by_v = self.curvature = self.G = np.zeros((0, 0))
@@ -83,7 +82,7 @@ def linearise(eq: SystemEquations, w: Stages, i: int, t: float) -> bool:
         eq.tangents.append(tangent)
     multipliers = np.zeros(system.rows)
     multipliers[eq.active] = w.L[:, i]
-    eq.curvature = joint_stiffness(system, t, q, multipliers)
+    eq.curvature = system.curvature(t, q, multipliers)
     eq.G = system.jacobian(t, q)[eq.active]
     return all(np.isfinite(x).all() for x in (eq.by_q, eq.by_v, eq.curvature, eq.G))
 
@@ -149,33 +148,7 @@ def gap_between(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
 
 def project(eq: SystemEquations, w: Stages, tab: Scheme) -> None:  # noqa: ARG001
     """w.qn, w.vn onto the constraints, by the least changes in the mass norm."""
-    made = on_constraints(eq.system, w.now[0] + w.now[1], w.qn, w.vn, eq.active, eq.excess)
-    w.qn[:], w.vn[:] = made[: len(w.qn)], made[len(w.qn) :]
-
-
-def joint_stiffness(system: System, t: float, q: Array, multipliers: Array) -> Array:
-    """d(G^T lambda)/dq; closed form for the linkage, central differences otherwise."""
-    full = np.zeros((system.size, system.size))
-    at = 0
-    for element, index in system.joints:
-        part = multipliers[at : at + element.rows]
-        at += element.rows
-        if element.constant_jacobian or not part.any():
-            continue
-        own: Any = getattr(element, "curvature", None)
-        if own is not None:
-            full[np.ix_(index, index)] += own(q[index], part)
-            continue
-        local = q[index]
-        for j in range(len(index)):
-            step = 1e-6 * max(1.0, abs(local[j]))
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = local.copy()
-                moved[j] += sign * step
-                ends.append(element.jacobian(t, moved).T @ part)  # type: ignore[attr-defined]
-            full[index, index[j]] += (ends[0] - ends[1]) / (2 * step)
-    return full
+    w.qn[:], w.vn[:] = on_constraints(eq.system, w.now[0] + w.now[1], w.qn, w.vn, eq.active)
 
 
 def saddle_solver(
@@ -213,5 +186,5 @@ FUNCTIONS = (
     begin, stages, linearise, factorise, solve, change, defect, kernel_stages.end_state, kernel_stages.keep_path,
     gap_between, project,
 )  # fmt: skip
-NAMES = {**lanes.NAMES, "np": np, "math": math, "saddle_solver": saddle_solver, "joint_stiffness": joint_stiffness,
+NAMES = {**lanes.NAMES, "np": np, "math": math, "saddle_solver": saddle_solver,
          "on_constraints": on_constraints}  # fmt: skip

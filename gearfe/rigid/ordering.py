@@ -70,16 +70,16 @@ def symbolic_factor(m: int, coupled: Iterable[tuple[int, int]]) -> tuple[Factor,
     return made, target
 
 
-def elimination_order(rows: list[tuple[int, tuple[int, int]]], n_bodies: int) -> list[int]:
-    """Order of rows given as (joint, (body, body)); body `n_bodies` is the ground and couples nothing.
+def elimination_order(rows: list[tuple[int, tuple[int, ...]]], n_bodies: int) -> list[int]:
+    """Order of rows given as (joint, bodies); body `n_bodies` is the ground and couples nothing.
 
     Joint by joint, always next the joint with the fewest neighbours left.
     """
     members: dict[int, list[int]] = defaultdict(list)
     on_body: dict[int, set[int]] = defaultdict(set)
-    for i, (joint, pair) in enumerate(rows):
+    for i, (joint, bodies) in enumerate(rows):
         members[joint].append(i)
-        for body in pair:
+        for body in bodies:
             if body != n_bodies:
                 on_body[body].add(joint)
     near: dict[int, set[int]] = {joint: set() for joint in members}

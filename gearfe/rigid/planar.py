@@ -8,16 +8,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from ..errors import InputError, shown, unknown_name
-from ..typing import Array
-from .forces import Force
+from .forces import Force, StateFunction
 from .forms import GROUND, Point
 from .joints import Joint
-from .statefunctions import StateFunction
 from .timefunctions import TimeFunction, constant
 
 #: Masses and inertias below this, or above its inverse, overflow in products.
@@ -104,18 +99,3 @@ def body_numbers(bodies: tuple[Body, ...], joints: tuple[Joint, ...], forces: tu
             cure = "name two different bodies (or the ground)"
             raise InputError(label, used[0], "joins a body to itself", cure)
     return index
-
-
-def with_ground(x: Array) -> Array:
-    """(..., n) by bodies, (..., n/3 + 1, 3): the ground is the last."""
-    return np.concatenate([x, np.zeros((*x.shape[:-1], 3))], axis=-1).reshape(*x.shape[:-1], -1, 3)
-
-
-def add_at(total: Array, values: Array, *places: Any) -> None:
-    """total[..., places] += values, also where places repeat."""
-    np.add.at(total, (..., *places), values)
-
-
-def turned(vectors: Array) -> Array:
-    """A quarter turn ahead: the derivatives of turning vectors by the angle."""
-    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)

@@ -232,8 +232,25 @@ def least_change(system: System, G: Array, right: Array, sizes: Array) -> Array:
     G, right = G * system.units / sizes[:, None], right / sizes
     some = np.linalg.lstsq(G, right, rcond=RANK)[0]
     free = free_motions(G)
-    root = system.mass_root() * system.units
+    root = system.mass_root * system.units
     return system.units * (some - free @ np.linalg.lstsq(root @ free, root @ some, rcond=None)[0])
+
+
+def on_constraints(system: System, t: float, q: Array, v: Array, active: np.ndarray) -> tuple[Array, Array]:
+    """State beside the constraints moved onto g = 0 and G v = -dg/dt by the least changes in the mass norm.
+
+    Rows that are redundant follow by themselves.
+    """
+    if system.rows == 0:
+        return q, v
+    sizes = system.row_units[active]
+    for _ in range(5):
+        gap = system.residual(t, q)[active]
+        if np.abs(gap / sizes).max(initial=0.0) < 1e-14:
+            break
+        q = q - least_change(system, system.jacobian(t, q)[active], gap, sizes)
+    G = system.jacobian(t, q)[active]
+    return q, v - least_change(system, G, G @ v + system.rate(t, q)[active], sizes)
 
 
 def _positions(system: System, time: float, q: Array, forced: Sequence[Forced]) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -11,9 +11,10 @@ import numpy as np
 from ..errors import InputError
 from ..typing import Array
 from .contract import Element
+from .forces import StateFunction
 from .linkage import Linkage
-from .planar import add_at
-from .statefunctions import StateFunction
+from .tape import Program, Tape
+from .written import Written
 
 #: A load beyond this value (N, N m) where a run ends has a pole there.
 POLE = 1e7
@@ -98,6 +99,7 @@ class System:
         with np.errstate(divide="ignore"):
             return np.diag(1.0 / np.diagonal(mass))
 
+    @cached_property
     def mass_root(self) -> Array:
         """R with R^T R = M, shape (size, size)."""
         held = np.diagonal(self.mass) > 0.0
@@ -121,7 +123,7 @@ class System:
         (..., size)."""
         total = -(v @ self.damping.T + q @ self.stiffness.T) if self.linear else np.zeros(q.shape)
         for element, index in self.forces if stressed else self._others:
-            add_at(total, in_states(element, element.force, t, q[..., index], v[..., index]), index)
+            total[..., index] += in_states(element, element.force, t, q[..., index], v[..., index])
         return total
 
     def force_jacobian(self, t: float, q: Array, v: Array, *, stressed: bool = True) -> tuple[Array, Array]:
@@ -145,8 +147,9 @@ class System:
         return [law for part in parts for _, law in (*part.state_loads, *part.tension_laws)]
 
     @cached_property
-    def _loads(self) -> list[tuple[StateFunction, np.ndarray]]:
-        return [(load, i) for e, i in self.forces if isinstance(e, Linkage) for _, load in e.assembly.state_loads]
+    def _loads(self) -> list[tuple[Linkage, StateFunction, np.ndarray]]:
+        parts = [(e, i) for e, i in self.forces if isinstance(e, Linkage)]
+        return [(e, load, i) for e, i in parts for _, load in e.assembly.state_loads]
 
     def forget_complaints(self) -> None:
         """Before a state is tried of which they shall speak."""
@@ -156,16 +159,17 @@ class System:
     def blame(self, t: float, q: Array, v: Array) -> None:
         """Let loads that are not finite there, and the largest if it has a pole, say so."""
         self.force(t, q, v)
-        sizes = [abs(load.value(t, q[index], v[index])) for load, index in self._loads]
+        sizes = [abs(load.value(t, q[index], v[index])) for _, load, index in self._loads]
         if max(sizes, default=0.0) > POLE:
-            largest = self._loads[int(np.argmax(sizes))][0]
+            largest = self._loads[int(np.argmax(sizes))][1]
             largest.complaint = largest.complaint or largest.pole(t, max(sizes))
 
     def blame_between(self, one: tuple[float, Array, Array], two: tuple[float, Array, Array]) -> None:
         """Let the load that has a pole between two states (t, q, v) say so."""
-        for load, index in self._loads:
-            if load.pieces(one[0], *(x[index] for x in one[1:])) != load.pieces(two[0], *(x[index] for x in two[1:])):
-                load.complaint = load.pole(one[0], abs(load.value(one[0], *(x[index] for x in one[1:]))))
+        for linkage, load, index in self._loads:
+            before, after = ((t, q[index], v[index]) for t, q, v in (one, two))
+            if linkage.load_pieces(load, *before) != linkage.load_pieces(load, *after):
+                load.complaint = load.pole(one[0], abs(load.value(*before)))
 
     @cached_property
     def pieced(self) -> bool:
@@ -199,6 +203,45 @@ class System:
             full[..., at : at + element.rows, index] += in_states(element, own.jacobian, t, q[..., index])
             at += element.rows
         return full
+
+    def curvature(self, t: float, q: Array, multipliers: Array) -> Array:
+        """d(G^T lambda)/dq at fixed lambda; central differences for elements that do not provide theirs."""
+        full = np.zeros((self.size, self.size))
+        at = 0
+        for element, index in self.joints:
+            part = multipliers[at : at + element.rows]
+            at += element.rows
+            if element.constant_jacobian or not part.any():
+                continue
+            own: Any = element
+            if hasattr(own, "curvature"):
+                full[np.ix_(index, index)] += own.curvature(q[index], part)
+                continue
+
+            def pull(x: Array, own: Any = own, part: Array = part) -> Array:
+                return np.asarray(own.jacobian(t, x).T @ part)
+
+            full[np.ix_(index, index)] += differences(pull, q[index])
+        return full
+
+    @cached_property
+    def program(self) -> Program | None:
+        """The system on a tape; None where an element cannot be written."""
+        tape = Tape(self.size)
+        for element, places in zip(self.elements, self.index, strict=True):
+            own: Any = element
+            if hasattr(own, "write"):
+                if not own.write(tape, places):
+                    return None
+            elif element.rows or hasattr(element, "force"):
+                return None
+        return tape.program(self.mass, self.damping, self.stiffness, self.units)
+
+    @property
+    def series(self) -> Program | None:
+        """The same where it is one of registers and rows alone, which have Taylor series."""
+        made = self.program
+        return None if made is None or len(made.bars.place) or len(made.floats.place) else made
 
     def coordinate_names(self) -> list[str]:
         """Names of all coordinates: body and coordinate with its unit, or element and number."""
@@ -263,7 +306,7 @@ class System:
 
 def in_states(element: Element, function: Any, t: float | Array, *states: Array) -> Array:
     """A function of an element in one state, or in those at several times."""
-    if np.ndim(t) == 0 or isinstance(element, Linkage):
+    if np.ndim(t) == 0 or isinstance(element, Written):
         return np.asarray(function(t, *states), dtype=float)
     return np.array([function(*one) for one in zip(np.asarray(t), *states, strict=True)])
 
@@ -317,14 +360,11 @@ def element_jacobian(element: Element, t: float, q: Array, v: Array) -> tuple[Ar
     if own is not None:
         return own(t, q, v)
     force: Any = element.force  # type: ignore[attr-defined]
-    k = len(q)
-    by = np.zeros((2, k, k))
-    for j in range(k):
-        for part, state in enumerate((q, v)):
-            step = 1e-6 * max(1.0, abs(state[j]))
-            up, down = state.copy(), state.copy()
-            up[j] += step
-            down[j] -= step
-            ends = (force(t, up, v), force(t, down, v)) if part == 0 else (force(t, q, up), force(t, q, down))
-            by[part][:, j] = (ends[0] - ends[1]) / (2 * step)
-    return by[0], by[1]
+    return differences(lambda x: force(t, x, v), q), differences(lambda x: force(t, q, x), v)
+
+
+def differences(function: Callable[[Array], Array], x: Array) -> Array:
+    """Derivatives of a function (k,) of the vector x, shape (k, n), by central differences."""
+    steps = 1e-6 * np.diag(np.maximum(1.0, np.abs(x)))
+    columns = [(function(x + step) - function(x - step)) / (2 * step.max()) for step in steps]
+    return np.array(columns, dtype=float).T

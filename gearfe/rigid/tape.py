@@ -19,9 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..typing import Array, IntArray
-from .tables import Times, time_arrays
-from .timefunctions import TimeFunction
+from ..typing import Array, BoolArray, IntArray
+from .timefunctions import TimeFunction, Times, time_arrays
 
 #: Operations: f a + g b + c; of the variables, of their rates; of time; products and so on, see `kernel_tape`.
 SUM, LINEAR, RATE, FUNCTION, MUL, DIV, POWER, EXP, LOG, SIN, COS, TANH, ANGLE, SIDE, SHIFT, ENTRY = range(16)
@@ -110,6 +109,20 @@ class Program(NamedTuple):
     bars: Bars
     floats: Floats
 
+    def without_redundant(self, active: BoolArray) -> Program:
+        """The same without the rows that are not `active`, shape (m,)."""
+        if active.all():
+            return self
+        rows, number = self.rows, np.cumsum(active) - 1
+        held, pairs = active[rows.place[:, 0]], active[rows.pair[:, 0]]
+        place, pair = rows.place[held], rows.pair[pairs]
+        place[:, 0], pair[:, 0] = number[place[:, 0]], number[pair[:, 0]]
+        kept = rows._replace(
+            place=place, factor=rows.factor[held], pair=pair, weight=rows.weight[pairs],
+            constant=rows.constant[active], motion=rows.motion[active], unit=rows.unit[active],
+        )  # fmt: skip
+        return self._replace(rows=kept)
+
 
 class Tape:
     """Writes the equations of a system; operations give the number of a register.
@@ -125,7 +138,7 @@ class Tape:
         self._curves: dict[tuple[object, ...], int] = {}
         self._curve_rows: list[tuple[int, int, int, int, float]] = []
         self.constant = np.zeros(size)
-        self._functions: list[TimeFunction] = []
+        self.functions: list[TimeFunction] = []
         self._rows: list[tuple[Terms, Sequence[tuple[int, int, float]], float, int, float]] = []
         self._ops: list[tuple[int, int, int, int]] = []
         self._factors: list[tuple[float, float, float]] = []
@@ -136,7 +149,6 @@ class Tape:
         self._known: dict[tuple[object, ...], int] = {}
         self._bars: list[tuple[Array, ...]] = []
         self._floats: list[tuple[tuple[int, ...], Array, Array, float]] = []
-        self.blocks = np.zeros((2, size, size))
         self.stresses = 0
 
     def bars(
@@ -290,8 +302,8 @@ class Tape:
 
     # ----------------------------------------------------------------------------------------------------------
     def _numbered(self, function: TimeFunction) -> int:
-        self._functions.append(function)
-        return len(self._functions) - 1
+        self.functions.append(function)
+        return len(self.functions) - 1
 
     def _leaf(self, kind: int, terms: Terms, constant: float) -> int:
         key = (kind, tuple(sorted(terms.items())), constant)
@@ -354,13 +366,12 @@ class Tape:
             np.array([s[3] for s in self._switches], dtype=float),
             np.array([s[4] for s in self._switches], dtype=np.int64),
         )
-        damping, stiffness = damping + self.blocks[0], stiffness + self.blocks[1]
         block = np.argwhere((damping != 0.0) | (stiffness != 0.0)).astype(np.int64)
         at = tuple(block.T)
         return Program(
             np.ascontiguousarray(mass), np.ascontiguousarray(block), damping[at], stiffness[at], self.constant, unit,
             Curves(_ints([r[:4] for r in self._curve_rows], 4), np.array([r[4] for r in self._curve_rows], float)),
-            rows, code, switches, time_arrays(self._functions), self._bar_arrays(), self._float_arrays(),
+            rows, code, switches, time_arrays(self.functions), self._bar_arrays(), self._float_arrays(),
         )  # fmt: skip
 
     def _bar_arrays(self) -> Bars:

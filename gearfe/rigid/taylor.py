@@ -25,7 +25,6 @@ from . import (
 from .corners import blame_ahead
 from .dense import Polynomials
 from .packed import Packed
-from .programs import tape_program
 from .row_tables import Equations, row_tables
 from .start import Start
 from .steps import Status, Watch, run_in_pieces
@@ -150,7 +149,7 @@ class Prepared(NamedTuple):
 
 def prepare(system: System, start: Start, order: int, jit: bool) -> Prepared:
     """What runs of one system at one order share; they stay with it."""
-    program = tape_program(system)
+    program = system.series
     assert program is not None  # the caller asks before
     light = np.flatnonzero(start.excess)
     known: dict[tuple[Any, ...], Prepared] = system.__dict__.setdefault("_prepared", {})

@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..typing import Array
+from ..typing import Array, IntArray
 
 
 @dataclass(frozen=True)
@@ -157,3 +158,28 @@ def _moved(piece: tuple[float, tuple[float, ...]], origin: float) -> tuple[float
         return piece[1]
     moved = np.polynomial.Polynomial(piece[1])(np.polynomial.Polynomial([shift, 1.0]))
     return tuple(float(c) for c in moved.coef)
+
+
+class Times(NamedTuple):
+    """Time functions: polynomial pieces and sines."""
+
+    first: IntArray  # (functions + 1,) pieces of each time function
+    start: Array  # (pieces,)
+    origin: Array  # (pieces,)
+    factor: Array  # (pieces, width)
+    sine_first: IntArray  # (functions + 1,)
+    sine: Array  # (sines, 3)
+
+
+def time_arrays(functions: list[TimeFunction]) -> Times:
+    """Arrays of functions of time, for the kernels."""
+    used = functions or [constant(0.0)]
+    width = max(len(row) for f in used for row in f.coefficients)
+    return Times(
+        first=np.cumsum([0, *(len(f.starts) for f in used)]).astype(np.int64),
+        start=np.array([s for f in used for s in f.starts], dtype=float),
+        origin=np.array([o for f in used for o in f.origins], dtype=float),
+        factor=np.array([[*row, *[0.0] * (width - len(row))] for f in used for row in f.coefficients]),
+        sine_first=np.cumsum([0, *(len(f.sines) for f in used)]).astype(np.int64),
+        sine=np.array([s for f in used for s in f.sines], dtype=float).reshape(-1, 3),
+    )

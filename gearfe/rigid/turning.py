@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..typing import Array
-from .forces import Along, Force, Tension, Weight
+from .forces import Along, Force, StateFunction, Tension, Weight
 from .forms import Frames
-from .statefunctions import StateFunction
 
 if TYPE_CHECKING:
-    from .linkage_tape import BodyVariables
+    from .linkage import BodyVariables, Linkage
 
 
 @dataclass(frozen=True)
@@ -40,23 +39,25 @@ class TurningFrame(Force):
         return made
 
 
+def field_and_rate(linkage: Linkage) -> tuple[Array, float]:
+    """Uniform field (m/s2) that acts on a linkage, and the rate of its turning frame (rad/s)."""
+    field = np.zeros(2)
+    for force in linkage.forces:
+        for part in force.parts(linkage.frames):
+            if isinstance(part, Weight):
+                field += part.acceleration
+    return field, sum(f.rate for f in linkage.forces if isinstance(f, TurningFrame))
+
+
 class Coriolis(StateFunction):
     """A load in proportion to one velocity."""
 
     def __init__(self, place: int, factor: float) -> None:
         self.place, self.factor = place, factor
 
-    def value(self, t: float | Array, q: Array, v: Array) -> Any:  # noqa: ARG002
-        """Factor times velocity, in one state or in many."""
-        return self.factor * v[..., self.place]
-
-    values = value
-
-    def slopes(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:  # noqa: ARG002
-        """The factor."""
-        by_v = np.zeros(len(v))
-        by_v[self.place] = self.factor
-        return np.zeros(len(q)), by_v
+    def value(self, t: float, q: Array, v: Array) -> float:  # noqa: ARG002
+        """Factor times velocity."""
+        return float(self.factor * v[self.place])
 
     def write(self, bodies: BodyVariables) -> int:
         """A rate."""

@@ -33,23 +33,23 @@ JOINTS: dict[str, Kind] = {
         ("direction",),
     ),
     "distance": Kind(
-        "gearfe.rigid.distance:Distance",
+        "gearfe.rigid.joints:Distance",
         {"body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "length_m": "length"},
     ),
     "fixed": Kind("gearfe.rigid.joints:Fixed", {"body": "a", "to": "b"}),
-    "gear": Kind("gearfe.rigid.gear_ratio:GearRatio", {"body": "a", "to": "b", "ratio": "ratio"}, ("ratio",)),
+    "gear": Kind("gearfe.rigid.couplings:GearRatio", {"body": "a", "to": "b", "ratio": "ratio"}, ("ratio",)),
     "belt": Kind(
-        "gearfe.rigid.belt:Belt",
+        "gearfe.rigid.couplings:Belt",
         {"body": "a", "to": "b", "radius_m": "radius_a", "to_radius_m": "radius_b", "crossed": "crossed"},
         ("radius_m", "to_radius_m"),
     ),
     "rack": Kind(
-        "gearfe.rigid.rack:Rack",
+        "gearfe.rigid.couplings:Rack",
         {"body": "a", "to": "b", "point": "point", "direction": "direction", "radius_m": "radius"},
         ("radius_m",),
     ),
     "rolling": Kind(
-        "gearfe.rigid.rolling:Rolling",
+        "gearfe.rigid.joints:Rolling",
         {
             "body": "body", "to": "line", "point": "point", "to_point": "origin", "direction": "direction",
             "radius_m": "radius",
@@ -57,7 +57,7 @@ JOINTS: dict[str, Kind] = {
         ("radius_m",),
     ),
     "cam": Kind(
-        "gearfe.rigid.cam:Cam",
+        "gearfe.rigid.couplings:Cam",
         {"body": "a", "to": "b", "point": "point", "coordinate": "coordinate", "profile": "profile"},
         ("coordinate", "profile"),
     ),

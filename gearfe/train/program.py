@@ -9,7 +9,7 @@ import numpy as np
 
 from ..meshlaw.law import stacked_laws
 from ..rigid import SeriesLaw
-from ..rigid.tables import time_arrays
+from ..rigid.timefunctions import time_arrays
 from ..stiffness.periodic import PeriodicInterpolant, curve_arrays
 from ..typing import Array, IntArray
 from . import corners, friction, series

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from ..meshlaw.law import Laws
 from ..rigid.kernel_rows import time_series
-from ..rigid.tables import Times
+from ..rigid.timefunctions import Times
 from ..stiffness.periodic import Curves
 from ..typing import Array, IntArray
 from .friction import product, smoothed_sign

@@ -19,7 +19,7 @@ import numpy as np
 
 from gearfe.rigid.kernel_rows import time_series
 from gearfe.rigid.packed import Packed
-from gearfe.rigid.tables import Times, time_arrays
+from gearfe.rigid.timefunctions import Times, time_arrays
 from gearfe.stiffness.periodic import Curves, curve_arrays
 from gearfe.train.forces import CurveFlank
 
