@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gearfe import steady_state
 from gearfe.errors import InputError
 from gearfe.rigid import TimeFunction, constant, smoothed_step
 from gearfe.train import Drive, GearMesh, Load, build_train, simulate
@@ -130,3 +131,19 @@ def test_what_is_no_mistake() -> None:
     for torque in (50.0, -50.0):
         made = simulate(build_train(loaded(torque, drive=still)), np.linspace(0.0, 1e-3, 5))
         assert made.contact_force.min() >= -1e-9
+
+
+@pytest.mark.parametrize("kind", ["curve", "map"])
+def test_steady_states_on_back_flanks_begin_behind_the_backlash(tmp_path: Path, kind: str) -> None:
+    """Slow motions carry the force of statics, of the load and of the opposite one, and the teeth stay in contact."""
+    text = SMALL + BORES if kind == "curve" else SMALL.replace("stiffness_N_per_m = 2e8", "") + BORES + PAIR
+    text = text.replace("= 2e8", "= 2e8\nbacklash_um = 20.0").replace("ratio = 0.05", "ratio = 0.2")
+    job = read_train_job(written(tmp_path, text))
+    curves = train_curves(job)
+    driven = job_train(job, curves)
+    driving = changed(driven, loads=tuple(dataclasses.replace(x, torque=-1.0 * x.torque) for x in driven.loads))
+    there, back = (steady_state(build_train(one), -20.0) for one in (driven, driving))
+    force = 30.0 / (0.027 * math.cos(math.radians(20.0)))
+    assert there.force.mean() == pytest.approx(force, rel=1e-3)
+    assert back.force.mean() == pytest.approx(-force, rel=1e-3)
+    assert there.force.min() > 0.0 > back.force.max()

@@ -48,6 +48,8 @@ _NAMED, _LEAST = 5, 0.2
 _BESIDE = 0.02
 #: End of the frequency axis: this multiple of the highest mesh frequency, unless larger lines lie above it.
 _MESH_MULTIPLES = 4.2
+#: Numbers of multiples: height of a row (points), and where they stand left of their lines, in parts of the axis.
+ROW, MARGIN = 8.5, 0.015
 #: Lines of the meshes.
 _DASHES = ((0, (6, 3)), (0, (2, 2)), (0, (6, 2, 2, 2)))
 
@@ -108,7 +110,10 @@ def draw_power(
 def _frequency_axes(
     figure: Any, title: str, response: TrainResponse, made: TrainSpectra, ends: tuple[float, float]
 ) -> Any:
-    """Axes between two frequencies (kHz) with the meshes' lines and multiples, and orders of the first shaft on top."""
+    """Axes between two frequencies (kHz) with the meshes' lines and multiples, and orders of the first shaft on top.
+
+    The numbers of each mesh's multiples stand in a row of their own.
+    """
     axes = figure.add_axes((0.062, 0.175, 0.925, 0.615))
     panel(axes, "", "", "")
     head, _, below = title.partition("\n")
@@ -129,15 +134,16 @@ def _frequency_axes(
         label = None if line.name in named else groups[line.name]
         named.add(line.name)
         axes.axvline(place, color=colour, linewidth=1.0, linestyle=dash, zorder=1, label=label)
+        last = place > ends[1] - MARGIN * (ends[1] - ends[0])
         axes.annotate(
             str(line.order),
             (place, 1.0),
-            (-1.5 if number % 2 else 1.5, -3),
+            (-1.5 if last else 1.5, -3 - ROW * number),
             xycoords=("data", "axes fraction"),
             textcoords="offset points",
             fontsize=7.5,
             color=colour,
-            ha="right" if number % 2 else "left",
+            ha="right" if last else "left",
             va="top",
         )
     if named:

@@ -91,6 +91,8 @@ class Oscillator:
         Harmonics that excite, one for each mesh: its cycles in a period of its phase.
     limit
         Largest motion that means something, in parts of the scale.
+    start : (m,), optional
+        Freedoms beside those of the state without vibration; those under the constant force alone when left out.
     """
 
     linear: Linear
@@ -99,6 +101,7 @@ class Oscillator:
     scale: Array
     orders: tuple[tuple[int, ...], ...] = ((1,),)
     limit: float = math.inf
+    start: Array | None = None
 
     @cached_property
     def periods(self) -> tuple[float, ...]:

@@ -112,7 +112,11 @@ def condense(model: TrainModel, shared: int = SHARED) -> CondensedTrain:
     scale = _scale(model, linear, freedoms, flanks)
     limit = DIVERGED * min(line.module for line in model.meshes) / float(scale[freedoms[:, 0]].max())
     many = tuple(tuple(row) for row in orders.tolist())
-    system = Oscillator(linear, forces, tuple(float(t) for t in turns), scale, many, limit)
+    start = linear.rest.copy()
+    for numbers, force in zip(of_mesh, steady.tolist(), strict=True):
+        if force < 0.0 and len(numbers) == 2:  # statics press the back flanks, which bear behind the backlash
+            start[freedoms[list(numbers), 0]] += flanks[numbers[1]].gap * np.array([-1.0, 1.0])
+    system = Oscillator(linear, forces, tuple(float(t) for t in turns), scale, many, limit, start)
     return CondensedTrain(model, system, forces, of_mesh, steady)
 
 

@@ -43,9 +43,9 @@ def first_motion(system: Oscillator, speed: float, *, tolerance: float, highest:
     def forces(theta: Array, _part: float, u: Array, du: Array) -> Pushes:
         return system.forces(theta, speed, u, du)
 
-    grows = Growing(system.linear, forces, system.turns, system.scale, system.orders, system.limit, speed)
+    grows = Growing(system.linear, forces, system.turns, system.scale, system.orders, system.limit, speed=speed)
     places = np.zeros((grows.harmonics(0.0, 0.0) + 1, system.linear.size), dtype=complex)
-    places[0] = system.linear.rest
+    places[0] = system.linear.rest if system.start is None else system.start
     start, _ = solve(grows, 0.0, places, tolerance)
     if not start.found:
         return None
