@@ -124,7 +124,7 @@ def _tornado(path: Path, title: str, outputs: Mapping[str, Mapping[str, Any]]) -
         tidy(part)
         largest = sorted(found.items(), key=lambda item: abs(item[1]))[-10:]
         sizes = [value for _, value in largest]
-        part.barh([_short(n, " ") for n, _ in largest], sizes, color=[BLUE if v >= 0 else ORANGE for v in sizes])
+        part.barh([_short(n, ", ") for n, _ in largest], sizes, color=[BLUE if v >= 0 else ORANGE for v in sizes])
         part.axvline(0.0, color="#374151", linewidth=0.9)
         part.set_xlabel(f"{what} {name}", fontsize=8.5)
         part.tick_params(labelsize=8.5)
