@@ -79,7 +79,7 @@ def draw_spectrum(
     axes.plot(frequency, amplitude, "o", color=BLUE, markersize=3.4, markerfacecolor="white")
     shown = (frequency <= highest) & (frequency > lowest)
     top = float(amplitude[shown].max(initial=0.0)) or 1.0
-    axes.set_ylim(0.0, 1.3 * top)
+    axes.set_ylim(0.0, (1.3 + 0.06 * len({line.name for line in lines})) * top)  # rows of numbers are above the names
     label_lines(axes, named, frequency[shown], amplitude[shown], fontsize=8.5)
     axes.set_ylabel("amplitude  (m/s²)")
     save_fixed(figure, path)
