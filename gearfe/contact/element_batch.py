@@ -207,8 +207,7 @@ def _window(flank: Flank, force: Array, share: float, margin: int) -> IntArray:
 
 def _to_tip(flank: Flank, force: Array) -> Array:
     """How far from the flank's end the loads on its nodes lie in the mean (m), shape (m,)."""
-    load, arc = np.abs(force.view(complex)), np.zeros(len(flank.nodes))
-    arc[::2], arc[1::2] = flank.ends, 0.5 * (flank.ends[1:] + flank.ends[:-1])
+    load, arc = np.abs(force.view(complex)), flank.arc(0.5 * np.arange(len(flank.nodes)))
     return np.asarray(flank.ends[-1] - load @ arc / load.sum(axis=1))
 
 

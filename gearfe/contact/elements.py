@@ -305,8 +305,8 @@ def solve(batch: Batch, start: State, turn: ComplexArray, equations: dict[int, E
         place[rows.points] = rows.place
         p = pressure[rows.points]
         now = rows.forces(p, len(forces))
-        error = _error(batch, rows, p, forces, now)
-        converged |= live & (error < np.maximum(TOLERANCE, _rounding(batch, rows)))
+        error, least = _errors(batch, rows, p, forces, now)
+        converged |= live & (error < np.maximum(TOLERANCE, least))
         asks = (rows.trial > 0) | (p > 0)
         live &= ~converged & (np.bincount(rows.at[asks], minlength=batch.size) > 0)
         if number == STEPS or not live.any():
@@ -348,24 +348,21 @@ def _mixed(past: list[tuple[Array, Array]]) -> Array:
     return np.asarray(reached[-1] - share @ np.diff(reached, axis=0))
 
 
-def _error(batch: Batch, rows: ProjectedPoints, pressure: Array, forces: ComplexArray, now: ComplexArray) -> Array:
-    """Of each position how far its pressures are from what the law asks or its forces from those of its pressures at
-    the places reached, `now`, the larger, relative to their sums, shape (B,).
+def _errors(
+    batch: Batch, rows: ProjectedPoints, pressure: Array, forces: ComplexArray, now: ComplexArray
+) -> tuple[Array, Array]:
+    """Of each position its error, and the least that rounding lets the law reach, both of shape (B,).
+
+    The error is how far its pressures are from what the law asks or its forces from those of its pressures at the
+    places reached, `now`, the larger, relative to their sums; the least is gamma times the last bit of a coordinate.
     """
 
     def total(at: IntArray, values: Array) -> Array:
         return np.bincount(at, values, batch.size)
 
     least, of = 1e-300, batch.node_position
-    off = total(rows.at, rows.area * np.abs(pressure - rows.trial))
-    off /= np.maximum(total(rows.at, rows.area * rows.trial), least)
-    return np.maximum(off, total(of, np.abs(forces - now)) / np.maximum(total(of, np.abs(now)), least))
-
-
-def _rounding(batch: Batch, rows: ProjectedPoints) -> Array:
-    """Smallest error that rounding lets the law reach in each position: gamma times the last bit of a coordinate."""
-    bears = rows.trial > 0
-    stiff = np.bincount(rows.at, rows.area * bears * batch.parameter[rows.points], batch.size)
-    load = np.bincount(rows.at, rows.area * rows.trial, batch.size)
-    extent = batch.elastic.centre_distance
-    return np.asarray(np.finfo(float).eps * extent * stiff / np.maximum(load, 1e-300))
+    load = np.maximum(total(rows.at, rows.area * rows.trial), least)
+    off = total(rows.at, rows.area * np.abs(pressure - rows.trial)) / load
+    changed = total(of, np.abs(forces - now)) / np.maximum(total(of, np.abs(now)), least)
+    stiff = total(rows.at, rows.area * (rows.trial > 0) * batch.parameter[rows.points])
+    return np.maximum(off, changed), np.finfo(float).eps * batch.elastic.centre_distance * stiff / load
