@@ -15,6 +15,7 @@ from gearfe.contact.panels import (
     ELLIPSE_X,
     MIDDLES,
     WIDTHS,
+    couplings,
     first_guess,
     influence,
     mean_log,
@@ -74,10 +75,38 @@ def test_panels_give_hertz() -> None:
     deep = compliance * force * (0.5 - math.log(b / 2))  # approach of the centre, which makes the force F
     gap = x**2 / (2 * radius) - deep
     width = half[:, None] * WIDTHS
-    pressure, settled = unilateral(influence(half, compliance), gap, first_guess(gap))
+    one, nothing = couplings(np.zeros(1, int), np.zeros(1, int), 1), np.zeros(1)
+    pressure, _, settled = unilateral(one, influence(half, compliance), nothing, width, gap, first_guess(gap))
     assert settled.all()
     assert (pressure * width).sum() == pytest.approx(force, rel=1e-3)
     inside = np.abs(x[0]) < 0.9 * b
     ellipse = 2 * force / (math.pi * b) * np.sqrt(1 - (x[0][inside] / b) ** 2)
     assert pressure[0][inside] == pytest.approx(ellipse, rel=5e-3)
     assert 2 * math.sqrt((pressure * width * x**2).sum() / force) == pytest.approx(b, rel=3e-3)
+
+
+def test_panels_of_tooth_pairs_that_feel_each_others_forces() -> None:
+    """Pressures of three contacts, two of them of one tooth pair, against the equations of all panels at once:
+    p >= 0, g + K p >= 0, p (g + K p) = 0, with what forces do (T) in K.
+    """
+    draw = np.random.default_rng(3)
+    couples = couplings(np.zeros(3, int), np.array([0, 0, 1]), 1)
+    half, T = np.array([1e-4, 2e-4, 3e-4]), draw.uniform(0.5, 1.5, (3, 3))
+    x = half[:, None] * MIDDLES + np.array([[0.0], [4e-4], [0.0]])
+    width, gap = half[:, None] * WIDTHS, 30 * x**2 / half[:, None] - 2e-4 * np.arange(1, 4)[:, None]
+    blocks = np.zeros((5, len(MIDDLES), len(MIDDLES)))  # couples 00 01 10 11 22
+    blocks[couples.beside.own] = influence(half, 1.0)
+    for couple, (i, j) in ((1, (0, 1)), (2, (1, 0))):
+        blocks[couple] = -np.log(np.abs(x[i][:, None] - x[j])) * width[j]
+    K = (T + T.T)[:, None, :, None] * np.broadcast_to(width, (3, len(MIDDLES), *width.shape))
+    for block, i, j in zip(blocks, couples.beside.first, couples.beside.second, strict=True):
+        K[i, :, j] += block
+    T = (T + T.T)[couples.first, couples.second]
+    p, approach, settled = unilateral(couples, blocks, T, width, gap, first_guess(gap))
+    assert settled.all()
+    assert approach == pytest.approx(np.einsum("ikjl,jl->ik", K, p), rel=1e-10)
+    closed = p > 0
+    assert 0 < closed.sum() < closed.size
+    assert (p >= 0).all()
+    assert np.abs((gap + approach)[closed]).max() < 1e-10 * np.abs(gap).max()
+    assert (gap + approach)[~closed].min() > 0

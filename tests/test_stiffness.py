@@ -8,7 +8,7 @@ import pytest
 from gearfe import InputError, Material, sweep_stiffness
 from gearfe.gear.spur_gear import TipRelief
 from gearfe.loadmap.sweep import sweep_loads
-from gearfe.stiffness.positions import HalfPlaneSolver
+from gearfe.stiffness.positions import PositionSolver
 from gearfe.stiffness.sweep import elastic_pair
 
 from .counting import counted
@@ -110,13 +110,13 @@ def test_every_cycle_is_the_same(gears, elastic):
 
 def test_repeated_positions_are_solved_once(gears, elastic, monkeypatch):
     solved = []
-    solve = HalfPlaneSolver.solve
+    solve = PositionSolver.solve
 
     def counting(self, angles, twists, kept=()):
         solved.extend(angles)
         return solve(self, angles, twists, kept)
 
-    monkeypatch.setattr(HalfPlaneSolver, "solve", counting)
+    monkeypatch.setattr(PositionSolver, "solve", counting)
     angles = np.radians(np.arange(1.0, 41.0, 3.0))
     folded = at(gears, angles, elastic)
     assert len(solved) == 6  # 1, 4, 7, ... modulo 18 deg
@@ -250,13 +250,13 @@ def test_more_torque_more_transmission_error(gears, elastic):
 def test_a_torque_beyond_reach_is_flagged(gears, elastic, monkeypatch):
     """Never a guess: a solver that gives up beyond 60 N m leaves that position without numbers."""
 
-    solve = HalfPlaneSolver.solve
+    solve = PositionSolver.solve
 
     def weak(self, angles, twists, kept=()):
         made = solve(self, angles, twists, kept)
         return made.with_status(np.where(made.torque_wheel > 60, "not_converged", made.status))
 
-    monkeypatch.setattr(HalfPlaneSolver, "solve", weak)
+    monkeypatch.setattr(PositionSolver, "solve", weak)
     fine = at(gears, [0.1], elastic, twist=None, torque=50.0)
     assert fine.torque_wheel[0] == pytest.approx(50.0, rel=1e-7)
     lost = at(gears, [0.1], elastic, twist=None, torque=100.0)

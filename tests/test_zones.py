@@ -13,7 +13,7 @@ import pytest
 from gearfe.contact.compliance import flank_loads
 from gearfe.contact.elements import solve_elements
 from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
-from gearfe.contact.panels import MIDDLES, PANELS, WIDTHS, influence, log_integral, unilateral
+from gearfe.contact.panels import MIDDLES, PANELS, WIDTHS, couplings, influence, log_integral, unilateral
 from gearfe.contact.position import Positions
 from gearfe.gear.face import ToothDeviations
 from gearfe.stiffness.job import read_stiffness_job
@@ -50,11 +50,11 @@ def test_two_windows_side_by_side_are_one() -> None:
     gap = x**2 / (2 * radius) - compliance * force * (0.5 - math.log(b / 2))
     z = x[:, :, None] - x[::-1, None, :]
     between = -compliance * (log_integral(z + width[:, None] / 2) - log_integral(z - width[:, None] / 2))
-    own = influence(half, compliance)
-    K = np.block([[own[0], between[0]], [between[1], own[1]]])[None]
-    pressure, settled = unilateral(K, gap.reshape(1, -1), np.zeros((1, 2 * PANELS), dtype=bool))
+    own, couples = influence(half, compliance), couplings(np.zeros(2, int), np.zeros(2, int), 1)
+    K = np.stack([own[0], between[0], between[1], own[1]])
+    none = np.zeros((2, PANELS), dtype=bool)
+    pressure, _, settled = unilateral(couples, K, np.zeros(4), width, gap, none)
     assert settled.all()
-    pressure = pressure.reshape(2, PANELS)
     assert (pressure * width).sum(axis=1) == pytest.approx([force / 2, force / 2], rel=1e-3)
     inside = np.abs(x) < 0.9 * b
     ellipse = 2 * force / (math.pi * b) * np.sqrt(1 - (x[inside] / b) ** 2)

@@ -30,6 +30,7 @@ from ..elasticity import Material, Plane, element_stiffness, finite_strain_rates
 from ..errors import InputError
 from ..gear.face import ToothDeviations
 from ..gear.pair import GearPair
+from ..gear.spur_gear import Gear
 from ..gear.touching import WAY
 from ..meshing.tooth_sector import SectorMesh
 from ..multifrontal import Factor, condense
@@ -98,6 +99,11 @@ class GearBody:
 
     @cached_property
     def _driven(self) -> dict[int, Array]:
+        return {}
+
+    @cached_property
+    def compliances(self) -> dict[Gear, Any]:
+        """What `gearfe.contact.flank_compliance` made of it for the exact flank of a gear: it is kept with the body."""
         return {}
 
     @property

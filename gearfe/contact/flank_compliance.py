@@ -170,7 +170,10 @@ def cubic_spline(at: Array) -> Array:
 
 
 def flank_compliance(gear: Gear, body: GearBody) -> FlankCompliance:
-    """Reduce the finite-element flank of a gear to its stations."""
+    """Reduce the finite-element flank of a gear to its stations; once for each body and gear."""
+    if gear in body.compliances:
+        known: FlankCompliance = body.compliances[gear]
+        return known
     face, inverse_modulus, module = face_of(gear), body.contact_compliance, gear.module
     corner, wedge = corner_of(face)
     stations, bumps, nodal = _stations(body.flank, float(face.arc[0]), module)
@@ -179,6 +182,7 @@ def flank_compliance(gear: Gear, body: GearBody) -> FlankCompliance:
     smooth = {step: sides @ body.coupling[step % body.teeth] @ sides.T for step in range(-REACH, REACH + 1)}
     made = FlankCompliance(face, inverse_modulus, corner, wedge, stations, bumps, smooth)
     smooth[0] = smooth[0] + loads @ body.own @ loads.T + inverse_modulus / body.width * _local(made)
+    body.compliances[gear] = made
     return made
 
 

@@ -43,15 +43,13 @@ from ..typing import Array, BoolArray, IntArray
 from .half_plane_pair import HalfPlanePair, half_plane_pair
 from .half_plane_step import SMALL, WINDOW, Setting, State, Step, cross, reference_approach, smooth_influence, step
 from .panels import PANELS, Couplings, unilateral
-from .position import STATUS, TORQUES, Contacts, Positions, joined, of_positions, taken, together
+from .position import STATUS, TORQUES, Contacts, Positions, in_batches, joined, of_positions, taken
 from .zones import completed
 
 __all__ = ["HalfPlanePair", "half_plane_pair", "solve_half_plane"]
 
-#: Positions solved side by side: their matrices hold some megabytes; larger ones cost the system more than calls do.
-BATCH = 40
 #: Newton steps for the twist; rounds for the forces; sharpest edge (modules) that the curvature of a contact knows.
-TWIST_STEPS, FORCE_ROUNDS, SHARPEST = 10, 2, 0.02
+TWIST_STEPS, FORCE_ROUNDS, SHARPEST = 7, 2, 0.02
 
 
 def unloaded(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Setting, State]:
@@ -92,11 +90,8 @@ def shared(couples: Couplings, T: Array, own: Array, overlap: Array, on: BoolArr
     """Forces per width (N/m) that take up overlaps (m), both of shape (p,), where contacts yield by `own` (m2/N) as
     well as by T; `on` and `held` as in `unilateral`.
     """
-    compliance = T.copy()
-    compliance[couples.own] += own
-    gap, first = (couples.vectors(values[:, None]) for values in (-overlap, on))
-    found, _ = unilateral(couples.matrices(compliance[:, None, None]), gap, first, held=held)
-    return couples.parts(found)[:, 0]
+    width = np.ones((len(own), 1))
+    return unilateral(couples, own[:, None, None], T, width, -overlap[:, None], on[:, None], held=held)[0][:, 0]
 
 
 def first_state(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Setting, State]:
@@ -118,7 +113,7 @@ def expected_twists(law: HalfPlanePair, torques: Array, touching: Touching) -> A
     Parameters
     ----------
     touching
-        What `law.teeth.touching` says of their angles.
+        What `law.touching` says of their angles.
     """
     numbers, position = np.unique(touching.position, return_inverse=True)
     found, goal, arm = replace(touching, position=position), torques[numbers], touching.arm[:, 1]
@@ -155,9 +150,7 @@ HELD_STEPS, TOLERANCE = 3, 1e-6
 AHEAD, LEAST_AHEAD = 1e-3, 1e-10
 
 
-def solve_half_plane(
-    law: HalfPlanePair, pinion_angles: ArrayLike, twists: ArrayLike, *, touching: Touching | None = None
-) -> Positions:
+def solve_half_plane(law: HalfPlanePair, pinion_angles: ArrayLike, twists: ArrayLike) -> Positions:
     """Solve the contact of a gear pair at several positions.
 
     Parameters
@@ -166,17 +159,12 @@ def solve_half_plane(
         rad.
     twists : array_like, shape (n,) or ()
         Twist of the wheel (rad), from where a wheel space faces the pinion tooth.
-    touching
-        What `law.teeth.touching` says of these angles, when it is there already.
     """
     angles = np.array(pinion_angles, dtype=float, ndmin=1)
     twist = np.array(np.broadcast_to(np.asarray(twists, dtype=float), angles.shape))
-    met = law.teeth.touching(angles) if touching is None else touching
-    met, made = taken(met, met.twist < twist[met.position]), []
-    for start in range(0, max(1, len(angles)), BATCH):
-        part = np.arange(start, min(start + BATCH, len(angles)))
-        made.append(_batch(law, angles[part], twist[part], of_positions(met, part)))
-    return together(made)
+    met = law.touching(angles)
+    met = taken(met, met.twist < twist[met.position])
+    return in_batches(lambda part: _batch(law, angles[part], twist[part], of_positions(met, part)), len(angles))
 
 
 def _kept(setting: Setting, state: State, positions: BoolArray) -> tuple[Setting, State]:
@@ -319,7 +307,7 @@ def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array
         Pinion angle of the tooth of the couple's lower pair (rad), teeth between both pairs, and the approach of the
         gears at one pair by a unit force on the other (m/N); forces count as moments on the wheel over its base radius.
     """
-    met = law.teeth.touching(pinion_angles)
+    met = law.touching(pinion_angles)
     met = met.take(np.flatnonzero(met.twist < twists[met.position]))
     setting, state = unloaded(law, twists, met)
     couples, arm = setting.couples, met.arm[:, 1] / law.pair.wheel.base_radius

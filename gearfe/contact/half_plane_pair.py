@@ -15,23 +15,26 @@ wheel.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gear.face import FlankTables, ToothDeviations, flank_tables
+from ..gear.face import NOMINAL, FlankTables, ToothDeviations, flank_tables
 from ..gear.pair import GearPair
-from ..gear.touching import ToothFlanks
+from ..gear.touching import ToothFlanks, Touching
 from ..typing import Array, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliance, shapes_of
-from .panels import LEAST_DISTANCE, Couplings, log_integral
+from .panels import Couplings, log_integral
+from .position import BATCH, joined, of_positions
 
 #: Places at which both faces of a contact are compared where they have no deviations, and besides for each piece of a
 #: deviation.
 PLACES, PER_PIECE = 32, 2
+#: Pinion angles of a mesh cycle at which flanks with deviations are looked at for their first touch.
+LOOKS = 24
 #: Distance (m) from a kink at which its sides' tangents are taken.
 BESIDE = 1e-9
 
@@ -62,6 +65,41 @@ class HalfPlanePair:
         """Mesh cycles after which the same teeth meet again: 1 where all teeth of each gear are alike."""
         alike = all(one.alike for one in self.teeth.deviations)
         return 1 if alike else math.lcm(self.pair.pinion.teeth, self.pair.wheel.teeth)
+
+    def touching(self, angles: Array) -> Touching:
+        """Tooth pairs whose rigid flanks can meet at pinion angles (rad), by position; searched for once an angle."""
+        known = self._touched
+        new = np.setdiff1d(angles, np.concatenate([np.zeros(0), *(at for at, _ in known)]))
+        for start in range(0, len(new) if known else max(1, len(new)), BATCH):
+            part = new[start : start + BATCH]
+            found, before = self.teeth.touching(part), sum(len(at) for at, _ in known)
+            known.append((part, replace(found, position=found.position + before)))
+        every = np.concatenate([at for at, _ in known])
+        known[:] = [(every, joined([met for _, met in known]))]
+        order = np.argsort(every)
+        return of_positions(known[0][1], order[np.searchsorted(every, angles, sorter=order)])
+
+    @cached_property
+    def _touched(self) -> list[tuple[Array, Touching]]:
+        return []
+
+    def touching_twists(self, angles: Array) -> Array:
+        """Twists (rad) at which the rigid gears just touch, infinite where they never do, shape (n,)."""
+        found = self.touching(angles)
+        made = np.full(len(angles), np.inf)
+        np.minimum.at(made, found.position, found.twist)
+        return made
+
+    def first_touch(self, angles: Array) -> float:
+        """Twist (rad) that stiffness counts from: where unmodified flanks touch, or before, what stands out of them.
+
+        The first touch of the mesh cycle, these pinion angles (rad) among it.
+        """
+        free = self.pair.contact_twist
+        if self.teeth.deviations == NOMINAL:
+            return free
+        every = np.concatenate([angles, self.pair.mesh_cycle * np.arange(LOOKS) / LOOKS])
+        return float(min(free, self.touching_twists(every).min()))
 
     @cached_property
     def tables(self) -> FlankTables:
@@ -194,28 +232,24 @@ def half_plane_pair(elastic: MeshingPair) -> HalfPlanePair:
     return HalfPlanePair(pair, ToothFlanks(pair, elastic.deviations), (pinion, wheel), elastic.width)
 
 
-def moved_beside(law: HalfPlanePair, couples: Couplings, normal: ComplexArray, arc: Array, y: Array) -> ComplexArray:
-    """Displacement of the faces at the first contact across its normal, by a unit force per width along the normal of
-    the second, shape (q, 2), tooth axes (m2/N).
+def local_influence(law: HalfPlanePair, couples: Couplings, normal: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """What a unit force per width along the normal of the second contact does to the face at the first: by the
+    half-plane, per ln of their distance, and by the wedge, per ln(y + y), both of shape (q, 2) (m2/N).
+
+    Displacements in units of the first contact's normal, real along it and imaginary across.
 
     Parameters
     ----------
     normal : ndarray of complex, shape (p, 2)
         n in the teeth's axes.
-    arc, y : ndarray, shape (p, 2)
-        Arcs of the contacts and their distances from the corners (m).
     """
-    i, j = couples.first, couples.second
-    apart = np.maximum(np.abs(arc[i] - arc[j]), LEAST_DISTANCE)
-    wedge = law.wedge(normal[j]) * np.log(y[i] + y[j])
-    moved = -law.inverse_modulus * (2 / np.pi * np.log(apart) * normal[j] + wedge)
-    return np.asarray(1j * normal[i] * (moved * normal[i].conj()).imag)
+    seen, load = -law.inverse_modulus * normal[couples.first].conj(), normal[couples.second]
+    return 2 / np.pi * seen * load, seen * law.wedge(load)
 
 
 def panel_influence(
-    law: HalfPlanePair,
+    influence: tuple[ComplexArray, ComplexArray],
     couples: Couplings,
-    normal: ComplexArray,
     places: tuple[Array, Array],
     panels: tuple[Array, Array, Array],
 ) -> Array:
@@ -224,6 +258,8 @@ def panel_influence(
 
     Parameters
     ----------
+    influence
+        `local_influence`.
     places
         Arcs of the places and their distances from the corners, shape (p, 2, m) (m).
     panels
@@ -231,14 +267,14 @@ def panel_influence(
     """
     i, j = couples.first, couples.second
     (arcs, y), (panel_arcs, panel_y, widths) = places, panels
-    along = -law.inverse_modulus * (law.wedge(normal[j]) * normal[i].conj()).real
-    factor = along[..., None, None] * widths[j][:, None, None]
-    made: Array = np.log(y[i][..., None] + panel_y[j][:, :, None]) * factor
+    plane, wedge = (one.real[..., None, None] for one in influence)
+    made: Array = y[i][..., None] + panel_y[j][:, :, None]
+    np.log(made, out=made)
+    made *= wedge * widths[j][:, None, None]
     other = np.flatnonzero(i != j)
     if len(other):
         i, j = i[other], j[other]
-        plane = -2 / np.pi * law.inverse_modulus * (normal[i] * normal[j].conj()).real
         half = 0.5 * widths[j][:, None, None]
         apart = arcs[i][..., None] - panel_arcs[j][:, :, None]
-        made[other] += plane[..., None, None] * (log_integral(apart + half) - log_integral(apart - half))
+        made[other] += plane[other] * (log_integral(apart + half) - log_integral(apart - half))
     return made

@@ -10,7 +10,7 @@ import numpy as np
 from ..gear.face import FlankTables
 from ..gear.touching import LOOK, WAY, Faces, Touching, windows
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from .half_plane_pair import HalfPlanePair, moved_beside, panel_influence
+from .half_plane_pair import HalfPlanePair, local_influence, panel_influence
 from .panels import (
     LEAST_DISTANCE,
     MIDDLES,
@@ -225,9 +225,10 @@ def answers(law: HalfPlanePair, values: Array, normal: ComplexArray, couples: Co
     """
     count, k = len(normal), values.shape[2]
     load = (values[..., None] * normal.view(float).reshape(count, 2, 1, 2)).reshape(count, 2, 2 * k)
-    wide = 2 * couples.furthest + 1
-    answer = np.matmul(load.swapaxes(0, 1), law.influence(couples.furthest)).reshape(2, count * wide, k, 2)
-    columns = couples.second * wide + couples.step + couples.furthest
+    furthest = int(np.abs(couples.step).max(initial=0))
+    wide = 2 * furthest + 1
+    answer = np.matmul(load.swapaxes(0, 1), law.influence(furthest)).reshape(2, count * wide, k, 2)
+    columns = couples.second * wide + couples.step + furthest
     return answer.take(columns, axis=1).swapaxes(0, 1).view(complex)
 
 
@@ -253,10 +254,12 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     y, far = _distances(setting, state.arc)
     load = (force[:, None] * SIGN).take(couples.second, axis=0)
     displaced, stretch = couples.sums(smooth.moved * load), couples.sums(smooth.slope * load)
-    load = (force[:, None] * SIGN).take(beside.second, axis=0)
-    displaced += beside.sums(moved_beside(law, beside, normal, state.arc, y) * load)
+    plane, wedge = near = local_influence(law, beside, normal)
+    i, j = beside.first, beside.second
+    apart = np.maximum(np.abs(state.arc[i] - state.arc[j]), LEAST_DISTANCE)
+    across = (plane.imag * np.log(apart) + wedge.imag * np.log(y[i] + y[j])) * (force[:, None] * SIGN)[j]
     turn = setting.turn / state.normal[:, None]
-    offset = (law.hub - state.centre[:, None]) / state.normal[:, None] + turn * displaced
+    offset = (law.hub - state.centre[:, None]) / state.normal[:, None] + turn * displaced + 1j * beside.sums(across)
     faces = Faces(turn, offset, stretch, state.arc)
 
     low, high, found = state.low, state.high, None
@@ -269,7 +272,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
         arcs, heights, _ = faces.heights(tables, look)
         gap = heights[:, 1] - heights[:, 0]
         if len(beside.first) > len(force):
-            gap += _opened(setting, state, arcs)
+            gap += _opened(setting, state, near, arcs)
         found = windows(look, heights, gap, state.reach * law.compliance * floor)
         low, high = found.low, np.maximum(found.high, found.low + 2e-4 * scale)
     half = 0.5 * (high - low)
@@ -282,16 +285,13 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     if law.kinks[0].shape[1]:
         gap += _mean_over_kinks(setting, arcs, width)
     y = np.maximum(np.abs(points[:, :, :PANELS] - corner[:, :, None]), LEAST_DISTANCE)
-    local = panel_influence(law, beside, normal, (arcs, y), (arcs, y, width))
-    blocks = (smooth.compliance[:, None] * width.take(couples.second, axis=0))[:, None].repeat(PANELS, axis=1)
-    blocks[couples.step == 0] += local[:, 0] + local[:, 1]
-    blocks[couples.own] += influence(half, law.compliance)
-    K = couples.matrices(blocks)
+    local = panel_influence(near, beside, (arcs, y), (arcs, y, width))
+    K = local[:, 0] + local[:, 1]
+    own = slice(None) if len(K) == len(half) else beside.own  # a slice is not copied
+    K[own] += influence(half, law.compliance)
     bearing = state.bearing if state.bearing.any() else first_guess(gap)
     free = gap - couples.sums(smooth.compliance * force.take(couples.second))[:, None]  # the gap holds these forces
-    pressure, settled = unilateral(K, couples.vectors(free), couples.vectors(bearing), held=held)
-
-    p = couples.parts(pressure)
+    p, approach, settled = unilateral(couples, K, smooth.compliance, width, free, bearing, held=held)
     force = (p * width).sum(axis=1)
     loaded = force > 0
     shares = p * width / np.where(loaded, force, 1.0)[:, None]
@@ -306,7 +306,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     slope = (between * (middle[:, 1:] - middle[:, :-1])).sum(axis=1) / np.where(area > 0, half * area, 1.0)
     outgrown, energy = np.zeros(len(p), dtype=bool), np.zeros(len(p))
     if found is None:
-        energy = 0.5 * (p * width * couples.parts((K @ pressure[..., None])[..., 0])).sum(axis=1)
+        energy = 0.5 * (p * width * approach).sum(axis=1)
     else:
         place, slope = np.where(loaded, place, found.nearest), np.where(loaded, slope, found.mean_slope)
         outgrown = ((p[:, 0] > 0) & (low > reach[0])) | ((p[:, -1] > 0) & (high < reach[1]))
@@ -339,14 +339,16 @@ def change(couples: Couplings, state: State, new: State, place: Array) -> Array:
     return couples.total(all_) / np.maximum(couples.total(new.force), SMALL)
 
 
-def _opened(setting: Setting, state: State, arcs: Array) -> Array:
-    """How far the other contacts of the pair open the gap at arcs (m) of each, (p, 2, m), under even pressures (m)."""
-    couples, normal = setting.couples.beside, state.normal[:, None] / setting.turn
+def _opened(setting: Setting, state: State, near: tuple[ComplexArray, ComplexArray], arcs: Array) -> Array:
+    """How far the other contacts of the pair open the gap at arcs (m) of each, (p, 2, m), under even pressures (m);
+    `near` is their `local_influence`.
+    """
+    couples = setting.couples.beside
     width = np.maximum(4 * np.sqrt(state.variance), LEAST_DISTANCE)[:, None]
     own = state.arc[:, :, None]
     panels = own, setting.distances(own), width
     by = (state.force[:, None] / width)[couples.second] * (couples.first != couples.second)[:, None]
-    into = panel_influence(setting.law, couples, normal, (arcs, setting.distances(arcs)), panels)[..., 0]
+    into = panel_influence(near, couples, (arcs, setting.distances(arcs)), panels)[..., 0]
     return couples.sums(into.sum(axis=1) * by)
 
 

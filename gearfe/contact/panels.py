@@ -29,8 +29,9 @@ sharp tips by at most 0.006 %: left out.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -87,26 +88,26 @@ class Couplings:
     ----------
     position, slot : ndarray, shape (p,)
         Position of each contact, and its number within the position.
+    pair : ndarray, shape (p,)
+        Tooth pair of each contact.
     first, second : ndarray, shape (c,)
         The contacts i and j of each couple, in rising order.
-    step : ndarray, shape (c,)
-        Tooth pair's number of i less that of j: 0 for contacts of one tooth pair.
     positions, slots
         Number of positions, and most contacts of one.
     """
 
     position: IntArray
     slot: IntArray
+    pair: IntArray
     first: IntArray
     second: IntArray
-    step: IntArray
     positions: int
     slots: int
 
     @cached_property
-    def furthest(self) -> int:
-        """Most teeth between two pairs of a position."""
-        return int(np.abs(self.step).max(initial=0))
+    def step(self) -> IntArray:
+        """Tooth pair's number of i less that of j, shape (c,): 0 for contacts of one tooth pair."""
+        return self.pair[self.first] - self.pair[self.second]
 
     @cached_property
     def own(self) -> IntArray:
@@ -125,9 +126,9 @@ class Couplings:
 
     @cached_property
     def beside(self) -> Couplings:
-        """The couples of contacts of one tooth pair alone."""
-        same = self.step == 0
-        return replace(self, first=self.first[same], second=self.second[same], step=self.step[same])
+        """Which contacts share a tooth pair: these with the tooth pairs as positions."""
+        new = (np.diff(self.position, prepend=-1) != 0) | (np.diff(self.pair, prepend=0) != 0)
+        return couplings(np.cumsum(new) - 1, np.zeros_like(self.pair), int(new.sum()))
 
     def total(self, of_contacts: Array | BoolArray) -> Array:
         """Sums over the contacts of each position, shape (positions,)."""
@@ -140,78 +141,117 @@ class Couplings:
     def matrices(self, blocks: Array) -> Array:
         """Matrices of the positions, shape (positions, z n, z n) with z slots, of blocks by couple, shape (c, n, n)."""
         z, n = self.slots, blocks.shape[1]
+        if z == 1:
+            return blocks
         made = np.zeros((self.positions, z, n, z, n))
         made[self.position[self.first], self.slot[self.first], :, self.slot[self.second]] = blocks
         return made.reshape(self.positions, z * n, z * n)
 
     def vectors(self, of_contacts: Array) -> Array:
-        """Vectors of the positions, shape (positions, z n), of parts by contact, shape (p, n); 0 in empty slots."""
-        n = of_contacts.shape[1]
-        made = np.zeros((self.positions, self.slots, n), dtype=of_contacts.dtype)
-        made[self.position, self.slot] = of_contacts
-        return made.reshape(self.positions, self.slots * n)
+        """Vectors of the positions, shape (positions, z n, ...), of parts by contact, shape (p, n, ...); 0 in empty
+        slots.
+        """
+        n, *shape = of_contacts.shape[1:]
+        made = of_contacts
+        if len(self.position) < self.positions * self.slots:
+            made = np.zeros((self.positions, self.slots, n, *shape), dtype=of_contacts.dtype)
+            made[self.position, self.slot] = of_contacts
+        return made.reshape(self.positions, self.slots * n, *shape)
 
     def parts(self, vectors: Array) -> Array:
-        """The parts by contact, shape (p, n), of vectors of the positions."""
-        n = vectors.shape[1] // self.slots
-        made: Array = vectors.reshape(self.positions, self.slots, n)[self.position, self.slot]
-        return made
+        """The parts by contact, shape (p, n, ...), of vectors of the positions."""
+        n, full = vectors.shape[1] // self.slots, self.positions * self.slots
+        made = vectors.reshape(full, n, *vectors.shape[2:])
+        return made if len(self.position) == full else made[self.slots * self.position + self.slot]
 
 
-def couplings(position: IntArray, number: IntArray, positions: int) -> Couplings:
-    """Couples of the contacts of tooth pairs `number` at `position`, both of shape (p,), sorted by both."""
+def couplings(position: IntArray, pair: IntArray, positions: int) -> Couplings:
+    """Couples of the contacts of tooth pairs `pair` at `position`, both of shape (p,), sorted by both."""
     slot = np.arange(len(position)) - np.searchsorted(position, position)
     slots = int(slot.max(initial=0)) + 1
     at = np.full((positions, slots), -1)
     at[position, slot] = np.arange(len(position))
     mates = at[position]
     first, place = np.nonzero(mates >= 0)
-    second = mates[first, place]
-    return Couplings(position, slot, first, second, number[first] - number[second], positions, slots)
+    return Couplings(position, slot, pair, first, mates[first, place], positions, slots)
 
 
 def influence(half: Array, compliance: float) -> Array:
     """K of half-planes on panels over windows of half width `half` (m), shape (p,), `compliance` = 2/pi sum 1/E'."""
-    log = np.log(half)[:, None, None] * WIDTHS
-    return np.asarray(compliance * half[:, None, None] * (LOGS - log))
+    scale = (compliance * half)[:, None, None]
+    made = scale * LOGS
+    made -= scale * np.log(half)[:, None, None] * WIDTHS
+    return made
 
 
-def unilateral(K: Array, gap: Array, bearing: BoolArray, *, held: bool = False) -> tuple[Array, BoolArray]:
-    """Solve the unilateral problems of m positions with n unknowns each.
+def unilateral(
+    couples: Couplings,
+    K: Array,
+    T: Array,
+    width: Array,
+    gap: Array,
+    bearing: BoolArray,
+    *,
+    held: bool = False,
+) -> tuple[Array, Array, BoolArray]:
+    r"""Solve the unilateral problems of m positions with n panels a contact.
+
+    Tooth pairs feel each other by forces alone. With those of all contacts, F, the panels of one tooth pair bear
+    :math:`p = p_0 - P\,T F`, where :math:`p_0` closes the gap and P an approach of 1 of each of its contacts; the sums
+    of that over the panels are the equations for F.
 
     Parameters
     ----------
-    K : ndarray, shape (m, n, n)
-        Approach of the panels' middles by pressures on all panels (m/Pa).
-    gap : ndarray, shape (m, n)
-        g (m).
-    bearing : ndarray of bool, shape (m, n)
+    K : ndarray, shape (q, n, n)
+        Approach of the panels' middles by pressures on the panels of the same tooth pair, by couple of
+        `couples.beside` (m/Pa).
+    T : ndarray, shape (c,)
+        Approach of all panels of the first contact by a unit force per width on the second (m2/N).
+    width, gap : ndarray, shape (p, n)
+        Widths of the panels and g (m).
+    bearing : ndarray of bool, shape (p, n)
         First guess of the panels that bear.
     held
         Whether that is no guess but what bears.
 
     Returns
     -------
-    pressure : ndarray, shape (m, n)
-        p (Pa).
+    pressure, approach : ndarray, shape (p, n)
+        p (Pa), and what it brings the panels' middles nearer by (m).
     settled : ndarray of bool, shape (m,)
         Whether the set of panels that bear was found.
     """
-    pressure, settled, open_ = np.zeros_like(gap), np.zeros(len(gap), dtype=bool), np.arange(len(gap))
+    pairs, n = couples.beside, gap.shape[1]
+    z, K, smooth = pairs.slots, pairs.matrices(K), couples.matrices(T[:, None, None])
+    right = np.zeros((len(gap), n, z + 1))
+    right[:, :, 0] = -gap
+    right[np.arange(len(gap)), :, 1 + pairs.slot] = 1
+    right, on = pairs.vectors(right), pairs.vectors(bearing)
+    beside, column = couples.step == 0, 1 + pairs.slot[pairs.second]
+    made, yields, nothing = np.empty_like(right), np.zeros(len(T)), np.eye(z * n)
+    new: Any = slice(None)  # tooth pairs whose panels are to be solved
     for _ in range(1 if held else CHANGES):
-        used = np.flatnonzero(bearing.any(axis=0))
-        on, p = bearing[:, used], np.zeros_like(gap)
-        system = np.where(on[:, :, None] & on[:, None], K[:, used[:, None], used], np.eye(len(used)))
-        p[:, used] = np.linalg.solve(system, np.where(on, -gap[:, used], 0.0)[..., None])[..., 0]
-        approach = (K @ p[..., None])[..., 0]
+        mask = on[new]
+        system = np.where(mask[:, :, None] & mask[:, None], K[new], nothing)
+        made[new] = np.linalg.solve(system, np.where(mask[:, :, None], right[new], 0.0))
+        answers = pairs.parts(made)
+        forces = (width[:, None] @ answers)[:, 0]
+        yields[beside] = forces[pairs.first, column]
+        system = np.eye(couples.slots) + couples.matrices(yields[:, None, None]) @ smooth
+        found = np.linalg.solve(system, couples.vectors(forces[:, :1])[:, :, None])
+        even = couples.parts((smooth @ found)[:, :, 0])
+        back = pairs.vectors(even)[pairs.position]
+        pressure = answers[:, :, 0] - (answers[:, :, 1:] @ back[:, :, None])[:, :, 0]
+        approach = pairs.parts((K @ pairs.vectors(pressure)[:, :, None])[:, :, 0]) + even
         bound = ROUNDING * np.abs(approach).max(axis=1, keepdims=True)
-        now = np.where(bearing, p > 0, gap + approach < -bound)
-        same = (now == bearing).all(axis=1)
-        pressure[open_], settled[open_] = p, same
-        if same.all():
+        now = pairs.vectors(np.where(pairs.parts(on), pressure > 0, gap + approach < -bound))
+        new = np.flatnonzero((now != on).any(axis=1))
+        if len(new) == 0:
             break
-        K, gap, bearing, open_ = K[~same], gap[~same], now[~same], open_[~same]
-    return pressure, settled
+        on = now
+    settled = np.ones(couples.positions, dtype=bool)
+    settled[couples.position[np.isin(pairs.position, new)]] = False
+    return pressure, approach, settled
 
 
 def first_guess(gap: Array) -> BoolArray:

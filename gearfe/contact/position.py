@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..progress import count
 from ..typing import Array, BoolArray, ComplexArray, Dataclass, IntArray
 
 
@@ -307,3 +308,17 @@ def together(parts: Sequence[Positions]) -> Positions:
         return joined([one for one in own if len(one.position)] or own[:1])
 
     return _by_field(parts, np.concatenate, moved)
+
+
+#: Positions that are solved side by side: enough to share the calls, few enough to stay small in memory.
+BATCH = 128
+
+
+def in_batches(solve: Callable[[IntArray], Positions], size: int) -> Positions:
+    """The positions 0 ... size - 1; `solve` gives those of the numbers that it is asked for."""
+    made = []
+    for start in range(0, max(1, size), BATCH):
+        end = min(start + BATCH, size)
+        made.append(solve(np.arange(start, end)))
+        count(end, size, "positions")
+    return together(made)

@@ -26,7 +26,7 @@ import numpy as np
 
 from ..gear.touching import WAY, Faces
 from ..typing import Array, BoolArray, IntArray
-from .half_plane_pair import HalfPlanePair
+from .half_plane_pair import HalfPlanePair, local_influence
 from .half_plane_step import SIGN, WIDER, WINDOW, Setting, State, Step, answers, reference_approach
 from .panels import EDGES, LEAST_DISTANCE, log_integral, mean_log
 from .position import joined, taken
@@ -118,13 +118,13 @@ def _gaps(setting: Setting, state: State) -> tuple[Array, Array, Array]:
     each = answers(law, law.shapes.at(state.arc)[:, :, 0], normal, couples)[..., 0]
     load = state.force[couples.second][:, None, None] * SIGN[:, None]
     moved = law.shapes.along(couples.sums(each * load), arcs)
-    beside, load = couples.beside, state.force[:, None] * SIGN * normal
+    beside = couples.beside
     i, j = beside.first, beside.second
-    wedge = law.wedge(load)[j][:, :, None]
+    load = (state.force[:, None] * SIGN)[j]
+    plane, wedge = ((one * load)[:, :, None] for one in local_influence(law, beside, normal))
     y, at = setting.distances(arcs), setting.distances(state.arc[:, :, None])
     logs = mean_log(arcs[i] - state.arc[j][:, :, None], _half_widths(state)[j, None, None])
-    local = 2 / np.pi * logs * load[j][:, :, None] + np.log(y[i] + at[j]) * wedge
-    seen = (moved - law.inverse_modulus[:, None] * beside.sums(local)) * turn[:, :, None]
+    seen = moved * turn[:, :, None] + beside.sums(plane * logs + wedge * np.log(y[i] + at[j]))
     arcs, heights, _ = faces.heights(tables, x[:, None] + seen.imag)  # of the points that come to x
     past = ((arcs <= state.ends[:, :, :1]) | (arcs >= state.ends[:, :, 1:])).any(axis=1)
     gap = heights[:, 1] - heights[:, 0] + seen[:, 1].real - seen[:, 0].real

@@ -21,7 +21,7 @@ from ..gear.pair import GearPair
 from ..progress import Stopwatch, count, one_thread, stage
 from ..stiffness.job import Keep, StiffnessJob
 from ..stiffness.periodic import distinct_phases
-from ..stiffness.positions import HalfPlaneSolver, PositionSolver, at_torques, position_solver
+from ..stiffness.positions import PositionSolver, at_torques, position_solver
 from ..stiffness.sweep import assembled_curve, elastic_pair, requested_angles
 from ..tables.loadmap import LoadMapTable
 from ..typing import Array, IntArray
@@ -96,7 +96,7 @@ def sweep_loads(
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"
         raise InputError("torques", len(goals), problem, "use fewer torques or positions, or state mesh_cycles")
     with watch.stage("unloaded flanks"):
-        solver.touching(solved_angles)
+        solver.law.touching(solved_angles)
     roots = None
     if root_stress:
         from .root_stress import pair_roots
@@ -186,7 +186,7 @@ def _room(
     Seen from the other side the pinion turns the other way.
     """
     pair, radius = solver.pair, solver.pair.wheel.base_radius
-    behind = radius * (HalfPlaneSolver(solver.law.deviated(back)).touching_twists(-angles) - pair.contact_twist)
+    behind = radius * (solver.law.deviated(back).touching_twists(-angles) - pair.contact_twist)
     error = radius * (found.twist - pair.contact_twist)
     room = pair.normal_backlash + np.tile(behind, len(found) // len(angles)) + error
     return behind, np.where(found.status == "converged", room, np.nan)
@@ -208,7 +208,7 @@ def _check_contact(made: LoadMap, solver: PositionSolver) -> None:
     lost = sorted(expected - set(number(made.pairs[0].pair).tolist()))
     if not lost:
         return
-    curve, met = made.curves[0], solver.touching(made.pinion_angle)
+    curve, met = made.curves[0], solver.law.touching(made.pinion_angle)
     rows = np.flatnonzero(number(met.pair) == lost[0])
     position, twist = met.position[rows], met.twist[rows] - geometry.contact_twist
     gap = twist - curve.twist[position]  # of rigid flanks; loaded neighbours move a tooth away, too

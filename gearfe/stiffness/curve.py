@@ -151,7 +151,7 @@ class StiffnessCurve(ShownTable):
         Seconds by stage; not in the CSV file.
     relative_error
         Estimated discretisation error of k_mesh (-), which covers the true one at about 19 of 20 positions, see
-        `gearfe.stiffness.curve_error`; not-a-number where there is none.
+        `gearfe.stiffness.positions`; not-a-number where there is none.
     """
 
     pinion_angle: Array = _column("pinion_angle_deg")

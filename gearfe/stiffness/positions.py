@@ -1,4 +1,4 @@
-r"""Positions of a sweep solved in batches, at given twists or at given torques.
+r"""Positions of a sweep at given twists or at given torques, and their discretisation error.
 
 **The twist of a torque** by safeguarded Newton's method on many positions at once. The torque T rises with the twist,
 from nothing where the rigid flanks just touch. With the deflection :math:`\delta` beyond that, :math:`\ln\delta` is
@@ -8,28 +8,57 @@ nearly straight over :math:`\ln T` for line contacts; Newton's step there,
 
 is taken with the solver's own tangent T' where it stays between the largest twist that was too little and the smallest
 that was too much; otherwise the interval is halved, or the deflection doubled while nothing has been too much yet.
+
+**Discretisation error of the half-plane law**, from coarser gears. At a given twist the energy of a position is
+:math:`U = \max_F\,(g\cdot F - \tfrac12 F\,C\,F)` over the forces, and stationary with their places and normals. The
+influence function of the coarser gears (other elements, stations and bumps; wedge and half-plane cancel) changes the
+compliance between the contacts by :math:`\delta C`, and with the forces, places, normals and widths moving on at the
+rates that each solution has, the torque by
+
+.. math:: \delta T = -\frac{d}{d\varphi}\,\tfrac12\,F(\varphi)\,\delta C(\varphi)\,F(\varphi) .
+
+With sizes larger by the factor c and errors of order p, one position's error is
+:math:`d_i = |\delta T_i/T_i|/(c^p-1)`. Alone that is not to be trusted: both meshes often agree by chance. The
+errors are alike at all n positions of a sweep, hence
+
+.. math:: e_i = \max\Big(d_i,\; 2\,\big(\tfrac1n\sum_j d_j^2\big)^{1/2}\Big),
+
+twice the standard deviation, which covers 95 % of what is normally distributed (JCGM 100:2008, *Guide to the
+expression of uncertainty in measurement*, 6.2.2). p is 1, the lowest order that was measured.
+
+**Laws on the elements** start from the half-plane law's solution :math:`T^{HP}` of the same gears, whose contact is on
+no mesh. From the truth they are as far as from that, and that from the truth, at most:
+
+.. math:: e_i = |T_i/T_i^{HP} - 1| + e_i^{HP} .
+
+What a law yields by itself (the overlap of a soft penalty) is in it.
+
+Not in it: the model (plane, no friction, rigid bores, small strain with its first-order correction) and what no
+refinement of one mesh family shows: of the half-plane law, the wedge that stands for a sharp tip (0.2 to 0.4 % where
+one bears; docs/contact_laws.md). `scripts/measure_curve_accuracy.py` measures over random pairs how often it covers
+the true error.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..contact.compliance import MeshingPair, finite_strain_shares, flank_loads, panel_pressures
 from ..contact.elements import solve_elements
 from ..contact.half_plane import HalfPlanePair, expected_twists, half_plane_pair, solve_half_plane
-from ..contact.laws import HalfPlane
-from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, joined, of_positions, taken, together
+from ..contact.half_plane_step import smooth_influence
+from ..contact.laws import COARSENING, HalfPlane
+from ..contact.panels import Couplings, couplings
+from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, in_batches, taken
 from ..errors import InputError
 from ..gear.derived import mesh_stiffness
-from ..gear.face import NOMINAL
-from ..gear.touching import Touching
+from ..gear.pair import GearPair
 from ..gear.validity import MOST_YIELD
-from ..progress import count
-from ..typing import Array, IntArray
+from ..typing import Array, ComplexArray, IntArray
 
 #: Solutions of a position in search of its torque; random pairs, laws and torques took three at most.
 MAX_SOLUTIONS = 12
@@ -82,96 +111,61 @@ def twists_for_torque(
 NONE: IntArray = np.zeros(0, dtype=np.int64)
 
 
-def position_solver(elastic: MeshingPair) -> PositionSolver:
-    """The solver of the elastic pair's law."""
-    half_plane = HalfPlaneSolver(half_plane_pair(elastic), elastic)
-    return half_plane if isinstance(elastic.law, HalfPlane) else ElementSolver(half_plane)
+@dataclass(frozen=True)
+class PositionSolver:
+    """Positions of one pair of gears by a contact law.
 
+    Attributes
+    ----------
+    elastic
+        The gears.
+    law
+        Them as the half-plane law sees them.
+    on_elements
+        Whether the law is one on the finite elements of the flanks; it starts from the half-plane law's loads.
+    """
 
-#: Pinion angles of a mesh cycle at which flanks with deviations are looked at for their first touch.
-LOOKS = 24
-#: Angles whose first touch is searched for at once: that takes kilobytes for each.
-AT_ONCE = 512
-
-
-class HalfPlaneSolver:
-    """Positions of one pair by the half-plane law; without the elastic gears there are no loads on nodes."""
-
-    def __init__(self, law: HalfPlanePair, elastic: MeshingPair | None = None) -> None:
-        self.pair, self._elastic, self.law = law.pair, elastic, law
-        self._angles = np.zeros(0)
-        self._known: list[Touching] = []
+    elastic: MeshingPair
+    law: HalfPlanePair
+    on_elements: bool
 
     @property
-    def elastic(self) -> MeshingPair:
-        """The elastic gears."""
-        assert self._elastic is not None
-        return self._elastic
+    def pair(self) -> GearPair:
+        """Geometry of the gears."""
+        return self.law.pair
+
+    @property
+    def half_plane(self) -> PositionSolver:
+        """The solver of the same gears by the half-plane law."""
+        return replace(self, on_elements=False)
 
     def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
-        """Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads."""
-        found = solve_half_plane(self.law, angles, twists, touching=self.touching(angles))
+        r"""Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads.
+
+        For laws on elements the half-plane law tells which tooth pairs bear, with the forces :math:`F_k`, and how wide
+        their contacts are (:math:`2b_k`). Where
+
+        .. math:: \sum_k F_k\,\frac{h_k}{2b_k} > \sum_k F_k
+
+        with the longer of both flanks' elements there, :math:`h_k`, the contact is narrower than an element. The torque
+        then swings with the place of the nodes (docs/contact_laws.md), and the position is ``under_resolved``.
+        """
+        every = np.arange(len(angles))
+        if not self.on_elements:
+            return self._with_loads(solve_half_plane(self.law, angles, twists), kept)
+        expected = self.half_plane.solve(angles, twists, every)
+        thin = (expected.status == "converged") & (self.elements_per_contact(expected) < 1.0)
+        expected = expected.with_status(np.where(thin, "under_resolved", expected.status))
+        found = in_batches(lambda part: solve_elements(self.elastic, expected.take(part)), len(angles))
+        return found.with_loads(np.isin(every, kept))
+
+    def _with_loads(self, found: Positions, kept: IntArray) -> Positions:
+        """Positions of the half-plane law, those numbered `kept` with loads."""
         if len(kept) == 0:
             return found
         loaded = taken(found.contacts, np.isin(found.contacts.position, kept))
         loads = flank_loads(self.elastic, loaded, found.pinion_angle, found.twist)
         return replace(found, loads=loads, points=panel_pressures(self.elastic, loaded))
-
-    def touching_twists(self, angles: Array) -> Array:
-        """Twists (rad) at which the rigid gears just touch."""
-        found = self.touching(angles)
-        made = np.full(len(angles), math.inf)
-        np.minimum.at(made, found.position, found.twist)
-        return made
-
-    def first_touch(self, angles: Array) -> float:
-        """Twist (rad) that stiffness counts from: where unmodified flanks touch, or before, what stands out of them.
-
-        The first touch of the mesh cycle, these pinion angles (rad) among it.
-        """
-        free = self.pair.contact_twist
-        if self.elastic.deviations == NOMINAL:
-            return free
-        every = np.concatenate([angles, self.pair.mesh_cycle * np.arange(LOOKS) / LOOKS])
-        return float(min(free, self.touching_twists(every).min()))
-
-    def touching(self, angles: Array) -> Touching:
-        """Tooth pairs whose rigid flanks can meet at pinion angles (rad), by position; searched for once an angle."""
-        every = np.setdiff1d(angles, self._angles)
-        for start in range(0, len(every) if self._known else max(1, len(every)), AT_ONCE):
-            new = every[start : start + AT_ONCE]
-            found = self.law.teeth.touching(new)
-            self._known.append(replace(found, position=found.position + len(self._angles)))
-            self._angles = np.concatenate([self._angles, new])
-        self._known = [joined(self._known)]
-        order = np.argsort(self._angles)
-        return of_positions(self._known[0], order[np.searchsorted(self._angles, angles, sorter=order)])
-
-
-class ElementSolver:
-    r"""Positions of one pair by a law on the finite elements of its flanks, where these resolve the contact.
-
-    The half-plane law of the same gears tells beforehand which tooth pairs bear, with the forces :math:`F_k`, and how
-    wide their contacts are (:math:`2b_k`). Where
-
-    .. math:: \sum_k F_k\,\frac{h_k}{2b_k} > \sum_k F_k
-
-    with the longer of both flanks' elements there, :math:`h_k`, the contact is narrower than an element. The torque
-    then swings with the place of the nodes (docs/contact_laws.md), and the position is ``under_resolved``.
-    """
-
-    def __init__(self, half_plane: HalfPlaneSolver) -> None:
-        self.half_plane, self.elastic = half_plane, half_plane.elastic
-        self.pair, self.law = half_plane.pair, half_plane.law
-        self.touching, self.touching_twists = half_plane.touching, half_plane.touching_twists
-        self.first_touch = half_plane.first_touch
-
-    def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
-        """Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads."""
-        expected = self.half_plane.solve(angles, twists, kept=np.arange(len(angles)))
-        thin = (expected.status == "converged") & (self.elements_per_contact(expected) < 1.0)
-        expected = expected.with_status(np.where(thin, "under_resolved", expected.status))
-        return solve_elements(self.elastic, expected).with_loads(np.isin(np.arange(len(angles)), kept))
 
     def elements_per_contact(self, found: Positions) -> Array:
         """Elements that see the contact of positions of `half_plane`, shape (n,): harmonic means, by force, over their
@@ -187,26 +181,14 @@ class ElementSolver:
         return np.divide(force, spread, out=np.full(len(found), np.nan), where=spread > 0)
 
 
-PositionSolver = HalfPlaneSolver | ElementSolver
-
-
-#: Positions handed to the solver at once: enough to work side by side, few enough to stay small in memory.
-BATCH = 128
-
-
-def in_batches(solver: PositionSolver, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
-    """Positions at pinion angles and twists, both of shape (n,) (rad); those numbered `kept` with loads."""
-    made = []
-    for start in range(0, max(1, len(angles)), BATCH):
-        part = slice(start, start + BATCH)
-        made.append(solver.solve(angles[part], twists[part], kept - start))
-        count(min(start + BATCH, len(angles)), len(angles), "positions")
-    return together(made)
+def position_solver(elastic: MeshingPair) -> PositionSolver:
+    """The solver of the elastic pair's law."""
+    return PositionSolver(elastic, half_plane_pair(elastic), not isinstance(elastic.law, HalfPlane))
 
 
 def at_twists(solver: PositionSolver, angles: Array, twists: Array, *, finite: bool = False) -> Positions:
     """Positions at pinion angles and twists, both of shape (n,) (rad); with or without finite strain."""
-    found = in_batches(solver, angles, twists, np.arange(len(angles)) if finite else NONE)
+    found = solver.solve(angles, twists, np.arange(len(angles)) if finite else NONE)
     return found.raised(finite_strain_shares(solver.elastic, found)) if finite else found
 
 
@@ -242,15 +224,15 @@ def at_torques(
         Numbers of the positions with loads; all have them where finite strain counts.
     """
     kept = np.arange(len(angles)) if finite else kept
-    touching, most = solver.touching_twists(angles), math.pi / solver.pair.wheel.teeth
+    touching, most = solver.law.touching_twists(angles), math.pi / solver.pair.wheel.teeth
 
     def solve(numbers: IntArray, twists: Array) -> Positions:
-        return in_batches(solver, angles[numbers], twists, np.flatnonzero(np.isin(numbers, kept)))
+        return solver.solve(angles[numbers], twists, np.flatnonzero(np.isin(numbers, kept)))
 
-    if isinstance(solver, ElementSolver):
+    if solver.on_elements:
         first = at_torques(solver.half_plane, angles, torques).twist
     else:
-        first = expected_twists(solver.law, torques, solver.touching(angles))
+        first = expected_twists(solver.law, torques, solver.law.touching(angles))
     found = solve(np.arange(len(angles)), np.minimum(first, most))
     found = twists_for_torque(solve, found, torques, touching=touching, most=most)
     if finite:
@@ -284,7 +266,7 @@ def closed(found: Positions, goal: Array, touching: Array) -> Positions:
 
 def checked_contact(solver: PositionSolver, found: Positions) -> Positions:
     """Mark positions without contact whose exact rigid flanks overlap, and take all numbers off failed ones."""
-    touching = solver.touching_twists(found.pinion_angle)
+    touching = solver.law.touching_twists(found.pinion_angle)
     overlap = (found.status == "no_contact") & (found.twist > touching + ANGLE_ROUNDING)
     return found.with_status(np.where(overlap, "not_converged", found.status))
 
@@ -302,3 +284,66 @@ def load_shares(found: Positions) -> tuple[Array, Array]:
     leading[np.isinf(leading)] = np.nan
     shares[np.isnan(found.torque_wheel)] = np.nan
     return leading, shares
+
+
+#: Assumed order of convergence p.
+ORDER = 1.0
+#: Standard deviations that cover 95 %.
+COVERAGE = 2.0
+#: Way ahead in twist for the derivative of the energy, as a share of the way in which the forces double.
+AHEAD = 1e-4
+
+
+def curve_error(solver: PositionSolver, coarse: MeshingPair, solved: Positions, *, finite: bool) -> Array:
+    """Estimated relative error of n solved positions from the coarser gears `coarse`, shape (n,); not-a-number where
+    none converged.
+    """
+    numbers, made = np.flatnonzero(solved.status == "converged"), np.full(len(solved), np.nan)
+    if len(numbers) == 0:
+        return made
+    own = chosen = solved.take(numbers)
+    error = np.zeros(len(numbers))
+    if solver.on_elements:
+        own = at_twists(solver.half_plane, chosen.pinion_angle, chosen.twist, finite=finite)
+        error = np.abs(chosen.torque_wheel / own.torque_wheel - 1)
+    single = np.abs(torque_changes(solver.law, half_plane_pair(coarse), own)) / (COARSENING**ORDER - 1)
+    error += np.maximum(single, COVERAGE * np.sqrt(np.mean(single**2)))
+    # a twist of some bits of the gears' angles is not what the gears are turned by
+    made[numbers] = error + ANGLE_ROUNDING * np.abs(chosen.tangent / chosen.torque_wheel)
+    return made
+
+
+def torque_changes(law: HalfPlanePair, other: HalfPlanePair, found: Positions) -> Array:
+    """Relative changes of the wheel's torque when the influence function of `law` is that of `other`, shape (n,).
+
+    Parameters
+    ----------
+    found
+        Positions solved with `law`; not-a-number where there is no contact.
+    """
+    c = found.contacts
+    frames = law.teeth.frames(found.pinion_angle[c.position], c.pair, found.twist[c.position])
+    normal = c.normal[:, None] * np.exp(-1j * frames)
+    couples = couplings(c.position, c.pair, len(found))
+    here = c.force, c.arc, normal, 0.25 * c.half_width**2
+    total = couples.total(c.force)
+    rate = couples.total(np.abs(c.force_rate))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by = AHEAD * np.where(rate > 0, total / rate, np.nan)
+        b = by[c.position]
+        there = (
+            c.force + c.force_rate * b,
+            c.arc + c.arc_rate * b[:, None],
+            normal * np.exp(1j * (c.normal_rate[:, None] - np.array([0.0, 1.0])) * b[:, None]),
+            here[3] * np.exp(2 * c.growth * b),
+        )
+        energies = [_energy(other, couples, *at) - _energy(law, couples, *at) for at in (here, there)]
+        return np.asarray((energies[0] - energies[1]) / (by * couples.total(c.torque_wheel)))
+
+
+def _energy(
+    law: HalfPlanePair, couples: Couplings, force: Array, arc: Array, normal: ComplexArray, variance: Array
+) -> Array:
+    """Energy (J) of the smooth displacements of each position, shape (n,), for forces (N)."""
+    T = smooth_influence(law, couples, normal, arc, variance).compliance
+    return couples.total(0.5 * force * couples.sums(T * force[couples.second])) / law.width

@@ -18,8 +18,8 @@ from ..gear.validity import overlap_warnings
 from ..tables.pair import DEFAULT_LAW
 from ..typing import Array
 from .curve import EDGES, StiffnessCurve
-from .curve_error import ORDER
 from .job import StiffnessJob
+from .positions import ORDER
 
 #: Allowable contact stress of case-hardened steel for unlimited life (MPa): ISO 6336-5, material quality MQ.
 ALLOWABLE_MPA = 1500.0

@@ -49,7 +49,6 @@ from ..meshing.tooth_sector import sector_mesh, sector_recipes
 from ..progress import Stopwatch, one_thread
 from ..typing import Array, BoolArray, IntArray
 from .curve import EDGES, ROUNDED, SINGULAR, SOLVED, StiffnessCurve
-from .curve_error import curve_error
 from .periodic import distinct_phases
 from .positions import (
     PositionSolver,
@@ -57,6 +56,7 @@ from .positions import (
     at_twists,
     check_torque,
     checked_contact,
+    curve_error,
     load_shares,
     position_solver,
 )
@@ -167,7 +167,7 @@ def sweep_stiffness(
     if torque is not None:
         check_torque(solver.law, load)
     with watch.stage("unloaded flanks"):
-        solver.touching(solved_angles)
+        solver.law.touching(solved_angles)
     with watch.stage("positions"), one_thread():
         solve = at_twists if torque is None else at_torques
         solved = solve(solver, solved_angles, np.full(len(solved_angles), load), finite=finite)
@@ -229,7 +229,7 @@ def assembled_curve(
     failed = ~np.isin(solved.status, SOLVED)
     total = np.where(failed & searched, np.nan, solved.twist)
     twist, torque = total - lost, solved.torque_wheel
-    deflection = total - solver.first_touch(solved.pinion_angle)
+    deflection = total - solver.law.first_touch(solved.pinion_angle)
     stiffness = np.divide(torque, deflection, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
     cycles = np.round((requested - solved.pinion_angle) / pair.mesh_cycle).astype(np.int64)
     leading, shares = load_shares(solved)
@@ -245,7 +245,7 @@ def assembled_curve(
         k_mesh=stiffness / radius**2,
         k_tangent=solved.tangent / radius**2,
         transmission_error=twist * radius,
-        transmission_error_unloaded=(solver.touching_twists(solved.pinion_angle) - lost) * radius,
+        transmission_error_unloaded=(solver.law.touching_twists(solved.pinion_angle) - lost) * radius,
         leading_pair=leading - cycles,
         load_share=shares,
         teeth_in_contact=np.where(failed, -1, (shares > 0).sum(axis=1)),
@@ -295,7 +295,7 @@ class PairLoads:
 
 def pair_loads(solver: PositionSolver, found: Positions) -> PairLoads:
     """Loaded tooth pairs of positions."""
-    elastic, contacts, touching = solver.elastic, found.contacts, solver.touching(found.pinion_angle)
+    elastic, contacts, touching = solver.elastic, found.contacts, solver.law.touching(found.pinion_angle)
     met, pairs = ((np.stack([one.position, one.pair], axis=1) @ [1 << 32, 1]) for one in (touching, contacts))
     k = np.minimum(np.searchsorted(met, pairs), len(met) - 1)
     known = np.flatnonzero((contacts.torque_wheel > 0) & (met[k] == pairs))

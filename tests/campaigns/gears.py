@@ -167,13 +167,13 @@ def on_path(pair: GearPair, angle: float, twist: float, found: Positions) -> boo
 
 def ratio_checks(solver: PositionSolver, angles: Any, twists: Any, found: Positions) -> list[Check]:
     """The torque ratio on the path, where it is worst against its limit."""
-    pair, known = solver.pair, getattr(solver, "half_plane", None)
+    pair, known = solver.pair, solver.half_plane if solver.on_elements else None
     checks = []
     for angle, twist, p in zip(angles, twists, found, strict=True):
         if p.status != "converged" or not on_path(pair, angle, twist, p):
             continue
         ratio = p.torque_wheel / p.torque_pinion
-        expected = pair.wheel.teeth / pair.pinion.teeth
+        expected: Any = pair.wheel.teeth / pair.pinion.teeth
         if known is not None:
             same = known.solve(np.array([angle]), np.array([twist]))[0]
             expected = same.torque_wheel / same.torque_pinion
