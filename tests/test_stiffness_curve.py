@@ -153,6 +153,14 @@ def test_interpolation_leaves_failed_positions_out():
     assert np.shape(slope) == ()
 
 
+def test_an_array_of_another_length_is_no_unknown_one():
+    angles = np.linspace(0.0, 0.3, 5)
+    known = StiffnessCurve(pinion_angle=angles, k_mesh=np.ones(5), mesh_cycle=0.3)
+    assert np.isnan(known.torque_wheel).all()
+    with pytest.raises(InputError, match=r"k_mesh.*has 4 entries, the curve 5 positions"):
+        StiffnessCurve(pinion_angle=angles, k_mesh=np.ones(4), mesh_cycle=0.3)
+
+
 def test_unknown_quantity():
     with pytest.raises(InputError, match="did you mean 'k_mesh'"):
         invented().interpolate(0.0, "k_mehs")

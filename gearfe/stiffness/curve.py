@@ -94,7 +94,7 @@ OUTLIER = 2.0
 class StiffnessCurve(ShownTable):
     """Mesh stiffness of a gear pair over the pinion's rotation; all arrays have one entry per position, shape (n,).
 
-    What is not given is unknown: not-a-number, -1 or an empty word.
+    What is not given is unknown: not-a-number, -1 or an empty word; an array of another length is an `InputError`.
 
     Attributes
     ----------
@@ -185,8 +185,13 @@ class StiffnessCurve(ShownTable):
 
     def __post_init__(self) -> None:
         for own, column in COLUMNS.items():
-            if not column.constant and len(getattr(self, own)) != len(self):
-                object.__setattr__(self, own, np.full(len(self), column.unknown))
+            given = 0 if column.constant else len(getattr(self, own))
+            if column.constant or given == len(self):
+                continue
+            if given:
+                cure = "give one for each, or leave it out: it is unknown then"
+                raise InputError(own, None, f"has {given} entries, the curve {len(self)} positions", cure)
+            object.__setattr__(self, own, np.full(len(self), column.unknown))
 
     def __len__(self) -> int:
         return len(self.pinion_angle)
