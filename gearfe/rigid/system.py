@@ -123,7 +123,8 @@ class System:
         (..., size)."""
         total = -(v @ self.damping.T + q @ self.stiffness.T) if self.linear else np.zeros(q.shape)
         for element, index in self.forces if stressed else self._others:
-            total[..., index] += in_states(element, element.force, t, q[..., index], v[..., index])
+            places: Any = (..., index)  # may repeat
+            np.add.at(total, places, in_states(element, element.force, t, q[..., index], v[..., index]))
         return total
 
     def force_jacobian(self, t: float, q: Array, v: Array, *, stressed: bool = True) -> tuple[Array, Array]:
