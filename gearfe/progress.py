@@ -33,6 +33,7 @@ class _Stage:
     what: str = ""
     counted: float = 0.0  # when the count began
     first: float = 0.0  # what was done then
+    apart: float = 0.0  # when it began, of what is no part of the counts outside
 
     def text(self, now: float) -> str:
         """Name, how far it is, its rate and the time that is left."""
@@ -67,18 +68,19 @@ class Display:
         self._thread = threading.Thread(target=self._look, name="progress", daemon=True)
         self._thread.start()
 
-    def enter(self, name: str) -> None:
+    def enter(self, name: str, *, apart: bool = False) -> None:
         """A stage begins."""
         with self._lock:
-            self._stages.append(_Stage(name))
+            self._stages.append(_Stage(name, apart=time.monotonic() if apart else 0.0))
             if self._rewritten or self._each:
                 self._show()
 
     def leave(self) -> None:
         """The innermost stage is over."""
         with self._lock:
-            if self._stages:
-                self._stages.pop()
+            if self._stages and (begun := self._stages.pop().apart):
+                for outer in self._stages:
+                    outer.counted += time.monotonic() - begun if outer.counted else 0.0
             if not self._stages:
                 self._clear()
 
@@ -115,8 +117,10 @@ class Display:
         now = time.monotonic()
         if now - self._begun < self._silent or not self._stages:
             return
-        counted = next((i for i, at in enumerate(self._stages) if at.total > 0.0), len(self._stages) - 1)
-        stages = self._stages[: counted + 1]  # what goes on inside of a count is a part of it
+        apart = max((i for i, at in enumerate(self._stages) if at.apart), default=0)
+        inner = self._stages[apart:]
+        counted = next((i for i, at in enumerate(inner) if at.total > 0.0), len(inner) - 1)
+        stages = self._stages[: apart + counted + 1]  # what goes on inside of a count is a part of it
         text = ": ".join([*(s.name for s in stages[:-1]), stages[-1].text(now)])
         if self._rewritten:
             width = shutil.get_terminal_size().columns - 1
@@ -182,13 +186,17 @@ def shown(stream: TextIO | None = None, *, verbose: bool = False) -> Iterator[No
 
 
 @contextmanager
-def stage(name: str) -> Iterator[None]:
-    """Name the work inside for the display; also as a decorator."""
+def stage(name: str, *, apart: bool = False) -> Iterator[None]:
+    """Name the work inside for the display; also as a decorator.
+
+    It is a part of what a stage outside counts, unless it stands `apart`: told while it lasts, its time not of the
+    count's rate.
+    """
     display = _display()
     if display is None:
         yield
         return
-    display.enter(name)
+    display.enter(name, apart=apart)
     try:
         yield
     finally:

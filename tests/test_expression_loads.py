@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -190,6 +191,26 @@ def test_a_run_out_of_the_table_tells_where(tmp_path: Path, how: dict[str, str])
 def test_wrong_expressions(tmp_path: Path, expression: str, text: str) -> None:
     with pytest.raises(InputError, match=text):
         load_mechanism(write(tmp_path, ROD + MOMENT.format(expression))).start()
+
+
+SPRING = '\n[forces.spring]\ntype = "spring"\nbody = "rod"\npoint = "tip"\nto_point = [1.0, 1.0]\ntension_N = "{}"\n'
+OUTPUT = '\n[[outputs]]\nname = "more"\nvalue = "{}"\n'
+
+
+@pytest.mark.parametrize(
+    ("added", "known", "unknown"),
+    [
+        (MOMENT.format("foo(rod)"), "rate, sin, .* vx, vy, x, y$", "deflection"),
+        (MOMENT.format("foo"), r"angle\(...\), pi, rate\(...\), time, vx", "kinetic"),
+        (SPRING.format("zzz"), "length, length_rate, pi, time$", "rate\\("),
+        (OUTPUT.format("zzz"), r"angle\(...\), .*kinetic.* y\(...\)$", "deflection"),
+    ],
+)
+def test_messages_offer_what_the_place_knows(tmp_path: Path, added: str, known: str, unknown: str) -> None:
+    """Not the quantities of flexible links where there is none, nor those that no load depends on."""
+    with pytest.raises(InputError, match=f"known names: .*{known}") as caught:
+        load_mechanism(write(tmp_path, ROD + added))
+    assert not re.search(unknown, str(caught.value))
 
 
 @pytest.mark.parametrize(

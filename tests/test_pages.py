@@ -62,6 +62,8 @@ def test_python_runs(page: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
         (tmp_path / "rod.toml").write_text(text, encoding="utf-8")
     for text in blocks(ROOT / "docs" / page, "python"):
         exec(compile(text, page, "exec"), names)
+    if page == "mechanisms.md":  # a load that is written and one that is called
+        np.testing.assert_allclose(names["one"].q, names["other"].q, atol=1e-8)
 
 
 def shorter(text: str) -> str:

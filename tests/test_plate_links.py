@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -440,6 +441,19 @@ def test_wrong_files(tmp_path: Path, old: str, new: str, text: str) -> None:
     assert old in ARM
     with pytest.raises(InputError, match=text):
         load_mechanism(write(tmp_path, ARM.replace(old, new, 1)))
+
+
+@pytest.mark.parametrize(("modulus", "told"), [("2.1e11", True), ("2.1e5", True), ("1100.0", False)])
+def test_a_modulus_in_another_unit_is_told_before_the_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture, modulus: str, told: bool
+) -> None:
+    """Pa or MPa of steel taken as GPa make sound 1.6e8 and 1.6e5 m/s fast, beyond 36.1 km/s; diamond's does not."""
+    old = re.search(r"youngs_modulus_GPa = .*", ARM)
+    assert old is not None
+    steel = ARM.replace("density_kg_per_m3 = 1000.0", "density_kg_per_m3 = 7850.0")
+    path = write(tmp_path, steel.replace(old[0], f"youngs_modulus_GPa = {modulus}"))
+    assert main(["mechanism", str(path), "--out", str(tmp_path / "out"), "--analysis", "modes", "--no-pictures"]) == 0
+    assert (".plate.youngs_modulus_GPa" in capsys.readouterr().err) is told
 
 
 def test_methods_with_tiny_steps_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

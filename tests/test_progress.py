@@ -11,7 +11,11 @@ import pytest
 from gearfe import progress
 from gearfe.cli import main
 from gearfe.progress import Display, Stopwatch, _Stage, count, shown, stage
+from gearfe.rigid import integrate
+from gearfe.rigid.compiled import Kernels
 from gearfe.tables.examples import job_file
+
+from .rigid_cases import pendulum
 
 
 def waited(stream: io.StringIO, text: str) -> str:
@@ -43,6 +47,39 @@ def test_stages_are_lines_where_lines_stay():
     assert all(line.startswith("gearfe: ") for line in lines)
     assert "reducing: modes: 199 of 200" in lines[0]
     assert "\r" not in stream.getvalue()
+
+
+def test_a_stage_apart_is_told_inside_of_a_count_and_is_none_of_its_time(monkeypatch):
+    """Kernels are compiled in the middle of a run: 20 s of ten parts, 30 s of compiling, eight parts are left."""
+    clock = [100.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: clock[0])
+    display = Display(stream := io.StringIO(), rewritten=False, silent=0.0, each=True)
+    display.enter("integrating")
+    display.count(0, 100, "implicit")
+    clock[0] += 20.0
+    display.count(20, 100, "implicit")
+    display.enter("compiling the kernels", apart=True)
+    clock[0] += 30.0
+    display.leave()
+    assert display._stages[-1].text(clock[0]) == "integrating: implicit 20 of 100, 1/s, 80 s left"
+    display.enter("a part of the count")
+    display.close()
+    lines = [line.split(": ", 2)[2] for line in stream.getvalue().splitlines()]
+    assert "integrating: compiling the kernels" in lines
+    assert not any("a part of the count" in line for line in lines)
+
+
+@pytest.mark.parametrize("method", ["taylor", "implicit", "symplectic"])
+def test_every_method_tells_that_it_compiles(method, capsys, monkeypatch):
+    pytest.importorskip("numba")
+    system = pendulum()
+    integrate(system, [0.0, 0.1], method=method, backend="compiled")  # they are there now
+    monkeypatch.setattr(Kernels, "ready", False)
+    capsys.readouterr()
+    with pytest.MonkeyPatch.context() as other, shown(stream := io.StringIO(), verbose=True):
+        other.setattr(Kernels, "load", lambda kernels, run: 0.0)
+        integrate(system, [0.0, 0.1], method=method, backend="compiled")
+    assert stream.getvalue().count("compiling the kernels once") == 1
 
 
 def test_a_terminal_has_one_line_that_is_cleared():

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from gearfe.errors import InputError
 from gearfe.rigid import (
+    GROUND,
     Body,
     Element,
     Gravity,
+    Hinge,
     LinearJoint,
     Linkage,
     LocalForce,
     ModalBlocks,
+    Moment,
     SeriesLaw,
+    SpanFunction,
+    Spring,
+    StateFunction,
     System,
     consistent_start,
     integrate,
@@ -249,3 +257,22 @@ def test_stiff_system_takes_the_implicit_method():
     assert np.abs(made.q[:, 1] - np.cos(sqrt(40.0) * times)).max() <= 1e-4
     slow = (2e6 - sqrt(4e12 - 4e6)) / 2
     assert np.abs(made.q[:, 0] - np.exp(-slow * times)).max() <= 1e-4
+
+
+class Unwritten(StateFunction, SpanFunction):
+    """A load and a tension that write nothing."""
+
+    def write(self, *_: object) -> Any:
+        return None
+
+    def value(self, *_: object) -> float:
+        return 1.0
+
+
+@pytest.mark.parametrize(
+    "force", [Moment("rod", Unwritten()), Spring("rod", GROUND, (0.8, 0.0), (1.0, 1.0), law=Unwritten())]
+)
+def test_a_load_without_a_register_is_told_what_to_be(force: Any) -> None:
+    body = Body("rod", 2.0, 0.1, (0.4, 0.0))
+    with pytest.raises(InputError, match=r"Unwritten.write: gives no number of a register; .*LocalForce"):
+        integrate(System([Linkage((body,), (Hinge("rod", GROUND),), (force,))]), [0.0, 0.1])

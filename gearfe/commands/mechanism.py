@@ -49,8 +49,12 @@ def run(args: argparse.Namespace) -> int:
 
     from ..files import recorded
     from ..mechanisms.job import run_mechanism
+    from ..mechanisms.links import doubts
     from ..mechanisms.model import make_mechanism
+    from ..progress import announce
 
+    for doubt in doubts(file):  # the run may not end
+        announce(f"warning: {doubt}")
     mechanism = make_mechanism(file, Path(args.file))
     run: Callable[..., Outcome]
     folder, slopes = Path(args.out), None

@@ -61,17 +61,20 @@ class Node:
     parts: tuple[Node, ...] = ()
 
 
-def parse(text: str, label: str, tables: Mapping[str, Table] | None = None, *, plain: Sequence[str] = PLAIN) -> Node:
+def parse(
+    text: str, label: str, tables: Mapping[str, Table] | None = None, *, known: Sequence[str] = (*PLAIN, *NAMED)
+) -> Node:
     """Syntax tree of `text`; `label` names it in messages, `tables` are functions of one number by name.
 
-    `plain` are the quantities that stand without a body.
+    `known` are the quantities that messages offer for an unknown name; those without a body beside `PLAIN` are read.
 
     Raises
     ------
     InputError
         When it is not arithmetic on named quantities.
     """
-    known, where = tables or {}, f"{label} = {text!r}"
+    functions, where = tables or {}, f"{label} = {text!r}"
+    plain, named = [q for q in known if q not in NAMED], [q for q in known if q in NAMED]
 
     def node(tree: ast.expr) -> Node:  # noqa: PLR0911 (a value for each kind of node)
         match tree:
@@ -81,10 +84,10 @@ def parse(text: str, label: str, tables: Mapping[str, Table] | None = None, *, p
                 return Node("number", float(value))
             case ast.Name(id="pi"):
                 return Node("number", float(np.pi))
-            case ast.Name(id=name) if name in plain:
+            case ast.Name(id=name) if name in plain or name in PLAIN:
                 return Node("quantity", (name, None))
             case ast.Name(id=name):
-                raise unknown_name(where, name, [*plain, "pi", *(f"{q}(...)" for q in NAMED)])
+                raise unknown_name(where, name, [*plain, "pi", *(f"{q}(...)" for q in named)])
             case ast.UnaryOp(op=ast.USub()):
                 return Node("negative", parts=(node(tree.operand),))
             case ast.UnaryOp(op=ast.UAdd()):
@@ -103,13 +106,13 @@ def parse(text: str, label: str, tables: Mapping[str, Table] | None = None, *, p
             one = {OF_BODY: "a body or joint", OF_LINK: "a flexible link"}
             example = next((text for names, text in one.items() if name in names), "a point such as rod.B")
             raise _wrong(label, text, f"{name}(...) needs the name of {example}")
-        if name not in FUNCTIONS and name not in known:
-            raise unknown_name(where, name, [*FUNCTIONS, *known, *NAMED])
-        count = 1 if name in known else FUNCTIONS[name][0]
+        if name not in FUNCTIONS and name not in functions:
+            raise unknown_name(where, name, [*FUNCTIONS, *functions, *named])
+        count = 1 if name in functions else FUNCTIONS[name][0]
         if len(arguments) != count:
             raise _wrong(label, text, f"{name} takes {count} argument(s), not {len(arguments)}")
         parts = tuple(node(one) for one in arguments)
-        return Node("table", (name, known[name]), parts) if name in known else Node("call", name, parts)
+        return Node("table", (name, functions[name]), parts) if name in functions else Node("call", name, parts)
 
     return node(syntax(text, label))
 

@@ -21,6 +21,8 @@ from ..typing import Array
 from .plates import PlateLink
 
 Point = tuple[float, float]
+#: The fastest sound of any solid or liquid (m/s): Trachenko et al., Science Advances 6 (2020) eabc8662.
+FASTEST_SOUND = 36.1e3
 
 
 def section_of(table: BeamTable) -> Section:
@@ -30,6 +32,22 @@ def section_of(table: BeamTable) -> Section:
     if table.diameter_m is not None:
         return Section.tube(table.diameter_m, table.inner_diameter_m)
     return Section(given(table.area_m2, "area_m2"), given(table.second_moment_m4, "second_moment_m4"), table.edge_m)
+
+
+def doubts(file: MechanismFile) -> list[str]:
+    """Notes on flexible links of no real material, sqrt(E / rho) > `FASTEST_SOUND`: as a rule, E is in another unit."""
+    told = []
+    for name, body in file.bodies.items():
+        table = body.beam or body.plate
+        if table is None or not body.bends:
+            continue
+        speed = math.sqrt(1e9 * table.youngs_modulus_GPa / table.density_kg_per_m3)
+        if speed > FASTEST_SOUND:
+            key = f"bodies.{name}.{'plate' if body.beam is None else 'beam'}.youngs_modulus_GPa"
+            problem = f"makes sound faster ({speed:.2g} m/s) than in any material ({FASTEST_SOUND:.2g} m/s)"
+            cure = f"give it in GPa, beside the density of {table.density_kg_per_m3:g} kg/m3 (steel: 210, 7850)"
+            told.append(f"{key} = {table.youngs_modulus_GPa:g}: {problem}; {cure}")
+    return told
 
 
 def link_of(file: MechanismFile, name: str, table: BodyTable) -> BeamLink:

@@ -19,6 +19,7 @@ from ..typing import Array
 from .expressions import (
     FUNCTIONS,
     NAMED,
+    OF_BODY,
     OF_LINK,
     OF_PLATE,
     OF_POINT,
@@ -263,9 +264,9 @@ class Mechanism:
 
     def _forced(self, text: str, target: float, level: int) -> Forced:
         label = f"start.{('positions', 'velocities')[level]} {text!r}"
-        node = parse(text, label)
-        needed = quantities(node)
         allowed = (("angle", "x", "y"), ("rate", "vx", "vy"))[level]
+        node = parse(text, label, known=allowed)
+        needed = quantities(node)
         for kind, _ in needed:
             if kind not in allowed:
                 problem = f"uses {kind}; only {', '.join(allowed)} can be forced here"
@@ -356,10 +357,11 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
         if isinstance(load, ExpressionLoad):
             load.bind(made)
     zero = np.zeros((1, system.size))
+    known = (*PLAIN, *OF_BODY, *OF_POINT, *((*OF_SECTION, *OF_LINK) if held else ()))
     for i, output in enumerate(file.outputs):
         if output.name in outputs or output.name == "time_s":
             raise InputError(f"outputs[{i}].name", output.name, "is used twice", "rename the column")
-        node = parse(output.value, f"outputs[{i}].value", tables)
+        node = parse(output.value, f"outputs[{i}].value", tables, known=known)
         try:
             made.values(quantities(node), zero, zero, zero)  # names exist
         except InputError as error:

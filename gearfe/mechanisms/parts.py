@@ -14,7 +14,7 @@ from ..tables.kinds import Kind
 from ..tables.mechanism import BodyTable, ForceTable, FunctionTable, JointTable, MechanismFile
 from .expressions import parse
 from .links import link_of
-from .loads import OF_SPAN, ExpressionLoad, ExpressionTension
+from .loads import ALLOWED, OF_SPAN, ExpressionLoad, ExpressionTension
 from .plates import PlatePart
 from .tables import ValueTable
 
@@ -100,10 +100,10 @@ def part_of(
         elif key == "profile":
             value = _profile(value, tables, f"{label}.profile")
         elif isinstance(value, str) and key in LOADS:
-            node = parse(value, f"{label}.{key}", tables)
+            node = parse(value, f"{label}.{key}", tables, known=ALLOWED)
             value = ExpressionLoad(value, f"{label}.{key}", node)
         elif key == "tension_N" and value is not None:
-            node = parse(value, f"{label}.{key}", tables, plain=OF_SPAN)
+            node = parse(value, f"{label}.{key}", tables, known=OF_SPAN)
             value = ExpressionTension(value, f"{label}.{key}", node)
         elif key.endswith("_deg") and value is not None:
             value = math.radians(value)

@@ -228,7 +228,7 @@ class Kernels:
         if self.loaded:
             return 0.0
         began = time.perf_counter()
-        with stage("compiling the kernels"), uncollected():
+        with stage("compiling the kernels", apart=True), uncollected():
             run()
         self.loaded = True
         return time.perf_counter() - began

@@ -29,8 +29,8 @@ elastic body in
 7. ``constant_jacobian = True`` when g is linear in q with constant coefficients and no time: such rows are
 eliminated at
    set-up by `gearfe.rigid.elimination` where an integrator profits. Absent: treated as any constraint.
-8. Being a `gearfe.rigid.Linkage`: planar bodies, whose Taylor recurrences the compiled kernels know.
-   The Taylor method runs when it is the only element; ``method="auto"`` takes it or else the explicit method, or the
+8. Being a `gearfe.rigid.Linkage`: planar bodies, whose joints and forces are written from forms (`gearfe.rigid.forms`).
+   ``method="auto"`` takes the Taylor method where all elements are written (14.), else the explicit one, or the
    implicit one, whichever is predicted to take the fewest seconds.
 9. ``potential(q)``: its potential energy in local coordinates (..., k). Absent: zero. (The kinetic one is 1/2 v M v.)
 10. Being a `LocalForce`: a force along few directions, ``f = W phi(t, W^T q, W^T v)``, with a law that can be compiled.

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 class StateFunction(ABC):
     """A load f(t, q, v) of the coordinates and velocities of a whole linkage.
 
-    Values, slopes and corners follow from its registers on a tape. Where it has no value, a step is made shorter and
+    Values, slopes and corners follow from its registers on a tape; a load that cannot be written is a `LocalForce`, or
+    the ``force`` of another element (`gearfe.rigid.contract`). Where it has no value, a step is made shorter and
     the run ends at last; `value` is not-a-number there, and sets `complaint`, which says why.
     """
 

@@ -284,8 +284,10 @@ def _implicit_ways(system: System, backend: str, options: dict[str, Any], plain:
 def _implicit(
     system: System, jit: bool, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
 ) -> Run:
-    from .implicit import run_implicit
+    from .implicit import KERNELS, run_implicit
 
+    if jit:
+        _told(KERNELS)
     program = system.program if jit else None
     held = None if program is None else program.without_redundant(start.active)
     return run_implicit(system, start, times, most=most, watch=watch, program=held, **options)
@@ -294,12 +296,18 @@ def _implicit(
 def _taylor(
     system: System, jit: bool, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
 ) -> Run:
-    if jit and not taylor.KERNELS.ready:
-        announce(COMPILING)
+    if jit:
+        _told(taylor.KERNELS)
     local, longest = max(LOCAL_SHARE * options["tolerance"], 5e-16), options["longest"]
     prepared = taylor.prepare(system, start, taylor.order_for(local), jit)
     end = float(times[-1])
     return taylor.run_taylor(prepared, start, end, tolerance=local, longest=longest, most=most, watch=watch)
+
+
+def _told(kernels: compiled.Kernels) -> None:
+    """Tell of the wait for kernels that are not there yet."""
+    if not kernels.ready:
+        announce(COMPILING)
 
 
 def use_compiled(backend: str) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import InputError
 from ..typing import Array, IntArray
 from .assembly import Assembly, Held, assemble
-from .forces import Along, Force, StateFunction, Tension
+from .forces import Along, Force, SpanFunction, StateFunction, Tension
 from .forms import Form, Frames, Vector
 from .joints import Joint
 from .planar import Body, body_numbers
@@ -112,7 +112,7 @@ class BodyVariables:
                 flow = tape.sum(tape.mul(span[0], speed[0]), tape.mul(span[1], speed[1]))
                 pull = tape.sum(pull, tape.div(flow, square), g=damping)
             if spring.law is not None:
-                law = spring.law.write(tape, tape.mul(square, inverse), tape.mul(flow, inverse))
+                law = register(spring.law, spring.law.write(tape, tape.mul(square, inverse), tape.mul(flow, inverse)))
                 pull = tape.sum(pull, tape.mul(law, inverse))
         for part, along in zip(span, (x, y), strict=True):
             opposite = {i: -f for i, f in along.terms.items()}
@@ -126,12 +126,20 @@ class BodyVariables:
             pull = tape.sum(tape.linear(*form), tape.rate(form.terms), f=-force.stiffness, g=-force.damping)
             tape.push(pull, form.terms, told=True)
         if isinstance(force.load, StateFunction):
-            load = force.load.write(self)
+            load = register(force.load, force.load.write(self))
             tape.push(load, form.terms)
         elif force.load is not None:
             load = tape.function(force.load)
             tape.push(load, form.terms, told=True)
         return form, load
+
+
+def register(load: StateFunction | SpanFunction, number: object) -> int:
+    """Number of the register that a load has written, refused where it is none."""
+    if isinstance(number, int):
+        return number
+    cure = "return what the tape's operations give; a load that no tape holds is a gearfe.rigid.LocalForce"
+    raise InputError(f"{type(load).__name__}.write", None, "gives no number of a register", cure)
 
 
 class Observed(NamedTuple):

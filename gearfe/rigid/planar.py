@@ -90,7 +90,7 @@ def body_numbers(bodies: tuple[Body, ...], joints: tuple[Joint, ...], forces: tu
                 raise InputError(f"{label} {key}", value, "must be finite", "give a number")
             if key in ("function", "x", "y") and not isinstance(value, TimeFunction | StateFunction):
                 if not isinstance(value, int | float):
-                    cure = "use constant, polynomial, sine or smoothed_step"
+                    cure = "use constant, polynomial, sine, smoothed_step, or a StateFunction"
                     raise InputError(f"{label} {key}", None, "must be a function of time", cure)
                 object.__setattr__(part, key, constant(float(value)))
         if getattr(part, "direction", None) == (0, 0):

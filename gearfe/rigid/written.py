@@ -152,9 +152,10 @@ class TapeValues:
     # rows -----------------------------------------------------------------------------------------------------
     def variables(self, q: Array) -> Variables:
         """Variables at the coordinates q, shape (n,) or (states, n); those of the last ones are remembered."""
-        if self._known is None or not np.array_equal(self._known[0], q):
-            self._known = q.copy(), self._variables(q.T)
-        return self._known[1]
+        known = self._known  # another thread may remember others meanwhile
+        if known is None or not np.array_equal(known[0], q):
+            known = self._known = q.copy(), self._variables(q.T)
+        return known[1]
 
     def _variables(self, q: Array) -> Variables:
         n, (_, then, _, _) = self.size, self.program.curves.place.T
