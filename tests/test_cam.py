@@ -83,6 +83,28 @@ def test_a_harmonic_cam_lifts_and_pushes(tmp_path: Path, method: str) -> None:
     assert inverse.start().freedoms.net == 0
 
 
+def test_slopes_of_a_load_beside_many_cams(tmp_path: Path) -> None:
+    """A motor's line by a table falls by 0.5 N m s, however many profiles stand on the tape before it."""
+    text = CAM.replace("[bodies.follower]", "rate_rad_per_s = 3.0\n[bodies.follower]")
+    table = CAM[CAM.index("[tables.lift]") :]
+    for k in range(15):
+        write(tmp_path, text, points=31 + k)
+        (tmp_path / "lift.csv").rename(tmp_path / f"lift{k}.csv")
+        text += table.replace("tables.lift]", f"tables.lift{k}]").replace("lift.csv", f"lift{k}.csv")
+        text += (
+            f'[joints.contact{k}]\ntype = "cam"\nbody = "follower"\nto = "cam"\ncoordinate = "y"\nprofile = "lift{k}"\n'
+        )
+    text += '[tables.line]\nfile = "line.csv"\nx = "rate"\ny = "moment"\n'
+    text += '[forces.motor]\ntype = "moment"\nbody = "cam"\nmoment_N_m = "line(rate(cam))"\n'
+    (tmp_path / "line.csv").write_text("rate,moment\n0,5\n4,3\n10,0\n", encoding="utf-8")
+    linkage = load_mechanism(write(tmp_path, text)).linkage
+    q, v = linkage.start()
+    assert linkage.force(0.0, q, v)[2] == pytest.approx(3.5, rel=1e-14)
+    by_q, by_v = linkage.force_jacobian(0.0, q, v)
+    assert by_v[2, 2] == pytest.approx(-0.5, rel=1e-14)
+    assert not by_q.any()
+
+
 def test_a_free_cam_and_its_follower_keep_their_energy(tmp_path: Path) -> None:
     text = CAM.replace("[bodies.follower]", "rate_rad_per_s = 20.0\n[bodies.follower]")
     mechanism = load_mechanism(write(tmp_path, text))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,8 @@ from gearfe.rigid import (
     integrate,
 )
 from gearfe.rigid.couplings import Belt, GearRatio, Rack
-from gearfe.rigid.joints import Rolling
+from gearfe.rigid.forms import Frames
+from gearfe.rigid.joints import Joint, Rolling, Row
 
 TIMES = np.linspace(0.0, 0.8, 5)
 METHODS = [("taylor", 1e-11), ("explicit", 1e-10), ("implicit", 1e-6)]
@@ -58,6 +60,33 @@ def test_coupled_shafts_are_one_inertia(coupling, ratio, lever, method, toleranc
     np.testing.assert_allclose(made.q[:, 5], ratio * 0.5 * acceleration * TIMES**2, atol=1e-7)
     row = next(i for i, n in enumerate(made.system.row_names()) if "gear" in n or "belt" in n)
     np.testing.assert_allclose(np.abs(lever * made.multipliers[:, row]), ratio**2 * 0.8 * acceleration, rtol=1e-5)
+
+
+@dataclass(frozen=True)
+class Differential(Joint):
+    """A carrier turns by the mean of two bodies' turns."""
+
+    a: str
+    b: str
+    line: str
+    name: str = ""
+
+    def rows(self, frames: Frames) -> list[Row]:
+        """theta_a + theta_b - 2 theta_line."""
+        return [Row("angles", frames.angle(self.a) + frames.angle(self.b) - 2.0 * frames.angle(self.line))]
+
+
+@pytest.mark.parametrize(("method", "tolerance"), METHODS)
+def test_a_joint_may_hold_three_bodies(method: str, tolerance: float) -> None:
+    """(I_a + I_c/4) a'' + I_c/4 b'' = T, I_c/4 a'' + (I_b + I_c/4) b'' = 0."""
+    bodies, hinges = two_shafts()
+    bodies.append(Body("c", 1.0, 0.4, (0.0, 0.0), (1.0, 0.0)))
+    hinges.append(Hinge("c", "ground", (0.0, 0.0), (1.0, 0.0)))
+    joints = [*hinges, Differential("a", "b", "c")]
+    made = run(bodies, joints, [Moment("a", constant(2.0))], method, tolerance)
+    a, b = np.linalg.solve([[0.3 + 0.1, 0.1], [0.1, 0.8 + 0.1]], [2.0, 0.0])
+    for angle, acceleration in ((2, a), (5, b), (8, 0.5 * (a + b))):
+        np.testing.assert_allclose(made.q[:, angle], 0.5 * acceleration * TIMES**2, atol=1e-7)
 
 
 @pytest.mark.parametrize(("method", "tolerance"), METHODS)

@@ -109,7 +109,7 @@ class _Group(NamedTuple):
     op: int
     own: IntArray  # (g,)
     one: IntArray  # (g,) operands, -1 for none
-    two: IntArray
+    two: IntArray  # registers alone: switches are no operands
     factor: Array  # (g, 3)
 
 
@@ -229,7 +229,7 @@ class TapeValues:
                     for r, k in zip(own, one, strict=True):
                         R[r] = self.functions[k](t)
                 elif op in (SHIFT, ENTRY):
-                    for r, a, b in zip(own, one, two, strict=True):
+                    for r, (_, a, b, _) in zip(own, self.program.code.op[own], strict=True):
                         x, k = self._place(b if op == SHIFT else a, R)
                         R[r] = x if op == SHIFT else self._table(a)[1][k, b] + 0.0 * x
                 else:
@@ -319,7 +319,7 @@ def _groups(op: IntArray, factor: Array, switched: IntArray) -> list[_Group]:
         found[level[r], kind].append(r)
     for place, kind in sorted(found):
         own = np.array(found[place, kind])
-        two = op[own, 2] if kind in (*BINARY, SHIFT, ENTRY) else np.full(len(own), -1)
+        two = op[own, 2] if kind in BINARY else np.full(len(own), -1)
         groups.append(_Group(kind, own, op[own, 1], two, factor[own]))
     return groups
 
