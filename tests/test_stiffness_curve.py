@@ -159,6 +159,8 @@ def test_an_array_of_another_length_is_no_unknown_one():
     assert np.isnan(known.torque_wheel).all()
     with pytest.raises(InputError, match=r"k_mesh.*has 4 entries, the curve 5 positions"):
         StiffnessCurve(pinion_angle=angles, k_mesh=np.ones(4), mesh_cycle=0.3)
+    with pytest.raises(InputError, match=r"load_share.*has 4 entries, the curve 5 positions"):
+        StiffnessCurve(pinion_angle=angles, load_share=np.ones((4, 2)), mesh_cycle=0.3)
 
 
 def test_unknown_quantity():

@@ -184,14 +184,14 @@ class StiffnessCurve(ShownTable):
     timings: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for own, column in COLUMNS.items():
-            given = 0 if column.constant else len(getattr(self, own))
-            if column.constant or given == len(self):
-                continue
-            if given:
+        each = [own for own, column in COLUMNS.items() if not column.constant]
+        for own in (*each, "load_share"):
+            given = len(getattr(self, own))
+            if given not in (0, len(self)):
                 cure = "give one for each, or leave it out: it is unknown then"
                 raise InputError(own, None, f"has {given} entries, the curve {len(self)} positions", cure)
-            object.__setattr__(self, own, np.full(len(self), column.unknown))
+            if given < len(self) and own in COLUMNS:
+                object.__setattr__(self, own, np.full(len(self), COLUMNS[own].unknown))
 
     def __len__(self) -> int:
         return len(self.pinion_angle)
