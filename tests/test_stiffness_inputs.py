@@ -1,5 +1,6 @@
 """Every key of [pair] and [stiffness] that can change the curve does change it: none is read and then forgotten."""
 
+import re
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -7,6 +8,8 @@ import numpy as np
 import pytest
 
 from gearfe.config import build
+from gearfe.errors import InputError
+from gearfe.gear.derived import iso_values
 from gearfe.gear.pair import GearPair
 from gearfe.stiffness.job import StiffnessJob
 from gearfe.stiffness.positions import twists_for_torque
@@ -124,6 +127,19 @@ def test_every_key_is_in_this_file():
     elsewhere = {"twist_deg", "twist_from", "nitsche_gamma0", "law_parameters", "solve_all", "interpolation"}
     elsewhere |= {"angle_stop_deg", "angle_step_deg"}
     assert {field.name for field in fields(StiffnessTable)} <= {*SWEEP_CHANGES, *elsewhere}
+
+
+def test_a_torque_beyond_small_strain_names_its_key():
+    """From where the mean stiffness of ISO 6336, of E' = E/(1 - nu^2), yields by 0.25 modules; and from Python."""
+    pair = build(PairTable, {**BASE, "pinion": {**BASE["pinion"], "face_width_mm": 20.0}}, "pair")
+    job = StiffnessJob(pair, StiffnessTable(torque_Nm=1e6), GearPair.from_table(pair))
+    strain = 200e9 / (1 - 0.3**2)  # of the wheel; the pinion, twice as wide as the contact, is twice as stiff
+    level = iso_values(job.pair, 2 * strain, strain)["c_gamma_times_width_N_per_m"]
+    most = f"must be <= {level * 0.25 * 2.5e-3 * job.pair.wheel.base_radius:.3g} N m"
+    with pytest.raises(InputError, match=f"stiffness.torque_Nm = 1000000.0: {re.escape(most)}.*0.25 modules"):
+        _ = job.sweep
+    with pytest.raises(InputError, match=f"^torque = 1000000.0: {re.escape(most)}"):
+        sweep_stiffness(job.pair, job.model, torque=1e6)
 
 
 def test_a_torque_in_a_jump_is_given_up_soon():

@@ -37,7 +37,10 @@ import numpy as np
 from ..config import fields_of
 from ..elasticity import Material, Plane
 from ..errors import InputError
+from ..gear.derived import mesh_stiffness
 from ..gear.face import NOMINAL, ToothDeviations
+from ..gear.pair import GearPair
+from ..gear.validity import MOST_YIELD
 from ..tables.pair import check_flank_coarsen, law_class
 from ..typing import Array, BoolArray
 
@@ -273,3 +276,17 @@ class PairModel:
 
 #: The model where nothing else is said.
 DEFAULT_MODEL = PairModel()
+
+
+def check_torque(pair: GearPair, model: PairModel, torque: float, name: str = "torque") -> None:
+    """Raise `InputError` for a torque at the wheel (N m) that small strain is not meant for, called by `name`."""
+    gears = pair.pinion, pair.wheel
+    width = min(gear.face_width for gear in gears)
+    moduli = [
+        gear.face_width / (width * material.contact_compliance(model.plane))  # E' per width of the contact
+        for gear, material in zip(gears, model.materials, strict=True)
+    ]
+    most = MOST_YIELD * pair.pinion.module * mesh_stiffness(pair, *moduli) * width * pair.wheel.base_radius
+    if torque > most:
+        problem = f"must be <= {most:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
+        raise InputError(name, torque, problem, "linear elasticity does not reach so far; give less")

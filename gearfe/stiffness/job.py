@@ -21,7 +21,7 @@ import numpy as np
 
 from ..cache import cache_key, cached_arrays, source_hash, versions
 from ..config import load_job
-from ..contact.laws import ContactLaw, PairModel, check_alike, law_named
+from ..contact.laws import ContactLaw, PairModel, check_alike, check_torque, law_named
 from ..elasticity import Material
 from ..errors import InputError
 from ..gear.face import NOMINAL, ToothDeviations
@@ -141,6 +141,8 @@ class StiffnessJob:
             if not t.twist_deg < most:
                 problem = f"must be < {most:.6g} deg, half a pitch of the wheel"
                 raise InputError("stiffness.twist_deg", t.twist_deg, problem, "0.01 to 0.5 deg is usual")
+        if t.torque_Nm is not None:
+            check_torque(self.pair, self.model, t.torque_Nm, "stiffness.torque_Nm")
         return {
             "twist": None if t.twist_deg is None else math.radians(t.twist_deg),
             "torque": t.torque_Nm,

@@ -54,10 +54,7 @@ from ..contact.half_plane_step import smooth_influence
 from ..contact.laws import COARSENING, HalfPlane
 from ..contact.panels import Couplings, couplings
 from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, in_batches, taken
-from ..errors import InputError
-from ..gear.derived import mesh_stiffness
 from ..gear.pair import GearPair
-from ..gear.validity import MOST_YIELD
 from ..typing import Array, ComplexArray, IntArray
 
 #: Solutions of a position in search of its torque; random pairs, laws and torques took three at most.
@@ -190,16 +187,6 @@ def at_twists(solver: PositionSolver, angles: Array, twists: Array, *, finite: b
     """Positions at pinion angles and twists, both of shape (n,) (rad); with or without finite strain."""
     found = solver.solve(angles, twists, np.arange(len(angles)) if finite else NONE)
     return found.raised(finite_strain_shares(solver.elastic, found)) if finite else found
-
-
-def check_torque(law: HalfPlanePair, torque: float, name: str = "torque") -> None:
-    """Raise `InputError` for a torque (N m) that small strain is not meant for."""
-    pair = law.pair
-    stiffness = mesh_stiffness(pair, *(1 / law.inverse_modulus)) * law.width
-    most = MOST_YIELD * pair.pinion.module * stiffness * pair.wheel.base_radius
-    if torque > most:
-        problem = f"must be <= {most:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
-        raise InputError(name, torque, problem, "linear elasticity does not reach so far; give less")
 
 
 def at_torques(

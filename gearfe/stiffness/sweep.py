@@ -39,7 +39,7 @@ from numpy.typing import ArrayLike
 
 from ..contact.compliance import MeshingPair, gear_body
 from ..contact.half_plane_pair import HalfPlanePair
-from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, check_alike, law_text, uses_stress
+from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, check_alike, check_torque, law_text, uses_stress
 from ..contact.position import Positions
 from ..errors import InputError
 from ..gear.face import NOMINAL
@@ -54,7 +54,6 @@ from .positions import (
     PositionSolver,
     at_torques,
     at_twists,
-    check_torque,
     checked_contact,
     curve_error,
     load_shares,
@@ -163,9 +162,9 @@ def sweep_stiffness(
     solved_angles, source = (
         (requested, np.arange(len(requested))) if solve_all else distinct_phases(requested, pair.mesh_cycle)
     )
-    solver = position_solver(elastic)
     if torque is not None:
-        check_torque(solver.law, load)
+        check_torque(pair, elastic.model, load)
+    solver = position_solver(elastic)
     with watch.stage("unloaded flanks"):
         solver.law.touching(solved_angles)
     with watch.stage("positions"), one_thread():
