@@ -108,6 +108,22 @@ def test_nothing_jumps_where_contacts_part_or_join(angle: float) -> None:
     assert rate == pytest.approx(work, rel=1.5e-3)
 
 
+def test_a_pressure_that_ends_at_a_cut_hides_no_contact() -> None:
+    """Between two contacts of a wavy flank lies a stretch of 16 um that bears nothing, beside a pressure that reaches
+    the cut: seen as an ellipse that overlapped there, and a contact was missed for ever. The torque is dU/dtwist.
+    """
+    gears = gear_pair(
+        23, 61, module=2e-3, pressure_angle=20.0, width=20e-3, bore=0.4, tip_round=5e-5, tooth_thinning=4e-5
+    )
+    law = half_plane_pair(elastic_pair(gears)).deviated((wave(gears.pinion, 138, 2e-6), PLAIN))
+    angle = np.full(1, 1.37 * gears.mesh_cycle / 24)
+    twist, step = law.touching_twists(angle) + math.radians(0.05), math.radians(1e-5)
+    found = solve_half_plane(law, np.repeat(angle, 3), twist + step * np.arange(-1, 2))
+    assert set(found.status) == {"converged"}
+    assert most_zones(found) == 2
+    assert (found.energy[2] - found.energy[0]) / (2 * step) == pytest.approx(found.torque_wheel[1], rel=1e-3)
+
+
 def test_light_load_touches_where_the_rigid_flanks_do() -> None:
     """One contact at the crest that meets first, with Hertz's width for the curvatures there."""
     law = law_of(200, 1e-5)

@@ -26,7 +26,7 @@ import numpy as np
 
 from ..gear.touching import WAY, Faces
 from ..typing import Array, BoolArray, IntArray
-from .half_plane_pair import HalfPlanePair, local_influence
+from .half_plane_pair import local_influence
 from .half_plane_step import SIGN, WIDER, WINDOW, Setting, State, Step, answers, reference_approach
 from .panels import EDGES, LEAST_DISTANCE, log_integral, mean_log
 from .position import joined, taken
@@ -53,7 +53,7 @@ def completed(setting: Setting, state: State, made: Step) -> tuple[Setting, Stat
     bound = -MISSED * reference_approach(setting.law) * couples.total(state.force)[couples.position]
     sides = _beyond(made, x)
     for i in np.flatnonzero((sides.any(axis=0) & (gap < 0)).any(axis=1)).tolist():
-        exact = gap[i] + _beside_ellipse(setting.law, state, made, i, x[i])
+        exact = gap[i] + _beside_ellipses(setting, state, made, i, arcs[i, 0])
         if i not in cut and (sides[:, i].any(axis=0) & (exact < bound[i])).any():
             cut[i] = _added(setting, state, i, (x[i], arcs[i, 0], exact), sides[:, i], bound[i])
     changed = np.zeros(couples.positions, dtype=bool)
@@ -135,12 +135,16 @@ def _half_widths(state: State) -> Array:
     return np.maximum(2 * np.sqrt(state.variance), LEAST_DISTANCE)
 
 
-def _beside_ellipse(law: HalfPlanePair, state: State, made: Step, i: int, x: Array) -> Array:
-    """What the pressure of the contact i makes of the gap at places x (m) beside what an ellipse would (m)."""
-    half = 0.5 * made.width[i]
-    apart = x[:, None] - made.x[i]
-    logs = (log_integral(apart + half) - log_integral(apart - half)) @ made.pressure[i]
-    return np.asarray(law.compliance * (state.force[i] * mean_log(x, _half_widths(state)[i]) - logs))
+def _beside_ellipses(setting: Setting, state: State, made: Step, i: int, arcs: Array) -> Array:
+    """What the pressures of the contacts of i's tooth pair make of the gap at arcs (m) of the pinion's face, shape
+    (m,), beside what ellipses would (m): one that ends at a cut is none.
+    """
+    found = setting.found
+    own = np.flatnonzero((found.position == found.position[i]) & (found.pair == found.pair[i]))
+    half, apart = 0.5 * made.width[own], arcs[:, None, None] - made.arcs[own, 0]
+    logs = ((log_integral(apart + half) - log_integral(apart - half)) * made.pressure[own]).sum(axis=2)
+    ellipses = state.force[own] * mean_log(arcs[:, None] - state.arc[own, 0], _half_widths(state)[own])
+    return np.asarray(setting.law.compliance * (ellipses - logs).sum(axis=1))
 
 
 def _added(
