@@ -30,6 +30,7 @@ from gearfe.rigid.couplings import Cam
 from gearfe.rigid.floating import Floating, FloatingBody, frame_joint
 from gearfe.rigid.implicit import KERNELS, Stepper, equations, narrow_band
 from gearfe.rigid.lanes import as_lanes, lanes
+from gearfe.rigid.numpy_equations import saddle_solver
 from gearfe.rigid.ordering import narrow_order
 from gearfe.rigid.start import Start
 from gearfe.rigid.steps import Status, StepControl, StepLaw
@@ -211,3 +212,16 @@ def test_a_run_that_comes_within_rounding_of_its_end_is_done() -> None:
     assert control.t < 1.0
     assert control.next_step(lambda: (np.zeros(0), np.zeros(0))) is None
     assert control.status is Status.DONE
+
+
+@pytest.mark.parametrize("size", [4, 200])
+def test_a_singular_matrix_of_a_step_has_no_solver(size: int) -> None:
+    """Dense or sparse; with one row x_1 = 1 in place of two alike, x = f elsewhere and lambda = f - 1."""
+    rows = np.zeros((2, size))
+    rows[:, 0] = 1.0
+    assert saddle_solver(np.eye(size), rows, np.ones(size), np.ones(2)) is None
+    made = saddle_solver(np.eye(size), rows[:1], np.ones(size), np.ones(1))
+    assert made is not None
+    x, multiplier = made(np.full(size, 3.0), np.ones(1))
+    np.testing.assert_allclose(x, [1.0, *[3.0] * (size - 1)], atol=1e-14)
+    assert multiplier == pytest.approx(3.0 - 1.0, rel=1e-14)

@@ -88,13 +88,16 @@ def linearise(eq: SystemEquations, w: Stages, i: int, t: float) -> bool:
 
 
 def factorise(eq: SystemEquations, w: Stages, tab: Scheme) -> bool:
-    """Factors of all eigenvalues."""
+    """Factors of all eigenvalues; False where a pivot vanishes."""
     system, h = eq.system, w.now[1]
     eq.solves = []
     for k, (real, imag) in enumerate(tab.values):
         mu = complex(real, imag) if k else real
         top = mu**2 / h**2 * system.mass - mu / h * eq.by_v - eq.by_q + eq.curvature
-        eq.solves.append(saddle_solver(top, eq.G, system.units, system.row_units[eq.active]))
+        made = saddle_solver(top, eq.G, system.units, system.row_units[eq.active])
+        if made is None:
+            return False
+        eq.solves.append(made)
     return True
 
 
@@ -132,7 +135,10 @@ def defect(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
     none = np.zeros(len(w.gap))
     if len(none):
         G = system.jacobian(w.now[0], w.q)[eq.active]
-        second = M @ saddle_solver(M, G, system.units, system.row_units[eq.active])(second, none)[0]
+        made = saddle_solver(M, G, system.units, system.row_units[eq.active])
+        if made is None:
+            return math.inf
+        second = M @ made(second, none)[0]
     off, _ = eq.solves[0](second + tab.values[0, 0] / h * M @ first - eq.by_v @ first, none)
     return float(np.sqrt(np.mean((off / w.limit) ** 2)))
 
@@ -153,8 +159,11 @@ def project(eq: SystemEquations, w: Stages, tab: Scheme) -> None:  # noqa: ARG00
 
 def saddle_solver(
     top: Array, G: Array, units: Array, row_units: Array
-) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """Solver of [[top, G^T], [G, 0]], scaled by the units of coordinates and rows; sparse when it is large."""
+) -> Callable[[Array, Array], tuple[Array, Array]] | None:
+    """Solver of [[top, G^T], [G, 0]], scaled by the units of coordinates and rows; sparse when it is large.
+
+    None where the matrix is singular.
+    """
     n, m = len(top), len(G)
     top, G = top * np.outer(units, units), G * units / row_units[:, None]
     scale = 1.0 / max(1e-300, float(np.abs(np.diagonal(top)).max()))
@@ -166,14 +175,20 @@ def saddle_solver(
         from scipy.sparse import csc_matrix
         from scipy.sparse.linalg import splu
 
-        solve: Callable[[Array], Array] = splu(csc_matrix(matrix)).solve
+        try:
+            solve: Callable[[Array], Array] = splu(csc_matrix(matrix)).solve
+        except RuntimeError:  # exactly singular
+            return None
     else:
-        from scipy.linalg import lu_factor, lu_solve
+        from scipy.linalg import get_lapack_funcs
 
-        factor = lu_factor(matrix, check_finite=False)
+        factorised, solved = get_lapack_funcs(("getrf", "getrs"), (matrix,))
+        factors, pivots, vanishing = factorised(matrix)
+        if vanishing:
+            return None
 
         def solve(b: Array) -> Array:
-            return lu_solve(factor, b, check_finite=False)
+            return np.asarray(solved(factors, pivots, b)[0])
 
     def apply(force: Array, gap: Array) -> tuple[Array, Array]:
         x = solve(np.concatenate([force * units * scale, gap / row_units]).astype(matrix.dtype))
