@@ -10,6 +10,8 @@ import pytest
 from gearfe import sweep_stiffness
 from gearfe.contact.laws import Nitsche, Penalty
 from gearfe.elasticity import Material
+from gearfe.gear.face import face_of
+from gearfe.stiffness.positions import at_torques, position_solver, unseen_twists
 from gearfe.stiffness.sweep import elastic_pair
 
 from . import gears
@@ -80,3 +82,42 @@ def test_finer_settings_are_estimated_finer():
     angles = np.radians([3.0, 5.0, 12.0, 14.0])
     coarse, fine = (sweep_stiffness(SHARP, angles=angles, coarsen=c, **given) for c in (2.0, 1.0))
     assert fine.typical_error < coarse.typical_error / 1.5
+
+
+def test_light_loads_follow_hertz_down_to_what_rounding_and_the_tables_of_flanks_leave():
+    """Where one tooth pair bears, only its contact is no spring: with b^2 proportional to the force F per width, the
+    approach per force falls by C/2 per unit of ln F, C = 2/pi sum 1/E' (Johnson, *Contact Mechanics*, eq. 5.60).
+    """
+    pair = gears.pair(23, 61, pressure_angle=20.0, tip_round=1.5e-4, width=22e-3)
+    solver = position_solver(elastic_pair(pair, law="half_plane"))
+    angles = np.arange(24) * pair.mesh_cycle / 24
+    touch, torques = solver.law.touching_twists(angles), 10.0 ** np.arange(-6, -1)
+    made = [at_torques(solver, angles, np.full(24, torque)) for torque in torques]
+    assert all(set(one.status) == {"converged"} for one in made)
+    single = np.bincount(made[-1].contacts.position, minlength=24) == 1
+    assert single.sum() > 5
+    yields = np.array([(one.twist - touch) / torque for one, torque in zip(made, torques, strict=True)])
+    slope = solver.law.compliance / (2 * solver.law.width * pair.wheel.base_radius**2)
+    off = np.abs((yields - yields[-1] + slope * np.log(torques / torques[-1])[:, None]) / yields)
+    told = [unseen_twists(solver.law, one) * one.tangent / one.torque_wheel for one in made]
+    assert (off < np.array(told) + 1e-5)[:, single].all()  # windows follow the contact by a panel
+    assert np.max(told[1]) < 0.01
+
+
+def test_loads_below_the_rounding_of_places_are_not_solved():
+    curve = sweep_stiffness(SHARP, torque=1e-9, angles=np.radians([0.0, 9.0]))
+    assert set(curve.status) == {"not_converged"}
+
+
+def test_tabulated_flanks_miss_the_exact_ones_by_what_is_told():
+    """In the middles of the pieces, where Hermite's cubic errs most; the places of a gear of 160 mm have 1e-17 m."""
+    face = face_of(gears.gear(20, module=8e-3, pressure_angle=20.0))
+    u = 0.5 * (face.knots[1:] + face.knots[:-1])
+    arc, exact = face.arc_at(u), face.points(u)
+    for _ in range(3):  # the foot on the table: middles of parameters are not those of arcs
+        point, tangent = face.at(arc)
+        arc = arc + ((exact - point) * tangent.conj()).real
+    point, _ = face.at(arc)
+    off = np.abs(((exact - point) * face.normals(u).conj()).real)
+    assert (off < 1.1 * face.misses + 5e-17).all()
+    assert np.median(off / face.misses) > 0.9

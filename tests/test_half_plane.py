@@ -232,7 +232,7 @@ def test_forces_that_stand_still_by_chance_are_no_solution() -> None:
     made = step(setting, state)
     assert np.abs(made.place).max() > 1e-6
     still = replace(state, force=made.next.force)
-    assert change(setting.couples, still, made.next, made.place).min() > NEAR
+    assert change(setting, still, made.next, made.place).min() > NEAR
 
 
 def test_an_undercuts_edge_on_a_nearly_flat_mate() -> None:

@@ -22,7 +22,7 @@ from .panels import (
     influence,
     unilateral,
 )
-from .position import taken
+from .position import ANGLE_ROUNDING, taken
 
 #: Gap at the window's ends in units of that at the ends of Hertz's contact of the same force, and what it grows by
 #: where the pressure reaches an end: beside edges contacts are wider.
@@ -35,6 +35,8 @@ MOVED = 0.1
 SMALL = 1e-6
 #: Force, of all pairs of a position, and half width in modules below which a window is not made smaller.
 LEAST_FORCE, LEAST_WIDTH = 1e-4, 1e-6
+#: Largest share of a position's force that rounding may make: what is lighter is not solved.
+MOST_UNSEEN = 0.01
 #: Half width (modules) of Hertz's contacts whose approach first forces are made with: a length, as T in them is what
 #: the logarithms of lengths in metres leave.
 REFERENCE_WIDTH = 0.01
@@ -296,7 +298,8 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     loaded = force > 0
     shares = p * width / np.where(loaded, force, 1.0)[:, None]
     place = (shares * x).sum(axis=1)
-    variance = (shares * ((x - place[:, None]) ** 2 + width**2 / 12)).sum(axis=1)
+    # not below nothing: panels that are held may pull
+    variance = np.maximum((shares * ((x - place[:, None]) ** 2 + width**2 / 12)).sum(axis=1), 0.0)
     between = 0.5 * (p[:, 1:] + p[:, :-1])
     # both deformed faces have the same slope; the one further from its edges changes less with where it is taken
     into = beside.sums((local @ p.take(beside.second, axis=0)[:, None, :, None])[..., 0])
@@ -323,20 +326,34 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
         bearing=p > 0,
         reach=state.reach,
     )
-    changed, settled = change(couples, state, following, place)[couples.position], settled[couples.position]
+    changed, settled = change(setting, state, following, place)[couples.position], settled[couples.position]
     wider = outgrown & (changed <= WIDENED_BELOW)
     following = replace(following, reach=np.where(wider, WIDER * state.reach, state.reach))
     return Step(following, p, settled, low, high, outgrown, x, width, arcs, place, energy, changed)
 
 
-def change(couples: Couplings, state: State, new: State, place: Array) -> Array:
-    """What a step changed, shape (m,): the forces in units of their sum, and weighted by them the places and widths of
-    the contacts, in units of these.
+def unseen_force(law: HalfPlanePair) -> float:
+    r"""Force per width (N/m) that rounding of the gears' angles makes of none: :math:`r_b\,\Delta\varphi` over the
+    approach of a usual contact.
+
+    Gaps are differences of places and have the rounding of these, whatever the load. Places and widths of contacts, in
+    units of these, change by about as much: with :math:`b^2\kappa = 2CF` a gap tilted by e over b moves its place by
+    :math:`e/(b\kappa)`, which is :math:`e/(2CF)` of b.
     """
+    return ANGLE_ROUNDING * law.pair.wheel.base_radius / reference_approach(law)
+
+
+def change(setting: Setting, state: State, new: State, place: Array) -> Array:
+    """What a step changed beyond what rounding does, shape (m,): the forces in units of their sum, and weighted by them
+    the places and widths of the contacts, in units of these.
+    """
+    couples = setting.couples
     safe = np.where(new.variance > 0, new.variance, 1.0)
     moved = (new.variance > 0) * (0.5 * np.abs(place) / np.sqrt(safe) + np.abs(1 - state.variance / safe))
     all_ = np.abs(new.force - state.force) + MOVED * new.force * moved
-    return couples.total(all_) / np.maximum(couples.total(new.force), SMALL)
+    force = np.maximum(couples.total(new.force), SMALL)
+    unseen = unseen_force(setting.law)
+    return np.maximum(couples.total(all_) - np.where(unseen < MOST_UNSEEN * force, unseen, 0.0), 0.0) / force
 
 
 def _opened(setting: Setting, state: State, near: tuple[ComplexArray, ComplexArray], arcs: Array) -> Array:

@@ -7,7 +7,7 @@ which can bear as a sharp tip does, and the mate's tip passes so close below it 
 **By arc length** it is one tabulated curve. Between knots on the exact curve, points are cubic in the arc length s with
 the exact points and unit tangents at both ends (Hermite): with :math:`\tau = s - s_i`,
 :math:`z(s) = z_i + t_i\tau + c_i\tau^2 + d_i\tau^3`. The knots include all marks, so kinks stay sharp; the error is
-:math:`h^4\kappa''/384` of the curvature :math:`\kappa`, nanometres and less.
+:math:`h^4\kappa''/384` of the curvature :math:`\kappa`, 1e-15 m on usual flanks, more near a base circle.
 
 A flank with a deviation is tabulated by the arc length of the flank without: the same material has the same s, however
 far a waviness lengthens the curve, and the tangents are longer than 1 by half the square of the deviation's slope.
@@ -36,8 +36,9 @@ AT_AN_END = 1e-9
 BESIDE = 1e-5
 #: Knots on the involute, on the tip round and on the upper half of the root.
 INVOLUTE, ROUND, ROOT = 513, 65, 129
-#: One-sided parameter (of a length of 1) at which the tangent at a knot is taken.
-BESIDE_KNOT = 1e-9
+#: One-sided parameter (of a length of 1) at which the tangent at a knot is taken. It bows a piece too little, by a
+#: quarter of its length times the angle by which the curve turns along this: below rounding.
+BESIDE_KNOT = 1e-12
 #: Most cells of the grid that finds the piece at an arc length.
 MOST_CELLS = 1 << 15
 
@@ -210,6 +211,16 @@ class Face:
         )
 
     @cached_property
+    def misses(self) -> Array:
+        r"""About how far the pieces are from the exact curve (m), shape (k - 1,): :math:`h^4\kappa''/384`.
+
+        :math:`\kappa'' \approx 6\,\Delta d/h` is that of the lesser step of the third coefficients to the next pieces:
+        no kink's.
+        """
+        step = np.abs(np.diff(self.cubic[3]))
+        return np.asarray(np.diff(self.arc) ** 3 * np.minimum(np.append(step, step[-1]), np.append(step[0], step)) / 64)
+
+    @cached_property
     def _nominal(self) -> Face:
         return replace(self, flank=replace(self.flank, deviation=None))
 
@@ -256,6 +267,8 @@ class FlankTables:
         Arc length where each piece starts, and where the next one of the flank does (m).
     cubic : ndarray of complex, shape (4, k)
         As in `Face`.
+    misses : ndarray, shape (k,)
+        As in `Face` (m).
     steps
         Most pieces that start within a cell.
     """
@@ -268,6 +281,7 @@ class FlankTables:
     arc: Array
     beyond: Array
     cubic: ComplexArray
+    misses: Array
     steps: int
 
     @cached_property
@@ -281,11 +295,16 @@ class FlankTables:
             self, low=self.low[flank], high=self.high[flank], cells=self.cells[flank], start=self.start[flank]
         )
 
-    def pieces(self, s: Array) -> tuple[ComplexArray, Array]:
-        """Coefficients, shape (4, ..., f, m), and arc lengths within the pieces, for arc lengths s (m), (..., f, m)."""
+    def piece_at(self, s: Array) -> IntArray:
+        """Numbers of the pieces at arc lengths s (m), shape (..., f, m)."""
         i = self.piece.take(((s - self.low) * self.cells).astype(np.int64) + self.start)
         for _ in range(self.steps):
             i = i + (s >= self.beyond.take(i))
+        return i
+
+    def pieces(self, s: Array) -> tuple[ComplexArray, Array]:
+        """Coefficients, shape (4, ..., f, m), and arc lengths within the pieces, for arc lengths s (m), (..., f, m)."""
+        i = self.piece_at(s)
         return self.cubic.take(i, axis=1), s - self.arc.take(i)
 
     def at(self, s: Array) -> tuple[ComplexArray, ComplexArray]:
@@ -321,6 +340,7 @@ def flank_tables(faces: Sequence[Face]) -> FlankTables:
         arc=np.concatenate([face.arc[:-1] for face in faces]),
         beyond=np.concatenate([np.append(face.arc[1:-1], np.inf) for face in faces]),
         cubic=np.concatenate([face.cubic for face in faces], axis=1),
+        misses=np.concatenate([face.misses for face in faces]),
         steps=steps,
     )
 

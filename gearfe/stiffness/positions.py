@@ -295,9 +295,19 @@ def curve_error(solver: PositionSolver, coarse: MeshingPair, solved: Positions, 
         error = np.abs(chosen.torque_wheel / own.torque_wheel - 1)
     single = np.abs(torque_changes(solver.law, half_plane_pair(coarse), own)) / (COARSENING**ORDER - 1)
     error += np.maximum(single, COVERAGE * np.sqrt(np.mean(single**2)))
-    # a twist of some bits of the gears' angles is not what the gears are turned by
-    made[numbers] = error + ANGLE_ROUNDING * np.abs(chosen.tangent / chosen.torque_wheel)
+    made[numbers] = error + unseen_twists(solver.law, own) * np.abs(chosen.tangent / chosen.torque_wheel)
     return made
+
+
+def unseen_twists(law: HalfPlanePair, found: Positions) -> Array:
+    """Twists (rad) from the touch that mean nothing at positions of the half-plane law, shape (n,): the rounding of the
+    gears' angles, and what the tabulated flanks miss of the exact ones, whose touch it is.
+    """
+    contacts, worst = found.contacts, np.zeros(len(found))
+    tables = law.tables.of(law.teeth.flank(contacts.pair))
+    missed = tables.misses.take(tables.piece_at(contacts.arc[:, :, None])).sum(axis=(1, 2))
+    np.maximum.at(worst, contacts.position, missed)
+    return ANGLE_ROUNDING + worst / law.pair.wheel.base_radius
 
 
 def torque_changes(law: HalfPlanePair, other: HalfPlanePair, found: Positions) -> Array:

@@ -185,7 +185,7 @@ def pressure_lines(curve: StiffnessCurve) -> list[str]:
 def cure_of(statuses: NDArray[np.str_]) -> str:
     """What to do about failed positions of these statuses."""
     if "under_resolved" not in statuses:
-        return "use another load (far below a newton, places of flanks are lost in rounding) or another coarsen"
+        return "use another load (far below a millinewton, places of flanks are lost in rounding) or another coarsen"
     return (
         'where under_resolved, contacts are narrower than the elements of the flanks: law = "half_plane" answers every '
         "load, a finer flank (flank_coarsen below 1) resolves lighter ones"
