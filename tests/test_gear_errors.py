@@ -53,7 +53,10 @@ def gear(teeth=20, **form):
         ({"tip_round": 2e-3}, "tip_round", r"overlap: must be < 1\.\d+ mm"),
         ({"tip_shortening": -0.1}, "tip_shortening", ">= 0"),
         ({"tooth_thinning": -1e-6}, "tooth_thinning", ">= 0"),
-        ({"tooth_thinning": 4e-3}, "tooth_thinning", "no tooth thickness"),
+        ({"tooth_thinning": 4e-3}, "tooth_thinning", "no tooth thickness.*must be < 3927 um"),  # pi m/2
+        ({"module": 2.5e-6, "tooth_thinning": 4e-5}, "tooth_thinning", "must be < 3.927 um; .* a larger module"),
+        # thinning alone would leave some: 4 tan(20 deg) x > 2 thinning/m - pi
+        ({"tooth_thinning": 4e-5, "profile_shift": -3.0}, "profile_shift", r"must be > -2\.1358"),
         ({"addendum": 2.0}, "addendum", r"pointed.*must be < 1\.\d+"),
         ({"teeth": 8, "profile_shift": 0.9}, "addendum", "pointed"),
         ({"tip_shortening": 2.0}, "addendum", "below the start of the involute: must be > "),

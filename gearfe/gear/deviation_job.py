@@ -123,7 +123,7 @@ def flank_deviations(one: FlankOf) -> ToothDeviations:
             turn = _mirrored(turn, one.number == 1)
         return tooth_deviations(one.gear, made, turn)
     except InputError as error:
-        raise _named(error, one.where) from None
+        raise _named(error, one.where, one.own) from None
 
 
 def pitch_errors_of(
@@ -144,7 +144,7 @@ def pitch_errors_of(
             index = _index_deviations(own.flank(side), gear, where, Path(folder))
             turn = pitch_errors.turns(gear, index) if index.any() else ()
         except InputError as error:
-            raise _named(error, where) from None
+            raise _named(error, where, own.flank(side)) from None
         made.append(tuple(gear.base_radius * e for e in turn))
     return made[0], made[1]
 
@@ -232,8 +232,8 @@ def _index_deviations(table: FlankTable, gear: Gear, where: str, folder: Path) -
         return made
     if len(given) != gear.teeth:
         key = "pitch_um" if table.pitch_um else "single_pitch_um"
-        problem = f"must have one entry for each of the {gear.teeth} teeth"
-        raise InputError(f"{where}.{key}", f"a list of {len(given)}", problem, "give as many as the gear has teeth")
+        problem = f"must have one entry for each of the {gear.teeth} teeth, has {len(given)}"
+        raise InputError(f"{where}.{key}", list(getattr(table, key)), problem, "give as many as the gear has teeth")
     return made + given
 
 
@@ -282,19 +282,28 @@ def _teeth(numbers: Array, gear: Gear, field: str, name: str) -> IntArray:
     return order
 
 
-def _named(error: InputError, where: str) -> InputError:
+def _named(error: InputError, where: str, table: FlankTable) -> InputError:
     """The same error in the words of the job file."""
-    names = {
-        "tip_relief.start": "tip_relief_start_mm",
-        "root_relief.start": "root_relief_start_mm",
-        "tip_relief.end": "tip_relief_end_mm",
-        "root_relief.end": "root_relief_end_mm",
-    }
     if error.field.startswith(where):
         return error
-    value = error.value
-    if error.field in names and isinstance(value, float):
-        value = float(f"{1e3 * value:.6g}")
-    elif isinstance(value, float) and error.field in ("deviation", "pitch errors") and abs(value) < 1e-2:
-        value = float(f"{1e6 * value:.6g}")
-    return InputError(f"{where}.{names.get(error.field, error.field)}", value, error.problem, error.cure)
+    given = [key for key in ("pitch_um", "single_pitch_um", "pitch_csv", "pitch_class") if getattr(table, key)]
+    names = {
+        "tip_relief.amount": "tip_relief_um",
+        "tip_relief.start": "tip_relief_start_mm",
+        "tip_relief.end": "tip_relief_end_mm",
+        "root_relief.amount": "root_relief_um",
+        "root_relief.start": "root_relief_start_mm",
+        "root_relief.end": "root_relief_end_mm",
+        "crowning": "crowning_um",
+        "slope": "slope_um",
+        "extra[0]": "points" if table.points else "measured_csv",
+        "extra[1]": "measured_csv",
+        "pitch errors": (given or ["run_out_um"])[0],
+    }
+    key, value = error.field, error.value
+    if key.startswith("waviness"):
+        key = f"{key}_um"
+    key = names.get(key, "measured_csv" if key.startswith("measured") else key)
+    if isinstance(value, float):
+        value = float(f"{(1e3 if key.endswith('_mm') else 1e6) * value:.6g}")
+    return InputError(f"{where}.{key}", value, error.problem, error.cure)

@@ -37,6 +37,8 @@ ARC, WAVE = 32, 48
 STEEPEST, LARGEST = 0.2, 0.05
 #: Places where they are looked for, beside the breaks.
 CHECKED = 401
+#: Parts of a flank's deviation by the field that they are of, with the amount in it (m), if it has one.
+Parts = dict[str, tuple[float | None, Deviation]]
 
 
 @dataclass(frozen=True)
@@ -188,51 +190,63 @@ def tooth_deviations(gear: Gear, made: FlankModification, turn: Sequence[float] 
     InputError
         For reliefs that overlap, flanks that are too steep or deviate too far, a wrong number of teeth.
     """
-    parts: list[Deviation] = []
+    parts: Parts = {}
     tip, root = made.tip_relief, made.root_relief
     if tip is not None:
-        parts.append(relief(gear, tip, tip=True))
+        parts["tip_relief.amount"] = tip.amount, relief(gear, tip, tip=True)
     if root is not None:
-        parts.append(relief(gear, root, tip=False))
+        parts["root_relief.amount"] = root.amount, relief(gear, root, tip=False)
     if tip is not None and root is not None and tip.start < root.start:
         problem = f"overlaps the root relief, which reaches up to {1e3 * root.start:.5g} mm of roll length"
         raise InputError("tip_relief.start", tip.start, problem, "shorten one of the reliefs")
     if made.crowning:
-        parts.append(crowning(gear, made.crowning))
+        parts["crowning"] = made.crowning, crowning(gear, made.crowning)
     if made.slope:
-        parts.append(slope(gear, made.slope))
-    parts += made.extra
+        parts["slope"] = made.slope, slope(gear, made.slope)
+    parts |= {f"extra[{i}]": (None, one) for i, one in enumerate(made.extra)}
     if made.measured and len(made.measured) != gear.teeth:
         problem = f"must be one for each of the {gear.teeth} teeth"
         raise InputError("measured", len(made.measured), problem, "give all teeth, or one for all")
-    common = total(parts)
-    waves = [w for w in made.waviness if w.amplitude]
-    several = bool(made.measured) or any(w.waves % gear.teeth for w in waves)
+    common = total([one for _, one in parts.values()])
+    waves = {f"waviness[{i}].amplitude": w for i, w in enumerate(made.waviness) if w.amplitude}
+    several = bool(made.measured) or any(w.waves % gear.teeth for w in waves.values())
     profiles: dict[Any, int] = {}
     found: list[Deviation | None] = []
     numbers = []
     for tooth in range(gear.teeth if several else 1):
         own = made.measured[tooth] if made.measured else None
-        key = (tuple((w.waves * tooth) % gear.teeth for w in waves), own)
+        key = (tuple((w.waves * tooth) % gear.teeth for w in waves.values()), own)
         if key not in profiles:
             profiles[key] = len(found)
-            every = [common, own, *(wave(gear, w, tooth) for w in waves)]
-            found.append(_checked(gear, total([one for one in every if one is not None])))
+            more: Parts = {name: (w.amplitude, wave(gear, w, tooth)) for name, w in waves.items()}
+            more |= {} if own is None else {f"measured[{tooth}]": (None, own)}
+            whole = total([one for one in (common, *(part for _, part in more.values())) if one is not None])
+            found.append(_checked(gear, whole, parts | more))
         numbers.append(profiles[key])
     return ToothDeviations(tuple(found), tuple(numbers), tuple(float(one) for one in turn))
 
 
-def _checked(gear: Gear, made: Deviation | None) -> Deviation | None:
+def _checked(gear: Gear, made: Deviation | None, parts: Parts) -> Deviation | None:
+    """The sum of the parts, where it is no more than microgeometry."""
     if made is None:
         return None
     low, high = ends_of(gear)
     inside = [s for s in made.breaks if low < s < high]
-    height, rise = (np.abs(one) for one in made.at(np.concatenate([np.linspace(low, high, CHECKED), inside])))
-    if rise.max() > STEEPEST:
-        problem = f"is too steep: its slope must be <= {STEEPEST:g}"
-        raise InputError("deviation", round(float(rise.max()), 4), problem, "use smaller amounts or longer reliefs")
-    if height.max() > LARGEST * gear.module:
-        problem = f"leaves the range of microgeometry: must be <= {1e6 * LARGEST * gear.module:.4g} um, 0.05 module"
-        cure = "larger changes belong into the geometry: tip_relief of [pair]"
-        raise InputError("deviation", float(height.max()), problem, cure)
+    places = np.concatenate([np.linspace(low, high, CHECKED), inside])
+
+    def refused(order: int, problem: str, cure: str) -> InputError:
+        """Of the part that has the most of it, by its field and amount."""
+        name = max(parts, key=lambda one: float(np.abs(parts[one][1].at(places)[order]).max()))
+        return InputError(name, parts[name][0], problem, cure)
+
+    height, rise = (float(np.abs(one).max()) for one in made.at(places))
+    if rise > STEEPEST:
+        problem = f"makes the flank too steep: a slope of {rise:.4g}, must be <= {STEEPEST:g}"
+        raise refused(1, problem, "use smaller amounts or longer reliefs")
+    if height > LARGEST * gear.module:
+        problem = (
+            f"makes the flank deviate by {1e6 * height:.4g} um, which leaves the range of microgeometry: must be <= "
+            f"{1e6 * LARGEST * gear.module:.4g} um, 0.05 module"
+        )
+        raise refused(0, problem, "larger changes belong into the geometry: tip_relief of [pair]")
     return made

@@ -107,7 +107,7 @@ def from_single(single: ArrayLike) -> Array:
     left = float(f.sum())
     if abs(left) > CLOSED:
         problem = f"must add up to 0 round the gear, within {1e6 * CLOSED:g} um: the sum is {1e6 * left:.4g} um"
-        raise InputError("single_pitch_um", f"a list of {len(f)}", problem, "subtract their mean")
+        raise InputError("single_pitch_um", None, problem, "subtract their mean")
     f = f - left / len(f)
     return np.cumsum(f) - f[0]
 
@@ -150,6 +150,7 @@ def turns(gear: Gear, index: Sequence[float] | Array) -> tuple[float, ...]:
         problem = f"must have one entry for each of the {gear.teeth} teeth"
         raise InputError("pitch errors", len(F), problem, "give as many as the gear has teeth")
     if not (np.isfinite(F).all() and np.ptp(F) <= 0.1 * gear.module):
-        problem = f"must be finite and within {1e6 * 0.1 * gear.module:.4g} um, a tenth of the module, of each other"
-        raise InputError("pitch errors", float(np.ptp(F)), problem, "are they in um?")
+        most = f"{1e6 * 0.1 * gear.module:.4g} um, a tenth of the module, of each other"
+        problem = f"span {1e6 * np.ptp(F):.4g} um: must be finite and within {most}"
+        raise InputError("pitch errors", None, problem, "are they in um?")
     return tuple((F / gear.reference_radius).tolist())

@@ -76,9 +76,14 @@ def check_gear(gear: Gear) -> None:
         _check("tip_relief.length", gear.tip_relief.length, 0.0, math.inf, False)
         _check("tip_relief.exponent", gear.tip_relief.exponent, 1.0, math.inf, True)
     if gear.half_thickness_angle <= 0.0:
-        name = "tooth_thinning" if gear.tooth_thinning > 0.0 else "profile_shift"
-        problem = "leaves no tooth thickness at the reference circle"
-        raise InputError(name, getattr(gear, name), problem, "use less thinning or more profile shift")
+        what, slope = "leaves no tooth thickness at the reference circle", 2.0 * math.tan(gear.pressure_angle)
+        most = gear.module * (0.5 * math.pi + slope * gear.profile_shift)  # thickness without thinning
+        if most > 0.0:
+            cure = "use less thinning, a larger module or more profile shift"
+            raise InputError("tooth_thinning", gear.tooth_thinning, f"{what}: must be < {1e6 * most:.4g} um", cure)
+        least = (gear.tooth_thinning / gear.module - 0.5 * math.pi) / slope
+        problem = f"{what}: must be > {least:.6g}"
+        raise InputError("profile_shift", gear.profile_shift, problem, "use more profile shift")
     _check_rim(gear)
     if 0.0 < gear.tip_round < LEAST_ROUND * gear.module:
         problem = f"must be 0 or >= {1e3 * LEAST_ROUND * gear.module:.6g} mm, {LEAST_ROUND:g} module"
