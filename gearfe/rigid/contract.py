@@ -45,8 +45,9 @@ eliminated at
     coordinates; False where they cannot be written. Rows are quadratic in coordinates, cosines and sines. The Taylor
     method then runs any system compiled. Not needed by what has neither rows nor ``force``. A
     `gearfe.rigid.written.Written` has the rows of 3. from it.
-15. ``pieced = True`` and ``pieces(t, q, v)``: whole numbers that change where its force has a corner, a jump or a pole.
-    Steps of Runge-Kutta and of the implicit method end there. Absent: smooth.
+15. ``pieced = True`` and ``pieces(t, q, v)``: whole numbers, shape (..., s) at times (...), that change where its force
+    has a corner, a jump or a pole; -1 where it has no value. Steps of Runge-Kutta and of the implicit method end there.
+    Absent: smooth.
 16. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
 
 An element has no state of its own that changes during a run: integrators call it at trial points in any order.

@@ -29,8 +29,8 @@ AHEAD = (1e-9, 1e-6, 1e-5)
 TRUSTED = 1e3
 #: Rounding of the speed of a stage, relative to positions over the step: 1e-16 by the inverse of the stages' integrals.
 ROUNDING = 1e-14
-#: (q, q') at a share of a step.
-Path = Callable[[float], tuple[Array, Array]]
+#: (q, q') at shares of a step, one or many of shape (k,).
+Path = Callable[[float | Array], tuple[Array, Array]]
 
 
 class Corners:
@@ -79,22 +79,20 @@ class Corners:
 
 def _corner(system: System, t: float, h: float, path: Path) -> tuple[float, float, bool] | None:
     """Shares of the step just before and behind the first corner, and whether loads have no value behind it."""
-    pieces = system.pieces
-    before = pieces(t, *path(0.0))
-    if None in before:
+    looks = np.arange(LOOKS + 1) / LOOKS
+    found = system.pieces(t + looks * h, *path(looks))
+    if (found[0] < 0).any():
         return 0.0, 0.0, True
-
-    def left(x: float) -> bool:
-        return pieces(t + x * h, *path(x)) != before
-
-    high = next((k / LOOKS for k in range(1, LOOKS + 1) if left(k / LOOKS)), None)
-    if high is None:
+    left = (found != found[0]).any(axis=1)
+    if not left.any():
         return None
+    high = float(looks[left.argmax()])
     low = high - 1.0 / LOOKS
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if left(middle) else (middle, high)
-    return low, high, None in pieces(t + high * h, *path(high))
+        moved = (system.pieces(t + middle * h, *path(middle)) != found[0]).any()
+        low, high = (low, middle) if moved else (middle, high)
+    return low, high, bool((system.pieces(t + high * h, *path(high)) < 0).any())
 
 
 def _pole(system: System, t: float, h: float, path: Path, x: float) -> bool:
@@ -120,8 +118,9 @@ def blame_ahead(system: System, t: float, state: tuple[Array, Array, Array], spa
         system.blame(t, q, v)
         for reach in np.multiply(AHEAD, span):
 
-            def path(x: float, reach: float = float(reach)) -> tuple[Array, Array]:
-                return q + x * reach * v, v + x * reach * a
+            def path(x: float | Array, reach: float = float(reach)) -> tuple[Array, Array]:
+                way = np.asarray(x)[..., None] * reach
+                return q + way * v, v + way * a
 
             if not system.complaint:
                 system.blame(t + reach, *path(1.0))
@@ -146,4 +145,9 @@ def collocated_path(h: float, powers: Array, speeds: Array) -> Path:
     (velocities from the coordinates would be their rounding over the step).
     """
     p, r = np.arange(float(len(powers))), np.arange(float(len(speeds)))
-    return lambda x: (x**p @ powers, (x * h - h) ** r @ speeds)
+
+    def path(x: float | Array) -> tuple[Array, Array]:
+        share = np.asarray(x)[..., None]
+        return share**p @ powers, (share * h - h) ** r @ speeds
+
+    return path

@@ -183,12 +183,12 @@ def _error(tab: Tableau, K: Array, d: float, reach: Array, sizes: Array, toleran
 
 
 def _path(polynomial: Array, d: float) -> Path:
-    """(q, v) at a share of the step."""
+    """(q, v) at shares of the step."""
     n = polynomial.shape[1] // 2
 
-    def path(x: float) -> tuple[Array, Array]:
-        y = (x * d) ** np.arange(8.0) @ polynomial
-        return y[:n], y[n:]
+    def path(x: float | Array) -> tuple[Array, Array]:
+        y = (np.asarray(x)[..., None] * d) ** np.arange(8.0) @ polynomial
+        return y[..., :n], y[..., n:]
 
     return path
 

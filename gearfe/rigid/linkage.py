@@ -287,11 +287,11 @@ class Linkage(Written):
         """Whether loads have corners."""
         return bool(self.values.switches)
 
-    def pieces(self, t: float, q: Array, v: Array) -> tuple[int | None, ...]:
-        """Numbers of the smooth pieces that loads and laws of springs are on."""
+    def pieces(self, t: float | Array, q: Array, v: Array) -> IntArray:
+        """Numbers of the smooth pieces that loads and laws of springs are on, shape (..., s); -1 without a value."""
         return self.values.pieces(self.values.registers(t, q, v))
 
-    def load_pieces(self, load: StateFunction, t: float, q: Array, v: Array) -> tuple[int | None, ...]:
+    def load_pieces(self, load: StateFunction, t: float, q: Array, v: Array) -> IntArray:
         """Those of one load."""
         tape = Tape(self.size)
         load.write(BodyVariables(tape, np.arange(self.size)))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..typing import Array
+from ..typing import Array, IntArray
 from .contract import Element
 from .forces import StateFunction
 from .linkage import Linkage
@@ -169,7 +169,7 @@ class System:
         """Let the load that has a pole between two states (t, q, v) say so."""
         for linkage, load, index in self._loads:
             before, after = ((t, q[index], v[index]) for t, q, v in (one, two))
-            if linkage.load_pieces(load, *before) != linkage.load_pieces(load, *after):
+            if (linkage.load_pieces(load, *before) != linkage.load_pieces(load, *after)).any():
                 load.complaint = load.pole(one[0], abs(load.value(*before)))
 
     @cached_property
@@ -177,10 +177,11 @@ class System:
         """Whether forces may have corners."""
         return any(getattr(element, "pieced", False) for element in self.elements)
 
-    def pieces(self, t: float, q: Array, v: Array) -> tuple[int | None, ...]:
-        """Numbers of the smooth pieces that the forces are on."""
+    def pieces(self, t: float | Array, q: Array, v: Array) -> IntArray:
+        """Numbers of the smooth pieces that the forces are on at times (...), shape (..., s); -1 without a value."""
         parts = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if getattr(e, "pieced", False)]
-        return tuple(piece for e, i in parts for piece in e.pieces(t, q[i], v[i]))  # type: ignore[attr-defined]
+        found = [e.pieces(t, q[..., i], v[..., i]) for e, i in parts]  # type: ignore[attr-defined]
+        return np.concatenate([np.zeros((*np.shape(t), 0), dtype=np.int64), *found], axis=-1)
 
     def residual(self, t: float | Array, q: Array) -> Array:
         """g, shape (..., rows)."""

@@ -278,9 +278,11 @@ class TapeValues:
         held = set(self.program.curves.place[:, 2].tolist())
         return [s for s in range(len(self.program.switches.register)) if s not in held]
 
-    def pieces(self, R: Array) -> tuple[int | None, ...]:
-        """Numbers of the smooth pieces that registers of one state are on; None where there is no value."""
-        return tuple(None if not np.isfinite(x) else int(k) for x, k in (self._place(s, R) for s in self.switches))
+    def pieces(self, R: Array) -> IntArray:
+        """Numbers of the smooth pieces that registers (k + 1, ...) are on, shape (..., s); -1 without a value."""
+        places = (self._place(s, R) for s in self.switches)
+        found = [np.where(np.isfinite(x), k, -1) for x, k in places]
+        return np.stack(found, axis=-1) if found else np.zeros((*R.shape[1:], 0), dtype=np.int64)
 
     def _table(self, switch: int) -> tuple[Array, Array, float]:
         """Knots, coefficients (pieces, 4) of powers of the distance from the knot below, highest first, and period."""
