@@ -48,7 +48,9 @@ eliminated at
 15. ``pieced = True`` and ``pieces(t, q, v)``: whole numbers, shape (..., s) at times (...), that change where its force
     has a corner, a jump or a pole; -1 where it has no value. Steps of Runge-Kutta and of the implicit method end there.
     Absent: smooth.
-16. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
+16. ``has_knots = True`` and ``knots(q)``: whole numbers, shape (..., s) in states (..., k), that change where the third
+    derivative of a row jumps (knots of a cam's profile). Steps of the implicit method end there. Absent: smooth.
+17. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
 
 An element has no state of its own that changes during a run: integrators call it at trial points in any order.
 """

@@ -27,6 +27,9 @@ POLE_SHARE, POLE_NEARER = 1e-3, 0.7
 AHEAD = (1e-9, 1e-6, 1e-5)
 #: Steps with larger errors (over the tolerance) do not tell where corners are.
 TRUSTED = 1e3
+#: A knot of a profile in this share of a step at either end does not cut it: an error of the cube of the share. A cut
+#: is found to 2**-KNOT_HALVINGS of the step.
+KNOT_SHARE, KNOT_HALVINGS = 1e-3, 15
 #: Rounding of the speed of a stage, relative to positions over the step: 1e-16 by the inverse of the stages' integrals.
 ROUNDING = 1e-14
 #: (q, q') at shares of a step, one or many of shape (k,).
@@ -47,7 +50,13 @@ class Corners:
     def __init__(self, system: System | None, control: StepControl, tolerance: float) -> None:
         self.control = control
         self.system = system if system is not None and system.pieced else None
+        self.profiled = system if system is not None and system.has_knots else None
         self.near = max(PASSING * tolerance, 1e-12) * max(control.span, abs(control.t))
+
+    @property
+    def cutting(self) -> bool:
+        """Whether the path of a step is to be shown to `cut`."""
+        return self.system is not None or self.profiled is not None
 
     def passing(self, h: float) -> bool:
         """Whether a step is one over a corner, after which the method begins anew."""
@@ -56,6 +65,9 @@ class Corners:
     def cut(self, t: float, h: float, path: Path) -> bool:
         """Whether the step h from t is not to stand: the control then knows that the next ends before a corner."""
         system = self.system
+        if self.profiled is not None and not self.passing(h) and (share := _knot(self.profiled, path)) < 1.0:
+            self.control.end_at(t + share * h)
+            return True
         if system is None or self.passing(h) or (found := _corner(system, t, h, path)) is None:
             return False
         low, high, ends = found
@@ -93,6 +105,22 @@ def _corner(system: System, t: float, h: float, path: Path) -> tuple[float, floa
         moved = (system.pieces(t + middle * h, *path(middle)) != found[0]).any()
         low, high = (low, middle) if moved else (middle, high)
     return low, high, bool((system.pieces(t + high * h, *path(high)) < 0).any())
+
+
+def _knot(system: System, path: Path) -> float:
+    """Share of the step at which rows first pass a knot of their profile; 1 where they pass none."""
+    looks = np.linspace(KNOT_SHARE, 1.0 - KNOT_SHARE, LOOKS + 1)
+    numbers = system.knots(path(looks)[0])
+    left = (numbers != numbers[0]).any(axis=1)
+    if not left.any():
+        return 1.0
+    high = float(looks[left.argmax()])
+    low = float(looks[left.argmax() - 1])
+    for _ in range(KNOT_HALVINGS):
+        middle = 0.5 * (low + high)
+        moved = (system.knots(path(middle)[0]) != numbers[0]).any()
+        low, high = (low, middle) if moved else (middle, high)
+    return high
 
 
 def _pole(system: System, t: float, h: float, path: Path, x: float) -> bool:

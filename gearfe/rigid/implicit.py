@@ -212,7 +212,7 @@ class Stepper:
                 control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
                 continue
             error = self.error(tolerance)
-            if corners.system is not None and error <= TRUSTED:
+            if corners.cutting and error <= TRUSTED:
                 quiet = quiet_speeds(tab.c, w.v, w.V[:, :-1].T, w.vn, units * float((reach / units).max()) / abs(h))
                 speeds = (tab.speed @ np.vstack([w.v, quiet])) / h ** self._powers[:, None]
                 if corners.cut(t, h, collocated_path(h, powers_of_path(tab.path, w.known, tab.inner), speeds)):

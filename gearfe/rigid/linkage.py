@@ -291,6 +291,15 @@ class Linkage(Written):
         """Numbers of the smooth pieces that loads and laws of springs are on, shape (..., s); -1 without a value."""
         return self.values.pieces(self.values.registers(t, q, v))
 
+    @property
+    def has_knots(self) -> bool:
+        """Whether joints follow profiles."""
+        return self.values.has_knots
+
+    def knots(self, q: Array) -> IntArray:
+        """Pieces of the profiles that joints are on, shape (..., profiles)."""
+        return self.values.knots(q)
+
     def load_pieces(self, load: StateFunction, t: float, q: Array, v: Array) -> IntArray:
         """Those of one load."""
         tape = Tape(self.size)

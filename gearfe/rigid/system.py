@@ -183,6 +183,16 @@ class System:
         found = [e.pieces(t, q[..., i], v[..., i]) for e, i in parts]  # type: ignore[attr-defined]
         return np.concatenate([np.zeros((*np.shape(t), 0), dtype=np.int64), *found], axis=-1)
 
+    @cached_property
+    def has_knots(self) -> bool:
+        """Whether rows follow profiles with knots."""
+        return any(getattr(element, "has_knots", False) for element in self.elements)
+
+    def knots(self, q: Array) -> IntArray:
+        """Pieces of the profiles that rows are on in states (..., size), shape (..., profiles)."""
+        parts = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if getattr(e, "has_knots", False)]
+        return np.concatenate([e.knots(q[..., i]) for e, i in parts], axis=-1)  # type: ignore[attr-defined]
+
     def residual(self, t: float | Array, q: Array) -> Array:
         """g, shape (..., rows)."""
         return self._stack("residual", t, q)

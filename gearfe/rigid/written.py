@@ -278,6 +278,16 @@ class TapeValues:
         held = set(self.program.curves.place[:, 2].tolist())
         return [s for s in range(len(self.program.switches.register)) if s not in held]
 
+    @property
+    def has_knots(self) -> bool:
+        """Whether rows follow profiles, whose third derivative jumps at knots."""
+        return bool(self._profiles)
+
+    def knots(self, q: Array) -> IntArray:
+        """Pieces of the profiles that the rows are on in states (..., n), shape (..., profiles)."""
+        tables = ((self._table(switch), q[..., self.coordinate[variable]]) for variable, switch in self._profiles)
+        return np.stack([_piece(knots, period, x)[1] for (knots, _, period), x in tables], axis=-1)
+
     def pieces(self, R: Array) -> IntArray:
         """Numbers of the smooth pieces that registers (k + 1, ...) are on, shape (..., s); -1 without a value."""
         places = (self._place(s, R) for s in self.switches)
