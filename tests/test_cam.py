@@ -115,12 +115,17 @@ def test_a_free_cam_and_its_follower_keep_their_energy(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not compiled.available(), reason="needs numba")
-@pytest.mark.parametrize(("method", "tolerance", "error"), [("taylor", 1e-12, 1e-12), ("implicit", 1e-8, 1e-6)])
+@pytest.mark.parametrize(
+    ("method", "tolerance", "error"), [("taylor", 1e-12, 1e-12), ("implicit", 1e-7, 1e-6), ("implicit", 1e-8, 1e-7)]
+)
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_a_free_cam_turns_as_its_energy_says(
     tmp_path: Path, method: str, tolerance: float, error: float, sense: float
 ) -> None:
-    """(I + m s'(a)^2) a'^2 = 2 E: the time to an angle a is an integral, by Gauss's points between the knots."""
+    """(I + m s'(a)^2) a'^2 = 2 E: the time to an angle a is an integral, by Gauss's points between the knots.
+
+    The output times are those at which the cam is at a knot: a step across it would err by ten times the bound.
+    """
     text = CAM.replace("[bodies.follower]", f"rate_rad_per_s = {20.0 * sense}\n[bodies.follower]")
     mechanism = load_mechanism(write(tmp_path, text, points=25))
     knots = np.linspace(0.0, 2 * math.pi, 25)
