@@ -36,7 +36,6 @@ CONSTANTS: dict[str, dict[str, tuple[Any, Any]]] = {
     },
     "gear.touching": {"NEAR": (5e-4, 2e-3), "STEEPEST": (0.1, 0.4)},
     "contact.elements": {"AHEAD": (5e-5, 2e-4), "BESIDE": (3, 10), "CHORD": (1e-4, 1e-2), "STEPS": (30, 80)},
-    "stiffness.positions": {"STEEP": (5.0, 20.0), "JUMP": (5e-4, 2e-3), "MAX_FAILURES": (2, 6)},
 }  # fmt: skip
 #: Modules whose constants the condensed gears depend on.
 OF_GEARS = ("contact.flank_compliance",)
