@@ -3,8 +3,6 @@
 Public names load on first use (PEP 562), so ``import gearfe`` costs milliseconds and a job loads only what it needs.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 
 TYPE_CHECKING = False  # `typing` itself would be a third of the import
@@ -81,7 +79,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name in _PUBLIC:
         value = getattr(import_module(f".{_PUBLIC[name]}", __name__), name)
         globals()[name] = value

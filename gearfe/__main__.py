@@ -2,6 +2,11 @@
 
 import sys
 
-from .cli import main
+from .isolation import leave_working_folder
 
-sys.exit(main())
+if __name__ == "__main__":
+    leave_working_folder(module=True)  # before anything else is imported
+
+    from .cli import main
+
+    sys.exit(main())

@@ -9,6 +9,8 @@ import io
 import os
 import sys
 
+from .isolation import leave_working_folder
+
 TYPE_CHECKING = False  # `typing` itself would be a third of the program's start
 if TYPE_CHECKING:
     import argparse
@@ -46,6 +48,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     0 done, 1 done with failures, 2 bad input, 130 interrupted, 141 the reader of the output closed it.
     """
     listening = False
+    if argv is None:
+        leave_working_folder()
     try:
         import signal
 

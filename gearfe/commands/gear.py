@@ -50,8 +50,6 @@ def run(args: argparse.Namespace) -> int:
 
     pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
 
-    from ..figures.gears import pair_picture
-    from ..figures.style import save
     from ..files import output_folder, whole_set, write_json
     from ..gear.derived import derived_geometry, iso_values
     from ..stiffness.job import StiffnessJob
@@ -66,6 +64,9 @@ def run(args: argparse.Namespace) -> int:
             with stage(f"writing {name}"):
                 _export(made / name, pair, tables.get("microgeometry"), Path(args.job).parent)
         if not args.no_pictures:
+            from ..figures.gears import pair_picture
+            from ..figures.style import save
+
             with stage("drawing"):
                 save(pair_picture(pair, math.radians(args.angle_deg), _notes(geometry)), made / "gear_pair.png")
         write_json(made / "gear_pair.json", {**geometry, "iso_6336": iso, "warnings": list(pair.warnings)})

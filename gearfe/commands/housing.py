@@ -85,10 +85,12 @@ def run(args: argparse.Namespace) -> int:
             problem = "" if args.no_pictures or not body.has_mesh else _draw(made, body, fields)
         names = sorted(path.name for path in made.iterdir())
     print_results((), folder, names, {"reduced body": seconds}, () if not problem else (f"no pictures: {problem}",))
-    from ..figures.offscreen import MISSING
+    failed = not np.all(np.isfinite(body.coupled.frequencies_hz))
+    if problem:
+        from ..figures.offscreen import MISSING
 
-    drawn = not problem or problem == MISSING  # who installs no VTK wants no pictures of it
-    return int(not drawn or not np.all(np.isfinite(body.coupled.frequencies_hz)))
+        failed = failed or problem != MISSING  # who installs no VTK wants no pictures of it
+    return int(failed)
 
 
 def _report(body: ModalBody, errors: dict[str, Any], response: dict[str, float]) -> None:

@@ -37,7 +37,6 @@ def run(args: argparse.Namespace) -> int:
     if args.no_stability:
         table = replace(table, stability=False)
 
-    from ..figures.runup import RunUpPictures
     from ..files import output_folder
     from ..progress import Stopwatch
     from ..runup.files import RunUpChoice, write_runup
@@ -52,7 +51,11 @@ def run(args: argparse.Namespace) -> int:
             raise unknown_name("--attachment", args.attachment, bores)
         folder = output_folder(args.out)
     made, unstable = solved(job, table, args.curve, watch=watch)
-    draw = None if args.no_pictures else RunUpPictures(title(job.table, driven=False))
+    draw = None
+    if not args.no_pictures:
+        from ..figures.runup import RunUpPictures
+
+        draw = RunUpPictures(title(job.table, driven=False))
     choice, further = RunUpChoice(table.multiples, args.attachment, args.fields), described(job, table)
     summary, names = write_runup(folder, made, choice, draw=draw, watch=watch, further=further, unstable=unstable)
     print_results(_report_lines(summary), folder, names, watch.seconds, summary["warnings"])

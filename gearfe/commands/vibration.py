@@ -70,7 +70,6 @@ def run(args: argparse.Namespace) -> int:
     if args.band is not None and not 0.0 <= args.band[0] < args.band[1]:
         raise InputError("--band", args.band, "must be two rising frequencies >= 0", "as --band 200 4000")
 
-    from ..figures.train import TrainPictures
     from ..files import output_folder
     from ..progress import Stopwatch
     from ..vibration.analysis import Analysis, record_start
@@ -103,12 +102,17 @@ def run(args: argparse.Namespace) -> int:
     start = record_start(job, train, every, watch.stage)
     choice = replace(choice, spectrum_start=start)
     check_choice(choice, job.times, bores)
+    draw = None
+    if not args.no_pictures:
+        from ..figures.train import TrainPictures
+
+        draw = TrainPictures(title(job.table), args.band and tuple(args.band), args.range)
     written = write_run(
         folder,
         planned,
         choice,
         watch=watch,
-        draw=None if args.no_pictures else TrainPictures(title(job.table), args.band and tuple(args.band), args.range),
+        draw=draw,
         beside=Analysis(job, train, every, start),
     )
     response = written.response

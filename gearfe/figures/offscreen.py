@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..isolation import EMPTY
 from ..output.arrays import save_arrays
 from ..typing import Array, IntArray
 
@@ -25,6 +26,8 @@ MISSING = "pyvista is not installed: pip install 'gearfe[fields]'"
 
 def draw_apart(module: str, pictures: Mapping[str | Path, Mapping[str, Array]], *, seconds: float) -> str:
     """Run ``python -m module JOB PATH JOB PATH ...`` on stored arrays; return an empty text, or what was not drawn.
+
+    The process takes neither modules nor settings from the working folder.
 
     Parameters
     ----------
@@ -38,19 +41,21 @@ def draw_apart(module: str, pictures: Mapping[str | Path, Mapping[str, Array]], 
     if importlib.util.find_spec("pyvista") is None:
         return MISSING
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", module]
+        command = [sys.executable, "-P", "-m", module]
         for number, (path, arrays) in enumerate(pictures.items()):
             job = Path(folder) / f"{number}.npz"
             save_arrays(job, arrays)
-            command += [str(job), str(path)]
+            command += [str(job), os.path.abspath(path)]
         environment = dict(os.environ)
         if sys.platform.startswith("linux"):
             environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        environment["PYTHONPATH"] = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+        root = str(Path(__file__).parents[2])  # found last, for a package that the working folder alone holds
+        environment["PYTHONPATH"] = os.pathsep.join([*filter(os.path.isabs, sys.path), root])
         try:
             done = subprocess.run(
-                command, env=environment, capture_output=True, text=True, errors="replace", timeout=seconds, check=False
-            )
+                command, env=environment, cwd=EMPTY, capture_output=True, text=True, errors="replace", timeout=seconds,
+                check=False,
+            )  # fmt: skip
         except subprocess.TimeoutExpired:
             return f"drawing took longer than {seconds:g} s"
     if done.returncode != 0:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..errors import MissingLibraryError
+from ..isolation import load
 from ..typing import Array
 
 
@@ -25,7 +26,7 @@ def write_dxf(path: Path, outlines: Mapping[str, Array], circles: Mapping[str, f
         Without ezdxf.
     """
     try:
-        import ezdxf
+        ezdxf = load("ezdxf")
     except ImportError:
         raise MissingLibraryError("DXF needs ezdxf: pip install 'gearfe[exchange]'") from None
     document = ezdxf.new("R2000", units=ezdxf.units.MM)

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import cache
 from ..progress import stage
-from .native import Entry, ObjectCode
+from .native import Entry, ObjectCode, import_numba
 from .parts import part_options, uncollected
 
 if TYPE_CHECKING:
@@ -243,8 +243,7 @@ OPTIONS: dict[str, Any] = {
 
 def _part(function: FunctionType, inline: bool) -> Any:
     """A function that entries contain; it is translated when they are."""
-    import numba
-
+    numba = import_numba()
     made = numba.njit(function, forceinline=inline, **part_options(), **OPTIONS)
     template = made.get_call_template
 
@@ -258,7 +257,7 @@ def _part(function: FunctionType, inline: bool) -> Any:
 
 def _entry(function: FunctionType, layouts: tuple[Layout, ...]) -> ObjectCode:
     """Machine code of a function of blocks: the object file that numba's own cache would keep."""
-    import numba
+    numba = import_numba()
     from llvmlite import binding
 
     from .packed_type import PackedType

@@ -12,6 +12,7 @@ import ctypes
 import hashlib
 import json
 import os
+import sys
 import tempfile
 import threading
 from collections.abc import Callable
@@ -19,6 +20,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from ..isolation import load
 
 if TYPE_CHECKING:
     from .packed import Layout, Packed
@@ -92,6 +95,18 @@ class Entry:
         return function
 
 
+def import_numba() -> Any:
+    """Import numba without the settings that a working folder holds for it (``.numba_config.yaml``).
+
+    Numba reads them again before each compilation, from a file of the name set here.
+    """
+    if "numba" not in sys.modules:
+        load("numba")
+        load("numba.core.config")._config_fname = os.devnull  # type: ignore[attr-defined]
+        load("numba.core.registry")
+    return sys.modules["numba"]
+
+
 def link(code: ObjectCode) -> int:
     """Address of a function whose object file becomes part of this process."""
     from llvmlite import binding
@@ -101,9 +116,8 @@ def link(code: ObjectCode) -> int:
     machine = binding.Target.from_default_triple().create_target_machine(jit=True)
     engine = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)  # opens the process's own symbols
     if any(binding.address_of_symbol(name) is None for name in code.calls):
-        import numba.core.registry  # brings functions that are neither in the process nor in its libraries
-
-        numba.core.registry.cpu_target.target_context.refresh()
+        # brings functions that are neither in the process nor in its libraries
+        import_numba().core.registry.cpu_target.target_context.refresh()
     engine.add_object_file(binding.ObjectFileRef.from_data(code.code))
     engine.finalize_object()
     _ENGINES.append(engine)

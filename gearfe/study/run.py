@@ -19,6 +19,7 @@ from multiprocessing import connection, get_context, parent_process
 from typing import Any
 
 from ..errors import InputError
+from ..isolation import away
 from ..progress import one_thread
 from .case import DIED, HERE, Row, Task, solve_case, solve_group
 
@@ -118,10 +119,26 @@ def side_by_side(
             end_processes(pool)
 
 
+class IsolatedPool(ProcessPoolExecutor):
+    """Pool whose processes begin in an empty folder, so that none imports modules of the working folder.
+
+    multiprocessing starts them by ``python -c``; once begun, they take this process's path of modules and folder.
+    """
+
+    def __init__(self, workers: int) -> None:
+        folder = os.getcwd()
+        with away():
+            super().__init__(workers, get_context("spawn"), _begin, (folder,))
+
+    def submit(self, *call: Any, **options: Any) -> Future[Any]:
+        """Start a process where one is missing, and hand a call to one."""
+        with away():
+            return super().submit(*call, **options)
+
+
 def processes(workers: int) -> Executor:
     """Fresh processes, whatever this one has loaded; on Windows no pool has more than 61 (`concurrent.futures`)."""
-    workers = min(workers, 61) if sys.platform == "win32" else workers
-    return ProcessPoolExecutor(workers, get_context("spawn"), _begin)
+    return IsolatedPool(min(workers, 61) if sys.platform == "win32" else workers)
 
 
 def _begun(workers: int) -> tuple[Executor, Future[int] | None]:
@@ -130,8 +147,9 @@ def _begun(workers: int) -> tuple[Executor, Future[int] | None]:
     return pool, pool.submit(os.getpid)
 
 
-def _begin() -> None:
-    """A worker leaves Ctrl-C to the program that started it, and ends with it, however that ends."""
+def _begin(folder: str) -> None:
+    """Enter the folder of the program that started this worker, leave Ctrl-C to it, and end with it in any case."""
+    os.chdir(folder)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     if parent is not None:
