@@ -97,7 +97,7 @@ def program(tmp_path: Path) -> list[str]:
 def ran(line: list[str], folder: Path, **environment: str) -> str:
     """Output of a program in this folder."""
     done = subprocess.run(
-        line, cwd=folder, env={**os.environ, **environment}, capture_output=True, text=True, timeout=300, check=False
+        line, cwd=folder, env={**os.environ, **environment}, capture_output=True, text=True, timeout=900, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Traceback" not in done.stderr
