@@ -201,13 +201,16 @@ def element_stiffness(coordinates: Array, material: Material, plane: Plane, thic
 def finite_strain_rates(
     points: Array, triangles: IntArray, fields: Array, material: Material, plane: Plane, thickness: float
 ) -> Array:
-    r"""What a small-strain solution's energy gains by finite strain, to first order, as something changes it.
+    r"""Return the rates of the energy that a small-strain solution gains by finite strain, to first order.
 
     With the Green strain :math:`E = \varepsilon + \eta`, :math:`\eta = \tfrac12\nabla u^T\nabla u`, a Saint
     Venant-Kirchhoff body stores :math:`\Delta W = \int \sigma(\varepsilon):\eta + \tfrac12\,\eta:C:\eta` more than the
-    linear one; with :math:`\tau = C:\eta` and u' the rate of u,
+    linear one. The second term is of the order of what the body gives back when u adjusts itself to the first, and the
+    two cancel where they are large (in a body that hardly changes its volume, lambda tr(eta) would be the pressure that
+    keeps it from doing so). So the energy of first order is the first term alone; with :math:`\tau = C:\eta` and u'
+    the rate of u,
 
-    .. math:: \Delta W' = \int \big(\tau + \nabla u\,(\sigma(\varepsilon) + \tau)\big) : \nabla u'.
+    .. math:: \Delta W' = \int \big(\tau + \nabla u\,\sigma(\varepsilon)\big) : \nabla u'.
 
     Parameters
     ----------
@@ -243,12 +246,12 @@ def finite_strain_rates(
 
 
 def _finite_density(lam: float, mu: float, state: Array, rate: Array) -> Array:
-    """(tau + grad u (sigma + tau)) : grad u' with tau = C:eta."""
+    """(tau + grad u sigma) : grad u' with tau = C:eta."""
     a, c, b, d = (state[:, :, j, i] for j in (0, 1) for i in (0, 1))  # grad u = (a b; c d)
     xx, yy, xy = 0.5 * (a * a + c * c), 0.5 * (b * b + d * d), mu * (a * b + c * d)
     mean, strain = lam * (xx + yy), lam * (a + d)
     xx, yy = mean + 2 * mu * xx, mean + 2 * mu * yy
-    s_xx, s_yy, s_xy = xx + strain + 2 * mu * a, yy + strain + 2 * mu * d, xy + mu * (b + c)
+    s_xx, s_yy, s_xy = strain + 2 * mu * a, strain + 2 * mu * d, mu * (b + c)
     first = (xx + a * s_xx + b * s_xy) * rate[:, :, 0, 0] + (xy + a * s_xy + b * s_yy) * rate[:, :, 1, 0]
     second = (xy + c * s_xx + d * s_xy) * rate[:, :, 0, 1] + (yy + c * s_xy + d * s_yy) * rate[:, :, 1, 1]
     return np.asarray(first + second)
