@@ -109,37 +109,6 @@ def jacobian_determinants(nodes: Array, tets: IntArray) -> Array:
     return maps(nodes, tets, np.concatenate(slopes, axis=2))[0]
 
 
-class Unfolded(NamedTuple):
-    """Nodes after `unfolded`, and how many elements were changed."""
-
-    nodes: Array
-    changed: int
-
-
-def unfolded(nodes: Array, tets: IntArray) -> Unfolded:
-    """Straighten the edges of second-order elements that their curved edges fold.
-
-    An element counts as folded when its volume ratio at a quadrature point is not positive. Meshers leave a few
-    such at coarsely meshed bores.
-    """
-    if tets.shape[1] == 4:
-        return Unfolded(nodes, 0)
-    changed = np.zeros(len(tets), dtype=bool)
-    suspects = curved_elements(nodes, tets)
-    for _ in range(10):
-        chosen = np.flatnonzero(suspects)
-        ratio = jacobian_determinants(nodes, tets[chosen])
-        folded = chosen[ratio.min(axis=1) <= 0.0]
-        if not len(folded):
-            break
-        changed[folded] = True
-        bad = tets[folded]
-        nodes = nodes.copy()
-        nodes[bad[:, 4:]] = 0.5 * (nodes[bad[:, EDGES[:, 0]]] + nodes[bad[:, EDGES[:, 1]]])
-        suspects = curved_elements(nodes, tets)
-    return Unfolded(nodes, int(changed.sum()))
-
-
 class _Pattern(NamedTuple):
     """Where each element entry goes in the node-by-node sparse matrix."""
 

@@ -12,6 +12,7 @@ import pytest
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
 from gearfe.housing.attachments import Attachment, Bore, Plane, interface_matrix
+from gearfe.housing.mesh_checks import boundary_faces
 from gearfe.housing.model import Housing
 from gearfe.meshing.session import gmsh_session
 from gearfe.solid import curved_elements, jacobian_determinants
@@ -234,10 +235,51 @@ def test_bad_attachments_and_supports_are_named() -> None:
             Housing.from_arrays(nodes, tets, [], fixed)
 
 
-def test_folded_curved_elements_are_straightened_and_named() -> None:
-    housing = Housing.from_arrays(*broken("folded"))
-    assert any("folded" in note for note in housing.notes)
-    assert not curved_elements(housing.nodes, housing.mesh.cells).any()
+def folded_disc(sag: float, thickness: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Box of (1, 1, thickness) whose bottom bulges into it by `sag` at midside nodes, and the volume that it loses.
+
+    The midside node of an edge of the bottom moves up by `sag`; the bottom's triangles lose ``sag/3 area`` for each of
+    their midside nodes (the integral of the quadratic function of a midside node is a third of the area).
+    """
+    nodes, tets = box((4, 4, 1), (1.0, 1.0, thickness))
+    bottom = boundary_faces(tets)
+    bottom = bottom[np.all(nodes[bottom, 2] < 1e-9, axis=1)]
+    inner = [n for n in np.unique(bottom[:, 3:]) if 0.3 < nodes[n, 0] < 0.7 and 0.3 < nodes[n, 1] < 0.7]
+    nodes[inner, 2] += sag
+    corners = nodes[bottom[:, :3], :2]
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    lost = sag / 3.0 * float(area @ np.isin(bottom[:, 3:], inner).sum(axis=1))
+    return nodes, tets, lost
+
+
+@pytest.mark.parametrize(("sag", "thickness"), [(0.065, 0.2), (0.08, 0.2), (0.06, 0.1)])
+def test_folded_elements_follow_the_surface(sag: float, thickness: float) -> None:
+    """Inner nodes move first; the mass is that of the given surface unless the surface itself had to move."""
+    nodes, tets, lost = folded_disc(sag, thickness)
+    assert jacobian_determinants(nodes, tets).min() <= 0.0
+    housing = Housing.from_arrays(nodes, tets)
+    assert jacobian_determinants(housing.nodes, housing.mesh.cells).min() > 0.0
+    given = 7850.0 * (thickness - lost)
+    assert housing.mass_kg - housing.added_kg == pytest.approx(given, rel=1e-9)
+    note = next(note for note in housing.notes if "folded" in note)
+    surface = np.unique(boundary_faces(tets))
+    if housing.added_kg == 0.0:
+        np.testing.assert_array_equal(housing.nodes[surface], nodes[surface])
+        assert "the mass stay what" in note
+    else:  # straight edges would give all of it back
+        assert 0.0 < housing.added_kg < 0.5 * 7850.0 * lost
+        assert f"{housing.added_kg:+.2g} kg" in note
+    assert housing.reduce(2).added_kg == housing.added_kg
+
+
+def test_midside_nodes_are_moved_no_further_than_needed() -> None:
+    """A midside node slid along its edge folds at a quadrature point beyond a quarter of it; it stays near there."""
+    nodes, tets = broken("folded")
+    housing = Housing.from_arrays(nodes, tets)
+    assert jacobian_determinants(housing.nodes, housing.mesh.cells).min() > 0.0
+    assert curved_elements(housing.nodes, housing.mesh.cells).any()
+    assert housing.mass_kg == pytest.approx(7850.0 * 2.0, rel=1e-9)
 
 
 def test_any_number_of_attachments() -> None:

@@ -102,7 +102,7 @@ def _report(body: ModalBody, errors: dict[str, Any], response: dict[str, float])
     print(
         f"mass            {mass:.4f} kg"
         if math.isfinite(mass)
-        else "mass            not told by matrices of a held body"
+        else "mass            unknown: matrices of a held body do not contain it"
     )
     print(f"mesh            {len(body.nodes)} nodes, {body.nodes.size} unknowns")
     kept = f"{body.modes} modes to {body.internal_hz[body.modes - 1]:.0f} Hz" if body.modes else "no modes"
@@ -112,7 +112,10 @@ def _report(body: ModalBody, errors: dict[str, Any], response: dict[str, float])
     for name, point in zip(body.attachment_names, body.attachment_points, strict=True):
         x, y, z = np.round(1e3 * point, 6) + 0.0
         print(f"bore {name:<10} reference point x {x:8.3f}  y {y:8.3f}  z {z:8.3f} mm")
-    print("frequencies, bores rigid and free to move; estimated error (mesh and reduction, all towards too high):")
+    sign = ""
+    if body.has_mesh:
+        sign = ", all towards too high" if body.added_kg == 0.0 else "; without that of the moved nodes, of either sign"
+    print(f"frequencies, bores rigid and free to move; estimated error (mesh and reduction{sign}):")
     for number, estimate in enumerate(errors["all"]):
         frequency = body.coupled.frequencies_hz[number]
         said = f"<= {100.0 * estimate:5.2f} %   (reduction {100.0 * errors['reduction'][number]:.1e} %)"
@@ -185,6 +188,7 @@ def _write(folder: Path, body: ModalBody, fields: Any, errors: dict[str, Any], r
         write_vtkhdf(folder / "modes.vtkhdf", body.nodes, body.cells, point_data=dict(zip(names, fields, strict=True)))
     summary = {
         "mass_kg": body.rigid_mass[0, 0],
+        "mass_added_by_moved_nodes_kg": body.added_kg,
         "unknowns": body.nodes.size,
         "coordinates": body.size,
         "modes": body.modes,

@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
-from ..solid import EDGES, FACES, jacobian_determinants, unfolded
+from ..solid import EDGES, FACES, jacobian_determinants
 from ..typing import Array, IntArray
 
 #: A midside node further than this part of its edge's length from the edge's middle belongs to another edge.
@@ -61,11 +61,6 @@ def checked_mesh(nodes: object, tets: object) -> CheckedMesh:
     if cells.shape[1] == 10:
         cells = _ordered(points, cells)
     _check_volumes(points, cells)
-    points, folded = unfolded(points, cells)
-    if folded:
-        notes.append(
-            f"curved edges folded {folded} elements; their midside nodes were moved to the middles of the edges"
-        )
     _check_connected(points, cells)
     return CheckedMesh(points, cells, original, tuple(notes))
 

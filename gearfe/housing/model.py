@@ -30,6 +30,7 @@ from .attachments import (
 from .mesh_checks import checked_mesh
 from .meshes import Outer, Prisms, Tetrahedra
 from .surface import Surface, nodal_normals
+from .unfolding import Unfolded, unfolded
 
 #: Said whenever linear tetrahedra are chosen.
 LINEAR_NOTE = (
@@ -63,6 +64,8 @@ class Housing(Facts):
         Number that each node had in the arrays that were given.
     notes
         What the user should know.
+    added_kg
+        Mass that moved nodes of folded elements add (kg); zero where the body has the shape of its mesh.
     """
 
     mesh: Tetrahedra | Prisms
@@ -72,6 +75,7 @@ class Housing(Facts):
     surface: Surface
     original: IntArray
     notes: tuple[str, ...] = ()
+    added_kg: float = 0.0
 
     def facts(self) -> dict[str, str]:
         """Size, attachments, mass."""
@@ -121,6 +125,7 @@ class Housing(Facts):
             Names what is wrong with the mesh, a bore, an attachment or the held nodes.
         """
         mesh = checked_mesh(nodes, tets)
+        shape = unfolded(mesh.nodes, mesh.tets)
         new_number = np.full(len(np.asarray(nodes)), -1)
         new_number[mesh.original] = np.arange(len(mesh.original))
         made = [
@@ -128,15 +133,16 @@ class Housing(Facts):
             for given in attachments
         ]
         housing = cls.of_mesh(
-            Tetrahedra(mesh.nodes, mesh.tets),
+            Tetrahedra(shape.nodes, mesh.tets),
             bores,
-            _fixed_nodes(fixed, mesh.nodes, new_number),
+            _fixed_nodes(fixed, shape.nodes, new_number),
             material=material,
             attachments=made,
             outer=outer,
         )
-        notes = (*mesh.notes, *([LINEAR_NOTE] if mesh.tets.shape[1] == 4 else []), *housing.notes)
-        return replace(housing, original=mesh.original, notes=notes)
+        linear = [LINEAR_NOTE] if mesh.tets.shape[1] == 4 else []
+        notes = (*mesh.notes, *housing.unfolding_notes(shape), *linear, *housing.notes)
+        return replace(housing, original=mesh.original, notes=notes, added_kg=material.density * shape.volume)
 
     @classmethod
     def of_mesh(
@@ -197,6 +203,19 @@ class Housing(Facts):
         """Mass (kg)."""
         return float(self.matrices().nodal_mass.sum())
 
+    def unfolding_notes(self, shape: Unfolded) -> tuple[str, ...]:
+        """What was moved to unfold elements, and the mass that it adds."""
+        if not shape.folded:
+            return ()
+        note = f"curved edges folded {shape.folded} elements; inner nodes beside them were moved"
+        if not shape.moved:
+            return (f"{note}; the surface and the mass stay what they are",)
+        added, mass = self.material.density * shape.volume, self.mass_kg
+        return (
+            f"{note}, and {shape.moved} midside nodes of the surface by up to {1e3 * shape.farthest:.2g} mm: the mass "
+            f"changes by {added:+.2g} kg ({100.0 * added / (mass - added):+.2g} %), which no error estimate covers",
+        )
+
     def reduce(
         self,
         modes: int | None = None,
@@ -253,6 +272,7 @@ class Housing(Facts):
             softening=np.zeros_like(found.mass),
             held=len(self.fixed) > 0,
             notes=self.notes,
+            added_kg=self.added_kg,
         )
         return self.with_estimate(body) if estimate else body
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..progress import stage
-from ..solid import unfolded
 from ..typing import Array
 from .bisection import Bisected, bisected
 from .meshes import Outer, Tetrahedra
 from .model import Housing
+from .unfolding import unfolded
 
 #: Part of the estimated error whose elements are refined in a round (Doerfler, SIAM J. Numer. Anal. 33, 1996).
 BULK = 0.5
@@ -52,8 +52,11 @@ def refined(housing: Housing, unknowns: int, outer: Outer | None = None) -> Hous
         with stage(f"refining the housing's mesh, {housing.unknowns} of {unknowns} unknowns"):
             found, room = _round(housing, mesh, unknowns)
         if found is not None:
-            mesh = replace(mesh, nodes=unfolded(found.nodes, found.tets).nodes, cells=found.tets)
-            housing, rounds = _on(housing, mesh, found, outer), rounds + 1
+            shape = unfolded(found.nodes, found.tets)
+            mesh = replace(mesh, nodes=shape.nodes, cells=found.tets)
+            added = housing.added_kg + housing.material.density * shape.volume
+            housing, rounds = replace(_on(housing, mesh, found, outer), added_kg=added), rounds + 1
+            housing = replace(housing, notes=(*housing.notes, *housing.unfolding_notes(shape)))
     times = f"{rounds} round{'s' * (rounds != 1)}"
     note = f"the mesh was refined from {first} to {housing.unknowns} unknowns in {times}, where it erred most"
     return replace(housing, notes=(*housing.notes, note))

@@ -28,7 +28,7 @@ from ..shown import Shown
 from ..typing import Array, IntArray
 
 #: Written to files; a file of another format is refused with a message.
-FORMAT = 4
+FORMAT = 5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -97,6 +97,9 @@ class ModalBody(Reduction, Shown):
         Whether a part of the body is fixed to the frame; a free body has six rigid-body modes.
     notes
         What the user should know about how it was made.
+    added_kg
+        Mass that moved nodes of folded elements added (kg). Unless it is zero, the body has another shape than its
+        mesh, and frequencies may err to either side.
     """
 
     damping: Array
@@ -113,6 +116,7 @@ class ModalBody(Reduction, Shown):
     softening: Array
     held: bool
     notes: tuple[str, ...] = ()
+    added_kg: float = 0.0
 
     @property
     def size(self) -> int:
