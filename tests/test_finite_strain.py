@@ -38,7 +38,7 @@ def meshing_pair(coarsen: float) -> MeshingPair:
 
 
 def extra_energy(pair: MeshingPair, position: Positions) -> float:
-    """First-order part of W_SVK - W_linear, the integral of sigma:eta over both gears (J): full tensors, all sectors."""
+    """First-order part of W_SVK - W_linear: the integral of sigma:eta over both gears (J), full tensors."""
     total = 0.0
     for gear, body in enumerate(pair.bodies):
         every = np.arange(body.teeth)
@@ -77,7 +77,7 @@ def test_few_neighbours_suffice() -> None:
 
 
 def test_share_has_a_limit_where_the_volume_is_kept() -> None:
-    """Elasticity has a limit for nu -> 0.5, from which it differs by the order of 1 - 2 nu; the mesh adds some per cent.
+    """Elasticity has a limit for nu -> 0.5, from which it differs by the order of 1 - 2 nu; meshes add some %.
 
     With the energy's second-order term the share at 0.4999 has the other sign and 15 times the amount.
     """

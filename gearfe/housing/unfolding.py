@@ -1,4 +1,4 @@
-r"""Unfold curved tetrahedra: a mesher puts midside nodes on the true surface, and thin elements below it turn inside out.
+r"""Unfold curved tetrahedra: midside nodes on the true surface can turn thin elements below it inside out.
 
 The displacement d from straight edges to curved ones is continued into the body as that of an elastic solid whose
 surface is moved by d (Persson, Peraire, AIAA paper 2009-949): inner nodes near the folded elements follow the surface,
