@@ -44,7 +44,7 @@ def test_the_series_sums_up_to_the_law(kind, s):
     if kind == "law":
         law = hertzian_law(0.3)
         flanks = (
-            LawFlank(3, 2, 1.0, 1.0, 0.006, 1e8, 0.0, law, 0.2, rayleigh=500.0),
+            LawFlank(3, 2, 1.0, 1.0, 0.006, 1e8, 0.0, law, 0.2, mean_damping=500.0),
             LawFlank(4, 5, 1.0, -1.0, 0.0585, 0.0, -2e-6, law, 0.0),
         )
     else:

@@ -229,6 +229,11 @@ class LocalForce(Element):
     series
         The same law by the orders of its Taylor series. When the only force of a linear system has one, the whole
         integration runs compiled.
+    breaks
+        Times (s) at which the law is not smooth.
+    piece_numbers
+        ``(t, u, du)`` -> whole numbers, shape (..., s) at times (...), that change where the law has a corner or a
+        jump; None: it is smooth.
     """
 
     touches: tuple[Element, ...] = field()
@@ -236,7 +241,18 @@ class LocalForce(Element):
     law: Callable[[float, Array, Array], Array] = field()
     series: SeriesLaw | None = None
     breaks: tuple[float, ...] = ()
+    piece_numbers: Callable[[float | Array, Array, Array], IntArray] | None = None
     name: str = "local force"
+
+    @property
+    def pieced(self) -> bool:
+        """Whether its law has corners or jumps."""
+        return self.piece_numbers is not None
+
+    def pieces(self, t: float | Array, q: Array, v: Array) -> IntArray:
+        """Numbers of the smooth pieces that the law is on, shape (..., s)."""
+        assert self.piece_numbers is not None
+        return self.piece_numbers(t, q @ self.W, v @ self.W)
 
     def force(self, t: float, q: Array, v: Array) -> Array:
         """W law."""

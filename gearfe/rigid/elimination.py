@@ -8,11 +8,15 @@ afterwards.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..typing import Array
+from .contract import Element, LocalForce, ModalBlocks
+from .start import Start
 from .system import System
 
 #: Entries of the damping beside the diagonal that are smaller than this part of the largest one are round-off:
@@ -95,3 +99,28 @@ def _modal_coordinates(system: System) -> ModalCoordinates:
     least = ROUND_OFF * float(np.abs(damping).max(initial=0.0))
     damping = np.where((np.abs(damping) > least) | np.eye(len(damping), dtype=bool), damping, 0.0)
     return ModalCoordinates(system, T, origin, eigenvalues, damping, -T.T @ (system.stiffness @ origin))
+
+
+def in_modes(modal: ModalCoordinates, start: Start) -> tuple[System, Start]:
+    """The system in its minimal coordinates, which no joint holds, and its start there."""
+    body = ModalBlocks(np.eye(len(modal.eigenvalues)), modal.damping, np.diag(modal.eigenvalues))
+    elements: list[Element] = [body]
+    for force, index in modal.system.forces:
+        assert isinstance(force, LocalForce)
+        offset, numbers = modal.origin[index] @ force.W, force.piece_numbers
+        law = _shifted(force.law, offset)
+        pieces = None if numbers is None else _shifted(numbers, offset)
+        directions = modal.T[index].T @ force.W
+        elements.append(LocalForce((body,), directions, law, breaks=force.breaks, piece_numbers=pieces))
+    elements.append(LocalForce((body,), modal.constant[:, None], lambda *_: np.ones(1)))
+    q, v = modal.reduce(start.q, start.v)
+    return System(elements), replace(start, q=q, v=v, active=np.zeros(0, dtype=bool), excess=np.zeros(0))
+
+
+def _shifted(law: Callable[..., Any], offset: Array) -> Callable[..., Any]:
+    """A law of (t, u, u') at u + offset."""
+
+    def moved(t: float | Array, u: Array, du: Array) -> Any:
+        return np.asarray(law(t, u + offset, du))
+
+    return moved

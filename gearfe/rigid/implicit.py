@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -29,10 +28,10 @@ from . import (
 )
 from .collocation import RADAU, Collocated, Scheme, path_matrix, powers_of_path, scheme
 from .compiled import Kernels, bind
-from .contract import Element, LocalForce, ModalBlocks
+from .contract import LocalForce
 from .corners import TRUSTED, Corners, collocated_path, quiet_speeds
 from .dense import Polynomials
-from .elimination import ModalCoordinates, is_linear, modal_coordinates
+from .elimination import in_modes, is_linear, modal_coordinates
 from .kernel_collocation import SOLVED, Stages
 from .kernel_equations import Band, Equations, Scratch, Wide
 from .numpy_equations import SystemEquations
@@ -371,20 +370,3 @@ def narrow_band(program: Program) -> Band:
         place, entries, program.mass[tuple(entries.T)], np.ascontiguousarray(held.astype(np.int64)),
         program.mass[tuple(held.T)], acting, first.astype(np.int64), reach.astype(np.int64), last.astype(np.int64),
     )  # fmt: skip
-
-
-def in_modes(modal: ModalCoordinates, start: Start) -> tuple[System, Start]:
-    """The system in its minimal coordinates, which no joint holds, and its start there."""
-    body = ModalBlocks(np.eye(len(modal.eigenvalues)), modal.damping, np.diag(modal.eigenvalues))
-    elements: list[Element] = [body]
-    for force, index in modal.system.forces:
-        assert isinstance(force, LocalForce)
-        offset = modal.origin[index] @ force.W
-
-        def law(t: float, u: Array, du: Array, own: Any = force.law, offset: Array = offset) -> Array:
-            return np.asarray(own(t, u + offset, du))
-
-        elements.append(LocalForce((body,), modal.T[index].T @ force.W, law, breaks=force.breaks))
-    elements.append(LocalForce((body,), modal.constant[:, None], lambda *_: np.ones(1)))
-    q, v = modal.reduce(start.q, start.v)
-    return System(elements), replace(start, q=q, v=v, active=np.zeros(0, dtype=bool), excess=np.zeros(0))

@@ -18,7 +18,7 @@ from . import kernel_modal
 from .compiled import Kernels
 from .contract import LocalForce, SeriesLaw
 from .dense import Dense, within_run
-from .elimination import ModalCoordinates, is_linear
+from .elimination import ModalCoordinates, in_modes, is_linear
 from .explicit import Expand, Problem, run_problem
 from .packed import Packed
 from .start import Start
@@ -60,7 +60,10 @@ def run_modal_explicit(
     y0 = np.concatenate(modal.reduce(start.q, start.v))
     options: dict[str, Any] = {"breaks": modal.system.breaks, "longest": longest, "most": most, "watch": watch}
     local = max(PLAIN_SHARE * tolerance, 1e-14)
-    dense, status, statistics = run_problem(modal_problem(modal), (start.time, float(times[-1])), y0, local, **options)
+    problem = modal_problem(modal)
+    if modal.system.pieced:
+        problem = problem._replace(system=in_modes(modal, start)[0])
+    dense, status, statistics = run_problem(problem, (start.time, float(times[-1])), y0, local, **options)
     return dense, status, {**statistics, "backend": "plain", "free_coordinates": modal.T.shape[1]}
 
 

@@ -66,6 +66,8 @@ class Pushes(NamedTuple):
     value: Array  # (S, m)
     by_place: Array  # (S, m, m): of force i with freedom j
     by_rate: Array | None  # (S, m, m)
+    momentum: Array | None = None  # (S, m) whose rate of change is a further force: of dampers that act in contact only
+    momentum_by_place: Array | None = None  # (S, m, m)
 
 
 class SteadyForces(Protocol):
@@ -199,6 +201,8 @@ def evaluate(
     u, du = lattice.synthesis(places), lattice.synthesis(turning * places)
     pushes = system.forces(lattice.theta, speed, u, du)
     forces = lattice.analysis(pushes.value)[: len(places)]
+    if pushes.momentum is not None:
+        forces = forces + turning * lattice.analysis(pushes.momentum)[: len(places)]
     return Evaluated(places - moved(system, flexibility, forces), forces, pushes, lattice)
 
 
@@ -222,7 +226,7 @@ def unpacked(x: Array, scale: Array) -> ComplexArray:
 def product(system: Oscillator, speed: float, at: Evaluated, flexibility: ComplexArray) -> Callable[[Array], Array]:
     """Change of the residual for a change of the amplitudes, both `packed`: the Jacobian, without a matrix."""
     lattice, scale, count = at.lattice, system.scale, len(at.residual)
-    by, rate = at.pushes.by_place, at.pushes.by_rate
+    by, rate, momentum = at.pushes.by_place, at.pushes.by_rate, at.pushes.momentum_by_place
     turning = 1j * system.omega(speed, count - 1)[:, None]
     if rate is not None:
         by = np.concatenate([by, rate], axis=2)
@@ -231,6 +235,9 @@ def product(system: Oscillator, speed: float, at: Evaluated, flexibility: Comple
         change = unpacked(x, scale)
         moves = lattice.synthesis(change if rate is None else np.hstack([change, turning * change]))
         forces = lattice.analysis(np.matmul(by, moves[..., None])[..., 0])[:count]
+        if momentum is not None:
+            moment = np.matmul(momentum, moves[:, : len(scale), None])[..., 0]
+            forces = forces + turning * lattice.analysis(moment)[:count]
         return x - packed((flexibility @ forces[..., None])[..., 0], scale)
 
     return changed

@@ -162,10 +162,10 @@ def _check(model: TrainModel) -> None:
 
 
 def _damping(model: TrainModel) -> Array:
-    """Of the coordinates, without what the forces of mesh laws take off."""
+    """Of the coordinates, without what the forces of flanks that damp in contact only take off."""
     made = model.modal.damping.copy()
     for line in model.meshes:
-        if line.law is not None:
+        if line.in_contact:
             along = model.modal.T.T @ line.row
             made -= line.rayleigh * np.outer(along, along)
     return made

@@ -4,6 +4,13 @@ The same forces as `gearfe.train.forces`: with the turns n of the drive in a per
 phase of a flank is :math:`s(g\,n\cdot\theta + u_r) + \varphi_0`, but for whole cycles of the mesh, so the rotation's
 feedback on the phase is kept. What stands in the linear part already, the mean stiffness along the approach, is taken
 off.
+
+A damper that acts in contact only has a force that jumps at the touch. It is the rate of change of what does not,
+
+.. math:: c\,H(\delta)\,\dot\delta = \frac{d}{dt}\,c\max(\delta, 0) ,
+
+so its harmonics are :math:`ik\cdot\omega` times those of :math:`c\max(\delta, 0)`, and Newton's method has their
+derivatives.
 """
 
 from __future__ import annotations
@@ -84,12 +91,19 @@ class MeshForces:
         """Forces at the freedoms, what the linear part has taken off."""
         value = np.zeros_like(u)
         by_place = np.zeros((*u.shape, u.shape[1]))
-        by_rate = None
+        by_rate, momentum, momentum_by_place = None, None, None
         for number, (flank, (d, r, a, s)) in enumerate(zip(self.flanks, self.freedoms, strict=True)):
             at = self.flank(number, theta, speed, u, du)
             value[:, d] += flank.mean * u[:, d] - at.force
             by_place[:, d, d] += flank.mean - at.tangent
             by_place[:, d, r] -= flank.sense * at.cross
+            if at.momentum is not None and at.per_rate is not None:
+                if momentum is None or momentum_by_place is None:
+                    momentum, momentum_by_place = np.zeros_like(u), np.zeros_like(by_place)
+                value[:, d] += at.per_rate * du[:, d]
+                momentum[:, d] -= at.momentum
+                momentum_by_place[:, d, d] -= at.per_rate
+                continue
             if by_rate is None and (at.per_rate is not None or at.drag is not None):
                 by_rate = np.zeros_like(by_place)
             if at.per_rate is not None and by_rate is not None:
@@ -106,4 +120,4 @@ class MeshForces:
                     by_rate[:, on, d] -= at.drag.by_rate[:, i]
                     by_rate[:, on, a] -= at.drag.by_across_rate[:, i]
                     by_rate[:, on, s] -= at.drag.by_turn_rate[:, i]
-        return Pushes(value, by_place, by_rate)
+        return Pushes(value, by_place, by_rate, momentum, momentum_by_place)

@@ -75,7 +75,7 @@ def coupled_modes(train: CondensedTrain, speeds: Array, highest_hz: float) -> Co
     count = int((modal.eigenvalues <= (2.0 * math.pi * highest_hz) ** 2).sum())
     damping = linear.damping.copy()
     for line in model.meshes:
-        if line.law is not None:
+        if line.in_contact:
             along = modal.T.T @ line.row
             damping += line.damping * np.outer(along, along)
     gyro = linear.tilts @ linear.gyroscopic @ linear.tilts.T

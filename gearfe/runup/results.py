@@ -131,7 +131,7 @@ def steady_result(
             beyond |= bool(at.beyond.any())
         along = train.forces.freedoms[numbers[0], 0]
         approach[:, i], apart[i] = u[:, along], open_.mean()
-        if line.law is None:
+        if not line.in_contact:
             force[:, i] += line.damping * du[:, along]
     modal = system.linear.modal(omega, orbit.speed, orbit.forces)
     acceleration = -(omega**2)[:, None] * real_times(modal, train.bores_of_modes.T)

@@ -118,13 +118,30 @@ def _multipliers(
 ) -> tuple[ComplexArray, bool]:
     """Multipliers with so many steps, and whether derivatives jump."""
     theta, u, du = along(system, orbit, span.turns, steps)
-    _, A, B = system.forces(theta, orbit.speed, u, du)
+    pushes = system.forces(theta, orbit.speed, u, du)
+    A, B = pushes.by_place, pushes.by_rate
     order = np.argsort(kick_times(np.linspace(0.0, 1.0, steps + 1)).ravel(), kind="stable")  # kicks step back, too
     changes = np.abs(np.diff(A[order], axis=0)).max(axis=0)
     jumps = bool((np.diag(changes) * np.diag(system.linear.statics) > JUMP).any())
     kept = strengths(system.linear, A) >= reached * np.diag(system.linear.damping) / np.sqrt(system.linear.squares)
+    if pushes.momentum_by_place is not None:
+        step = 2.0 * math.pi * span.turns / abs(orbit.speed) / steps
+        A, B, touches = _with_momentum(A, B, pushes.momentum_by_place, step)
+        jumps |= touches
     made = around(system, orbit.speed, A, B, kept, span)
     return made, jumps
+
+
+def _with_momentum(A: Array, B: Array | None, momentum: Array, step: float) -> tuple[Array, Array, bool]:
+    """Add the derivatives of a force that is the rate of change of a momentum p(u), and say whether p_u jumps.
+
+    Its change is p_u u' + p_u' u. Where teeth touch p_u jumps, and p_u' is an impulse, spread over its step (s). It
+    is what the saltation matrix of a jump in the acceleration has (Leine & Nijmeijer, Dynamics and Bifurcations of
+    Non-Smooth Mechanical Systems, 2004, Ch. 7).
+    """
+    by_step = momentum.reshape(-1, len(KICKS), *momentum.shape[1:])
+    change = (by_step[:, -1] - by_step[:, 0]) / step
+    return A + np.repeat(change, len(KICKS), axis=0), momentum if B is None else B + momentum, bool(change.any())
 
 
 def along(system: Oscillator, orbit: Orbit, turns: float, steps: int) -> tuple[Array, Array, Array]:

@@ -84,6 +84,12 @@ class TrainMeshTable:
         "a gear keyed at an angle; left out: 0, and where gears are shared by meshes what their teeth make it",
     )
     damping_N_s_per_m: float = quantity(0.0, low=0.0, doc="damping along the line of action (N s/m)")
+    damping_acts: str | None = quantity(
+        None,
+        choices=("always", "in_contact"),
+        doc="when the damper of the mesh acts, its part of rayleigh_beta_s included: always, or in_contact, only while "
+        "teeth bear (with a map in proportion to the force); left out: in_contact with a map, always with a curve",
+    )
     centre_distance_mm: float | None = quantity(
         None, above=0.0, doc="working centre distance (mm); left out: no backlash"
     )
@@ -153,6 +159,10 @@ class TrainMeshTable:
         if self.backlash_um is not None and self.rigid:
             problem = "stands beside rigid = true: rigid teeth never part"
             raise InputError(f"{where}.backlash_um", self.backlash_um, problem, "leave one out")
+        for key in ("damping_N_s_per_m", "damping_acts"):
+            if getattr(self, key) and self.rigid:
+                problem = "stands beside rigid = true: a rigid mesh does not yield, so nothing damps it"
+                raise InputError(f"{where}.{key}", getattr(self, key), problem, "leave one out")
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from ..gear.pair import GearPair, in_keys
 from ..meshlaw.law import MeshLaw
 from ..stiffness.periodic import PeriodicInterpolant
 from .friction import check_friction
-from .gear_train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from .kinematics import driving_senses
 from .phases import tooth_places
 from .statics import check_flanks, one_sided
@@ -164,10 +164,28 @@ def _check_mesh(train: GearTrain, mesh: GearMesh) -> None:
         raise InputError(
             f"{label} damping", mesh.damping, "must be finite and >= 0 N s/m", "negative damping feeds energy in"
         )
+    _check_damper(mesh)
     check_friction(label, mesh.friction, isinstance(mesh.stiffness, MeshLaw))
     for gear in (one, two):
         _check_pitch_errors(label, gear, isinstance(mesh.stiffness, MeshLaw))
     check_curve(mesh, one.gear.teeth)
+
+
+def _check_damper(mesh: GearMesh) -> None:
+    """The damper of a mesh acts at times that the mesh has."""
+    label, acts = f"mesh {mesh.name!r} damping_acts", mesh.damping_acts
+    if acts not in (None, ALWAYS, IN_CONTACT):
+        raise InputError(label, acts, f"must be {ALWAYS!r} or {IN_CONTACT!r}", "leave it out for the default")
+    if acts == IN_CONTACT and not isinstance(mesh.stiffness, MeshLaw) and mesh.backlash is None:
+        problem = (
+            "needs teeth that part, and a mesh without a law and without a backlash is a spring that acts both ways"
+        )
+        raise InputError(label, acts, problem, "give backlash_um, or leave it out: such a damper acts always")
+    if mesh.stiffness is None and (acts or mesh.damping):
+        problem = "stands beside a rigid mesh, which does not yield, so nothing damps it"
+        raise InputError(
+            label if acts else label.replace("damping_acts", "damping"), acts or mesh.damping, problem, "leave it out"
+        )
 
 
 def _check_pitch_errors(label: str, gear: ShaftGear, law: bool) -> None:

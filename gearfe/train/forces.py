@@ -5,7 +5,9 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
 
 - of a *flank with a stiffness curve*: along the approach d, :math:`-(k(\varphi)\,(u_d - j) - k_0 u_d)` with
   :math:`\varphi = s\,(g\psi + u_r) + \varphi_0` and r the driver's rotation. The part with the mean :math:`k_0` stands
-  in the system's stiffness. A flank that may part bears where :math:`u_d > j`;
+  in the system's stiffness. A flank that may part bears where :math:`u_d > j`. A damper that acts in contact only
+  adds :math:`-(c\,H(u_d - j)\,u_d' - c_0 u_d')`, H being Heaviside's step and :math:`c_0` what stands in the system's
+  damping;
 - of a *flank with a mesh law* (`gearfe.meshlaw.law`): :math:`-(F\,\langle 1 + \chi u_d'\rangle - k_0 u_d)` along d, and
   :math:`-s M` along r, the driver's rotation relative to the line of centres; with *friction* (`gearfe.train.friction`)
   :math:`-\sum\mu N_k s(v_k/v_0)` across the line of action, and that times :math:`e_k` along the driver's turn
@@ -31,7 +33,7 @@ import numpy as np
 from ..meshlaw.law import MeshForces, MeshLaw
 from ..rigid.timefunctions import TimeFunction
 from ..stiffness.periodic import PeriodicInterpolant
-from ..typing import Array, BoolArray
+from ..typing import Array, BoolArray, IntArray
 from .friction import Sliding, smooth_sign
 
 
@@ -61,6 +63,7 @@ class FlankForces(NamedTuple):
     per_rate: Array | None = None  # N s/m
     moment: Array | None = None  # N m on the phase
     moment_by_approach: Array | None = None  # N m/m
+    momentum: Array | None = None  # N s: its rate of change is the damper's part of the force, which jumps at the touch
     bend: Array | None = None  # N m/rad: of the moment with the phase
     drag: Drag | None = None
 
@@ -88,6 +91,9 @@ class MeshFlank(ABC):
         Stiffness (N/m) that the system's constant part has along the approach already.
     gap
         Approach (m) at which unmodified flanks touch.
+
+    Flanks also have a `mean_damping` (N s/m), which the system's constant part has along the approach already, and a
+    `damping` that acts while their teeth bear.
     """
 
     direction: int
@@ -113,20 +119,28 @@ class MeshFlank(ABC):
 
 @dataclass(frozen=True, eq=False)
 class CurveFlank(MeshFlank):
-    """Force k(phase) times approach; where `parts`, none before the touch."""
+    """Force k(phase) times approach; where `parts`, none before the touch.
 
-    damping: ClassVar[float] = 0.0
-    rayleigh: ClassVar[float] = 0.0
+    `damping` is c (N s/m) of a damper that acts in contact only: at the touch its force jumps.
+    """
+
     sliding: ClassVar[None] = None
     curve: PeriodicInterpolant
     parts: bool
+    damping: float = 0.0
+    mean_damping: float = 0.0
 
     def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:  # noqa: ARG002
         """Forces at phases (rad) and approaches beyond the gap (m), (n,)."""
         k, slope = self.curve(phase)
         bears = self.bears(phase, approach)
         force, tangent, cross = (np.where(bears, x, 0.0) for x in (k * approach, k, slope * approach))
-        return FlankForces(force, tangent, cross, ~bears, np.zeros(len(phase), dtype=bool))
+        never = np.zeros(len(phase), dtype=bool)
+        if not self.damping > 0.0:
+            return FlankForces(force, tangent, cross, ~bears, never)
+        c, momentum = np.where(bears, self.damping, 0.0), np.where(bears, self.damping * approach, 0.0)
+        force = force + c * slip.rates[:, 0]
+        return FlankForces(force, tangent, cross, ~bears, never, per_rate=c, momentum=momentum)
 
     def bears(self, phase: Array, approach: Array) -> BoolArray:  # noqa: ARG002
         """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
@@ -138,14 +152,13 @@ class LawFlank(MeshFlank):
     """A mesh law; `damping` is chi (s/m), `sliding` its friction or None.
 
     `shifts`, shape (L,), is the approach (m) by which tooth pair k touches later, k taken modulo L: its pitch errors.
-    `rayleigh` (N s/m) is what the system's constant part damps along the approach already.
     """
 
     law: MeshLaw
     damping: float
     sliding: Sliding | None = None
     shifts: Array = field(default_factory=lambda: np.zeros(1))
-    rayleigh: float = 0.0
+    mean_damping: float = 0.0
 
     def bears(self, phase: Array, approach: Array) -> BoolArray:
         """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
@@ -241,7 +254,7 @@ class TrainForces:
         out = np.zeros_like(u)
         rate = self.angle(t, 1)
         for flank, made in zip(self.flanks, flanks or self.of_flanks(t, u, du), strict=True):
-            out[:, flank.direction] += flank.mean * u[:, flank.direction] + flank.rayleigh * du[:, flank.direction]
+            out[:, flank.direction] += flank.mean * u[:, flank.direction] + flank.mean_damping * du[:, flank.direction]
             out[:, flank.direction] -= made.force
             if made.moment is not None:
                 out[:, flank.turn] -= flank.sense * made.moment
@@ -266,6 +279,24 @@ class TrainForces:
             return made
 
         return law
+
+    @property
+    def jumps(self) -> bool:
+        """Whether forces jump where teeth touch: dampers of curves that act in contact only."""
+        return any(isinstance(flank, CurveFlank) and flank.damping > 0.0 for flank in self.flanks)
+
+    def pieces(self, t: float | Array, u: Array, du: Array) -> IntArray:  # noqa: ARG002
+        """Whether the teeth of each flank with a curve bear, 1 or 0, at times (...); shape (..., flanks).
+
+        u and du have the shape (..., directions).
+        """
+        flat, angle = u.reshape(-1, self.size), np.atleast_1d(self.angle(t)).ravel()
+        bearing = [
+            flank.bears(*flank.phase_and_approach(angle, flat))
+            for flank in self.flanks
+            if isinstance(flank, CurveFlank)
+        ]
+        return np.stack(bearing, axis=-1).astype(np.int64).reshape(*u.shape[:-1], -1)
 
     @property
     def breaks(self) -> tuple[float, ...]:

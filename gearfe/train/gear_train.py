@@ -22,6 +22,8 @@ from ..typing import Array
 from .friction import Lubrication
 
 Vector = tuple[float, float, float]
+#: When the damper of a mesh acts.
+ALWAYS, IN_CONTACT = "always", "in_contact"
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,10 @@ class GearMesh:
         line of centres. None: from the teeth of the connected gears, the first of whose meshes has 0; see
         `gearfe.train.phases`.
     damping
-        N s/m along the line of action; with a law at the force of steady running.
+        N s/m along the line of action; with a law that damps in contact only, at the force of steady running.
+    damping_acts
+        ``always``, or ``in_contact``: only while teeth bear. None: in contact with a law, else always. The part of
+        `Damping.beta` acts alike.
     interpolation
         ``cubic`` (monotone) or ``linear``, for a curve.
     centre_distance
@@ -123,11 +128,19 @@ class GearMesh:
     centre_distance: float | None = None
     backlash: float | None = None
     friction: float | Lubrication = 0.0
+    damping_acts: str | None = None
 
     @property
     def name(self) -> str:
         """``driver-driven``."""
         return f"{self.driver}-{self.driven}"
+
+    @property
+    def damps_in_contact(self) -> bool:
+        """Whether its damper acts only while teeth bear."""
+        if self.damping_acts is None:
+            return isinstance(self.stiffness, MeshLaw)
+        return self.damping_acts == IN_CONTACT
 
     def interpolant(self) -> PeriodicInterpolant:
         """Stiffness over the driver's rotation, of a mesh without a law; a constant becomes a flat curve."""

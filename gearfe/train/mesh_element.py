@@ -15,9 +15,13 @@ its multiplier.
 A mesh law (`gearfe.meshlaw`) takes the place of :math:`k\,\delta`. Its phase is the driver's rotation relative to the
 line of centres, whose turn is :math:`t\cdot(u_2 - u_1)/a` with the displacements of the gears' centres, and its moment
 M acts on that: on the driver, and across the line of centres. The back flanks, where a backlash j is known, have the
-line of action :math:`n_b = -\cos\alpha_w\,t + \sin\alpha_w\,c` and bear behind j. Damping of such a mesh grows with
-its force, :math:`d\,\dot\delta\,F/F_0`, and never pulls; :math:`F_0` is the force in steady running. Friction acts
-across the line of action, see `gearfe.train.friction`.
+line of action :math:`n_b = -\cos\alpha_w\,t + \sin\alpha_w\,c` and bear behind j. Friction acts across the line of
+action, see `gearfe.train.friction`.
+
+The damper of a mesh acts always, :math:`d\,\dot\delta` along the driving line of action (Kahraman & Singh, J. Sound
+Vib. 142, 1990), or in contact only. With a curve that is :math:`d\,\dot\delta\,H(\delta)`, on each flank along its own
+line of action; with a mesh law it grows with the force, :math:`d\,\dot\delta\,F/F_0`, and never pulls (Hunt & Crossley,
+J. Appl. Mech. 42, 1975); :math:`F_0` is the force in steady running.
 """
 
 from __future__ import annotations
@@ -67,8 +71,10 @@ class MeshLine:
     mean, damping
         Mean of k (N/m), infinite for a rigid mesh; d (N s/m), the Rayleigh part included.
     rayleigh
-        The Rayleigh part (N s/m). Of a law it stands in the constant part, which then is damped alike in all modes, and
-        the law's forces take it off again.
+        The Rayleigh part (N s/m). Of a damper that acts in contact only it stands in the constant part, which then is
+        damped alike in all modes, and the forces of the flanks take it off again.
+    in_contact
+        Whether the damper acts in contact only, the Rayleigh part included.
     reference
         F0 (N) of a law.
     driver
@@ -98,6 +104,7 @@ class MeshLine:
     mean: float
     damping: float
     rayleigh: float
+    in_contact: bool
     reference: float
     driver: int
     ratio: float
@@ -151,7 +158,7 @@ class MeshLine:
         if self.rigid:
             return LinearJoint(tuple(bodies), self.row[None, :], np.zeros(1), name=f"mesh {self.name}")
         square = np.outer(self.row, self.row)
-        damping = self.rayleigh if self.law is not None else self.damping
+        damping = self.rayleigh if self.in_contact else self.damping
         return LinearForce(tuple(bodies), damping * square, self.mean * square, f"mesh {self.name}")
 
     def flanks(self, first: int) -> tuple[Flank, ...]:
@@ -161,15 +168,16 @@ class MeshLine:
         made: list[Flank] = []
         for number, (side, mean, gap) in enumerate(ends):
             place = (first + number, turn, self.ratio, side * self.sense, side * self.phase, mean, gap)
+            damping = self.damping if self.in_contact else 0.0
+            mean_damping = self.rayleigh if self.in_contact and number == 0 else 0.0
             if self.law is not None:
                 sliding = self.sliding
                 if sliding is not None:
                     sliding = replace(sliding, across=turn + 1 + 2 * number, spin=turn + 2)
-                rayleigh = self.rayleigh if number == 0 else 0.0
-                chi = self.damping / self.reference
-                made.append(LawFlank(*place, self.law.sides[number], chi, sliding, self.shifts[number], rayleigh))
+                law, chi = self.law.sides[number], damping / self.reference
+                made.append(LawFlank(*place, law, chi, sliding, self.shifts[number], mean_damping))
             elif self.curve is not None:
-                made.append(CurveFlank(*place, self.curve, not self.pulls))
+                made.append(CurveFlank(*place, self.curve, not self.pulls, damping, mean_damping))
         return tuple(made)
 
 
@@ -266,6 +274,7 @@ def mesh_line(train: GearTrain, mesh: GearMesh, shafts: Shafts, running: Operati
         mean=mean,
         damping=mesh.damping + rayleigh,
         rayleigh=rayleigh,
+        in_contact=mesh.damps_in_contact,
         reference=reference,
         driver=i,
         ratio=ratios[i],

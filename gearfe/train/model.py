@@ -169,8 +169,9 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
     forces, directions = _forces(train, lines, torques, angle, placed)
     series = train_series(forces)
     changing = LocalForce(
-        tuple(bodies), directions, forces.at_one_time, series, forces.breaks, name="forces of the train"
-    )
+        tuple(bodies), directions, forces.at_one_time, series, forces.breaks, forces.pieces if forces.jumps else None,
+        name="forces of the train",
+    )  # fmt: skip
     elements = [*bodies, *_supports(train, shafts, housing), *(line.element(bodies) for line in lines), changing]
     system, modal = _damped(train, elements, bodies)
     return TrainModel(

@@ -54,7 +54,7 @@ class Gyros(NamedTuple):
 
 
 class Flanks(NamedTuple):
-    """Flanks, see `gearfe.train.forces.LawFlank`; of those with curves the damping is 0."""
+    """Flanks, see `gearfe.train.forces`: `damping` is chi (s/m) of a law and c (N s/m) of a curve."""
 
     direction: IntArray
     turn: IntArray
@@ -64,7 +64,7 @@ class Flanks(NamedTuple):
     mean: Array
     gap: Array
     damping: Array
-    rayleigh: Array
+    mean_damping: Array
 
 
 class Slides(NamedTuple):
@@ -132,12 +132,14 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
         memory[row + Z2, j] = product(j, row + Z, row + Z, memory)
         memory[row + Z3, j] = product(j, row + Z2, row + Z, memory)
         out[d] += p.flanks.mean[k] * u[d, j]
+        out[d] += p.flanks.mean_damping[k] * rate * u[d, j + 1]
         if p.places.curve[k] < 0:
             contact(j, k, rate, u, p, memory, pieces, out)
         else:
             memory[row + STIFFNESS, j] = cubic(j, row, row + CELL, 0, memory)
             if pieces[p.places.piece[k] + 2] >= 0:
                 out[d] -= product(j, row + STIFFNESS, row + DELTA, memory)
+                out[d] -= p.flanks.damping[k] * rate * u[d, j + 1]
 
 
 def cubic(j: int, z: int, numbers: int, column: int, memory: Array) -> float:
@@ -165,7 +167,6 @@ def contact(
     memory[row + DAMPED, j] = p.flanks.damping[k] * rate * u[d, j + 1]
     if j == 0:
         memory[row + DAMPED, 0] += 1.0
-    out[d] += p.flanks.rayleigh[k] * rate * u[d, j + 1]
     settled = False
     for _ in range(NEWTON):  # for order 0 alone, whose forces then are those that make the gaps vanish
         gaps(j, slots, memory, row, pieces, at)

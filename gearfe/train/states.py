@@ -98,7 +98,7 @@ def contact_forces(
             if line.sliding is not None and made.drag is not None:
                 torque[:, i] += made.drag.value @ np.array([line.sliding.arm, 1.0])
                 power[:, i] += made.drag.power
-        if line.law is None:
+        if not line.in_contact:
             out[:, i] += line.damping * (v @ line.row)
     return out, torque, power, apart
 

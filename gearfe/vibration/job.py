@@ -158,7 +158,9 @@ def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
     if curves is None:
         from ..train.checks import check_flanks, check_layout
 
-        bare = replace(train, meshes=tuple(replace(mesh, backlash=None, damping=0.0) for mesh in meshes))
+        bare = replace(
+            train, meshes=tuple(replace(mesh, backlash=None, damping=0.0, damping_acts=None) for mesh in meshes)
+        )
         check_layout(bare)
         check_flanks(bare, np.array([not back_flanks(job, train, i) for i in range(len(meshes))], dtype=bool))
     return train
@@ -231,6 +233,7 @@ def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness, friction: 
         None if distance is None else 1e-3 * distance,
         None if table.backlash_um is None else 1e-6 * table.backlash_um,
         friction,
+        table.damping_acts,
     )
 
 
