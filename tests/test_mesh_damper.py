@@ -132,7 +132,7 @@ def test_a_transient_ends_in_the_steady_motion(acts):
 
 @pytest.mark.parametrize("acts", RULES)
 def test_the_damper_of_a_mesh_law(acts):
-    """Always: d times the rate beside the law's own force; in contact: in proportion to that force, and never a pull."""
+    """Always: d times the rate beside the law's force; in contact: in proportion to that force, without a pull."""
     law = hertzian_law(2 * math.pi / 20)
     made = train([(20, 30)], stiffness=lambda _: law)
     mesh = dataclasses.replace(made.meshes[0], damping=800.0, damping_acts=acts)

@@ -17,7 +17,9 @@ from gearfe.figures.campbell import signal_of
 from gearfe.rigid import constant
 from gearfe.rigid.compiled import available
 from gearfe.runup.condensed import condense
-from gearfe.runup.modes import coupled_modes, crossings
+from gearfe.runup.critical import crossings
+from gearfe.runup.modes import coupled_modes
+from gearfe.runup.orders import OrderCut
 from gearfe.runup.run_up import run_up, steady_state
 from gearfe.runup.stability import multipliers
 from gearfe.runup.swinging import mesh_modes, swinging, write_modes
@@ -215,10 +217,11 @@ def test_critical_speeds_lie_where_orders_meet_modes():
     model = build_train(loaded([(20, 30)], smooth))
     made = condense(model)
     modes = coupled_modes(made, np.linspace(200.0, 1500.0, 5), 4000.0)
-    met = crossings(made, modes, 3)
+    cuts = [OrderCut((a,), 20.0 * a, (f"{a} x mesh 1",), 0, a) for a in (1, 2, 3)]
+    met = crossings(modes, cuts)
     assert met
     for c in met:
-        assert c.frequency == pytest.approx(c.multiple * 20 * c.speed / (2 * math.pi))
+        assert c.frequency == pytest.approx(c.cut.multiple * 20 * c.speed / (2 * math.pi))
         assert c.frequency == pytest.approx(np.interp(c.speed, modes.speeds, modes.frequency[:, c.mode]), rel=1e-6)
 
 

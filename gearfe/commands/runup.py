@@ -90,9 +90,15 @@ def _report_lines(summary: dict[str, Any]) -> list[str]:
             parts.append(f"apart up to {share:.3g} % of the time at {open_['speed_rad_per_s']:.6g} rad/s")
         lines.append(f"mesh {name}: " + ", ".join(parts or ["no steady force"]))
     for peak in summary["peaks"][:6]:
-        lines.append(
-            f"critical speed {peak['speed_rad_per_s']:.6g} rad/s: {peak['order']} at {peak['frequency_Hz']:.0f} Hz "
-            f"meets {peak['mode']}, {peak['mode_frequency_Hz']:.0f} Hz; dynamic factor {peak['dynamic_factor']:.3g} in "
-            f"{peak['mesh']}"
-        )
+        where = f"{peak['order']} at {peak['frequency_Hz']:.0f} Hz"
+        if peak["mode"] is None:
+            beside = f"{where} grows most, and meets no mode within {100.0 * peak['searched_within']:g} % of the speed"
+            lines.append(f"peak at {peak['speed_rad_per_s']:.6g} rad/s: {beside}; {_factor(peak)}")
+        else:
+            met = f"{where} meets {peak['mode']}, {peak['mode_frequency_Hz']:.0f} Hz"
+            lines.append(f"critical speed {peak['speed_rad_per_s']:.6g} rad/s: {met}; {_factor(peak)}")
     return lines
+
+
+def _factor(peak: dict[str, Any]) -> str:
+    return f"dynamic factor {peak['dynamic_factor']:.3g} in {peak['mesh']}"

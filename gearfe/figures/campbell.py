@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..runup.critical import CriticalSpeeds
 from ..runup.instability import InstabilityMap
-from ..runup.modes import STRONG, CoupledModes, Crossing
+from ..runup.modes import STRONG
 from ..runup.orders import orders
 from ..runup.report import waterfall
 from ..runup.results import SteadyState
@@ -90,8 +91,9 @@ def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str
     save(figure, path)
 
 
-def draw_campbell(path: Path, run: RunUp, modes: CoupledModes, met: list[Crossing], multiples: int, title: str) -> None:
+def draw_campbell(path: Path, run: RunUp, critical: CriticalSpeeds, multiples: int, title: str) -> None:
     """Natural frequencies over the speed with the meshes' orders; modes with much strain in meshes are drawn strong."""
+    modes, met = critical.modes, critical.met
     share = modes.strain[:, : len(run.train.model.meshes)].sum(axis=1)
     rising, highest = np.argsort(modes.speeds), 1e-3 * run.band_hz
     speed, frequency, damping = modes.speeds[rising], 1e-3 * modes.frequency[rising], modes.damping_ratio[rising[-1]]

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..runup.critical import CriticalSpeeds
 from ..runup.instability import InstabilityMap
-from ..runup.modes import CoupledModes, Crossing
 from ..runup.orders import orders
 from ..runup.report import dynamic_factors, iso_dynamic_factors
 from ..runup.run_up import RunUp
@@ -29,12 +29,10 @@ class RunUpPictures:
 
     title: str
 
-    def __call__(
-        self, folder: Path, run: RunUp, modes: CoupledModes, met: list[Crossing], multiples: int, bore: int
-    ) -> None:
+    def __call__(self, folder: Path, run: RunUp, critical: CriticalSpeeds, multiples: int, bore: int) -> None:
         """Draw into a folder; `bore` is the number of the attachment."""
         draw_waterfall(folder / "waterfall.png", run, multiples, bore, self.title)
-        draw_campbell(folder / "campbell.png", run, modes, met, multiples, self.title)
+        draw_campbell(folder / "campbell.png", run, critical, multiples, self.title)
         draw_orders(folder / "orders.png", run, multiples, bore, self.title)
         save(forces_picture(run, self.title), folder / "meshes.png")
 

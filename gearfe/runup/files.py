@@ -11,8 +11,9 @@ from ..files import whole_set, write_csv, write_json
 from ..output.arrays import save_arrays
 from ..vibration.report import attachment_to_draw
 from . import report
+from .critical import CriticalSpeeds, critical_speeds
 from .instability import InstabilityMap
-from .modes import STRONG, CoupledModes, Crossing
+from .modes import STRONG
 from .run_up import RunUp
 from .swinging import mesh_modes, write_modes
 
@@ -27,9 +28,7 @@ FILES = (
 class Pictures(Protocol):
     """Who draws a run-up: `gearfe.figures.runup.RunUpPictures`. Pictures stand above the results that they draw."""
 
-    def __call__(
-        self, folder: Path, run: RunUp, modes: CoupledModes, met: list[Crossing], multiples: int, bore: int
-    ) -> None:
+    def __call__(self, folder: Path, run: RunUp, critical: CriticalSpeeds, multiples: int, bore: int) -> None:
         """Draw into a folder."""
 
     def instability(self, path: Path, made: InstabilityMap) -> None:
@@ -63,21 +62,21 @@ def write_runup(
     multiples, model = choice.multiples, run.train.model
     bore = model.bores.index(attachment_to_draw(model.bores, choice.attachment, model.train))
     with watch.stage("modes"):
-        modes, met = report.campbell(run, multiples)
+        critical = critical_speeds(run, multiples)
     with whole_set(folder, may_write=FILES) as target:
         with watch.stage("tables"):
-            for name, columns in report.tables(run, modes, met, multiples, unstable).items():
+            for name, columns in report.tables(run, critical, multiples, unstable).items():
                 write_csv(target / f"{name}.csv", columns)
             save_arrays(target / "waterfall.npz", report.waterfall(run))
         if draw is not None:
             with watch.stage("pictures"):
-                draw(target, run, modes, met, multiples, bore)
+                draw(target, run, critical, multiples, bore)
                 if unstable is not None:
                     draw.instability(target / "instability.png", unstable)
         if choice.fields:
             with watch.stage("fields"):
-                write_modes(target, model, mesh_modes(modes, len(model.meshes), STRONG))
-        made = {**further, **report.summary(run, modes, multiples), "warnings": report.warnings(run)}
+                write_modes(target, model, mesh_modes(critical.modes, len(model.meshes), STRONG))
+        made = {**further, **report.summary(run, critical), "warnings": report.warnings(run)}
         made["timings_s"] = dict(watch.seconds)
         write_json(target / "summary.json", made)
         names = sorted(path.name for path in target.iterdir())

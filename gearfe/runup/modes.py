@@ -45,29 +45,6 @@ class CoupledModes:
     strain_in: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Crossing:
-    """A mesh order that meets a mode: a critical speed.
-
-    Attributes
-    ----------
-    speed
-        Of the drive (rad/s).
-    frequency
-        Hz.
-    mode
-        Number of the mode, from 0.
-    mesh, multiple
-        Number of the mesh and multiple of its frequency.
-    """
-
-    speed: float
-    frequency: float
-    mode: int
-    mesh: int
-    multiple: int
-
-
 def coupled_modes(train: CondensedTrain, speeds: Array, highest_hz: float) -> CoupledModes:
     """Modes with natural frequencies up to `highest_hz` at rest, followed over the speeds in the order of frequency."""
     model, linear = train.model, train.system.linear
@@ -116,22 +93,3 @@ def _name(number: int, strain: Array, kinetic: Array, parts: tuple[str, ...]) ->
     at = int(strain.argmax())
     moving = "shafts" if kinetic[0] > 0.5 else "housing"
     return f"mode {number + 1}: strain in {parts[at]} ({100.0 * strain[at]:.0f} %), {moving} moving"
-
-
-def crossings(train: CondensedTrain, modes: CoupledModes, multiples: int) -> list[Crossing]:
-    """Where multiples of the mesh frequencies meet modes within the speeds, by speed."""
-    found = []
-    low, high = np.abs(modes.speeds[[0, -1]])
-    sense = math.copysign(1.0, float(modes.speeds[0]))
-    for mesh, cycles in enumerate(train.model.rolling.cycles):
-        for multiple in range(1, multiples + 1):
-            line = multiple * float(cycles) * np.abs(modes.speeds) / (2.0 * math.pi)
-            for mode in range(modes.frequency.shape[1]):
-                off = modes.frequency[:, mode] - line
-                for k in np.flatnonzero((off[:-1] >= 0.0) != (off[1:] >= 0.0)):
-                    part = off[k] / (off[k] - off[k + 1])
-                    speed = abs(modes.speeds[k]) + part * (abs(modes.speeds[k + 1]) - abs(modes.speeds[k]))
-                    if min(low, high) <= speed <= max(low, high):
-                        frequency = multiple * float(cycles) * speed / (2.0 * math.pi)
-                        found.append(Crossing(sense * float(speed), float(frequency), mode, mesh, multiple))
-    return sorted(found, key=lambda c: abs(c.speed))

@@ -18,6 +18,16 @@ class OrderCut(NamedTuple):
     order: float  # of the drive's turns
     names: tuple[str, ...]  # such as "2 x mesh 1", "1 x mesh 1 + 1 x mesh 2"
     mesh: int | None  # the first of which it is a multiple; None for a combination
+    multiple: int | None = None  # of that mesh's frequency
+
+
+def multiples_of(run: RunUp, mesh: int, multiples: int) -> list[OrderCut]:
+    """The first multiples of a mesh frequency."""
+    cycles, waves = float(run.train.model.rolling.cycles[mesh]), np.array(run.train.system.orders[mesh])
+    return [
+        OrderCut(tuple((a * waves).tolist()), a * cycles, (f"{a} x mesh {mesh + 1}",), mesh, a)
+        for a in range(1, multiples + 1)
+    ]
 
 
 def orders(run: RunUp, multiples: int) -> list[OrderCut]:

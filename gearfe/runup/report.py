@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,36 +13,26 @@ from ..gear.pair import MeshGeometry
 from ..typing import Array, IntArray
 from ..vibration.radiation import power_level
 from . import torus
+from .critical import CriticalSpeeds, largest_force, peaks_of
 from .instability import InstabilityMap
-from .modes import CoupledModes, Crossing, coupled_modes, crossings
-from .orders import order_columns, orders
+from .modes import CoupledModes
+from .orders import order_columns
 from .results import SteadyState
 from .run_up import RunUp
 
-#: Speeds of the Campbell diagram.
-CAMPBELL = 7
-
-#: Peaks of the dynamic factor that rise by this part of it over the valleys beside them are critical speeds.
-RISE = 0.03
 RPM = 30.0 / math.pi
 
 
-def campbell(run: RunUp, multiples: int) -> tuple[CoupledModes, list[Crossing]]:
-    """Coupled modes over the speeds of a run, and where mesh orders meet them."""
-    modes = coupled_modes(run.train, np.linspace(run.speeds[0], run.speeds[-1], CAMPBELL), run.band_hz)
-    return modes, crossings(run.train, modes, multiples)
-
-
 def tables(
-    run: RunUp, modes: CoupledModes, met: list[Crossing], multiples: int, unstable: InstabilityMap | None = None
+    run: RunUp, critical: CriticalSpeeds, multiples: int, unstable: InstabilityMap | None = None
 ) -> dict[str, dict[str, Any]]:
     """Columns of all tables, by the names of their files."""
     made = {
         "runup": runup_columns(run),
         "orders": order_columns(run, multiples),
         "waterfall": waterfall_columns(run),
-        "modes": mode_columns(modes),
-        "critical_speeds": critical_columns(modes, met),
+        "modes": mode_columns(critical.modes),
+        "critical_speeds": critical_columns(critical),
     }
     return made if unstable is None else {**made, "instability": instability_columns(unstable)}
 
@@ -90,11 +79,6 @@ def stability_columns(run: RunUp) -> dict[str, Array]:
         "largest_multiplier_angle_deg": np.degrees(np.abs(np.angle(largest))),
         "multiplier_over_s": np.array([s.span for s in run.states]),
     }
-
-
-def largest_force(state: SteadyState, mesh: int) -> float:
-    """Largest size of a mesh's force (N)."""
-    return float(np.abs(state.force[:, mesh]).max())
 
 
 def dynamic_factors(run: RunUp, mesh: int) -> Array:
@@ -203,16 +187,17 @@ def instability_columns(made: InstabilityMap) -> dict[str, Any]:
     }
 
 
-def critical_columns(modes: CoupledModes, met: list[Crossing]) -> dict[str, Any]:
+def critical_columns(critical: CriticalSpeeds) -> dict[str, Any]:
     """Columns of critical_speeds.csv: where a mesh order meets a mode, with the mode's shares of energy."""
+    modes, met = critical.modes, critical.met
     mode = np.array([c.mode for c in met], dtype=int)
     columns: dict[str, Any] = {
         "speed_rad_per_s": np.array([c.speed for c in met]),
         "speed_rpm": RPM * np.array([c.speed for c in met]),
         "frequency_Hz": np.array([c.frequency for c in met]),
         "mode": mode + 1,
-        "mesh": np.array([c.mesh for c in met], dtype=int) + 1,
-        "multiple": np.array([c.multiple for c in met], dtype=int),
+        "mesh": np.array([c.cut.mesh for c in met], dtype=int) + 1,
+        "multiple": np.array([c.cut.multiple for c in met], dtype=int),
         "damping_ratio": modes.damping_ratio[0][mode],
     }
     columns |= share_columns(modes, mode)
@@ -220,63 +205,9 @@ def critical_columns(modes: CoupledModes, met: list[Crossing]) -> dict[str, Any]
     return columns
 
 
-def peaks_of(run: RunUp, modes: CoupledModes, multiples: int) -> list[dict[str, Any]]:
-    """Peaks of the dynamic factors over the speed, highest first, each with the order and mode that meet there: of the
-    larger one of the motions that a slow run-up and a slow run-down meet.
-    """
-    both = list(zip(run.sweep(), run.sweep(up=False), strict=True))
-    cut = orders(run, multiples)
-    found = []
-    for mesh, line in enumerate(run.train.model.meshes):
-        steady = abs(float(run.train.steady[mesh]))
-        swept = [max(two, key=partial(largest_force, mesh=mesh)) for two in both]
-        values = np.array([largest_force(s, mesh) for s in swept]) / max(steady, 1e-300)
-        for at in _tops(values):
-            state = swept[at]
-            size, there = np.abs(state.lines(state.force[:, mesh])), [c for c in cut if c.waves in state.numbers]
-            loudest = max(there, key=lambda c: float(size[state.numbers[c.waves]]))
-            frequency = float(state.frequency[state.numbers[loudest.waves]])
-            row = int(np.argmin(np.abs(modes.speeds - state.speed)))
-            mode = _answering(modes, row, frequency, modes.strain_in.index(line.name))
-            found.append(
-                {
-                    "speed_rad_per_s": state.speed,
-                    "mesh": line.name,
-                    "dynamic_factor": float(values[at]),
-                    "order": " = ".join(loudest.names),
-                    "frequency_Hz": frequency,
-                    "mode": modes.names[mode],
-                    "mode_frequency_Hz": float(modes.frequency[row, mode]),
-                    "damping_ratio": float(modes.damping_ratio[row, mode]),
-                }
-            )
-    return sorted(found, key=lambda x: -float(x["dynamic_factor"]))
-
-
-def _answering(modes: CoupledModes, row: int, frequency: float, part: int) -> int:
-    """Mode that answers most to a force in a mesh at a frequency: its share of strain there, times its resonance."""
-    ratio = frequency / modes.frequency[row]
-    resonance = np.abs(1.0 / (1.0 - ratio**2 + 2j * modes.damping_ratio[row] * ratio))
-    return int(np.nanargmax(modes.strain[:, part] * resonance))
-
-
-def _tops(values: Array) -> list[int]:
-    """Places of local maxima that rise over both valleys beside them."""
-    found = []
-    for at in range(1, len(values) - 1):
-        if not values[at - 1] <= values[at] > values[at + 1]:
-            continue
-        sides = []
-        for part in (values[:at][::-1], values[at + 1 :]):
-            higher = np.flatnonzero(part > values[at])
-            sides.append(float(part[: higher[0] if len(higher) else len(part)].min()))
-        if values[at] - max(sides) > RISE * values[at]:
-            found.append(at)
-    return found
-
-
-def summary(run: RunUp, modes: CoupledModes, multiples: int) -> dict[str, Any]:
+def summary(run: RunUp, critical: CriticalSpeeds) -> dict[str, Any]:
     """What summary.json says of the run-up."""
+    modes = critical.modes
     states, model = run.states, run.train.model
     reached = {s.speed for s in states} & set(run.speeds.tolist())
     factors = [dynamic_factors(run, i) for i in range(len(model.meshes))]
@@ -303,7 +234,7 @@ def summary(run: RunUp, modes: CoupledModes, multiples: int) -> dict[str, Any]:
         "steady_forces_N": run.train.steady.tolist(),
         "largest_dynamic_factor": [most(f) for f in factors],
         "largest_share_without_contact": [most(x) for x in open_],
-        "peaks": peaks_of(run, modes, multiples),
+        "peaks": peaks_of(run, critical),
         "modes": [
             {"name": n, "frequency_Hz": float(f), "damping_ratio": float(z)}
             for n, f, z in zip(modes.names, modes.frequency[0], modes.damping_ratio[0], strict=True)

@@ -63,9 +63,9 @@ class FlankForces(NamedTuple):
     per_rate: Array | None = None  # N s/m
     moment: Array | None = None  # N m on the phase
     moment_by_approach: Array | None = None  # N m/m
-    momentum: Array | None = None  # N s: its rate of change is the damper's part of the force, which jumps at the touch
     bend: Array | None = None  # N m/rad: of the moment with the phase
     drag: Drag | None = None
+    momentum: Array | None = None  # N s: its rate of change is the damper's part of the force, which jumps at the touch
 
 
 class Slip(NamedTuple):
