@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..typing import Array
-from .modes import CoupledModes, coupled_modes
+from .modes import CoupledModes, coupled_modes, modes_below
 from .orders import OrderCut, multiples_of, orders
 from .results import SteadyState
 from .run_up import RunUp
@@ -96,7 +96,8 @@ def critical_speeds(run: RunUp, multiples: int) -> CriticalSpeeds:
             known = cuts.get(cut.waves)
             cuts[cut.waves] = cut if known is None else known._replace(names=(*known.names, *cut.names))
     searched, shown = list(cuts.values()), [cut for mesh in meshes for cut in multiples_of(run, mesh, multiples)]
-    modes, wider = (coupled_modes(run.train, speeds, limit) for limit in (run.band_hz, highest))
+    wider = coupled_modes(run.train, speeds, highest)
+    modes = modes_below(run.train, wider, run.band_hz)
     return CriticalSpeeds(modes, crossings(modes, shown), searched, wider, crossings(wider, searched, beyond=NEAR))
 
 

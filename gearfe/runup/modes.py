@@ -49,7 +49,7 @@ def coupled_modes(train: CondensedTrain, speeds: Array, highest_hz: float) -> Co
     """Modes with natural frequencies up to `highest_hz` at rest, followed over the speeds in the order of frequency."""
     model, linear = train.model, train.system.linear
     modal = model.modal
-    count = int((modal.eigenvalues <= (2.0 * math.pi * highest_hz) ** 2).sum())
+    count = count_below(train, highest_hz)
     damping = linear.damping.copy()
     for line in model.meshes:
         if line.in_contact:
@@ -69,6 +69,19 @@ def coupled_modes(train: CondensedTrain, speeds: Array, highest_hz: float) -> Co
     names = tuple(_name(i, strain[i], kinetic[i], parts) for i in range(count))
     frequency = np.abs(poles) / (2.0 * math.pi)
     return CoupledModes(names, np.asarray(speeds), frequency, -poles.real / np.abs(poles), strain, kinetic, parts)
+
+
+def modes_below(train: CondensedTrain, modes: CoupledModes, highest_hz: float) -> CoupledModes:
+    """Those of the modes with natural frequencies up to `highest_hz` at rest."""
+    count = count_below(train, highest_hz)
+    strain, kinetic, parts = _shares(train, count)
+    frequency, damping = modes.frequency[:, :count], modes.damping_ratio[:, :count]
+    return CoupledModes(modes.names[:count], modes.speeds, frequency, damping, strain, kinetic, parts)
+
+
+def count_below(train: CondensedTrain, highest_hz: float) -> int:
+    """Number of modes with natural frequencies up to `highest_hz` at rest."""
+    return int((train.model.modal.eigenvalues <= (2.0 * math.pi * highest_hz) ** 2).sum())
 
 
 def _shares(train: CondensedTrain, count: int) -> tuple[Array, Array, tuple[str, ...]]:
