@@ -147,7 +147,7 @@ def test_units_and_abaqus_matrix_input(unit, force, length, bodies, tmp_path) ->
         ("massless", {}, r"mass = 'M\.mtx': is not positive: .* is all mass there"),
         ("lost rows", {}, r"has \d+ motions of the attachments without energy"),
         ("", {"stiffness": "none.mtx"}, "there is no such file"),
-        ("", {"stiffness": "text.mtx"}, "neither Matrix Market nor Abaqus' matrix input nor DMIG: line 1 is 'hello'"),
+        ("", {"stiffness": "text.mtx"}, "neither Matrix Market nor matrices of Abaqus nor DMIG: line 1 is 'hello'"),
         ("", {"stiffness": "cut.mtx"}, "cannot be read as Matrix Market"),
         ("", {"attachments": [{"point_mm": [0, 0, 0], "node": 3}]}, "is not told by Matrix Market files"),
     ],

@@ -30,9 +30,9 @@ def reduced_housing(table: HousingTable, folder: str | Path = ".") -> ModalBody:
         return damped(superelement(table.superelement, folder), table)
     recipe: list[object] = [dataclasses.replace(table, damping=HousingDampingTable()), RECIPE, FORMAT, __version__]
     if table.mesh.file is not None:
-        from .own_mesh import fingerprint
+        from ..meshing.mesh_file import source_fingerprint
 
-        recipe.append(fingerprint(Path(folder) / table.mesh.file, "housing.mesh"))
+        recipe.append(source_fingerprint(Path(folder) / table.mesh.file, "housing.mesh"))
 
     def read(path: Path) -> ModalBody | None:
         with suppress(InputError):

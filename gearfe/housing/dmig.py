@@ -9,11 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import InputError
-from ..meshing.nastran import entries, number
-
-Label = tuple[int, int]
-#: Values by row and column.
-Entries = dict[tuple[Label, Label], float]
+from ..meshing.nastran import entries, lines_of, number
+from .entries import Entries, add_entry
 
 
 def read_dmig(text: str, path: Path, field: str) -> dict[str, Entries]:
@@ -25,7 +22,7 @@ def read_dmig(text: str, path: Path, field: str) -> dict[str, Entries]:
         For complex matrices, and for lines that cannot be read.
     """
     matrices: dict[str, Entries] = {}
-    for line, card in entries(text, ("DMIG",)):
+    for line, card in entries(lines_of(text, path.name), ("DMIG",)):
         name = card[1].upper()
         try:
             if card[2] == "0":
@@ -39,12 +36,11 @@ def read_dmig(text: str, path: Path, field: str) -> dict[str, Entries]:
             for at in range(5, len(card), 4):
                 row = card[at : at + 4]
                 if row[0]:
-                    made[(int(row[0]), int(row[1] or 0)), column] = number(row[2])
+                    add_entry(made, (int(row[0]), int(row[1] or 0)), column, number(row[2]))
         except InputError:
             raise
-        except (ValueError, IndexError):
-            problem = f"the DMIG entry of line {line} cannot be read"
-            raise InputError(
-                field, path.name, problem, "write node, freedom, and rows of node, freedom, value"
-            ) from None
+        except (ValueError, IndexError, OverflowError) as error:
+            problem = f"the DMIG entry of line {line.number} cannot be read ({error})"
+            cure = "write node, freedom, and rows of node, freedom, value, each entry once"
+            raise InputError(field, path.name, problem, cure) from None
     return matrices

@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import InputError
 from ..meshing.nastran import number
 from ..typing import Array
-from .dmig import Entries
+from .entries import Entries
 
 #: Matrices by name: values, or single entries with node and freedom.
 Matrices = dict[str, Array | Entries]

@@ -8,7 +8,6 @@ point of the axis in the middle of the nodes' range.
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +37,7 @@ def own_housing(table: HousingTable, folder: Path, material: Material) -> Housin
     found = read_mesh_file(folder / given(table.mesh.file, field), field, table.mesh.size_mm)
     mesh = found._replace(nodes=_turned(UNITS[table.mesh.unit] * found.nodes, table.mesh))
     used = np.unique(mesh.tets)
-    notes = [size_note(mesh.nodes[used], table.mesh.unit)]
+    notes = [*mesh.notes, size_note(mesh.nodes[used], table.mesh.unit)]
     attachments = []
     for i, bore in enumerate(table.bores):
         made, remarks = _attachment(bore, i, mesh, used)
@@ -90,16 +89,6 @@ def size_note(nodes: Array, unit: str) -> str:
         cure = f"write mesh = {{ file = ..., unit = ... }}, one of {', '.join(UNITS)}"
         raise InputError("housing.mesh.unit", unit, problem, cure)
     return note
-
-
-def fingerprint(path: Path, field: str) -> str:
-    """Hash of a file's content."""
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        reason = error.strerror or str(error)
-        cure = "check the path; it is looked for beside the job file"
-        raise InputError(field, str(path), f"cannot be read ({reason})", cure) from None
 
 
 def fitted_cylinder(points: Array) -> tuple[Array, Array, float, float]:

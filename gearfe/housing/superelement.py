@@ -4,8 +4,8 @@ With the attachments' six coordinates :math:`q_b` each and whatever the program 
 the attachments held, :math:`K_{ii}\Phi = M_{ii}\Phi\Lambda`, and the constraint modes :math:`\Psi = -K_{ii}^{-1}K_{ib}`
 turn the coordinates to those of `gearfe.ModalBody`, all of them kept: frequencies and response stay the matrices'.
 
-Matrices are in Matrix Market format, Abaqus' matrix input (lines of node, freedom, node, freedom, value), DMIG
-entries of Nastran, or its files of the kinds OUTPUT2 and OUTPUT4.
+Matrices are in Matrix Market format, those of a substructure or of a model of Abaqus (`abaqus_matrix`), DMIG entries
+of Nastran, or its files of the kinds OUTPUT2 and OUTPUT4.
 """
 
 from __future__ import annotations
@@ -23,8 +23,10 @@ from ..files import read_text, whole_file
 from ..reduction.modal_body import ModalBody
 from ..tables.housing import FORCES, UNITS, AttachmentTable, SuperelementTable
 from ..typing import Array, IntArray
+from .abaqus_matrix import is_substructure, read_entries, read_substructure
 from .attachments import rigid_motions
-from .dmig import Entries, Label, read_dmig
+from .dmig import read_dmig
+from .entries import Entries, Label, check_rows, matrix_of, shown
 from .nastran_files import read_nastran
 
 #: Parts of the largest entry up to which matrices are symmetric; energy, against the largest, that is none; masses,
@@ -35,7 +37,11 @@ MASSLESS = 1e-12
 #: Bounds on the root of rotational over translational stiffness, a length, in parts of the span of the attachments; a
 #: unit of mm in place of m makes a thousand.
 LENGTHS = (1 / 300, 100.0)
-#: Eigenvalue of a mass matrix of unit diagonal that is none; highest frequency of no housing (Hz).
+#: Numbers that no stiffness or mass has in any unit.
+TINY, HUGE = 1e-30, 1e30
+#: What rounding to the four digits of short fields may add to the bound on an entry by the diagonal.
+ROUNDED = 0.01
+#: Eigenvalue of a matrix of unit diagonal that is singular; highest frequency of no housing (Hz).
 NO_MASS, LEAST_HZ = 1e-13, 0.01
 NO_ESTIMATE = "matrices of another program: nothing tells the error of their mesh and reduction"
 MOTIONS = ("x", "y", "z", "rotation about x", "rotation about y", "rotation about z")
@@ -67,8 +73,11 @@ def superelement(table: SuperelementTable, folder: str | Path) -> ModalBody:
         if len(K.values) == len(M.values):
             problem = "is of other nodes and freedoms than the stiffness"
         raise InputError(f"{field}.mass", table.mass, problem, "write both of the same superelement")
-    _check_symmetric(K.values, f"{field}.stiffness", table.stiffness)
-    _check_symmetric(M.values, f"{field}.mass", table.mass)
+    if not K.values.any():
+        raise InputError(f"{field}.stiffness", table.stiffness, "has only zeros", "name the file of the stiffness")
+    for matrix, key, name in ((K, "stiffness", table.stiffness), (M, "mass", table.mass)):
+        _check_symmetric(matrix.values, f"{field}.{key}", name)
+        _check_entries(matrix, f"{field}.{key}", name)
     rows = [_rows(one, i, K, field) for i, one in enumerate(table.attachments)]
     bound = np.concatenate(rows)
     twice = np.flatnonzero(np.bincount(bound) > 1)
@@ -98,58 +107,51 @@ def _with_rows_of(stiffness: Matrix, mass: Matrix) -> Matrix:
 
 
 def read_matrix(path: Path, field: str, initial: str = "K") -> Matrix:
-    """A matrix of Matrix Market format, Abaqus' matrix input or Nastran's files; where it is half of one, the whole.
+    """A matrix of a file, the whole one where the file has half of it.
 
-    Of several matrices in a file of Nastran that one is taken whose name begins with `initial`.
+    Of several matrices in a file of Nastran that one is taken whose name begins with `initial`, of those of a
+    substructure of Abaqus the stiffness (K) or the mass (M).
     """
     if path.suffix.lower() in (".op2", ".op4"):
         return _made(_chosen(read_nastran(path, field), path, field, initial), field, path)
     text = read_text(path, field)
     if text.lstrip().lower().startswith("%%matrixmarket"):
         return Matrix(_market(path, field), [])
+    if is_substructure(text):
+        values, labels = read_substructure(text, path, field, initial)
+        return Matrix(_checked(values, field, path), labels)
     if re.search(r"^DMIG[ *,]", text, re.MULTILINE | re.IGNORECASE):
         return _made(_chosen(read_dmig(text, path, field), path, field, initial), field, path)
-    made: dict[tuple[Label, Label], float] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        if not line.strip() or line.lstrip().startswith("*"):
-            continue
-        cells = [cell.strip() for cell in line.split(",") if cell.strip()]
-        try:
-            a, b, c, d = (int(cell) for cell in cells[:4])
-            (value,) = (float(cell) for cell in cells[4:])
-        except ValueError:
-            problem = (
-                f"is neither Matrix Market nor Abaqus' matrix input nor DMIG: line {number} is {line.strip()[:60]!r}"
-            )
-            cure = "begin it with %%MatrixMarket, or write lines of node, freedom, node, freedom, value"
-            raise InputError(field, path.name, problem, cure) from None
-        made[(a, b), (c, d)] = value
-    return _made(made, field, path)
+    return _made(read_entries(text, path, field), field, path)
 
 
 def _made(made: Array | Entries, field: str, path: Path) -> Matrix:
     """The whole matrix, of values or of single entries."""
     if not isinstance(made, dict):  # rows without names
         return Matrix(_whole(_checked(made, field, path)), [])
-    labels = sorted({label for both in made for label in both})
-    place = {label: i for i, label in enumerate(labels)}
-    values = np.zeros((len(labels), len(labels)))
-    for (one, other), value in made.items():
-        values[place[one], place[other]] = value
-        if (other, one) not in made:
-            values[place[other], place[one]] = value
+    values, labels = matrix_of(made, path, field)
     return Matrix(_checked(values, field, path), labels)
 
 
 def _market(path: Path, field: str) -> Array:
-    from scipy.io import mmread
+    from scipy.io import mminfo, mmread
     from scipy.sparse import issparse
 
     try:
-        found = mmread(path)
+        rows, columns, *_ = mminfo(path)
+        check_rows(max(rows, columns), path, field)
+        content = mmread(path)
+    except InputError:
+        raise
     except Exception as error:
         raise InputError(field, path.name, f"cannot be read as Matrix Market ({error})", "is it whole?") from None
-    values = np.asarray(found.toarray() if issparse(found) else found)
+    if issparse(content):
+        places, times = np.unique(np.stack([content.row, content.col]), axis=1, return_counts=True)
+        if (times > 1).any():
+            i, j = places[:, times > 1][:, 0] + 1
+            problem = f"gives the entry ({i}, {j}) twice, also counting the other half of a symmetric matrix"
+            raise InputError(field, path.name, problem, "write each entry once, of a symmetric matrix one half")
+    values = np.asarray(content.toarray() if issparse(content) else content)
     if np.iscomplexobj(values):
         raise InputError(field, path.name, "is complex", "bring a real matrix; damping is [housing.damping]")
     return _whole(_checked(np.asarray(values, dtype=float), field, path))
@@ -178,7 +180,12 @@ def _checked(values: Array, field: str, path: Path) -> Array:
     if values.ndim != 2 or values.shape[0] != values.shape[1] or not len(values):
         raise InputError(field, path.name, f"must be a square matrix, but has the shape {values.shape}", "transpose?")
     if not np.isfinite(values).all():
-        raise InputError(field, path.name, "holds numbers that are not finite", "write it anew")
+        i, j = np.argwhere(~np.isfinite(values))[0] + 1
+        raise InputError(field, path.name, f"holds a number that is not finite, entry ({i}, {j})", "write it again")
+    largest = np.abs(values).max()
+    if largest > 0.0 and not TINY < largest < HUGE:
+        problem = f"has {largest:.3g} as its largest number, which no elastic body has in any unit"
+        raise InputError(field, path.name, problem, "the file may be damaged: write it again")
     return values
 
 
@@ -197,6 +204,33 @@ def _check_symmetric(values: Array, field: str, name: str) -> None:
             f"is not symmetric: entry ({i + 1}, {j + 1}) is {values[i, j]:.6g}, ({j + 1}, {i + 1}) {values[j, i]:.6g}"
         )
         raise InputError(field, name, problem, "bring stiffness and mass of an elastic body without damping or spin")
+
+
+def _check_entries(matrix: Matrix, field: str, name: str) -> None:
+    """Refuse entries that no positive matrix has, as lost and damaged rows leave them.
+
+    A positive semidefinite matrix has no negative number on its diagonal, and ``a_ij**2 <= a_ii * a_jj`` elsewhere.
+    """
+    values, diagonal = matrix.values, np.diag(matrix.values)
+
+    def named(i: int) -> str:
+        return f"{i + 1} ({shown(matrix.labels[i])})" if matrix.labels else str(i + 1)
+
+    cure = "a row or a number of the file is lost or damaged, or its sign is wrong: write it again"
+    i = int(diagonal.argmin())
+    if diagonal[i] < 0.0:
+        raise InputError(field, name, f"is not positive: row {named(i)} has {diagonal[i]:.6g} on its diagonal", cure)
+    root = np.sqrt(diagonal)
+    slack = SYMMETRIC * root.max() * np.minimum.outer(root, root)
+    excess = np.abs(values) - (1.0 + ROUNDED) * np.outer(root, root) - slack
+    np.fill_diagonal(excess, 0.0)
+    i, j = (int(k) for k in np.unravel_index(int(excess.argmax()), excess.shape))
+    if excess[i, j] > 0.0:
+        problem = (
+            f"is not positive: the entry of rows {named(i)} and {named(j)} is {values[i, j]:.6g}, larger than the root "
+            f"of the product of {diagonal[i]:.6g} and {diagonal[j]:.6g} on the diagonal"
+        )
+        raise InputError(field, name, problem, cure)
 
 
 def _rows(one: AttachmentTable, i: int, matrix: Matrix, field: str) -> IntArray:
@@ -230,7 +264,8 @@ def _body(k: Array, m: Array, points: Array, table: SuperelementTable, field: st
 
     b, size = 6 * len(points), len(k)
     stiff, heavy = k[b:, b:], m[b:, b:]
-    if size > b and not np.linalg.eigvalsh(stiff / np.sqrt(np.outer(np.diag(stiff), np.diag(stiff))))[0] > 0.0:
+    root = np.sqrt(np.diag(stiff))
+    if size > b and not ((root > 0.0).all() and np.linalg.eigvalsh(stiff / np.outer(root, root))[0] > NO_MASS):
         problem = "is not positive definite with the attachments held: a part inside can move freely"
         raise InputError(f"{field}.stiffness", table.stiffness, problem, "are these the attachments' rows?")
     periods, modes = eigh(heavy, stiff) if size > b else (np.zeros(0), np.zeros((0, 0)))

@@ -1,32 +1,31 @@
-"""Tetrahedra and named groups of a mesh file, as far as meshio reads its format; CAD files are meshed by gmsh."""
+"""Tetrahedra and named groups of a mesh file of any format; CAD files are meshed by gmsh."""
 
 from __future__ import annotations
 
-import contextlib
-import io
+import hashlib
 import itertools
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InputError, nearest
-from ..files import read_text
 from ..typing import Array, IntArray
-from .nastran import read_bulk_mesh
+from .abaqus import read_abaqus
+from .abaqus_cards import inclusion as card_inclusion
+from .gmsh_file import ENDINGS, read_by_gmsh
+from .included import source_files
+from .meshio_file import heavy_files, read_by_meshio
+from .nastran import inclusion as bulk_inclusion
+from .nastran_mesh import read_bulk_mesh
 from .session import gmsh_session
+from .source import SourceMesh, checked_source
 
-#: Formats of CAD programs, which have no mesh yet.
+#: Formats of CAD programs, which have no mesh yet; of Nastran and Abaqus; and surfaces, which have no inside.
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
-#: Formats of which gmsh reads more than meshio; of Nastran, which both misread; and surfaces, which have no inside.
-BY_GMSH = (".unv", ".med", ".mesh")
 NASTRAN = (".bdf", ".nas", ".fem")
+ABAQUS = (".inp",)
 SURFACES = (".stl", ".ply", ".off", ".obj", ".wkt", ".svg")
-#: Arrays of whole numbers by which formats number groups without a name.
-NUMBERED = ("gmsh:physical", "medit:ref", "nastran:ref", "ref", "cell_tags", "point_tags", "avsucd:material")
-#: Triangles of .inp files, as gmsh and CalculiX write them beside the tetrahedra, that meshio's reader does not name.
-TRIANGLES = {"CPS6": "triangle6", "CPE3": "triangle", "S6": "triangle6", "M3D3": "triangle", "M3D6": "triangle6"}
 INSIDE = "mesh its inside: give the CAD model (.step), or what gmsh FILE -3 -order 2 makes of it"
 #: The same tetrahedron with its second and third corner exchanged.
 MIRRORED = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]
@@ -46,11 +45,14 @@ class MeshFile(NamedTuple):
         Node numbers from 0.
     groups : dict
         Name, or number as text, of each group of nodes, faces or elements -> its nodes.
+    notes
+        What the user should know about how the file was read.
     """
 
     nodes: Array
     tets: IntArray
     groups: dict[str, IntArray]
+    notes: tuple[str, ...] = ()
 
     def group(self, name: str, field: str) -> IntArray:
         """Nodes of a group that belong to tetrahedra.
@@ -60,6 +62,9 @@ class MeshFile(NamedTuple):
         InputError
             Where there is none of this name, or none of its nodes belongs to an element.
         """
+        alike = [other for other in self.groups if other.casefold() == name.casefold()]
+        if name not in self.groups and len(alike) == 1:  # Abaqus and others do not tell capitals from small letters
+            name = alike[0]
         if name not in self.groups:
             listed = (
                 ", ".join(itertools.starmap(self._text_of, itertools.islice(self.groups.items(), LISTED))) or "none"
@@ -107,11 +112,11 @@ def read_mesh_file(path: str | Path, field: str, size: float) -> MeshFile:
         return _meshed(path, field, size)
     if path.suffix.lower() in SURFACES:
         raise InputError(field, path.name, "is a surface, which has no tetrahedra", INSIDE)
-    mesh = _reader(path)(path, field)
-    points = np.asarray(mesh.points, dtype=float)
-    if points.ndim != 2 or points.shape[1] != 3:
+    mesh = read_source(path, field)
+    points = mesh.points
+    if points.shape[1] != 3:
         raise InputError(field, path.name, "is a plane mesh: its nodes have no z", "bring a mesh of solid elements")
-    kinds = {block.type: len(block.data) for block in mesh.cells}
+    kinds = {kind: len(nodes) for kind, nodes in mesh.cells.items()}
     found = [kind for kind in TETRAHEDRA if kind in kinds]
     others = [
         kind for kind in kinds if kind not in TETRAHEDRA and kind.startswith(("hexa", "wedge", "pyramid", "poly"))
@@ -123,127 +128,56 @@ def read_mesh_file(path: str | Path, field: str, size: float) -> MeshFile:
     if not found:
         problem = f"has no tetrahedra, but {listed}"
         raise InputError(field, path.name, problem, INSIDE)
-    tets = np.concatenate([block.data for block in mesh.cells if block.type == found[0]]).astype(np.int64)
+    tets = mesh.cells[found[0]]
     a, b, c, d = (points[tets[:, k]] for k in range(4))
     if (np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0).all():  # the sense in which MED numbers corners
         tets = tets[:, MIRRORED[: tets.shape[1]]]
-    groups: dict[str, list[IntArray]] = {}
-    for name, nodes in _groups(mesh):
-        groups.setdefault(name, []).append(np.asarray(nodes, dtype=np.int64).ravel())
-    whole = {name: np.unique(np.concatenate(parts)) for name, parts in groups.items()}
-    return MeshFile(points, tets, {name: nodes for name, nodes in whole.items() if len(nodes)})
+    return MeshFile(points, tets, {name: nodes for name, nodes in mesh.groups.items() if len(nodes)}, mesh.notes)
 
 
-def _reader(path: Path) -> Callable[[Path, str], Any]:
+def read_source(path: Path, field: str) -> SourceMesh:
+    """Mesh of a file with elements of any kind; its suffix gives the format.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, is damaged, or names nodes that it does not have.
+    """
     ending = path.suffix.lower()
-    return _by_gmsh if ending in BY_GMSH else _nastran if ending in NASTRAN else _read
+    if ending in ENDINGS:
+        mesh = read_by_gmsh(path, field)
+    elif ending in NASTRAN:
+        mesh = read_bulk_mesh(path, field)
+    elif ending in ABAQUS:
+        mesh = read_abaqus(path, field)
+    else:
+        mesh = read_by_meshio(path, field)
+    return checked_source(mesh, path, field)
 
 
-def _nastran(path: Path, field: str) -> Any:
-    import meshio
+def source_fingerprint(path: Path, field: str) -> str:
+    """Hash of the content of a mesh file and of the files that it names.
 
-    mesh = read_bulk_mesh(read_text(path, field), path, field)
-    return meshio.Mesh(mesh.points, list(mesh.cells.items()), point_sets=mesh.properties)
-
-
-def _read(path: Path, field: str) -> Any:
-    import meshio
-    from meshio.abaqus._abaqus import abaqus_to_meshio_type
-
-    abaqus_to_meshio_type.update(TRIANGLES)
-    said = io.StringIO()
-    try:  # meshio prints what it tried, and ends the process when nothing helps
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            return meshio.read(path)
-    except (Exception, SystemExit) as error:
-        if path.suffix.lower() not in meshio.extension_to_filetypes:
-            known = ", ".join(sorted({*meshio.extension_to_filetypes, *CAD, *BY_GMSH, *NASTRAN} - {*SURFACES}))
-            raise InputError(field, path.name, f"has an ending that is not known: {known}", "convert it") from None
-        lines = [line.strip() for line in [*said.getvalue().splitlines(), str(error)] if line.strip()]
-        reason = next(
-            (line for line in lines if "Couldn't read" not in line and line != "1"), "no reader understands it"
-        )
-        problem = f"cannot be read as a {path.suffix} file ({reason[:200]})"
-        raise InputError(field, path.name, problem, "is it whole? or write it as .msh (gmsh) or .vtu") from None
-
-
-def _by_gmsh(path: Path, field: str) -> Any:
-    """A mesh as gmsh reads it; where it names no groups, properties and references are the numbers of its entities."""
-    import meshio
-    from meshio.gmsh.common import _gmsh_to_meshio_type
-
-    with gmsh_session("housing") as gmsh:
+    Raises
+    ------
+    InputError
+        When one of them cannot be read.
+    """
+    ending, files = path.suffix.lower(), [path]
+    if path.is_file() and ending in (*NASTRAN, *ABAQUS):
+        files = source_files(path, field, bulk_inclusion if ending in NASTRAN else card_inclusion)
+    elif path.is_file() and ending == ".xdmf":
+        files += heavy_files(path, field)
+    found = hashlib.sha256()
+    for file in files:
         try:
-            gmsh.merge(str(path))
-        except Exception as error:
-            raise InputError(
-                field, path.name, f"cannot be read ({error})", "is it whole? or write it as .msh"
-            ) from None
-        model = gmsh.model
-        kinds, _, members = model.mesh.getElements()
-        if not len(kinds):
-            raise InputError(field, path.name, "has no elements", "is it whole? or write it as .msh (gmsh)")
-        points, number = _nodes(model)
-        counts = [model.mesh.getElementProperties(kind)[3] for kind in kinds]
-        cells = [
-            (_gmsh_to_meshio_type[kind], number[nodes.astype(np.int64)].reshape(-1, count))
-            for kind, nodes, count in zip(kinds, members, counts, strict=True)
-        ]
-        groups: dict[str, list[IntArray]] = {}
-        for dimension, tag in model.getPhysicalGroups():
-            nodes = model.mesh.getNodesForPhysicalGroup(dimension, tag)[0]
-            groups.setdefault(model.getPhysicalName(dimension, tag).strip() or str(tag), []).append(nodes)
-        for dimension, tag in () if groups else [*model.getEntities(2), *model.getEntities(3)]:
-            groups.setdefault(str(tag), [np.concatenate(model.mesh.getElements(dimension, tag)[2])])  # faces first
-        sets = {name: number[np.concatenate(parts).astype(np.int64)] for name, parts in groups.items()}
-    return meshio.Mesh(points, cells, point_sets=sets)
-
-
-def _nodes(model: Any) -> tuple[Array, IntArray]:
-    """Nodes of gmsh's model, and the row of each by its tag."""
-    tags, points, _ = model.mesh.getNodes()
-    number = np.full(int(tags.max()) + 1, -1)
-    number[tags.astype(np.int64)] = np.arange(len(tags))
-    return points.reshape(-1, 3), number
-
-
-def _groups(mesh: Any) -> Iterator[tuple[str, IntArray]]:
-    """Names and nodes of all groups of a mesh, one by one; a name may come several times."""
-    for name, nodes in (mesh.point_sets or {}).items():
-        yield name, nodes
-    for name, parts in (mesh.cell_sets or {}).items():
-        if not name.startswith("gmsh:"):
-            for block, rows in zip(mesh.cells, parts, strict=False):
-                if rows is not None and len(rows):
-                    yield name, block.data[np.asarray(rows, dtype=np.int64)]
-    names: dict[int, list[str]] = {int(np.ravel(tag)[0]): [] for tag in mesh.field_data.values()}  # by name
-    for tags in (getattr(mesh, "cell_tags", None), getattr(mesh, "point_tags", None)):
-        for tag, own in (tags or {}).items():
-            names.setdefault(int(tag), []).extend(own)
-    for key, blocks in mesh.cell_data.items():
-        for block, values in zip(mesh.cells, blocks, strict=False):
-            for name, rows in _rows(key, np.asarray(values), names):
-                yield name, block.data[rows]
-    for key, values in mesh.point_data.items():
-        yield from _rows(key, np.asarray(values), names)
-    for name, known in mesh.field_data.items():  # physical names of gmsh before version 4
-        for block, values in zip(mesh.cells, mesh.cell_data.get("gmsh:physical", []), strict=False):
-            rows = np.flatnonzero(np.asarray(values) == np.asarray(known).ravel()[0])
-            if len(rows) and name not in (mesh.cell_sets or {}):
-                yield name, block.data[rows]
-
-
-def _rows(key: str, values: Array, names: dict[int, list[str]]) -> Iterator[tuple[str, IntArray]]:
-    """Groups of one array: its numbers, where they are known to be groups; else, of marks 0 and 1, its own name."""
-    if values.ndim != 1:
-        return
-    if key in NUMBERED:
-        for number in np.unique(values[values != 0]):
-            rows = np.flatnonzero(values == number)
-            for name in names.get(int(number), [str(int(number))]):
-                yield name, rows
-    elif not key.startswith("gmsh:") and np.isin(values, (0, 1)).all() and values.any():
-        yield key, np.flatnonzero(values)
+            content = file.read_bytes()
+        except OSError as error:
+            reason = error.strerror or str(error)
+            cure = "check the path; it is looked for beside the job file"
+            raise InputError(field, str(file), f"cannot be read ({reason})", cure) from None
+        found.update(hashlib.sha256(content).digest())
+    return found.hexdigest()
 
 
 def _meshed(path: Path, field: str, size: float) -> MeshFile:
@@ -266,7 +200,9 @@ def _meshed(path: Path, field: str, size: float) -> MeshFile:
             raise InputError(
                 field, path.name, f"cannot be meshed ({error})", "mend the solid, or other size_mm"
             ) from None
-        points, number = _nodes(gmsh.model)
+        tags, flat, _ = gmsh.model.mesh.getNodes()
+        points, number = flat.reshape(-1, 3), np.full(int(tags.max()) + 1, -1)
+        number[tags.astype(np.int64)] = np.arange(len(tags))
         _, cells = gmsh.model.mesh.getElementsByType(11)
         groups = {
             str(tag): number[gmsh.model.mesh.getNodes(2, tag, includeBoundary=True)[0].astype(np.int64)]

@@ -12,7 +12,7 @@ import numpy as np
 from ..elasticity import least_jacobian, second_order
 from ..errors import InputError
 from ..typing import Array, IntArray
-from .mesh_file import _read
+from .mesh_file import read_source
 from .session import gmsh_session
 
 Point = tuple[float, float]
@@ -75,7 +75,7 @@ def _circle(geo: Any, hole: Array, size: float) -> int:
 
 
 def read_plate(path: Path, field: str, unit: float) -> PlateMesh:
-    """Triangles of a mesh file that meshio reads; `unit` is the length of its unit (m).
+    """Triangles of a mesh file; `unit` is the length of its unit (m).
 
     Raises
     ------
@@ -84,17 +84,16 @@ def read_plate(path: Path, field: str, unit: float) -> PlateMesh:
     """
     if not path.is_file():
         raise InputError(field, str(path), "there is no such file", "check the path; it is beside the mechanism file")
-    mesh = _read(path, field)
-    points = np.asarray(mesh.points, dtype=float)
-    faces = {b.type: b.data for b in mesh.cells if not b.type.startswith(("vertex", "line"))}
+    mesh = read_source(path, field)
+    points = mesh.points
+    faces = {kind: nodes for kind, nodes in mesh.cells.items() if not kind.startswith(("vertex", "line"))}
     kind = next((k for k in ("triangle6", "triangle") if k in faces), None)
     if kind is None or len(faces) > 1:
         listed = ", ".join(f"{len(data)} {name}" for name, data in faces.items()) or "no faces"
         raise InputError(field, path.name, f"must have triangles of one order only, but has {listed}", "mesh it anew")
     if points.shape[1] == 3 and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points):
         raise InputError(field, path.name, "is not plane: z differs", "lay the part into the x-y plane")
-    triangles = np.concatenate([b.data for b in mesh.cells if b.type == kind]).astype(np.int64)
-    used, triangles = np.unique(triangles, return_inverse=True)
+    used, triangles = np.unique(faces[kind], return_inverse=True)
     triangles = triangles.reshape(-1, 6 if kind == "triangle6" else 3)
     points = unit * points[used, :2]
     if kind == "triangle":

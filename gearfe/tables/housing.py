@@ -156,7 +156,7 @@ class AttachmentTable:
         low=1,
         doc="rows of u_x, u_y, u_z and the rotations in the matrices, from 1 on; left out: six by six in order",
     )
-    node: int | None = quantity(None, doc="or its node, in Abaqus' matrix input or DMIG")
+    node: int | None = quantity(None, doc="or its node, in matrices of Abaqus or DMIG")
 
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that contradict each other."""
@@ -171,7 +171,7 @@ class SuperelementTable:
     """Matrices of another program in place of a mesh."""
 
     stiffness: str = quantity(
-        doc="file of the stiffness matrix: Matrix Market, Abaqus' matrix input, Nastran's DMIG, OUTPUT2 or OUTPUT4"
+        doc="file of the stiffness: Matrix Market, matrices or substructure of Abaqus, DMIG, OUTPUT2 or OUTPUT4"
     )
     mass: str = quantity(doc="file of the mass matrix")
     unit: str = quantity(
