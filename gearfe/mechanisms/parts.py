@@ -95,6 +95,8 @@ def part_of(
         value = getattr(table, key)
         if key in ("body", "to", "point", "to_point"):
             continue
+        if key == "carrier" and value is not None:
+            value = _place(file, links, value, None, f"{label}.carrier", pointed=False)[0]
         if isinstance(value, FunctionTable):
             value = time_function(value, tables, f"{label}.{key}", smooth=key not in LOADS)
         elif key == "profile":
@@ -151,7 +153,9 @@ def time_function(
     if table.step is not None:
         made = made + smoothed_step(table.step_centre_s, given(table.step_width_s, f"{label}.step_width_s"), table.step)
     if table.sine is not None:
-        made = made + sine(table.sine, 2 * math.pi * table.frequency_hz, math.radians(table.phase_deg))
+        made = made + sine(
+            table.sine, 2 * math.pi * given(table.frequency_hz, f"{label}.frequency_hz"), math.radians(table.phase_deg)
+        )
     return made
 
 

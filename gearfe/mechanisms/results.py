@@ -143,6 +143,8 @@ def reactions(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
     the joints is not unique.
     """
     linkage, out = mechanism.linkage, {}
+    if not linkage.joints:
+        return {}
     q, multipliers = trajectory.q[:, : linkage.size], trajectory.multipliers[:, : linkage.rows]
     pulls = in_blocks(partial(_pulls, linkage), q, multipliers, size=LARGEST // (1 + linkage.rows * linkage.size))
     for j, (name, joint) in enumerate(zip(mechanism.file.joints, linkage.joints, strict=True)):

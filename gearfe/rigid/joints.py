@@ -192,7 +192,7 @@ class Prescribed(Joint):
     """A motion given as a function of time: one constraint.
 
     `coordinate` is ``"angle"`` (rad, relative to body `relative_to`), ``"rate"`` (rad/s, likewise; the angle starts
-    from the start pose), or ``"x"`` or ``"y"`` (m, of the point `point`, in the ground's frame).
+    from the start pose), or ``"x"`` or ``"y"`` (m, of the point `point`, in the frame of body `relative_to`).
     """
 
     body: str
@@ -206,12 +206,18 @@ class Prescribed(Joint):
         if self.coordinate not in ("angle", "rate", "x", "y"):
             where = f"prescribed motion {self.name!r} coordinate"
             raise InputError(where, self.coordinate, "must be one of angle, rate, x, y", "choose one of these")
+        if self.coordinate in ("angle", "rate") and self.point != (0.0, 0.0):
+            where = f"prescribed motion {self.name!r} point"
+            raise InputError(where, self.point, "has no part in an angle", "remove it, or prescribe x or y")
 
     def rows(self, frames: Frames) -> list[Row]:
         """The coordinate less its function of time."""
         if self.coordinate in ("x", "y"):
-            place = frames.point(self.body, self.point)
-            return [Row(self.coordinate, place.x if self.coordinate == "x" else place.y, self.function)]
+            along = (1.0, 0.0) if self.coordinate == "x" else (0.0, 1.0)
+            gap = frames.point(self.body, self.point)
+            if self.relative_to != GROUND:
+                gap = gap - frames.point(self.relative_to, (0.0, 0.0))
+            return [Row(self.coordinate, frames.direction(self.relative_to, along).dot(gap), self.function)]
         motion = self.function
         if self.coordinate == "rate":
             motion = motion.integral(frames.start_angle(self.body) - frames.start_angle(self.relative_to))

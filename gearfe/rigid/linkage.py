@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import InputError
 from ..typing import Array, IntArray
 from .assembly import Assembly, Held, assemble
+from .couplings import with_carriers
 from .forces import Along, Force, SpanFunction, StateFunction, Tension
 from .forms import Form, Frames, Vector
 from .joints import Joint
@@ -170,8 +171,9 @@ class Linkage(Written):
     def __init__(
         self, bodies: tuple[Body, ...], joints: tuple[Joint, ...] = (), forces: tuple[Force, ...] = ()
     ) -> None:
-        self.bodies, self.joints, self.forces = bodies, joints, forces
+        self.bodies, self.forces = bodies, forces
         self.frames = Frames(bodies, body_numbers(bodies, joints, forces))
+        self.joints = joints = with_carriers(joints, self.frames)
         self.body_index = self.frames.number
         self.name = "linkage"
         self.assembly: Assembly = assemble(joints, forces, self.frames)

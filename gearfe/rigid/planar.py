@@ -75,9 +75,9 @@ def body_numbers(bodies: tuple[Body, ...], joints: tuple[Joint, ...], forces: tu
         index[body.name] = i
     for k, part in enumerate((*joints, *forces)):
         label = f"{type(part).__name__.lower()} {getattr(part, 'name', '') or k}"
-        used = [
-            getattr(part, key) for key in ("a", "b", "body", "line", "relative_to", "reaction") if hasattr(part, key)
-        ]
+        keys = ("a", "b", "body", "line", "relative_to", "reaction", "carrier")
+        named = [(key, getattr(part, key)) for key in keys if hasattr(part, key)]
+        used = [value for key, value in named if key != "carrier" or value is not None]
         for name in used:
             if not isinstance(name, str):
                 order = ", ".join(vars(part))
@@ -95,7 +95,10 @@ def body_numbers(bodies: tuple[Body, ...], joints: tuple[Joint, ...], forces: tu
                 object.__setattr__(part, key, constant(float(value)))
         if getattr(part, "direction", None) == (0, 0):
             raise InputError(f"{label} direction", (0, 0), "must not be zero", "give the direction of the line")
-        if len(used) == 2 and used[0] == used[1]:
+        if len(used) >= 2 and used[0] == used[1]:
             cure = "name two different bodies (or the ground)"
             raise InputError(label, used[0], "joins a body to itself", cure)
+        if len(used) == 3 and used[2] in used[:2]:
+            cure = "name the body on which both turn"
+            raise InputError(f"{label} carrier", used[2], "is one of the two that are coupled", cure)
     return index

@@ -12,6 +12,7 @@ class Kind(NamedTuple):
     reference: str  # "module:Class"
     fields: Mapping[str, str]  # key of the table -> field of the class
     required: tuple[str, ...] = ()
+    needs: Mapping[str, str] = {}  # key that says nothing alone -> the key that it goes with
 
 
 #: Types of joints. A new one is a class (`gearfe.rigid.joints` says what it provides), and a line here.
@@ -37,15 +38,25 @@ JOINTS: dict[str, Kind] = {
         {"body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "length_m": "length"},
     ),
     "fixed": Kind("gearfe.rigid.joints:Fixed", {"body": "a", "to": "b"}),
-    "gear": Kind("gearfe.rigid.couplings:GearRatio", {"body": "a", "to": "b", "ratio": "ratio"}, ("ratio",)),
+    "gear": Kind(
+        "gearfe.rigid.couplings:GearRatio",
+        {"body": "a", "to": "b", "ratio": "ratio", "carrier": "carrier"},
+        ("ratio",),
+    ),
     "belt": Kind(
         "gearfe.rigid.couplings:Belt",
-        {"body": "a", "to": "b", "radius_m": "radius_a", "to_radius_m": "radius_b", "crossed": "crossed"},
+        {
+            "body": "a", "to": "b", "radius_m": "radius_a", "to_radius_m": "radius_b", "crossed": "crossed",
+            "carrier": "carrier",
+        },
         ("radius_m", "to_radius_m"),
     ),
     "rack": Kind(
         "gearfe.rigid.couplings:Rack",
-        {"body": "a", "to": "b", "point": "point", "direction": "direction", "radius_m": "radius"},
+        {
+            "body": "a", "to": "b", "point": "point", "direction": "direction", "radius_m": "radius",
+            "carrier": "carrier",
+        },
         ("radius_m",),
     ),
     "rolling": Kind(
@@ -58,7 +69,10 @@ JOINTS: dict[str, Kind] = {
     ),
     "cam": Kind(
         "gearfe.rigid.couplings:Cam",
-        {"body": "a", "to": "b", "point": "point", "coordinate": "coordinate", "profile": "profile"},
+        {
+            "body": "a", "to": "b", "point": "point", "coordinate": "coordinate", "profile": "profile",
+            "carrier": "carrier",
+        },
         ("coordinate", "profile"),
     ),
     "prescribed": Kind(
@@ -79,6 +93,7 @@ FORCES: dict[str, Kind] = {
             "damping": "damping", "free_length_m": "free_length", "tension_N": "law",
         },
         ("body",),
+        {"free_length_m": "stiffness"},
     ),
     "coordinate_spring": Kind(
         "gearfe.rigid.forces:CoordinateSpring",
@@ -87,6 +102,7 @@ FORCES: dict[str, Kind] = {
             "damping": "damping", "reference": "reference",
         },
         ("body", "coordinate"),
+        {"reference": "stiffness"},
     ),
     "force": Kind(
         "gearfe.rigid.forces:PointForce", {"body": "body", "point": "point", "x_N": "x", "y_N": "y"}, ("body",)

@@ -99,14 +99,24 @@ class FunctionTable:
     step_centre_s: float = quantity(0.0, doc="time at the middle of the step in s")
     step_width_s: float | None = quantity(None, above=0.0, doc="duration of the step (s)")
     sine: float | None = quantity(None, doc="amplitude of a sine term")
-    frequency_hz: float = quantity(0.0, low=0.0, doc="frequency of the sine in Hz")
+    frequency_hz: float | None = quantity(None, low=0.0, doc="frequency of the sine in Hz")
     phase_deg: float = quantity(0.0, doc="phase of the sine in degrees")
     table: str | None = quantity(None, doc="name of a table in [tables], over the time in s")
 
     def check(self, where: str) -> None:
-        """A step needs its width."""
-        if self.step is not None and self.step_width_s is None:
-            raise InputError(f"{where}.step_width_s", None, "is required with a step", "give its duration in s")
+        """A step has its width and a sine its frequency; no key of a term that is not there."""
+        for term, key, cure in (
+            ("step", "step_width_s", "give its duration in s"),
+            ("sine", "frequency_hz", "give it in Hz"),
+        ):
+            if getattr(self, term) is not None and getattr(self, key) is None:
+                raise InputError(f"{where}.{key}", None, f"is required with a {term}", cure)
+        terms = {"polynomial": ("origin_s",), "step": ("step_centre_s", "step_width_s")}
+        for term, keys in {**terms, "sine": ("frequency_hz", "phase_deg")}.items():
+            for key in keys:
+                if getattr(self, term) in (None, ()) and getattr(self, key) not in (None, 0.0):
+                    problem = f"says nothing without {term}"
+                    raise InputError(f"{where}.{key}", getattr(self, key), problem, f"add {term}, or remove it")
 
 
 Function = float | FunctionTable
@@ -142,11 +152,16 @@ class JointTable:
     length_m: float | None = quantity(
         None, above=0.0, doc="distance that a distance joint keeps in m (default: at start)"
     )
-    ratio: float | None = quantity(None, doc="turns of 'to' per turn of the body: -z/z_to of external gears")
+    ratio: float | None = quantity(
+        None, doc="turns of 'to' per turn of the body: -z/z_to of external gears, z/z_to of a ring"
+    )
     radius_m: float | None = quantity(
         None, doc="radius of the body's pulley or wheel, or of a rack's pinion 'to', in m"
     )
     to_radius_m: float | None = quantity(None, above=0.0, doc="radius of the pulley of 'to' in m")
+    carrier: str | None = quantity(
+        None, doc="body on which gears, pulleys, rack and pinion turn or slide (default: by the hinges)"
+    )
     crossed: bool = quantity(False, doc="a crossed belt: the pulleys turn in opposite senses")
     coordinate: str | None = quantity(
         None, choices=("angle", "rate", "x", "y"), doc="what is prescribed, or follows a cam"
@@ -173,7 +188,7 @@ class ForceTable:
     point: str | Pair | None = quantity(None, doc="point of the body: a name or [x, y] in m")
     to_point: str | Pair | None = quantity(None, doc="point of the other body: a name or [x, y] in m")
     acceleration_m_per_s2: Pair | None = quantity(None, doc="gravity [x, y] in m/s2")
-    stiffness: float = quantity(0.0, low=0.0, doc="stiffness in N/m, or N m/rad on an angle, >= 0")
+    stiffness: float | None = quantity(None, low=0.0, doc="stiffness in N/m, or N m/rad on an angle, >= 0 (default: 0)")
     damping: float = quantity(0.0, low=0.0, doc="damping in N s/m, or N m s/rad on an angle, >= 0")
     free_length_m: float = quantity(0.0, low=0.0, doc="length of the spring without force (m)")
     tension_N: str | None = quantity(None, doc="further tension of a spring in N, by length and length_rate (m, m/s)")
@@ -187,6 +202,8 @@ class ForceTable:
     def check(self, where: str) -> None:
         """Only the keys of this type."""
         _check_keys(self, where, FORCES[self.type], f"a force of type {self.type}")
+        if self.type == "force" and self.x_N is None and self.y_N is None:
+            raise InputError(where, None, "has no force", "give x_N or y_N")
         if self.body is not None and self.body == self.to:
             raise InputError(f"{where}.to", self.to, "joins a body to itself", "name another body or 'ground'")
 
@@ -269,6 +286,17 @@ class FigureTable:
     every: int = quantity(10, low=1, doc="draw each so manyth reference point")
     magnification: float = quantity(1.0, low=0.0, doc="factor of the deflections of flexible links in pictures")
 
+    def check(self, where: str) -> None:
+        """Markers have a file and columns."""
+        if self.reference is None and self.reference_columns:
+            raise InputError(f"{where}.reference_columns", None, "says nothing without reference", "name the CSV file")
+        if self.reference is not None and not self.reference_columns:
+            problem, cure = "draws nothing without reference_columns", 'write { OUTPUT = "COLUMN" }'
+            raise InputError(f"{where}.reference", self.reference, problem, cure)
+        for name in self.reference_columns:
+            if self.curves and name not in self.curves:
+                raise unknown_name(f"{where}.reference_columns", name, self.curves)
+
 
 @dataclass(frozen=True)
 class MechanismFile:
@@ -310,8 +338,8 @@ class MechanismFile:
                 raise InputError("joints", name, "is the name of a body, too", "rename the joint")
         for kind in ("joints", "forces"):
             for name, part in getattr(self, kind).items():
-                for key in ("body", "to"):
-                    value = getattr(part, key)
+                for key in ("body", "to", "carrier"):
+                    value = getattr(part, key, None)
                     if value is not None and value not in known:
                         raise unknown_name(f"{kind}.{name}.{key}", value, known)
                 for key, body, point in (("point", part.body, part.point), ("to_point", part.to, part.to_point)):
@@ -355,6 +383,10 @@ def _check_keys(table: JointTable | ForceTable, where: str, kind: Kind, what: st
     for spec in fields(table):
         if spec.name not in kind.fields and spec.name != "type" and getattr(table, spec.name) != spec.default:
             raise InputError(f"{where}.{spec.name}", None, f"does not belong to type {table.type!r}", own)
+    for key, other in kind.needs.items():
+        if getattr(table, key) not in (None, 0.0) and getattr(table, other) is None:
+            problem = f"says nothing without {other}"
+            raise InputError(f"{where}.{key}", getattr(table, key), problem, f"add {other}, or remove it")
     for key in kind.required:
         if getattr(table, key) is None:
             raise InputError(f"{where}.{key}", None, f"is required by {what}", f"add it: {docs[key]}")
