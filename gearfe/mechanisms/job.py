@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..files import output_folder, whole_set, write_csv, write_json
 from ..progress import stage
 from ..rigid import Start, Trajectory, integrate
+from ..rigid.carried import free_motions
 from ..rigid.inverse import prescribed_motion
 from .error_estimate import RUNS, TrajectoryError, trajectory_error
 from .model import Mechanism
@@ -23,6 +24,8 @@ from .results import Results, evaluate, in_blocks, reactions, reference_table
 if TYPE_CHECKING:
     from .sensitivity import Sensitivities
 
+#: Bodies that a line of the report names.
+MOST_NAMES = 8
 #: Files that depend on the options: what is left of them from an earlier run is removed.
 MAY_WRITE = (
     "trajectory.csv", "energy.csv", "equilibrium.csv", "bodies.csv", "modes.csv", "shapes.csv", "modes.png",
@@ -187,6 +190,8 @@ def summarise(
             "constraints": freedoms.constraints,
             "redundant": len(freedoms.redundant),
             "net": freedoms.net,
+            "prescribed": sum(row.motion is not None for row in linkage.assembly.rows),
+            "undriven_bodies": undriven_bodies(mechanism, start),
             "redundant_constraints": [label[r] for r in freedoms.redundant],
             "singular_at_start": [label[r] for r in freedoms.passing],
         },
@@ -205,6 +210,16 @@ def summarise(
         },
         "timings": timings,
     }
+
+
+def undriven_bodies(mechanism: Mechanism, start: Start) -> list[str]:
+    """Names of the bodies that can move while all prescribed motions stand still: they follow forces and the start."""
+    system, linkage = mechanism.system, mechanism.linkage
+    G = system.jacobian(start.time, start.q) * system.units / system.row_units[:, None]
+    moves = np.abs(free_motions(G)).max(axis=1, initial=0.0)[: linkage.size].reshape(-1, 3).max(axis=1)
+    names = [body.name for body, size in zip(linkage.bodies, moves, strict=True) if size > 1e-9]
+    links = {node: link for link in mechanism.file.bodies for node in names if node.startswith(f"{link}.")}
+    return list(dict.fromkeys(links.get(name, name) for name in names))
 
 
 def _flexible(mechanism: Mechanism, results: Results, name: str) -> dict[str, Any]:
@@ -267,11 +282,25 @@ def _link_line(link: dict[str, Any]) -> str:
     return line
 
 
+def _undriven_line(f: dict[str, Any]) -> str:
+    """Freedoms that no joint drives: what a joint too few leaves, and what a free motion has."""
+    names = f["undriven_bodies"]
+    listed = ", ".join(names[:MOST_NAMES]) + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
+    one = f["net"] == 1
+    line = f"{f['net']} {'freedom is' if one else 'freedoms are'} driven by no joint: forces and start velocities move"
+    drives = f["prescribed"]
+    if not drives:
+        return f"{line} {listed}"
+    verb = "joint prescribes a motion" if drives == 1 else "joints prescribe motions"
+    return f"{line} {listed}, while {drives} {verb}: check that no joint is missing"
+
+
 def _text(summary: dict[str, Any]) -> str:
     f = summary["freedoms"]
     lines = [
         f"{f['bodies']} bodies, {f['coordinates']} coordinates - {f['constraints']} constraints"
         f" + {f['redundant']} redundant = {f['net']} free",
+        *([_undriven_line(f)] if f["net"] > 0 else []),
         *(f"redundant: {name}" for name in f["redundant_constraints"]),
         *(_link_line(link) for link in summary["flexible_links"]),
         f"{summary['method']}: {summary['status']} at {summary['reached_s']:g} s in {summary['steps']} steps,"

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..typing import Array
 from .carried import RANK, free_motions, mass_excess
+from .second_order import SINGULAR, hidden_freedoms, motions_of_second_order
 from .system import System
 
 #: A row is dependent on earlier ones when this share of its gradient is left (noise of redundant rows: up to 3e-9).
@@ -38,17 +39,20 @@ class Freedoms:
     """Count of coordinates and constraints, and the rows that add nothing.
 
     `redundant` rows depend on the others in every position near the start, `passing` ones only at the start itself.
+    `hidden` freedoms are left by the gradients alone: rows `barely` hold them to second order, in every position.
     """
 
     coordinates: int
     constraints: int
     redundant: tuple[int, ...] = ()
     passing: tuple[int, ...] = ()
+    hidden: int = 0
+    barely: tuple[int, ...] = ()
 
     @property
     def net(self) -> int:
         """Net freedom: coordinates less independent constraints."""
-        return self.coordinates - self.constraints + len(self.redundant)
+        return self.coordinates - self.constraints + len(self.redundant) - self.hidden
 
 
 @dataclass(frozen=True)
@@ -83,46 +87,68 @@ def consistent_start(
     Raises
     ------
     InputError
-        When a loop cannot close, or forced values contradict the constraints; the message names them.
+        When a loop cannot close, forced values contradict the constraints, or constraints are singular in every
+        position; the message names them.
     """
     q = np.array(system.start_q if q is None else q, dtype=float)
     v = np.array(system.start_v if v is None else v, dtype=float)
     q = _positions(system, time, q, positions)
     v = _velocities(system, time, q, v, velocities)
     freedoms = count_freedoms(system, time, q)
+    if freedoms.hidden:
+        names = " and ".join(system.row_names()[r] for r in freedoms.barely)
+        problem = (
+            f"holds only to second order, in every position: gradients leave {freedoms.net + freedoms.hidden} free, the"
+            f" joints {freedoms.net}, so motion and forces across it are undetermined"
+        )
+        raise InputError(names, None, problem, "leave that direction free: a slot instead of a hinge, or a joint less")
     active = np.ones(system.rows, dtype=bool)
     active[list(freedoms.redundant)] = False
     return Start(float(time), q, v, freedoms, active, mass_excess(system, time, q, v, active))
 
 
 def count_freedoms(system: System, time: float, q: Array) -> Freedoms:
-    """Redundant rows: dependent at the start and at neighbours on the constraint manifold."""
+    """Redundant rows: dependent at the start and at neighbours on the constraint manifold; freedoms that are hidden."""
     here = dependent_rows(system, time, q)
-    if not here:
+    if not here and _regular(system, time, q):
         return Freedoms(system.size, system.rows)
     random = np.random.default_rng(5)
     fewest = here
-    G = system.jacobian(time, q) * system.units / system.row_units[:, None]
-    _, sizes, right = np.linalg.svd(G, full_matrices=True)
-    rank = int((sizes > 1e-9 * sizes.max(initial=0.0)).sum())
-    free = right[rank:].T
-    tried = 0
-    for size in (0.1, 0.03, 0.01, 0.1, 0.03):
-        step = free @ random.standard_normal(free.shape[1])
-        length = np.abs(step).max(initial=0.0)
-        near = q + (size / length * system.units * step if length > 0 else 0.0)
+    hidden: list[int] = []
+    place, tried = (time, q), 0
+    motions = motions_of_second_order(system, time, q, 5)
+    for size, motion in zip((0.1, 0.03, 0.01, 0.1, 0.03), motions, strict=False):
+        near = q + size * system.units * motion
         at = time + _time_of_change(system, time, q, size * random.uniform(0.3, 1.0))
         found, gap = close(system, at, near, ())
         if not closes(system, found, gap) or np.abs((found - q) / system.units).max(initial=0.0) < 1e-3 * size:
             continue
         tried += 1
+        place = at, found
         there = dependent_rows(system, at, found)
+        hidden.append(hidden_freedoms(system, at, found)[1])
         if len(there) < len(fewest):
             fewest = there
-        if tried == 3 or not fewest:
+        if tried == 3 or not (fewest or min(hidden)):
             break
+    if not motions:
+        hidden = [hidden_freedoms(system, time, q)[0]]
+    if min(hidden, default=0):
+        barely = tuple(dependent_rows(system, *place, share=np.sqrt(SINGULAR)))
+        return Freedoms(system.size, system.rows - len(barely), (), (), min(hidden), barely)
     passing = tuple(r for r in here if r not in fewest)
     return Freedoms(system.size, system.rows, tuple(fewest), passing[: len(here) - len(fewest)])
+
+
+def _regular(system: System, time: float, q: Array) -> bool:
+    """Whether no singular value of the gradients is nearly zero."""
+    if system.rows == 0:
+        return True
+    B = _comparable_rows(system, time, q)
+    if _independent(B):
+        return True
+    sizes = np.linalg.svd(B, compute_uv=False)
+    return bool(len(B) <= B.shape[1] and sizes.min() > SINGULAR * sizes.max())
 
 
 def _time_of_change(system: System, time: float, q: Array, size: float) -> float:
@@ -137,26 +163,36 @@ def _time_of_change(system: System, time: float, q: Array, size: float) -> float
     return found
 
 
-def dependent_rows(system: System, time: float, q: Array) -> list[int]:
-    """Rows of G that depend on the ones before them, in coordinates and rows that compare."""
-    if system.rows == 0:
-        return []
+def _comparable_rows(system: System, time: float, q: Array) -> Array:
+    """Rows of G of length 1, in coordinates that compare."""
     B = system.jacobian(time, q) * system.units / system.row_units[:, None]
     lengths = np.sqrt((B * B).sum(axis=1))
     lengths[lengths == 0.0] = 1.0
-    B = B / lengths[:, None]
+    return np.asarray(B / lengths[:, None])
+
+
+def _independent(B: Array) -> bool:
+    """Whether rows are clearly independent."""
     try:
-        if (np.diagonal(np.linalg.cholesky(B @ B.T)) > 1e-4).all():
-            return []
+        return bool((np.diagonal(np.linalg.cholesky(B @ B.T)) > 1e-4).all())
     except np.linalg.LinAlgError:
-        pass
+        return False
+
+
+def dependent_rows(system: System, time: float, q: Array, share: float = DEPENDENT) -> list[int]:
+    """Rows of G of which less than a `share` is left by the ones before them, in coordinates and rows that compare."""
+    if system.rows == 0:
+        return []
+    B = _comparable_rows(system, time, q)
+    if share == DEPENDENT and _independent(B):
+        return []
     basis = np.zeros((0, B.shape[1]))
     found = []
     for r, row in enumerate(B):
         rest = row - basis.T @ (basis @ row)
         rest -= basis.T @ (basis @ rest)
         size = float(np.linalg.norm(rest))
-        if size < DEPENDENT:
+        if size < share:
             found.append(r)
         else:
             basis = np.vstack([basis, rest / size])

@@ -1,0 +1,80 @@
+"""Freedoms that no joint drives are reported with the bodies that have them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gearfe.config import build
+from gearfe.mechanisms.job import Outcome, run_mechanism
+from gearfe.mechanisms.model import make_mechanism
+from gearfe.tables.mechanism import MechanismFile
+
+
+def four_bar() -> dict[str, Any]:
+    def link(x: float, y: float, turn: float, length: float) -> dict[str, Any]:
+        ends = {"A": [0.0, 0.0], "B": [length, 0.0]}
+        return {"mass_kg": 1.0, "inertia_kg_m2": 0.1, "position_m": [x, y], "angle_rad": turn, "points_m": ends}
+
+    def hinge(body: str, point: str, to: str, at: Any) -> dict[str, Any]:
+        return {"type": "hinge", "body": body, "point": point, "to": to, "to_point": at}
+
+    return {
+        "run": {"end_s": 0.02, "step_s": 0.01},
+        "bodies": {
+            "crank": link(0.0, 0.0, 1.0, 0.3),
+            "coupler": link(0.16, 0.25, 0.3, 0.8),
+            "rocker": link(1.0, 0.0, 1.6, 0.5),
+        },
+        "joints": {
+            "O": hinge("crank", "A", "ground", [0.0, 0.0]),
+            "P": hinge("coupler", "A", "crank", "B"),
+            "Q": hinge("coupler", "B", "rocker", "B"),
+            "C": hinge("rocker", "A", "ground", [1.0, 0.0]),
+            "drive": {"type": "prescribed", "body": "crank", "coordinate": "rate", "motion": 2.0},
+        },
+    }
+
+
+def report(raw: dict[str, Any], folder: Path) -> Outcome:
+    return run_mechanism(make_mechanism(build(MechanismFile, raw, "")), folder, estimate=False)
+
+
+@pytest.mark.parametrize(
+    ("missing", "net", "bodies", "text"),
+    [
+        ((), 0, [], None),
+        (("drive",), 1, ["crank", "coupler", "rocker"], "1 freedom is driven by no joint.* move crank, coupler, r"),
+        (("Q",), 2, ["coupler", "rocker"], "2 freedoms .* coupler, rocker, while 1 joint .* joint is missing"),
+        (("P", "Q"), 4, ["coupler", "rocker"], "4 freedoms .*while 1 joint prescribes a motion"),
+        (("Q", "drive"), 3, ["crank", "coupler", "rocker"], "3 freedoms are driven by no joint"),
+    ],
+)  # fmt: skip
+def test_what_no_joint_drives(
+    missing: tuple[str, ...], net: int, bodies: list[str], text: str | None, tmp_path: Path
+) -> None:
+    raw = four_bar()
+    for name in missing:
+        raw["joints"].pop(name)
+    outcome = report(raw, tmp_path)
+    freedoms = outcome.summary["freedoms"]
+    assert (freedoms["net"], freedoms["undriven_bodies"]) == (net, bodies)
+    assert freedoms["prescribed"] == int("drive" not in missing)
+    if text is None:
+        assert "driven by no joint" not in outcome.text
+    else:
+        assert re.search(text, outcome.text), outcome.text
+
+
+def test_a_third_crank_leaves_one_freedom(tmp_path: Path) -> None:
+    """A redundant joint changes nothing in what is undriven."""
+    raw = four_bar()
+    raw["joints"].pop("drive")
+    raw["bodies"]["crank"]["angle_rad"] = 1.0
+    raw["joints"]["again"] = {"type": "hinge", "body": "crank", "point": "A"}
+    freedoms = report(raw, tmp_path).summary["freedoms"]
+    assert (freedoms["net"], freedoms["redundant"]) == (1, 2)
+    assert freedoms["undriven_bodies"] == ["crank", "coupler", "rocker"]
