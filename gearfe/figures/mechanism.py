@@ -12,7 +12,8 @@ from ..mechanisms.results import Results, reference_table
 from ..progress import count, stage
 from ..rigid import Trajectory
 from ..rigid.modes import Modes
-from .mechanism_scene import MOST_NAMES, draw_paths, draw_state, frame
+from .mechanism_field import draw_field
+from .mechanism_scene import MOST_NAMES, draw_paths, draw_state, drawn_states, frame
 from .style import BLUE, COLOURS, ORANGE, fixed, new_figure, save_fixed, tidy
 
 
@@ -27,12 +28,17 @@ def draw_figures(folder: Path, mechanism: Mechanism, results: Results) -> None:
     time = trajectory.time[-1] if picture_time is None else min(picture_time, trajectory.time[-1])
     figure = new_figure(7, 6)
     axes = figure.subplots()
-    draw_paths(axes, mechanism, trajectory.q)
-    q = trajectory.dense(np.array([time]))
-    frame(axes, mechanism, trajectory.q)
+    states = drawn_states(mechanism, trajectory)
+    draw_paths(axes, mechanism, states)
+    frame(axes, mechanism, states)
     width, height = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
-    figure.set_size_inches(7, float(np.clip(6.1 * height / width, 2.2, 8.0)) + 0.9)
-    draw_state(axes, mechanism, q, names=len(mechanism.file.bodies) <= MOST_NAMES)
+    names = len(mechanism.file.bodies) <= MOST_NAMES
+    if mechanism.file.figure.colour is not None and len(trajectory.time) > 1:
+        figure.set_size_inches(8, float(np.clip(5.7 * height / width, 2.6, 8.0)) + 0.9)
+        draw_field(axes, mechanism, trajectory, float(time), names=names)
+    else:
+        figure.set_size_inches(7, float(np.clip(6.1 * height / width, 2.2, 8.0)) + 0.9)
+        draw_state(axes, mechanism, trajectory.dense(np.array([time])), names=names)
     axes.set_title(f"{mechanism.file.title or 'mechanism'} at {time:g} s", fontsize=11, loc="left")
     save_fixed(figure, folder / "picture.png")
     if mechanism.links:
@@ -70,10 +76,11 @@ def draw_animation(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -
     frames = mechanism.file.run.frames
     times = np.linspace(trajectory.time[0], trajectory.time[-1], frames)
     states = trajectory.dense(times)
+    path = drawn_states(mechanism, trajectory)
     figure = fixed(4.8, 4.2)
     figure.set_dpi(80)
     axes = figure.add_axes((0.16, 0.12, 0.8, 0.8))
-    frame(axes, mechanism, trajectory.q)
+    frame(axes, mechanism, path)
     height = float(np.clip(4.0 * np.ptp(axes.get_ylim()) / np.ptp(axes.get_xlim()), 1.2, 4.0))
     figure.set_size_inches(4.8, height + 0.8)
     axes.set_position((0.14, 0.5 / (height + 0.8), 0.84, height / (height + 0.8)))
@@ -82,9 +89,9 @@ def draw_animation(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -
         for done, (time, q) in enumerate(zip(times, states, strict=True)):
             count(done, len(times), "frames")
             axes.clear()
-            draw_paths(axes, mechanism, trajectory.q)
+            draw_paths(axes, mechanism, path)
             draw_state(axes, mechanism, q[None, :])
-            frame(axes, mechanism, trajectory.q)
+            frame(axes, mechanism, path)
             axes.set_title(f"{time:.4g} s", fontsize=9)
             writer.grab_frame()
 

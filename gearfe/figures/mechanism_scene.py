@@ -11,7 +11,7 @@ import numpy as np
 from ..mechanisms.links import FlexibleLink
 from ..mechanisms.model import Mechanism
 from ..mechanisms.plates import PlateLink
-from ..rigid import GROUND, Prismatic, Slot, Spring
+from ..rigid import GROUND, Prismatic, Slot, Spring, Trajectory
 from ..rigid.joints import Distance
 from ..typing import Array, ComplexArray
 from .style import COLOURS, GREY
@@ -22,45 +22,71 @@ MOST_NAMES = 20
 COILS, COIL_WIDTH = 9, 0.016
 #: Width of a letter of a name (points), at most.
 WIDTH = 6.0
+#: Largest distance of a path from the chords that draw it, in parts of its size; pieces of a step to begin with, which
+#: see a turn that ends where it begins; most states of a picture.
+SAGITTA, LEAST_PIECES, MOST_STATES = 5e-4, 8, 40_000
 Point = tuple[float, float]
 
 
 def draw_state(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0, names: bool = False) -> None:
     """Bodies as outlines of their points at one state, q of shape (1, k); with `names` those of bodies and points."""
-    _couplings(axes, mechanism, q, _size(mechanism, q), alpha)
+    draw_backdrop(axes, mechanism, q, alpha=alpha)
     magnification = mechanism.file.figure.magnification
-    colours = itertools.cycle(COLOURS)
-    for (name, body, points), colour in zip(_points(mechanism), colours, strict=False):
-        centre = _place(q, body, (0.0, 0.0))[0]
-        ends = np.array([_place(q, body, p)[0] for p in points.values()])
-        if len(ends) == 1:
-            ends = np.append(ends, centre)
+    for (body, points), colour in zip(rigid_ends(mechanism), _colours(mechanism), strict=False):
+        centre = place_of(q, body, (0.0, 0.0))[0]
+        ends = np.array([place_of(q, body, (p.real, p.imag))[0] for p in points])
         loop = ends if len(ends) < 3 else np.append(ends, ends[0])
         if len(ends) > 2:
             axes.fill(loop.real, loop.imag, color=colour, alpha=0.1 * alpha, linewidth=0)
         axes.plot(loop.real, loop.imag, "-o", color=colour, lw=2, ms=3.5, alpha=alpha)
         axes.plot(centre.real, centre.imag, "+", color=colour, ms=8, alpha=alpha)
-        if names:
-            _name(axes, name, ends.mean() if len(ends) else centre, colour, weight="bold")
-    for (name, link), colour in zip(mechanism.links.items(), colours, strict=False):
-        shape, nodes = (_of_link(link, q, at, magnification)[0] for at in (link.smooth, link.beam.link.ends))
+    for link, colour in zip(mechanism.links.values(), _colours(mechanism), strict=False):
+        shape, nodes = (link_places(link, at, q, magnification)[0] for at in (link.smooth, link.beam.link.ends))
         axes.plot(shape.real, shape.imag, lw=2, color=colour, alpha=alpha)
         axes.plot(nodes.real, nodes.imag, "o", ms=3, color=colour, alpha=alpha)
-        if names:
-            _name(axes, name, shape[len(shape) // 2], colour, weight="bold")
-    for (name, plate), colour in zip(mechanism.plates.items(), colours, strict=False):
-        places = plate.exaggerated(q, magnification)[0]
-        draw_plate(axes, plate, places, colour, alpha)
-        if names:
-            _name(axes, name, places.mean(), colour, weight="bold")
+    for plate, colour in zip(mechanism.plates.values(), _colours(mechanism), strict=False):
+        draw_plate(axes, plate, plate.exaggerated(q, magnification)[0], colour, alpha)
+    if names:
+        draw_names(axes, mechanism, q)
+
+
+def draw_backdrop(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0) -> None:
+    """What is no body: springs, rods, guides, points at rest, and the factor of deflections."""
+    _couplings(axes, mechanism, q, _size(mechanism, q), alpha)
+    magnification = mechanism.file.figure.magnification
     if mechanism.elastic and magnification != 1.0:
         axes.text(0.01, 0.01, f"deflections x {magnification:g}", transform=axes.transAxes, fontsize=8)
-    for name, place in mechanism.file.ground.points_m.items():
+    for place in mechanism.file.ground.points_m.values():
         axes.plot(*place, "k^", ms=6, mfc="none", alpha=alpha)
-        if names:
-            _name(axes, name, complex(*place), "black")
-    if names:
-        _point_names(axes, mechanism, q)
+
+
+def draw_names(axes: Any, mechanism: Mechanism, q: Array) -> None:
+    """Names of the bodies in their colours, and of points."""
+    magnification = mechanism.file.figure.magnification
+    rigid = [name for name in mechanism.file.bodies if name not in mechanism.elastic]
+    middles = [
+        np.mean([place_of(q, body, (p.real, p.imag))[0] for p in points]) for body, points in rigid_ends(mechanism)
+    ]
+    named = list(zip(rigid, middles, _colours(mechanism), strict=False))
+    for (name, link), colour in zip(mechanism.links.items(), _colours(mechanism), strict=False):
+        shape = link_places(link, link.smooth, q, magnification)[0]
+        named.append((name, shape[len(shape) // 2], colour))
+    for (name, plate), colour in zip(mechanism.plates.items(), _colours(mechanism), strict=False):
+        named.append((name, plate.exaggerated(q, magnification)[0].mean(), colour))
+    for name, place, colour in named:
+        _name(axes, name, complex(place), colour, weight="bold")
+    for name, place in mechanism.file.ground.points_m.items():
+        _name(axes, name, complex(*place), "black")
+    _point_names(axes, mechanism, q)
+
+
+def rigid_ends(mechanism: Mechanism) -> list[tuple[int, ComplexArray]]:
+    """Number of each rigid body, and its named points relative to the mass centre; beside a single one the centre."""
+    found = []
+    for _, body, points in _points(mechanism):
+        ends = np.array([complex(*point) for point in points.values()], dtype=complex)
+        found.append((body, np.append(ends, 0.0) if len(ends) < 2 else ends))
+    return found
 
 
 def draw_plate(axes: Any, plate: PlateLink, places: np.ndarray, colour: str, alpha: float) -> None:
@@ -76,27 +102,70 @@ def draw_plate(axes: Any, plate: PlateLink, places: np.ndarray, colour: str, alp
 
 
 def draw_paths(axes: Any, mechanism: Mechanism, q: Array) -> None:
-    """Paths of points over the run, q of shape (n, k)."""
+    """Paths of points over the run, q of shape (n, k): states that `drawn_states` has chosen."""
+    for label, body, point in _path_points(mechanism):
+        places = place_of(q, body, point)
+        axes.plot(places.real, places.imag, lw=0.8, alpha=0.7, color=GREY, zorder=1, label=label)
+
+
+def drawn_states(mechanism: Mechanism, trajectory: Trajectory) -> Array:
+    """States over the run, shape (n, k), so close that chords between them leave no path by `SAGITTA` of the picture.
+
+    The paths are those of the file's points, and of the points of rigid bodies, which the frame of the picture holds.
+    They follow from the solution between the output times, not from these.
+    """
+    if len(trajectory.time) < 2 or len(trajectory.dense.times) < 2:
+        return trajectory.q
+    begin, end = sorted((trajectory.time[0], trajectory.time[-1]))
+    ends = np.sort(trajectory.dense.times)
+    ends = np.unique(np.concatenate([[begin], ends[(ends > begin) & (ends < end)], [end]]))
+    pieces = int(np.clip(MOST_STATES // len(ends), 1, LEAST_PIECES))
+    times = np.interp(np.arange((len(ends) - 1) * pieces + 1) / pieces, np.arange(len(ends)), ends)
+    tracks = [(body, point) for _, body, point in _path_points(mechanism)]
+    tracks += [(body, (p.real, p.imag)) for body, points in rigid_ends(mechanism) for p in points]
+
+    def places(at: Array) -> ComplexArray:
+        q = trajectory.dense(at)
+        return (
+            np.stack([place_of(q, *track) for track in tracks], axis=1) if tracks else np.zeros((len(at), 1), complex)
+        )
+
+    z = places(times)
+    size = float(max(np.ptp(z.real), np.ptp(z.imag)))
+    while len(times) < MOST_STATES:
+        middle = 0.5 * (times[1:] + times[:-1])
+        between = places(middle)
+        off = np.abs(between - 0.5 * (z[1:] + z[:-1])).max(axis=1)
+        wanted = np.flatnonzero(off > SAGITTA * size)
+        if not len(wanted):
+            break
+        times, z = np.insert(times, wanted + 1, middle[wanted]), np.insert(z, wanted + 1, between[wanted], axis=0)
+    return trajectory.dense(times)
+
+
+def _path_points(mechanism: Mechanism) -> list[tuple[str, int, Point]]:
+    """Label, body and place relative to the mass centre of the points whose paths are drawn."""
+    found = []
     for path in mechanism.file.paths:
-        body = mechanism.linkage.body_index[path.body]
-        if body == len(mechanism.linkage.bodies):
-            continue
         if isinstance(path.point, str):
             label = f"{path.body}.{path.point}"
-            body, point = mechanism.point(label)
+            found.append((label, *mechanism.point(label)))
         else:
-            label = f"{path.body} {path.point}"
-            centre = mechanism.file.bodies[path.body].centre_m
-            point = (path.point[0] - centre[0], path.point[1] - centre[1])
-        places = _place(q, body, point)
-        axes.plot(places.real, places.imag, lw=0.8, alpha=0.7, color=GREY, zorder=1, label=label)
+            body = mechanism.linkage.body_index[path.body]
+            found.append((f"{path.body} {path.point}", body, mechanism.linkage.frames.arm(path.body, path.point)))
+    return found
+
+
+def _colours(mechanism: Mechanism) -> list[str]:
+    """Colours of the bodies in their order."""
+    return list(itertools.islice(itertools.cycle(COLOURS), max(len(mechanism.file.bodies), 1)))
 
 
 def frame(axes: Any, mechanism: Mechanism, q: Array) -> None:
     """Limits that hold the whole run, labels with their unit."""
     factor = mechanism.file.figure.magnification
     places = [*_rigid_places(mechanism, q), *(place for _, *ends in _coupled(mechanism, q) for place in ends)]
-    places += [_of_link(link, q, link.beam.link.ends, factor) for link in mechanism.links.values()]
+    places += [link_places(link, link.beam.link.ends, q, factor) for link in mechanism.links.values()]
     places += [plate.exaggerated(q, factor) for plate in mechanism.plates.values()]
     low, high = (np.array([[f(p.real), f(p.imag)] for p in places]) for f in (np.min, np.max))
     (x0, y0), (x1, y1) = low.min(axis=0), high.max(axis=0)
@@ -110,7 +179,7 @@ def frame(axes: Any, mechanism: Mechanism, q: Array) -> None:
     axes.set_ylabel("y (m)")
 
 
-def _of_link(link: FlexibleLink, q: Array, at: Array, factor: float) -> ComplexArray:
+def link_places(link: FlexibleLink, at: Array, q: Array, factor: float) -> ComplexArray:
     """Places of a flexible link, deflections times a factor, as complex numbers (n, k)."""
     shape = link.exaggerated(q, at, factor)
     return np.asarray(shape[:, :, 0] + 1j * shape[:, :, 1])
@@ -127,7 +196,7 @@ def _seen(mechanism: Mechanism, q: Array, body: str, at: Point) -> ComplexArray:
     """Places of a point of a body, or of the ground, which stands still."""
     linkage = mechanism.linkage
     every = np.append(q[:, : 3 * len(linkage.bodies)], np.zeros((len(q), 3)), axis=1)
-    return _place(every, linkage.body_index[body], linkage.frames.arm(body, at))
+    return place_of(every, linkage.body_index[body], linkage.frames.arm(body, at))
 
 
 def _points(mechanism: Mechanism) -> list[tuple[str, int, dict[str, Point]]]:
@@ -143,7 +212,7 @@ def _points(mechanism: Mechanism) -> list[tuple[str, int, dict[str, Point]]]:
     ]
 
 
-def _place(q: Array, body: int, point: Point) -> ComplexArray:
+def place_of(q: Array, body: int, point: Point) -> ComplexArray:
     """Places (n,) of a point relative to the mass centre, as complex numbers (m)."""
     turn = np.exp(1j * q[:, 3 * body + 2])
     return np.asarray(q[:, 3 * body] + 1j * q[:, 3 * body + 1] + turn * complex(*point))
@@ -151,7 +220,7 @@ def _place(q: Array, body: int, point: Point) -> ComplexArray:
 
 def _rigid_places(mechanism: Mechanism, q: Array) -> list[ComplexArray]:
     """Places of the points and mass centres of rigid bodies, and of the points at rest."""
-    made = [_place(q, body, p) for _, body, points in _points(mechanism) for p in [*points.values(), (0.0, 0.0)]]
+    made = [place_of(q, body, p) for _, body, points in _points(mechanism) for p in [*points.values(), (0.0, 0.0)]]
     return [*made, *(np.array([complex(*place)]) for place in mechanism.file.ground.points_m.values())]
 
 
@@ -216,7 +285,7 @@ def _point_names(axes: Any, mechanism: Mechanism, q: Array) -> None:
     labelled = [(name, complex(*place)) for name, place in mechanism.file.ground.points_m.items()]
     for _, body, points in _points(mechanism):
         for name, point in points.items():
-            place = complex(_place(q, body, point)[0])
+            place = complex(place_of(q, body, point)[0])
             if not any(name == other and abs(place - there) < near for other, there in labelled):
                 labelled.append((name, place))
                 _name(axes, name, place, "#374151")

@@ -191,7 +191,7 @@ def summarise(
             "redundant": len(freedoms.redundant),
             "net": freedoms.net,
             "prescribed": sum(row.motion is not None for row in linkage.assembly.rows),
-            "undriven_bodies": undriven_bodies(mechanism, start),
+            "undriven_bodies": undriven_bodies(mechanism, trajectory),
             "redundant_constraints": [label[r] for r in freedoms.redundant],
             "singular_at_start": [label[r] for r in freedoms.passing],
         },
@@ -212,11 +212,17 @@ def summarise(
     }
 
 
-def undriven_bodies(mechanism: Mechanism, start: Start) -> list[str]:
-    """Names of the bodies that can move while all prescribed motions stand still: they follow forces and the start."""
+def undriven_bodies(mechanism: Mechanism, trajectory: Trajectory) -> list[str]:
+    """Names of the bodies that can move while all prescribed motions stand still: they follow forces and the start.
+
+    Of several states of the run, since dead centres hold some bodies for a moment.
+    """
     system, linkage = mechanism.system, mechanism.linkage
-    G = system.jacobian(start.time, start.q) * system.units / system.row_units[:, None]
-    moves = np.abs(free_motions(G)).max(axis=1, initial=0.0)[: linkage.size].reshape(-1, 3).max(axis=1)
+    moves = np.zeros(len(linkage.bodies))
+    for k in np.unique(np.linspace(0, len(trajectory.time) - 1, 5).astype(int)):
+        G = system.jacobian(trajectory.time[k], trajectory.q[k]) * system.units / system.row_units[:, None]
+        free = np.abs(free_motions(G)).max(axis=1, initial=0.0)[: linkage.size]
+        moves = np.maximum(moves, free.reshape(-1, 3).max(axis=1))
     names = [body.name for body, size in zip(linkage.bodies, moves, strict=True) if size > 1e-9]
     links = {node: link for link in mechanism.file.bodies for node in names if node.startswith(f"{link}.")}
     return list(dict.fromkeys(links.get(name, name) for name in names))

@@ -284,6 +284,11 @@ class FigureTable:
     )
     reference_columns: dict[str, str] = quantity(dict, doc="output name = column of the reference file")
     every: int = quantity(10, low=1, doc="draw each so manyth reference point")
+    colour: str | None = quantity(
+        None,
+        choices=("displacement", "velocity"),
+        doc="colours of the picture: the distance of each point from the start, or its speed, with arrows",
+    )
     magnification: float = quantity(1.0, low=0.0, doc="factor of the deflections of flexible links in pictures")
 
     def check(self, where: str) -> None:
@@ -352,8 +357,8 @@ class MechanismFile:
                     if link is not None and link.beam is not None and isinstance(point, tuple):
                         check_on_axis(link.beam, point[0], label)
         for i, path in enumerate(self.paths):
-            if path.body not in known:
-                raise unknown_name(f"paths[{i}].body", path.body, known)
+            if path.body not in self.bodies:
+                raise unknown_name(f"paths[{i}].body", path.body, self.bodies)
             link = self.bodies.get(path.body)
             if isinstance(path.point, tuple) and link is not None and link.bends:
                 cure = "give it a name in points_m"
