@@ -103,7 +103,7 @@ def answer(arguments: list[str], run: Callable[[list[str]], int]) -> int:
 
 
 def _answered(arguments: list[str], run: Callable[[list[str]], int]) -> int:
-    from .errors import InputError, MissingLibraryError
+    from .errors import InputError, MissingLibraryError, cut
 
     try:
         return run(arguments)
@@ -118,7 +118,7 @@ def _answered(arguments: list[str], run: Callable[[list[str]], int]) -> int:
     except OSError as error:
         place = error.filename or "a file cannot be written or read"
         message, code = f"error: {place}: {error.strerror or error}", 2
-    print(f"gearfe: {message}", file=sys.stderr)
+    print(f"gearfe: {cut(message)}", file=sys.stderr)
     return code
 
 

@@ -20,7 +20,7 @@ from dataclasses import MISSING
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .errors import InputError, nearest, unknown_name
+from .errors import InputError, nearest, unknown_key
 from .files import read_text
 
 T = TypeVar("T")
@@ -188,7 +188,7 @@ def _built(cls: type[T], table: Any, where: str) -> T:
         if key in getattr(cls, "REMOVED", ()):
             raise InputError(_joined(where, key), table[key], *kind.REMOVED[key])
         if key not in fields:
-            raise unknown_name(where or "job file", key, fields)
+            raise unknown_key(where, key, table[key], fields)
     values: dict[str, Any] = {}
     for name, spec in fields.items():
         label = _joined(where, name)
@@ -242,13 +242,13 @@ def job_tables(
     raw: dict[str, Any], path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()
 ) -> dict[str, Any]:
     """The same of tables that are parsed; `path` is named in messages."""
-    for name in raw:
+    for name, table in raw.items():
         if name in REMOVED_TABLES:
             raise InputError(f"[{name}]", None, *REMOVED_TABLES[name])
         if name not in TABLES:
             if {"run", "bodies"} <= raw.keys():
                 raise InputError("job file", str(path), "describes a mechanism", "run it: gearfe mechanism FILE")
-            raise unknown_name(f"job file {Path(path).name}", name, TABLES)
+            raise unknown_key("", name, table, TABLES, field=f"job file {Path(path).name}")
     for name in needed:
         if name not in raw:
             cure = f"add a table [{name}] (see gearfe new)"

@@ -45,7 +45,7 @@ def gear(teeth=20, **form):
         ({"profile_shift": -5.0}, "profile_shift", "no tooth thickness"),
         ({"addendum": -1.0}, "addendum", "> 0"),
         ({"dedendum": -1.25}, "dedendum", "> 0"),
-        ({"dedendum": 2.2}, "dedendum", "no land.*< 2.158"),
+        ({"dedendum": 2.2}, "dedendum", "no land.*< 2.1579"),
         ({"rack_tip_radius": -0.1}, "rack_tip_radius", ">= 0"),
         ({"rack_tip_radius": 0.5}, "rack_tip_radius", "land.*<= 0.471"),
         ({"pressure_angle": math.radians(30.0)}, "rack_tip_radius", "land.*<= 0.1103"),

@@ -51,8 +51,8 @@ def tooth_root(gear: Gear) -> tuple[Trochoid, float, bool]:
         limit = math.floor(1e4 * max(largest, 0.0)) / 1e4
         if largest < 0.0:
             most = (math.pi / 4 + 0.5 * gear.tooth_thinning / m) / math.tan(alpha)
-            problem = f"leaves no land at the tip of a rack of this pressure angle: must be < {most:.4g}"
-            raise InputError("dedendum", gear.dedendum, problem, "use less dedendum")
+            problem = "leaves no land at the tip of a rack of this pressure angle"
+            raise InputError("dedendum", gear.dedendum, problem, "use less dedendum", ("<", most, ""))
         problem = f"exceeds the land of the rack's tip: at this pressure angle and dedendum it must be <= {limit:g}"
         raise InputError("rack_tip_radius", gear.rack_tip_radius, problem, "use a smaller radius or less dedendum")
     offset = max(0.0, math.pi * m / 4 + 0.5 * gear.tooth_thinning - depth * math.tan(alpha) - rho / math.cos(alpha))
@@ -171,9 +171,9 @@ def tooth_profile(gear: Gear) -> ToothProfile:
     tip_half_angle = cmath.phase(flank.at(np.array(end_roll)))
     if tip_half_angle <= 0.0:
         peak = flank.base_radius / math.cos(inverse_inv(flank.base_angle))
-        problem = f"the tooth is pointed below its tip circle: must be < {_addendum_to(gear, peak):.5g}"
+        problem, limit = "the tooth is pointed below its tip circle", ("<", _addendum_to(gear, peak), "")
         cure = "use less addendum or profile shift, or some tip_shortening"
-        raise InputError("addendum", gear.addendum, problem, cure)
+        raise InputError("addendum", gear.addendum, problem, cure, limit)
     round_roll = _round_start(gear, flank, tip_roll, end_roll)
     flank = replace(flank, end=round_roll)
 
@@ -201,10 +201,8 @@ def _flank(gear: Gear, form_roll: float) -> tuple[Involute, float]:
     base, base_angle, tip_roll = gear.base_radius, gear.base_angle, gear.roll_length(gear.tip_radius)
     if tip_roll <= form_roll:
         lowest = _addendum_to(gear, math.hypot(base, form_roll))
-        problem = f"the tip circle lies below the start of the involute: must be > {lowest:.5g}"
-        raise InputError(
-            "addendum", gear.addendum, problem, "use more addendum, teeth or profile shift, or less dedendum"
-        )
+        problem, cure = "the tip circle lies below the start of the involute", "use more addendum or less dedendum"
+        raise InputError("addendum", gear.addendum, problem, cure, (">", lowest, ""))
     flank, relief = Involute(base, base_angle, form_roll, tip_roll), gear.tip_relief
     if relief is None or relief.amount == 0.0:
         return flank, tip_roll

@@ -322,9 +322,30 @@ def in_keys(error: InputError, where: str, *, key: str = "", unit: float = 0.0) 
     return InputError(f"{where}.{key or named}", value, error.problem, error.cure)
 
 
+def _of_drawn(error: InputError, table: PairTable, side: str, drawn: str, made: str) -> InputError:
+    """The error of a coefficient as that of the drawing value that it was made from, its bound as one of that value."""
+    own: GearTable = getattr(table, side)
+    field, value = f"pair.{side}.{drawn}", getattr(own, drawn)
+    if error.limit is None:
+        return InputError(field, value, f"{made}: {error.problem}", error.cure)
+    sign, bound, _ = error.limit
+    form, module = table.tooth_form(side), table.module_mm_of(side)
+    shift = float(form["profile_shift"])
+    if drawn != "tip_diameter_mm":  # these fall as the dedendum and the thinning grow
+        sign = {"<": ">", ">": "<"}[sign]
+    if drawn == "span_mm":
+        angle = math.radians(form["pressure_angle_deg"])
+        whole = module * nominal_span(own.teeth, shift, angle, given(own.span_teeth, "span_teeth"))
+        limit = whole - 1e-3 * bound * math.cos(angle)
+    else:
+        limit = module * (own.teeth + 2.0 * shift + 2.0 * (bound if drawn == "tip_diameter_mm" else -bound))
+    cure = f"use a {'smaller' if sign == '<' else 'larger'} {drawn}"
+    return InputError(field, value, f"{made}: {error.reason}: must be {sign} {limit:.6g} mm", cure)
+
+
 def _renamed(error: InputError, table: PairTable, side: str, name: str) -> InputError:
     """The same error in the words of the job file: its key where it was given, its unit."""
-    error = InputError(name, error.value, error.problem, error.cure)
+    error = InputError(name, error.value, error.reason, error.cure, error.limit)
     key, unit = KEYS.get(name, (name, 1.0))
     if not side:
         return in_keys(error, "pair")
@@ -332,8 +353,7 @@ def _renamed(error: InputError, table: PairTable, side: str, name: str) -> Input
     for drawn, stands_for in INSTEAD.items():
         if key in stands_for and getattr(own, drawn) is not None:
             number = error.value / unit if isinstance(error.value, float) else error.value
-            problem = f"makes {key} {number:.6g}: {error.problem}"
-            return InputError(f"pair.{side}.{drawn}", getattr(own, drawn), problem, error.cure)
+            return _of_drawn(error, table, side, drawn, f"makes {key} {number:.6g}")
     if name == "module" and own.pitch_diameter_mm is not None:
         return in_keys(error, f"pair.{side}", key="pitch_diameter_mm", unit=1e-3 / own.teeth)
     shared = getattr(own, key, None) is None and getattr(table, key, None) is not None

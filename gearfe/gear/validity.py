@@ -80,7 +80,7 @@ def check_gear(gear: Gear) -> None:
         most = gear.module * (0.5 * math.pi + slope * gear.profile_shift)  # thickness without thinning
         if most > 0.0:
             cure = "use less thinning, a larger module or more profile shift"
-            raise InputError("tooth_thinning", gear.tooth_thinning, f"{what}: must be < {1e6 * most:.4g} um", cure)
+            raise InputError("tooth_thinning", gear.tooth_thinning, what, cure, ("<", 1e6 * most, "um"))
         least = (gear.tooth_thinning / gear.module - 0.5 * math.pi) / slope
         problem = f"{what}: must be > {least:.6g}"
         raise InputError("profile_shift", gear.profile_shift, problem, "use more profile shift")
@@ -106,8 +106,11 @@ def _check_rim(gear: Gear) -> None:
     """Raise `InputError` unless the gear has a bore that holds it and a rim around it."""
     if gear.root_radius <= LEAST_RIM * gear.module:
         most = gear.teeth / 2 + gear.profile_shift - LEAST_RIM
-        problem = f"leaves no material inside the root circle: must be < {most:.6g}"
-        raise InputError("dedendum", gear.dedendum, problem, "use less dedendum, more teeth or more profile shift")
+        problem, cure = (
+            "leaves no material inside the root circle",
+            "use less dedendum, more teeth or more profile shift",
+        )
+        raise InputError("dedendum", gear.dedendum, problem, cure, ("<", most, ""))
     if not gear.bore_diameter >= LEAST_BORE * gear.module:
         problem = f"must be >= {1e3 * LEAST_BORE * gear.module:.6g} mm, {LEAST_BORE:g} module"
         cure = "use a larger bore: the gear is held there, and a point holds nothing"
@@ -135,10 +138,10 @@ def check_pair(pair: MeshGeometry) -> None:
     a = pair.working_centre_distance
     for name, gear, mate in (("pinion", pinion, wheel), ("wheel", wheel, pinion)):
         if gear.tip_radius + mate.root_radius >= a:
-            room = (a - mate.root_radius - gear.reference_radius) / gear.module
-            problem = "makes the tip circle hit the mate's root circle: addendum + profile_shift - tip_shortening must"
+            room = (a - mate.root_radius - gear.tip_radius) / gear.module
+            problem, limit = "makes the tip circle hit the mate's root circle", ("<", gear.addendum + room, "")
             cure = "use more tip_shortening, less addendum, more dedendum or more centre distance"
-            raise InputError(f"{name}.addendum", gear.addendum, f"{problem} be < {room:.6g}", cure)
+            raise InputError(f"{name}.addendum", gear.addendum, problem, cure, limit)
     _check_ratio(pair)
     for name, mate_name in (("pinion", "wheel"), ("wheel", "pinion")):
         _check_interference(pair, name, mate_name)
@@ -217,9 +220,9 @@ def _check_interference(pair: MeshGeometry, name: str, mate_name: str) -> None:
         most = mate.addendum - (mate.tip_radius - allowed) / mate.module
         problem = (
             f"makes the tip reach {1e3 * lost:.4g} mm of roll length below the start of the {name}'s involute "
-            f"(form diameter {2e3 * gear.form_radius:.6g} mm), where the root is no involute: must be < {most:.5g}"
+            f"(form diameter {2e3 * gear.form_radius:.6g} mm), where the root is no involute"
         )
-        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure)
+        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure, ("<", most, ""))
     depth = tip_penetration(gear, mate, pair.working_centre_distance, 0.5 * pair.normal_backlash / mate.base_radius)
     if depth > TOLERANCE * gear.module:
         problem = f"makes the tip cut {1e3 * depth:.4g} mm into the {name}'s root"

@@ -89,7 +89,7 @@ def tooth_form(*tables: ToothFormTable) -> dict[str, Any]:
 class GearTable(ToothFormTable):
     """One gear of a pair."""
 
-    teeth: int = quantity(doc="number of teeth", low=8, high=1000)
+    teeth: int = quantity(doc="number of teeth of an external gear", low=8, high=1000)
     bore_diameter_mm: float = quantity(doc="diameter of the rigid bore (mm); it decides the stiffness level", above=0.0)
     pitch_diameter_mm: float | None = quantity(None, doc="reference diameter (mm), instead of module_mm", above=0.0)
     tip_diameter_mm: float | None = quantity(

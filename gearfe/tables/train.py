@@ -49,7 +49,7 @@ class TrainGearTable(ToothFormTable):
     shaft: str = quantity(doc="shaft that carries it")
     y_mm: float = quantity(doc="y of its middle plane (mm)")
     gear: str = quantity("", choices=("pinion", "wheel", ""), doc="pinion or wheel of [pair]; left out: give teeth")
-    teeth: int | None = quantity(None, low=8, doc="number of teeth, for a gear of its own")
+    teeth: int | None = quantity(None, low=8, doc="number of teeth of an external gear, for a gear of its own")
     bore_diameter_mm: float | None = quantity(None, above=0.0, doc="bore (mm); left out: 0.2 times the pitch diameter")
     density_kg_per_m3: float | None = quantity(
         None, above=0.0, doc="density (kg/m3); left out: of [pair.material], or steel"

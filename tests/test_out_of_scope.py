@@ -1,0 +1,124 @@
+"""What is out of scope is refused by its name, bounds are those of the key that was written, no message is long."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from gearfe.cli import main
+from gearfe.errors import LONGEST_MESSAGE, OUT_OF_SCOPE, InputError
+from gearfe.tables.pair import GearTable, PairTable, ToothFormTable
+from gearfe.tables.train import TrainShaftTable, TrainTable
+
+JOB = str(Path(__file__).parents[1] / "geometry" / "gear_train.toml")
+LONG = "q" * 10_000
+SPACED = "q " * 5_000
+
+
+def refused(capsys: pytest.CaptureFixture[str], *line: str) -> str:
+    assert main(list(line)) == 2
+    message = capsys.readouterr().err
+    assert message.startswith("gearfe: error: ")
+    assert len(message) < LONGEST_MESSAGE + 100
+    return message
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        ("pair.helix_angle_deg=15", "helical gears"),
+        ("pair.wheel.internal=true", "internal gears"),
+        ("train.planets=3", "planetary gears"),
+        ("train.carrier='arm'", "planetary gears"),
+        ("pair.pinion.cone_angle_deg=30", "bevel gears"),
+        ("worm.starts=2", "worm gears"),
+        ("pair.lead_crowning_um=5", "along the face width"),
+        ("train.shafts.0.torsional_stiffness_Nm_per_rad=1e5", "elastic shafts"),
+    ],
+)
+def test_well_known_names_are_not_taken_for_slips(change: str, what: str, capsys: pytest.CaptureFixture[str]) -> None:
+    message = refused(capsys, "gear", JOB, "--set", change)
+    assert what in message
+    assert "not supported" in message
+    assert "spur gears" in message
+    assert "did you mean" not in message
+
+
+def test_negative_numbers_of_teeth_are_internal_gears(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "external gear" in refused(capsys, "gear", JOB, "--set", "pair.wheel.teeth=-60")
+
+
+def test_no_key_that_exists_is_out_of_scope() -> None:
+    for table in (PairTable, GearTable, ToothFormTable, TrainTable, TrainShaftTable):
+        for key in table.__dataclass_fields__:
+            assert not any(re.search(words, key) for words in OUT_OF_SCOPE), key
+
+
+@pytest.mark.parametrize("long", [LONG, SPACED])
+@pytest.mark.parametrize("place", ["command", "file", "option", "key", "table", "value", "set", "out"])
+def test_names_of_ten_thousand_letters_are_cut(place: str, long: str, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = {
+        "command": [long],
+        "file": ["gear", long],
+        "option": ["gear", JOB, f"--{long}"],
+        "key": ["gear", JOB, "--set", f"pair.{long}=1"],
+        "table": ["gear", JOB, "--set", f"{long}.{long}=1"],
+        "value": ["gear", JOB, "--set", f"pair.module_mm='{long}'"],
+        "set": ["gear", JOB, "--set", long],
+        "out": ["gear", JOB, "--out", long],
+    }
+    message = refused(capsys, *lines[place])
+    assert "..." in message or len(message) < 200
+
+
+def test_names_are_cut_in_the_field_of_an_error_too() -> None:
+    assert len(str(InputError(LONG, LONG, LONG, SPACED))) < LONGEST_MESSAGE + 10
+
+
+#: 20 teeth, module 2, x 0.2, 20 deg. The tooth is pointed where inv(alpha') = pi/2z + 2 x tan(alpha)/z + inv(alpha),
+#: so below a tip diameter of m z cos(alpha)/cos(alpha') = 46.6203 mm (ISO 21771).
+POINTED = """
+[pair]
+module_mm = 2.0
+pressure_angle_deg = 20.0
+face_width_mm = 20.0
+[pair.pinion]
+teeth = 20
+profile_shift = 0.2
+bore_diameter_mm = 15.0
+{drawn}
+[pair.wheel]
+teeth = 200
+bore_diameter_mm = 100.0
+"""
+
+
+def pointed_diameter_mm() -> float:
+    alpha = math.radians(20.0)
+    involute = 0.5 * math.pi / 20 + 0.4 * math.tan(alpha) / 20 + math.tan(alpha) - alpha
+    low, high = 0.1, 1.4
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if math.tan(middle) - middle < involute else (low, middle)
+    return 40.0 * math.cos(alpha) / math.cos(low)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "bound"),
+    [
+        ("tip_diameter_mm = 49.5", f"must be < {pointed_diameter_mm():.6g} mm; use a smaller tip_diameter_mm"),
+        ("root_diameter_mm = 0.5", "must be > 1 mm; use a larger root_diameter_mm"),  # half a module of rim
+        ("span_mm = 5.0\nspan_teeth = 3", "mm; use a larger span_mm"),
+    ],
+)
+def test_bounds_are_of_the_key_that_was_written(
+    drawn: str, bound: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    job = tmp_path / "job.toml"
+    job.write_text(POINTED.format(drawn=drawn))
+    message = refused(capsys, "gear", str(job))
+    assert f"pair.pinion.{drawn.partition(' ')[0]} = " in message
+    assert bound in message
