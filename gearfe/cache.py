@@ -24,38 +24,41 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from . import __version__
+from .environment import limit, named_folder, user_folder
 
 T = TypeVar("T")
 
 #: Packages whose versions decide the numbers.
 PACKAGES = ("numpy", "scipy", "gmsh")
-#: Environment variables that name the folder (``off`` keeps nothing) and the largest size of all entries (MB).
-CACHE_VARIABLE, LIMIT_VARIABLE = "GEARFE_CACHE", "GEARFE_CACHE_LIMIT_MB"
-#: That size where none is named (bytes), and the share of it that is left after the oldest went.
-LIMIT, KEPT_SHARE = 10**9, 0.8
+#: Share of the largest size of all entries that is left after the oldest went.
+KEPT_SHARE = 0.8
 #: One new entry in so many looks at the size of all: a look costs milliseconds.
 LOOK = 16
 
 
-def named_folder() -> str:
-    """What the user says about the folder: its path, ``off``, or nothing."""
-    named = os.environ.get(CACHE_VARIABLE, "").strip()
-    return "off" if named.lower() == "off" else named
-
-
 def cache_folder() -> Path | None:
-    """``$GEARFE_CACHE``, else the user's cache folder of this platform; ``None`` when off."""
+    """Return ``$GEARFE_CACHE``, else the user's cache folder of this platform; ``None`` when off, or without a home.
+
+    Raises
+    ------
+    InputError
+        See `gearfe.environment.named_folder`.
+    """
     named = named_folder()
     if named == "off":
         return None
     if named:
-        return Path(named).expanduser()
+        return Path(named)
+    try:
+        home = Path.home()
+    except RuntimeError:  # a user without one
+        return None
     if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+        base = Path(user_folder("LOCALAPPDATA") or home / "AppData" / "Local")
     elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
+        base = home / "Library" / "Caches"
     else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        base = Path(user_folder("XDG_CACHE_HOME") or home / ".cache")
     return base / "gearfe"
 
 
@@ -222,14 +225,6 @@ def entries(folder: Path) -> list[Entry]:
                 size, used = sum(s.st_size for s in files), max(s.st_mtime for s in files)
                 found.append(Entry(path, kind, size, used))
     return sorted(found, key=lambda entry: entry.used)
-
-
-def limit() -> int:
-    """Largest size of all entries (bytes)."""
-    try:
-        return int(1e6 * float(os.environ[LIMIT_VARIABLE]))
-    except (KeyError, ValueError, OverflowError):
-        return LIMIT
 
 
 def trim(folder: Path, size: int) -> list[Entry]:

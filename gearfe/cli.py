@@ -149,8 +149,10 @@ def run_command(module: Any, name: str, summary: str, example: str, arguments: l
     """Run a command module (its contract is in `gearfe.commands`), called by `name`, with these arguments."""
     import warnings
 
+    from . import environment
     from .commands.arguments import completed, parser_of
 
+    environment.check()
     parsed = completed(parser_of(module, name, summary, example).parse_args(arguments))
     with warnings.catch_warnings():
         messages = _watch_tables()

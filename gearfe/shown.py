@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -13,6 +14,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .typing import Array
+
+
+def percent(share: float, digits: int = 2) -> str:
+    """Share as text in per cent with so many significant digits: 120 %, 0.031 %; powers of ten only below 0.001 %."""
+    value = 100.0 * share
+    if not math.isfinite(value):
+        return "unknown"
+    if value == 0.0 or not 1e-3 <= abs(value) < 1e15:
+        return f"{value:.{digits}g} %"
+    decimals = digits - 1 - math.floor(math.log10(abs(value)))
+    text = f"{round(value, decimals):.{max(decimals, 0)}f}"
+    return (text.rstrip("0").rstrip(".") if "." in text else text) + " %"
 
 
 class Facts:

@@ -12,9 +12,11 @@ import pytest
 
 from gearfe.cli import CLOSED, main
 from gearfe.commands.arguments import CommandParser
+from gearfe.commands.housing import cure_of_error
 from gearfe.errors import InputError, NotFiniteWarning, shown
 from gearfe.files import csv_table, write_csv
 from gearfe.tables.examples import job_file
+from gearfe.tables.housing import HousingMeshTable
 
 JOB = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
 #: Every command that reads a job file, with what it needs besides.
@@ -274,3 +276,24 @@ def test_any_key_of_a_job_can_be_set(tmp_path):
 def test_a_wrong_change_is_named(tmp_path, capsys, change, message):
     assert main(["gear", str(JOB), "--out", str(tmp_path / "out"), "--set", change]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_no_pictures_means_none_with_fields_either(tmp_path):
+    options = ["--angles", "0", "9", "9", "--no-estimate", "--no-pictures", "--coarsen", "4"]
+    for fields in (["0"], ["all"]):
+        assert main(["stiffness", str(JOB), "--out", str(tmp_path), *options, "--fields", *fields]) == 0
+        names = {path.name for path in tmp_path.iterdir()}
+        assert names == {"fields.vtkhdf", "pressure.csv", "stiffness.csv", "summary.json"}
+
+
+def test_a_large_estimated_error_of_a_housing_comes_with_its_cure(tmp_path, capsys):
+    """The mesh of the example is coarse: tens of per cent at least."""
+    box = JOB.parents[1] / "meshes" / "box.toml"
+    assert main(["housing", str(box), "--out", str(tmp_path), "--no-pictures", "--modes", "2"]) == 0
+    said = capsys.readouterr().out
+    assert 'mesh = { file = "box.msh", refine_to_unknowns = ' in said
+    assert "e+0" not in said
+    own, parametric = HousingMeshTable(file="solid.step"), HousingMeshTable(size_mm=9.0)
+    assert "smaller size_mm, or refine" in cure_of_error(own, 3000, by_reduction=False)
+    assert "size_mm in [housing.mesh] (now 9)" in cure_of_error(parametric, 3000, by_reduction=False)
+    assert "modes_below_Hz" in cure_of_error(own, 3000, by_reduction=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import math
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from gearfe.errors import MissingLibraryError
 from gearfe.figures.results import PICTURES
 from gearfe.mechanisms import load_mechanism
 from gearfe.rigid import constant, integrate
-from gearfe.shown import Shown, as_numbers
+from gearfe.shown import Shown, as_numbers, percent
 from gearfe.spectrum import amplitude_spectrum
 from gearfe.stiffness.sweep import elastic_pair
 from gearfe.train import Damping, Load
@@ -131,3 +132,12 @@ def test_a_missing_library_is_named_with_its_line(results: dict[str, Any], monke
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
     with pytest.raises(MissingLibraryError, match=r"pip install 'gearfe\[study\]'"):
         results["StiffnessCurve"].to_pandas()
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [(1.2, "120 %"), (12.34, "1200 %"), (0.0996, "10 %"), (0.031, "3.1 %"), (0.5, "50 %"), (0.0, "0 %"),
+     (2.9e-6, "0.00029 %"), (2.9e-9, "2.9e-07 %"), (-0.25, "-25 %"), (math.nan, "unknown")],
+)  # fmt: skip
+def test_percentages_have_no_powers_of_ten_that_people_write_out(share: float, text: str) -> None:
+    assert percent(share) == text

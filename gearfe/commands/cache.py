@@ -27,12 +27,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """List the entries, and remove the chosen ones; 1 when something could not be removed."""
-    from ..cache import CACHE_VARIABLE, LIMIT_VARIABLE, cache_folder, entries, limit, remove
+    from ..cache import cache_folder, entries, remove
+    from ..environment import CACHE_VARIABLE, LIMIT_VARIABLE, limit
     from ..errors import unknown_name
 
     folder = cache_folder()
     if folder is None:
-        print(f"nothing is kept: {CACHE_VARIABLE} is off")
+        print(f"nothing is kept: {CACHE_VARIABLE} is off, or the user has no home folder")
         return 0
     there = entries(folder)
     kinds = sorted({entry.kind for entry in there})

@@ -9,16 +9,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..progress import stage
+from ..shown import percent
 from .arguments import add_folder, add_job, print_results
 
 if TYPE_CHECKING:
     from ..housing.modal_test import Comparison
     from ..reduction.modal_body import ModalBody
+    from ..tables.housing import HousingMeshTable
 
 
 #: Why a frequency has no estimate.
 _COARSE, _FEW = "the mesh is too coarse for one", "keep more modes (modes_below_Hz)"
 _UNKNOWN = "matrices tell none"
+#: Share of an estimated error above which the report says what makes it smaller.
+_LARGE = 0.1
 #: Modes drawn.
 _DRAWN = 6
 
@@ -76,6 +80,9 @@ def run(args: argparse.Namespace) -> int:
         }
     compared = None if test is None else compare(body, test, args.modes)
     _report(body, errors, response)
+    if response["response_error_estimate"] > _LARGE and body.has_mesh:
+        cure = cure_of_error(table.mesh, body.nodes.size, by_reduction=mesh.response < left_out.response)
+        print(f"the estimated error is large: {cure}")
     with whole_set(folder, ("housing.png", "modes.png", "comparison.csv", "points.csv", "mac.csv", "mac.png")) as made:
         with stage("tables"):
             _write(made, body, fields, errors, response)
@@ -118,16 +125,29 @@ def _report(body: ModalBody, errors: dict[str, Any], response: dict[str, float])
     print(f"frequencies, bores rigid and free to move; estimated error (mesh and reduction{sign}):")
     for number, estimate in enumerate(errors["all"]):
         frequency = body.coupled.frequencies_hz[number]
-        said = f"<= {100.0 * estimate:5.2f} %   (reduction {100.0 * errors['reduction'][number]:.1e} %)"
+        said = f"<= {percent(estimate, 3):>7}   (reduction {percent(errors['reduction'][number])})"
         if not math.isfinite(estimate):
             said = "unknown: " + (_UNKNOWN if not body.has_mesh else _COARSE if number < body.modes else _FEW)
         print(f"  {number + 1:3d} {frequency:10.2f} Hz   {said}")
     band, bound, mesh, reduction = response.values()
     why = "keep more modes" if body.has_mesh else _UNKNOWN
-    text = f"<= {100.0 * bound:.2g} % rms" if math.isfinite(bound) else f"unknown: {why}"
-    part = f" (mesh {100.0 * mesh:.2g} %, reduction {100.0 * reduction:.2g} %)"
+    text = f"<= {percent(bound)} rms" if math.isfinite(bound) else f"unknown: {why}"
+    part = f" (mesh {percent(mesh)}, reduction {percent(reduction)})"
     text += part if math.isfinite(bound) else ""
     print(f"response of the bores up to {band:.0f} Hz (1 % damping): estimated error {text}")
+
+
+def cure_of_error(mesh: HousingMeshTable, unknowns: int, *, by_reduction: bool) -> str:
+    """What makes the estimated error smaller: more modes, or smaller elements in the words of the job's mesh."""
+    if by_reduction:
+        return "keep more modes (a higher modes_below_Hz in [housing.reduction])"
+    if mesh.file is None:
+        return f"take a smaller size_mm in [housing.mesh] (now {mesh.size_mm:g})"
+    from ..meshing.mesh_file import CAD
+
+    size = "take a smaller size_mm, or " if Path(mesh.file).suffix.lower() in CAD else ""
+    more = f"refine_to_unknowns = {min(4 * unknowns, 2_000_000)}"
+    return f'{size}refine the mesh where it errs most: mesh = {{ file = "{mesh.file}", {more} }} in [housing]'
 
 
 def _compare(folder: Path, made: Comparison, args: argparse.Namespace) -> None:

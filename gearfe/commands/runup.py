@@ -7,6 +7,7 @@ import time
 from dataclasses import replace
 from typing import Any
 
+from ..shown import percent
 from ..tables.runup import RunUpTable
 from .arguments import print_results, with_keys
 from .vibration import add_train, title
@@ -86,8 +87,8 @@ def _report_lines(summary: dict[str, Any]) -> list[str]:
         if factor is not None:
             parts.append(f"dynamic factor up to {factor['value']:.3g} at {factor['speed_rad_per_s']:.6g} rad/s")
         if open_ is not None and open_["value"] > 0.0:
-            share = 100.0 * open_["value"]
-            parts.append(f"apart up to {share:.3g} % of the time at {open_['speed_rad_per_s']:.6g} rad/s")
+            share = open_["value"]
+            parts.append(f"apart up to {percent(share, 3)} of the time at {open_['speed_rad_per_s']:.6g} rad/s")
         lines.append(f"mesh {name}: " + ", ".join(parts or ["no steady force"]))
     for peak in summary["peaks"][:6]:
         where = f"{peak['order']} at {peak['frequency_Hz']:.0f} Hz"

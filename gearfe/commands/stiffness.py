@@ -104,20 +104,22 @@ def run(args: argparse.Namespace) -> int:
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, **sweep)
     watch.seconds.update(curve.timings)
     found = summary(job, curve, watch.seconds)
-    with whole_set(folder, ("stiffness.png", "fields.vtkhdf", "stress_*deg.png")) as made:
+    with whole_set(folder, ("stiffness.png", "fields.vtkhdf", "stress_*deg.png", "pressure.*")) as made:
         with watch.stage("table"):
             curve.to_csv(made / "stiffness.csv")
         if args.fields is not None:
             with watch.stage("fields"):
-                from ..figures.stiffness import pressure_figure
-                from ..figures.stress import stress_figure
                 from ..stiffness.fields_output import write_fields
 
                 def draw(position: Any, fields: Any) -> None:
+                    from ..figures.stress import stress_figure
+
                     stress_figure(made, job.pair, position, fields, args.range)
 
-                pressures = write_fields(made, elastic, curve, chosen, draw=draw)
-                if pressures:
+                pressures = write_fields(made, elastic, curve, chosen, draw=None if args.no_pictures else draw)
+                if pressures and not args.no_pictures:
+                    from ..figures.stiffness import pressure_figure
+
                     pressure_figure(made / "pressure.png", job.pair, pressures)
         if args.animation is not None:
             with watch.stage("animation"):

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from ..shown import percent
 from ..tables.spectrum import SpectrumTable
 from ..tables.train import TrainTable, value_text
 from .arguments import add_folder, add_job, add_keys, print_results, with_keys
@@ -193,14 +194,14 @@ def _contact_lines(summary: Mapping[str, Any]) -> list[str]:
         if share is not None:
             lost, factor = contact["contacts_lost"][i], contact["dynamic_factors"][i]
             parts = (
-                f"no contact in {100 * share:.3g} % of the time, contacts lost: {lost}" if lost else "always in contact"
+                f"no contact in {percent(share, 3)} of the time, contacts lost: {lost}" if lost else "always in contact"
             )
             most = "" if factor is None else f"; largest force {factor:.3g} times the steady one"
             lines.append(f"mesh {i + 1}: {contact['flanks'][i]}; {parts}{most}")
     for i, coefficient in enumerate(friction.get("coefficients", ())):
         if coefficient > 0.0:
             share = friction["efficiency"][i]
-            efficiency = "" if share is None else f", efficiency {100 * share:.4g} %"
+            efficiency = "" if share is None else f", efficiency {percent(share, 4)}"
             lines.append(
                 f"mesh {i + 1}: friction {coefficient:.4g}, loss {friction['mean_loss_W'][i]:.4g} W{efficiency}"
             )

@@ -16,6 +16,7 @@ from ..runup.orders import orders
 from ..runup.report import waterfall
 from ..runup.results import SteadyState
 from ..runup.run_up import RunUp
+from ..shown import percent
 from ..typing import Array
 from .style import BLUE, COLOURS, GREY, RANGE_DB, RED, REFERENCE, level, new_figure, on_white, save, single
 
@@ -111,7 +112,7 @@ def draw_campbell(path: Path, run: RunUp, critical: CriticalSpeeds, multiples: i
             most = f"{100.0 * modes.strain[mode, part]:.0f} % in {modes.strain_in[part]}"
             where = f"{100.0 * share[mode]:.0f} % in meshes" if strong else most
             axes.annotate(
-                f"{mode + 1}: {where}, {100.0 * damping[mode]:.2g} % damping", (high, float(frequency[-1, mode])),
+                f"{mode + 1}: {where}, {percent(damping[mode])} damping", (high, float(frequency[-1, mode])),
                 (high + 0.03 * (high - low), taken[-1]), fontsize=7.5, color=BLUE if strong else GREY, va="center",
                 annotation_clip=False,
                 arrowprops={"arrowstyle": "-", "color": "#b6c2d1", "linewidth": 0.5, "relpos": (0.0, 0.5)},

@@ -14,6 +14,7 @@ from ..gear import pitch_errors
 from ..gear.derived import derived_geometry
 from ..gear.deviation_job import GEARS
 from ..gear.validity import overlap_warnings
+from ..shown import percent
 from ..stiffness.curve import EDGES
 from ..stiffness.job import StiffnessJob
 from ..stiffness.report import cure_of, largest_pressures, pressure_lines
@@ -153,7 +154,7 @@ def report_lines(made: LoadMap) -> list[str]:
     if m > 2 and np.isfinite(made.peak_to_peak[best]):
         lines.append(f"least peak-to-peak error: {1e6 * made.peak_to_peak[best]:.3g} um at {made.torque[best]:.4g} N m")
     if made.root is not None:
-        lines.append(f"root stress: estimated error at worst {100 * _largest(made.root.error):.2g} %")
+        lines.append(f"root stress: estimated error at worst {percent(_largest(made.root.error))}")
     return lines
 
 

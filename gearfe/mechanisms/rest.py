@@ -16,6 +16,7 @@ from ..rigid import Start, Status, Trajectory
 from ..rigid.dense import Polynomials
 from ..rigid.equilibrium import Equilibrium, equilibrium
 from ..rigid.modes import Modes, modes
+from ..shown import percent
 from ..typing import Array
 from .job import MAY_WRITE, Outcome, write_elastic
 from .model import Mechanism
@@ -131,5 +132,5 @@ def _text(summary: dict[str, Any]) -> str:
     lines = [f"equilibrium in {summary['steps']} steps, {summary['residual_N']:.2g} N left"]
     lines += [f"{name} = {value:.9g}" for name, value in summary["outputs"].items()]
     for k, (f, d) in enumerate(zip(summary.get("frequencies_Hz", ()), summary.get("damping_ratios", ()), strict=True)):
-        lines.append(f"mode {k + 1}: {f:.6g} Hz, damping {100 * d:.3g} %")
+        lines.append(f"mode {k + 1}: {f:.6g} Hz, damping {percent(d, 3)}")
     return "\n".join(lines)

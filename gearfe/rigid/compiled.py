@@ -23,6 +23,7 @@ from types import FunctionType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from .. import cache
+from ..environment import named_folder, without_numba
 from ..progress import stage
 from .native import Entry, ObjectCode, import_numba
 from .parts import part_options, uncollected
@@ -37,7 +38,7 @@ LOAD_SECONDS = 0.05
 
 def available() -> bool:
     """Whether numba can be imported (it is not imported here)."""
-    return os.environ.get("GEARFE_NO_NUMBA", "") in ("", "0") and _installed()
+    return not without_numba() and _installed()
 
 
 @lru_cache(maxsize=1)
@@ -86,11 +87,8 @@ def _text(functions: Iterable[Callable[..., Any]]) -> str:
 
 def _roots() -> list[Path]:
     """Folders that may hold the cache, best first."""
-    try:
-        first = cache.cache_folder()
-    except RuntimeError:  # a user without a home
-        first = None
-    if cache.named_folder():
+    first = cache.cache_folder()
+    if named_folder():
         return [] if first is None else [first.absolute()]
     user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
     temporary = Path(tempfile.gettempdir()) / f"gearfe-{user}"

@@ -57,7 +57,7 @@ def write_fields(
     curve: StiffnessCurve,
     angles_deg: Sequence[float] | None,
     *,
-    draw: Callable[[Positions, tuple[GearField, GearField]], None],
+    draw: Callable[[Positions, tuple[GearField, GearField]], None] | None,
 ) -> list[tuple[float, list[FlankPressure]]]:
     """Write ``fields.vtkhdf`` (time: pinion angle in deg) and ``pressure.csv``.
 
@@ -90,11 +90,12 @@ def write_fields(
             _add(series, angle, fields, first=done == 1)
             most = max(float(field.von_mises.max()) for field in fields)
             if angles_deg is not None:
-                draw(position, fields)
+                if draw is not None:
+                    draw(position, fields)
             elif most > peak:
                 peak, worst = most, (position, fields)
             count(done, len(chosen), "fields")
-    if worst is not None:
+    if worst is not None and draw is not None:
         draw(*worst)
     write_csv(folder / "pressure.csv", pressure_table(elastic.gears, pressures))
     return pressures

@@ -15,6 +15,7 @@ from ..contact.laws import COARSENING
 from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
 from ..gear.validity import overlap_warnings
+from ..shown import percent
 from ..tables.pair import DEFAULT_LAW
 from ..typing import Array
 from .curve import EDGES, StiffnessCurve
@@ -144,7 +145,7 @@ def report_lines(job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, A
         against = "" if job.law.name == DEFAULT_LAW else "the half-plane law and "
         lines.append(
             f"discretisation error, estimated by {against}meshes {COARSENING:g} times coarser (order {ORDER:g} "
-            f"assumed): typically {100 * curve.typical_error:.2g} %, at worst {100 * curve.worst_error:.2g} %"
+            f"assumed): typically {percent(curve.typical_error)}, at worst {percent(curve.worst_error)}"
         )
     return lines
 
@@ -164,7 +165,7 @@ def pressure_lines(curve: StiffnessCurve) -> list[str]:
     found, lines = largest_pressures(curve), []
     if found["largest_hertzian_MPa"] > 0:
         line = f"Hertzian pressure on the flanks: largest {found['largest_hertzian_MPa']:.4g} MPa"
-        line += f" (the computed contact is {100 * found['its_relative_error']:.2g} % off Hertz's)"
+        line += f" (the computed contact is {percent(found['its_relative_error'])} off Hertz's)"
         if found["largest_hertzian_MPa"] > ALLOWABLE_MPA:
             line += (
                 f", beyond the {ALLOWABLE_MPA:.0f} MPa that case-hardened steel bears for long (ISO 6336-5): "

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..files import whole_file
-from ..shown import ShownTable, as_numbers, library
+from ..shown import ShownTable, as_numbers, library, percent
 from ..tables.study import LimitTable, StudyTable
 from ..typing import Array, BoolArray, IntArray
 from .case import DONE
@@ -326,5 +326,5 @@ def _share(found: Mapping[str, Any]) -> str:
     if found["share"] is None:
         return "no case is solved"
     low, high = found["interval"]
-    share = f"{found['good']} of {found['cases']}, {100 * found['share']:.3g} %"
-    return f"{share} (95 % interval {100 * low:.3g} to {100 * high:.3g} %)"
+    share = f"{found['good']} of {found['cases']}, {percent(found['share'], 3)}"
+    return f"{share} (95 % interval {percent(low, 3)} to {percent(high, 3)})"

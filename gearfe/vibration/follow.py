@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import csv_table
+from ..shown import percent
 from ..train.model import TrainModel
 from ..train.response import TrainResponse, joined
 from ..typing import Array, ComplexArray, IntArray
@@ -50,7 +51,7 @@ class Stability:
         if growth <= ROUND_OFF:
             return []
         return [
-            f"the train is parametrically unstable: its vibration grows by {100 * growth:.3g} % every "
+            f"the train is parametrically unstable: its vibration grows by {percent(growth, 3)} every "
             f"{1e3 * self.time:.4g} ms; add damping, or change the speed"
         ]
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..record_spectrum import Decimator
+from ..shown import percent
 from ..spectrum import Waterfall, waterfall
 from ..train.response import TrainResponse
 from ..typing import Array, ComplexArray
@@ -196,7 +197,7 @@ def steady_from(time: Array, groups: list[Array], period: float | None) -> float
     if first > count - max(1, count // 4):
         worst = off[-max(1, count // 4) :].max()
         problem = (
-            f"the run is not steady: forces or accelerations still change by {100 * worst:.3g} % in its last quarter"
+            f"the run is not steady: forces or accelerations still change by {percent(worst, 3)} in its last quarter"
         )
         raise InputError("spectrum.spectrum_from", "steady", problem, cure)
     return float(begin[first])
