@@ -1,4 +1,4 @@
-"""Which meshes of housings `gearfe.meshing.housing_mesh` makes: for the cache, without loading the mesher."""
+"""Version of the meshes that `housing_mesh` and `cad` make: for the cache, without loading the mesher."""
 
-#: Raised when anything there changes the meshes that come out.
-RECIPE = 3
+#: Raised when anything there changes the meshes that come out (element sizes, the order of surface algorithms).
+RECIPE = 4

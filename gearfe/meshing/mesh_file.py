@@ -13,16 +13,15 @@ from ..errors import InputError, nearest
 from ..typing import Array, IntArray
 from .abaqus import read_abaqus
 from .abaqus_cards import inclusion as card_inclusion
+from .cad import CAD, mesh_cad_file
 from .gmsh_file import ENDINGS, read_by_gmsh
 from .included import source_files
 from .meshio_file import heavy_files, read_by_meshio
 from .nastran import inclusion as bulk_inclusion
 from .nastran_mesh import read_bulk_mesh
-from .session import gmsh_session
 from .source import SourceMesh, checked_source
 
-#: Formats of CAD programs, which have no mesh yet; of Nastran and Abaqus; and surfaces, which have no inside.
-CAD = (".step", ".stp", ".iges", ".igs", ".brep")
+#: Formats of Nastran and Abaqus; and surfaces, which have no inside.
 NASTRAN = (".bdf", ".nas", ".fem")
 ABAQUS = (".inp",)
 SURFACES = (".stl", ".ply", ".off", ".obj", ".wkt", ".svg")
@@ -109,7 +108,7 @@ def read_mesh_file(path: str | Path, field: str, size: float) -> MeshFile:
         problem = "is a folder, not a file" if path.is_dir() else "there is no such file"
         raise InputError(field, str(path), problem, "check the path; it is looked for beside the job file")
     if path.suffix.lower() in CAD:
-        return _meshed(path, field, size)
+        return MeshFile(*mesh_cad_file(path, field, size))
     if path.suffix.lower() in SURFACES:
         raise InputError(field, path.name, "is a surface, which has no tetrahedra", INSIDE)
     mesh = read_source(path, field)
@@ -178,34 +177,3 @@ def source_fingerprint(path: Path, field: str) -> str:
             raise InputError(field, str(file), f"cannot be read ({reason})", cure) from None
         found.update(hashlib.sha256(content).digest())
     return found.hexdigest()
-
-
-def _meshed(path: Path, field: str, size: float) -> MeshFile:
-    """Second-order tetrahedra of a CAD file, in mm; its surfaces are groups by their numbers in gmsh."""
-    with gmsh_session("housing") as gmsh:
-        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
-        try:
-            gmsh.model.occ.importShapes(str(path))
-            gmsh.model.occ.synchronize()
-        except Exception as error:
-            raise InputError(field, path.name, f"cannot be read ({error})", "export it anew as STEP") from None
-        if not gmsh.model.getEntities(3):
-            raise InputError(field, path.name, "has no solid, only surfaces or curves", "export the solid body")
-        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 12)
-        try:
-            gmsh.model.mesh.generate(3)
-            gmsh.model.mesh.setOrder(2)
-        except Exception as error:
-            raise InputError(
-                field, path.name, f"cannot be meshed ({error})", "mend the solid, or other size_mm"
-            ) from None
-        tags, flat, _ = gmsh.model.mesh.getNodes()
-        points, number = flat.reshape(-1, 3), np.full(int(tags.max()) + 1, -1)
-        number[tags.astype(np.int64)] = np.arange(len(tags))
-        _, cells = gmsh.model.mesh.getElementsByType(11)
-        groups = {
-            str(tag): number[gmsh.model.mesh.getNodes(2, tag, includeBoundary=True)[0].astype(np.int64)]
-            for _, tag in gmsh.model.getEntities(2)
-        }
-    return MeshFile(points, number[cells.astype(np.int64)].reshape(-1, 10), groups)
