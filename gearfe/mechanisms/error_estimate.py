@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..progress import stage
-from ..rigid import Start, Trajectory, integrate
+from ..rigid import Start, Status, Trajectory, integrate
 from ..typing import Array
 from .model import Mechanism
 from .results import Results, evaluate
@@ -32,6 +32,8 @@ LEAST_TOLERANCE = 1e-13
 #: Below this a smaller tolerance leaves the steps of series as they are, so that the longest step alone makes a run
 #: finer: then it is that share of the shortest step, for at most so many times the steps.
 SHARPEST, MOST_STEPS = 1e-12, 6.0
+#: Times the steps of a run that stopped early after which a finer one is given up: it approaches what stopped the run.
+GIVEN_UP = 2.0 * MOST_STEPS
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,8 @@ def finer_run(mechanism: Mechanism, start: Start, made: Trajectory, tolerance: f
     backend = "compiled" if made.statistics.get("backend") == "compiled" else "plain"
     options: dict[str, Any] = {"method": made.method, "backend": backend, "start": start, "longest": longest}
     options["raise_on_failure"] = False
+    if made.status is not Status.DONE:
+        options["most_steps"] = int(GIVEN_UP * len(ends)) + 100
     try:
         return integrate(mechanism.system, made.time, tolerance=tolerance, **options)
     except InputError:

@@ -25,12 +25,15 @@ from .linkage import Linkage
 from .modal import series_force
 from .start import Start, consistent_start
 from .steps import Status, Watch
+from .stopped import locked, short_steps
 from .system import System
 from .trajectory import IntegrationError, Trajectory
 
 Run = tuple[Dense, Status, dict[str, Any]]
 #: Points of the implicit methods.
 COLLOCATION = {"implicit": RADAU, "symplectic": GAUSS}
+#: Ends of runs whose cause is looked for.
+UNFINISHED = (Status.STEP_TOO_SMALL, Status.NOT_FINITE, Status.NOT_SOLVED, Status.ENDLESS, Status.MOST_STEPS)
 METHODS = ("auto", "taylor", "explicit", *COLLOCATION)
 #: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some
 #: hundred times.
@@ -138,12 +141,16 @@ def integrate(
     kept = output_times if status is Status.DONE else output_times[sign * output_times <= reached]
     if status is Status.DONE and not _dropped_rows_hold(system, start, dense, tolerance):
         status = Status.REDUNDANT_NOT_MET
-    if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE, Status.NOT_SOLVED, Status.ENDLESS) and len(dense.times) > 1:
+    if status in UNFINISHED and len(dense.times) > 1:
         last = dense.times[-6:]  # the very last ones may be beyond all numbers
         end, (q, v, a) = float(last[-1]), (dense(last[-1:], k)[0] for k in range(3))
         blame_ahead(system, end, (q, v, a), float(output_times[-1]) - start.time)
         link = loose_link(system, last, dense(last, 0), dense(last, 1), start)
         statistics = statistics if link is None else {**statistics, "loose_link": link}
+        if link is None and (why := locked(system, end, q, start.active)):
+            statistics = {**statistics, "locked": why}
+        elif cause := short_steps(system, start, end, q, v, float(np.abs(np.diff(last)).mean())):
+            statistics = {**statistics, "short_steps": cause}
     if status is not Status.DONE and (why := system.complaint):
         statistics = {**statistics, "complaint": why}
     made = Trajectory(system, start, kept, status, chosen, statistics, dense)

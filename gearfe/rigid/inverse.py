@@ -6,6 +6,8 @@ from M a = f - G^T lambda as in every trajectory.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..errors import InputError
@@ -14,6 +16,7 @@ from .carried import RANK
 from .dense import hermite
 from .start import Start, close, closes
 from .steps import Status
+from .stopped import locked
 from .system import System
 from .trajectory import Trajectory
 
@@ -44,12 +47,13 @@ def prescribed_motion(system: System, start: Start, times: Array) -> Trajectory:
         if not np.isfinite(system.force(t, q, v)).all():
             why = system.complaint or f"at {t:.6g} s"
             raise InputError("forces", None, f"have no value on the way: {why}", "mend the expression")
+    statistics: dict[str, Any] = {"scheme": "closed positions", "steps": len(done) - 1}
+    if status is not Status.DONE and (why := locked(system, done[-1], states[-1][0], start.active)):
+        statistics["locked"] = why
     kept = np.asarray(times[: np.searchsorted(times, done[-1], side="right")])
     q, v, a = (np.array([s[k] for s in states]) for k in range(3))
     dense = hermite(np.array(done), q, v, a)
-    return Trajectory(
-        system, start, kept, status, "inverse", {"scheme": "closed positions", "steps": len(done) - 1}, dense
-    )
+    return Trajectory(system, start, kept, status, "inverse", statistics, dense)
 
 
 def _advance(

@@ -82,20 +82,27 @@ def modes(system: System, start: Start, rest: Equilibrium, count: int) -> Modes:
 
 
 def fastest_rate(system: System, start: Start) -> tuple[float, float]:
-    """Fastest decay (1/s) and fastest vibration (rad/s) of the free motion in a state.
-
-    The linear part of forces is projected onto the directions that the constraints leave free.
-    """
+    """Fastest decay (1/s) and fastest vibration (rad/s) of the free motion in a state."""
     planar = system.linkage
     if not (system.linear or (bool(system.forces) if planar is None else planar.springy)):
         return 0.0, 0.0
+    growth, decay, vibration = rates(system, start)
+    return max(growth, decay), vibration
+
+
+def rates(system: System, start: Start) -> tuple[float, float, float]:
+    """Fastest growth and decay by velocities (1/s) and fastest vibration (rad/s) of the free motion in a state.
+
+    The linear part of forces is projected onto the directions that the constraints leave free.
+    """
     by_q, by_v = system.force_jacobian(start.time, start.q, start.v)
     G = system.jacobian(start.time, start.q)[start.active] / system.row_units[start.active, None]
     free = system.units[:, None] * free_motions(G * system.units)
     root = np.linalg.solve(np.linalg.qr(system.mass_root @ free)[1].T, free.T).T  # root^T M root = 1
     K, C = -root.T @ by_q @ root, -root.T @ by_v @ root
     if K.size == 0:
-        return 0.0, 0.0
-    decay = float(np.abs(np.linalg.eigvals(C)).max()) if C.any() else 0.0
-    omega = float(np.sqrt(np.abs(np.linalg.eigvals(K)).max()))
-    return decay, omega
+        return 0.0, 0.0, 0.0
+    damping = np.linalg.eigvals(C) if C.any() else np.zeros(1)
+    signs = damping.real < 0.0
+    growth, decay = (float(np.abs(damping[kept]).max(initial=0.0)) for kept in (signs, ~signs))
+    return growth, decay, float(np.sqrt(np.abs(np.linalg.eigvals(K)).max()))

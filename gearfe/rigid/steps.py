@@ -12,11 +12,13 @@ An error of order h^(1/e) in the step h gives the next one h 0.9 error^-e (Haire
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
+from ..progress import announce
 from ..typing import Array
 
 #: ``watch(t, steps, state)``: the time reached, the steps done, and a function that gives (q, v) there; False ends the
@@ -30,8 +32,11 @@ CUT = 0.01
 #: Steps below this share of the time, or of the run's length, are rounding; steps below the second whose errors have no
 #: size end the run.
 ROUNDING, NO_SIZE = 1e-14, 1e-12
-#: Steps between two looks at the pace, and how many times the steps allowed the rest may take by it.
+#: Steps between two looks at the pace; how many times the steps allowed a run may need by its pace before it stops.
 PACE, ENDLESS = 4096, 100.0
+#: Steps before the first doubling of their number that counts; doublings in a row, each in at most this many times the
+#: time of the last, after which the number of steps counts as growing exponentially.
+FIRST_DOUBLING, DOUBLINGS, SLOWER = 512, 3, 1.05
 
 
 @dataclass(frozen=True)
@@ -59,9 +64,50 @@ class StepLaw:
     steady: bool = False
 
 
-def endless(passed: float, left: float, steps: int, most: int) -> bool:
-    """Whether so many steps over the time `passed` (s) leave the rest hopelessly many: a load grows without bound."""
-    return steps >= PACE and abs(left) * steps > ENDLESS * most * abs(passed)
+class Pace:
+    """The number of steps that a run needs, extrapolated from the steps so far.
+
+    Two rules: the pace of the last steps stays, or the number of steps doubles in equal times, as where a force feeds
+    the motion. (Where steps grow shorter by a power of the time, up to the fourteenth, every doubling takes longer.)
+
+    Parameters
+    ----------
+    begin, end : float
+        Of the run (s).
+    most : int
+        Number of steps allowed.
+    """
+
+    def __init__(self, begin: float, end: float, most: int) -> None:
+        self.end, self.most = end, most
+        self._last = begin, 0
+        self._doubled = begin, FIRST_DOUBLING
+        self._times: list[float] = []  # that doublings took (s)
+        self._announced = False
+
+    def hopeless(self, t: float, steps: int) -> bool:
+        """Whether the rest of the run needs `ENDLESS` times the steps allowed, at time t (s) after so many steps."""
+        left = abs(self.end - t)
+        if steps >= 2 * self._doubled[1]:
+            doublings = math.log2(steps / self._doubled[1])
+            self._times.append(abs(t - self._doubled[0]) / doublings)
+            self._doubled = t, steps
+        elif steps >= FIRST_DOUBLING and not self._times and self._doubled[1] == FIRST_DOUBLING:
+            self._doubled = (t, steps) if steps < 2 * FIRST_DOUBLING else self._doubled
+        recent = self._times[-DOUBLINGS:]
+        steady = len(recent) == DOUBLINGS and all(b <= SLOWER * a for a, b in itertools.pairwise(recent))
+        needed = 0.0
+        if steady:
+            needed = steps * 2.0 ** min(left / max(recent[-1], 1e-300), 1000.0)
+        if steps >= self._last[1] + PACE:
+            passed = abs(t - self._last[0])
+            needed = max(needed, steps + left * (steps - self._last[1]) / max(passed, 1e-300))
+            self._last = t, steps
+        hopeless = needed > ENDLESS * self.most
+        if needed > self.most and not (hopeless or self._announced):
+            self._announced = True
+            announce(f"at this pace the run would need {needed:.1g} steps; it stops after {self.most:.1g}")
+        return hopeless
 
 
 class StepControl:
@@ -104,7 +150,7 @@ class StepControl:
         self.status = Status.DONE
         self.accepted = self.rejected = 0
         self._step, self._cut, self._before = 0.0, False, 0.0
-        self._looked = self.t, 0  # time and steps of the last look at the pace
+        self._pace = Pace(self.t, self.end, most)
         self._added = False  # whether the first goal is one of `end_at`
 
     def next_step(self, state: Callable[[], tuple[Array, Array]]) -> float | None:
@@ -115,12 +161,9 @@ class StepControl:
         if self.accepted >= self.most:
             self.status = Status.MOST_STEPS
             return None
-        if self.accepted >= self._looked[1] + PACE:
-            passed, steps = self.t - self._looked[0], self.accepted - self._looked[1]
-            if endless(passed, self.end - self.t, steps, self.most):
-                self.status = Status.ENDLESS
-                return None
-            self._looked = self.t, self.accepted
+        if self._pace.hopeless(self.t, self.accepted):
+            self.status = Status.ENDLESS
+            return None
         if self.watch is not None and not self.watch(self.t, self.accepted, state):
             self.status = Status.STOPPED
             return None
@@ -196,17 +239,16 @@ def run_in_pieces(
     watch
         See `Watch`; it looks between two pieces.
     """
-    done, before = 0, span[0]
+    done, pace = 0, Pace(*span, most)
     if watch is not None:
-        watch(before, 0, state)
+        watch(span[0], 0, state)
     while done < most:
         status, t, count = fill(min(room, most - done))
         done += count
         if status != Status.MOST_STEPS:
             return Status(status), done
-        if endless(t - before, span[1] - t, count, most):
+        if pace.hopeless(t, done):
             return Status.ENDLESS, done
-        before = t
         if done < most and watch is not None and not watch(t, done, state):
             return Status.STOPPED, done
         room = min(2 * room, max(largest, room))

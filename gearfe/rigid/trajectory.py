@@ -109,10 +109,14 @@ class Trajectory(Shown):
 
     @property
     def message(self) -> str:
-        """The status in words, with the link that is to blame where one is known."""
+        """The status in words, with its cause where one is known: a load, a locked position, a link without mass."""
         link, complaint = self.statistics.get("loose_link"), self.statistics.get("complaint")
         if complaint is not None:
             return f"{self.status.message}: {complaint}"
+        if "locked" in self.statistics:
+            return str(self.statistics["locked"])
+        if "short_steps" in self.statistics:
+            return f"{self.status.message}: {self.statistics['short_steps']}"
         if link is None:
             return self.status.message
         return (
