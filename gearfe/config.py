@@ -25,8 +25,8 @@ from .files import read_text
 
 T = TypeVar("T")
 
-#: No number in everyday units is larger: the fourth powers of such numbers overflow.
-LARGEST = 1e75
+#: No number in everyday units is larger: the fourth powers of such numbers overflow; whole ones have 64 bits in arrays.
+LARGEST, LARGEST_WHOLE = 1e75, 2**63 - 1
 
 #: Table name in a job file -> "module:class" of the dataclass that describes it. Each module is light (no numpy).
 TABLES: dict[str, str] = {
@@ -332,17 +332,25 @@ def _convert_scalar(hint: Any, value: Any, label: str, meta: Any) -> Any:
         raise InputError(label, value, "must be a whole number", doc)
     try:
         number = int(value) if hint is int else float(value)
-    except OverflowError:
-        raise InputError(label, value, "is too large", doc) from None
+    except OverflowError:  # a whole number beyond any float
+        number = value
     check_range(number, label, meta)
     return number
 
 
+def check_size(number: float, label: str, cure: str = "") -> None:
+    """Raise `InputError` for numbers that are not finite or too large for any key, whole ones or others."""
+    largest = LARGEST_WHOLE if isinstance(number, int) else LARGEST
+    if not abs(number) <= largest:
+        raise InputError(label, number, f"must be finite, of a size up to {largest:.3g}", cure)
+
+
 def check_range(number: float, label: str, meta: Any) -> None:
     """Raise `InputError` when a number leaves the range that a field's metadata allow."""
+    largest = LARGEST_WHOLE if isinstance(number, int) else LARGEST
     low, high, above, below = (meta.get(k) for k in ("low", "high", "above", "below"))
     outside = (
-        abs(number) > LARGEST
+        abs(number) > largest
         or (isinstance(number, float) and not math.isfinite(number))
         or (low is not None and number < low)
         or (high is not None and number > high)
@@ -352,6 +360,8 @@ def check_range(number: float, label: str, meta: Any) -> None:
     if outside:
         left = f">= {low:g}" if low is not None else f"> {above:g}" if above is not None else ""
         right = f"<= {high:g}" if high is not None else f"< {below:g}" if below is not None else ""
-        size = f"of a size up to {LARGEST:g}" if LARGEST < abs(number) < math.inf and not (right and number > 0) else ""
+        size = (
+            f"of a size up to {largest:.3g}" if largest < abs(number) < math.inf and not (right and number > 0) else ""
+        )
         allowed = " and ".join(part for part in ("finite", left, right, size) if part)
         raise InputError(label, number, f"must be {allowed}", meta.get("doc", ""))

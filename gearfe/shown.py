@@ -95,7 +95,7 @@ def as_numbers(cells: Iterable[Any]) -> Array:
     if values.dtype.kind != "U":
         return values
     for kind in (np.int64, np.float64):
-        with suppress(ValueError):
+        with suppress(ValueError, OverflowError):
             return values.astype(kind)
     return values.astype(object)
 

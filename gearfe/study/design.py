@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, given
+from ..config import check_size
+from ..errors import InputError, given, shown
 from ..files import read_csv
 from ..tables.study import StudyTable
 from ..typing import Array
@@ -40,7 +41,7 @@ def study_cases(table: StudyTable, folder: Path, base: Mapping[str, Any]) -> tup
         levels = [one.levels() for one in parameters]
         count = math.prod(map(len, levels))
         if count > MOST:
-            problem = f"make {count} combinations, more than {MOST}"
+            problem = f"make {shown(count)} combinations, more than {MOST}"
             raise InputError("study.parameters", None, problem, "take fewer levels, or another design")
         return parameters, list(itertools.product(*levels))
     shares = _shares(table, len(parameters))
@@ -112,6 +113,9 @@ def _cell(text: str, one: Parameter, path: str, row: int) -> Any:
         number = float(text)
     except ValueError:
         return text
-    if not math.isfinite(number):
-        raise InputError(f"{path}, row {row}, {one.name}", text, "must be finite", "mend it")
-    return int(number) if one.whole and number.is_integer() else number
+    label = f"{path}, row {row}, {one.name}"
+    check_size(number, label, "change it")
+    if not (one.whole and number.is_integer()):
+        return number
+    check_size(int(number), label, "change it")
+    return int(number)

@@ -12,13 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from ..config import TABLES, build, table_class, type_hints
+from ..config import TABLES, build, check_size, table_class, type_hints
 from ..errors import InputError, given, unknown_name
 from ..tables.study import DistributionTable
 from ..typing import Array
 
 _KEYS = {field.name for field in dataclasses.fields(DistributionTable)}
 WHERE = "study.parameters"
+#: Whole numbers are exact as floats up to this size.
+WHOLE = 2.0**53
 _OF_TRAINS = ("pair", "stiffness", "microgeometry", "housing", "train")
 #: Kind of job -> the tables that decide it.
 READ = {
@@ -133,6 +135,8 @@ def read_parameters(given: Mapping[str, Any], kind: str, base: Mapping[str, Any]
         if isinstance(spec, list):
             if not spec:
                 raise InputError(label, [], "is empty", "give at least one value")
+            for value in spec:
+                _check_sizes(value, label)
             made.append(Parameter(name, whole, tuple(spec)))
             continue
         found = build(DistributionTable, spec, label)
@@ -141,12 +145,25 @@ def read_parameters(given: Mapping[str, Any], kind: str, base: Mapping[str, Any]
             raise InputError(label, None, "is no number: low, high, mean do not apply", "give a list of values")
         if found.iso_class is not None:
             found = _of_class(found, found.iso_class, name, base)
+        for end in ("low", "high", "mean", "deviation") if whole else ():
+            if abs(getattr(found, end) or 0.0) > WHOLE:
+                problem = f"must be of a size up to {WHOLE:.3g}, for the key takes whole numbers"
+                raise InputError(f"{label}.{end}", getattr(found, end), problem, "take a smaller one")
         if whole and found.low is not None and found.high is not None and math.ceil(found.low) > found.high:
             raise InputError(label, (found.low, found.high), "holds no whole number", "widen it")
         for other in also:
             key_hint(kind, other, base)
         made.append(Parameter(name, whole, distribution=found, also=also))
     return tuple(made)
+
+
+def _check_sizes(value: Any, label: str) -> None:
+    """Numbers of a value, within lists and tables too, are such as a key can have."""
+    if isinstance(value, (list, dict)):
+        for inner in value.values() if isinstance(value, dict) else value:
+            _check_sizes(inner, label)
+    elif isinstance(value, (int, float)):
+        check_size(value, label, "change that value of the list")
 
 
 def _of_class(found: DistributionTable, class_: int, name: str, base: Mapping[str, Any]) -> DistributionTable:
