@@ -19,6 +19,9 @@ from typing import TextIO
 
 #: Seconds before the first message, between two looks at a run, and of a count before its rate is shown.
 SILENT, LOOK, SETTLED = 2.0, 0.2, 1.0
+#: A time left is shown where the rates of all that is counted and of its later half differ by this factor at most; how
+#: much longer than the one before a stretch is whose end is remembered.
+STEADY, STRETCH = 1.5, 1.2
 #: Seconds after which a stage that still goes on is shown again where lines stay; doubled each time.
 AGAIN = 60.0
 
@@ -29,26 +32,52 @@ class _Stage:
 
     name: str
     done: float = 0.0
-    total: float = 0.0
+    total: float | None = 0.0  # None: nobody knows
     what: str = ""
     counted: float = 0.0  # when the count began
     first: float = 0.0  # what was done then
     apart: float = 0.0  # when it began, of what is no part of the counts outside
+    marks: list[tuple[float, float]] = field(default_factory=list)  # (when, what was done then), ever farther apart
+
+    @property
+    def is_counted(self) -> bool:
+        """Whether it says how far it is."""
+        return self.total is None or self.total > 0.0
+
+    def mark(self, now: float) -> None:
+        """Remember how far it is."""
+        if not self.marks or self.done - self.first >= STRETCH * (self.marks[-1][1] - self.first):
+            self.marks.append((now, self.done))
+
+    def _steady(self, now: float) -> float:
+        """What is done in a second; 0 where that changes so much that no time left would be honest."""
+        made = self.done - self.first
+        rates = [made / (now - self.counted)]
+        halves = [mark for mark in self.marks if mark[1] - self.first <= 0.5 * made and mark[0] < now]
+        if halves:
+            when, done = halves[-1]
+            rates.append((self.done - done) / (now - when))
+        return min(rates) if max(rates) <= STEADY * min(rates) else 0.0
 
     def text(self, now: float) -> str:
         """Name, how far it is, its rate and the time that is left."""
-        if not self.total > 0.0:
+        if not self.is_counted:
             return self.name
+        elapsed = now - self.counted
+        made = self.done - self.first
+        if self.total is None:
+            parts = [f"{self.done} {self.what}"]
+            parts += [f"{made / elapsed:.3g}/s"] if elapsed >= SETTLED and made > 0.0 else []
+            return f"{self.name}: {', '.join(parts)}"
         share = min(1.0, self.done / self.total)
         whole = isinstance(self.total, int)
         what = self.what if self.what and self.what != self.name else ""
         far = f"{self.done} of {self.total}" if whole else f"{100.0 * share:.0f} %"
         parts = [f"{what} {far}".strip()]
-        elapsed = now - self.counted
-        made = self.done - self.first
         if elapsed >= SETTLED and made > 0.0 and share < 1.0:
             parts += [f"{made / elapsed:.3g}/s"] if whole else []
-            parts.append(f"{_duration(elapsed * (self.total - self.done) / made)} left")
+            if (rate := self._steady(now)) > 0.0:
+                parts.append(f"{_duration((self.total - self.done) / rate)} left")
         return f"{self.name}: {', '.join(parts)}"
 
 
@@ -80,19 +109,22 @@ class Display:
         with self._lock:
             if self._stages and (begun := self._stages.pop().apart):
                 for outer in self._stages:
-                    outer.counted += time.monotonic() - begun if outer.counted else 0.0
+                    taken = time.monotonic() - begun if outer.counted else 0.0
+                    outer.counted += taken
+                    outer.marks = [(when + taken, done) for when, done in outer.marks]
             if not self._stages:
                 self._clear()
 
-    def count(self, done: float, total: float, what: str) -> None:
+    def count(self, done: float, total: float | None, what: str) -> None:
         """How far the innermost stage is."""
         with self._lock:
             if not self._stages:
                 self._stages.append(_Stage(what))
             at = self._stages[-1]
             if at.what != what or done < at.done or not at.counted:
-                at.counted, at.first = time.monotonic(), done
+                at.counted, at.first, at.marks = time.monotonic(), done, []
             at.done, at.total, at.what = done, total, what
+            at.mark(time.monotonic())
 
     def say(self, text: str) -> None:
         """A line that stays."""
@@ -119,7 +151,7 @@ class Display:
             return
         apart = max((i for i, at in enumerate(self._stages) if at.apart), default=0)
         inner = self._stages[apart:]
-        counted = next((i for i, at in enumerate(inner) if at.total > 0.0), len(inner) - 1)
+        counted = next((i for i, at in enumerate(inner) if at.is_counted), len(inner) - 1)
         stages = self._stages[: apart + counted + 1]  # what goes on inside of a count is a part of it
         text = ": ".join([*(s.name for s in stages[:-1]), stages[-1].text(now)])
         if self._rewritten:
@@ -203,8 +235,11 @@ def stage(name: str, *, apart: bool = False) -> Iterator[None]:
         display.leave()
 
 
-def count(done: float, total: float, what: str = "") -> None:
-    """Report how far the stage is: whole numbers of a whole number of things, or as floats a share."""
+def count(done: float, total: float | None, what: str = "") -> None:
+    """Report how far the stage is: whole numbers of a whole number of things, or as floats a share.
+
+    A total of None is not known: no time is left then.
+    """
     if display := _display():
         display.count(done, total, what)
 

@@ -12,15 +12,15 @@ class _Counts(progress.Display):
 
     def __init__(self) -> None:
         super().__init__(io.StringIO(), rewritten=False)
-        self.seen: list[tuple[float, float, str]] = []
+        self.seen: list[tuple[float, float | None, str]] = []
 
-    def count(self, done: float, total: float, what: str) -> None:
+    def count(self, done: float, total: float | None, what: str) -> None:
         """How far the innermost stage is."""
         self.seen.append((done, total, what))
 
 
 @contextmanager
-def counted() -> Iterator[list[tuple[float, float, str]]]:
+def counted() -> Iterator[list[tuple[float, float | None, str]]]:
     """Yield the list of what is counted inside."""
     display = _Counts()
     progress._displays.append(display)

@@ -110,6 +110,25 @@ def test_rate_and_remaining_time():
     assert gone_on.text(20.0) == "cases: 930 of 1000, 3/s, 23 s left"
     assert _Stage("meshing").text(50.0) == "meshing"
     assert _Stage("a", 5, 5, "", 0.0).text(9.0) == "a: 5 of 5"
+    assert _Stage("search", 30, None, "points", 10.0).text(20.0) == "search: 30 points, 3/s"
+
+
+@pytest.mark.parametrize(
+    ("later", "told"),
+    [
+        (10.0, "cases: 40 of 100, 1/s, 60 s left"),
+        (200.0, "cases: 40 of 100, 0.0952/s"),  # became twenty times slower: nobody knows
+        (2.5, "cases: 40 of 100, 1.6/s"),
+    ],
+)
+def test_a_time_left_is_shown_where_the_rate_is_steady_alone(later, told):
+    """Twenty cases at one a second, twenty more of which ten take `later` seconds."""
+    at = _Stage("cases", 0, 100, "cases", 100.0)
+    now = 100.0
+    for at.done in range(41):
+        at.mark(now)
+        last, now = now, now + (1.0 if at.done < 20 else later / 10.0)
+    assert at.text(last) == told
 
 
 @pytest.mark.parametrize(
