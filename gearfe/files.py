@@ -246,7 +246,7 @@ def csv_table(path: str | Path, *, gaps: bool = True) -> Iterator[Table]:
                     found.setdefault(name, [0, rows + int(bad[0]) + 1])[0] += len(bad)
             rows += max(map(len, columns.values()), default=0)
             if not begun:
-                stream.write(",".join(map(_quoted, columns)) + "\n")
+                stream.write(",".join(map(quoted, columns)) + "\n")
                 begun = True
             for first in range(0, max(map(len, columns.values()), default=0), AT_ONCE):
                 some = [_listed(values[first : first + AT_ONCE]) for values in columns.values()]
@@ -286,11 +286,11 @@ def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
 
 def _cell(value: Any) -> str:
     if isinstance(value, (str, bool)):
-        return _quoted(str(value))
+        return quoted(str(value))
     return str(int(value)) if _is_integer(value) else f"{float(value):.17g}"
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
     """A text as RFC 4180 has it: within quotes where a comma, a quote or an end of line stands in it."""
     return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\r\n') else text
 

@@ -38,7 +38,7 @@ class Empty(Task):
 def measured(count: int, workers: int, folder: Path) -> tuple[float, float, float]:
     """Elapsed seconds from the first row to the last, the driver's processor seconds, and seconds to the first row."""
     names = ("a", "b", "c")
-    task = Empty("mechanism", Path("none"), {}, False, names, {"y": "1"})
+    task = Empty("mechanism", Path("none"), {}, False, names, {"y": "1"}, {})
     cases = [(n, (float(n), 0.1 * n, 1.0 / (n + 1))) for n in range(count)]
     values = dict(cases)
     with only_writer(folder):

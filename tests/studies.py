@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 import csv
+import sqlite3
+from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
+
+from gearfe.cache import versions
+from gearfe.study.job import Study
+from gearfe.study.journal import Journal
+from gearfe.study.run import serially
 
 JOBS = Path(__file__).parents[1] / "geometry"
 
@@ -61,3 +69,26 @@ def rows_of(folder: Path) -> list[list[str]]:
     """Rows of study.csv without the seconds."""
     with (folder / "study.csv").open(newline="") as stream:
         return [row[:-1] for row in csv.reader(stream)]
+
+
+def stored_rows(folder: Path) -> list[list[str]]:
+    """Rows of the database of a folder that no program has open, without the seconds."""
+    with closing(sqlite3.connect(folder / "study.db")) as connection:
+        lines = [line for (line,) in connection.execute("SELECT line FROM rows ORDER BY number")]
+    return [row[:-1] for row in csv.reader(lines)]
+
+
+def solved_before(study: Study, folder: Path, numbers: Iterable[int]) -> None:
+    """Leave a folder as a run does that was killed after these cases: without exports."""
+    journal = journal_of(study, folder)
+    for rows in serially(study.task, [(n, study.cases[n]) for n in numbers]):
+        journal.append(rows, study.cases)
+    journal._close()
+    (folder / "study.csv").unlink()
+    (folder / "study.json").unlink()
+
+
+def journal_of(study: Study, folder: Path) -> Journal:
+    """The journal of a study, as the program opens it."""
+    names = study.task.names, tuple(study.table.outputs)
+    return Journal(folder, study.head, versions(), *names, cases=study.cases)

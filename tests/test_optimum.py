@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import sqlite3
+import subprocess
+import sys
 import tomllib
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +68,7 @@ def test_a_closed_optimum_and_its_tolerances(tmp_path, capsys) -> None:
     assert made["at_their_ends"] == []
     told = capsys.readouterr().out
     assert re.search(rf"f: .* base 13, .* within the tolerances\n  {X} less by its tolerance 0\.0", told)
-    names = {"best.toml", "study.csv", "study.json", "study.png", "study_lines.png", "study_tornado.png"}
+    names = {"best.toml", "study.csv", "study.db", "study.json", "study.png", "study_lines.png", "study_tornado.png"}
     assert {path.name for path in out.iterdir()} == names | {"summary.json"}
     row = rows_of(out)[1 + made["best_case"]]
     assert [float(cell) for cell in row[1:4]] == [made["best"][X], made["best"][Y], f["best"]]
@@ -76,8 +81,9 @@ def test_a_search_goes_on_where_it_was_interrupted(tmp_path) -> None:
     path = study_file(tmp_path)
     whole = ran(path, tmp_path / "whole", "--no-pictures")
     ran(path, tmp_path / "out", "--no-pictures")
-    table = tmp_path / "out" / "study.csv"
-    table.write_text("".join(table.read_text().splitlines(keepends=True)[:40]))
+    with closing(sqlite3.connect(tmp_path / "out" / "study.db")) as connection, connection:
+        connection.execute("DELETE FROM rows WHERE number >= 40 OR number IN (7, 21)")  # came out of order
+        connection.execute("PRAGMA user_version = 38")
     again = ran(path, tmp_path / "out", "--no-pictures")
     assert {k: v for k, v in again.items() if not k.startswith(("seconds", "timings"))} == {
         k: v for k, v in whole.items() if not k.startswith(("seconds", "timings"))
@@ -134,7 +140,7 @@ def best_relief(tmp_path: Path, **changes: str) -> dict:
 
 
 def test_the_shipped_search_finds_a_relief_on_both_gears(tmp_path) -> None:
-    made = best_relief(tmp_path, positions="6", cases="16")
+    made = best_relief(tmp_path, positions="6", cases="40")
     error = made["outputs"]["error_um"]
     assert error["best"] < 0.5 * error["base"]
     assert error["best"] <= min(*error["less"].values(), *error["more"].values())
@@ -153,3 +159,54 @@ def test_long_relief_designed_for_a_torque(tmp_path) -> None:
     made = json.loads((tmp_path / "map" / "loadmap.json").read_text())["by_torque"]
     least = int(np.argmin(made["transmission_error_peak_to_peak_um"]))
     assert made["torque_Nm"][least] == pytest.approx(100, rel=0.05)
+
+
+@pytest.mark.parametrize("cases", [24, 60, 100])
+def test_a_search_keeps_its_budget(tmp_path, cases) -> None:
+    """The points of the tolerances, 4 sides and 4 corners, are among them."""
+    made = ran(study_file(tmp_path, ("cases = 160", f"cases = {cases}")), tmp_path / "out", "--no-pictures")
+    assert made["cases"] <= cases
+    assert made["outputs"]["f"]["best"] < made["outputs"]["f"]["base"]
+
+
+@pytest.mark.parametrize("share", [1.0, 10.0])
+def test_a_search_stops_where_its_tolerances_say_so(tmp_path, share) -> None:
+    """The optimum (1, 2) is found within the tolerances, with a small part of the points that are allowed."""
+    changes = ("tolerance = 0.1", f"tolerance = {0.1 * share}"), ("tolerance = 0.2", f"tolerance = {0.2 * share}")
+    made = ran(study_file(tmp_path, ("cases = 160", "cases = 4000"), *changes), tmp_path / "out", "--no-pictures")
+    assert abs(made["best"][X] - 1.0) <= 0.1 * share
+    assert abs(made["best"][Y] - 2.0) <= 0.2 * share
+    assert made["cases"] < 1000
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is sent as a signal")
+def test_ctrl_c_prints_the_best_point_and_the_same_command_goes_on(tmp_path) -> None:
+    path, out = study_file(tmp_path), tmp_path / "out"
+    program = (
+        "import os, signal, sys; from gearfe.cli import main; from gearfe.study.search import Search\n"
+        "solve = Search.solve\n"
+        "def stopped(self, points):\n"
+        "    found = solve(self, points)\n"
+        "    if len(self) > 30: os.kill(os.getpid(), signal.SIGINT)\n"
+        "    return found\n"
+        "Search.solve = stopped\n"
+        "sys.exit(main(sys.argv[1:]))"
+    )
+    command = ["study", path, "--out", str(out), "--jobs", "1", "--no-pictures"]
+    run = subprocess.run(
+        [sys.executable, "-c", program, *command], capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(JOBS.parent)},
+    )  # fmt: skip
+    assert run.returncode == 130
+    told = re.search(r"best of (\d+) points so far, case (\d+): .*f = (\S+), g = ", run.stderr)
+    assert told is not None, run.stderr
+    rows = rows_of(out)[1:]
+    assert len(rows) == int(told[1]) > 30
+    least = min(rows, key=lambda row: float(row[3]))
+    assert told[2] == least[0]
+    assert float(told[3]) == pytest.approx(float(least[3]), rel=1e-5)
+    assert "the same command goes on" in run.stderr
+    again = ran(path, out, "--no-pictures")
+    whole = ran(path, tmp_path / "whole", "--no-pictures")
+    assert rows_of(out) == rows_of(tmp_path / "whole")
+    assert again["best"] == whole["best"]

@@ -2,25 +2,43 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import os
 import random
+import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
+import typing
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+from gearfe.cache import versions
 from gearfe.cli import main
-from gearfe.config import job_tables, read_toml
+from gearfe.config import TABLES, _convert, fields_of, job_tables, read_toml, table_class, type_hints
+from gearfe.errors import InputError
+from gearfe.files import output_folder
 from gearfe.study.job import read_study, run_study
+from gearfe.study.journal import Journal
+from gearfe.study.run import serially
+from gearfe.tables.mechanism import MechanismFile
 
-from .studies import rows_of, written
+from .studies import rows_of, stored_rows, written
 
+#: Numbers that no key can have -> how a message shows them, and their largest size.
+HUGE = {
+    2**63: ("9.223e+18", "9.22e+18"),
+    -(10**400): ("-1.000e+400", "9.22e+18"),
+    1e80: ("1e+80", "1e+75"),
+    math.inf: ("inf", "1e+75"),
+    math.nan: ("nan", "1e+75"),
+}
 PLACE = "bodies.a.position_m.0 = {"
 OUTPUT = 'y = "'
 
@@ -45,6 +63,18 @@ OUTPUT = 'y = "'
         ('"sobol"', '"sobl"', "did you mean 'sobol'"),
         ("cases = 8", "cases = 0", "must be finite and >= 1"),
         ("cases = 8", "cases = 8\ncores = 2", "unknown name 'cores'"),
+        ("seed = 3", f"seed = {2**63}", "study.seed = 9.223e+18: must be finite and >= 0 and of a size up to 9.22e+18"),
+        ("seed = 3", f"seed = {10**400}", "study.seed = 1.000e+400: must be finite and >= 0"),
+        *(
+            (
+                PLACE,
+                f"bodies.a.mass_kg = [1.0, {value}]\n{PLACE}",
+                f"mass_kg = {shown}: must be finite, of a size up to {most}",
+            )
+            for value, (shown, most) in HUGE.items()
+        ),
+        (PLACE, f"bodies.a.mass_kg = {{ low = 1, high = {10**400} }}\n{PLACE}", "high = 1.000e+400: must be finite"),
+        (PLACE, f"bodies.a.mass_kg = {{ mean = nan, deviation = 1 }}\n{PLACE}", "mean = nan: must be finite"),
         ('"base.toml"', '"bse.toml"', "there is no such file"),
         ('design = "sobol"', 'design = "rows"\nrows_csv = "rows.csv"', "columns are the parameters"),
     ],
@@ -67,6 +97,7 @@ def test_mistakes_are_told_before_cases_run(tmp_path, capsys, old, new, told):
         ("bodies.a.mas_kg\n1.0\n", "did you mean 'mass_kg'"),
         ("bodies.a.mass_kg\n", "no rows"),
         ("bodies.a.mass_kg\nnan\n", "must be finite"),
+        ("bodies.a.mass_kg\n1e400\n", "rows.csv, row 1, bodies.a.mass_kg = inf: must be finite, of a size up to 1e+75"),
         (None, "there is no such file"),
     ],
 )
@@ -94,9 +125,13 @@ def test_a_folder_of_another_study_is_refused(tmp_path, capsys):
     assert "base.bodies.a.mass_kg differs; choose another --out, or give --restart" in capsys.readouterr().err
     assert rows_of(tmp_path / "out") == before
     assert main(["study", str(path), *out, "--restart"]) == 0
-    (tmp_path / "out" / "study.json").unlink()
+    (tmp_path / "out" / "study.json").unlink()  # an export
+    assert main(["study", str(path), *out]) == 0
+    (tmp_path / "out" / "study.db").unlink()  # as a folder of an earlier version
+    before = (tmp_path / "out" / "study.csv").read_bytes()
     assert main(["study", str(path), *out]) == 2
-    assert "without its study.json" in capsys.readouterr().err
+    assert "holds a study.csv without its study.db" in capsys.readouterr().err
+    assert (tmp_path / "out" / "study.csv").read_bytes() == before
 
 
 def test_a_file_that_the_job_names_is_a_part_of_the_study(tmp_path, capsys):
@@ -184,15 +219,19 @@ def test_a_case_that_is_written_elsewhere_finds_its_files(tmp_path):
 
 def test_versions_stand_with_the_rows_that_they_made(tmp_path):
     study = read_study(written(tmp_path))
-    run_study(study, tmp_path, jobs=1)
-    head = json.loads((tmp_path / "study.json").read_text())
+    run_study(study, tmp_path / "out", jobs=1)
+    head = json.loads((tmp_path / "out" / "study.json").read_text())
     assert [v["rows_before"] for v in head["versions"]] == [0]
-    run_study(study, tmp_path, jobs=1)
-    assert json.loads((tmp_path / "study.json").read_text()) == head
-    head["versions"][0]["numpy"] = "0.1"  # as if another one had begun
-    (tmp_path / "study.json").write_text(json.dumps(head))
-    run_study(study, tmp_path, jobs=1)
-    assert [v["rows_before"] for v in json.loads((tmp_path / "study.json").read_text())["versions"]] == [0, 8]
+    run_study(study, tmp_path / "out", jobs=1)
+    assert json.loads((tmp_path / "out" / "study.json").read_text()) == head
+    shutil.rmtree(tmp_path / "out")
+    older = {**versions(), "numpy": "0.1"}  # as if another one had begun
+    names = study.task.names, tuple(study.table.outputs)
+    with Journal(output_folder(tmp_path / "out"), study.head, older, *names, cases=study.cases) as journal:
+        for rows in serially(study.task, list(enumerate(study.cases))):
+            journal.append(rows, study.cases)
+    run_study(study, tmp_path / "out", jobs=1)
+    assert [v["rows_before"] for v in json.loads((tmp_path / "out" / "study.json").read_text())["versions"]] == [0, 8]
 
 
 @pytest.mark.slow
@@ -201,7 +240,7 @@ def test_twenty_kills_at_random_moments_lose_nothing(tmp_path):
     """Driver or a worker, by turns of a seed: rows that stood stay as they were; the rest is done, each case once."""
     dice, path = random.Random(7), written(tmp_path, cases=3000)
     command = [sys.executable, "-m", "gearfe", "study", str(path), "--out", str(tmp_path / "out"), "--no-pictures"]
-    table, kept, kills = tmp_path / "out" / "study.csv", {}, {"driver": 0, "worker": 0}
+    table, kept, kills = tmp_path / "out" / "study.db", {}, {"driver": 0, "worker": 0}
     while sum(kills.values()) < 20:
         run = subprocess.Popen([*command, "--jobs", "2"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         whom = dice.choice(list(kills))
@@ -217,7 +256,7 @@ def test_twenty_kills_at_random_moments_lose_nothing(tmp_path):
         if whom == "worker" and run.poll() is None:
             _kill(run.pid)  # goes on in another driver, with what the replaced worker did
         run.wait()
-        rows = {row[0]: row for row in rows_of(tmp_path / "out")[1:] if len(row) == 6} if table.exists() else {}
+        rows = {row[0]: row for row in stored_rows(tmp_path / "out")} if table.exists() else {}
         for number, row in kept.items():
             assert rows[number] == row
         kept = {n: row for n, row in rows.items() if row[5] == ""}
@@ -248,3 +287,61 @@ def _workers(driver: int) -> list[int]:
 def _kill(pid: int) -> None:
     with suppress(ProcessLookupError):
         os.kill(pid, signal.SIGKILL)
+
+
+@pytest.mark.parametrize("key", ["teeth", "pitch_seed"])
+@pytest.mark.parametrize(
+    ("spec", "told"),
+    [
+        ("[20, 99999999999999999999]", "= 1.000e+20: must be finite, of a size up to 9.22e+18"),
+        ("{ low = 1, high = 1e30 }", "high = 1e+30: must be of a size up to 9.01e+15, for the key takes whole numbers"),
+        ("{ mean = -1e17, deviation = 2.0 }", "mean = -1e+17: must be of a size up to 9.01e+15"),
+        ("{ mean = 1.0, deviation = 1e17 }", "deviation = 1e+17: must be of a size up to 9.01e+15"),
+        ("{ low = 1, high = 1e15 }", "combinations, more than 10000000"),
+    ],
+)
+def test_whole_numbers_of_a_study_have_64_bits(tmp_path, key, spec, told):
+    name = {"teeth": "pair.pinion.teeth", "pitch_seed": "microgeometry.pinion.pitch_seed"}[key]
+    path = tmp_path / "study.toml"
+    path.write_text(
+        "[pair]\nmodule_mm = 2.0\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"
+        "[pair.pinion]\nteeth = 20\nbore_diameter_mm = 8.0\n[pair.wheel]\nteeth = 31\nbore_diameter_mm = 15.0\n"
+        '[study]\njob = "loadmap"\ndesign = "factorial"\n[study.outputs]\nx = "1"\n'
+        f"[study.parameters]\n{name} = {spec}\n"
+    )
+    with pytest.raises(InputError, match=re.escape(told)):
+        read_study(path)
+
+
+def _whole_keys():
+    """Every key of every job table that takes whole numbers: its table, name and field."""
+    seen, tables = set(), [*map(table_class, TABLES), MechanismFile]
+    while tables:
+        table = tables.pop()
+        if table in seen:
+            continue
+        seen.add(table)
+        for name, hint in type_hints(table).items():
+            inside = [hint]
+            while inside:
+                option = inside.pop()
+                inside += typing.get_args(option)
+                if dataclasses.is_dataclass(option):
+                    tables.append(option)
+                elif option is int:
+                    yield table, name
+    assert len(seen) > 20
+
+
+@pytest.mark.parametrize(("table", "name"), sorted(set(_whole_keys()), key=str))
+@pytest.mark.parametrize("value", [2**63, -(2**63), 10**19, 10**400])
+def test_whole_numbers_of_all_tables_have_64_bits(table, name, value):
+    field = fields_of(table)[name]
+    hint = type_hints(table)[name]
+    written = value
+    while typing.get_origin(hint) in (tuple, dict):  # a list of them, say
+        written = [written] if typing.get_origin(hint) is tuple else {"a": written}
+        hint = typing.get_args(hint)[-1 if typing.get_origin(hint) is dict else 0]
+    with pytest.raises(InputError, match="must") as caught:
+        _convert(type_hints(table)[name], written, name, field.metadata)
+    assert len(str(caught.value)) < 600

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import logging
 import time
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,10 @@ from .arguments import add_folder, add_job, print_results
 TIMEOUT_S = 20
 #: Job file of the best point of a search.
 BEST = "best.toml"
+#: Files of a study that are written while it runs.
+FILES = ("study.csv", "study.db", "study.json")
+#: Processes of --jobs at most.
+MOST_JOBS = 1024
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,8 +41,9 @@ def run(args: argparse.Namespace) -> int:
     from ..shown import library
     from ..study.job import read_study, run_study
 
-    if args.jobs is not None and args.jobs < 1:
-        raise InputError("--jobs", args.jobs, "must be >= 1", "the number of processors is the default")
+    if args.jobs is not None and not 1 <= args.jobs <= MOST_JOBS:
+        problem = f"must be >= 1 and <= {MOST_JOBS}"
+        raise InputError("--jobs", args.jobs, problem, "the number of processors is the default")
     if (args.row is None) != (args.write is None):
         raise InputError("--row", args.row, "goes with --write", "give both: --row 17 --write best.toml")
     if args.parquet:  # refused before the work, not after it
@@ -48,26 +53,31 @@ def run(args: argparse.Namespace) -> int:
         return _write_row(study, args.row, Path(args.write))
 
     from ..files import output_folder, whole_set, write_json
-    from ..progress import Stopwatch
+    from ..progress import Stopwatch, announce
     from ..study import optimum, statistics
     from ..study.search import Search
 
     searched: bool = study.table.design == "search"
     watch = Stopwatch({"program start": time.perf_counter() - started})
     folder = output_folder(args.out)
-    with ExitStack() as stack, watch.stage("cases"):
+    with _goes_on(), ExitStack() as stack, watch.stage("cases"):
         where: dict[str, Any] = {"jobs": args.jobs}
         if args.dask is not None:
             where = _cluster(args.dask, stack)
         where["restart"] = args.restart
         if searched:
-            best = optimum.optimum(stack.enter_context(Search(study, folder, **where)))
+            search = stack.enter_context(Search(study, folder, **where))
+            try:
+                best = optimum.optimum(search)
+            except KeyboardInterrupt:
+                announce(optimum.interrupted_line(search))
+                raise
             made, summary, lines = best.result, best.summary(), optimum.report_lines
         else:
             made, lines = run_study(study, folder, **where), statistics.report_lines
             with watch.stage("statistics"):
                 summary = made.summary()
-    with whole_set(folder, ("study*.png", "study.parquet", BEST), ("study.csv", "study.json")) as place:
+    with whole_set(folder, ("study*.png", "study.parquet", BEST), FILES) as place:
         if searched:
             _write_case(study, summary["best_case"], list(summary["best"].values()), place / BEST, folder)
         if args.parquet:
@@ -80,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
                 study_figures(place, made, summary, title)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(place / "summary.json", {**summary, "timings_s": dict(watch.seconds)})
-        names = sorted(["study.csv", "study.json", *(path.name for path in place.iterdir())])
+        names = sorted([*FILES, *(path.name for path in place.iterdir())])
     bad, warnings = int((~made.done).sum()), []
     if bad:
         first = next(i for i, good in enumerate(made.done) if not good)
@@ -88,6 +98,18 @@ def run(args: argparse.Namespace) -> int:
         warnings.append(f"{bad} of {len(made.done)} cases are not solved wholly; {example}")
     print_results(lines(summary), folder, names, watch.seconds, warnings)
     return 1 if bad and not searched else 0
+
+
+@contextmanager
+def _goes_on() -> Iterator[None]:
+    """Say how an interrupted study is continued."""
+    from ..progress import announce
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        announce("finished cases are kept in the output folder: the same command goes on from there")
+        raise
 
 
 def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..config import build, read_toml
 from ..errors import InputError
+from ..files import output_folder
 from ..progress import count, one_thread
 from ..tables.study import StudyTable
 from .case import DIED, ERROR, HERE, INVALID, Row, Task, evaluate, files_named
@@ -143,7 +144,7 @@ def run_study(
     Parameters
     ----------
     folder
-        Of ``study.csv`` and ``study.json``: a study that was interrupted goes on.
+        Of ``study.db`` and its export ``study.csv``: a study that was interrupted goes on.
     jobs
         Processes; None: as many as there are processors; 1: in this process.
     executor
@@ -165,22 +166,27 @@ def run_study(
 
     if study.table.design == "search":
         raise InputError("study.design", "search", "has no cases beforehand", "gearfe study runs it; or gearfe.Search")
-    folder = Path(folder)
     base = check_outputs(study)
-    folder.mkdir(parents=True, exist_ok=True)
-    with only_writer(folder):
-        names = study.task.names, tuple(study.table.outputs)
-        journal = Journal(folder, study.head, versions(), *names, restart=restart)
+    folder = output_folder(folder)
+    names = study.task.names, tuple(study.table.outputs)
+    with (
+        only_writer(folder),
+        Journal(folder, study.head, versions(), *names, cases=study.cases, restart=restart) as journal,
+    ):
         bad, first = 0, ""
         missing = [n for n in _order(study) if n not in journal.done]
         cases = [(n, study.cases[n]) for n in missing]
         for group in solved_rows(study.task, cases, jobs, executor, workers, check):
-            journal.append(group, study.cases)
-            count(len(journal.done), len(study.cases), "cases")
+            kept = []
             for row in group:
                 hopeless = row.status in (INVALID, ERROR, DIED)
                 first = first or (row.message if hopeless else "")
                 bad = bad + 1 if hopeless and bad >= 0 else -1
+                kept.append(row)
+                if bad >= HOPELESS:
+                    break
+            journal.append(kept, study.cases)
+            count(len(journal.done), len(study.cases), "cases")
             if bad >= HOPELESS:
                 problem = f"the first {bad} cases have no answer; one of them: {first}"
                 raise InputError("study", None, problem, "change the base job or the parameters; their rows are kept")

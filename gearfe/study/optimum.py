@@ -14,8 +14,9 @@ from .parameters import Parameter
 from .search import Search, Solution
 from .statistics import StudyResult
 
-#: Members of the population for each parameter; more tolerances than the other number have no worst corner.
-POPULATION, CORNERS = 8, 6
+#: Members of the population for each parameter at most; fewest points of differential evolution (scipy's), its share
+#: of the points of a search and its generations where these allow; more tolerances than this have no worst corner.
+POPULATION, FEWEST, EVOLVED, GENERATIONS, CORNERS = 8, 5, 0.6, 4, 6
 #: A parameter nearer to an end than this share of its range is told to be there.
 AT_END = 1e-3
 
@@ -91,9 +92,18 @@ def report_lines(summary: Mapping[str, Any]) -> list[str]:
     return lines
 
 
+def interrupted_line(search: Search) -> str:
+    """What a search that is interrupted has so far."""
+    best = search.best()
+    if best is None:
+        return f"none of {len(search)} points so far has an answer within the limits"
+    cells = ", ".join(f"{name} = {value:.6g}" for name, value in (best.point | best.outputs).items())
+    return f"best of {len(search)} points so far, case {best.case}: {cells}"
+
+
 def optimum(search: Search) -> Optimum:
-    """Differential evolution with about as many points as the study's `cases`, Nelder's and Mead's method from the best
-    of them on, and the points within the tolerances.
+    """Differential evolution, Nelder's and Mead's method from the best of its points on, and the points within the
+    tolerances, together at most as many as the study's `cases`, however few that may be for the first population.
 
     Raises
     ------
@@ -101,21 +111,24 @@ def optimum(search: Search) -> Optimum:
         Where no point has an answer within the limits.
     """
     table, parameters = search.study.table, search.study.parameters
-    rounds = max(1, math.ceil(table.cases / (POPULATION * len(parameters))) - 1)
-    search.evolve(rounds=rounds, population=POPULATION, seed=table.seed)
-    best = search.refine()
+    distributions = {one.name: one.distribution for one in parameters}
+    off = {name: d.tolerance for name, d in distributions.items() if d is not None and d.tolerance > 0.0}
+    units = [tuple(sign * (i == k) for i in range(len(off))) for k in range(len(off)) for sign in (-1, 1)]
+    corners = list(itertools.product((-1, 1), repeat=len(off))) if 0 < len(off) <= CORNERS else []
+    budget = max(FEWEST, table.cases - len(set(units) | set(corners)))
+    d, evolved = len(parameters), EVOLVED * budget
+    population = max(math.ceil(FEWEST / d), min(POPULATION, int(evolved / (GENERATIONS * d))))
+    rounds = max(0, int(evolved / (population * d)) - 1)
+    search.evolve(rounds=rounds, population=population, seed=table.seed)
+    best = search.refine(budget - search.asked)
     if best is None:
         problem = "has no point with an answer within the limits" + search.first_problem()
         raise InputError("study", search.study.path.name, problem, "change ends or limits; the points are kept")
-    given = {one.name: one.distribution for one in parameters}
-    off = {name: one.tolerance for name, one in given.items() if one is not None and one.tolerance > 0.0}
 
     def moved(signs: Sequence[int]) -> dict[str, Any]:
         ends = {name: best.point[name] + s * size for s, (name, size) in zip(signs, off.items(), strict=True)}
         return {**best.point, **ends}
 
-    units = [tuple(sign * (i == k) for i in range(len(off))) for k in range(len(off)) for sign in (-1, 1)]
-    corners = list(itertools.product((-1, 1), repeat=len(off))) if 0 < len(off) <= CORNERS else []
     found = search.solve([moved(signs) for signs in (*units, *corners)])
     pairs = list(zip(found[0 : len(units) : 2], found[1 : len(units) : 2], strict=True))
     beside = dict(zip(off, pairs, strict=True))

@@ -1,7 +1,8 @@
-"""The cases of a study, one after the other, on processes, or on any executor; each finished one is handed on at once.
+"""The cases of a study, one after the other, on processes, or on any executor; finished ones are handed on in groups.
 
-Cases go in groups of about `GROUP_SECONDS`, so that handing over costs little. The cases of groups that never come
-back run again one by one, with nothing beside them, so that it is known whose fault a death is, `AGAIN` times at most.
+Groups take about `GROUP_SECONDS`, so that handing over and storing cost little; a kill loses no more than that. The
+cases of groups that never come back run again one by one, with nothing beside them, so that it is known whose fault a
+death is, `AGAIN` times at most. Processes that end as they start say nothing about cases: they are replaced.
 Where a case runs changes no digit of its row.
 """
 
@@ -12,8 +13,9 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from multiprocessing import connection, get_context, parent_process
 from typing import Any
@@ -25,8 +27,10 @@ from .case import DIED, HERE, Row, Task, solve_case, solve_group
 
 #: Seconds of a group of cases, and groups that wait for each worker.
 GROUP_SECONDS, WAITING = 0.5, 2
-#: How often cases run again after the worker that had them died.
-AGAIN = 2
+#: How often cases run again after the worker that had them died, and processes are started in vain.
+AGAIN, STARTS = 2, 5
+#: Seconds to wait for the exit codes of processes that have ended.
+EXIT_SECONDS = 5.0
 #: Cases of a group at most, and seconds between two looks whether an executor still answers.
 LARGEST, LOOK_SECONDS = 1000, 1.0
 
@@ -36,9 +40,16 @@ Case = tuple[int, tuple[Any, ...]]
 
 def serially(task: Task, cases: Iterable[Case]) -> Iterator[list[Row]]:
     """Rows, one case after the other in this process."""
+    rows: list[Row] = []
     with one_thread():
+        begun = time.monotonic()
         for number, values in cases:
-            yield [solve_case(task, number, values, HERE)]
+            rows.append(solve_case(task, number, values, HERE))
+            if time.monotonic() - begun >= GROUP_SECONDS:
+                yield rows
+                rows, begun = [], time.monotonic()
+    if rows:
+        yield rows
 
 
 def side_by_side(
@@ -62,14 +73,15 @@ def side_by_side(
     Raises
     ------
     InputError
-        When processes of our own end before they work, as those of a script do that starts a study wherever it is read.
+        When processes of our own end before they work: those of a script that starts a study wherever it is read do,
+        and those that something kills every time.
     """
     pool, begun = (executor, None) if executor is not None else _begun(workers)
     ahead = iter(cases)
     running: dict[Future[list[Row]], list[Case]] = {}
     suspects: deque[Case] = deque()
     deaths: Counter[int] = Counter()
-    size = 1
+    size, starts = 1, 0
     try:
         while True:
             alone = bool(suspects)
@@ -89,6 +101,7 @@ def side_by_side(
             ended = wait(running, look, FIRST_COMPLETED).done if running else ()
             if check is not None:
                 check()
+            arrived: list[Row] = []
             for future in ended:
                 group = running.pop(future)
                 try:
@@ -98,14 +111,23 @@ def side_by_side(
                     continue
                 mean = sum(row.seconds for row in rows) / len(rows)
                 size = max(1, min(LARGEST, 2 * size, int(GROUP_SECONDS / max(mean, 1e-9))))
-                yield rows
+                arrived += rows
+            if arrived:  # all at once: storing costs the same for many
+                yield arrived
             if lost and begun is not None:
-                if begun.exception() is not None:
-                    cure = 'a script, which processes read again, calls it under `if __name__ == "__main__":`'
-                    raise InputError("jobs", workers, "makes processes that end as they begin", cure)
                 lost += [(group, lost[0][1]) for group in running.values()]
                 running.clear()
-                pool.shutdown(wait=False, cancel_futures=True)
+                worked = begun.exception() is None
+                starts = 0 if worked else starts + 1
+                if not worked:
+                    _refuse(workers, _exit_codes(pool), starts)
+                    again = [case for group, _ in lost for case in group]
+                    if alone:
+                        suspects.extendleft(reversed(again))
+                    else:
+                        ahead = itertools.chain(again, ahead)
+                    lost = []
+                end_processes(pool)
                 pool, begun = _begun(workers)
             for group, reason in lost:
                 for case in group:
@@ -134,6 +156,27 @@ class IsolatedPool(ProcessPoolExecutor):
         """Start a process where one is missing, and hand a call to one."""
         with away():
             return super().submit(*call, **options)
+
+
+def _refuse(workers: int, codes: Sequence[int], starts: int) -> None:
+    """Raise where processes that ended as they started would do so again."""
+    if any(code > 0 for code in codes):  # an error of theirs; who is killed, as the pool kills the others, has signals
+        cure = 'a script, which processes read again, calls it under `if __name__ == "__main__":`'
+        raise InputError("jobs", workers, "makes processes that end as they begin", cure)
+    if starts >= STARTS:
+        signals = ", ".join(map(str, sorted({-code for code in codes}))) or "unknown"
+        problem = f"makes processes that are killed as they begin, {starts} times (signal {signals})"
+        raise InputError("jobs", workers, problem, "is memory short? finished rows are kept: take fewer, or 1")
+
+
+def _exit_codes(pool: Any) -> list[int]:
+    """End a broken pool; exit codes of its processes, negative where a signal ended them."""
+    running = list((getattr(pool, "_processes", None) or {}).values())
+    end_processes(pool)
+    limit = time.monotonic() + EXIT_SECONDS
+    while any(process.exitcode is None for process in running) and time.monotonic() < limit:
+        time.sleep(0.01)  # the pool collects them
+    return [process.exitcode for process in running if process.exitcode is not None]
 
 
 def processes(workers: int) -> Executor:

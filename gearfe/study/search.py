@@ -7,6 +7,7 @@ optimiser is an `Optimiser`, with `ask` and `tell`, or calls `Search.solve` itse
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections import Counter
@@ -20,6 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import InputError
+from ..files import output_folder
 from ..progress import count
 from ..shown import Facts
 from ..typing import Array
@@ -31,9 +33,9 @@ from .statistics import StudyResult
 
 #: A constraint's value of a point that has no answer, beyond its limit.
 FAR = 1e30
-#: Of `Search.refine`, as shares of the ranges: its first steps, and those in which it ends; the change of the output in
-#: which it ends, as a share of it.
-FIRST_STEP, LAST_STEP, LAST_CHANGE = 0.03, 1e-4, 1e-5
+#: First steps of `Search.refine` as a share of the range; a coordinate is found as well as this share of its tolerance,
+#: or without one as this share of its range.
+FIRST_STEP, TOLERANCE_SHARE, RANGE_SHARE = 0.03, 0.1, 1e-3
 
 Point = Mapping[str, Any]
 
@@ -67,7 +69,8 @@ class Search(Facts):
     study
         Its parameters are the coordinates; its design is not used.
     folder
-        Of ``study.csv`` and ``study.json``: a search that was interrupted finds its points there. None: kept in memory.
+        Of ``study.db`` and its export ``study.csv``: an interrupted search finds its points there. None: kept in
+        memory.
     jobs, executor, workers, check, restart
         As of `gearfe.study.job.run_study`.
 
@@ -95,13 +98,13 @@ class Search(Facts):
         self._case: dict[tuple[str, ...], int] = {}
         self._rows: list[Row] = []
         self._points: list[tuple[Any, ...]] = []
+        self._asked: set[tuple[str, ...]] = set()
         self._journal: Journal | None = None
         self._held = ExitStack()
         if folder is not None:
-            Path(folder).mkdir(parents=True, exist_ok=True)
             with ExitStack() as held:
-                held.enter_context(only_writer(Path(folder)))
-                self._journal = self._known(Path(folder), restart)
+                held.enter_context(only_writer(output_folder(folder)))
+                self._journal = held.enter_context(self._known(Path(folder), restart))
                 self._held = held.pop_all()
 
     def _known(self, folder: Path, restart: bool) -> Journal:
@@ -110,7 +113,7 @@ class Search(Facts):
 
         names, outputs = self.study.task.names, tuple(self.study.table.outputs)
         journal = Journal(folder, {**self.study.head, "search": True}, versions(), names, outputs, restart=restart)
-        columns = journal.finish()
+        columns = journal.cells()
         for i, case in enumerate(columns["case"]):
             self._case[tuple(columns[name][i] for name in names)] = len(self._rows)
             found = tuple(float(columns[name][i]) for name in outputs)
@@ -132,14 +135,19 @@ class Search(Facts):
     def __enter__(self) -> Search:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._held.close()
+    def __exit__(self, *error: Any) -> None:
         if self._own is not None:
             end_processes(self._own)
             self._own = None
+        self._held.__exit__(*error)
 
     def __len__(self) -> int:
         return len(self._rows)
+
+    @property
+    def asked(self) -> int:
+        """Number of points that were asked for, solved now or in the folder before."""
+        return len(self._asked)
 
     def solve(self, points: Sequence[Point]) -> list[dict[str, float]]:
         """Outputs at these points, in their order; not-a-number where a point has no answer.
@@ -157,6 +165,7 @@ class Search(Facts):
             values = tuple(_plain(point[name]) for name in names)
             key = tuple(map(cell_text, values))
             keys.append(key)
+            self._asked.add(key)
             if key not in self._case and key not in fresh:
                 fresh[key] = values
         if fresh:
@@ -165,33 +174,35 @@ class Search(Facts):
         return [dict(zip(outputs, self._rows[self._case[key]].outputs, strict=True)) for key in keys]
 
     def _solve(self, fresh: Mapping[tuple[str, ...], tuple[Any, ...]]) -> None:
-        first = max((row.case for row in self._rows), default=-1) + 1
-        cases = list(enumerate(fresh.values(), start=first))
-        values = dict(cases)
-        made: dict[int, Row] = {}
+        taken = {row.case for row in self._rows}
+        free = (number for number in itertools.count() if number not in taken)  # as without an interruption
+        points = dict(zip(free, fresh.values(), strict=False))
         executor = self._executor
         if executor is None and self._jobs > 1:
             executor = self._own = self._own or processes(self._jobs)
-        for rows in solved_rows(self.study.task, cases, self._jobs, executor, self._workers, self._check):
-            made |= {row.case: row for row in rows}
-            self._keep([row for row in rows if row.status != DIED], values, first + len(cases))
-        died = [(case, values[case]) for case, row in made.items() if row.status == DIED]
-        if died:
-            if self._own is not None:  # a separate process for each shows whose fault it was
-                end_processes(self._own)
-                self._own = None
-                for rows in solved_rows(self.study.task, died, self._jobs, None, None):
-                    made |= {row.case: row for row in rows}
-            self._keep([made[case] for case, _ in died], values, first + len(cases))
-        for (case, point), key in zip(cases, fresh, strict=True):
-            self._case[key] = len(self._rows)
-            self._rows.append(made[case])
-            self._points.append(point)
+        died: list[Row] = []
+        task, cases = self.study.task, list(points.items())
+        for rows in solved_rows(task, cases, self._jobs, executor, self._workers, self._check):
+            died += [row for row in rows if row.status == DIED]
+            self._keep([row for row in rows if row.status != DIED], points)
+        if died and self._own is not None:  # a separate process for each shows whose fault it was
+            end_processes(self._own)
+            self._own = None
+            again = [(row.case, points[row.case]) for row in died]
+            for rows in solved_rows(task, again, self._jobs, None, None):
+                self._keep(rows, points)
+        else:
+            self._keep(died, points)
 
-    def _keep(self, rows: Sequence[Row], values: Mapping[int, Sequence[Any]], total: int) -> None:
+    def _keep(self, rows: Sequence[Row], points: Mapping[int, tuple[Any, ...]]) -> None:
+        """Store points that have come back."""
         if self._journal is not None:
-            self._journal.append(rows, values)
-            count(len(self._journal.done), total, "points")
+            self._journal.append(rows, points)
+        for row in rows:
+            self._case[tuple(map(cell_text, points[row.case]))] = len(self._rows)
+            self._rows.append(row)
+            self._points.append(points[row.case])
+        count(len(self), None, "points")
 
     def run(self, optimiser: Optimiser) -> Solution | None:
         """Ask, solve, tell, until the optimiser has no more points; then the best point."""
@@ -218,13 +229,18 @@ class Search(Facts):
     def best(self) -> Solution | None:
         """The best point of all that keep the limits; None where none does."""
         name, sign = self.aim
-        outputs, found, least = tuple(self.study.table.outputs), None, math.inf
-        for row, values in zip(self._rows, self._points, strict=True):
-            found_outputs = dict(zip(outputs, row.outputs, strict=True))
-            if row.status == DONE and sign * found_outputs[name] < least and self._excess(found_outputs) <= 0.0:
-                least = sign * found_outputs[name]
-                found = Solution(row.case, dict(zip(self.study.task.names, values, strict=True)), found_outputs)
-        return found
+        outputs = tuple(self.study.table.outputs)
+        solutions = (
+            Solution(
+                row.case,
+                dict(zip(self.study.task.names, values, strict=True)),
+                dict(zip(outputs, row.outputs, strict=True)),
+            )
+            for row, values in zip(self._rows, self._points, strict=True)
+            if row.status == DONE
+        )
+        good = (one for one in solutions if math.isfinite(one.outputs[name]) and self._excess(one.outputs) <= 0.0)
+        return min(good, key=lambda one: (sign * one.outputs[name], one.case), default=None)
 
     def _excess(self, outputs: Mapping[str, float]) -> float:
         """How far the worst output is beyond its limits; infinite where one has no value."""
@@ -248,13 +264,23 @@ class Search(Facts):
         """
         return [one.ends for one in self.study.parameters]
 
+    def _resolutions(self) -> Array:
+        """How well each parameter is to be found, in its unit."""
+        return np.array(
+            [
+                TOLERANCE_SHARE * d.tolerance if d is not None and d.tolerance > 0.0 else RANGE_SHARE * (high - low)
+                for d, (low, high) in zip([p.distribution for p in self.study.parameters], self.bounds(), strict=True)
+            ]
+        )
+
     def evolve(self, *, rounds: int = 40, population: int = 10, seed: int = 1) -> Solution | None:
         """Search by differential evolution (Storn & Price 1997, by scipy), limits as its constraints (Lampinen 2002).
 
         Parameters
         ----------
         rounds
-            Generations at most; it ends before where the members agree within 1 %.
+            Generations at most, after the first population; it ends before where the outputs of its members agree
+            within 1 %, or their parameters as well as a tenth of the tolerances.
         population
             Members for each parameter.
         seed
@@ -281,6 +307,11 @@ class Search(Facts):
         def excess(x: Array) -> Array:
             return np.array([[min(self._excess(one), FAR) for one in solved(x)]])
 
+        ends = self._resolutions()
+
+        def agreed(intermediate_result: Any) -> bool:
+            return bool((np.ptp(intermediate_result.population, axis=0) <= ends).all())
+
         limited = bool(self.study.table.limits)
         differential_evolution(
             objective,
@@ -289,6 +320,7 @@ class Search(Facts):
             maxiter=rounds,
             popsize=population,
             polish=False,
+            callback=agreed,
             rng=np.random.default_rng(seed),
             integrality=whole,
             vectorized=True,
@@ -296,9 +328,14 @@ class Search(Facts):
         )
         return self.best()
 
-    def refine(self) -> Solution | None:
-        """Nelder's and Mead's method (by scipy) from the best point on, over the ranges scaled to 0..1; whole numbers
-        stay, points beyond the limits are no better than any.
+    def refine(self, points: int | None = None) -> Solution | None:
+        """Nelder's and Mead's method (by scipy) from the best point on; whole numbers stay, points beyond limits are
+        no better than any. It ends where its points agree within a tenth of the tolerances.
+
+        Parameters
+        ----------
+        points
+            To solve at most; None: 40 for each parameter.
 
         Returns
         -------
@@ -309,15 +346,19 @@ class Search(Facts):
 
         begun, (name, sign) = self.best(), self.aim
         free = [one for one in self.study.parameters if not one.whole]
-        if begun is None or not free:
+        most = 40 * len(free) if points is None else points
+        if begun is None or not free or most < 1:
             return begun
         low, high = np.array([one.ends for one in free]).T
-        start = (np.array([begun.point[one.name] for one in free]) - low) / (high - low)
-        steps = np.where(start < 0.5, FIRST_STEP, -FIRST_STEP)
+        unit = self._resolutions()[[not one.whole for one in self.study.parameters]]
+        start = (np.array([begun.point[one.name] for one in free]) - low) / unit
+        top = (high - low) / unit
+        step = np.maximum(FIRST_STEP * top, 2.0)
+        steps = np.where(start < 0.5 * top, step, -step)
 
         def objective(u: Array) -> float:
-            values = dict(zip([one.name for one in free], (low + u * (high - low)).tolist(), strict=True))
-            (found,) = self.solve([{**begun.point, **values}])
+            values = dict(zip([one.name for one in free], np.clip(low + u * unit, low, high).tolist(), strict=True))
+            (found,) = self.solve([begun.point if np.array_equal(u, start) else {**begun.point, **values}])
             good = math.isfinite(found[name]) and self._excess(found) <= 0.0
             return sign * found[name] if good else math.inf
 
@@ -325,12 +366,12 @@ class Search(Facts):
             objective,
             start,
             method="Nelder-Mead",
-            bounds=[(0.0, 1.0)] * len(free),
+            bounds=[(0.0, end) for end in top],
             options={
                 "initial_simplex": np.vstack([start, start + np.diag(steps)]),
-                "xatol": LAST_STEP,
-                "fatol": LAST_CHANGE * abs(begun.outputs[name]),
-                "maxfev": 40 * len(free),
+                "xatol": 1.0,
+                "fatol": math.inf,  # below its tolerances, a change of the output is none that can be made
+                "maxfev": most,
             },
         )
         return self.best()

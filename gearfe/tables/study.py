@@ -88,7 +88,7 @@ class StudyTable:
         low=1,
         high=10_000_000,
         doc="number of random cases; saltelli: base points; morris: trajectories; "
-        "search: about how many, besides those of its end",
+        "search: points at most, those at the tolerances included",
     )
     seed: int = quantity(1, low=0, doc="seed of the random cases")
     rows_csv: str | None = quantity(None, doc="CSV file whose columns are named as the keys, for design = rows")
