@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Random campaigns that look for crashes, hangs and wrong results: docs/development/campaigns.md.
 
-Usage: python scripts/stress.py [gears|laws|mechanisms|trains|files|estimates|all] [--seed N] [--out DIR] ...
+Usage: python scripts/stress.py [gears|laws|mesh_laws|mechanisms|trains|files|estimates|all] [--seed N] [--out DIR] ...
 """
 
 from __future__ import annotations

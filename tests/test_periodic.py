@@ -99,7 +99,7 @@ def test_what_fails_is_left_out():
 
 def test_a_repeated_phase_counts_once():
     nodes = np.concatenate([np.arange(10), [3, 13, 23 - 1e-13]]) * PERIOD / 10
-    values = np.concatenate([np.arange(10.0), [99.0, 98.0, 97.0]])
+    values = np.concatenate([np.arange(10.0), [3.01, 3.02, 2.99]])
     curve = periodic_interpolant(nodes, values, PERIOD)
     np.testing.assert_allclose(curve(nodes[:10]).value, np.arange(10.0), atol=1e-12)
 
@@ -120,3 +120,44 @@ def test_an_uncovered_cycle_is_refused(values):
 def test_unknown_method():
     with pytest.raises(InputError, match="cubic, linear"):
         periodic_interpolant([0.0], [1.0], PERIOD, method="quintic")
+
+
+def _two_cycles(step: float) -> tuple[np.ndarray, np.ndarray]:
+    """A peaky periodic function at steps over two periods and a bit, with places that do not repeat."""
+    phase = np.arange(0.0, 2.1, step) * PERIOD
+    turned = 2 * np.pi * phase / PERIOD
+    return phase, 1e8 * (1.5 + np.tanh(8 * np.sin(turned)) + 0.1 * np.cos(3 * turned))
+
+
+@pytest.mark.parametrize("step", [1 / 12, 1 / 36, 0.0713, 0.019])
+def test_a_table_of_several_cycles_agrees_with_itself(step) -> None:
+    phase, values = _two_cycles(step)
+    rng = np.random.default_rng(1)
+    periodic_interpolant(phase, values * (1 + 1e-3 * rng.uniform(-1, 1, len(values))), PERIOD)
+    rounded = np.radians(np.round(np.degrees(phase), 3))
+    periodic_interpolant(rounded, values, PERIOD)
+    order = rng.permutation(len(phase))
+    periodic_interpolant(phase[order] - 3 * PERIOD, values[order], PERIOD)
+
+
+@pytest.mark.parametrize("step", [1 / 12, 1 / 36, 0.0713, 0.019])
+@pytest.mark.parametrize("where", ["later", "earlier", "shifted"])
+def test_a_table_that_contradicts_itself_is_refused(step, where) -> None:
+    phase, values = _two_cycles(step)
+    row = int(1.3 / step)  # in the second cycle
+    if where == "shifted":
+        phase, row = phase - 5.4 * PERIOD, int(1.7 / step)
+    elif where == "earlier":
+        phase, values = phase[::-1], values[::-1]
+        row = len(phase) - 1 - int(0.27 / step)
+    values[row] *= 1.3
+    with pytest.raises(InputError, match=rf"contradicts itself: .*row {row + 1} \(") as told:
+        periodic_interpolant(phase, values, PERIOD)
+    assert str(told.value).count("row ") == 2
+
+
+def test_one_angle_with_two_values_is_refused() -> None:
+    phase = np.append(np.arange(12) / 12, 0.25) * PERIOD
+    values = np.append(np.full(12, 2.0), 3.0)
+    with pytest.raises(InputError, match=r"row 4 \(.*: 2\) against row 13 \(.*: 3\)"):
+        periodic_interpolant(phase, values, PERIOD)

@@ -166,3 +166,15 @@ def test_an_array_of_another_length_is_no_unknown_one():
 def test_unknown_quantity():
     with pytest.raises(InputError, match="did you mean 'k_mesh'"):
         invented().interpolate(0.0, "k_mehs")
+
+
+def test_a_file_that_contradicts_itself_one_mesh_cycle_on(tmp_path) -> None:
+    """Rows 18 and 20 deg, of a pinion with 20 teeth, are those of 0 and 2 deg."""
+    rows = {angle: 1e8 for angle in range(0, 18, 2)} | {18: 5e8, 20: 1e7}
+    path = tmp_path / "curve.csv"
+    text = "pinion_angle_deg,k_mesh_N_per_m\n" + "".join(f"{a},{k:g}\n" for a, k in rows.items())
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=r"row 1 \(0 deg: 1e\+08\) against row 10 \(18 deg: 5e\+08\)"):
+        StiffnessCurve.from_csv(path, mesh_cycle=math.radians(18.0))
+    path.write_text(text.replace("18,5e+08\n20,1e+07", "18,1.001e+08\n20,1e+08"), encoding="utf-8")
+    assert StiffnessCurve.from_csv(path, mesh_cycle=math.radians(18.0)).interpolant().mean == pytest.approx(1e8)

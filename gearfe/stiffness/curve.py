@@ -26,7 +26,7 @@ from ..errors import InputError, shown, unknown_name
 from ..files import read_csv, write_csv
 from ..shown import ShownTable
 from ..typing import Array, BoolArray, IntArray
-from .periodic import PeriodicInterpolant, ValueAndSlope, periodic_interpolant
+from .periodic import PeriodicInterpolant, ValueAndSlope, check_repeats, periodic_interpolant
 
 #: Suffix of a column name -> factor from SI to that unit; other columns are in SI.
 _FACTORS = {"_deg": 180.0 / math.pi, "_um": 1e6, "_mm": 1e3, "_MPa": 1e-6}
@@ -67,6 +67,9 @@ SOLVED = ("converged", "no_contact")
 #: elasticity is singular. Then the places of the last two.
 EDGES = ("none", "rounded", "singular")
 ROUNDED, SINGULAR = 1, 2
+
+#: Problem of a table without a mesh cycle.
+NO_CYCLE = "does not say what its mesh cycle is"
 
 #: Column that a table has where there are estimates, and those of the pairs' shares.
 ESTIMATE, SHARE = "k_mesh_relative_error", "load_share_"
@@ -284,9 +287,12 @@ class StiffnessCurve(ShownTable):
         Raises
         ------
         InputError
-            When the file is not such a table, or says nothing of the mesh cycle.
+            When the file is not such a table, says nothing of the mesh cycle, or contradicts itself one mesh cycle on.
         """
-        return cls.from_columns(read_csv(path, "stiffness curve"), path, mesh_cycle=mesh_cycle, base_radius=base_radius)
+        columns = read_csv(path, "stiffness curve")
+        curve = cls.from_columns(columns, path, mesh_cycle=mesh_cycle, base_radius=base_radius)
+        check_repeats(curve.pinion_angle, curve.k_mesh, curve.mesh_cycle, str(path))
+        return curve
 
     @classmethod
     def from_columns(
@@ -303,7 +309,7 @@ class StiffnessCurve(ShownTable):
                 values[own] = found[0] if column.constant else found
         if not (math.isfinite(values.get("mesh_cycle", math.nan)) and values["mesh_cycle"] > 0):
             cure = "add a column mesh_cycle_deg (360 deg/pinion teeth), or give mesh_cycle"
-            raise InputError("stiffness curve", str(path), "does not tell the mesh cycle", cure)
+            raise InputError("stiffness curve", str(path), NO_CYCLE, cure)
         values.setdefault("status", np.where(np.isfinite(values["k_mesh"]), "converged", "missing"))
         shares = [numbers(columns, name, path) for name in columns if name.startswith(SHARE)]
         values["load_share"] = np.stack(shares, axis=1) if shares else np.zeros((len(values["k_mesh"]), 0))

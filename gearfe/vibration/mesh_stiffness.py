@@ -16,7 +16,7 @@ from ..gear.face import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
 from ..meshlaw.law import MeshLaw
 from ..progress import stage
-from ..stiffness.curve import StiffnessCurve
+from ..stiffness.curve import NO_CYCLE, StiffnessCurve
 from ..train.gear_train import GearMesh, GearTrain
 from ..train.kinematics import driving_senses, steady_forces
 from .job import Stiffness, TrainJob, back_flanks, job_train
@@ -77,7 +77,7 @@ def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
     try:
         return StiffnessCurve.from_csv(path)
     except InputError as error:
-        if "mesh cycle" not in error.problem:
+        if error.problem != NO_CYCLE:
             raise
     return StiffnessCurve.from_csv(path, mesh_cycle=2.0 * math.pi / teeth)
 

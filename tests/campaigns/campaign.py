@@ -29,6 +29,7 @@ from .outcome import Finding, Outcome
 CAMPAIGNS: dict[str, str] = {
     "gears": "gears",
     "laws": "laws",
+    "mesh_laws": "mesh_laws",
     "mechanisms": "mechanisms",
     "trains": "trains",
     "files": "files",
