@@ -22,6 +22,8 @@ from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshlaw.make import mesh_law
 from gearfe.rigid import constant
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.train.kinematics import driving_senses
+from gearfe.train.phases import pair_shifts, tooth_places
 from gearfe.train.statics import static_errors
 from gearfe.vibration.job import job_train, read_train_job
 from gearfe.vibration.mesh_stiffness import train_curves
@@ -212,6 +214,23 @@ def test_a_train_takes_the_pitch_errors_of_its_teeth(sign, tmp_path) -> None:
     off = np.abs(static - expected)
     assert np.quantile(off, 0.95) < 0.05e-6
     assert off.max() < 0.2e-6
+
+
+def test_pitch_errors_of_a_train_displace_its_teeth(tmp_path) -> None:
+    """Back flanks touch as much later as driving ones touch earlier; in the mesh, too, for pairs of such teeth."""
+    values = [round(5.0 * math.sin(j), 3) for j in range(20)]
+    path = tmp_path / "job.toml"
+    text = train_text(f"[microgeometry.pinion]\npitch_um = {values}\n", law='"map"')
+    path.write_text(text.replace("tip_round_mm = 0.1", "tip_round_mm = 0.1\ntooth_thinning_um = 50.0"))
+    train = job_train(read_train_job(path), (2e8,))
+    left, right = next(g.pitch_errors for g in train.gears if g.gear.teeth == 20)
+    assert left == pytest.approx(1e-6 * math.cos(PAIR.pinion.pressure_angle) * np.array(values))
+    assert right == pytest.approx(-np.array(left))
+    (mesh,), (sense,) = train.meshes, driving_senses(train)
+    driving, back = pair_shifts(train, mesh, sense, tooth_places(train, (sense,)))
+    assert len(driving) == len(back) == 60
+    assert np.sort(back) == pytest.approx(np.sort(-driving))
+    assert np.ptp(driving) > 9e-6
 
 
 def test_back_flanks_have_their_own_microgeometry(tmp_path) -> None:

@@ -12,7 +12,7 @@ from gearfe.config import build
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.elasticity import Material
 from gearfe.gear import pitch_errors
-from gearfe.gear.deviation_job import deviations_of
+from gearfe.gear.deviation_job import deviations_of, pitch_errors_of
 from gearfe.gear.face import NOMINAL, ToothDeviations
 from gearfe.gear.modifications import FlankModification, Relief, Waviness, tooth_deviations
 from gearfe.gear.pair import GearPair, TipRelief
@@ -209,13 +209,106 @@ def test_the_room_behind_the_teeth(flank) -> None:
     assert np.ptp(thick) > 10e-6
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("gear", "teeth"), [("pinion", 23), ("wheel", 41)])
+def test_a_displaced_tooth_is_no_thicker(gear: str, teeth: int, sign: float) -> None:
+    """One tooth off its place by p: where it touches on one side, the room behind shrinks by p cos(alpha), once.
+
+    Out on the driving side, it leads there and its back flank is behind those of other pairs; into its place on the
+    driving side, it does so on the back. A tooth thicker by p on both sides would take twice that.
+    """
+    form = {"module": 3e-3, "pressure_angle": 20.0, "width": 20e-3, "tooth_thinning": 100e-6, "tip_round": 1e-4}
+    pair = gear_pair(23, 41, **form, pinion={"profile_shift": 0.2}, wheel={"profile_shift": -0.1})
+    backlash = pair.normal_backlash
+    assert backlash == pytest.approx(200e-6 * math.cos(math.radians(20.0)), rel=1e-3)
+    deviations = [sign * 12.0] + [0.0] * (teeth - 1)
+    elastic = elastic_pair(pair, coarsen=4.0)
+    rooms = {}
+    for name, table in {
+        "tooth": {"pitch_um": deviations},
+        "flanks": {"left": {"pitch_um": deviations}, "right": {"pitch_um": [-p for p in deviations]}},
+        "thick": {side: {"pitch_um": [12.0] + [0.0] * (teeth - 1)} for side in ("left", "right")},
+    }.items():
+        job = build(MicrogeometryTable, {gear: table}, "microgeometry")
+        own, back = (deviations_of(job, pair, flank=side) for side in ("left", "right"))
+        angles = pair.mesh_cycle * np.arange(-20, 21) / 10.0
+        rooms[name] = loads(elastic, [0.001], own, angles=angles, back=back).back_clearance[0]
+    moved = 12e-6 * math.cos(math.radians(20.0))
+    assert rooms["tooth"].min() == pytest.approx(backlash - moved, abs=2e-9)
+    assert rooms["tooth"].max() == pytest.approx(backlash, abs=2e-9)
+    assert rooms["flanks"] == pytest.approx(rooms["tooth"], abs=1e-12)
+    assert rooms["thick"].min() == pytest.approx(backlash - 2 * moved, abs=2e-9)
+
+
+def test_python_gets_the_back_flanks_of_displaced_teeth() -> None:
+    """Turns of the back flanks, in the order of the pair seen from behind, are those of a job file."""
+    pair = gear_pair()
+    lists = {"pinion": np.sin(np.arange(20.0)), "wheel": np.cos(np.arange(30.0))}
+    keys = {name: {"pitch_um": values.tolist()} for name, values in lists.items()}
+    table = build(MicrogeometryTable, keys, "microgeometry")
+    own, back = (deviations_of(table, pair, flank=side) for side in ("left", "right"))
+    for number in (0, 1):
+        assert pitch_errors.back_turns(own[number].turn, wheel=number == 1) == pytest.approx(back[number].turn)
+        assert pitch_errors.seen_from_behind(
+            pitch_errors.seen_from_behind(own[number].turn, wheel=number == 1), wheel=number == 1
+        ) == pytest.approx(own[number].turn)
+
+
+def test_run_out_is_a_gear_off_its_axis() -> None:
+    """Both flanks of all teeth moved by one vector: where they then cross the reference circle, from the involutes."""
+    gear = gear_pair(23, 41, pinion={"profile_shift": 0.3, "tooth_thinning": 50e-6}).pinion
+    off, direction = 5e-6, math.radians(40.0)
+    alpha, tau, radius = gear.pressure_angle, gear.half_thickness_angle, gear.reference_radius
+    tooth = 2 * math.pi * np.arange(23) / 23
+    phase = math.pi - direction + tau - alpha
+    made = pitch_errors.run_out(gear, off / math.cos(alpha), phase)
+    roll = math.tan(alpha) + np.array([-0.02, 0.0, 0.02])  # about the reference circle
+    for side, found in zip((1.0, -1.0), made, strict=True):
+        start = tooth[:, None] + side * (tau + math.tan(alpha) - alpha)
+        normal = np.exp(1j * (start - side * roll))  # from the base circle's centre to where its tangent leaves it
+        flank = gear.base_radius * normal * (1 + 1j * side * roll) + off * np.exp(1j * direction)
+        crossing = [np.interp(radius, abs(points), np.unwrap(np.angle(points))) for points in flank]
+        plain = [
+            np.interp(radius, abs(points), np.unwrap(np.angle(points)))
+            for points in flank - off * np.exp(1j * direction)
+        ]
+        moved = side * radius * (np.array(crossing) - np.array(plain))
+        assert found == pytest.approx(moved, abs=0.02 * off)
+    job = build(MicrogeometryTable, {"pinion": {"run_out_um": 8.0, "run_out_phase_deg": 25.0}}, "microgeometry")
+    pair = gear_pair()
+    turns = [1e-6 * np.array(errors) for errors in pitch_errors_of(job, pair.pinion, "pinion")]
+    cosine = math.cos(pair.pinion.pressure_angle)
+    expected = pitch_errors.run_out(pair.pinion, 8.0, math.radians(25.0))
+    assert 1e12 * turns[0] == pytest.approx(cosine * expected[0])
+    assert 1e12 * turns[1] == pytest.approx(cosine * expected[1])
+
+
+def test_pitch_deviations_by_single_ones_and_by_class() -> None:
+    """Single pitches that add up, and a drawn class, displace teeth, too; a list of one side is of its flanks."""
+    gear = gear_pair().pinion
+    single = np.sin(np.arange(20.0))
+    single -= single.mean()
+    keys = [{"single_pitch_um": single.tolist()}, {"pitch_class": 6}]
+    for given in keys:
+        table = build(MicrogeometryTable, {"pinion": given}, "microgeometry")
+        left, right = pitch_errors_of(table, gear, "pinion")
+        assert np.ptp(left) > 1e-6
+        assert left == pytest.approx([-e for e in right])
+    table = build(MicrogeometryTable, {"pinion": keys[0] | {"right": {"pitch_um": [3.0] * 20}}}, "microgeometry")
+    left, right = pitch_errors_of(table, gear, "pinion")
+    cosine = math.cos(gear.pressure_angle)
+    assert np.diff(left) == pytest.approx(1e-6 * cosine * single[1:])
+    assert right == pytest.approx([3e-6 * cosine] * 20)
+
+
 def test_gears_that_jam_have_no_numbers() -> None:
     """Teeth thicker than the space by 11 um: until the driving flanks yield by that, the back flanks would bear."""
     pair = gear_pair(tip_round=1e-4, tooth_thinning=5e-6)
     cosine = math.cos(pair.pinion.pressure_angle)
     thick = 1e-6 * 10.0 * cosine
     elastic = elastic_pair(pair, coarsen=3.0)
-    table = build(MicrogeometryTable, {"pinion": {"pitch_um": [10.0] * 20}}, "microgeometry")
+    sides = {side: {"pitch_um": [10.0] * 20} for side in ("left", "right")}
+    table = build(MicrogeometryTable, {"pinion": sides}, "microgeometry")
     own, back = (deviations_of(table, pair, flank=side) for side in ("left", "right"))
     angles = (np.arange(5) + 0.3) * pair.mesh_cycle / 5
     free = loads(elastic, [5.0, 250.0], own, angles=angles)

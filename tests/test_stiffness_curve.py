@@ -170,7 +170,7 @@ def test_unknown_quantity():
 
 def test_a_file_that_contradicts_itself_one_mesh_cycle_on(tmp_path) -> None:
     """Rows 18 and 20 deg, of a pinion with 20 teeth, are those of 0 and 2 deg."""
-    rows = {angle: 1e8 for angle in range(0, 18, 2)} | {18: 5e8, 20: 1e7}
+    rows = dict.fromkeys(range(0, 18, 2), 100000000.0) | {18: 5e8, 20: 1e7}
     path = tmp_path / "curve.csv"
     text = "pinion_angle_deg,k_mesh_N_per_m\n" + "".join(f"{a},{k:g}\n" for a, k in rows.items())
     path.write_text(text, encoding="utf-8")

@@ -6,19 +6,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..files import read_numbers
-from ..tables.microgeometry import ENDS, STARTS, FlankTable, MicrogeometryTable
+from ..tables.microgeometry import ENDS, STARTS, FlankTable, GearMicrogeometryTable, MicrogeometryTable
 from ..typing import Array, IntArray
 from . import pitch_errors
 from .deviation import Deviation
 from .face import ToothDeviations
 from .modifications import FlankModification, Relief, Waviness, tooth_deviations
 from .pair import Gear, GearPair
+from .pitch_errors import seen_from_behind
 
 GEARS = ("pinion", "wheel")
 
@@ -86,10 +86,15 @@ class FlankOf:
     mirrored: bool = False
 
     @property
-    def own(self) -> FlankTable:
-        """The flank's own table."""
-        found: FlankTable = getattr(self.table, self.name or GEARS[self.number]).flank(self.side)
+    def teeth(self) -> GearMicrogeometryTable:
+        """The gear's table, of both sides of its teeth."""
+        found: GearMicrogeometryTable = getattr(self.table, self.name or GEARS[self.number])
         return found
+
+    @property
+    def own(self) -> FlankTable:
+        """What holds on this side."""
+        return self.teeth.flank(self.side)
 
     @property
     def gear(self) -> Gear:
@@ -117,10 +122,10 @@ def flank_deviations(one: FlankOf) -> ToothDeviations:
     """Deviations of one side of a gear's teeth."""
     made = modification(one)
     try:
-        index = _index_deviations(one.own, one.gear, one.where, one.folder)
+        index = _index_deviations(one.teeth, one.side, one.gear, one.where, one.folder)
         turn = pitch_errors.turns(one.gear, index) if index.any() else (0.0,)
         if one.mirrored and len(turn) > 1:
-            turn = _mirrored(turn, one.number == 1)
+            turn = seen_from_behind(turn, wheel=one.number == 1)
         return tooth_deviations(one.gear, made, turn)
     except InputError as error:
         raise _named(error, one.where, one.own) from None
@@ -141,17 +146,12 @@ def pitch_errors_of(
     made = []
     for side in ("left", "right"):
         try:
-            index = _index_deviations(own.flank(side), gear, where, Path(folder))
+            index = _index_deviations(own, side, gear, where, Path(folder))
             turn = pitch_errors.turns(gear, index) if index.any() else ()
         except InputError as error:
             raise _named(error, where, own.flank(side)) from None
         made.append(tuple(gear.base_radius * e for e in turn))
     return made[0], made[1]
-
-
-def _mirrored(values: Sequence[Any], wheel: bool) -> tuple[Any, ...]:
-    """What belongs to teeth, in the order that the pair has seen from the other side: j is -j, on the wheel -1 - j."""
-    return tuple(values[(-j - wheel) % len(values)] for j in range(len(values)))
 
 
 def modification(one: FlankOf) -> FlankModification:
@@ -167,7 +167,7 @@ def modification(one: FlankOf) -> FlankModification:
         if len(found) == 1:
             extra += found
         else:
-            measured = _mirrored(found, one.number == 1) if one.mirrored else tuple(found)
+            measured = seen_from_behind(found, wheel=one.number == 1) if one.mirrored else tuple(found)
     return FlankModification(
         tip_relief=_relief(table, gear, where, "tip"),
         root_relief=_relief(table, gear, where, "root"),
@@ -213,28 +213,44 @@ def _relief(table: FlankTable, gear: Gear, where: str, end: str) -> Relief | Non
     return Relief(1e-6 * amount, roll, getattr(table, f"{name}_shape"), until)
 
 
-def _index_deviations(table: FlankTable, gear: Gear, where: str, folder: Path) -> Array:
-    """Index deviations (m) of all teeth."""
-    made = pitch_errors.sine(gear.teeth, 1e-6 * table.run_out_um, math.radians(table.run_out_phase_deg))
-    given: Array | None = None
+def _index_deviations(table: GearMicrogeometryTable, side: str, gear: Gear, where: str, folder: Path) -> Array:
+    """Index deviations (m) of the flanks of one side, > 0 out of their material, teeth counted counter-clockwise.
+
+    A list of the gear displaces its teeth, > 0 counter-clockwise: out of the material of left flanks, into that of
+    right ones. A list of one side is of its flanks, each out of its material.
+    """
+    flank: FlankTable = getattr(table, side) or FlankTable()
+    index = _listed(flank, gear, where, folder)
+    if index is None:
+        displaced = _listed(table, gear, where, folder)
+        index = np.zeros(gear.teeth) if displaced is None else displaced if side == "left" else -displaced
+    amplitude, phase = flank.run_out_um, flank.run_out_phase_deg
+    if amplitude or phase:  # of these flanks; what they do not give is the gear's
+        amplitude, phase = amplitude or table.run_out_um, phase or table.run_out_phase_deg
+        return index + pitch_errors.sine(gear.teeth, 1e-6 * amplitude, math.radians(phase))
+    left, right = pitch_errors.run_out(gear, 1e-6 * table.run_out_um, math.radians(table.run_out_phase_deg))
+    return index + (left if side == "left" else right)
+
+
+def _listed(table: FlankTable, gear: Gear, where: str, folder: Path) -> Array | None:
+    """Index deviations (m) of all teeth that a table lists, names or draws; None without."""
     if table.pitch_um:
-        given = 1e-6 * np.array(table.pitch_um)
+        listed = 1e-6 * np.array(table.pitch_um)
     elif table.single_pitch_um:
-        given = pitch_errors.from_single(1e-6 * np.array(table.single_pitch_um))
+        listed = pitch_errors.from_single(1e-6 * np.array(table.single_pitch_um))
     elif table.pitch_csv is not None:
         field = f"{where}.pitch_csv"
         columns = read_numbers(folder / table.pitch_csv, field, ("tooth", "pitch_um"), others=False)
-        order = _teeth(columns["tooth"], gear, field, table.pitch_csv)
-        given = 1e-6 * columns["pitch_um"][order]
+        listed = 1e-6 * columns["pitch_um"][_teeth(columns["tooth"], gear, field, table.pitch_csv)]
     elif table.pitch_class is not None:
-        given = pitch_errors.sampled(gear, table.pitch_class, table.pitch_seed)
-    if given is None:
-        return made
-    if len(given) != gear.teeth:
+        listed = pitch_errors.sampled(gear, table.pitch_class, table.pitch_seed)
+    else:
+        return None
+    if len(listed) != gear.teeth:
         key = "pitch_um" if table.pitch_um else "single_pitch_um"
-        problem = f"must have one entry for each of the {gear.teeth} teeth, has {len(given)}"
+        problem = f"must have one entry for each of the {gear.teeth} teeth, has {len(listed)}"
         raise InputError(f"{where}.{key}", list(getattr(table, key)), problem, "give as many as the gear has teeth")
-    return made + given
+    return listed
 
 
 def _measured(name: str, gear: Gear, active: tuple[float, float], field: str, folder: Path) -> list[Deviation]:

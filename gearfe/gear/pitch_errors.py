@@ -1,9 +1,26 @@
-r"""Pitch errors of a gear: lists, a sine of one turn, or drawn at random for a class of ISO 1328-1.
+r"""Pitch errors of a gear: lists, the run-out of its mounting, or drawn at random for a class of ISO 1328-1.
 
 The index deviation :math:`F_j` of tooth j is how far its flank is off its place along the reference circle, > 0: out of
 the material of that flank. It turns the flank by :math:`F_j/r` and moves it along the line of action by
 :math:`F_j \cos\alpha`. The single pitch deviations are :math:`f_j = F_j - F_{j-1}`, the cumulative pitch deviation is
 the range of F.
+
+**Both sides of a tooth.** A tooth that stands off its place by :math:`F_j`, counter-clockwise, has :math:`F_j` on its
+left flank and :math:`-F_j` on its right one: it is displaced, not thicker. With teeth counted counter-clockwise
+:math:`f_j > 0` is then a pitch that is too large, on both sides.
+
+**Run-out.** Teeth that are cut about an axis off the one they run about are all displaced by the same vector, of length
+e in the direction :math:`\beta`; the radial run-out of ISO 1328-1, the range of a ball's radial places in the tooth
+spaces, is :math:`F_r = 2e`. At the reference circle the flanks of tooth j stand at :math:`\theta_j \pm \tau`,
+:math:`\theta_j = 2\pi j/z`, :math:`\tau` half the tooth thickness angle, and their normals lie at the pressure angle
+to the tangent, both outwards. The vector along these normals, over :math:`\cos\alpha`, is
+
+.. math::
+    F_j = \frac{e}{\cos\alpha}\sin(\beta - \theta_j - \tau + \alpha) \text{ (left)}, \quad
+    -\frac{e}{\cos\alpha}\sin(\beta - \theta_j + \tau - \alpha) \text{ (right)} :
+
+both sides of a place on the circle differ in phase by twice the pressure angle, besides the opposite sign, and the
+backlash varies with the distance of the centres. One value a tooth leaves out that the vector turns while it meets.
 
 Tolerances in um (ISO 1328-1:2013, 5.3, formulae 5 to 9), for the diameter d and the module m in mm and class A:
 
@@ -22,6 +39,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +47,8 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..typing import Array
 from .spur_gear import Gear
+
+Value = TypeVar("Value")
 
 #: Classes of the standard.
 CLASSES = (1, 11)
@@ -117,6 +137,15 @@ def sine(teeth: int, amplitude: float, phase: float = 0.0) -> Array:
     return amplitude * np.sin(2 * math.pi * np.arange(teeth) / teeth + phase)
 
 
+def run_out(gear: Gear, amplitude: float, phase: float = 0.0) -> tuple[Array, Array]:
+    """Index deviations (m) of left and right flanks of teeth cut off the axis by amplitude cos(alpha); see the module.
+
+    `amplitude` (m) is that of the index deviations, amplitude sin(2 pi j/z + phase) on the left flanks.
+    """
+    apart = 2.0 * (gear.pressure_angle - gear.half_thickness_angle)
+    return sine(gear.teeth, amplitude, phase), -sine(gear.teeth, amplitude, phase + apart)
+
+
 def sampled(gear: Gear, class_: int, seed: int) -> Array:
     """Index deviations (m) drawn at random, as large as the class allows.
 
@@ -154,3 +183,17 @@ def turns(gear: Gear, index: Sequence[float] | Array) -> tuple[float, ...]:
         problem = f"span {1e6 * np.ptp(F):.4g} um: must be finite and within {most}"
         raise InputError("pitch errors", None, problem, "are they in um?")
     return tuple((F / gear.reference_radius).tolist())
+
+
+def seen_from_behind(values: Sequence[Value], *, wheel: bool = False) -> tuple[Value, ...]:
+    """Values of all teeth in the order of the pair seen from the other side: j becomes -j, on the wheel -1 - j."""
+    return tuple(values[(-j - wheel) % len(values)] for j in range(len(values)))
+
+
+def back_turns(turns: Sequence[float], *, wheel: bool = False) -> tuple[float, ...]:
+    """Turns (rad) of the back flanks of displaced teeth from those of their driving flanks, in the order of the pair
+    seen from the other side, as ``sweep_loads(..., back=...)`` takes them.
+
+    What turns a driving flank out of its material turns the back flank of the same tooth into it.
+    """
+    return tuple(-turn for turn in seen_from_behind(turns, wheel=wheel))

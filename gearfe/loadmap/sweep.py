@@ -68,7 +68,8 @@ def sweep_loads(
         Also the tension at the tooth roots, on separate refined meshes, see `gearfe.loadmap.root_stress`.
     back
         Deviations of the back flanks of pinion and wheel, of the pair seen from the other side as
-        `gearfe.gear.deviation_job.deviations_of` gives them, to know the room behind the teeth: positions without
+        `gearfe.gear.deviation_job.deviations_of` and, for displaced teeth, `gearfe.gear.pitch_errors.back_turns` give
+        them, to know the room behind the teeth: positions without
         have the status `gearfe.loadmap.load_map.BACK` and no numbers.
     model, kinematics, elastic, changes
         See `gearfe.stiffness.sweep.sweep_stiffness`; teeth may differ (``deviations=(pinion, wheel)``).

@@ -25,6 +25,10 @@ from .law import NO_CONTACT, MeshLaw
 SMOOTH_PHASE, SMOOTH_FORCE, LEVEL_FORCE = 1e-4, 0.25, 0.1
 #: Pairs with less than this share of the mesh force count less: what they yield is divided by their force.
 SHARE = 0.5
+#: What the approach of a contact solution is off by (m) where flanks have kinks: smaller approaches count less.
+NOISE = 1e-9
+#: Least dLambda/dF, in parts of the least Lambda/F of contact solutions: b may be anything where none are near.
+LEAST_COMPLIANCE = 0.7
 #: Cells of the pair force end at these parts of the largest: Lambda's cubics err by 1e-4 of it in a cell of ratio 2.2,
 #: and by 1e-3 in those of small forces.
 PARTS = (0.0, 0.002, 0.01, 0.05, 0.2, 0.45, 1.0)
@@ -114,7 +118,8 @@ def fit_law(
     middle, level = float(y.mean()), float(np.average(found.approach / found.force, weights=found.share))
     right = (found.approach / found.force - level + hertz * (y - middle)) / NANO
     A = _rows_kron(P, 2 * Y[0] + Y[1])
-    weight = sparse.diags_array(np.minimum(1.0, found.share / SHARE))
+    exact = found.approach**2 / (found.approach**2 + NOISE**2)
+    weight = sparse.diags_array(exact * np.minimum(1.0, found.share / SHARE))
     n, m = P.shape[1], Y[0].shape[1]
     cycle = touch.angle[cells] - touch.angle[0]
     (whole, _, bent), (along, sloped, curved) = _grams(phase, cycle), _grams(force, 1.0)
@@ -132,6 +137,8 @@ def fit_law(
     line = level - hertz * (at - middle)
     approach = (b @ (2 * values + slopes) + line) * parts[1:]
     slope = b @ (2 * values + 3 * slopes + bends) + line - hertz
+    least = LEAST_COMPLIANCE * float((found.approach / found.force)[exact > 0.5].min(initial=level))
+    approach, slope = _rising(parts, approach, slope, least)
     return MeshLaw(
         nodes=touch.angle[: cells + 1],
         forces=parts,
@@ -230,6 +237,24 @@ def _energies(phase: Array, parts: Array, approach: Array, slope: Array) -> Arra
     orders = np.stack([spline(begin, nu=a) / math.factorial(a) for a in range(4)], axis=1)  # cells, order, rest
     whole = orders.reshape(len(begin), 4, len(parts) - 1, 5)
     return np.ascontiguousarray(whole.transpose(0, 2, 1, 3))
+
+
+def _rising(parts: Array, approach: Array, slope: Array, least: float) -> tuple[Array, Array]:
+    """Lambda and its slope at the ends of the force cells, so that the slope is `least` (m/N) at least in all of them.
+
+    Sufficient for cubics by Fritsch and Carlson (SIAM J. Numer. Anal. 17, 1980): slopes of 0 to 3 times the secants on
+    both sides; for the quadratic of the first cell 0 to 2 times. What holds for the coefficients of splines over the
+    phase holds between their nodes, as B-splines are positive.
+    """
+    h = np.diff(parts)
+    secant = np.diff(approach, axis=1, prepend=0.0) / h - least
+    poor = (secant < 0.0).any(axis=1)
+    secant = np.maximum(secant, 0.0)
+    approach = np.where(poor[:, None], np.cumsum((secant + least) * h, axis=1), approach)
+    most = 3.0 * secant
+    most[:, 0] = 2.0 * secant[:, 0]
+    most[:, :-1] = np.minimum(most[:, :-1], 3.0 * secant[:, 1:])
+    return approach, least + np.clip(slope - least, 0.0, most)
 
 
 def _by_slots(cells_of_pair: Array, cells: int) -> Array:

@@ -29,8 +29,11 @@ HELD_PLACES, HELD_DEPTHS = (0.1, 0.9), (0.0045, 0.039, 0.155, 0.4, 0.87)
 #: Error of force and torque there from which on a cell is halved, in parts of them, or of this part of the largest
 #: where that is more: what contacts on elements of the default sizes err by (0.11 % in the shipped pair).
 TOLERANCE, LEAST_FORCE = 1e-3, 0.1
-#: Error (m) of the touching curve's cubics from which on a cell is halved, and how often a cell is halved for either.
-CLOSE, HALVINGS = 2e-9, 3
+#: Error of the touching curve's cubics (parts of the reach) from which on a cell is halved: a tenth of `TOLERANCE`, as
+#: forces of a tenth of the largest count; and how often a cell is halved for this or for its forces.
+CLOSE, HALVINGS = 1e-4, 3
+#: Least reach (m): what contact solutions are off by (`gearfe.meshlaw.fit.NOISE`) is then 1 % of it.
+LEAST_REACH = 1e-7
 #: The law's tables go on to where pairs touch at this many times its reach, so that no pair bears at their ends.
 BEYOND = 1.1
 #: Pinion angles at which the approach is searched for that makes the largest force.
@@ -52,6 +55,8 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
     """
     geometry = pair.pair
     reach = _reach(pair, force)
+    if reach < LEAST_REACH:
+        reach, force = LEAST_REACH, force * LEAST_REACH / reach
     nodes, slots = _nodes(pair, reach)
     C = coupling_curve(pair, _phases(nodes, slots), reach)
     known: list[PairForces] = []
@@ -86,18 +91,25 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
             break
         begin, width = np.append(begin[coarse], begin[coarse] + 0.5 * width[coarse]), np.tile(0.5 * width[coarse], 2)
         nodes = np.union1d(nodes, begin)
+    if not math.isfinite(error):
+        problem = f"has contact solutions from which no mesh law for forces up to {force:.6g} N can be made"
+        raise InputError("force", force, problem, "ask for a law up to larger forces, or change the reliefs")
     return replace(law, backlash=geometry.normal_backlash, error=error)
 
 
 def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) -> Array:
-    """Error of force, or of the driver's torque, in parts of contact solutions, or of a least force (N)."""
+    """Error of force, or of the driver's torque, in parts of contact solutions, or of a least force (N).
+
+    Infinite where the law's pair forces do not settle.
+    """
     r1, r2 = law.base_radii
-    found = law(solved.pinion_angle, r2 * (solved.twist - pair.pair.contact_twist))
+    begin = np.zeros((len(solved), law.slots))
+    found = law(solved.pinion_angle, r2 * (solved.twist - pair.pair.contact_twist), begin=begin)
     force = solved.torque_wheel / r2
     moment = solved.torque_pinion - r1 * force
     off = np.maximum(np.abs(found.force - force), np.abs(found.moment - moment) / r1)
-    made: Array = off / np.maximum(force, least)
-    return made
+    missed = np.where(np.isfinite(found.force), off / np.maximum(force, least), math.inf)
+    return np.where(np.isfinite(force), missed, 0.0)  # some contacts are not solved, as of flanks with short waves
 
 
 def pair_forces(pair: HalfPlanePair, solved: Positions, met: Touching, coupling: Sequence[Couple]) -> PairForces:
@@ -130,6 +142,15 @@ def touch_curve(pair: HalfPlanePair, phases: Array) -> TouchCurve:
     value[at] = radius * (met.twist[own] - geometry.contact_twist)
     slope[at] = radius * (1.0 / geometry.gear_ratio - met.arm[own, 0] / met.arm[own, 1])
     return TouchCurve(phases, value, slope)
+
+
+def _late(pair: HalfPlanePair, phases: Array) -> Array:
+    """How much later (m) than the first pair there a pair touches, at pinion angles of its own tooth (rad)."""
+    met, first = _touching(pair, phases)
+    own = np.flatnonzero(met.pair == 0)
+    late = np.full(len(phases), NO_CONTACT)
+    late[met.position[own]] = pair.pair.wheel.base_radius * (met.twist[own] - first[met.position[own]])
+    return late
 
 
 def coupling_curve(pair: HalfPlanePair, phases: Array, reach: float) -> list[Couple]:
@@ -190,8 +211,8 @@ def _nodes(pair: HalfPlanePair, reach: float) -> tuple[Array, int]:
     step = 0.1 * cycle / CELLS
 
     def bearing(places: Array) -> Array:
-        """Angles at which a pair touches, of these numbers of steps."""
-        return step * places[touch_curve(pair, step * places).value < BEYOND * reach]
+        """Angles at which a pair can bear, of these numbers of steps."""
+        return step * places[_late(pair, step * places) < BEYOND * reach]
 
     found = bearing(10.0 * np.arange(-3.0 * CELLS, 3 * CELLS + 1))
     ends = np.round(found[[0, -1]] / step)[:, None] + np.arange(-10.0, 11.0)
@@ -209,7 +230,7 @@ def _nodes(pair: HalfPlanePair, reach: float) -> tuple[Array, int]:
     nodes = begin + np.sort(np.concatenate([[0.0, cycle], corners, even]))
     for _ in range(HALVINGS):
         off = _midway(pair, nodes, slots, BEYOND * reach)
-        coarse = np.flatnonzero(off > CLOSE)
+        coarse = np.flatnonzero(off > CLOSE * reach)
         if not len(coarse):
             break
         nodes = np.sort(np.append(nodes, 0.5 * (nodes[coarse] + nodes[coarse + 1])))
@@ -231,10 +252,11 @@ def _midway(pair: HalfPlanePair, nodes: Array, slots: int, reach: float) -> Arra
     ends = _phases(nodes, slots)
     middle = 0.5 * (ends[1:] + ends[:-1])
     true = touch_curve(pair, middle).value
+    late = _late(pair, middle)
     c = touch_cubics(touch_curve(pair, ends))
     z = middle - ends[:-1]
     off = np.abs(c[:, 0] + z * (c[:, 1] + z * (c[:, 2] + z * c[:, 3])) - true)
-    found: Array = np.where(true < reach, off, 0.0).reshape(slots, -1).max(axis=0)
+    found: Array = np.where(late < reach, off, 0.0).reshape(slots, -1).max(axis=0)
     return found
 
 

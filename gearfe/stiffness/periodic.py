@@ -197,9 +197,7 @@ def _between(places: Array, phase: Array, period: float) -> tuple[IntArray, Arra
     return low % len(places), share, np.asarray(gap)
 
 
-def _contradiction(
-    phase: Array, values: Array, period: float, pair: tuple[int, int], source: str | None
-) -> InputError:
+def _contradiction(phase: Array, values: Array, period: float, pair: tuple[int, int], source: str | None) -> InputError:
     """The error for two samples."""
     said = [f"row {i + 1} ({np.degrees(phase[i]):.6g} deg: {values[i]:.6g})" for i in sorted(pair)]
     problem = f"contradicts itself: {said[0]} against {said[1]}, with a mesh cycle of {np.degrees(period):.6g} deg"

@@ -59,8 +59,10 @@ class FlankTable:
     pitch_um: tuple[float, ...] = quantity((), doc="index deviations of all teeth (um), along the reference circle")
     single_pitch_um: tuple[float, ...] = quantity((), doc="or the single pitch deviations (um), which add up to 0")
     pitch_csv: str | None = quantity(None, doc="or a file with the columns tooth and pitch_um")
-    run_out_um: float = quantity(0.0, doc="amplitude of a sine of one turn (um) of the index deviations", low=0.0)
-    run_out_phase_deg: float = quantity(0.0, doc="its phase (deg)")
+    run_out_um: float = quantity(
+        0.0, doc="amplitude of a sine of one turn (um) of the index deviations, those of an eccentric gear", low=0.0
+    )
+    run_out_phase_deg: float = quantity(0.0, doc="its phase (deg), of the left flanks where both have it")
     pitch_class: int | None = quantity(None, doc="index deviations drawn for a class of ISO 1328-1", low=1, high=11)
     pitch_seed: int = quantity(1, doc="seed of the draw", low=0, high=2**63 - 1)
 
@@ -79,7 +81,10 @@ class FlankTable:
 
 @dataclass(frozen=True)
 class GearMicrogeometryTable(FlankTable):
-    """Deviations of one gear: of both flanks of its teeth, or of one, which then wins key by key."""
+    """Deviations of one gear: of both flanks of its teeth, or of one, which then wins key by key.
+
+    Pitch errors of both flanks displace teeth, see `gearfe.gear.pitch_errors`; those of one side are of its flanks.
+    """
 
     left: FlankTable | None = quantity(None, doc="of the left (counter-clockwise) flanks")  # noqa: RUF009
     right: FlankTable | None = quantity(None, doc="of the right flanks")  # noqa: RUF009

@@ -75,9 +75,9 @@ class ShaftGear:
         kg/m3.
     pitch_errors : (left, right), each a tuple of z numbers, or empty
         How much earlier the flanks of each tooth touch along the line of action (m): index deviations times the cosine
-        of the pressure angle. Teeth count about the axis of the train, from the one that stands at the gear's angle in
-        `gearfe.train.phases.tooth_places`. Left flanks drive where the driver turns about the axis. For meshes with a
-        law.
+        of the pressure angle; a displaced tooth has opposite values on its sides. Teeth count about the axis of the
+        train, from the one that stands at the gear's angle in `gearfe.train.phases.tooth_places`. Left flanks drive
+        where the driver turns about the axis. For meshes with a law.
     """
 
     name: str

@@ -13,7 +13,10 @@ HELP = "random campaigns that look for crashes, hangs and wrong results"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument(
-        "campaign", nargs="?", default="all", help="gears, laws, mesh_laws, mechanisms, trains, files, estimates or all (default)"
+        "campaign",
+        nargs="?",
+        default="all",
+        help="gears, laws, mesh_laws, mechanisms, trains, files, estimates or all (default)",
     )
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the random cases (default: 1)")
     parser.add_argument("--out", metavar="DIR", default=None, help="results folder (default: out/stress)")
