@@ -29,9 +29,11 @@ HELD_PLACES, HELD_DEPTHS = (0.1, 0.9), (0.0045, 0.039, 0.155, 0.4, 0.87)
 #: Error of force and torque there from which on a cell is halved, in parts of them, or of this part of the largest
 #: where that is more: what contacts on elements of the default sizes err by (0.11 % in the shipped pair).
 TOLERANCE, LEAST_FORCE = 1e-3, 0.1
-#: Error of the touching curve's cubics (parts of the reach) from which on a cell is halved: a tenth of `TOLERANCE`, as
-#: forces of a tenth of the largest count; and how often a cell is halved for this or for its forces.
-CLOSE, HALVINGS = 1e-4, 3
+#: Error of the touching curve's cubics (parts of the reach) from which on a cell is halved, a tenth of `TOLERANCE`, as
+#: forces of a tenth of the largest count; and how often: a few cells at the ends of the path need it.
+CLOSE, TOUCH_HALVINGS = 1e-4, 8
+#: How often a cell is halved for its forces.
+HALVINGS = 3
 #: Least reach (m): what contact solutions are off by (`gearfe.meshlaw.fit.NOISE`) is then 1 % of it.
 LEAST_REACH = 1e-7
 #: The law's tables go on to where pairs touch at this many times its reach, so that no pair bears at their ends.
@@ -228,7 +230,7 @@ def _nodes(pair: HalfPlanePair, reach: float) -> tuple[Array, int]:
     even = width * np.arange(1, CELLS)
     even = even[np.abs(even[:, None] - corners).min(axis=1, initial=np.inf) > NEAR * width]
     nodes = begin + np.sort(np.concatenate([[0.0, cycle], corners, even]))
-    for _ in range(HALVINGS):
+    for _ in range(TOUCH_HALVINGS):
         off = _midway(pair, nodes, slots, BEYOND * reach)
         coarse = np.flatnonzero(off > CLOSE * reach)
         if not len(coarse):
