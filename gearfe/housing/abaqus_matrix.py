@@ -79,6 +79,8 @@ def read_substructure(text: str, path: Path, field: str, initial: str) -> tuple[
                 freedoms.append((first, own))
             elif stripped and block is not None:
                 block += [float(word.upper().replace("D", "E")) for word in stripped.split(",") if word.strip()]
+        except InputError:
+            raise
         except (ValueError, KeyError):
             problem = f"line {number} of this substructure cannot be read: {stripped[:60]!r}"
             raise InputError(field, path.name, problem, _WHOLE) from None

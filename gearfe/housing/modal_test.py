@@ -26,6 +26,8 @@ from ..typing import Array, IntArray
 COLUMNS = ("frequency_Hz", "x_mm", "y_mm", "z_mm", "direction_x", "direction_y", "direction_z", "amplitude")
 #: Distance of a measured point to the nearest node, in parts of the body's size, beyond which it is somewhere else.
 APART = 0.05
+#: Amplitude that no shape has, whatever its scale.
+HUGE = 1e100
 #: Points that are taken of another model.
 SAMPLED = 2000
 
@@ -168,12 +170,28 @@ def read_modes(path: str | Path) -> TestModes:
     """
     suffix = Path(path).suffix.lower()
     if suffix == ".csv":
-        return _of_table(Path(path))
-    if suffix in (".uff", ".unv"):
-        return _of_universal(Path(path))
-    if suffix == ".npz":
-        return _of_body(ModalBody.load(path))
-    raise InputError("--compare", str(path), "must end in .csv, .uff, .unv or .npz", "see docs/housing.md")
+        modes = _of_table(Path(path))
+    elif suffix in (".uff", ".unv"):
+        modes = _of_universal(Path(path))
+    elif suffix == ".npz":
+        modes = _of_body(ModalBody.load(path))
+    else:
+        raise InputError("--compare", str(path), "must end in .csv, .uff, .unv or .npz", "see docs/housing.md")
+    return _checked(modes, path)
+
+
+def _checked(modes: TestModes, path: str | Path) -> TestModes:
+    """The modes, if their numbers are finite and their frequencies above zero."""
+    cure = "the file may be damaged: write it again"
+    if not (np.isfinite(modes.frequencies).all() and (modes.frequencies > 0.0).all()):
+        wrong = modes.frequencies[~(np.isfinite(modes.frequencies) & (modes.frequencies > 0.0))][0]
+        raise InputError("--compare", str(path), f"has a mode at {wrong:.6g} Hz; it must be above zero", cure)
+    for name in ("points", "directions", "shapes"):
+        if not np.isfinite(getattr(modes, name)).all():
+            raise InputError("--compare", str(path), f"has {name} with numbers that are not finite", cure)
+    if modes.shapes.size == 0 or not np.abs(modes.shapes).max() < HUGE:
+        raise InputError("--compare", str(path), "has no amplitudes, or larger ones than a shape has", cure)
+    return modes
 
 
 def _of_body(body: ModalBody) -> TestModes:
@@ -234,7 +252,17 @@ def _of_universal(path: Path) -> TestModes:
         sets = pyuff.UFF(str(path)).read_sets()
     except Exception as error:
         raise InputError("--compare", str(path), f"cannot be read ({error})", "write it anew") from None
-    sets = [sets] if isinstance(sets, dict) else sets
+    try:
+        return _of_sets([sets] if isinstance(sets, dict) else sets, path)
+    except InputError:
+        raise
+    except (ValueError, TypeError, KeyError, IndexError, ZeroDivisionError) as error:  # pyuff checks little
+        problem = f"has datasets that contradict themselves or are cut short ({error})"
+        raise InputError("--compare", str(path), problem, "the file may be damaged: write it again") from None
+
+
+def _of_sets(sets: list[dict[str, Any]], path: Path) -> TestModes:
+    """Modes of datasets as pyuff reads them."""
     length = next((float(one["length"]) for one in sets if one.get("type") == 164), 1.0)
     nodes: dict[int, Array] = {}
     for one in sets:

@@ -29,6 +29,8 @@ DMIG = (114, 1, 120)  # what the DMIG entries of a MATPOOL begin with
 #: Types: real, and those of double precision, which take two words of four bytes; 3 and 4 are complex.
 REAL, DOUBLE = (1, 2), (2, 4)
 PACKED = 65536
+#: Numbers of a matrix beside stiffness and mass, such as the rows for recovery: 2 GB.
+MOST_ENTRIES = 2**28
 
 
 def read_nastran(path: Path, field: str) -> Matrices:
@@ -44,8 +46,8 @@ def read_nastran(path: Path, field: str) -> Matrices:
         return read(path.read_bytes())
     except FileNotFoundError:
         raise InputError(field, str(path), "there is no such file", "check the path") from None
-    except (ValueError, IndexError, StopIteration):
-        cure = "is it whole? A punch file of DMIG entries will do as well"
+    except (ValueError, IndexError, StopIteration, OverflowError, RuntimeError):
+        cure = "the file may be cut short or damaged: write it again; a punch file of DMIG entries will do as well"
         raise InputError(field, path.name, f"cannot be read as {kind}", cure) from None
 
 
@@ -55,6 +57,11 @@ class Words:
 
     order: str
     size: int
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for words that no file has."""
+        if self.size not in (4, 8):
+            raise ValueError(f"words of {self.size} bytes")
 
     def integers(self, data: bytes) -> list[int]:
         whole = data[: len(data) // self.size * self.size]
@@ -73,6 +80,13 @@ class Words:
         """A name: four letters a word, blanks where there is room for eight."""
         letters = b"".join(data[i : i + 4] for i in range(0, len(data), self.size))
         return letters.decode("ascii").strip().upper()
+
+
+def _zeros(rows: int, columns: int) -> Array:
+    """Zeros of a matrix; ValueError for sizes that only damaged files name."""
+    if rows < 0 or columns < 0 or rows * columns > MOST_ENTRIES:
+        raise ValueError(f"a matrix of {rows} x {columns}")
+    return np.zeros((rows, columns))
 
 
 def _fortran(data: bytes) -> tuple[str, list[bytes]]:
@@ -140,7 +154,7 @@ def _logical_records(key: Callable[[], int], records: Iterator[bytes]) -> Iterat
 
 
 def _columns_of(words: Words, pieces: list[tuple[int, list[bytes]]], shape: tuple[int, int], kind: int) -> Array:
-    values = np.zeros(shape)
+    values = _zeros(*shape)
     columns = [parts for column, parts in pieces if column]
     for j, parts in enumerate(columns):
         for part in parts:
@@ -188,7 +202,7 @@ def output4(data: bytes) -> Matrices:
         words = Words(order, len(records[at]) // 6)  # four integers, and a name of two words
         columns, rows, _, kind = words.integers(records[at][: 4 * words.size])
         name = words.text(records[at][4 * words.size :])
-        values = np.zeros((abs(rows), columns))
+        values = _zeros(abs(rows), columns)
         at += 1
         while True:
             number_, row, length = words.integers(records[at][: 3 * words.size])
@@ -235,7 +249,7 @@ def _output4_text(lines: list[str]) -> Matrices:
         name, form = lines[at][32:40].strip().upper(), re.search(r"(\d+)[ED](\d+)", lines[at][40:])
         per_line, width = (int(form[1]), int(form[2])) if form else (5, 16)
         per_number = 2 if kind in DOUBLE else 1
-        values = np.zeros((abs(rows), columns))
+        values = _zeros(abs(rows), columns)
         at += 1
         while True:
             j, row, left = integers(lines[at], 3)

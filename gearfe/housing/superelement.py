@@ -26,7 +26,8 @@ from ..typing import Array, IntArray
 from .abaqus_matrix import is_substructure, read_entries, read_substructure
 from .attachments import rigid_motions
 from .dmig import read_dmig
-from .entries import Entries, Label, check_rows, matrix_of, shown
+from .entries import Entries, Label, matrix_of, shown
+from .matrix_market import read_market
 from .nastran_files import read_nastran
 
 #: Parts of the largest entry up to which matrices are symmetric; energy, against the largest, that is none; masses,
@@ -116,7 +117,7 @@ def read_matrix(path: Path, field: str, initial: str = "K") -> Matrix:
         return _made(_chosen(read_nastran(path, field), path, field, initial), field, path)
     text = read_text(path, field)
     if text.lstrip().lower().startswith("%%matrixmarket"):
-        return Matrix(_market(path, field), [])
+        return Matrix(_whole(_checked(read_market(text, path, field), field, path)), [])
     if is_substructure(text):
         values, labels = read_substructure(text, path, field, initial)
         return Matrix(_checked(values, field, path), labels)
@@ -131,30 +132,6 @@ def _made(made: Array | Entries, field: str, path: Path) -> Matrix:
         return Matrix(_whole(_checked(made, field, path)), [])
     values, labels = matrix_of(made, path, field)
     return Matrix(_checked(values, field, path), labels)
-
-
-def _market(path: Path, field: str) -> Array:
-    from scipy.io import mminfo, mmread
-    from scipy.sparse import issparse
-
-    try:
-        rows, columns, *_ = mminfo(path)
-        check_rows(max(rows, columns), path, field)
-        content = mmread(path)
-    except InputError:
-        raise
-    except Exception as error:
-        raise InputError(field, path.name, f"cannot be read as Matrix Market ({error})", "is it whole?") from None
-    if issparse(content):
-        places, times = np.unique(np.stack([content.row, content.col]), axis=1, return_counts=True)
-        if (times > 1).any():
-            i, j = places[:, times > 1][:, 0] + 1
-            problem = f"gives the entry ({i}, {j}) twice, also counting the other half of a symmetric matrix"
-            raise InputError(field, path.name, problem, "write each entry once, of a symmetric matrix one half")
-    values = np.asarray(content.toarray() if issparse(content) else content)
-    if np.iscomplexobj(values):
-        raise InputError(field, path.name, "is complex", "bring a real matrix; damping is [housing.damping]")
-    return _whole(_checked(np.asarray(values, dtype=float), field, path))
 
 
 def _chosen(found: Mapping[str, Array | Entries], path: Path, field: str, initial: str) -> Array | Entries:

@@ -247,7 +247,7 @@ class ModalBody(Reduction, Shown):
         """
         stored = load_arrays(path)
         made: dict[str, Any] = {}
-        if int(stored.get("format", np.array(-1))) != FORMAT:
+        if not np.array_equal(stored.get("format", np.array(-1)), FORMAT):
             raise InputError("reduced model", str(path), "was written by another version", "make it anew")
         for field in dataclasses.fields(cls):
             if field.name not in stored:
@@ -257,7 +257,39 @@ class ModalBody(Reduction, Shown):
                 made[field.name] = value.item()
             else:
                 made[field.name] = tuple(value.tolist()) if field.type == "tuple[str, ...]" else value
+        _check_consistent(made, path)
         return cls(**made)
+
+
+def _check_consistent(values: dict[str, Any], path: str | Path) -> None:
+    """Raise `InputError` where the entries of a file do not fit each other: no program of this project wrote them."""
+
+    def refuse(name: str, problem: str) -> InputError:
+        return InputError("reduced model", str(path), f"its entry {name!r} {problem}", "make it anew")
+
+    for name, value in values.items():
+        if isinstance(value, np.ndarray) and value.dtype.kind not in "fiu":
+            raise refuse(name, "is no array of numbers")
+    size, points = len(np.atleast_1d(values["mass"])), len(np.atleast_1d(values["nodes"]))
+    count = len(values["attachment_names"])
+    square = ("mass", "stiffness", "damping", "radiation", "softening")
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(square, (size, size))
+    shapes |= {"shapes": (3 * points, size), "nodes": (points, 3), "normals": (points, 3)}
+    shapes |= {"attachment_points": (count, 3), "attachment_axes": (count, 3), "internal_hz": (size - 6 * count,)}
+    shapes |= {"momentum": (6, size), "rigid_mass": (6, 6)}
+    for name, shape in shapes.items():
+        if values[name].shape != shape:
+            raise refuse(name, f"has the shape {values[name].shape}, not {shape}")
+    for name in ("mass", "stiffness", "damping", "nodes", "attachment_points", "attachment_axes"):
+        if not np.isfinite(values[name]).all():
+            raise refuse(name, "holds a number that is not finite")
+    for name, widths in (("elements", (4, 6, 10)), ("faces", (3, 6))):
+        cells = values[name]
+        whole = cells.dtype.kind in "iu" and cells.ndim == 2 and cells.shape[1] in widths
+        if not whole or (cells.size and not (cells.min() >= 0 and cells.max() < points)):
+            raise refuse(name, "does not fit the nodes")
+    if not 0 <= values["modes"] <= size - 6 * count:
+        raise refuse("modes", f"is {values['modes']}")
 
 
 @dataclass(frozen=True, eq=False)
