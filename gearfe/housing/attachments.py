@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from ..errors import InputError
-from ..typing import Array, IntArray
+from ..typing import Array, BoolArray, IntArray
 
 Vector = tuple[float, float, float]
 
@@ -23,6 +23,10 @@ Vector = tuple[float, float, float]
 RADIUS_TOLERANCE = 1e-3
 #: The same for planes and ends of ranges, in parts of the body's size.
 PLACE_TOLERANCE = 1e-6
+#: Spread of the distances from the axis, in parts of the radius, above which nodes are no bore.
+OUT_OF_ROUND = 0.05
+#: Gap between neighbouring nodes round the axis (rad) above which a bore is open: six edges a circle leave 60 deg.
+OPEN = math.radians(75.0)
 
 
 @dataclass(frozen=True)
@@ -80,15 +84,29 @@ class Attachment:
     nodes: IntArray
 
 
-def bore_attachment(bore: Bore | Sequence[Any], number: int, nodes: Array) -> tuple[Attachment, tuple[str, ...]]:
-    """Attachment of a bore: all nodes at or inside its radius, within its range. Also notes for the user.
+def bore_attachment(
+    bore: Bore | Sequence[Any], number: int, nodes: Array, corners: BoolArray | None = None
+) -> tuple[Attachment, tuple[str, ...]]:
+    """Attach all nodes at or inside the radius of a bore, within its range; also return notes for the user.
 
     The reference point is the point of the axis in the middle of the range.
+
+    Parameters
+    ----------
+    bore
+        The bore, or the values of a `Bore`.
+    number
+        Its number, counted from 1, which is its name where it has none.
+    nodes : (n, 3)
+        Nodes of the mesh (m).
+    corners : (n,)
+        Which of them are corners of elements: these should lie on the cylinder; midside nodes of straight edges lie on
+        chords. By default all.
 
     Raises
     ------
     InputError
-        Not a bore; no nodes there.
+        Not a bore; no nodes there; nodes that are far from lying on a cylinder.
     """
     made = bore if isinstance(bore, Bore) else _bore(bore, number)
     name = made.name or str(number)
@@ -131,17 +149,97 @@ def bore_attachment(bore: Bore | Sequence[Any], number: int, nodes: Array) -> tu
             f"{radial[chosen].min():.6g} m from the axis): that is material, not a bore"
         )
         raise InputError(f"{field}.radius", made.radius, problem, "give the bore's own radius in metres, and its axis")
+    known = chosen if corners is None or not corners[chosen].any() else chosen[corners[chosen]]
+    notes = cylinder_notes(field, name, offset[known], axis, of_radius=made.radius)
     begin, end = float(height[chosen].min()), float(height[chosen].max())
-    notes: tuple[str, ...] = ()
     if not (math.isfinite(first) and math.isfinite(last)):
         first, last = max(first, begin), min(last, end)
     elif max(begin - first, last - end) > 0.01 * (last - first) + slack:
-        notes = (
+        notes += (
             f"bore {name}: its nodes reach from {begin:.6g} to {end:.6g} m along the axis, the given range from "
             f"{first:.6g} to {last:.6g} m; the reference point is the middle of the given range",
         )
     reference = point + 0.5 * (first + last) * axis
     return Attachment(name, reference, axis, chosen), notes
+
+
+def cylinder_notes(field: str, name: str, offset: Array, axis: Array, *, of_radius: float) -> tuple[str, ...]:
+    """Say where nodes differ from a cylinder that has a given radius, is closed round its axis, and has a length.
+
+    Parameters
+    ----------
+    field, name
+        Key and name of the bore, for messages.
+    offset : (k, 3)
+        Places of the nodes from a point of the axis (m).
+    axis : (3,)
+        Unit vector.
+    of_radius
+        Radius that they should have (m).
+
+    Raises
+    ------
+    InputError
+        When they are out of round by more than `OUT_OF_ROUND`.
+    """
+    height, across = offset @ axis, offset @ np.linalg.svd(axis[None])[2][1:].T
+    radial = np.linalg.norm(across, axis=1)
+    least, most = float(radial.min()), float(radial.max())
+    between = f"its {len(radial)} nodes lie {1e3 * least:.4g} to {1e3 * most:.4g} mm from the axis"
+    notes = []
+    if most - least > OUT_OF_ROUND * of_radius:
+        problem = (
+            f"{between}: out of round by {100.0 * (most - least) / of_radius:.2g} % of the radius, more than "
+            f"{100.0 * OUT_OF_ROUND:g} %"
+        )
+        cure = (
+            "check axis, point and radius, give each wall a bore of its own (range), or attach the nodes of a group to "
+            "a point (point_mm beside group), whatever their shape"
+        )
+        raise InputError(field, name, problem, cure)
+    if most - least > 2.0 * RADIUS_TOLERANCE * of_radius:
+        why = _why_not_round(across, radial, height)
+        notes.append(f"bore {name}: {between}{why}; nodes that lie further out than its radius are not attached")
+    elif abs(0.5 * (least + most) - of_radius) > 2.0 * RADIUS_TOLERANCE * of_radius:
+        notes.append(f"bore {name}: {between}, its radius is {1e3 * of_radius:.4g} mm")
+    gap, length = _largest_gap(across), float(np.ptp(height))
+    if gap > OPEN:
+        notes.append(
+            f"bore {name}: its nodes leave {math.degrees(gap):.0f} of 360 deg round the axis open; if it is a whole "
+            "bore, check its point and radius"
+        )
+    if length < RADIUS_TOLERANCE * of_radius:
+        notes.append(
+            f"bore {name}: its nodes are one ring without length; a bearing's width is held where the range or group "
+            "has nodes over all of it"
+        )
+    return tuple(notes)
+
+
+def _why_not_round(across: Array, radial: Array, height: Array) -> str:
+    """Parts of the distances from the axis that are eccentric, tilted, conical and oval: the largest, in words."""
+    angle = np.arctan2(across[:, 1], across[:, 0])
+    span = float(np.ptp(height))
+    along = (height - height.mean()) / span if span > RADIUS_TOLERANCE * radial.mean() else np.zeros(len(height))
+    waves = [np.cos(angle), np.sin(angle), along * np.cos(angle), along * np.sin(angle), along]
+    waves += [np.cos(2.0 * angle), np.sin(2.0 * angle)]
+    fit = np.linalg.lstsq(np.column_stack([np.ones(len(angle)), *waves]), radial, rcond=None)[0]
+    rest = radial - np.column_stack([np.ones(len(angle)), *waves]) @ fit
+    amounts = {
+        "off the axis by": math.hypot(fit[1], fit[2]),
+        "tilted over its length by": math.hypot(fit[3], fit[4]),
+        "wider at one end by": abs(float(fit[5])),
+        "oval by": 2.0 * math.hypot(fit[6], fit[7]),
+        "scattered by": 2.0 * float(np.sqrt(np.mean(rest**2))),
+    }
+    word = max(amounts, key=lambda key: amounts[key])
+    return f", {word} {1e3 * amounts[word]:.2g} mm"
+
+
+def _largest_gap(across: Array) -> float:
+    """Largest angle between neighbouring nodes round the axis (rad)."""
+    angle = np.sort(np.arctan2(across[:, 1], across[:, 0]))
+    return float(np.diff(np.append(angle, angle[0] + 2.0 * math.pi)).max())
 
 
 def plane_nodes(plane: Plane, nodes: Array) -> IntArray:

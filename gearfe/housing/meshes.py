@@ -44,6 +44,13 @@ class Tetrahedra:
     nodes: Array
     cells: IntArray
 
+    @property
+    def corners(self) -> BoolArray:
+        """(n,) whether a node is a corner of an element."""
+        found = np.zeros(len(self.nodes), dtype=bool)
+        found[self.cells[:, :4]] = True
+        return found
+
     def assemble(self, material: Material) -> SolidMatrices:
         """Stiffness and mass."""
         return assemble(self.nodes, self.cells, material)
@@ -80,6 +87,11 @@ class Prisms:
     def nodes(self) -> Array:
         """(n, 3) coordinates (m)."""
         return self._places(self.used)
+
+    @property
+    def corners(self) -> None:
+        """None: all nodes lie on the true cylinders."""
+        return None
 
     @cached_property
     def cells(self) -> IntArray:

@@ -159,7 +159,7 @@ class Housing(Facts):
         made: list[Attachment] = []
         notes: list[str] = []
         for number, bore in enumerate(bores, start=1):
-            attachment, remarks = bore_attachment(bore, number, mesh.nodes)
+            attachment, remarks = bore_attachment(bore, number, mesh.nodes, mesh.corners)
             made.append(attachment)
             notes += remarks
         made += attachments

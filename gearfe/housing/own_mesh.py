@@ -17,7 +17,7 @@ from ..errors import InputError, given
 from ..meshing.mesh_file import MeshFile, read_mesh_file
 from ..tables.housing import UNITS, HeldTable, HousingMeshTable, HousingTable, MeshBoreTable
 from ..typing import Array, BoolArray, IntArray
-from .attachments import RADIUS_TOLERANCE, Attachment, Bore, Plane, bore_attachment, plane_nodes
+from .attachments import RADIUS_TOLERANCE, Attachment, Bore, Plane, bore_attachment, cylinder_notes, plane_nodes
 from .model import Housing
 from .refinement import refined
 
@@ -130,6 +130,8 @@ def fitted_cylinder(points: Array) -> tuple[Array, Array, float, float]:
 
 def _attachment(bore: MeshBoreTable, i: int, mesh: MeshFile, used: IntArray) -> tuple[Attachment, tuple[str, ...]]:
     field, name = f"housing.bores[{i}]", bore.name or str(i + 1)
+    corners = np.zeros(len(mesh.nodes), dtype=bool)
+    corners[mesh.tets[:, :4]] = True
     point = None if bore.point_mm is None else 1e-3 * np.array(bore.point_mm)
     if bore.group is None:
         along = None if bore.range_mm is None else (1e-3 * bore.range_mm[0], 1e-3 * bore.range_mm[1])
@@ -137,15 +139,21 @@ def _attachment(bore: MeshBoreTable, i: int, mesh: MeshFile, used: IntArray) -> 
         radius = 1e-3 * given(bore.radius_mm, f"{field}.radius_mm")
         there = Bore((x, y, z), bore.direction, radius, along, name)
         try:
-            made, notes = bore_attachment(there, i + 1, mesh.nodes[used])
+            made, notes = bore_attachment(there, i + 1, mesh.nodes[used], corners[used])
         except InputError as error:
             cure = "check point_mm, direction, radius_mm and range_mm, and the unit of the mesh"
+            cure += "; a group beside point_mm may have any shape" if "round" in error.problem else ""
             raise InputError(field, name, error.problem, cure) from None
         return dataclasses.replace(made, nodes=used[made.nodes]), notes
     nodes = mesh.group(bore.group, f"{field}.group")
     if point is not None:
         axis = np.array(bore.direction, dtype=float)
-        return Attachment(name, point, axis / np.linalg.norm(axis), nodes), ()
+        axis /= np.linalg.norm(axis)
+        offset = mesh.nodes[nodes] - point
+        radial = 1e3 * np.linalg.norm(offset - np.outer(offset @ axis, axis), axis=1)
+        shape = f"{radial.min():.4g} to {radial.max():.4g} mm from the axis through its point_mm"
+        note = f"bore {name}: the {len(nodes)} nodes of group {bore.group} are attached as they lie, {shape}"
+        return Attachment(name, point, axis, nodes), (note,)
     at = mesh.nodes[nodes]
     foot, axis, radius, off = fitted_cylinder(at) if len(at) >= 6 else (at[0], at[0], 0.0, np.inf)
     if not (off <= RADIUS_TOLERANCE * radius and radius <= np.linalg.norm(np.ptp(at, axis=0))):  # else a flat patch
@@ -158,7 +166,9 @@ def _attachment(bore: MeshBoreTable, i: int, mesh: MeshFile, used: IntArray) -> 
     height = (at - foot) @ axis
     reference = foot + 0.5 * (height.min() + height.max()) * axis
     note = f"bore {name}: group {bore.group} is a cylinder of radius {1e3 * radius:.6g} mm"
-    return Attachment(name, reference, axis, nodes), (note,)
+    known = nodes[corners[nodes]] if corners[nodes].any() else nodes
+    notes = cylinder_notes(f"{field}.group", name, mesh.nodes[known] - foot, axis, of_radius=radius)
+    return Attachment(name, reference, axis, nodes), (note, *notes)
 
 
 def _held(held: HeldTable, field: str, mesh: MeshFile, used: IntArray) -> IntArray:
