@@ -12,6 +12,7 @@ import pytest
 from gearfe.config import build
 from gearfe.errors import InputError
 from gearfe.mechanisms.model import Mechanism, make_mechanism
+from gearfe.mechanisms.results import reactions
 from gearfe.mechanisms.solve import solve
 from gearfe.rigid import Trajectory
 from gearfe.tables.mechanism import MechanismFile
@@ -200,6 +201,64 @@ def test_a_cylinder_of_given_length_raises_a_boom() -> None:
     angle = np.arccos((1.6**2 + base**2 - length**2) / (2 * 1.6 * base)) - math.atan2(0.4, 0.8)
     np.testing.assert_allclose(trajectory.q[:, 2], angle, atol=1e-8)
     assert angle[[0, -1]] == pytest.approx([0.1378, 0.5961], abs=1e-4)
+
+
+def actuator(length: Any) -> dict[str, Any]:
+    """A boom on a hinge, raised by a rod without mass of a given length; the power of the drive is work."""
+    return {
+        "run": {"end_s": 2.0, "step_s": 0.1},
+        "ground": {"points_m": {"P": [0.8, -0.4]}},
+        "bodies": {"boom": body(centre_m=[2.0, 0.0], angle_deg=10.0, points_m={"C": [1.6, 0.0]})},
+        "joints": {
+            "O": hinge("boom"),
+            "cylinder": {"type": "distance", "body": "boom", "point": "C", "to_point": "P", "length_m": length},
+        },
+        "forces": {"weight": {"type": "gravity", "acceleration_m_per_s2": [0.0, -9.81]}},
+    }
+
+
+@pytest.mark.parametrize("kind", ["step", "polynomial", "sines"])
+def test_a_distance_over_time_is_an_actuator(kind: str) -> None:
+    """The boom's angle closes the triangle; its moment about O is that of the tension, I angle'' less the weight's."""
+    lengths: dict[str, dict[str, Any]] = {
+        "step": {"constant": 1.0, "step": 0.4, "step_centre_s": 1.0, "step_width_s": 1.6},
+        "polynomial": {"polynomial": [1.0, 0.1, 0.05]},
+        "sines": {"constant": 1.2, "sine": 0.15, "frequency_hz": 0.7, "phase_deg": 20.0},
+    }
+    raw = actuator(lengths[kind])
+    raw["run"]["method"] = "taylor"
+    mechanism = made(raw)
+    solved = solve(mechanism)
+    trajectory = solved.results.trajectory
+    t = trajectory.time
+    x = np.clip((t - 0.2) / 1.6, 0.0, 1.0)
+    length = {
+        "step": 1.0 + 0.4 * (10 * x**3 - 15 * x**4 + 6 * x**5),
+        "polynomial": 1.0 + 0.1 * t + 0.05 * t**2,
+        "sines": 1.2 + 0.15 * np.sin(2 * math.pi * 0.7 * t + math.radians(20.0)),
+    }[kind]
+    base = math.hypot(0.8, 0.4)
+    angle = np.arccos((1.6**2 + base**2 - length**2) / (2 * 1.6 * base)) - math.atan2(0.4, 0.8)
+    np.testing.assert_allclose(trajectory.q[:, 2], angle, atol=1e-7)
+    pull = reactions(mechanism, trajectory)
+    arm = 1.6 * np.cos(angle), 1.6 * np.sin(angle)
+    moment = arm[0] * pull["cylinder_y_N"] - arm[1] * pull["cylinder_x_N"]
+    needed = (0.001 + 0.5 * 4.0) * trajectory.a[:, 2] + 0.5 * 9.81 * 2.0 * np.cos(angle)
+    np.testing.assert_allclose(moment, needed, atol=1e-4 * np.abs(needed).max())
+    assert np.ptp(solved.results.energy["total_J"]) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("length", "text"),
+    [
+        ({"polynomial": [1.0, -0.6]}, r"length_m = -0\.19999.*must be > 0 m at all times"),
+        ({"constant": 1.2, "step": 0.1, "step_width_s": 1.0, "sine": 0.1, "frequency_hz": 1.0}, "sines beside a poly"),
+        (-1.0, r"length_m = -1"),
+    ],
+)
+def test_lengths_that_cannot_be(length: Any, text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        made(actuator(length))
 
 
 @pytest.mark.parametrize("coordinate", ["x", "y"])

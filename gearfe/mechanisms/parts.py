@@ -7,6 +7,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from ..errors import InputError, given, unknown_name
 from ..rigid import GROUND, Body, TimeFunction, constant, polynomial, sine, smoothed_step
 from ..rigid.beam_link import BeamLink
@@ -23,6 +25,8 @@ Point = tuple[float, float]
 LOADS = ("x_N", "y_N", "moment_N_m")
 
 
+#: Times of a run at which a length over time is looked at.
+LENGTHS = 2001
 #: Flexible links by name: where joints and forces find the bodies that are their nodes.
 Links = Mapping[str, BeamLink | PlatePart]
 
@@ -99,6 +103,8 @@ def part_of(
             value = _place(file, links, value, None, f"{label}.carrier", pointed=False)[0]
         if isinstance(value, FunctionTable):
             value = time_function(value, tables, f"{label}.{key}", smooth=key not in LOADS)
+            if key == "length_m":
+                _check_length(value, file.run.end_s, f"{label}.{key}")
         elif key == "profile":
             value = _profile(value, tables, f"{label}.profile")
         elif isinstance(value, str) and key in LOADS:
@@ -118,6 +124,20 @@ def part_of(
         if wrong is None:
             raise
         raise InputError(f"{label}.{wrong}", error.value, error.problem, error.cure) from None
+
+
+def _check_length(length: TimeFunction, end: float, label: str) -> None:
+    """Refuse a length that is not positive over the run, or has no square."""
+    inner = [t for t in length.breaks if 0.0 < t < end]
+    times = np.unique(np.concatenate([np.linspace(0.0, end, LENGTHS), inner]))
+    values = length(times)
+    if not (values > 0.0).all():
+        at, value = times[int(values.argmin())], float(values.min())
+        raise InputError(label, value, f"must be > 0 m at all times (at {at:.6g} s)", "give a longer one")
+    try:
+        length.squared()
+    except InputError as error:
+        raise InputError(label, None, error.problem, error.cure) from None
 
 
 def _profile(name: str, tables: Mapping[str, ValueTable], label: str) -> ValueTable:

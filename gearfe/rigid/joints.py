@@ -127,26 +127,31 @@ class Fixed(Joint):
 class Distance(Joint):
     """Points `point_a` of body `a` and `point_b` of body `b` stay `length` (m) apart: one constraint.
 
-    ``None`` keeps the distance that they start with. The multiplier is the tension of the rod (N).
+    ``None`` keeps the distance that they start with; a function of time, which stays positive, is an actuator. The
+    multiplier is the tension of the rod (N), times its length over that at time 0.
     """
 
     a: str
     b: str
     point_a: Point = (0.0, 0.0)
     point_b: Point = (0.0, 0.0)
-    length: float | None = None
+    length: float | TimeFunction | None = None
     name: str = ""
 
     def rows(self, frames: Frames) -> list[Row]:
-        """(D . D - L^2) / (2 L) = 0 with the span D: its gradient is a unit force along the rod."""
+        """(D . D - L(t)^2) / (2 L(0)) = 0 with the span D: its gradient is a unit force along the rod at time 0."""
         span = frames.point(self.a, self.point_a) - frames.point(self.b, self.point_b)
-        length = self.length
+        given = self.length
+        length = float(given(0.0)) if isinstance(given, TimeFunction) else given
         if length is None:
             length = math.dist(frames.start_place(self.a, self.point_a), frames.start_place(self.b, self.point_b))
         if not length > 0.0:
             cure = "give it a length, or join the points by a hinge"
             raise InputError(f"distance {self.name!r} length", length, "must be > 0 m", cure)
-        return [Row("distance", span.dot(0.5 / length * span) - 0.5 * length)]
+        square = span.dot(0.5 / length * span)
+        if isinstance(given, TimeFunction):
+            return [Row("distance", square, 0.5 / length * given.squared())]
+        return [Row("distance", square - 0.5 * length)]
 
 
 @dataclass(frozen=True)

@@ -51,13 +51,13 @@ def motions_of_second_order(system: System, time: float, q: Array, count: int) -
     random = np.random.default_rng(5)
     found: list[Array] = []
     for _ in range(8 * count):
-        y = random.standard_normal(free.shape[1])
+        y: Array = random.standard_normal(free.shape[1])
         for _ in range(STEPS if forms.size else 0):
-            y = y / np.linalg.norm(y)
+            y = np.asarray(y / np.linalg.norm(y))
             turned = forms @ y
             across = turned - np.outer(turned @ y, y)  # a step along y changes no direction
             y = y - np.linalg.lstsq(2.0 * across, turned @ y, rcond=1e-8)[0]
-        y = y / np.linalg.norm(y)
+        y = np.asarray(y / np.linalg.norm(y))
         if np.abs(forms @ y @ y).max(initial=0.0) <= ALLOWED:
             v = free @ y
             found.append(v / np.abs(v).max())

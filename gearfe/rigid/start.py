@@ -129,7 +129,7 @@ def count_freedoms(system: System, time: float, q: Array) -> Freedoms:
         hidden.append(hidden_freedoms(system, at, found)[1])
         if len(there) < len(fewest):
             fewest = there
-        if tried == 3 or not (fewest or min(hidden)):
+        if tried == 3 or (not fewest and not hidden[-1]):
             break
     if not motions:
         hidden = [hidden_freedoms(system, time, q)[0]]

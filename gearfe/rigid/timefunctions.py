@@ -74,6 +74,29 @@ class TimeFunction:
 
     __rmul__ = __mul__
 
+    def squared(self) -> TimeFunction:
+        """Its square.
+
+        Raises
+        ------
+        InputError
+            When it has sines beside pieces that are not constant: their products have no place here.
+        """
+        rows = tuple(tuple(float(c) for c in np.convolve(row, row)) for row in self.coefficients)
+        made = TimeFunction(self.starts, self.origins, rows)
+        if not self.sines:
+            return made
+        if self.breaks or any(self.coefficients[0][1:]):
+            problem = "has sines beside a polynomial, a step or a table, whose square is no such function"
+            raise InputError("function of time", None, problem, "give sines and a constant, or the others")
+        level = self.coefficients[0][0]
+        terms = [sine(2.0 * level * a, w, p) for a, w, p in self.sines]
+        for a, w, p in self.sines:
+            for b, u, r in self.sines:  # sin sin = (cos(difference) - cos(sum)) / 2
+                terms.append(sine(0.5 * a * b, w - u, p - r + math.pi / 2))
+                terms.append(sine(-0.5 * a * b, w + u, p + r + math.pi / 2))
+        return sum(terms, made)
+
     @property
     def breaks(self) -> tuple[float, ...]:
         """Times at which one piece hands over to the next (s)."""

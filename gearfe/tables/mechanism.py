@@ -149,8 +149,8 @@ class JointTable:
     to_point: str | Pair | None = quantity(None, doc="point of the other body: a name or [x, y] in m")
     direction: Pair | None = quantity(None, doc="direction of the line in the other body's frame, [x, y]")
     angle_deg: float | None = quantity(None, doc="angle of body minus 'to' that a prismatic joint keeps, in degrees")
-    length_m: float | None = quantity(
-        None, above=0.0, doc="distance that a distance joint keeps in m (default: at start)"
+    length_m: Function | None = quantity(
+        None, above=0.0, doc="distance that a distance joint keeps in m, or a function of time (default: at start)"
     )
     ratio: float | None = quantity(
         None, doc="turns of 'to' per turn of the body: -z/z_to of external gears, z/z_to of a ring"
