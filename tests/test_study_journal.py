@@ -21,6 +21,7 @@ from pathlib import Path
 import pytest
 
 from gearfe.errors import InputError
+from gearfe.study import journal as module
 from gearfe.study import run
 from gearfe.study.case import Row
 from gearfe.study.job import read_study, run_study
@@ -386,6 +387,29 @@ def test_a_second_program_where_folders_have_no_locks_is_refused(tmp_path, resta
         journal(tmp_path, restart=restart)
     first.append([row(1)], CASES)
     assert first.finish()["case"] == ["0", "1"]
+
+
+def test_a_file_system_without_locks_of_files(tmp_path, monkeypatch):
+    """Some parallel ones of clusters: SQLite reports an error of input and output."""
+    connected = module._connected
+
+    class WithoutLocks(sqlite3.Connection):
+        def execute(self, statement: str, *more: object) -> sqlite3.Cursor:
+            if statement == "BEGIN EXCLUSIVE":
+                error = sqlite3.OperationalError("disk I/O error")
+                error.sqlite_errorcode = sqlite3.SQLITE_IOERR_LOCK
+                raise error
+            return super().execute(statement, *more)
+
+    def connect(path: Path, how: str) -> sqlite3.Connection:
+        return WithoutLocks(path, isolation_level=None) if how == "mode=rw" and path.exists() else connected(path, how)
+
+    columns = filled(tmp_path, 20)
+    monkeypatch.setattr(module, "_connected", connect)
+    with journal(tmp_path) as rows:
+        assert rows.cells() == columns
+        rows.append(map(row, range(60)), CASES)
+    assert journal(tmp_path).finish()["case"] == [str(i) for i in range(60)]
 
 
 # ---------------------------------------------------------------------------------------------- workers at their start

@@ -56,6 +56,8 @@ SCHEMA = {name: f"CREATE TABLE {name} (number INTEGER PRIMARY KEY, line TEXT, cr
 COMPANIONS = ("-journal", "-wal", "-shm")
 #: First bytes of a rollback journal that SQLite has to play back (sqlite.org/fileformat2.html, section 3).
 HOT = bytes.fromhex("d9d505f920a163d7")
+#: Result codes of SQLite where a file system has no locks of files, as some parallel ones of clusters have not.
+NO_LOCKS = (sqlite3.SQLITE_IOERR_LOCK, sqlite3.SQLITE_IOERR_RDLOCK)
 #: Seconds between two exports while cases run, and the largest share of the time that exports take.
 EXPORT_S, EXPORT_SHARE = 2.0, 0.05
 #: What to do about a file that is not the journal of the study, and about a damaged one.
@@ -235,11 +237,14 @@ class Journal:
         """Open the database for writing, after its description and all of its rows are checked."""
         self._compare()
         with _stored(self.folder):
-            self._connection = connection = _connected(self.path, "mode=rw")
+            try:
+                connection = _alone(self.path, "mode=rw")
+            except sqlite3.OperationalError as error:
+                if error.sqlite_errorcode not in NO_LOCKS:
+                    raise
+                connection = _alone(self.path, "mode=rw&nolock=1")
+        self._connection = connection
         try:
-            with _stored(self.folder):
-                connection.execute("PRAGMA locking_mode = EXCLUSIVE")
-                connection.execute("BEGIN EXCLUSIVE")  # plays back what a kill left
             with self._reading():
                 self.done = self._checked(connection)
                 versions = list(self._lines(connection, "versions"))
@@ -379,6 +384,18 @@ def _connected(path: Path, how: str) -> sqlite3.Connection:
     )
     connection.execute("PRAGMA trusted_schema = OFF")
     connection.execute("PRAGMA cell_size_check = ON")
+    return connection
+
+
+def _alone(path: Path, how: str) -> sqlite3.Connection:
+    """A database in a transaction that nobody else may read; what a kill left unfinished is played back."""
+    connection = _connected(path, how)
+    try:
+        connection.execute("PRAGMA locking_mode = EXCLUSIVE")
+        connection.execute("BEGIN EXCLUSIVE")
+    except BaseException:
+        connection.close()
+        raise
     return connection
 
 
