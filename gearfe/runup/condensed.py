@@ -44,6 +44,10 @@ class CondensedTrain:
         For each mesh the numbers of its driving flank and, where it has one, of its back flank.
     steady
         Force of each mesh by statics (N).
+    directions : (system size, m)
+        Of the freedoms.
+    torque : (system size,)
+        Constant torques on the coordinates.
     """
 
     model: TrainModel
@@ -51,6 +55,8 @@ class CondensedTrain:
     forces: MeshForces
     flanks_of_mesh: tuple[tuple[int, ...], ...]
     steady: Array
+    directions: Array
+    torque: Array
 
     @cached_property
     def bores_of_modes(self) -> Array:
@@ -91,9 +97,8 @@ def condense(model: TrainModel, shared: int = SHARED) -> CondensedTrain:
     used = sorted({x for four in reads for x in four if x >= 0})
     freedoms = np.array([[used.index(x) if x >= 0 else -1 for x in four] for four in reads])
     to_modes = modal.T.T @ model.directions
-    push = modal.constant + modal.T.T @ sum(
-        (d * float(f(model.torque_end)) for d, f in model.torques), start=np.zeros(len(modal.T))
-    )
+    torque = sum((d * float(f(model.torque_end)) for d, f in model.torques), start=np.zeros(len(modal.T)))
+    push = modal.constant + modal.T.T @ torque
     gyros = model.forces.gyros
     tilts = [column for g in gyros for column in (g.direction, g.direction + 1)]
     linear = Linear(
@@ -117,7 +122,7 @@ def condense(model: TrainModel, shared: int = SHARED) -> CondensedTrain:
         if force < 0.0 and len(numbers) == 2:  # statics press the back flanks, which bear behind the backlash
             start[freedoms[list(numbers), 0]] += flanks[numbers[1]].gap * np.array([-1.0, 1.0])
     system = Oscillator(linear, forces, tuple(float(t) for t in turns), scale, many, limit, start)
-    return CondensedTrain(model, system, forces, of_mesh, steady)
+    return CondensedTrain(model, system, forces, of_mesh, steady, model.directions[:, used], torque)
 
 
 def _rubbing(model: TrainModel, flank: Flank, mesh: int, force: float) -> Rubbing | None:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..train.response import XYZ
 from .run_up import RunUp
 
 
@@ -80,6 +81,9 @@ def order_columns(run: RunUp, multiples: int) -> dict[str, Any]:
     made |= {f"contact_force_{i + 1}_N": forces[:, i] for i in range(len(model.meshes))}
     made |= {f"transmission_error_{i + 1}_um": 1e6 * errors[:, i] for i in range(len(model.meshes))}
     made |= {f"acceleration_{name}_m_per_s2": moved[:, j] for j, name in enumerate(model.bores)}
+    loads = np.abs([states[i].bearing[k] for _, i, k in rows]).reshape(len(rows), -1, 6)
+    for j, name in enumerate(model.bores):
+        made |= {f"bearing_force_{name}_{x}_N": loads[:, j, n] for n, x in enumerate(XYZ)}
     if model.train.housing is not None:
         power = [states[i].power for _, i, _ in rows]
         made["radiated_power_W"] = np.array([p[k] for p, (_, _, k) in zip(power, rows, strict=True) if p is not None])

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..gear.derived import dynamic_factor
 from ..gear.pair import MeshGeometry
+from ..train.response import XYZ
 from ..typing import Array, IntArray
 from ..vibration.radiation import power_level
 from . import torus
@@ -62,8 +63,23 @@ def runup_columns(run: RunUp) -> dict[str, Any]:
     rms = np.array([s.rms(run.band_hz) for s in states]).reshape(len(states), -1)
     for j, name in enumerate(model.bores):
         made[f"acceleration_rms_{name}_m_per_s2"] = rms[:, j]
+    made |= bearing_means(run)
     if all(s.power is not None for s in states):
         made["radiated_power_level_dB"] = np.array([power_level(power_in_band(s, run.band_hz)) for s in states])
+    return made
+
+
+def bearing_means(run: RunUp) -> dict[str, Array]:
+    """Mean force of the shaft on each bore, and the rms of what swings about it up to the band."""
+    made, states = {}, run.states
+    for j, name in enumerate(run.train.model.bores):
+        for k, x in enumerate(XYZ):
+            lines = [s.bearing[:, j, k] for s in states]
+            inside = [(s.frequency > 0.0) & (s.frequency <= run.band_hz) for s in states]
+            made[f"mean_bearing_force_{name}_{x}_N"] = np.array([one[0].real for one in lines])
+            made[f"bearing_force_rms_{name}_{x}_N"] = np.array(
+                [math.sqrt(0.5 * float((np.abs(one[i]) ** 2).sum())) for one, i in zip(lines, inside, strict=True)]
+            )
     return made
 
 

@@ -56,6 +56,9 @@ class SteadyState:
         Whether a mesh goes beyond what its law is known for.
     acceleration : (K + 1, bores)
         Complex amplitudes along the shafts at the attachments (m/s2).
+    bearing : (K + 1, bores, 6)
+        Complex amplitudes of the force (N) and moment (N m) of the shaft on each bore about its reference point, along
+        x, y, z.
     power : (K + 1,) or None
         Equivalent radiated power of each line (W); None for a rigid housing.
     span
@@ -79,6 +82,7 @@ class SteadyState:
     apart: Array
     beyond: bool
     acceleration: ComplexArray
+    bearing: ComplexArray
     power: Array | None
     span: float
     multipliers: ComplexArray | None = None
@@ -139,11 +143,30 @@ def steady_result(
     if train.radiation_of_modes is not None:
         square = (modal.conj() * real_times(modal, train.radiation_of_modes)).sum(axis=1).real
         power = 0.5 * AIR_IMPEDANCE * omega**2 * np.maximum(square, 0.0)
+    bearing = _bearing(train, orbit, omega, modal)
+    bearing = _bearing(train, orbit, omega, modal)
     second = 2.0 * math.pi / abs(orbit.speed)  # of one turn
     waves, _ = torus.harmonics(system.periods, count)
     period = second * system.turns[0] if len(system.turns) == 1 else math.inf
     return SteadyState(
         orbit.speed, branch, orbit, period, waves,
         torus.numbers(system.periods, count), omega / (2.0 * math.pi), omega / abs(orbit.speed), lattice, force,
-        approach, apart, beyond, acceleration, power, second * window(system).turns, multipliers,
+        approach, apart, beyond, acceleration, bearing, power, second * window(system).turns, multipliers,
     )  # fmt: skip
+
+
+def _bearing(train: CondensedTrain, orbit: Orbit, omega: Array, modal: ComplexArray) -> ComplexArray:
+    """Amplitudes of the loads on the bores."""
+    model, linear, turning = train.model, train.system.linear, 1j * omega[:, None]
+    q = real_times(modal, model.modal.T.T)
+    v, a = turning * q, -(omega**2)[:, None] * q
+    acting = real_times(orbit.forces, train.directions.T)
+    for line in model.meshes:
+        if line.in_contact:  # which the constant part has, too
+            acting += line.rayleigh * real_times(v, np.outer(line.row, line.row))
+    tilts = [column for g in model.forces.gyros for column in (g.direction, g.direction + 1)]
+    along = model.directions[:, tilts]
+    acting += orbit.speed * real_times(v, along @ linear.gyroscopic.T @ along.T)
+    acting[0] += train.torque
+    q[0] += model.modal.origin
+    return model.bearings(q, v, a, acting)

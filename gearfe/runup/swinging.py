@@ -47,8 +47,20 @@ def swinging(model: TrainModel, modes: Sequence[int], frames: int = FRAMES) -> T
     v = np.concatenate([-rate * np.sin(angle) * shape for rate, shape in zip(rates, shapes, strict=True)])
     a = np.concatenate([-(rate**2) * np.cos(angle) * shape for rate, shape in zip(rates, shapes, strict=True)])
     approach = q @ np.array([line.row for line in model.meshes]).T
-    none = np.zeros_like(approach)
-    moved = TrainStates(time, q, v, a, none, approach, none > 0.0, np.zeros(len(time)), none, none)
+    none, loads = np.zeros_like(approach), np.zeros((len(time), len(model.bores), 6))
+    moved = TrainStates(
+        time,
+        q,
+        v,
+        a,
+        none,
+        approach,
+        none > 0.0,
+        np.zeros(len(time)),
+        none,
+        none,
+        loads,
+    )
     return response_of(replace(model, angle=constant(0.0)), moved, "done", float(time[-1]), {})
 
 

@@ -21,6 +21,7 @@ from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, Start, System
 from ..rigid.elimination import ModalCoordinates, modal_coordinates
 from ..shown import Facts
 from ..typing import Array, IntArray
+from .bearings import BearingLoads, bearing_loads, bore_motion
 from .checks import check_train
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge, rotor
 from .forces import Flank, Gyro, TrainForces, derivative
@@ -121,6 +122,16 @@ class TrainModel(Facts):
         left = iter(self.forces.flanks)
         counts = (0 if line.rigid else 1 if line.backlash is None else 2 for line in self.meshes)
         return tuple(tuple(islice(left, count)) for count in counts)
+
+    @cached_property
+    def bearings(self) -> BearingLoads:
+        """Loads on the bores that carry shafts."""
+        return bearing_loads(self)
+
+    @cached_property
+    def bore_motion(self) -> Array:
+        """Displacement and rotation of each bore along x, y, z for unit coordinates, (6 bores, system size)."""
+        return bore_motion(self)
 
     @cached_property
     def multipliers_of_forces(self) -> Array:

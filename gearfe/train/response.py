@@ -30,7 +30,12 @@ SAMPLED = (
     "modal",
     "modal_velocity",
     "modal_acceleration",
+    "rotation",
+    "bearing_load",
+    "bore_acceleration",
 )
+#: Directions of forces and motions in names of columns.
+XYZ = ("x", "y", "z")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,7 +47,8 @@ class TrainResponse(ShownTable):
     time : (n,)
         Times up to the time reached (s).
     drive_angle : (n,)
-        Rotation of the driving shaft relative to the bore of its drive (rad), positive about the axis of the train.
+        Prescribed rotation of the drive (rad), the integral of its speed, positive about the axis of the train. The
+        driving shaft turns with it where the drive is rigid; behind an elastic coupling it has its own `rotation`.
     mesh_names : tuple of m names
         Gear meshes, ``driver-driven``.
     drive_torque : (n,)
@@ -97,6 +103,14 @@ class TrainResponse(ShownTable):
         and ``longest_without_contact_s`` (None for meshes that do not part); error estimates
         (``integration``, ``reduction``).
     warnings : tuple of str
+    rotation : (n, s)
+        Rotation of each shaft since the start (rad), against the bore that `speed` is measured against.
+    bearing_load : (n, b, 6)
+        Force (N) and moment (N m) of the shaft on each bore about its reference point, along x, y, z, without the
+        reactions of drive and loads about the axis.
+    bore_acceleration : (n, b, 6)
+        Acceleration of each bore's reference point (m/s2) and angular acceleration (rad/s2), along x, y, z; 0 in a
+        rigid housing.
     """
 
     time: Array
@@ -131,6 +145,9 @@ class TrainResponse(ShownTable):
     statistics: Mapping[str, Any] = field(default_factory=dict)
     estimates: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    rotation: Array | None = None
+    bearing_load: Array | None = None
+    bore_acceleration: Array | None = None
 
     AXES = ("time_s",)
 
@@ -163,6 +180,32 @@ class TrainResponse(ShownTable):
             if coefficient > 0.0:
                 made[f"mesh_power_{i + 1}_W"] = self.mesh_power[:, i]
                 made[f"friction_power_{i + 1}_W"] = self.friction_power[:, i]
+        made["drive_torque_Nm"] = self.drive_torque
+        if self.rotation is not None:
+            made |= {f"rotation_{name}_deg": np.degrees(self.rotation[:, i]) for i, name in shafts}
+        return made
+
+    def bearing_forces(self) -> dict[str, Array]:
+        """Force of the shaft on each bore over time, its components as columns."""
+        if self.bearing_load is None:
+            return {}
+        return {
+            f"bearing_{name}_force_{x}_N": self.bearing_load[:, i, k]
+            for i, name in enumerate(self.attachment_names) for k, x in enumerate(XYZ)
+        }  # fmt: skip
+
+    def bearing_columns(self) -> dict[str, Array]:
+        """Columns of bearings.csv: forces and moments on the bores, and all their accelerations."""
+        made = {"time_s": self.time, **self.bearing_forces()}
+        for i, name in enumerate(self.attachment_names):
+            for k, x in enumerate(XYZ):
+                if self.bearing_load is not None:
+                    made[f"bearing_{name}_moment_{x}_Nm"] = self.bearing_load[:, i, 3 + k]
+        for i, name in enumerate(self.attachment_names):
+            for k, x in enumerate(XYZ):
+                if self.bore_acceleration is not None:
+                    made[f"attachment_{name}_acceleration_{x}_m_per_s2"] = self.bore_acceleration[:, i, k]
+                    made[f"attachment_{name}_angular_acceleration_{x}_rad_per_s2"] = self.bore_acceleration[:, i, 3 + k]
         return made
 
     def every(self, count: int, first: int = 0) -> TrainResponse:

@@ -336,6 +336,9 @@ def response_of(
     return TrainResponse(
         time=t,
         drive_angle=model.angle(t),
+        rotation=model.angle(t)[:, None] * model.ratios + moved.q @ model.spin_reference.T,
+        bearing_load=moved.bearing,
+        bore_acceleration=(moved.a @ model.bore_motion.T).reshape(len(t), -1, 6),
         mesh_names=tuple(line.name for line in model.meshes),
         contact_force=moved.contact_force,
         transmission_error=moved.approach,

@@ -31,6 +31,8 @@ class TrainStates:
         Torque of the drive on its shaft (N m).
     mesh_power, friction_power : (n, meshes)
         What the driver gives to the mesh, and what friction takes of it (W).
+    bearing : (n, bores, 6)
+        Force (N) and moment (N m) of the shaft on each bore about its reference point, along x, y, z.
     """
 
     time: Array
@@ -43,6 +45,7 @@ class TrainStates:
     drive_torque: Array
     mesh_power: Array
     friction_power: Array
+    bearing: Array
 
 
 def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
@@ -74,7 +77,8 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     spin = [int(model.first[i]) + 5 for i in drivers]
     speed = model.angle(t, 1)[:, None] * model.ratios[drivers] + v[:, spin]
     arms = rows[np.arange(len(rows)), spin]
-    return TrainStates(t, q, v, a, force, q @ rows.T, apart, push, speed * (arms * force + drag), loss)
+    power = speed * (arms * force + drag)
+    return TrainStates(t, q, v, a, force, q @ rows.T, apart, push, power, loss, model.bearings(q, v, a, acting))
 
 
 def contact_forces(

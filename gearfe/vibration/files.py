@@ -120,7 +120,7 @@ def write_run(
     draw: Pictures | None = None,
     beside: analysis.Analysis | None = None,
 ) -> Written:
-    """Write ``response.csv``, ``spectrum.csv``, ``summary.json`` and what else is chosen while a run goes on.
+    """Write the tables, ``summary.json`` and what else is chosen while a run goes on.
 
     A run that ended early is made once more up to where it came, and gets the same files.
 
@@ -221,8 +221,9 @@ class _Passes:
             run = _timed(pieces if self.beside is None else self.beside.watching(pieces), self.watch)
             record = self._record(times, choice)
             return follow(
-                run, times, self.planned.every, table=self.table, radiation=self._radiation, record=record, keep=keep
-            )
+                run, times, self.planned.every, table=self.table, bearings=self.table.with_name("bearings.csv"),
+                radiation=self._radiation, record=record, keep=keep,
+            )  # fmt: skip
 
     def _record(self, times: Array, choice: OutputChoice) -> TrainRecord | None:
         """What makes the spectra; None for too short a run."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..files import csv_table
+from ..files import Table, csv_table
 from ..shown import percent
 from ..train.model import TrainModel
 from ..train.response import TrainResponse, joined
@@ -137,6 +137,7 @@ def follow(
     every: int,
     *,
     table: Path | None = None,
+    bearings: Path | None = None,
     radiation: Array | None = None,
     record: TrainRecord | None = None,
     keep: IntArray | None = None,
@@ -151,6 +152,8 @@ def follow(
         Output times (s) of the whole run.
     table
         File to write: ``response.csv``; None for none.
+    bearings
+        File to write: ``bearings.csv``; None for none.
     radiation
         Surface matrix of the housing.
     record
@@ -168,7 +171,7 @@ def follow(
     extremes: _Extremes | None = None
     kept: list[TrainResponse] = []
     passed = 0
-    with nullcontext() if table is None else csv_table(table, gaps=False) as written:
+    with _table(table) as written, _table(bearings) as loads:
         for piece in pieces:
             if extremes is None:
                 mean = RunningMean(times, piece.load_end_s, piece.common_period_s)
@@ -176,6 +179,8 @@ def follow(
             count = len(piece.time)
             if written is not None:
                 written.write(response_columns(piece.every(every, -passed % every), radiation))
+            if loads is not None:
+                loads.write(piece.every(every, -passed % every).bearing_columns())
             if record is not None and count:
                 record.add(piece)
             envelope.add(passed, _drawn(piece))
@@ -203,6 +208,11 @@ def follow(
         joined(kept),
         record.spectra() if record is not None and record.complete else None,
     )
+
+
+def _table(path: Path | None) -> AbstractContextManager[Table | None]:
+    """A table that is written piece by piece, or none."""
+    return nullcontext() if path is None else csv_table(path, gaps=False)
 
 
 class RunningMean:

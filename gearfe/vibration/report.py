@@ -117,7 +117,7 @@ def train_summary(
             "highest_Hz": spectrum.frequency[-1],
             "motion_sampled_every_us": 1e6 * made.step / made.every,
         }
-        summary["dominant_lines"] = {n: dominant(made, response, n) for n in made.names if "absolute" not in n}
+        summary["dominant_lines"] = {n: dominant(made, response, n) for n in made.names if _named(n)}
         if made.power is not None:
             found = peaks(made.power.frequency, made.power.power, NAMED)
             summary["radiated_power"] = {
@@ -135,6 +135,11 @@ def train_summary(
         "timings_s": dict(timings),
     }
     return summary
+
+
+def _named(signal: str) -> bool:
+    """Whether the summary names the largest lines of a signal; spectrum.csv has those of all."""
+    return "absolute" not in signal and not signal.startswith("bearing_")
 
 
 def contact_summary(followed: Followed) -> dict[str, Any]:

@@ -16,6 +16,8 @@ from .radiation import AIR_IMPEDANCE, RadiatedPower, instantaneous_power
 
 #: Columns of response.csv that are no signals of the spectrum.
 NO_SIGNALS = ("time_s", "drive_angle_deg", "instantaneous_radiated_power_W", "band_limited")
+#: Beginnings of names of others.
+NO_SIGNAL = ("rotation_",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +134,10 @@ class TrainRecord:
         if min(highest, FASTEST) > nyquist:
             problem = f"modes up to {highest:.6g} Hz would fold, half the sampling frequency is {nyquist:.6g} Hz"
             raise InputError("response", None, problem, "simulate at the times of gearfe.record_spectrum.finer")
-        columns = {name: values for name, values in response_columns(piece).items() if name not in NO_SIGNALS}
+        every = response_columns(piece) | piece.bearing_forces()
+        columns = {
+            name: values for name, values in every.items() if name not in NO_SIGNALS and not name.startswith(NO_SIGNAL)
+        }
         values = np.column_stack(list(columns.values()))
         number = self._arrived - self.first * self.every
         self._arrived += len(values)
