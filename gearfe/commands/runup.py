@@ -57,7 +57,10 @@ def run(args: argparse.Namespace) -> int:
         from ..figures.runup import RunUpPictures
 
         draw = RunUpPictures(title(job.table, driven=False))
-    choice, further = RunUpChoice(table.multiples, args.attachment, args.fields), described(job, table)
+    choice, further = (
+        RunUpChoice(table.multiples, args.attachment, args.fields),
+        described(job, table, made.train.model.train),
+    )
     summary, names = write_runup(folder, made, choice, draw=draw, watch=watch, further=further, unstable=unstable)
     print_results(_report_lines(summary), folder, names, watch.seconds, summary["warnings"])
     return 0 if summary["speeds_reached"] == summary["speeds"] else 1
@@ -72,10 +75,13 @@ def _own_table(job: str) -> RunUpTable:
 
 def _report_lines(summary: dict[str, Any]) -> list[str]:
     """Lines for the terminal."""
+    from ..vibration.inherited import inherited_lines
+
     lines = [
         f"{summary['speeds_reached']} of {summary['speeds']} speeds, {summary['steady_states']} steady states; largest "
         f"error estimate {summary['largest_error_estimate']:.2g} of the approach under the steady force"
     ]
+    lines += inherited_lines(summary.get("inherited", {}))
     changes: dict[str, list[str]] = {}
     for change in summary["bifurcations"]:
         changes.setdefault(change["kind"], []).append(f"{change['speed_rad_per_s']:.6g}")

@@ -140,8 +140,11 @@ def title(table: TrainTable, *, driven: bool = True) -> str:
 
 def report_lines(response: TrainResponse, train: GearTrain, written: Written, choice: OutputChoice) -> list[str]:
     """Lines for the terminal."""
+    from ..vibration.inherited import inherited_lines
+
     summary = written.summary
     lines = [*_mesh_lines(response, train, summary), *_contact_lines(summary)]
+    lines += inherited_lines(summary.get("inherited", {}))
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)
         means = f"over the last {count} of them" if count else "over all times under load, which are fewer"

@@ -13,6 +13,8 @@ from ..progress import stage
 from ..rigid import constant
 from ..tables.runup import RunUpTable
 from ..train import build_train
+from ..train.gear_train import GearTrain
+from ..vibration.inherited import inherited
 from ..vibration.job import TrainJob, job_train, train_body
 from ..vibration.mesh_stiffness import train_curves
 from .instability import InstabilityMap, instability_map
@@ -52,6 +54,10 @@ def solved(
     return made, unstable
 
 
-def described(job: TrainJob, table: RunUpTable) -> dict[str, Any]:
+def described(job: TrainJob, table: RunUpTable, train: GearTrain) -> dict[str, Any]:
     """What was computed: entries of the summary."""
-    return {"variant": job.table.variant, "job": {"runup": asdict(table), "train": asdict(job.table)}}
+    return {
+        "variant": job.table.variant,
+        "inherited": inherited(job, train),
+        "job": {"runup": asdict(table), "train": asdict(job.table)},
+    }

@@ -116,17 +116,18 @@ def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
 
 def _runup(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
     from ..runup import report
+    from ..runup.critical import critical_speeds
     from ..runup.job import described, solved
     from ..tables.train import train_tables
     from ..vibration.job import train_job
 
     table, job = job_tables(raw, path, ("runup",))["runup"], train_job(path, train_tables(raw, path))
     run, unstable = solved(job, table, watch=Stopwatch())
-    modes, met = report.campbell(run, table.multiples)
+    critical = critical_speeds(run, table.multiples)
     notes = report.warnings(run)
-    made = {**described(job, table), **report.summary(run, modes, table.multiples), "warnings": notes}
+    made = {**described(job, table, run.train.model.train), **report.summary(run, critical), "warnings": notes}
     whole = made["speeds_reached"] == made["speeds"]
-    rows = report.tables(run, modes, met, table.multiples, unstable)
+    rows = report.tables(run, critical, table.multiples, unstable)
     return Answer(rows, made, "" if whole else "; ".join(notes) or "not all speeds were reached")
 
 

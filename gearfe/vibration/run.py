@@ -17,6 +17,7 @@ from ..train.phases import tooth_places
 from ..train.response import TrainResponse
 from ..train.simulate import simulate_in_pieces
 from .follow import TrainRun
+from .inherited import inherited
 from .job import TrainJob, job_train, train_body
 from .mesh_stiffness import train_curves
 from .report import stiffness_ranges
@@ -77,6 +78,7 @@ def described(job: TrainJob, train: GearTrain) -> dict[str, Any]:
     return {
         "variant": job.table.variant,
         "housing": housing or "rigid",
+        "inherited": inherited(job, train),
         "mesh_stiffness_N_per_m": stiffness_ranges(train),
         "mesh_phases_deg": {
             mesh.name: math.degrees(phase)
