@@ -105,7 +105,8 @@ def test_a_rigid_train(job, tmp_path, capsys):
     for part in ("mesh 1 (pinion-wheel): 1909.9 Hz", "resolution 500 Hz", "transient: done", "mean contact force"):
         assert part in said.out
     assert sorted(p.name for p in out.iterdir()) == [
-        "response.csv", "response.png", "spectrum.csv", "spectrum.png", "summary.json", "transmission_error.png",
+        "bearings.csv", "response.csv", "response.png", "spectrum.csv", "spectrum.png", "summary.json",
+        "transmission_error.png",
     ]  # fmt: skip
     names, values = table(out / "response.csv")
     assert names[:4] == ["time_s", "drive_angle_deg", "contact_force_1_N", "speed_one_rad_per_s"]
