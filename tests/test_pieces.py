@@ -92,7 +92,7 @@ def test_the_files_of_pieces(model, tmp_path, small_pieces):
         return write_run(tmp_path / name, planned, OutputChoice(), watch=Stopwatch())
 
     one, two = written("one", pieces), written("two", [joined(pieces)])
-    assert one.names == two.names == ("response.csv", "spectrum.csv", "summary.json")
+    assert one.names == two.names == ("bearings.csv", "response.csv", "spectrum.csv", "summary.json")
     texts = [(tmp_path / folder / "response.csv").read_text() for folder in ("one", "two")]
     assert texts[0] == texts[1]
     assert table(tmp_path / "one" / "response.csv")[1].shape[0] == 201
