@@ -147,8 +147,28 @@ def unknown_key(where: str, key: str, value: object, known: Iterable[str], *, fi
     return unknown_name(field or where or "job file", key, known)
 
 
+#: Names of other programs and of textbooks -> those of expressions here.
+SYNONYMS = {
+    **dict.fromkeys(("theta", "phi", "alpha", "beta", "psi", "rotation", "rot"), "angle"),
+    **dict.fromkeys(("omega", "w", "angular_velocity", "thetadot", "theta_dot", "phidot", "phi_dot"), "rate"),
+    **{
+        "t": "time",
+        "ln": "log",
+        "fabs": "abs",
+        "arcsin": "asin",
+        "arccos": "acos",
+        "arctan": "atan",
+        "arctan2": "atan2",
+    },
+}
+
+
 def nearest(name: str, choices: Iterable[str]) -> str:
-    """Question for the known name that is nearest to a wrong one; empty when none is near."""
+    """Question for the known name that means the same as a wrong one, or is nearest to it; empty when none is."""
+    choices = list(choices)
+    meant = [choice for choice in choices if choice.partition("(")[0] == SYNONYMS.get(name.lower())]
+    if meant:
+        return f"did you mean {meant[0]!r}?"
     near = difflib.get_close_matches(name[:LONGEST_TEXT], choices, n=1)
     return f"did you mean {near[0]!r}?" if near else ""
 

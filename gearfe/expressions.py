@@ -25,10 +25,15 @@ def syntax(text: str, label: str) -> ast.expr:
     if sum(text.count(sign) for sign in "+-*/(") > OPERATIONS:
         raise InputError(label, None, f"has more than {OPERATIONS} operations", "split it into several outputs")
     try:
-        return ast.parse(text.replace("\n", " ").strip(), mode="eval").body
+        tree = ast.parse(text.replace("\n", " ").strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         problem, cure = str(error).partition(" (")[0], "write numbers, names and functions as in Python"
         words = [word for word in re.findall(r"\w+", text) if keyword.iskeyword(word)]
         if words:
             cure += f"; {words[0]} is one of its keywords and can be no name here"
         raise InputError(label, text, f"is not an expression: {problem}", cure) from None
+    for node in ast.walk(tree):
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
+            power = f"{ast.unparse(node.left)} ** {ast.unparse(node.right)}"
+            raise InputError(label, text, "has ^, which is no power in this syntax", f"write {power}")
+    return tree

@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from gearfe.cli import main
+from gearfe.config import read_toml
 from gearfe.errors import LONGEST_MESSAGE, OUT_OF_SCOPE, InputError
+from gearfe.mechanisms.suspects import suspects
 from gearfe.tables.pair import GearTable, PairTable, ToothFormTable
 from gearfe.tables.train import TrainShaftTable, TrainTable
 
@@ -122,3 +124,55 @@ def test_bounds_are_of_the_key_that_was_written(
     message = refused(capsys, "gear", str(job))
     assert f"pair.pinion.{drawn.partition(' ')[0]} = " in message
     assert bound in message
+
+
+def mechanism(tmp_path: Path, *changes: tuple[str, str]) -> Path:
+    """The shipped slider crank with changes of its text."""
+    text = (Path(JOB).parent / "slider_crank.toml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    job = tmp_path / "mechanism.toml"
+    job.write_text(text, encoding="utf-8")
+    return job
+
+
+@pytest.mark.parametrize(
+    ("value", "cure"),
+    [
+        ("x(rod.B)^2", "write x(rod.B) ** 2"),
+        ("theta(crank)", "did you mean 'angle'?"),
+        ("omega(crank)", "did you mean 'rate'?"),
+        ("ln(2)", "did you mean 'log'?"),
+        ("sin(t)", "did you mean 'time'?"),
+        (LONG[:1500], "..."),
+    ],
+)
+def test_words_of_other_programs_in_expressions(
+    value: str, cure: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = f'[[outputs]]\nname = "of_mine"\nvalue = "{value}"\n'
+    job = mechanism(tmp_path)
+    job.write_text(job.read_text(encoding="utf-8") + output, encoding="utf-8")
+    message = refused(capsys, "mechanism", str(job), "--out", str(tmp_path / "out"))
+    assert cure in message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "remark"),
+    [
+        ("angle_deg = 45.0", "angle_rad = 45.0", "bodies.crank.angle_rad = 45 is 7.16 turns; if it is in degrees"),
+        ("B = [1.0, 0.0]", "B = [1000.0, 0.0]", "bodies.rod.points_m.B[0] = 1000 m is 1414 times the median"),
+    ],
+)
+def test_units_are_suspected_by_name(
+    old: str, new: str, remark: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    job = mechanism(tmp_path, (old, new))
+    main(["mechanism", str(job), "--out", str(tmp_path / "out"), "--until", "0.005", "--no-pictures", "--no-estimate"])
+    assert f"gearfe: warning: {remark}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["andrews", "slider_crank", "elastic_coupler", "elastic_slider_crank"])
+def test_shipped_mechanisms_are_not_suspected(name: str) -> None:
+    assert suspects(read_toml(Path(JOB).parent / f"{name}.toml")) == []
