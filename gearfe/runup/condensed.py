@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property, partial
 
 import numpy as np
@@ -20,7 +21,7 @@ from ..train.simulate import DIVERGED
 from ..typing import Array
 from .balance import Oscillator
 from .linear import Linear
-from .mesh_forces import MeshForces, Rubbing
+from .mesh_forces import WHOLE, MeshForces, Rubbing, SwingingTorque
 
 #: Meshes whose common period is of no more cycles share a phase: two phases then cost more than the longer period.
 SHARED = 12
@@ -73,31 +74,38 @@ class CondensedTrain:
         return np.asarray(shapes.T @ housing.radiation @ shapes)
 
 
-def condense(model: TrainModel, shared: int = SHARED) -> CondensedTrain:
+def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = ()) -> CondensedTrain:
     """The few freedoms of a train's meshes, at the loads that it has in the end.
 
     Parameters
     ----------
     shared
         Meshes that are in phase again after so many cycles at most share a phase.
+    speeds
+        Of the drive (rad/s), for loads that oscillate: periods of phases grow to those of torques that repeat after no
+        more than `shared` cycles of the fastest mesh.
 
     Raises
     ------
     InputError
-        For meshes of more than `MOST_PHASES` phases, rigid meshes, loads that oscillate, and parts that nothing holds.
+        For meshes of more than `MOST_PHASES` phases, rigid meshes, loads that never rest but for their sines, and parts
+        that nothing holds.
     """
     _check(model)
     modal, phases = model.modal, mesh_phases(model.rolling.cycles, shared)
     if len(phases) > MOST_PHASES:
         problem = f"need {len(phases)} phases of their own, more than {MOST_PHASES}: {model.rolling.note}"
         raise InputError("train.meshes", None, problem, "look at it with gearfe vibration")
+    phases = _with_torques(model, phases, shared, speeds)
     turns = [turns for turns, _ in phases]
     flanks = model.forces.flanks
     reads = [_directions(f) for f in flanks]
-    used = sorted({x for four in reads for x in four if x >= 0})
+    swinging = [(direction, wave) for direction, function in model.forces.torques for wave in function.sines]
+    used = sorted({*(x for four in reads for x in four if x >= 0), *(direction for direction, _ in swinging)})
     freedoms = np.array([[used.index(x) if x >= 0 else -1 for x in four] for four in reads])
     to_modes = modal.T.T @ model.directions
-    torque = sum((d * float(f(model.torque_end)) for d, f in model.torques), start=np.zeros(len(modal.T)))
+    ends = ((d, float(replace(f, sines=())(model.torque_end))) for d, f in model.torques)
+    torque = sum((d * value for d, value in ends), start=np.zeros(len(modal.T)))
     push = modal.constant + modal.T.T @ torque
     gyros = model.forces.gyros
     tilts = [column for g in gyros for column in (g.direction, g.direction + 1)]
@@ -113,8 +121,10 @@ def condense(model: TrainModel, shared: int = SHARED) -> CondensedTrain:
     rubbing = [_rubbing(model, flank, mesh_of[i], float(steady[mesh_of[i]])) for i, flank in enumerate(flanks)]
     orders = np.array([[int(c * t) * (i in at) for t, at in phases] for i, c in enumerate(model.rolling.cycles)])
     of_flank = np.array([np.where(orders[mesh_of[i]] > 0, [float(t) for t in turns], 0.0) for i in range(len(flanks))])
-    forces = MeshForces(flanks, freedoms, sense * of_flank, rubbing)
-    scale = _scale(model, linear, freedoms, flanks)
+    whole = np.array([float(t) for t in turns])
+    torques = [SwingingTorque(used.index(direction), *wave, whole) for direction, wave in swinging]
+    forces = MeshForces(flanks, freedoms, sense * of_flank, rubbing, torques)
+    scale = _scale(model, linear, freedoms, flanks, [torque.freedom for torque in torques])
     limit = DIVERGED * min(line.module for line in model.meshes) / float(scale[freedoms[:, 0]].max())
     many = tuple(tuple(row) for row in orders.tolist())
     start = linear.rest.copy()
@@ -161,9 +171,43 @@ def _check(model: TrainModel) -> None:
             problem = "has pitch errors: its motion repeats with the full period of the teeth, not with the meshes"
             raise InputError(f"gear {gear.name!r}", None, problem, "look at it with gearfe vibration")
     for load in model.train.loads:
-        if load.torque.sines:
-            problem = "oscillates: no motion repeats with the meshes"
-            raise InputError(f"load on {load.shaft!r}", None, problem, "look at it with gearfe vibration")
+        if not replace(load.torque, sines=()).ends:
+            problem = "changes all the time: no motion repeats with the meshes"
+            cure = "write what oscillates in sines, or look at it with gearfe vibration"
+            raise InputError(f"load on {load.shaft!r}", None, problem, cure)
+    if not model.train.driven.speed.ends:
+        problem = "has no speed in the end: no motion repeats with the meshes"
+        raise InputError(
+            "train.drive", None, problem, "prescribe a constant speed, or look at it with gearfe vibration"
+        )
+
+
+def _with_torques(
+    model: TrainModel, phases: list[tuple[Fraction, list[int]]], shared: int, speeds: Sequence[float]
+) -> list[tuple[Fraction, list[int]]]:
+    """Phases whose periods hold whole cycles of the torques that oscillate, at as many of the speeds as can be."""
+    cycles = model.rolling.cycles
+    for omega in {wave[1] for _, function in model.torques for wave in function.sines}:
+        for speed in speeds:
+            for number, (turns, meshes) in enumerate(phases):
+                part = Fraction(omega / abs(speed) * float(turns)).limit_denominator(shared)
+                longer = turns * part.denominator
+                near = abs(omega / abs(speed) * float(turns) - float(part)) <= WHOLE * float(part)
+                if part > 0 and near and longer * max(cycles[i] for i in meshes) <= shared:
+                    phases = [*phases[:number], (longer, meshes), *phases[number + 1 :]]
+                    break
+    return phases
+
+
+def unmatched(train: CondensedTrain, speed: float) -> str:
+    """Why no motion repeats at a speed (rad/s) under torques that oscillate, or nothing."""
+    for torque in train.forces.torques:
+        if torque.waves(speed) is None:
+            hertz = torque.omega / (2.0 * math.pi)
+            meshes = float(train.model.rolling.cycles[0]) * abs(speed) / (2.0 * math.pi)
+            said = f"a torque oscillates with {hertz:.9g} Hz, {hertz / meshes:.9g} times the frequency of mesh 1"
+            return f"{said}: the motion does not repeat within {SHARED} mesh cycles"
+    return ""
 
 
 def _damping(model: TrainModel) -> Array:
@@ -176,10 +220,13 @@ def _damping(model: TrainModel) -> Array:
     return made
 
 
-def _scale(model: TrainModel, linear: Linear, freedoms: Array, flanks: Sequence[Flank]) -> Array:
+def _scale(
+    model: TrainModel, linear: Linear, freedoms: Array, flanks: Sequence[Flank], torques: Sequence[int]
+) -> Array:
     """Approach of each mesh under its steady force; rotations that move a base circle so far."""
     size = max(float(np.abs(linear.rest[np.unique(freedoms[:, 0])]).max()), 1e-9)
     scale = np.full(linear.size, size)
+    scale[list(torques)] = size / (0.5 * model.meshes[0].module * 2.0 * math.pi)
     for flank, (d, r, _, s) in zip(flanks, freedoms, strict=True):
         if flank.mean > 0.0:
             scale[d] = max(abs(float(linear.rest[d])), 0.1 * size)

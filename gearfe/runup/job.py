@@ -45,7 +45,7 @@ def solved(
         made = run_up(model, speeds, **options)
     if not made.states:
         value = [table.speed_start_rad_per_s, table.speed_stop_rad_per_s]
-        problem = "has no periodic motion that was found at any of the speeds"
+        problem = "; ".join(["has no periodic motion that was found at any of the speeds", *made.notes])
         raise InputError("runup", value, problem, "add damping, or look at a transient: gearfe vibration")
     unstable = None
     if table.instability_loads:

@@ -50,6 +50,44 @@ class Rubbing:
         return replace(self.sliding, coefficient=mu, speed=self.sliding.speed * abs(speed / self.speed))
 
 
+#: A torque repeats with a phase where its cycles in the phase's period are a whole number to this part.
+WHOLE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class SwingingTorque:
+    """A torque ``amplitude sin(omega t + phase)`` along a freedom, which repeats with a phase of the motion.
+
+    Parameters
+    ----------
+    freedom
+        Its number.
+    amplitude, omega, phase
+        N m, rad/s, rad.
+    turns : (n,)
+        Turns of the drive in a period of each phase.
+    """
+
+    freedom: int
+    amplitude: float
+    omega: float
+    phase: float
+    turns: Array
+
+    def waves(self, speed: float) -> IntArray | None:
+        """Cycles in a period of each phase at a speed of the drive (rad/s), (n,); None where none has whole ones."""
+        cycles = self.omega / abs(speed) * self.turns
+        whole = np.round(cycles)
+        found = np.flatnonzero((np.abs(cycles - whole) <= WHOLE * cycles) & (whole > 0.0))
+        return None if not len(found) else np.asarray(whole * (np.arange(len(cycles)) == found[0]), dtype=np.int64)
+
+    def at(self, theta: Array, speed: float) -> Array:
+        """The torque (N m) at phases theta (S, n)."""
+        waves = self.waves(speed)
+        assert waves is not None  # such speeds are left out before
+        return np.asarray(self.amplitude * np.sin(theta @ waves + self.phase))
+
+
 @dataclass(frozen=True, eq=False)
 class MeshForces:
     """Forces of flanks at the m freedoms.
@@ -66,12 +104,15 @@ class MeshForces:
         backwards; 0 of other phases.
     rubbing
         Friction of each flank, or None.
+    torques
+        Those that swing.
     """
 
     flanks: Sequence[Flank]
     freedoms: IntArray
     turns: Array
     rubbing: Sequence[Rubbing | None]
+    torques: Sequence[SwingingTorque] = ()
     _pairs: dict[tuple[int, int], Array] = field(default_factory=dict, repr=False)
 
     def flank(self, number: int, theta: Array, speed: float, u: Array, du: Array) -> FlankForces:
@@ -120,4 +161,6 @@ class MeshForces:
                     by_rate[:, on, d] -= at.drag.by_rate[:, i]
                     by_rate[:, on, a] -= at.drag.by_across_rate[:, i]
                     by_rate[:, on, s] -= at.drag.by_turn_rate[:, i]
+        for torque in self.torques:
+            value[:, torque.freedom] += torque.at(theta, speed)
         return Pushes(value, by_place, by_rate, momentum, momentum_by_place)

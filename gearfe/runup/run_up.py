@@ -21,7 +21,7 @@ from ..train.kinematics import drive_sense
 from ..train.model import TrainModel
 from ..typing import Array, ComplexArray
 from .balance import Orbit, settled, size_of, solve
-from .condensed import CondensedTrain, condense
+from .condensed import CondensedTrain, condense, unmatched
 from .first import first_motion
 from .follow import Curve, Turn, follow
 from .results import SteadyState, steady_result
@@ -121,10 +121,13 @@ def steady_state(
     InputError
         For a train or speed that has no steady state, and where none was found.
     """
-    train = condense(model)
     _checked(model, [speed])
+    train = condense(model, speeds=[speed])
+    reason = unmatched(train, speed)
+    if reason:
+        raise InputError("speed", float(speed), f"has no periodic motion: {reason}", "look at it with gearfe vibration")
     with one_thread():
-        highest = 2.0 * math.pi * band_hz
+        highest = _highest(train, band_hz)
         if guess is None:
             made = first_motion(train.system, float(speed), tolerance=tolerance, highest=highest)
         else:
@@ -160,12 +163,15 @@ def run_up(
         For speeds that contain zero or change sign, and trains without a steady state.
     """
     given = _checked(model, speeds)
-    train = condense(model)
+    train = condense(model, speeds=given.tolist())
     made = _Curves([], [], [])
     lost: list[float] = []
-    options: dict[str, Any] = {"tolerance": tolerance, "highest": 2.0 * math.pi * band_hz}
+    options: dict[str, Any] = {"tolerance": tolerance, "highest": _highest(train, band_hz)}
     with one_thread():
         begin = 0
+        if train.forces.torques:  # of a fixed frequency: each speed is by itself
+            lost += _one_by_one(train, given, made, options)
+            begin = len(given)
         while begin < len(given):
             count(begin, len(given) - 1, "speeds")
             with stage("first motion"):
@@ -196,6 +202,32 @@ def run_up(
     notes = [*made.notes, *([_unfound(missing)] if missing else [])]
     turning = np.array([turn.speed for turn in made.turns])
     return RunUp(train, given, states, turning, _bifurcations(states, made.turns), tuple(notes), tolerance, band_hz)
+
+
+def _highest(train: CondensedTrain, band_hz: float) -> float:
+    """Angular frequency (rad/s) that harmonics reach at least: that of the band, and twice those of torques."""
+    return max(2.0 * math.pi * band_hz, *(2.0 * torque.omega for torque in train.forces.torques), 0.0)
+
+
+def _one_by_one(train: CondensedTrain, speeds: Array, made: _Curves, options: dict[str, Any]) -> list[float]:
+    """Motions at speeds that have no curve between them, since a torque has a frequency of its own; those not found."""
+    lost, refused = [], []
+    for number, speed in enumerate(speeds.tolist()):
+        count(number, len(speeds) - 1, "speeds")
+        reason = unmatched(train, speed)
+        if reason:
+            refused.append((speed, reason))
+            continue
+        with stage("first motion"):
+            orbit = first_motion(train.system, speed, **options)
+        if orbit is None:
+            lost.append(speed)
+        else:
+            made.orbits.append((orbit, 0))
+    if refused:
+        many = f"at {len(refused)} of {len(speeds)} speeds no motion repeats: at {refused[0][0]:.9g} rad/s "
+        made.notes.append(many + refused[0][1] + "; look at it with gearfe vibration")
+    return lost
 
 
 def _unfound(speeds: Sequence[float]) -> str:
