@@ -51,7 +51,7 @@ def motions_of_second_order(system: System, time: float, q: Array, count: int) -
     random = np.random.default_rng(5)
     found: list[Array] = []
     for _ in range(8 * count):
-        y: Array = random.standard_normal(free.shape[1])
+        y = random.standard_normal((free.shape[1],))
         for _ in range(STEPS if forms.size else 0):
             y = np.asarray(y / np.linalg.norm(y))
             turned = forms @ y
