@@ -106,6 +106,25 @@ def test_formats(mesh, box, formats) -> None:
     same(box, housing_from_table(table(mesh=mesh), formats))
 
 
+def test_an_instance_of_a_part(box, tmp_path) -> None:
+    """The shipped file of Abaqus as a part that its instance moves and turns back: mass, frequencies, bores."""
+    mesh = read_mesh_file(MESHES / "box.msh", "mesh", 1.0)
+    away = np.column_stack([-mesh.nodes[:, 1], mesh.nodes[:, 0], mesh.nodes[:, 2]]) - [100.0, 0.0, 0.0]
+    rows = [f"{i + 1}, {x!r}, {y!r}, {z!r}" for i, (x, y, z) in enumerate(away.tolist())]
+    text = ["*PART, NAME=Box", "*NODE", *rows, "*ELEMENT, TYPE=C3D10"]
+    text += [", ".join(str(n) for n in (e + 1, *(tet + 1))) for e, tet in enumerate(mesh.tets)]
+    text += ["*END PART", "*ASSEMBLY, NAME=A", "*INSTANCE, NAME=Box-1, PART=Box", "100., 0., 0."]
+    text += ["0., 0., 0., 0., 0., 1., -90.", "*END INSTANCE"]
+    for name in ("feet", *(b["group"] for b in BORES)):
+        numbers = np.intersect1d(mesh.groups[name], mesh.tets) + 1
+        text += [f"*NSET, NSET={name}, INSTANCE=Box-1", *(str(n) for n in numbers)]
+    (tmp_path / "box.inp").write_text("\n".join([*text, "*END ASSEMBLY", ""]))
+    other = housing_from_table(table(mesh="box.inp"), tmp_path)
+    same(box, other)
+    one, two = (h.reduce(6, quasi_static=0, estimate=False).coupled.frequencies_hz[:6] for h in (box, other))
+    assert two == pytest.approx(one, rel=1e-8)
+
+
 @pytest.mark.parametrize(
     ("ending", "group"),
     [("inp", "Surface1"), ("bdf", "1"), ("med", None), ("mesh", "1"), ("unv", None), ("vtk", None), ("msh", None)],

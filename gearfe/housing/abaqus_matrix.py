@@ -65,14 +65,14 @@ def read_substructure(text: str, path: Path, field: str, initial: str) -> tuple[
             if stripped.startswith("*"):
                 keys = "".join(stripped.upper().split()).split(",")
                 section, block = keys[0].lstrip("*"), None
-                values = dict(key.partition("=")[::2] for key in keys[1:])
+                given = dict(key.partition("=")[::2] for key in keys[1:])
                 if section == "USERELEMENT":
-                    count, symmetric = int(values["NODES"]), "UNSYMM" not in values
+                    count, symmetric = int(given["NODES"]), "UNSYMM" not in given
                 elif section == "MATRIX":
-                    if values["TYPE"] in blocks:
-                        problem = f"line {number}: the matrix {values['TYPE']} stands twice in the file"
+                    if given["TYPE"] in blocks:
+                        problem = f"line {number}: the matrix {given['TYPE']} stands twice in the file"
                         raise InputError(field, path.name, problem, "leave one substructure in the file")
-                    block = blocks.setdefault(values["TYPE"], [])
+                    block = blocks.setdefault(given["TYPE"], [])
             elif stripped and section == "USERELEMENT":
                 numbers = [int(word) for word in stripped.split(",") if word.strip()]
                 first, *own = numbers if freedoms else [1, *numbers]
@@ -89,15 +89,15 @@ def read_substructure(text: str, path: Path, field: str, initial: str) -> tuple[
         problem = f"has no *MATRIX, TYPE={kind}; there are: {known}"
         raise InputError(field, path.name, problem, f"write it with *SUBSTRUCTURE MATRIX OUTPUT, {kind}=YES")
     labels = _labels(nodes, freedoms, count, path, field)
-    n, given = len(labels), np.array(blocks[kind])
+    n, entries = len(labels), np.array(blocks[kind])
     asked = n * (n + 1) // 2 if symmetric else n * n
-    if len(given) != asked:
-        problem = f"the {kind} of {count} nodes with {n} freedoms must have {asked} numbers, but has {len(given)}"
+    if len(entries) != asked:
+        problem = f"the {kind} of {count} nodes with {n} freedoms must have {asked} numbers, but has {len(entries)}"
         raise InputError(field, path.name, problem, f"rows are missing or doubled; {_WHOLE}")
     if not symmetric:
-        return given.reshape(n, n), labels if nodes else []
+        return entries.reshape(n, n), labels if nodes else []
     values = np.zeros((n, n))
-    values[np.tril_indices(n)] = given
+    values[np.tril_indices(n)] = entries
     return values + np.tril(values, -1).T, labels if nodes else []
 
 

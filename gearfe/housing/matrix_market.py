@@ -52,11 +52,11 @@ def read_market(text: str, path: Path, field: str) -> Array:
         if layout == "array":
             flat = [float(word) for at, cells in body[1:] for word in cells]
             chosen = np.tril(np.ones((rows, columns), dtype=bool)) if symmetry == "symmetric" else ~given
-            j, i = np.nonzero(chosen.T)  # column by column
-            if len(flat) != len(i):
-                problem = f"has {len(flat)} numbers, its size line asks for {len(i)}"
+            along, down = np.nonzero(chosen.T)  # column by column
+            if len(flat) != len(down):
+                problem = f"has {len(flat)} numbers, its size line asks for {len(down)}"
                 raise InputError(field, path.name, problem, _WHOLE)
-            values[i, j] = flat
+            values[down, along] = flat
         else:
             if len(body) - 1 != count[0]:
                 problem = f"has {len(body) - 1} entries, its size line says {count[0]}"

@@ -162,7 +162,7 @@ class _Reader:
         nodes = self.open.nodes
         if nodes:
             placed = np.array(list(nodes.values())) @ turn.T + shift
-            self.open.nodes = dict(zip(nodes, map(tuple, placed.tolist()), strict=True))  # type: ignore[arg-type]
+            self.open.nodes = dict(zip(nodes, map(tuple, placed.tolist()), strict=True))
         self._end(card)
 
     def _placement(self) -> tuple[Array, Array]:

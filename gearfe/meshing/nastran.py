@@ -6,6 +6,7 @@ Reals may leave out the E of their exponent (2.5+3).
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator
 
@@ -16,11 +17,14 @@ _INCLUDE = re.compile(r"\s*INCLUDE\s+(.+)$", re.IGNORECASE)
 
 
 def number(text: str) -> float:
-    """A real of Nastran: 2.5, 2.5E+3, 2.5D+3 or 2.5+3."""
+    """A real of Nastran: 2.5, 2.5E+3, 2.5D+3 or 2.5+3; ValueError for anything else."""
     found = _REAL.match(text)
     if found is None:
         raise ValueError(text)
-    return float(f"{found[1]}e{found[2] or found[3] or 0}")
+    value = float(f"{found[1]}e{found[2] or found[3] or 0}")
+    if math.isinf(value):
+        raise ValueError(f"{text} is larger than any number")
+    return value
 
 
 def inclusion(line: str) -> Inclusion | None:

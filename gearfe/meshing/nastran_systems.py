@@ -81,7 +81,7 @@ class Systems:
         """
         places = np.array([point for point, _, _ in grids.values()], dtype=float).reshape(-1, 3)
         names = [name for _, name, _ in grids.values()]
-        first = {name: line for _, name, line in reversed(grids.values())}
+        first = {name: line for _, name, line in reversed(list(grids.values()))}
         for name, line in first.items():
             if name not in _BASIC:
                 chosen = np.array([own == name for own in names])
