@@ -49,6 +49,9 @@ REFUSED = {
     ),
 }
 _INCLUDE = re.compile(r"\*\s*INCLUDE\s*,", re.IGNORECASE)
+#: Cards whose data may stand in a file of its own; files of other cards, such as loads, do not matter.
+FROM_FILES = ("INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")
+_FROM_FILES = re.compile(rf"\*\s*({'|'.join(FROM_FILES)})\s*,", re.IGNORECASE)
 _INPUT = re.compile(r",\s*INPUT\s*=\s*(\"[^\"]*\"|[^,]*)", re.IGNORECASE)
 _PARTS = re.compile(r'((?:[^,"]|"[^"]*")*)(?:,|$)')
 
@@ -75,7 +78,7 @@ class Fault(NamedTuple):
 
 def inclusion(line: str) -> Inclusion | None:
     """File whose lines follow: that of an *INCLUDE, or the data of another card."""
-    if not line.lstrip().startswith("*") or line.lstrip().startswith("**"):
+    if not _FROM_FILES.match(line.lstrip()):
         return None
     named = _INPUT.search(line)
     return None if named is None else Inclusion(named[1].strip().strip('"'), not _INCLUDE.match(line.lstrip()))
@@ -124,7 +127,7 @@ def _card(line: Line, fault: Fault) -> Card:
         does, cure = REFUSED[name]
         problem = f"the card {first} {does}, which is not supported"
         raise fault.at(line, problem, cure)
-    if name == "INCLUDE" or ("INPUT" in keys and inclusion(line.text) is None):
+    if name == "INCLUDE" or (name in FROM_FILES and "INPUT" in keys and inclusion(line.text) is None):
         raise fault.at(line, "a file is included that cannot be found", "write *INCLUDE, INPUT=file in one line")
     return Card(name, keys, [], line)
 
