@@ -21,7 +21,7 @@ import numpy as np
 
 from ..cache import cache_key, cached_arrays, source_hash, versions
 from ..config import load_job
-from ..contact.laws import ContactLaw, PairModel, check_alike, check_torque, law_named
+from ..contact.laws import ContactLaw, PairModel, check_alike, check_poisson, check_torque, law_named
 from ..elasticity import Material
 from ..errors import InputError
 from ..gear.face import NOMINAL, ToothDeviations
@@ -106,6 +106,11 @@ class StiffnessJob:
     def model(self) -> PairModel:
         """What `gearfe.stiffness.sweep.elastic_pair` makes of the gears."""
         t = self.table
+        for side, material in zip(("pinion", "wheel"), self.materials, strict=True):
+            own = getattr(self.pair_table, side).material is not None
+            check_poisson(
+                material.poisson_ratio, t.plane, f"pair.{side if own else ''}{'.' * own}material.poisson_ratio"
+            )
         sizes = t.coarsen, t.flank_coarsen, t.points_per_edge
         return PairModel(self.materials, t.plane, self.law, *sizes, self.deviations)
 
