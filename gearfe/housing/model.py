@@ -16,6 +16,7 @@ from ..reduction.craig_bampton import Partition, partition, reduce_model
 from ..reduction.modal_body import ModalBody
 from ..shown import Facts
 from ..solid import SolidMatrices
+from ..tables.housing import POISSON_RATIOS
 from ..typing import Array, IntArray
 from .attachments import (
     Attachment,
@@ -38,6 +39,8 @@ LINEAR_NOTE = (
 )
 FREE_NOTE = "nothing is fixed: the housing is free and has six rigid-body modes"
 STEEL = Material()
+#: Most modes that are sought by frequency, as `modes` allows.
+MOST_MODES = 2000
 #: Part of the largest energy below which a field is contained in the others.
 DEPENDENT = 1e-10
 #: Part of the square of the highest frequency below which a mode is a rigid motion.
@@ -156,6 +159,10 @@ class Housing(Facts):
         outer: Outer | None = None,
     ) -> Housing:
         """Housing from a mesh that is in order; see `from_arrays`. `fixed` are numbers of nodes."""
+        low, high = POISSON_RATIOS
+        if not low <= material.poisson_ratio <= high:
+            problem = f"must be {low:g} to {high:g}: beyond, elements lock, and the mesh's error estimate does not hold"
+            raise InputError("material.poisson_ratio", material.poisson_ratio, problem, f"give {high:g} at most")
         made: list[Attachment] = []
         notes: list[str] = []
         for number, bore in enumerate(bores, start=1):
@@ -241,6 +248,8 @@ class Housing(Facts):
             Whether the body carries an estimate of the mesh's error (`ModalBody.softening`).
         """
         matrices, motions = self.matrices(), rigid_motions(self.nodes)
+        if modes is None:
+            self._check_frequency(below_hz, float(matrices.nodal_mass.sum()))
         parts = self.partition(matrices)
         momenta = (matrices.nodal_mass @ motions.reshape(len(self.nodes), -1)).reshape(motions.shape)
         del matrices  # a quarter of the peak of memory
@@ -249,6 +258,7 @@ class Housing(Facts):
             count=modes,
             below_hz=below_hz if modes is None else np.inf,
             at_least=least_modes,
+            at_most=MOST_MODES,
             corrections=quasi_static,
             free=len(self.fixed) == 0,
         )
@@ -275,6 +285,26 @@ class Housing(Facts):
             added_kg=self.added_kg,
         )
         return self.with_estimate(body) if estimate else body
+
+    def _check_frequency(self, below_hz: float, mass_kg: float) -> None:
+        """Raise `InputError` where more modes lie below a frequency than can be found, before any is sought.
+
+        Weyl's law counts ``V 4 pi/3 f^3 (1/c_l^3 + 2/c_t^3)`` modes of an elastic body below f, c_l and c_t the speeds
+        of its waves; thin bodies have more (Courant, Hilbert, Methods of Mathematical Physics I, ch. VI.4).
+        """
+        lam, mu = self.material.lame()
+        density = self.material.density
+        slow, fast = np.sqrt(mu / density), np.sqrt((lam + 2.0 * mu) / density)
+        per_cube = mass_kg / density * 4.0 * np.pi / 3.0 * (1.0 / fast**3 + 2.0 / slow**3)
+        most = min(MOST_MODES, len(self.internal) // 2)
+        if per_cube * below_hz**3 > most:
+            highest = float(np.cbrt(most / per_cube))
+            problem = (
+                f"about {per_cube * below_hz**3:.2g} modes of this body or more lie below it; {most} can be found "
+                f"({len(self.internal)} free unknowns), up to about {highest:.2g} Hz (shear waves of {slow:.3g} m/s)"
+            )
+            cure = "give twice the highest frequency of interest, or modes; check modulus, density and unit of the mesh"
+            raise InputError("housing.reduction.modes_below_Hz", below_hz, problem, cure)
 
     @property
     def rigid_nodes(self) -> list[IntArray]:

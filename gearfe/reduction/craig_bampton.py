@@ -106,6 +106,7 @@ def reduce_model(
     count: int | None = None,
     below_hz: float = math.inf,
     at_least: int = 0,
+    at_most: int | None = None,
     corrections: int = 1,
     free: bool = False,
 ) -> Reduction:
@@ -119,6 +120,8 @@ def reduce_model(
         Number of modes with the interfaces held, and their highest frequency (Hz): whichever ends first.
     at_least
         Number of modes kept in any case, when they are chosen by frequency.
+    at_most
+        Number of modes beyond which a highest frequency is refused.
     corrections
         Levels of correction vectors; 0 gives plain Craig-Bampton.
     free
@@ -140,7 +143,13 @@ def reduce_model(
     limit = (2.0 * math.pi * below_hz) ** 2
     with stage("modes"):
         modes = lowest_modes(
-            factor.solve, m_ii, count=count, limit=limit, at_least=at_least if count is None else 0, shift=shift
+            factor.solve,
+            m_ii,
+            count=count,
+            limit=limit,
+            at_least=at_least if count is None else 0,
+            at_most=at_most if count is None else None,
+            shift=shift,
         )
     added, left = _corrections(factor, m_ii, modes.vectors, coupling, corrections if m else 0)
     inner = np.concatenate([modes.vectors, added], axis=1)

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..typing import Array
 
 #: Residual of a mode, relative to theta, at which it counts as found; its frequency is then right to about its square.
@@ -54,6 +55,7 @@ def lowest_modes(
     count: int | None = None,
     limit: float = math.inf,
     at_least: int = 0,
+    at_most: int | None = None,
     shift: float = 0.0,
     block: int = 8,
 ) -> Modes:
@@ -71,10 +73,17 @@ def lowest_modes(
         Upper end of the eigenvalues (rad^2/s^2); with `count` given the smaller set is returned.
     at_least
         Least number of modes, even above the limit.
+    at_most
+        Number of modes below the limit with which the search is given up; by default it goes on.
     shift
         s >= 0 (rad^2/s^2), for pairs whose K is singular.
     block
         Columns a step.
+
+    Raises
+    ------
+    InputError
+        When more than `at_most` modes lie below the limit.
     """
     n = mass.shape[0]
     needed = n if count is None else min(count, n)
@@ -103,7 +112,13 @@ def lowest_modes(
         eigenvalues = 1.0 / np.maximum(theta, 1e-300) - shift
         found = residual <= TOLERANCE * np.abs(theta)
         near = residual <= NEAR * np.abs(theta)
-        inside = min(needed, max(at_least, int(np.searchsorted(eigenvalues, limit, side="right"))))
+        below = int(np.searchsorted(eigenvalues, limit, side="right"))
+        if at_most is not None and below > at_most:  # values of the projection lie above those of the pair
+            hz = [math.sqrt(max(value, 0.0)) / (2.0 * math.pi) for value in (limit, eigenvalues[at_most])]
+            problem = f"more than {at_most} modes lie below it, {at_most} of them below about {hz[1]:.3g} Hz"
+            cure = "give a lower one, or their number (modes); check modulus, density and unit of the mesh"
+            raise InputError("modes_below_Hz", hz[0], problem, cure)
+        inside = min(needed, max(at_least, below))
         exhausted = basis.size == done or done >= n
         inside = min(inside, n)
         if exhausted or (inside < done and bool(np.all(found[:inside])) and bool(near[inside])):

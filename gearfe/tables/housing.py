@@ -48,6 +48,14 @@ class FeetTable:
     fixed: bool = quantity(True, doc="whether the bottoms of the feet are held; false gives a free housing")
 
 
+#: Poisson's ratios (-) for which the mesh's error estimate holds. Tetrahedra lock near 0.5: errors against
+#: finer elements that do not (Taylor-Hood) were 0.81 of the estimate at 0.49, 0.98 at 0.495, 1.32 at 0.499; against a
+#: finer mesh 0.25 of it at -0.99.
+POISSON_RATIOS = (-0.99, 0.49)
+#: Speeds sqrt(E/rho) (m/s) of waves along bars: rubber has about 30, steel 5000, beryllium 13,000, diamond 18,000.
+BAR_SPEEDS = (20.0, 20_000.0)
+
+
 @dataclass(frozen=True)
 class HousingMaterialTable:
     """The housing's material."""
@@ -55,6 +63,24 @@ class HousingMaterialTable:
     youngs_modulus_GPa: float = quantity(200.0, low=1e-9, high=2000.0, doc="Young's modulus (GPa)")
     poisson_ratio: float = quantity(0.3, above=-1.0, below=0.5, doc="Poisson's ratio")
     density_kg_per_m3: float = quantity(7850.0, low=1e-9, high=1e9, doc="density (kg/m3)")
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for a Poisson's ratio that locks, and a modulus and a density that no solid has."""
+        low, high = POISSON_RATIOS
+        if not low <= self.poisson_ratio <= high:
+            problem = f"must be {low:g} to {high:g}: beyond, elements lock, and the mesh's error estimate does not hold"
+            cure = (
+                f"give {high:g} for a material that keeps its volume" if self.poisson_ratio > high else "0.3 is usual"
+            )
+            raise InputError(f"{where}.poisson_ratio", self.poisson_ratio, problem, cure)
+        speed = math.sqrt(1e9 * self.youngs_modulus_GPa / self.density_kg_per_m3)
+        if not BAR_SPEEDS[0] <= speed <= BAR_SPEEDS[1]:
+            problem = (
+                f"and youngs_modulus_GPa = {self.youngs_modulus_GPa:g} give waves of {speed:.3g} m/s along a bar: "
+                f"must be {BAR_SPEEDS[0]:g} to {BAR_SPEEDS[1]:g}"
+            )
+            cure = "one of them has another unit: steel has 7850 kg/m3 and 200 GPa, aluminium 2700 and 70"
+            raise InputError(f"{where}.density_kg_per_m3", self.density_kg_per_m3, problem, cure)
 
 
 @dataclass(frozen=True)
