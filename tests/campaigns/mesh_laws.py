@@ -7,6 +7,7 @@ was not made from.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,8 +28,13 @@ from .toml_text import toml_text
 TRUTHS, PLACES = 80, 2000
 #: Torques at the driven gear, as shares of what the material bears.
 TORQUES = (1e-4, 1.0)
-#: Largest error (of the force, or of a tenth of the largest one) over the stated one.
-FAR_OFF = 3.0
+#: Largest error (of the force, or of a tenth of the largest one) over the stated one, and the load (N/mm) from which on
+#: it is checked: in lighter contacts pairs change within a thousandth of a mesh cycle, where no place may have looked.
+FAR_OFF, CHECKED_LOAD = 3.0, 1.0
+
+
+#: Loads (N/mm) that part the rows of the table, and its quantiles.
+LOADS, QUANTILES = (0.0, 1.0, 10.0, math.inf), (0.5, 0.9, 1.0)
 
 
 def draw(random: np.random.Generator, number: int) -> Case:
@@ -87,26 +93,28 @@ def run(case: Case, folder: Path) -> Finding:
         "true_error_95": float(f"{np.quantile(off, 0.95):.3g}"),
         "unsolved": int((~solved).sum()),
     }
-    checks = [
-        Check("places without forces", float((~(forces > 0.0)).sum()), 0.0),
-        Check("error over stated", worst / law.error, FAR_OFF),
-    ]
+    checks = [Check("places without forces", float((~(forces > 0.0)).sum()), 0.0)]
+    if measures["load_N_per_mm"] >= CHECKED_LOAD:
+        checks.append(Check("error over stated", worst / law.error, FAR_OFF))
     return Finding("done", "", checks, measures)
 
 
 def tables(outcomes: Sequence[Outcome]) -> dict[str, Columns]:
-    """Distribution of the stated and the true largest errors (%) of the laws."""
+    """Stated and true largest errors (%) of the laws: median, nine of ten, largest, by the load (N/mm)."""
     rows = [row.measures for row in outcomes if row.measures]
-    if not rows:
-        return {}
-    shares = (0.1, 0.5, 0.9, 0.95, 1.0)
-    columns: dict[str, list[Any]] = {"quantile": list(shares)}
-    for name in ("stated_error", "true_error", "true_error_95"):
-        values = 100.0 * np.array([row[name] for row in rows])
-        columns[f"{name}_percent"] = [float(f"{value:.3g}") for value in np.quantile(values, shares)]
-    ratio = np.array([row["true_error"] / row["stated_error"] for row in rows])
-    columns["true_over_stated"] = [float(f"{value:.3g}") for value in np.quantile(ratio, shares)]
-    return {"mesh_laws_errors": columns}
+    columns: dict[str, list[Any]] = {"load_from_N_per_mm": [], "pairs": [], "quantile": []}
+    for low, high in itertools.pairwise(LOADS):
+        chosen = [row for row in rows if low <= row["load_N_per_mm"] < high]
+        for share in QUANTILES if chosen else ():
+            columns["load_from_N_per_mm"].append(low)
+            columns["pairs"].append(len(chosen))
+            columns["quantile"].append(share)
+            for name in ("stated_error", "true_error", "true_error_95"):
+                value = 100.0 * np.quantile([row[name] for row in chosen], share)
+                columns.setdefault(f"{name}_percent", []).append(float(f"{value:.3g}"))
+            ratio = np.quantile([row["true_error"] / row["stated_error"] for row in chosen], share)
+            columns.setdefault("true_over_stated", []).append(float(f"{ratio:.3g}"))
+    return {"mesh_laws_errors": columns} if rows else {}
 
 
 CAMPAIGN = Campaign("mesh_laws", 200, (0, 1, 2, 3), 120.0, draw, run, tables)
