@@ -8,6 +8,7 @@ Hairer, Lubich & Wanner, Geometric Numerical Integration, Sec. VI.4).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -123,11 +124,20 @@ def scheme(family: str, stages: int) -> Scheme:
     )  # fmt: skip
 
 
-def path_matrix(c: Array, accelerations: bool = False) -> Array:
-    """Coefficients of powers of x from q, h v at 0, q at the places c, q, h v at 1, and from h^2 q'' at 0 and 1."""
+def path_matrix(c: Array, accelerations: bool = False, origin: float = 0.0) -> Array:
+    """Coefficients of powers of x - origin from q, h v at 0, q at c, q, h v at 1, and from h^2 q'' at 0 and 1.
+
+    About the middle of the step rounding weighs a thousand times less at the step's end than about its begin.
+    """
     p = np.arange(len(c) + (6.0 if accelerations else 4.0))
-    rows = [p == 0, p == 1, *c[:, None] ** p, np.ones_like(p), p]
-    return np.linalg.inv(np.array([*rows, *([2.0 * (p == 2), p * (p - 1.0)] if accelerations else [])], dtype=float))
+
+    def derivative(x: float, k: int) -> Array:
+        factors = np.array([math.perm(j, k) for j in range(len(p))], dtype=float)
+        return np.asarray(factors * (x - origin) ** np.maximum(p - k, 0.0))
+
+    rows = [derivative(0.0, 0), derivative(0.0, 1), *(derivative(x, 0) for x in c), derivative(1.0, 0)]
+    rows += [derivative(1.0, 1), *([derivative(0.0, 2), derivative(1.0, 2)] if accelerations else [])]
+    return np.linalg.inv(np.array(rows))
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ class Dense(Protocol):
 
 @dataclass(frozen=True)
 class Polynomials:
-    """Dense output: on step k the polynomial sum_j c_kj (t - t_k)^j.
+    """Dense output: on step k the polynomial sum_j c_kj (t - o_k)^j about its origin o_k, by default the begin t_k.
 
     Parameters
     ----------
@@ -44,12 +44,15 @@ class Polynomials:
     begin
         Start of the run where that is not the first of the times (s): a start on a singular position is left by a
         series about a moment a little later.
+    origins : ndarray, shape (steps,), optional
+        o_k (s).
     """
 
     times: Array
     coefficients: Array
     evaluate: Callable[..., None] | None = None
     begin: float | None = None
+    origins: Array | None = None
 
     def __call__(self, t: ArrayLike, derivative: int = 0) -> Array:
         """Values of all columns (or a derivative of them) at the times t."""
@@ -63,7 +66,7 @@ class Polynomials:
             self.evaluate(self.times, self.coefficients, sign, t, derivative, out)
             return out
         k = np.clip(np.searchsorted(sign * self.times, sign * t, side="right") - 1, 0, len(self.coefficients) - 1)
-        h = (t - self.times[k])[:, None]
+        h = (t - (self.times if self.origins is None else self.origins)[k])[:, None]
         for j in range(self.coefficients.shape[1] - 1, derivative - 1, -1):
             out = out * h + math.perm(j, derivative) * self.coefficients[k, j]
         return out

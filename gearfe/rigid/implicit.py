@@ -70,6 +70,14 @@ KERNELS = Kernels(
 STAGES = 7
 #: Steps whose polynomials are made at once; bytes of a run's steps from which on they are told.
 BLOCK, TOLD_BYTES = 1024, 1e9
+#: Share of a step about which its polynomials are written.
+MIDDLE = 0.5
+#: Relative to the largest coordinate: a step whose path is straight within this is too short for differences of its
+#: positions, which are rounding, to give accelerations or multipliers.
+STRAIGHT = 1e-12
+#: A step more than so many times as long as the last one begins anew: speeds and multipliers of a very short step are
+#: rounding over powers of its length.
+MOST_AHEAD = 10.0
 #: Share of a step that is tried after Newton did not converge.
 NOT_SOLVED_SHARE = 0.3
 #: Rate of Newton's changes with which the next step is as long as the last; it grows with the step.
@@ -103,7 +111,7 @@ def run_implicit(
         )
         coefficients = within.coefficients @ modal.T.T
         coefficients[:, 0] += modal.origin
-        return Polynomials(within.times, coefficients), status, {**statistics, "free_coordinates": inner.size}
+        return replace(within, coefficients=coefficients), status, {**statistics, "free_coordinates": inner.size}
     step = Stepper(system, start, scheme(family, STAGES), program)
     return step.run(system, start, times, tolerance, watch, options)
 
@@ -230,7 +238,7 @@ class Stepper:
             ends.append(t)
             self.keep(h)
             q, v = w.qn.copy(), w.vn.copy()
-            if corners.passing(h):  # its multipliers are rounding over the square of its length
+            if corners.passing(h) or control.trial > MOST_AHEAD * abs(h):
                 accelerations.append(self.restart(system, start, t, q, v))
             elif not system.stressed:
                 accelerations.append(system.acceleration(t, q, v, start.active, start.excess)[0])
@@ -267,30 +275,76 @@ class Stepper:
     ) -> Polynomials:  # fmt: skip
         """Polynomials through the stages of every step and the states at its ends.
 
-        Accelerations of stiff links at the ends are the rounding of their strains; those of others are exact and in it.
+        Accelerations of stiff links at the ends are the rounding of their strains; those of others follow from the
+        equations of motion there. In steps that are too short for differences of positions (`STRAIGHT`) accelerations
+        go on a line between these; stiff links keep theirs, and their forces, from the step before.
         """
         inner, s = self.tab.inner, len(self.tab.c)
         if not known:
             return Polynomials(times, np.zeros((0, *self.w.known.shape)))
         h = np.diff(times)[:, None, None]
-        path = self.tab.path if system.stressed else path_matrix(self.tab.c[:inner], accelerations=True)
+        path = path_matrix(self.tab.c[:inner], accelerations=not system.stressed, origin=MIDDLE)
+        middles = times[:-1] + MIDDLE * np.diff(times)
         coefficients = np.empty((len(known), len(path), system.size))
         carried = [*np.flatnonzero(start.active), *(system.rows + np.arange(self.w.S.shape[0]))]
         parts = np.zeros((len(known), s, system.rows + self.w.S.shape[0])) if system.stressed else None
+        short, known_ends = np.zeros(len(known), dtype=bool), np.zeros((len(known), 2, system.size))
+        force_path = np.linalg.inv((self.tab.c[:, None] - MIDDLE) ** np.arange(s))
         for k in range(0, len(known), BLOCK):
             block = slice(k, k + BLOCK)
             whole, own = np.array(known[block]), h[block]
+            short[block], known_ends[block] = self._straight(whole, system.units), whole[:, :2]
             if not system.stressed:
                 a = np.array(accelerations[k : k + BLOCK + 1])[:, None, :]
                 whole = np.concatenate([whole, own**2 * a[:-1], own**2 * a[1:]], axis=1)
             coefficients[block] = powers_of_path(path, whole, inner) / own ** np.arange(len(path))[:, None]
             if parts is not None:
                 found = np.array(forces[block])[:, :, :s].transpose(0, 2, 1)
-                parts[block, :, carried] = self.tab.force @ found / own ** np.arange(s)[:, None]
+                parts[block, :, carried] = force_path @ found / own ** np.arange(s)[:, None]
             known[block] = forces[block] = [self.w.known[:0]] * len(whole)  # their memory is free
+        ends = np.array(accelerations) if parts is None else None
+        for k in np.flatnonzero(short):
+            a = [_before(coefficients, h[:, 0, 0], int(k), short)] * 2 if ends is None else ends[k : k + 2]
+            coefficients[k] = _line_of_accelerations(len(path), h[k, 0, 0], known_ends[k], a)
+            if parts is not None:
+                force = _before(parts, h[:, 0, 0], int(k), short, 0)
+                parts[k], parts[k, 0] = 0.0, force
         if parts is None:
-            return Polynomials(times, coefficients)
-        return Collocated(times, coefficients, forces=Polynomials(times, parts))
+            return Polynomials(times, coefficients, origins=middles)
+        return Collocated(times, coefficients, origins=middles, forces=Polynomials(times, parts, origins=middles))
+
+    def _straight(self, known: Array, units: Array) -> Array:
+        """Whether the stages of steps (steps, k, n) are on straight lines within rounding."""
+        begin, speed = known[:, :1], known[:, 1:2]
+        c = self.tab.c[: self.tab.inner, None]
+        bent = np.abs((known[:, 2 : self.tab.inner + 2] - begin - c * speed) / units).max(axis=(1, 2), initial=0.0)
+        return np.asarray(bent <= STRAIGHT * np.abs(begin / units).max(axis=(1, 2), initial=0.0))
+
+
+def _before(coefficients: Array, h: Array, k: int, short: Array, derivative: int = 2) -> Array:
+    """A derivative of polynomials about the middles of steps h (s), just before step k.
+
+    Of the last step without the flag `short`, as Radau's stages are the more exact the nearer to their end; else of the
+    next one at its begin, or zero.
+    """
+    before, behind = np.flatnonzero(~short[:k])[-1:], k + 1 + np.flatnonzero(~short[k + 1 :])[:1]
+    for step, x in ((before, 0.5), (behind, -0.5)):
+        for i in step:
+            powers = [
+                math.perm(j, derivative) * (x * h[i]) ** max(j - derivative, 0) for j in range(coefficients.shape[1])
+            ]
+            return np.asarray(powers @ coefficients[i])
+    return np.zeros(coefficients.shape[2])
+
+
+def _line_of_accelerations(count: int, h: float, begin: Array, a: Array | list[Array]) -> Array:
+    """Coefficients (count, n) about the middle of a step from (q, h v) at its begin, and from q'' at both ends."""
+    middle, slope = 0.5 * (a[0] + a[1]), (a[1] - a[0]) / h
+    v = begin[1] / h + 0.5 * h * (a[0] + 0.25 * h * slope)
+    coefficients = np.zeros((count, len(middle)))
+    coefficients[0] = begin[0] + 0.5 * begin[1] + h * h * (a[0] / 8.0 + h * slope / 48.0)
+    coefficients[1:4] = v, 0.5 * middle, slope / 6.0
+    return coefficients
 
 
 def work(s: int, n: int, m: int, k: int, known: int) -> Stages:

@@ -50,22 +50,22 @@ def begin(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
 
 
 def stages(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
-    """See `kernel_equations.stages`."""
+    """See `kernel_equations.stages`; all stages in one call of each element where it takes many states."""
     system, s = eq.system, len(tab.c)
-    for i, place in enumerate(tab.side.c):
-        t, q, v = w.now[0] + place * w.now[1], w.Q[:, i].view(np.ndarray), w.V[:, i].view(np.ndarray)
-        force = system.force(t, q, v, stressed=False)
-        for k, (element, index, part, shape) in enumerate(eq.stressed):
-            if i == s:  # the step's begin
-                force[index] += element.force(t, q[index], v[index])
-                continue
-            pull, lacks = eq.tangents[k].force(q[index], v[index], w.S[part, i].reshape(shape))
-            force[index] += pull
+    t, q, v = w.now[0] + tab.side.c * w.now[1], w.Q.view(np.ndarray).T.copy(), w.V.view(np.ndarray).T.copy()
+    force = system.force(t, q, v, stressed=False)
+    for k, (element, index, part, shape) in enumerate(eq.stressed):
+        force[s, index] += element.force(t[s], q[s, index], v[s, index])  # the step's begin
+        for i in range(s):
+            pull, lacks = eq.tangents[k].force(q[i, index], v[i, index], w.S[part, i].reshape(shape))
+            force[i, index] += pull
             w.S[part, i] += lacks.ravel()
-        G = system.jacobian(t, q)[eq.active]
-        w.rest[:, i] = system.mass @ w.A[:, i] - force + G.T @ w.L[:, i]
-        rate = w.now[1] * (G @ v + system.rate(t, q)[eq.active]) if tab.level else system.residual(t, q)[eq.active]
-        w.gap[:, i] = rate
+    G = system.jacobian(t, q)[:, eq.active]
+    w.rest[:] = system.mass @ w.A - force.T + np.einsum("irn,ri->ni", G, w.L.view(np.ndarray))
+    if tab.level:
+        w.gap[:] = w.now[1] * ((G @ v[..., None])[..., 0] + system.rate(t, q)[:, eq.active]).T
+    else:
+        w.gap[:] = system.residual(t, q)[:, eq.active].T
 
 
 def linearise(eq: SystemEquations, w: Stages, i: int, t: float) -> bool:
@@ -147,9 +147,8 @@ def gap_between(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
     """Largest gap of a row between the stages, in its unit."""
     if not eq.active.any() or not np.isfinite(w.known).all():
         return 0.0
-    states = zip(w.now[0] + tab.middles * w.now[1], tab.between @ w.known, strict=True)
-    gaps = [eq.system.residual(*state)[eq.active] / eq.system.row_units[eq.active] for state in states]
-    return float(np.abs(gaps).max())
+    gaps = eq.system.residual(w.now[0] + tab.middles * w.now[1], tab.between @ w.known)
+    return float(np.abs(gaps[:, eq.active] / eq.system.row_units[eq.active]).max())
 
 
 def project(eq: SystemEquations, w: Stages, tab: Scheme) -> None:  # noqa: ARG001

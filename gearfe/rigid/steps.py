@@ -32,6 +32,8 @@ CUT = 0.01
 #: Steps below this share of the time, or of the run's length, are rounding; steps below the second whose errors have no
 #: size end the run.
 ROUNDING, NO_SIZE = 1e-14, 1e-12
+#: Share of a step by which it is made longer to end at a break or at the end: rounding of the time leaves no step.
+STRETCH = 1e-6
 #: Steps between two looks at the pace; how many times the steps allowed a run may need by its pace before it stops.
 PACE, ENDLESS = 4096, 100.0
 #: Steps before the first doubling of their number that counts; doublings in a row, each in at most this many times the
@@ -172,6 +174,8 @@ class StepControl:
             self._added = False
         left = abs(self.goals[0] - self.t)
         self._step = min(self.trial, self.longest, left)
+        if left <= (1.0 + STRETCH) * self._step:
+            self._step = left
         self._cut = self._step == left
         if self._step < rounding:
             self.status = Status.STEP_TOO_SMALL

@@ -197,8 +197,8 @@ class System:
         """g, shape (..., rows)."""
         return self._stack("residual", t, q)
 
-    def rate(self, t: float, q: Array) -> Array:
-        """Partial time derivative of g."""
+    def rate(self, t: float | Array, q: Array) -> Array:
+        """Partial time derivative of g, shape (..., rows)."""
         return self._stack("rate", t, q)
 
     def velocity_terms(self, t: float, q: Array, v: Array) -> Array:
