@@ -15,7 +15,7 @@ import math
 import tomllib
 import types
 import typing
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING
 from pathlib import Path
 from typing import Any, TypeVar
@@ -58,13 +58,14 @@ def quantity(
     above: float | None = None,
     below: float | None = None,
     choices: tuple[str, ...] | None = None,
+    gone: Mapping[str, str] | None = None,
 ) -> Any:
     """Dataclass field of a table: ``low <= value <= high`` and ``above < value < below`` are checked on reading.
 
     `doc` is one sentence with the unit; it appears in error messages and in the generated job-file reference. A mutable
     default (list, dict) is not accepted: use a tuple, ``None`` or a ``default_factory`` through a callable default.
     """
-    meta = {"doc": doc, "low": low, "high": high, "above": above, "below": below, "choices": choices}
+    meta = {"doc": doc, "low": low, "high": high, "above": above, "below": below, "choices": choices, "gone": gone}
     if callable(default):
         return dataclasses.field(default_factory=default, metadata=meta, kw_only=True)
     if default is MISSING:
@@ -324,7 +325,8 @@ def _convert_scalar(hint: Any, value: Any, label: str, meta: Any) -> Any:
         choices = meta.get("choices")
         if choices and value not in choices:
             problem = "must be one of " + ", ".join(choice or '""' for choice in choices)
-            raise InputError(label, value, problem, nearest(str(value), choices) or doc)
+            cure = (meta.get("gone") or {}).get(str(value))
+            raise InputError(label, value, problem, cure or nearest(str(value), choices) or doc)
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(label, value, "must be a number", doc)

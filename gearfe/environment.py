@@ -9,8 +9,10 @@ from .errors import InputError
 
 #: Folder of what is kept on disk (``off`` keeps nothing), and the largest size of all entries (MB).
 CACHE_VARIABLE, LIMIT_VARIABLE = "GEARFE_CACHE", "GEARFE_CACHE_LIMIT_MB"
-#: 1 leaves the kernels of mechanisms and trains uncompiled.
-NUMBA_VARIABLE = "GEARFE_NO_NUMBA"
+#: Numba's own switch: 1 leaves the kernels of mechanisms and trains as Python functions, for debugging.
+NUMBA_VARIABLE = "NUMBA_DISABLE_JIT"
+#: The switch that this program had before.
+GONE_VARIABLE = "GEARFE_NO_NUMBA"
 #: Largest size of all entries where none is given (bytes), and largest one that can be given (MB).
 LIMIT, MOST_MB = 10**9, 1e12
 
@@ -57,17 +59,22 @@ def limit() -> int:
     return round(1e6 * size)
 
 
-def without_numba() -> bool:
-    """Whether kernels stay uncompiled.
+def interpreted() -> bool:
+    """Whether numba's switch `NUMBA_DISABLE_JIT` leaves the kernels as Python functions.
 
     Raises
     ------
     InputError
-        For a value that is neither 0 nor 1.
+        For a value that is neither 0 nor 1, and for the switch that this one replaces.
     """
+    if os.environ.get(GONE_VARIABLE, "").strip() not in ("", "0"):
+        cure = f"remove it, or set {NUMBA_VARIABLE}=1 to debug kernels"
+        raise InputError(GONE_VARIABLE, os.environ[GONE_VARIABLE], "was removed: numba is always there", cure)
     text = os.environ.get(NUMBA_VARIABLE, "").strip()
     if text not in ("", "0", "1"):
-        raise InputError(NUMBA_VARIABLE, text, "must be 0 or 1", "1 leaves the kernels uncompiled")
+        raise InputError(
+            NUMBA_VARIABLE, text, "must be 0 or 1", "1 leaves the kernels as Python functions, for debugging"
+        )
     return text == "1"
 
 
@@ -81,4 +88,4 @@ def check() -> None:
     """Raise `InputError` for a variable of this program whose value is wrong."""
     named_folder()
     limit()
-    without_numba()
+    interpreted()

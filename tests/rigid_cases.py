@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from gearfe.rigid import Body, Gravity, Hinge, Linkage, Slot, System
+from gearfe.rigid import Body, Gravity, Hinge, Linkage, Slot, Start, System, consistent_start
 
 DATA = Path(__file__).parent / "data"
 G = 9.81
@@ -45,6 +46,25 @@ def folding_angle(theta: float, omega: float, times: np.ndarray) -> np.ndarray:
 
     made = solve_ivp(rhs, (times[0], times[-1]), [theta, omega], "DOP853", t_eval=times, rtol=3e-14, atol=1e-14)
     return made.y[0]
+
+
+def by_scipy(
+    system: System, times: np.ndarray, start: Start | None = None, **options: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """(q, v) at the times by SciPy's Runge-Kutta of order 8 on a = M^-1 (f - G^T lambda), evaluated in NumPy.
+
+    Independent of all integrators and kernels: only values of the elements' forces, rows and gradients enter.
+    """
+    begin = consistent_start(system, float(times[0])) if start is None else start
+    n = system.size
+
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        return np.concatenate([y[n:], system.acceleration(t, y[:n], y[n:], begin.active, begin.excess)[0]])
+
+    y0 = np.concatenate([begin.q, begin.v])
+    options = {"rtol": 1e-12, "atol": 1e-12, **options}
+    y = solve_ivp(rhs, (times[0], times[-1]), y0, "DOP853", t_eval=times, **options).y.T
+    return y[:, :n], y[:, n:]
 
 
 def pendulum(angle: float = 1.0, length: float = 0.8, rate: float = 0.0) -> System:

@@ -20,7 +20,7 @@ BASE = """
 [run]
 end_s = 1e-3
 step_s = 1e-3
-method = "explicit"
+method = "taylor"
 [bodies.a]
 mass_kg = 1.0
 inertia_kg_m2 = 1.0

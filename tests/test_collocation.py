@@ -98,7 +98,7 @@ def test_saddle_matrices_side_by_side(seed: int) -> None:
     places = np.arange(size)
     over, right = lanes(size, 2, 4), np.minimum(places + width, size - 1)
     pivot, low, top = np.zeros((3, size), dtype=np.int64)
-    names = KERNELS.plain
+    names = KERNELS.python
     assert names.factorise_band(B, over, right.copy(), pivot, low, top, right.copy())
     names.solve_band(B, over, pivot, low, top, x)
     found = x[:, 0] + 1j * x[:, 1]
@@ -186,7 +186,7 @@ def test_kernels_step_as_numpy_does(make: Any, family: str) -> None:
     assert program is not None
     held = program.without_redundant(start.active)
     eq = equations(held, narrow_band(held), 3, len(one.w.S))
-    two._step = lambda: KERNELS.plain.collocation_step(eq, two.w, tab)
+    two._step = lambda: KERNELS.python.collocation_step(eq, two.w, tab)
     q, v, limit = start.q, start.v, np.full(system.size, 1e-9)
     for step in (one, two):
         step.restart(system, start, 0.02, q, v)

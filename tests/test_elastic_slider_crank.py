@@ -15,11 +15,9 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from gearfe.rigid import Element, ModalBlocks, QuadraticJoint, System, compiled, consistent_start, integrate, polynomial
+from gearfe.rigid import Element, ModalBlocks, QuadraticJoint, System, consistent_start, integrate, polynomial
 
-needs_numba = pytest.mark.skipif(not compiled.available(), reason="numba is not installed")
 DATA = json.loads((Path(__file__).parent / "data" / "elastic_slider_crank.json").read_text())
 SI = DATA["data_SI"]
 L1, L2, PI = SI["l1"], SI["l2"], SI["pi"]
@@ -100,13 +98,12 @@ def crank() -> tuple[System, Element, QuadraticJoint, np.ndarray]:
     return System([body, joint]), body, joint, first[0]
 
 
-@pytest.mark.parametrize("method", [pytest.param("taylor", marks=needs_numba), "explicit"])
-def test_state_at_the_end_and_forces(method: str) -> None:
+def test_state_at_the_end_and_forces() -> None:
     system, _, _, first = crank()
     end = DATA["at_0.1_s"]
     start = consistent_start(system)
     assert np.abs(start.q - first).max() < 1e-8
-    run = integrate(system, [0.0, 0.1], start=start, method=method, tolerance=1e-8)
+    run = integrate(system, [0.0, 0.1], start=start, method="taylor", tolerance=1e-8)
     q = run.q[-1]
     a, p = q[4:6], q[6:].reshape(4, 2)
     n = np.array([-a[1], a[0]])

@@ -8,7 +8,7 @@ import pytest
 
 from gearfe.cache import cache_folder
 from gearfe.cli import main
-from gearfe.environment import LIMIT, limit, without_numba
+from gearfe.environment import LIMIT, interpreted, limit
 
 JOB = str(Path(__file__).parents[1] / "geometry" / "gear_train.toml")
 
@@ -23,7 +23,8 @@ JOB = str(Path(__file__).parents[1] / "geometry" / "gear_train.toml")
         ("GEARFE_CACHE_LIMIT_MB", "nan", "must be a number >= 0"),
         ("GEARFE_CACHE_LIMIT_MB", "-1", "must be a number >= 0"),
         ("GEARFE_CACHE_LIMIT_MB", "1e300", "<= 1e+12"),
-        ("GEARFE_NO_NUMBA", "yes", "must be 0 or 1"),
+        ("NUMBA_DISABLE_JIT", "yes", "must be 0 or 1"),
+        ("GEARFE_NO_NUMBA", "1", "was removed"),
     ],
 )
 @pytest.mark.parametrize("line", [["cache"], ["gear", JOB], ["study", "study.toml"]])
@@ -44,10 +45,10 @@ def test_wrong_values_are_refused(
 
 
 def test_values_that_are_left_empty_are_the_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("GEARFE_CACHE_LIMIT_MB", "GEARFE_NO_NUMBA"):
+    for name in ("GEARFE_CACHE_LIMIT_MB", "NUMBA_DISABLE_JIT"):
         monkeypatch.setenv(name, "")
     assert limit() == LIMIT
-    assert not without_numba()
+    assert not interpreted()
     monkeypatch.setenv("GEARFE_CACHE_LIMIT_MB", "0.05")
     assert limit() == 50_000
 

@@ -15,7 +15,7 @@ from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import finer_run
 from gearfe.mechanisms.job import run_mechanism
 from gearfe.mechanisms.loads import ExpressionLoad
-from gearfe.rigid import IntegrationError, compiled, integrate
+from gearfe.rigid import IntegrationError, integrate
 from gearfe.rigid.inverse import prescribed_motion
 
 ROD = """
@@ -61,7 +61,7 @@ def test_a_controller_is_the_damped_oscillator(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.q[:, 2], 0.2 + u, atol=1e-9)
 
 
-@pytest.mark.parametrize(("method", "allowed"), [("explicit", 1e-8), ("implicit", 1e-6)])
+@pytest.mark.parametrize(("method", "allowed"), [("taylor", 1e-8), ("implicit", 1e-6)])
 def test_an_expression_of_places_is_the_spring_that_it_says(tmp_path: Path, method: str, allowed: float) -> None:
     spring = '[forces.s]\ntype = "spring"\nbody = "rod"\npoint = "tip"\nstiffness = 30.0\ndamping = 2.0\n'
     force = '[forces.s]\ntype = "force"\nbody = "rod"\npoint = "tip"\n'
@@ -74,8 +74,8 @@ def test_an_expression_of_places_is_the_spring_that_it_says(tmp_path: Path, meth
     force = force.replace("-30*x(rod.tip)", "-30*(x(rod.tip) - 0.3)").replace(
         "-30*y(rod.tip)", "-30*(y(rod.tip) - 0.1)"
     )
-    _, one = ran(tmp_path, ROD + spring, tolerance=1e-11, backend="plain")
-    _, two = ran(tmp_path, ROD + force, tolerance=1e-10 if method == "explicit" else 1e-8, method=method)
+    _, one = ran(tmp_path, ROD + spring, tolerance=1e-11)
+    _, two = ran(tmp_path, ROD + force, tolerance=1e-10 if method == "taylor" else 1e-8, method=method)
     assert one.method == "taylor"
     assert two.method == method
     np.testing.assert_allclose(two.q, one.q, atol=allowed)
@@ -88,7 +88,7 @@ def test_work_of_an_expression_balances_the_energy(tmp_path: Path) -> None:
     assert abs(energy["work_J"]).max() > 0.1
 
 
-@pytest.mark.parametrize(("method", "tolerance"), [("implicit", 1e-5), ("implicit", 1e-7), ("explicit", 1e-9)])
+@pytest.mark.parametrize(("method", "tolerance"), [("implicit", 1e-5), ("implicit", 1e-7), ("taylor", 1e-9)])
 @pytest.mark.parametrize("kind", ["corner", "jump", "pulses"])
 def test_steps_end_at_corners_and_jumps(tmp_path: Path, kind: str, method: str, tolerance: float) -> None:
     """A stop with a spring, or a constant load, gives back the speed; half waves of a sine add 2 M/w each."""
@@ -107,8 +107,7 @@ def test_steps_end_at_corners_and_jumps(tmp_path: Path, kind: str, method: str, 
         assert run.q[-1, 2] == pytest.approx(0.1, abs=5 * tolerance)
 
 
-@pytest.mark.parametrize("backend", ["compiled", "plain"])
-def test_a_damper_that_differs_by_direction(tmp_path: Path, backend: str) -> None:
+def test_a_damper_that_differs_by_direction(tmp_path: Path) -> None:
     """k a + c a', c of each direction: a whole swing from rest leaves exp(-pi (d_1/w_1 + d_2/w_2)) of it.
 
     The pivot lies far from the origin, so that speeds within short steps are rounded.
@@ -120,9 +119,7 @@ def test_a_damper_that_differs_by_direction(tmp_path: Path, backend: str) -> Non
     decay = damping / (2.0 * inertia)
     omega = np.sqrt(k / inertia - decay**2)
     end = math.pi * float((1.0 / omega).sum())
-    _, run = ran(
-        tmp_path, rod + MOMENT.format(load), end, method="implicit", tolerance=1e-9, backend=backend, most_steps=500
-    )
+    _, run = ran(tmp_path, rod + MOMENT.format(load), end, method="implicit", tolerance=1e-9, most_steps=500)
     assert run.q[-1, 2] == pytest.approx(0.4 * math.exp(-math.pi * float((decay / omega).sum())), abs=2e-8)
     assert run.v[-1, 2] == pytest.approx(0.0, abs=2e-7)
 
@@ -157,7 +154,7 @@ def test_a_table_holds_its_points_and_is_monotone(tmp_path: Path) -> None:
     assert linear.linkage.assembly.state_loads[0][1].value(0.0, np.zeros(3), np.zeros(3)) == pytest.approx(4.5)
 
 
-@pytest.mark.parametrize("how", [{}, {"method": "explicit"}, {"method": "implicit", "backend": "compiled"}])
+@pytest.mark.parametrize("how", [{}, {"method": "implicit"}])
 def test_a_run_out_of_the_table_tells_where(tmp_path: Path, how: dict[str, str]) -> None:
     (tmp_path / "motor.csv").write_text("speed,torque\n0,10\n1.5,9\n", encoding="utf-8")
     table = '[tables.motor]\nfile = "motor.csv"\nx = "speed"\ny = "torque"\n'
@@ -234,7 +231,7 @@ def test_a_division_by_zero_on_the_way_tells_time_and_values(tmp_path: Path) -> 
         ran(tmp_path, ROD + MOMENT.format("sqrt(0.5 - time)"))
 
 
-@pytest.mark.parametrize("method", ["auto", "explicit", "implicit"])
+@pytest.mark.parametrize("method", ["auto", "implicit"])
 def test_no_method_steps_over_a_pole(tmp_path: Path, method: str) -> None:
     with pytest.raises(IntegrationError, match=r"forces.drive.moment_N_m = '1/\(time - 0.5\)' at 0\.5 s") as caught:
         ran(tmp_path, ROD + MOMENT.format("1/(time - 0.5)"), method=method, tolerance=1e-6)
@@ -257,17 +254,16 @@ def test_a_pole_that_is_seen_from_afar_is_named_by_taylor(tmp_path: Path, load: 
         ran(tmp_path, ROD + MOMENT.format(load), method="taylor", tolerance=1e-6)
 
 
-@pytest.mark.skipif(not compiled.available(), reason="numba is not installed")
 def test_a_load_that_grows_without_bound_ends_the_run_and_is_named(tmp_path: Path) -> None:
     """The rod turns ever faster, twice as many times every 70 microseconds; no number of steps gets it to the end."""
     with pytest.raises(IntegrationError, match=r"would take more .*'exp\(10000\*time\)' at 0\.00.*: grows") as caught:
-        ran(tmp_path, ROD + MOMENT.format("exp(10000*time)"), method="taylor", tolerance=1e-6, backend="compiled")
+        ran(tmp_path, ROD + MOMENT.format("exp(10000*time)"), method="taylor", tolerance=1e-6)
     assert caught.value.result.statistics["steps"] < 100_000
 
 
 def test_output_times_by_rounding_beyond_the_end_of_a_stopped_run_are_left_out(tmp_path: Path) -> None:
     mechanism = load_mechanism(write(tmp_path, ROD + MOMENT.format("log(0.5 - time)")))
-    options = {"start": mechanism.start(), "method": "taylor", "backend": "plain", "raise_on_failure": False}
+    options = {"start": mechanism.start(), "method": "taylor", "raise_on_failure": False}
     end = integrate(mechanism.system, [0.0, 10.0], **options).dense.times[-1]  # type: ignore[arg-type]
     run = integrate(mechanism.system, [0.0, end + 5e-12, 10.0], **options)  # type: ignore[arg-type]
     np.testing.assert_array_equal(run.time, [0.0])
@@ -304,7 +300,7 @@ def test_a_motion_from_a_table_over_time(tmp_path: Path, coordinate: str) -> Non
     rows = "\n".join(f"{a},{b}" for a, b in zip(t, value, strict=True))
     (tmp_path / "drive.csv").write_text("t,value\n" + rows + "\n", encoding="utf-8")
     text = ROD.replace("angle_deg = 30.0\nrate_rad_per_s = 1.0\n", "") + TABLED.format(coordinate=coordinate)
-    mechanism, run = ran(tmp_path, text, backend="plain", method="taylor")
+    mechanism, run = ran(tmp_path, text, method="taylor")
     if coordinate == "angle":
         np.testing.assert_allclose(run.q[::2, 2], np.sin(t), atol=1e-12)
     else:

@@ -14,8 +14,6 @@ from gearfe.rigid.lanes import NAMES, Lanes, as_lanes, flat, halves, highest, la
 from gearfe.rigid.packed import Packed
 from gearfe.typing import Array, IntArray
 
-needs_numba = pytest.mark.skipif(not compiled.available(), reason="numba is not installed")
-
 
 class Inner(NamedTuple):
     weights: Array  # (n,)
@@ -53,7 +51,6 @@ def sample() -> Outer:
     return Outer(rng.normal(size=(3, 5, 4)), Inner(rng.normal(size=4), chosen, 0.75), 3, np.zeros(5))
 
 
-@needs_numba
 def test_a_block_reads_as_the_named_tuple_it_was_made_from(tmp_path, monkeypatch):
     monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
     names = compiled.bind((weighted, fill_out), {}, compiled=True, entries=("fill_out",))
@@ -64,7 +61,6 @@ def test_a_block_reads_as_the_named_tuple_it_was_made_from(tmp_path, monkeypatch
     assert np.allclose(outer.out, 3 * 0.75 * outer.inner.weights @ rows, rtol=1e-14)
 
 
-@needs_numba
 def test_parts_give_what_numba_alone_gives(tmp_path, monkeypatch):
     """One compilation with all parts in their entry against numba's own, each function for itself."""
     results = []
@@ -86,7 +82,6 @@ def test_arrays_that_are_not_contiguous_or_of_another_type_are_refused():
         Packed(Inner(np.zeros(8), np.zeros(2, dtype=np.int32), 1.0))
 
 
-@needs_numba
 def test_code_in_the_cache_is_found_by_another_process(tmp_path, monkeypatch):
     """With a block as argument, whose type another process makes anew."""
     monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
@@ -139,7 +134,6 @@ def use_sides(sides):  # type: ignore[no-untyped-def]
     return angles.shape[0]
 
 
-@needs_numba
 def test_lanes_compute_as_arrays_do(tmp_path, monkeypatch):
     """Compiled against NumPy; sines and cosines within two roundings of 1 of the library's, far from zero, too."""
     monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearfe import InputError
-from gearfe.rigid import compiled, constant
+from gearfe.rigid import constant
 from gearfe.runup.run_up import steady_state
 from gearfe.train import GearMesh, build_train, simulate
 
@@ -15,8 +15,7 @@ from .gear_oscillator import GearOscillator
 from .mesh_laws import hertzian_law
 from .trains import SPEED, base_radius, changed, curve, train
 
-needs_numba = pytest.mark.skipif(not compiled.available(), reason="the series in modal coordinates is compiled")
-METHODS = [pytest.param("taylor", marks=needs_numba), "explicit", "implicit"]
+METHODS = ["taylor", "explicit", "implicit"]
 RULES = ["always", "in_contact"]
 BACKLASH = 4e-5
 
@@ -65,7 +64,6 @@ def test_the_rules_differ_where_teeth_part():
     assert np.abs(ends[0] - ends[1]).max() > 1e-3 * np.abs(ends[0]).max()
 
 
-@needs_numba
 @pytest.mark.parametrize("acts", RULES)
 def test_a_wheel_between_both_flanks_keeps_its_speed_or_not(acts):
     """Without a load a flank gives back exp(-pi zeta / sqrt(1 - zeta^2)) of the speed; in the gap c alone may brake."""
@@ -122,7 +120,7 @@ def test_a_transient_ends_in_the_steady_motion(acts):
     state = steady_state(model, speed, tolerance=1e-4, stability=False)
     period = 2.0 * math.pi / (20 * speed)
     late = period * (150 + np.linspace(0.0, 1.0, 65))
-    response = simulate(model, [0.0, *late], tolerance=1e-7, method="taylor" if compiled.available() else "explicit")
+    response = simulate(model, [0.0, *late], tolerance=1e-7, method="taylor")
     force, error = response.contact_force[1:, 0], response.transmission_error[1:, 0]
     assert error.max() == pytest.approx(state.transmission_error[:, 0].max(), rel=2e-3)
     assert force.mean() == pytest.approx(torque / base_radius(30), rel=2e-2)

@@ -14,7 +14,6 @@ from gearfe.contact.laws import law_named
 from gearfe.meshlaw.law import MeshLaw
 from gearfe.meshlaw.make import mesh_law
 from gearfe.rigid import TimeFunction, constant, integrate, smoothed_step
-from gearfe.rigid.compiled import available
 from gearfe.stiffness.sweep import elastic_pair
 from gearfe.train import Damping, GearMesh, Load, build_train, simulate
 from gearfe.train.states import train_states
@@ -24,7 +23,6 @@ from .test_mesh_law import DESIGN, PAIR, STEEL
 from .test_train_contact import R1, R2, free_energy, free_pair, pair
 from .trains import base_radius, train
 
-needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed")
 EXCHANGED = GearPair(PAIR.wheel, PAIR.pinion)
 
 
@@ -69,7 +67,6 @@ def test_either_gear_may_drive(laws: tuple[MeshLaw, MeshLaw], force: float) -> N
     assert back == pytest.approx(np.full(200, force), rel=1e-3)
 
 
-@needs_numba
 def test_a_train_moves_alike_whichever_gear_is_called_the_driver(laws: tuple[MeshLaw, MeshLaw]) -> None:
     """Without backlash, under a load that changes its sign: the driving flank of one law is the other's back."""
     load = constant(10.0) + TimeFunction(sines=((25.0, 6e3, 0.2),))
@@ -88,7 +85,6 @@ def test_a_train_moves_alike_whichever_gear_is_called_the_driver(laws: tuple[Mes
     assert one.speed == pytest.approx(two.speed, abs=2e-3 * np.ptp(one.speed[:, 1]))
 
 
-@needs_numba
 def test_the_grid_of_the_cells_does_not_matter() -> None:
     """15, 30, 60 and 120 cells: touch of order 4, forces of a train, with parting and back flanks, to 2e-5 and 3e-6."""
     counts, relief = (15, 30, 60, 120), 5e-6
@@ -108,7 +104,6 @@ def test_the_grid_of_the_cells_does_not_matter() -> None:
     assert away[1] < 5e-6
 
 
-@needs_numba
 def test_small_motions_are_those_of_the_linear_law() -> None:
     """About a static load, almost at rest, a map acts as its tangent: off by the amplitude squared."""
     law, torque = hertzian_law(), 60.0
@@ -132,7 +127,6 @@ def test_small_motions_are_those_of_the_linear_law() -> None:
     assert np.divide(off[:-1], off[1:]) == pytest.approx([4.0, 4.0], rel=0.15)
 
 
-@needs_numba
 def test_each_mesh_of_an_idler_has_its_own_phase() -> None:
     """A loaded idler: at slow speed each mesh has the error of its own phase, the first under F2 + (T + M2)/r_b."""
     one, two = hertzian_law(relief=5e-6), hertzian_law(2 * math.pi / 30, relief=3e-6)
@@ -160,7 +154,6 @@ def test_each_mesh_of_an_idler_has_its_own_phase() -> None:
         force = last + (30.0 + law(phase, static).moment) / R2
 
 
-@needs_numba
 def test_a_torque_that_ramps_through_zero() -> None:
     """From the driving to the back flanks, through the backlash and to and fro once: statics before and after."""
     law, j = hertzian_law(relief=5e-6), 20e-6
@@ -178,7 +171,6 @@ def test_a_torque_that_ramps_through_zero() -> None:
         assert made.contact_force[part, 0] == pytest.approx(np.full(part.sum(), force / R2), rel=1e-3)
 
 
-@needs_numba
 @pytest.mark.parametrize("force", [800.0, 2000.0])
 def test_a_free_pair_of_gears_keeps_its_energy_over_a_thousand_cycles(
     laws: tuple[MeshLaw, MeshLaw], force: float

@@ -102,7 +102,7 @@ import concurrent.futures.process, ctypes, h5py, meshio, multiprocessing.connect
 import matplotlib.backends.backend_agg, matplotlib.font_manager, matplotlib.pyplot, skfem, scipy.io
 import scipy.interpolate, scipy.sparse, scipy.sparse.linalg
 import scipy.linalg, scipy.optimize, scipy.signal, scipy.stats, subprocess, sys, tempfile, gmsh, numpy, types
-import threadpoolctl
+import threadpoolctl, numba.core.registry
 taken = set()
 def locking(handle, mode, size):  # as the library reference has it: an OSError where the bytes are locked
     place = os.fstat(handle).st_ino
@@ -139,7 +139,7 @@ def test_commands_without_what_windows_lacks(tmp_path: Path) -> None:
     folder.mkdir()
     written(folder, cases=4)
     settings = {"PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}
-    settings |= {"LOCALAPPDATA": str(tmp_path / "AppData"), "PYTHONPATH": str(ROOT), "GEARFE_NO_NUMBA": "1"}
+    settings |= {"LOCALAPPDATA": str(tmp_path / "AppData"), "PYTHONPATH": str(ROOT)}
     environment = {key: value for key, value in os.environ.items() if key not in ("GEARFE_CACHE", "XDG_CACHE_HOME")}
     line = [sys.executable, "-c", WINDOWS, "getriebe ψ.toml", "kurbel.toml", "study.toml"]
     done = subprocess.run(line, cwd=folder, env={**environment, **settings}, capture_output=True, check=False)

@@ -73,12 +73,12 @@ def test_a_stage_apart_is_told_inside_of_a_count_and_is_none_of_its_time(monkeyp
 def test_every_method_tells_that_it_compiles(method, capsys, monkeypatch):
     pytest.importorskip("numba")
     system = pendulum()
-    integrate(system, [0.0, 0.1], method=method, backend="compiled")  # they are there now
+    integrate(system, [0.0, 0.1], method=method)  # they are there now
     monkeypatch.setattr(Kernels, "ready", False)
     capsys.readouterr()
     with pytest.MonkeyPatch.context() as other, shown(stream := io.StringIO(), verbose=True):
         other.setattr(Kernels, "load", lambda kernels, run: 0.0)
-        integrate(system, [0.0, 0.1], method=method, backend="compiled")
+        integrate(system, [0.0, 0.1], method=method)
     assert stream.getvalue().count("compiling the kernels once") == 1
 
 

@@ -29,7 +29,7 @@ def bob(angle: float, length: float) -> System:
 
 
 @pytest.mark.parametrize(("method", "tolerance", "allowed"),
-                         [("taylor", 1e-12, 1e-10), ("explicit", 1e-10, 1e-8), ("implicit", 1e-6, 1e-4)])  # fmt: skip
+                         [("taylor", 1e-12, 1e-10), ("implicit", 1e-6, 1e-4)])  # fmt: skip
 def test_pendulum_period_and_tension(method, tolerance, allowed):
     """Period 4 sqrt(l/g) K(sin(a/2)); tension m (g cos phi + l phi'^2)."""
     angle, length = 1.1, 0.6
@@ -45,8 +45,7 @@ def test_pendulum_period_and_tension(method, tolerance, allowed):
     assert np.ptp(total_energy(made)) < 100 * allowed
 
 
-@pytest.mark.parametrize("method", ["taylor", "explicit"])
-def test_a_coupler_without_mass_is_a_distance(method):
+def test_a_coupler_without_mass_is_a_distance():
     """A four-bar with a coupler of no mass, hinged at both ends, and one with a distance in its place."""
     crank = Body("crank", 1.3, 0.02, (0.2, 0.0), angle=0.6, rate=5.0)
     tip = (0.4 * cos(0.6), 0.4 * sin(0.6))
@@ -58,7 +57,7 @@ def test_a_coupler_without_mass_is_a_distance(method):
     ends = [Hinge("crank", "ground"), Hinge("rocker", "ground", (0.0, 0.0), (1.0, 0.0))]
     hinged = [*ends, Hinge("crank", "coupler", (0.4, 0.0)), Hinge("coupler", "rocker", (length, 0.0), (0.8, 0.0))]
     held = [*ends, Distance("crank", "rocker", (0.4, 0.0), (0.8, 0.0))]
-    times, options = np.linspace(0.0, 1.0, 11), {"method": method, "tolerance": 1e-11}
+    times, options = np.linspace(0.0, 1.0, 11), {"method": "taylor", "tolerance": 1e-11}
     first = integrate(system([crank, rocker, coupler], hinged), times, **options)
     second = integrate(system([crank, rocker], held), times, **options)
     np.testing.assert_allclose(second.q, first.q[:, :6], atol=1e-9)

@@ -47,19 +47,19 @@ def crossings(angle: np.ndarray) -> int:
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-12])
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
 def test_n_four_bar(count, tolerance):
-    check_n_four_bar(count, tolerance, 3.0, "plain")
+    check_n_four_bar(count, tolerance, 3.0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", range(1, 41))
 def test_n_four_bar_over_20_seconds(count):
     for tolerance in (1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13):
-        check_n_four_bar(count, tolerance, 20.0, "auto")
+        check_n_four_bar(count, tolerance, 20.0)
 
 
-def check_n_four_bar(count: int, tolerance: float, end: float, backend: str) -> None:
+def check_n_four_bar(count: int, tolerance: float, end: float) -> None:
     times = np.linspace(0.0, end, 1001)
-    made = integrate(n_four_bar(count), times, tolerance=tolerance, method="taylor", backend=backend)
+    made = integrate(n_four_bar(count), times, tolerance=tolerance, method="taylor")
     exact = n_four_bar_angle(count, times)
     assert made.message == "done"
     assert len(made.statistics["singular_passages"]) == crossings(exact) > 0
@@ -98,7 +98,7 @@ def peaucellier(phi: float, rate: float) -> tuple[System, Start]:
 def test_peaucellier_straight_line(tolerance):
     """P draws a straight line; both loops of the rhombus fold at once where A and B, or P and Q, fall together."""
     system, start = peaucellier(0.3, 3.0)
-    made = integrate(system, np.linspace(0.0, 5.0, 5001), tolerance=tolerance, start=start, backend="compiled")
+    made = integrate(system, np.linspace(0.0, 5.0, 5001), tolerance=tolerance, start=start)
     assert made.message == "done"
     angle = made.q[:, 2::3]
     P = 2.0 * np.cos(angle[:, 0]) + 0.8 * np.cos(angle[:, 2])
@@ -124,7 +124,7 @@ def two_linkages(apart: float) -> System:
 @pytest.mark.parametrize("apart", [0.1, 0.0159, 1e-3, 1e-4])
 def test_folds_soon_after_one_another(apart, tolerance):
     times = np.linspace(0.0, 2.0, 21)
-    made = integrate(two_linkages(apart), times, tolerance=tolerance, backend="compiled")
+    made = integrate(two_linkages(apart), times, tolerance=tolerance)
     exact = np.column_stack([folding_angle(a, 3.0, times) for a in (1.0, 1.0 + apart)])
     fine = np.linspace(0.0, 2.0, 2001)
     expected = sum(crossings(folding_angle(a, 3.0, fine) - pi / 2) for a in (1.0, 1.0 + apart))

@@ -43,7 +43,7 @@ def random_starts(count: int, seed: int = 11) -> list[tuple[float, float]]:
 @pytest.mark.parametrize(("theta", "omega"), random_starts(6))
 def test_random_starts(theta, omega):
     times = np.linspace(0.0, 4.0, 81)
-    made = integrate(folding_links(theta, omega), times, tolerance=1e-9, backend="compiled")
+    made = integrate(folding_links(theta, omega), times, tolerance=1e-9)
     assert made.status == 0
     assert np.abs(made.q[:, 2] - folding_angle(theta, omega, times)).max() <= 1e-8
     assert np.abs(made.q[:, 2] + made.q[:, 5]).max() <= 1e-9
@@ -52,7 +52,7 @@ def test_random_starts(theta, omega):
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-13])
 def test_no_wrong_branch_at_any_tolerance(tolerance):
     for theta, omega in random_starts(3, seed=5):
-        made = integrate(folding_links(theta, omega), [0.0, 3.0], tolerance=tolerance, backend="compiled")
+        made = integrate(folding_links(theta, omega), [0.0, 3.0], tolerance=tolerance)
         assert made.status == 0
         assert abs(made.q[-1, 2] + made.q[-1, 5]) <= 10 * tolerance
 
@@ -62,7 +62,7 @@ def test_no_wrong_branch_at_any_tolerance(tolerance):
 def test_starts_on_and_beside_the_fold(distance, side):
     theta, omega = side * pi / 2 + distance, 2.0
     times = np.linspace(0.0, 2.0, 21)
-    made = integrate(folding_links(theta, omega), times, tolerance=1e-9, backend="compiled")
+    made = integrate(folding_links(theta, omega), times, tolerance=1e-9)
     assert made.status == 0
     assert np.abs(made.q[:, 2] - folding_angle(theta, omega, times)).max() <= 1e-8
 
@@ -70,7 +70,7 @@ def test_starts_on_and_beside_the_fold(distance, side):
 def test_near_miss_is_no_fold():
     """A rod 0.1 % longer than the crank: no fold, the rod swings through; energy holds and the loop stays closed."""
     times = np.linspace(0.0, 1.5, 31)
-    made = integrate(folding_links(pi / 4, 3.0, rod=1.001), times, tolerance=1e-10, backend="compiled")
+    made = integrate(folding_links(pi / 4, 3.0, rod=1.001), times, tolerance=1e-10)
     assert made.status == 0
     assert len(made.statistics["singular_passages"]) == 0
     assert np.ptp(total_energy(made)) <= 1e-8
@@ -95,7 +95,7 @@ def test_redundant_constraint_is_found_and_harmless():
     assert start.freedoms.passing == ()
     assert start.freedoms.net == 1
     times = np.linspace(0.0, 1.0, 11)
-    made = integrate(system, times, tolerance=1e-10, start=start, backend="compiled")
+    made = integrate(system, times, tolerance=1e-10, start=start)
     exact = solve_ivp(
         lambda _t, y: [y[1], -(1.5 + 2.0) * G * np.cos(y[0]) / (1.0 + 2.0)],
         (0.0, 1.0), [0.4, 3.0], "DOP853", t_eval=times, rtol=1e-13, atol=1e-13,
@@ -123,7 +123,7 @@ def test_two_folds_at_the_same_moment():
         joints += (replace(joint, **keys),)
     system = System([Linkage(bodies, joints, one.forces)])
     times = np.linspace(0.0, 2.0, 21)
-    made = integrate(system, times, tolerance=1e-9, backend="compiled")
+    made = integrate(system, times, tolerance=1e-9)
     assert made.status == 0
     exact = folding_angle(1.0, 3.0, times)
     assert np.abs(made.q[:, [2, 8]] - exact[:, None]).max() <= 1e-8
@@ -131,7 +131,7 @@ def test_two_folds_at_the_same_moment():
 
 def test_start_at_rest_on_the_fold_selects_no_branch():
     """The status says so, and the start is returned."""
-    made = integrate(folding_links(pi / 2, 0.0), [0.0, 1.0], backend="compiled", raise_on_failure=False)
+    made = integrate(folding_links(pi / 2, 0.0), [0.0, 1.0], raise_on_failure=False)
     assert made.status is Status.NO_BRANCH
     assert made.reached == 0.0
     assert made.q.shape == (1, 6)
@@ -146,7 +146,7 @@ def test_parallel_cranks_turn_through_their_folds(count, tolerance):
     times = np.linspace(0.0, 3.0, 31)
     for _ in range(2):
         angle, rate = random.uniform(0, 2 * pi), random.choice([-1, 1]) * random.uniform(7, 9)
-        made = integrate(parallel_cranks(count, angle, rate), times, tolerance=tolerance, backend="compiled")
+        made = integrate(parallel_cranks(count, angle, rate), times, tolerance=tolerance)
         pull = (count / 2 + 2.0) * G / (count / 3 + 2.0)
         exact = solve_ivp(
             lambda _t, y, pull=pull: [y[1], -pull * cos(y[0])],
@@ -229,7 +229,7 @@ def test_four_bars_pass_their_flat_position(sides, tolerance):
             return [sign * np.sqrt(2 * (energy - G * height) / inertia)]
 
         exact = solve_ivp(rate, (0.0, 2.0), [theta], "DOP853", t_eval=times, rtol=1e-13, atol=1e-13).y[0]
-        made = integrate(system, times, tolerance=tolerance, start=start, backend="compiled")
+        made = integrate(system, times, tolerance=tolerance, start=start)
         assert made.status == 0
         turns = np.floor((exact - pi) / (2 * pi))
         assert len(made.statistics["singular_passages"]) >= np.ptp(turns) > 0
@@ -245,7 +245,7 @@ def test_prescribed_motions_that_contradict_each_other_later():
     motions = (Prescribed("a", "x", polynomial((0.0,))), Prescribed("a", "x", polynomial((0.0, 0.0, 0.5))))
     system = System([Linkage((body,), motions, ())])
     try:
-        made = integrate(system, [0.0, 1.0], backend="compiled", raise_on_failure=False)
+        made = integrate(system, [0.0, 1.0], raise_on_failure=False)
     except InputError:
         return
     assert made.status is Status.REDUNDANT_NOT_MET
@@ -256,7 +256,7 @@ def test_a_state_that_overflows_ends_the_run_with_its_status() -> None:
     rod = Body("rod", 1.0, 0.1, (0.4, 0.0))
     spun = Prescribed("rod", "angle", polynomial((0.0, 0.0, 1e150)))
     system = System([Linkage((rod,), (Hinge("rod", "ground"), Hinge("rod", "ground"), spun), ())])
-    options = {"method": "explicit", "tolerance": 1e-3, "backend": "compiled", "raise_on_failure": False}
+    options = {"method": "taylor", "tolerance": 1e-3, "raise_on_failure": False}
     made = integrate(system, np.linspace(0.0, 10.0, 11), **options)
     assert made.status is Status.NOT_FINITE
     assert np.isfinite(made.q).all()

@@ -14,7 +14,6 @@ from scipy.integrate import solve_ivp
 
 from gearfe.cli import main
 from gearfe.errors import InputError
-from gearfe.rigid.compiled import available
 from gearfe.runup import torus
 from gearfe.runup.balance import Orbit, Oscillator, Pushes, settled, solve
 from gearfe.runup.condensed import CondensedTrain, condense
@@ -31,7 +30,6 @@ from gearfe.train.kinematics import mesh_phases
 from .mesh_laws import hertzian_law
 from .test_runup_train import loaded, smooth
 
-needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed")
 HUNTING = [(17, 53), (19, 61)]
 
 
@@ -168,7 +166,6 @@ def state_of(train: CondensedTrain, speed: float, tolerance: float) -> SteadySta
         ([(20, 30), (20, 30)], smooth, 6.0, 30e-6),  # teeth that may part
         pytest.param(
             [(20, 30), (20, 30)], lambda teeth: hertzian_law(2 * math.pi / teeth, relief=4e-6), 60.0, 30e-6,
-            marks=needs_numba,
         ),
     ],
 )  # fmt: skip
@@ -209,7 +206,6 @@ def settled_forces(model: TrainModel, begin: float, length: float, count: int = 
     return times, made.contact_force[1:]
 
 
-@needs_numba
 @pytest.mark.parametrize(
     ("stages", "stiffness", "torque", "bound"),
     [

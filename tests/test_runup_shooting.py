@@ -12,7 +12,6 @@ import pytest
 from numpy.typing import NDArray
 
 from gearfe.rigid import constant, integrate
-from gearfe.rigid.compiled import available
 from gearfe.runup.balance import size_of, widened
 from gearfe.runup.condensed import condense
 from gearfe.runup.report import warnings
@@ -26,7 +25,6 @@ from .test_runup_train import loaded, smooth
 from .trains import curve
 
 Array = NDArray[np.float64]
-pytestmark = pytest.mark.skipif(not available(), reason="numba is not installed")
 
 
 def at_speed(model: TrainModel, speed: float) -> TrainModel:

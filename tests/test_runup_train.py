@@ -15,7 +15,6 @@ from gearfe.cli import main
 from gearfe.errors import InputError
 from gearfe.figures.campbell import signal_of
 from gearfe.rigid import constant
-from gearfe.rigid.compiled import available
 from gearfe.runup.condensed import condense
 from gearfe.runup.critical import crossings
 from gearfe.runup.modes import coupled_modes
@@ -30,8 +29,6 @@ from .mesh_laws import hertzian_law, numpy_law
 from .oscillators import analysis, rates, synthesis
 from .test_cli_vibration import SMALL
 from .trains import curve, elastic, train
-
-needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed")
 
 
 def loaded(stages, stiffness, *, speed=600.0, torque=60.0, ratio=0.05, backlash=None, flexible=True, **options):  # type: ignore[no-untyped-def]
@@ -63,7 +60,7 @@ def smooth(teeth):  # type: ignore[no-untyped-def]
     [
         ([(20, 30)], smooth, 600.0, None),
         ([(20, 30), (20, 30)], smooth, -500.0, None),
-        pytest.param([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), 700.0, 30e-6, marks=needs_numba),
+        pytest.param([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), 700.0, 30e-6),
     ],
 )
 def test_steady_running_is_what_a_transient_comes_to(stages, stiffness, speed, backlash):
@@ -82,7 +79,6 @@ def test_steady_running_is_what_a_transient_comes_to(stages, stiffness, speed, b
     assert state.error <= 1e-4
 
 
-@needs_numba
 def test_teeth_that_part_as_in_a_transient():
     law = hertzian_law(relief=6e-6)
     model = build_train(loaded([(20, 30)], lambda teeth: law, speed=1500.0, torque=15.0, ratio=0.02, flexible=False))
@@ -295,7 +291,6 @@ def test_speeds_without_a_first_motion_are_reached_from_the_next_one_or_told(mon
     assert "no motion with the periods of the meshes was found at 3 speeds, 400 to 500 rad/s" in note
 
 
-@needs_numba
 def test_a_light_load_within_a_resonance_is_found_on_all_its_branches():
     """Small motion from below, three motions at a time within, the large one alone above."""
     law = hertzian_law(2 * math.pi / 28, relief=4e-6)
@@ -372,7 +367,6 @@ def test_mistakes_in_a_job_are_told(job, capsys, extra, words):
     assert words in capsys.readouterr().err
 
 
-@needs_numba
 @pytest.mark.parametrize(("friction", "backlash", "torque"), [(0.06, None, 60.0), (0.1, 20e-6, 2.0)])
 def test_derivatives_of_the_forces(friction, backlash, torque):
     """Differences of the forces at random places, friction and both flanks included."""
@@ -401,7 +395,6 @@ def test_derivatives_of_the_forces(friction, backlash, torque):
             assert (off < 1e-3).mean() > 0.97  # beside the places where pairs come and go
 
 
-@needs_numba
 def test_friction_as_in_a_transient():
     gear_train = loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), speed=700.0)
     gear_train = dataclasses.replace(gear_train, meshes=(dataclasses.replace(gear_train.meshes[0], friction=0.08),))
@@ -419,7 +412,6 @@ def test_friction_as_in_a_transient():
     assert off < 0.1 * np.abs(state.acceleration[1:12] - without.acceleration[1:12]).max()  # friction shows
 
 
-@needs_numba
 def test_friction_of_an_oil_follows_the_speed():
     """Models built for two speeds rub alike at the same one."""
     oil = Lubrication(viscosity=0.04, roughness=0.4e-6)
@@ -434,7 +426,6 @@ def test_friction_of_an_oil_follows_the_speed():
     assert np.array_equal(multipliers(again, made[1].orbit), multipliers(system, made[1].orbit))
 
 
-@needs_numba
 def test_rayleigh_damping_of_a_law_as_in_a_transient():
     """It acts in contact only; the constant damper that keeps the modes apart is taken off by the forces."""
     gear_train = loaded([(20, 30)], lambda teeth: hertzian_law(relief=4e-6), speed=700.0, flexible=False)

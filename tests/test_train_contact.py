@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 
 from gearfe.errors import InputError
 from gearfe.rigid import TimeFunction, constant, integrate, smoothed_step
-from gearfe.rigid.compiled import available
 from gearfe.train import Damping, Drive, Load, build_train, simulate
 from gearfe.train.states import train_states
 from gearfe.train.statics import static_errors
@@ -20,7 +19,6 @@ from .mesh_laws import hertzian_law
 from .trains import base_radius, curve, train
 
 R1, R2 = base_radius(20), base_radius(30)
-needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed")
 
 
 def pair(law, *, speed=600.0, torque=None, backlash=None, **changes):  # type: ignore[no-untyped-def]
@@ -58,7 +56,6 @@ def free_energy(model, law, times, tolerance):  # type: ignore[no-untyped-def]
     return kinetic + elastic_part - work, elastic_part, moved
 
 
-@needs_numba
 @pytest.mark.parametrize("cycles", [20, pytest.param(1000, marks=pytest.mark.slow)])
 def test_a_free_pair_keeps_its_energy(cycles):
     """Undamped, with one and two pairs in contact in turns and teeth that part: 1e-9 of the elastic energy."""
@@ -71,7 +68,6 @@ def test_a_free_pair_keeps_its_energy(cycles):
     assert np.abs(energy - energy[0]).max() < 1e-6 * elastic_part.max()
 
 
-@needs_numba
 def test_slow_running_is_the_static_transmission_error():
     law = hertzian_law(relief=5e-6)
     torque, period = smoothed_step(0.01, 0.02, 60.0), 2 * math.pi / 20 / 0.3
@@ -101,7 +97,6 @@ def test_static_errors_beside_laws_and_springs(sign):
     assert (static_errors(pair(law, torque=load), angle)[0] is None) == (sign < 0.0)
 
 
-@needs_numba
 @pytest.mark.parametrize("back", [None, hertzian_law(relief=2e-6, cells=15)])
 def test_a_load_that_drives_bears_on_the_back_flanks(back):
     """Behind the backlash j, the mirrored law or their own: the approach is -(j + that of the mirrored phase)."""
@@ -119,7 +114,6 @@ def test_a_load_that_drives_bears_on_the_back_flanks(back):
     assert static_errors(gear_train, made.drive_angle[late])[0] == pytest.approx(static, abs=1e-14)
 
 
-@needs_numba
 def test_the_mirrored_train_moves_alike():
     """Drive and load reversed: the other flanks of the same teeth bear, and all forces are the same."""
     law = hertzian_law(relief=2e-6)
@@ -135,7 +129,6 @@ def test_the_mirrored_train_moves_alike():
     assert made[1] == pytest.approx(made[0], abs=1e-4 * np.abs(made[0]).max())
 
 
-@needs_numba
 @pytest.mark.parametrize("damping", [0.0, 400.0])
 def test_an_oscillator_with_backlash_against_events_by_scipy(damping):
     """One degree of freedom, k = k0 (1 + e cos), a damper that always acts, flanks that part behind a backlash.
@@ -179,7 +172,6 @@ def test_mistakes():
         build_train(pair(dataclasses.replace(law, back=hertzian_law(0.3))))
 
 
-@needs_numba
 def test_when_teeth_part_does_not_depend_on_the_output_times():
     """Number, share and longest time without contact: from 21 times as from 20,001, whose samples agree."""
     mesh = {"torque": constant(20.0), "backlash": 30e-6, "speed": 600.0}
@@ -196,7 +188,6 @@ def test_when_teeth_part_does_not_depend_on_the_output_times():
     assert 0.0 < many.statistics["longest_without_contact_s"][0] < 1e-3
 
 
-@needs_numba
 def test_a_load_that_keeps_no_flank_in_contact_runs_with_a_remark():
     """Nothing brakes, or what swings about nothing: the pair runs on, apart or not, and says so."""
     for load in (constant(0.0), constant(0.0) + TimeFunction(sines=((5.0, 6e3, 0.2),))):
@@ -207,7 +198,6 @@ def test_a_load_that_keeps_no_flank_in_contact_runs_with_a_remark():
     assert not simulate(build_train(braked), np.linspace(0.0, 1e-3, 21)).warnings
 
 
-@needs_numba
 def test_a_law_that_does_not_reach_says_what_to_ask_for():
     law = hertzian_law()
     gear_train = pair(law, torque=smoothed_step(0.5e-3, 1e-3, 3.0 * law.largest_force * R2))
@@ -233,7 +223,6 @@ def runge_kutta(model, times, tolerance):  # type: ignore[no-untyped-def]
     return pushes[0] - pushes[1], u[:, model.forces.flanks[0].direction]
 
 
-@needs_numba
 def test_parting_and_back_flanks_against_runge_kutta():
     """Lift-off, back flank and return, with friction and both kinds of damping: the error follows the tolerance.
 

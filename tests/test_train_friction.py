@@ -11,7 +11,6 @@ import pytest
 from gearfe.errors import InputError
 from gearfe.gear.pair import MeshGeometry
 from gearfe.rigid import TimeFunction, constant, smoothed_step
-from gearfe.rigid.compiled import available
 from gearfe.train import Bearing, Damping, Drive, Load, build_train, simulate
 from gearfe.train.forces import LawFlank, TrainForces
 from gearfe.train.friction import Lubrication, Sliding, smooth_sign
@@ -22,7 +21,6 @@ from .test_train_contact import R1, R2, pair
 from .test_train_corners import began
 from .trains import gear
 
-needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed")
 GEOMETRY = MeshGeometry(gear(20), gear(30))
 
 
@@ -79,7 +77,6 @@ def slow(law, mu, torque):  # type: ignore[no-untyped-def]
     return model, made.at(np.flatnonzero(made.time > 0.05))
 
 
-@needs_numba
 @pytest.mark.parametrize("relief", [0.0, 5e-6])
 def test_the_loss_of_slow_running_is_the_loss_factor(relief):
     """1 - efficiency = mu H_V with the load sharing of the law (Ohlendorf 1958; Niemann and Winter II)."""
@@ -91,7 +88,6 @@ def test_the_loss_of_slow_running_is_the_loss_factor(relief):
     assert loss / power == pytest.approx(mu * loss_factor(law, torque / R2), rel=0.02)
 
 
-@needs_numba
 def test_forces_of_slow_running_are_those_of_statics():
     """Moments about the driven gear's axis, and the loss mu F_k |v_k| of each pair, from the law alone."""
     law, mu, torque = hertzian_law(), 0.08, 60.0
@@ -113,7 +109,6 @@ def test_forces_of_slow_running_are_those_of_statics():
     assert made.friction_power[:, 0].mean() == pytest.approx(loss.mean(), rel=1e-3)
 
 
-@needs_numba
 @pytest.mark.parametrize("backlash", [None, 10e-6])
 def test_energy_balance_with_friction_in_fast_running(backlash):
     """Drive + load = change of kinetic and elastic energy + loss, without other damping; teeth part, and meet."""
@@ -138,7 +133,6 @@ def test_energy_balance_with_friction_in_fast_running(backlash):
     assert np.abs(change - work).max() < 1e-6 * np.abs(kinetic).max()
 
 
-@needs_numba
 def test_friction_pushes_the_bores_across_the_line_of_action():
     """Bearings as springs: their forces on the driven shaft balance that of the mesh, friction included."""
     law, mu, torque = hertzian_law(), 0.1, 60.0
@@ -160,7 +154,6 @@ def test_friction_pushes_the_bores_across_the_line_of_action():
     assert np.abs(drag[away]).max() > 0.05 * np.abs(mesh).max()
 
 
-@needs_numba
 def test_a_drive_that_reverses_is_braked_both_ways():
     law = hertzian_law()
     turn = smoothed_step(0.03, 0.04, -40.0) + constant(20.0)

@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 
 from gearfe.rigid import TimeFunction, constant, integrate
-from gearfe.rigid.compiled import available
 from gearfe.train import Drive, build_train
 from gearfe.train.forces import LawFlank
 from gearfe.train.states import train_states
 
 from .mesh_laws import hertzian_law
 from .test_train_contact import R1, R2, pair
-
-pytestmark = pytest.mark.skipif(not available(), reason="numba is not installed")
 
 
 def thrown(law, rate, **changes):  # type: ignore[no-untyped-def]

@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from gearfe.rigid import TimeFunction, constant, smoothed_step
-from gearfe.rigid.compiled import available
 from gearfe.runup.run_up import run_up
 from gearfe.train import TrainModel, build_train, simulate
 
@@ -24,7 +23,6 @@ Array = NDArray[np.float64]
 
 #: Mean stiffness (N/m), its swing, damping ratio, torque (N m), backlash (m); the driven gear's base radius (m).
 K, SWING, ZETA, TORQUE, BACKLASH, R2 = 1e8, 0.2, 0.05, 30.0, 20e-6, base_radius(30)
-needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed")
 
 
 def model_at(speed: TimeFunction) -> TrainModel:
@@ -120,7 +118,6 @@ def sweep(speeds: list[float]) -> list[tuple[float, float]]:
     return [(x.min(), x.max()) for x in made.transmission_error[1:, 0].reshape(len(speeds), -1)]
 
 
-@needs_numba
 @pytest.mark.parametrize("up", [True, False])
 def test_both_branches_and_both_jumps(up: bool) -> None:
     """A train that runs up, or down, by small steps stays on its branch up to the jump, and leaves it there.

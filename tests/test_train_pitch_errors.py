@@ -12,7 +12,6 @@ import pytest
 from gearfe.errors import InputError
 from gearfe.gear.curves import inv
 from gearfe.rigid import constant, smoothed_step
-from gearfe.rigid.compiled import available
 from gearfe.train import Damping, GearTrain, build_train, simulate
 from gearfe.train.forces import LawFlank
 from gearfe.train.kinematics import driving_senses
@@ -23,8 +22,6 @@ from gearfe.train.statics import static_errors
 from .mesh_laws import hertzian_law
 from .test_train_contact import free_energy, free_pair, pair
 from .trains import curve, train
-
-needs_numba = pytest.mark.skipif(not available(), reason="numba is not installed")
 
 
 def uneven(gear_train: GearTrain, seed: int = 0, size: float = 5e-6) -> GearTrain:
@@ -124,7 +121,6 @@ def test_which_teeth_meet(made: Any, phases: tuple[float | None, ...], speed: fl
     assert looked > 300
 
 
-@needs_numba
 def test_a_free_pair_with_pitch_errors_keeps_its_energy() -> None:
     """Each tooth pair at its own approach, through the full period of 60 mesh cycles."""
     law = hertzian_law(relief=3e-6)
@@ -140,7 +136,6 @@ def shifted(model: TrainModel) -> Any:
     return lambda phase, approach: flank.law(phase, approach, flank.shifts_at(phase))
 
 
-@needs_numba
 def test_slow_running_has_the_orders_of_the_shafts() -> None:
     """The static error at all times; a sine of one turn of the pinion is order 1 of its shaft, with its amplitude."""
     law, e = hertzian_law(), 10e-6

@@ -15,7 +15,7 @@ from gearfe.rigid import Body, Gravity, Hinge, Linkage, System, Trajectory, inte
 def made() -> Trajectory:
     body = Body("rod", 1.0, 0.1, (0.5, 0.0))
     system = System([Linkage((body,), (Hinge("rod", "ground", name="O"),), (Gravity(),))])
-    return integrate(system, np.linspace(0.0, 0.1, 3), backend="plain")
+    return integrate(system, np.linspace(0.0, 0.1, 3))
 
 
 def test_a_trajectory_says_what_it_is_in_a_line() -> None:

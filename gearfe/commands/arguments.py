@@ -125,7 +125,8 @@ def check_option(option: str, value: Any, table: type, key: str) -> None:
     if isinstance(value, (int, float)):
         check_range(value, option, known)
     elif (choices := known["choices"]) and value not in choices:
-        raise InputError(option, value, "must be one of " + ", ".join(choices), nearest(value, choices))
+        cure = (known.get("gone") or {}).get(value) or nearest(value, choices)
+        raise InputError(option, value, "must be one of " + ", ".join(choices), cure)
 
 
 def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:

@@ -65,7 +65,7 @@ def _compile() -> None:
     rod, hinge = Body("rod", 1.0, 1.0, (1.0, 0.0)), Hinge("rod", "ground")
     system = System([Linkage((rod,), (hinge,))])
     for method in ("taylor", "implicit"):
-        integrate(system, [0.0, 1e-3], method=method, backend="compiled")
+        integrate(system, [0.0, 1e-3], method=method)
 
 
 def _size(count: int) -> str:

@@ -26,8 +26,6 @@ from .results import Results, evaluate
 
 #: The finer runs' tolerance is that much smaller, their longest step that share of the median step of the first one.
 SHARPER, SHORTER, SAFETY = 30.0, 0.6, 2.0
-#: Runs of the length of one with an estimate: itself, and two with shorter steps.
-RUNS = 1.0 + 2.0 / SHORTER
 LEAST_TOLERANCE = 1e-13
 #: Below this a smaller tolerance leaves the steps of series as they are, so that the longest step alone makes a run
 #: finer: then it is that share of the shortest step, for at most so many times the steps.
@@ -101,8 +99,7 @@ def finer_run(mechanism: Mechanism, start: Start, made: Trajectory, tolerance: f
     # a step that both runs take is an error that both make
     usual = float(steps.min() if tolerance < SHARPEST else np.median(steps))
     longest = max(SHORTER * usual, float(steps.mean()) / MOST_STEPS)  # a run that failed ends with many short ones
-    backend = "compiled" if made.statistics.get("backend") == "compiled" else "plain"
-    options: dict[str, Any] = {"method": made.method, "backend": backend, "start": start, "longest": longest}
+    options: dict[str, Any] = {"method": made.method, "start": start, "longest": longest}
     options["raise_on_failure"] = False
     if made.status is not Status.DONE:
         options["most_steps"] = int(GIVEN_UP * len(ends)) + 100

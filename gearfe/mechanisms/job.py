@@ -17,7 +17,7 @@ from ..progress import stage
 from ..rigid import Start, Trajectory, integrate
 from ..rigid.carried import free_motions
 from ..rigid.inverse import prescribed_motion
-from .error_estimate import RUNS, TrajectoryError, trajectory_error
+from .error_estimate import TrajectoryError, trajectory_error
 from .model import Mechanism
 from .results import Results, evaluate, in_blocks, reactions, reference_table
 
@@ -78,7 +78,7 @@ def run_mechanism(
     read = clock.perf_counter()
     times = output_times(end, run.step_s)
     method = run.method if method is None else method
-    if mechanism.elastic and method in ("taylor", "explicit"):
+    if mechanism.elastic and method == "taylor":
         problem = "would follow the axial waves of flexible links with steps of next to no length"
         raise InputError("run.method", method, problem, "leave it out: they take the implicit method")
     if tolerance is None:
@@ -87,7 +87,6 @@ def run_mechanism(
         trajectory, estimate = prescribed_motion(mechanism.system, start, times), False
     else:
         options: dict[str, Any] = {"method": method, "tolerance": tolerance, "raise_on_failure": False}
-        options["runs"] = RUNS if estimate else 1.0
         trajectory = integrate(mechanism.system, times, start=start, **options)
     integrated = clock.perf_counter()
     compiling = float(trajectory.statistics.get("compile_seconds", 0.0))

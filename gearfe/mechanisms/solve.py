@@ -17,9 +17,7 @@ from ..config import build, read_toml, set_key
 from ..errors import InputError
 from ..progress import one_thread
 from ..rigid import Start, Trajectory, integrate
-from ..rigid.choice import STUCK
 from ..rigid.equilibrium import Equilibrium, equilibrium
-from ..rigid.integrate import use_compiled
 from ..rigid.inverse import prescribed_motion
 from ..rigid.modes import Modes, modes
 from ..tables.mechanism import MechanismFile, RunTable
@@ -64,7 +62,7 @@ class Solution:
 
 
 def solve(mechanism: Mechanism) -> Solution:
-    """The analysis of the file; a method that it leaves open follows from the mechanism and not from the clock.
+    """Run the analysis of the file.
 
     Raises
     ------
@@ -84,16 +82,9 @@ def _moved(mechanism: Mechanism, start: Start) -> Trajectory:
     times = output_times(run.end_s, run.step_s)
     if run.analysis == "inverse":
         return prescribed_motion(system, start, times)
-    method, backend = run.method, "compiled" if use_compiled("auto") else "plain"
-    if method == "auto":
-        stiff = any(element.stiff for element in system.elements)
-        method = "implicit" if stiff else "explicit" if system.series is None else "taylor"
     options: dict[str, Any] = {"start": start, "tolerance": mechanism.tolerance, "raise_on_failure": False}
     with np.errstate(over="ignore", invalid="ignore"):
-        made = integrate(system, times, method=method, backend=backend, **options)
-        if made.status in STUCK and run.method == "auto" and method == "taylor" and system.linkage is None:
-            return integrate(system, times, method="explicit", **options)
-        return made
+        return integrate(system, times, method=run.method, **options)
 
 
 @dataclass(frozen=True)

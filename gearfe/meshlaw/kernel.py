@@ -1,4 +1,4 @@
-r"""A mesh law with the derivatives that Newton's method needs, sample by sample; compiled where numba is installed.
+r"""A mesh law with the derivatives that Newton's method needs, sample by sample, compiled.
 
 With :math:`g_k = t'(\psi_k) + \Lambda_\psi(\psi_k, F_k) + \sum_l C'_{kl}F_l` and J as in `gearfe.meshlaw.law`,
 
@@ -12,8 +12,6 @@ With :math:`g_k = t'(\psi_k) + \Lambda_\psi(\psi_k, F_k) + \sum_l C'_{kl}F_l` an
 from __future__ import annotations
 
 import math
-from functools import lru_cache
-from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -257,22 +255,25 @@ FUNCTIONS = (law_jets, compliances, turning, coupled, matrix, solved)
 NAMES = {name: value for name, value in globals().items() if name == "math" or isinstance(value, int | float)}
 
 
-@lru_cache(maxsize=1)
-def _bound() -> SimpleNamespace:
-    return compiled.bind(FUNCTIONS, NAMES, compiled=compiled.available(), entries=("law_jets",))
+KERNELS = compiled.Kernels(FUNCTIONS, NAMES, ("law_jets",))
 
 
 def packed_tables(tables: LawTables) -> LawTables | Packed:
-    """What `evaluate` gets of a law, compiled or not."""
-    return Packed(tables) if compiled.available() else tables
+    """What `evaluate` gets of a law."""
+    made: LawTables | Packed = compiled.packed(tables)
+    return made
 
 
 def evaluate(
     tables: LawTables | Packed, phase: Array, approach: Array, shifts: Array, pairs: Array
 ) -> tuple[Array, Array]:
-    """Results and slopes of `law_jets`, compiled where numba is installed; `pairs` become the pair forces found."""
+    """Results and slopes of `law_jets`; `pairs` become the pair forces found."""
     count, slots = pairs.shape
     out, slopes, work = np.zeros((count, RESULTS)), np.zeros((2, count, slots)), np.zeros((ROWS + 2 * slots, slots))
     at = Jets(phase, approach, shifts, pairs, slopes, work, out)
-    _bound().law_jets(tables, Packed(at) if isinstance(tables, Packed) else at)
+    run = KERNELS.compiled.law_jets.on(tables, compiled.packed(at))
+    if KERNELS.loaded:
+        run()
+    else:
+        KERNELS.load(run)
     return out, slopes

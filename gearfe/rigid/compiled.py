@@ -1,9 +1,12 @@
-"""Binding of the kernels: compiled by numba with a cache of their own, or left as plain Python where that is quicker.
+"""Binding of the kernels: compiled by numba, with a cache of their own.
 
-The kernel modules hold plain functions that call one another by name. `bind` puts them into one namespace, either as
-compiled functions or as they are, so one text serves both. Compiled code (`gearfe.rigid.native`) is kept in the cache
-folder (`gearfe.cache`) below a hash of all that it was made from and for: no stale code after an upgrade, one form for
-all installations of the same sources, nothing written beside the installed package.
+The kernel modules hold plain functions that call one another by name. `bind` puts them into one namespace and compiles
+those that Python calls. With `NUMBA_DISABLE_JIT=1` in the environment, numba's own switch for debugging, they stay
+Python functions: a debugger steps through them, some hundred times slower.
+
+Compiled code (`gearfe.rigid.native`) is kept in the cache folder (`gearfe.cache`) below a hash of all that it was made
+from and for: no stale code after an upgrade, one form for all installations of the same sources, nothing written to the
+installed package.
 """
 
 from __future__ import annotations
@@ -17,33 +20,38 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from types import FunctionType, SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .. import cache
-from ..environment import named_folder, without_numba
-from ..progress import stage
+from ..environment import interpreted, named_folder
+from ..progress import announce, stage
 from .native import Entry, ObjectCode, import_numba
+from .packed import Layout, Packed
 from .parts import part_options, uncollected
 
-if TYPE_CHECKING:
-    from .packed import Layout
+COMPILING = "compiling the kernels, once for this version: about a quarter of a minute (gearfe cache --compile)"
 
 
-#: Seconds of loading kernels of an earlier run (measured).
-LOAD_SECONDS = 0.05
+class Interpreted:
+    """A kernel left as a Python function, called as a compiled one: with the named tuples of `packed`."""
+
+    def __init__(self, function: Callable[..., int]) -> None:
+        self.function = function
+
+    def __call__(self, *named: Any) -> int:
+        return self.function(*named)
+
+    def on(self, *named: Any) -> Callable[[], int]:
+        """The function of these arguments, for many calls."""
+        return partial(self.function, *named)
 
 
-def available() -> bool:
-    """Whether numba can be imported (it is not imported here)."""
-    return not without_numba() and _installed()
-
-
-@lru_cache(maxsize=1)
-def _installed() -> bool:
-    return importlib.util.find_spec("numba") is not None
+def packed(named: Any) -> Any:
+    """A named tuple as kernels get it: as one block, or itself where they are interpreted."""
+    return named if interpreted() else Packed(named)
 
 
 def cache_folder(functions: Iterable[Callable[..., Any]]) -> Path | None:
@@ -126,12 +134,11 @@ def bind(
     functions: Iterable[Callable[..., Any]],
     names: Mapping[str, Any],
     *,
-    compiled: bool,
     entries: tuple[str, ...] = (),
     inline: tuple[str, ...] = (),
     alias: Mapping[str, str] | None = None,
 ) -> SimpleNamespace:
-    """The `functions` in one namespace in which they see each other; compiled, the entries alone.
+    """The `functions` in one namespace in which they see each other: the entries compiled, or all as they are.
 
     Parameters
     ----------
@@ -139,11 +146,9 @@ def bind(
         Plain functions that call each other by name.
     names
         Modules and constants that they use.
-    compiled
-        Compile with numba; otherwise plain Python.
     entries
-        Names of the functions that are called from Python. They take named tuples, compiled their blocks
-        (`gearfe.rigid.packed.Packed`), and return an integer.
+        Names of the functions that are compiled to be called from Python. They take what `packed` makes of named tuples
+        and return an integer. Without any, all functions are left as they are.
     inline
         Names of the functions that are copied into their callers: the small hot ones. A call costs compiled code some
         hundred nanoseconds here, for the reference counts of the many arrays it hands over.
@@ -157,8 +162,10 @@ def bind(
         scope[function.__name__] = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     for name, other in (alias or {}).items():
         scope[other] = scope[name]
-    if not compiled:
+    if not entries:
         return SimpleNamespace(**{f.__name__: scope[f.__name__] for f in functions})
+    if interpreted():
+        return SimpleNamespace(**{name: Interpreted(scope[name]) for name in entries})
     parts = [f.__name__ for f in functions if f.__name__ not in entries]
     folder = cache_folder(functions)
 
@@ -181,14 +188,12 @@ def bind(
 
 @dataclass(eq=False)
 class Kernels:
-    """The kernels of a loop, bound plain or compiled where they are first wanted.
+    """The kernels of a loop, bound where they are first wanted.
 
     Parameters
     ----------
     functions, names, entries, inline, alias
         See `bind`.
-    making
-        Seconds that compiling them takes (measured).
     """
 
     functions: tuple[Callable[..., Any], ...]
@@ -196,36 +201,30 @@ class Kernels:
     entries: tuple[str, ...]
     inline: tuple[str, ...] = ()
     alias: Mapping[str, str] | None = None
-    making: float = 10.0
     loaded: bool = False  # whether the compiled ones are in this process
 
     @cached_property
-    def plain(self) -> SimpleNamespace:
-        """As they are."""
-        return bind(self.functions, self.names, compiled=False, alias=self.alias)
+    def python(self) -> SimpleNamespace:
+        """All functions as Python, for those that are called a few times in a run."""
+        return bind(self.functions, self.names, alias=self.alias)
 
     @cached_property
     def compiled(self) -> SimpleNamespace:
         """Their entries, compiled or from the cache at their first call."""
-        return bind(
-            self.functions, self.names, compiled=True, entries=self.entries, inline=self.inline, alias=self.alias
-        )
+        return bind(self.functions, self.names, entries=self.entries, inline=self.inline, alias=self.alias)
 
     @property
     def ready(self) -> bool:
         """Whether compiled ones are loaded already or wait in the cache."""
-        return self.loaded or (available() and is_cached(self.functions, self.entries[0]))
-
-    @property
-    def seconds(self) -> float:
-        """What there is to pay before the first compiled step."""
-        return 0.0 if self.loaded else LOAD_SECONDS if self.ready else self.making
+        return self.loaded or interpreted() or is_cached(self.functions, self.entries[0])
 
     def load(self, run: Callable[[], object]) -> float:
         """Compile them, or load them, by a run of no length; seconds that this took."""
         if self.loaded:
             return 0.0
         began = time.perf_counter()
+        if not self.ready:
+            announce(COMPILING)
         with stage("compiling the kernels", apart=True), uncollected():
             run()
         self.loaded = True

@@ -30,23 +30,23 @@ elastic body in
 eliminated at
    set-up by `gearfe.rigid.elimination` where an integrator profits. Absent: treated as any constraint.
 8. Being a `gearfe.rigid.Linkage`: planar bodies, whose joints and forces are written from forms (`gearfe.rigid.forms`).
-   ``method="auto"`` takes the Taylor method where all elements are written (14.), else the explicit one, or the
-   implicit one, whichever is predicted to take the fewest seconds.
+   ``method="auto"`` takes the Taylor method where all elements are written (14.) and the system is not overdamped,
+   else the implicit one (`gearfe.rigid.integrate.chosen_method`).
 9. ``potential(q)``: its potential energy in local coordinates (..., k). Absent: zero. (The kinetic one is 1/2 v M v.)
 10. Being a `LocalForce`: a force along few directions, ``f = W phi(t, W^T q, W^T v)``, with a law that can be compiled.
-    Absent: the force is called as it is; the integration in modal coordinates then calls Python in every stage.
+    Absent: the force is called as it is; collocation then calls Python in every stage.
 11. ``units()``: sizes of the own coordinates and of the rows that count as much as 1 rad, so that bounds do not depend
     on the unit of length. Absent: ones.
 12. ``shared_mass()``: constant mass on the local coordinates (k, k), for what gives mass to the coordinates of
     others: a beam whose nodes are bodies of a linkage. Absent: none.
-13. ``stiff = True``: its fast motions leave steps of series or Runge-Kutta next to no length; ``method="auto"`` then is
+13. ``stiff = True``: its fast motions leave steps of series next to no length; ``method="auto"`` then is
     the implicit method. Absent: not stiff.
 14. ``write(tape, places)``: its rows and forces on a `gearfe.rigid.tape.Tape`, `places` being the numbers of the local
     coordinates; False where they cannot be written. Rows are quadratic in coordinates, cosines and sines. The Taylor
     method then runs any system compiled. Not needed by what has neither rows nor ``force``. A
     `gearfe.rigid.written.Written` has the rows of 3. from it.
 15. ``pieced = True`` and ``pieces(t, q, v)``: whole numbers, shape (..., s) at times (...), that change where its force
-    has a corner, a jump or a pole; -1 where it has no value. Steps of Runge-Kutta and of the implicit method end there.
+    has a corner, a jump or a pole; -1 where it has no value. Steps of the implicit method end there.
     Absent: smooth.
 16. ``has_knots = True`` and ``knots(q)``: whole numbers, shape (..., s) in states (..., k), that change where the third
     derivative of a row jumps (knots of a cam's profile). Steps of the implicit method end there. Absent: smooth.

@@ -1,4 +1,4 @@
-"""Where forces leave their smooth pieces within a step of Runge-Kutta or of the implicit method.
+"""Where forces leave their smooth pieces within a step of collocation.
 
 A step that crosses a corner has an error that no estimate sees as it is. Such a step is made again, up to just before
 the corner; from there a short one goes over it, and the method begins anew behind it. Jumps are passed like this, too;

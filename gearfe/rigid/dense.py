@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -69,30 +69,6 @@ class Polynomials:
         h = (t - (self.times if self.origins is None else self.origins)[k])[:, None]
         for j in range(self.coefficients.shape[1] - 1, derivative - 1, -1):
             out = out * h + math.perm(j, derivative) * self.coefficients[k, j]
-        return out
-
-
-@dataclass(frozen=True)
-class Joined:
-    """Dense output of several legs."""
-
-    parts: tuple[Dense, ...]
-    times: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        ends = [self.parts[0].times, *(p.times[1:] for p in self.parts[1:])]
-        object.__setattr__(self, "times", np.concatenate(ends))
-
-    def __call__(self, t: Array, derivative: int = 0) -> Array:
-        """Coordinates (or a derivative of them) at the times t: of the leg that begins last before each."""
-        t = np.atleast_1d(np.asarray(t, dtype=float))
-        sign = 1.0 if self.times[-1] >= self.times[0] else -1.0
-        joints = np.array([sign * p.times[-1] for p in self.parts[:-1]])
-        which = np.searchsorted(joints, sign * t, side="left")
-        made = {k: part(t[which == k], derivative) for k, part in enumerate(self.parts) if (which == k).any()}
-        out = np.empty((len(t), next(iter(made.values())).shape[1]))
-        for k, values in made.items():
-            out[which == k] = values
         return out
 
 

@@ -1,13 +1,14 @@
 """Implicit integration by collocation: Radau IIA for stiff and flexible systems, Gauss where energy counts.
 
-Steps of `kernel_collocation`, compiled where the system can be written on a tape and numba is there, else in NumPy;
-this module chooses their lengths and keeps what they pass through. The order goes with the tolerance.
+Steps of `kernel_collocation`, compiled where the system can be written on a tape, with NumPy for elements of any other
+kind; this module chooses their lengths and keeps what they pass through. The order goes with the tolerance.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -27,7 +28,7 @@ from . import (
     numpy_equations,
 )
 from .collocation import RADAU, Collocated, Scheme, path_matrix, powers_of_path, scheme
-from .compiled import Kernels, bind
+from .compiled import Kernels, bind, packed
 from .contract import LocalForce
 from .corners import TRUSTED, Corners, collocated_path, quiet_speeds
 from .dense import Polynomials
@@ -36,7 +37,6 @@ from .kernel_collocation import SOLVED, Stages
 from .kernel_equations import Band, Equations, Scratch, Wide
 from .numpy_equations import SystemEquations
 from .ordering import narrow_order
-from .packed import Packed
 from .start import Start
 from .steps import Status, StepControl, StepLaw, Watch, first_step
 from .system import System
@@ -64,7 +64,6 @@ KERNELS = Kernels(
     },
     ("collocation_step",),
     HOT,
-    making=11.0,
 )
 #: Stages of a step (measured: five and nine take as long for the same error).
 STAGES = 7
@@ -87,9 +86,9 @@ MODES_SHARE = 0.01
 
 
 @lru_cache(maxsize=1)
-def _plain() -> Any:
+def _numpy_step() -> Any:
     functions = (*numpy_equations.FUNCTIONS, kernel_collocation.collocation_step)
-    return bind(functions, {**numpy_equations.NAMES, **kernel_collocation.NAMES}, compiled=False).collocation_step
+    return bind(functions, {**numpy_equations.NAMES, **kernel_collocation.NAMES}).collocation_step
 
 
 def run_implicit(
@@ -117,7 +116,7 @@ def run_implicit(
 
 
 class Stepper:
-    """Trial steps of one run, compiled or not.
+    """Trial steps of one run, compiled for systems on a tape.
 
     Parameters
     ----------
@@ -131,19 +130,19 @@ class Stepper:
 
     def __init__(self, system: System, start: Start, tab: Scheme, program: Program | None = None) -> None:
         self.tab = tab
-        plain = SystemEquations(system, start)
+        elements = SystemEquations(system, start)
         s, n, m = len(tab.c), system.size, int(start.active.sum())
-        self.w = work(s, n, m, plain.stresses, tab.inner + 4)
+        self.w = work(s, n, m, elements.stresses, tab.inner + 4)
         self.w.now[2] = SOLVED
         self.compiled, self.compile_seconds = program is not None, 0.0
         if program is None:
-            self._step: Callable[[], int] = lambda: _plain()(plain, self.w, tab)
+            self._step: Callable[[], int] = lambda: _numpy_step()(elements, self.w, tab)
         else:
             known = system.__dict__.setdefault("_bands", {})
             rows = start.active.tobytes()
             if rows not in known:
                 known[rows] = narrow_band(program)
-            self._held = Packed(equations(program, known[rows], s, plain.stresses)), Packed(self.w), Packed(tab)
+            self._held = packed(equations(program, known[rows], s, elements.stresses)), packed(self.w), packed(tab)
             self.w.now[1] = self.w.limit[0] = 1.0
             self.compile_seconds = KERNELS.load(lambda: KERNELS.compiled.collocation_step(*self._held))
             self._step = KERNELS.compiled.collocation_step.on(*self._held)
@@ -249,7 +248,7 @@ class Stepper:
             "scheme": f"{'Radau IIA' if tab.inner < len(tab.c) else 'Gauss'} of {len(tab.c)} stages"
         }
         if self.compiled:
-            counts |= {"backend": "compiled", "compile_seconds": self.compile_seconds}
+            counts["compile_seconds"] = self.compile_seconds
         return dense, control.status, {
             **counts, "steps": control.accepted, "newton_iterations": newton, "rejected": control.rejected,
         }  # fmt: skip

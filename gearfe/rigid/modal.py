@@ -1,7 +1,7 @@
 """Integration in modal coordinates: y'' = -omega^2 y - C y' + W^T phi(t, W y, W y').
 
-Where the only force is a `LocalForce` whose law has a series, the motion is a Taylor series of up to `ORDER` terms,
-in a compiled loop; Runge-Kutta of order 8, each stage of which calls Python, takes any force.
+The only force is a `LocalForce` whose law has a series; so the motion is a Taylor series of up to `ORDER` terms, in a
+compiled loop.
 """
 
 from __future__ import annotations
@@ -15,56 +15,19 @@ import numpy as np
 
 from ..typing import Array
 from . import kernel_modal
-from .compiled import Kernels
+from .compiled import Kernels, packed
 from .contract import LocalForce, SeriesLaw
 from .dense import Dense, within_run
-from .elimination import ModalCoordinates, in_modes, is_linear
-from .explicit import Expand, Problem, run_problem
-from .packed import Packed
+from .elimination import ModalCoordinates, is_linear
 from .start import Start
 from .steps import Status, Watch, run_in_pieces
 from .system import System
 
 #: Highest order of the series; 24 to 36 cost the same within a tenth.
 ORDER = 30
-#: Asked tolerance -> that of the plain Runge-Kutta steps: accelerations weigh the fast modes more than the state does.
-PLAIN_SHARE = 0.03
-#: That of the terms that a series leaves out: the energy of a free pair of gears then keeps to ten times the tolerance.
+#: Asked tolerance -> that of the terms that a series leaves out: the energy of a free pair of gears then keeps to ten
+#: times the tolerance.
 SERIES_SHARE = 0.1
-
-
-def modal_problem(modal: ModalCoordinates) -> Problem:
-    """The equations of motion in modal coordinates."""
-    n = modal.T.shape[1]
-
-    def acceleration(t: float, y: Array) -> Array:
-        stiff = modal.constant - modal.eigenvalues * y[:n] - modal.damping @ y[n:]
-        return stiff + modal.force(t, y[:n], y[n:])
-
-    def rhs(t: float, y: Array) -> Array:
-        return np.concatenate([y[n:], acceleration(t, y)])
-
-    def expand(t: float, y: Array, derivative: int) -> Array:
-        if derivative == 2:
-            return np.asarray(modal.T @ acceleration(t, y))
-        return np.asarray(modal.T @ y[n:] if derivative else modal.origin + modal.T @ y[:n])
-
-    return Problem(rhs, lambda _, y: y, expand, np.ones(2 * n))
-
-
-def run_modal_explicit(
-    modal: ModalCoordinates, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
-    watch: Watch | None = None,
-) -> tuple[Dense, Status, dict[str, Any]]:  # fmt: skip
-    """Integrate by Runge-Kutta; returns (dense output, status, statistics)."""
-    y0 = np.concatenate(modal.reduce(start.q, start.v))
-    options: dict[str, Any] = {"breaks": modal.system.breaks, "longest": longest, "most": most, "watch": watch}
-    local = max(PLAIN_SHARE * tolerance, 1e-14)
-    problem = modal_problem(modal)
-    if modal.system.pieced:
-        problem = problem._replace(system=in_modes(modal, start)[0])
-    dense, status, statistics = run_problem(problem, (start.time, float(times[-1])), y0, local, **options)
-    return dense, status, {**statistics, "backend": "plain", "free_coordinates": modal.T.shape[1]}
 
 
 def run_modal_taylor(
@@ -77,7 +40,7 @@ def run_modal_taylor(
     n = modal.T.shape[1]
 
     local = max(SERIES_SHARE * tolerance, 1e-14)
-    run = SeriesRun(modal, *found, local, longest, modal_problem(modal).expand)
+    run = SeriesRun(modal, *found, local, longest)
     compiling = run.load()
     y0 = np.concatenate(modal.reduce(start.q, start.v))
     ends, states, at_times, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, watch)
@@ -85,7 +48,6 @@ def run_modal_taylor(
         "scheme": "Taylor series",
         "steps": len(ends) - 1,
         "orders": orders,
-        "backend": "compiled",
         "compile_seconds": compiling,
         "free_coordinates": n,
     }
@@ -120,12 +82,19 @@ class SeriesRun:
     series: SeriesLaw
     tolerance: float
     longest: float
-    expand: Expand
 
     @property
     def _bound(self) -> Kernels:
         series = self.series
         return _kernels(series.order, series.corner, series.helpers, tuple(sorted(series.names.items())))
+
+    def expand(self, t: float, y: Array, derivative: int) -> Array:
+        """Coordinates, velocities or accelerations of the system in the state y at the time t."""
+        modal, n = self.modal, len(y) // 2
+        if derivative == 2:
+            free = modal.constant - modal.eigenvalues * y[:n] - modal.damping @ y[n:]
+            return np.asarray(modal.T @ (free + modal.force(t, y[:n], y[n:])))
+        return np.asarray(modal.T @ y[n:] if derivative else modal.origin + modal.T @ y[:n])
 
     def load(self) -> float:
         """Compile the kernels, or load them, by a run of no length; seconds that this took."""
@@ -154,11 +123,11 @@ class SeriesRun:
         now = np.array([t0, t1, 5.0 / max(rates, 1.0 / max(abs(t1 - t0), 1e-300))])
         counts, orders = np.zeros(3, dtype=np.int64), [0]
         ends, states, outputs = [np.array([t0])], [y0[None, :]], np.ascontiguousarray(output_times)
-        run, scratch, advance = Packed(equations), Packed(work), self._bound.compiled.modal_steps
+        run, scratch, advance = packed(equations), packed(work), self._bound.compiled.modal_steps
 
         def fill(room: int) -> tuple[int, float, int]:
             out = kernel_modal.Output(now, counts, outputs, found, np.empty(room), np.empty((room, 2 * n)))
-            status, count = advance(run, scratch, Packed(out)), int(counts[0])
+            status, count = advance(run, scratch, packed(out)), int(counts[0])
             orders[0] += int(counts[2])
             ends.append(out.ends[:count])
             states.append(out.states[:count])

@@ -1,4 +1,4 @@
-"""Taylor integration of systems that can be written on a tape: orders, work space, backend.
+"""Taylor integration of systems that can be written on a tape: orders, work space, runs.
 
 The loops are in the kernel modules.
 """
@@ -22,16 +22,14 @@ from . import (
     kernel_steps,
     kernel_tape,
 )
+from .compiled import packed
 from .corners import blame_ahead
 from .dense import Polynomials
-from .packed import Packed
 from .row_tables import Equations, row_tables
 from .start import Start
 from .steps import Status, Watch, run_in_pieces
 from .system import System
 
-#: Seconds of compiling the kernels (measured).
-COMPILE_SECONDS = 15.0
 FUNCTIONS = (
     *kernel_rows.FUNCTIONS, *kernel_tape.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_singular.FUNCTIONS,
     *kernel_locate.FUNCTIONS, *kernel_steps.FUNCTIONS, *kernel_run.FUNCTIONS,
@@ -45,11 +43,9 @@ HOT = (
 )  # fmt: skip
 
 
-KERNELS = compiled.Kernels(
-    (*FUNCTIONS, *kernel_run.STARTERS), NAMES, ("integrate_series", "sample"), HOT, making=COMPILE_SECONDS
-)
-#: Steps between two looks at the clock at first: plain ones, compiled ones; at most coefficients in a piece.
-FIRST_STEPS, FIRST_COMPILED, MOST_NUMBERS = 8, 64, 2_000_000
+KERNELS = compiled.Kernels((*FUNCTIONS, *kernel_run.STARTERS), NAMES, ("integrate_series", "sample"), HOT)
+#: Steps of the first piece, and most coefficients in a piece.
+FIRST_STEPS, MOST_NUMBERS = 64, 2_000_000
 #: Distance from a pole, as a share of the way to it, at which loads are asked for their side of it.
 NEAR_POLE = 1e-6
 
@@ -137,39 +133,36 @@ def work_space(tb: Equations, order: int) -> Work:
 
 
 class Prepared(NamedTuple):
-    """Tables and work space of a system at one order, and what kernels get of them: the same, or both as blocks."""
+    """Tables and work space of a system at one order, and both as kernels get them."""
 
     system: System
     tables: Equations
     order: int
-    jit: bool  # whether for compiled kernels
     work: Work
     handed: tuple[Any, Any]
 
 
-def prepare(system: System, start: Start, order: int, jit: bool) -> Prepared:
+def prepare(system: System, start: Start, order: int) -> Prepared:
     """What runs of one system at one order share; they stay with it."""
     program = system.series
     assert program is not None  # the caller asks before
     light = np.flatnonzero(start.excess)
     known: dict[tuple[Any, ...], Prepared] = system.__dict__.setdefault("_prepared", {})
-    key = order, jit, light.tobytes(), start.excess[light].tobytes()
+    key = order, light.tobytes(), start.excess[light].tobytes()
     if key not in known:
         tables = row_tables(program, system.inverse_of(start.excess), start.excess)
         work = work_space(tables, order)
-        known[key] = Prepared(
-            system, tables, order, jit, work, (Packed(tables), Packed(work)) if jit else (tables, work)
-        )
+        known[key] = Prepared(system, tables, order, work, (packed(tables), packed(work)))
     return known[key]
 
 
 def first_pieces(tables: Equations, w: Work, t: float, forward: bool) -> bool:
     """Pieces of all switches at the state in w; whether every table has a value there."""
-    plain, program = KERNELS.plain, tables.program
-    plain.time_series(program.times, t, forward, 2, w.TF)
-    plain.variables(tables, w, w.q)
-    plain.rates(tables, w, w.v)
-    return bool(plain.set_pieces(program, w.P, w.R0, w.TF, w.pieces))
+    python, program = KERNELS.python, tables.program
+    python.time_series(program.times, t, forward, 2, w.TF)
+    python.variables(tables, w, w.q)
+    python.rates(tables, w, w.v)
+    return bool(python.set_pieces(program, w.P, w.R0, w.TF, w.pieces))
 
 
 def load_kernels(prepared: Prepared, run: kernel_steps.Run) -> float:
@@ -181,7 +174,7 @@ def load_kernels(prepared: Prepared, run: kernel_steps.Run) -> float:
 
     def nothing() -> None:
         out = kernel_run.Output(state, times, coefficients, *np.zeros((2, 1), dtype=np.int64))
-        KERNELS.compiled.integrate_series(*prepared.handed, Packed(run), Packed(out))
+        KERNELS.compiled.integrate_series(*prepared.handed, packed(run), packed(out))
         sampler(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, width)))
 
     return KERNELS.load(nothing)
@@ -205,7 +198,7 @@ def run_taylor(
 
     `tolerance` is that of the last terms.
     """
-    system, tables, order, jit, w, both = shared
+    system, tables, order, w, both = shared
     t0 = start.time
     w.q[:], w.v[:], w.base[:] = start.q, start.v, ~start.active
     sign = 1.0 if end >= t0 else -1.0
@@ -213,9 +206,8 @@ def run_taylor(
     state, made = first_state(t0), np.zeros(1, dtype=np.int64)
     with np.errstate(all="ignore"):
         covered = first_pieces(tables, w, t0, sign > 0.0)
-    compiling = load_kernels(shared, run) if jit else 0.0
-    advance = (KERNELS.compiled if jit else KERNELS.plain).integrate_series
-    handed = (*both, Packed(run) if jit else run)
+    compiling = load_kernels(shared, run)
+    advance, handed = KERNELS.compiled.integrate_series, (*both, packed(run))
     width = w.q.size
     parts: list[tuple[Array, Array, IntArray]] = []
 
@@ -223,9 +215,9 @@ def run_taylor(
         times, coefficients = np.empty(room + 1), np.empty((room, order + 1, width))
         singular = np.zeros(room, dtype=np.int64)
         out = kernel_run.Output(state, times, coefficients, singular, made)
-        status = advance(*handed, Packed(out) if jit else out) if covered else Status.NOT_FINITE
+        status = advance(*handed, packed(out)) if covered else Status.NOT_FINITE
         if status == Status.SINGULAR_START:
-            rows, shift, ahead, row, status = KERNELS.plain.begin(tables, w, run, t0)
+            rows, shift, ahead, row, status = KERNELS.python.begin(tables, w, run, t0)
             state[:] = t0 + shift, rows, ahead, 1.0, 0.0, row
             if status == Status.DONE:
                 return fill(room)
@@ -241,19 +233,18 @@ def run_taylor(
 
     with np.errstate(all="ignore"):
         status, done = run_in_pieces(
-            fill, (t0, end), lambda: (w.q, w.v), room=FIRST_COMPILED if jit else FIRST_STEPS,
-            largest=max(FIRST_COMPILED, MOST_NUMBERS // ((order + 1) * width)), most=most, watch=look,
+            fill, (t0, end), lambda: (w.q, w.v), room=FIRST_STEPS,
+            largest=max(FIRST_STEPS, MOST_NUMBERS // ((order + 1) * width)), most=most, watch=look,
         )  # fmt: skip
     if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE):
         status = _because_of_loads(shared, run, float(state[kernel_run.TIME]), status)
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
     series = np.concatenate([p[1] for p in parts]) if len(parts) > 1 else parts[0][1]
-    dense = Polynomials(ends, series, sampler if jit else None, t0)
+    dense = Polynomials(ends, series, sampler, t0)
     statistics = {
         "scheme": "Taylor series",
         "steps": done,
         "order": order,
-        "backend": "compiled" if jit else "plain",
         "compile_seconds": compiling,
         "singular_passages": ends[np.flatnonzero(np.concatenate([p[2] for p in parts]))],
     }
@@ -263,19 +254,19 @@ def run_taylor(
 def _because_of_loads(shared: Prepared, run: kernel_steps.Run, t: float, status: Status) -> Status:
     """Why a run ended at the state in the work space: not finite where loads have no value there, or just beyond, or a
     pole within the step; they say so."""
-    system, tables, order, _, w, _ = shared
-    plain = KERNELS.plain
+    system, tables, order, w, _ = shared
+    python = KERNELS.python
     system.forget_complaints()
     blame_ahead(system, t, (w.q, w.v, 2.0 * w.Z[: len(w.q), 2]), run.end - run.begin)
     if system.complaint:
         return Status.NOT_FINITE
     with np.errstate(all="ignore"):
-        size = run.sign * plain.step_length(tables, w, run)
-        h, where = plain.leaves(tables.program, w.R, w.pieces, order - 1, size)
+        size = run.sign * python.step_length(tables, w, run)
+        h, where = python.leaves(tables.program, w.R, w.pieces, order - 1, size)
         if status == Status.NOT_FINITE and where >= 0:
             states = []
             for place in (h * (1.0 - NEAR_POLE), h * (1.0 + NEAR_POLE)):
-                plain.evaluate(w.Z, order, place, w.qn, w.vn)
+                python.evaluate(w.Z, order, place, w.qn, w.vn)
                 states.append((t + place, w.qn.copy(), w.vn.copy()))
             system.blame_between(*states)
     return status
@@ -283,4 +274,4 @@ def _because_of_loads(shared: Prepared, run: kernel_steps.Run, t: float, status:
 
 def sampler(times: Array, coefficients: Array, sign: float, t: Array, derivative: int, out: Array) -> None:
     """Compiled sums of the polynomials, see `Polynomials`."""
-    KERNELS.compiled.sample(Packed(kernel_steps.Samples(times, coefficients, sign, t, derivative, out)))
+    KERNELS.compiled.sample(packed(kernel_steps.Samples(times, coefficients, sign, t, derivative, out)))

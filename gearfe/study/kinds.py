@@ -1,7 +1,6 @@
 """One case of each kind of job, in this process: tables of a job in, tables and summary out.
 
-Where a job leaves the integrator open (``auto``) it is fixed here: auto chooses by the clock, and a case must have the
-same digits wherever it runs. What cases share is made once: a `Shared` keeps the condensed gears and the root meshes of
+What cases share is made once: a `Shared` keeps the condensed gears and the root meshes of
 the last pair, so that cases which differ in load or microgeometry alone cost positions only.
 """
 
@@ -91,7 +90,6 @@ def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
 
 
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
-    from ..rigid.integrate import use_compiled
     from ..tables.train import train_tables
     from ..vibration.analysis import Analysis, record_start
     from ..vibration.files import OutputChoice, write_run
@@ -99,8 +97,6 @@ def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     from ..vibration.run import simulated
 
     job, watch = train_job(path, train_tables(raw, path)), Stopwatch()
-    if job.table.method == "auto":
-        job = replace(job, table=replace(job.table, method="taylor" if use_compiled("auto") else "explicit"))
     planned = simulated(job, (), watch=watch, estimate=estimate)
     start = record_start(job, planned.model.train, planned.every, watch.stage)
     choice = OutputChoice(window=job.spectrum.window, spectrum_start=start, spectrum_length=job.spectrum.duration)

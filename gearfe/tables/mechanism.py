@@ -15,6 +15,9 @@ from .plate import PlateTable
 
 Pair = tuple[float, float]
 
+#: What to write for integrators that exist no more.
+GONE_METHODS = {"explicit": 'explicit was removed: leave the method out, or write "implicit"'}
+
 
 @dataclass(frozen=True)
 class BodyTable:
@@ -252,8 +255,9 @@ class RunTable:
     )
     method: str = quantity(
         "auto",
-        choices=("auto", "taylor", "explicit", "implicit", "symplectic"),
-        doc="integrator (auto: quickest; symplectic: keeps the energy)",
+        choices=("auto", "taylor", "implicit", "symplectic"),
+        gone=GONE_METHODS,
+        doc="integrator (auto: taylor or implicit by a rule; symplectic: keeps the energy)",
     )
     analysis: str = quantity(
         "transient",

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 from ..config import job_tables, quantity, read_toml
 from ..errors import InputError, unknown_name
+from .mechanism import GONE_METHODS
 from .pair import ToothFormTable
 from .timefunction import TrainFunctionTable
 
@@ -282,7 +283,10 @@ class TrainTable:
     step_us: float = quantity(35.0, above=0.0, doc="step of the output (us); spectra end at half its frequency")
     tolerance: float = quantity(1e-6, low=1e-12, high=0.1, doc="relative tolerance of the integration")
     method: str = quantity(
-        "auto", choices=("auto", "taylor", "explicit", "implicit"), doc="integrator (auto: quickest)"
+        "auto",
+        choices=("auto", "taylor", "implicit"),
+        gone=GONE_METHODS,
+        doc="integrator (auto: taylor or implicit by a rule)",
     )
     shafts: tuple[TrainShaftTable, ...] = quantity(doc="[[train.shafts]]")
     gears: tuple[TrainGearTable, ...] = quantity(doc="[[train.gears]]")

@@ -44,19 +44,16 @@ class TransientOptions:
     tolerance
         Of the integration, relative to each coordinate's largest value.
     method
-        ``auto``, ``taylor``, ``explicit`` or ``implicit``, see `gearfe.rigid.integrate`.
+        ``auto``, ``taylor`` or ``implicit``, see `gearfe.rigid.integrate`.
     estimate
         Estimate the errors: of the integration from a second run with a hundredth of the tolerance and shorter steps,
         and of the housing's reduction up to `band_hz` (Hz).
-    backend
-        ``compiled``, ``plain`` or ``auto``.
     """
 
     tolerance: float = 1e-6
     method: str = "auto"
     estimate: bool = False
     band_hz: float = 5000.0
-    backend: str = "auto"
 
 
 def simulate(model: TrainModel, times: ArrayLike, *, raise_on_failure: bool = True, **options: Any) -> TrainResponse:
@@ -71,7 +68,7 @@ def simulate(model: TrainModel, times: ArrayLike, *, raise_on_failure: bool = Tr
     raise_on_failure
         Raise where the end is not reached; without it the response as far as it came is returned, with its status.
     options
-        Of `TransientOptions`: ``tolerance``, ``method``, ``estimate``, ``band_hz``, ``backend``.
+        Of `TransientOptions`: ``tolerance``, ``method``, ``estimate``, ``band_hz``.
 
     Raises
     ------
@@ -102,7 +99,7 @@ def _pieces(model: TrainModel, t: Array, options: TransientOptions) -> Iterator[
     totals, begin, start = _Totals(), 0, model.start
     finer = None
     if options.estimate:
-        finer = _FinerRun(replace(options, tolerance=max(1e-2 * options.tolerance, 1e-13), backend="auto"), model.start)
+        finer = _FinerRun(replace(options, tolerance=max(1e-2 * options.tolerance, 1e-13)), model.start)
     now = options
     for end in _ends(model, t):
         if begin or end < len(t) - 1:
@@ -125,12 +122,7 @@ def _pieces(model: TrainModel, t: Array, options: TransientOptions) -> Iterator[
             return
         yield response
         begin, start = end, replace(start, time=float(t[end]), q=moved.q[-1].copy(), v=moved.v[-1].copy())
-        now = _chosen(now, trajectory)
-
-
-def _chosen(options: TransientOptions, trajectory: Trajectory) -> TransientOptions:
-    """Options of the next piece: with the method that the choice took for this one, unless it took several."""
-    return replace(options, method=trajectory.method) if options.method == "auto" else options
+        now = replace(now, method=trajectory.method)
 
 
 def _ends(model: TrainModel, t: Array) -> Iterator[int]:
@@ -151,10 +143,9 @@ def _run(
     trajectory = integrate(
         model.system,
         t,
-        method=options.method if len(model.modal.eigenvalues) else "explicit",  # nothing is left to integrate
+        method=options.method,
         tolerance=options.tolerance,
         start=start,
-        backend=options.backend,
         longest=longest,
         raise_on_failure=False,  # the response has its own status
     )
@@ -245,7 +236,7 @@ class _FinerRun:
             self.off = self.size = np.zeros(one.shape[1])
         self.off = np.maximum(self.off, np.abs(one - two).max(axis=0, initial=0.0))
         self.size = np.maximum(self.size, np.abs(two).max(axis=0, initial=0.0))
-        self.options = _chosen(self.options, trajectory)
+        self.options = replace(self.options, method=trajectory.method)
         if len(finer.time) == len(t):
             self.start = replace(self.start, time=float(t[-1]), q=finer.q[-1].copy(), v=finer.v[-1].copy())
 

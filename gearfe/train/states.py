@@ -51,7 +51,7 @@ class TrainStates:
 def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     """States at the trajectory's times."""
     modal, t, W = model.modal, trajectory.time, model.directions
-    by_modes = trajectory.method in ("taylor", "explicit")
+    by_modes = trajectory.method == "taylor"
     if by_modes:
         state = trajectory.dense.state(t)  # type: ignore[attr-defined]
         n = modal.T.shape[1]

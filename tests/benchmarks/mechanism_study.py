@@ -81,7 +81,7 @@ def tolerances(record: Record) -> None:
     """Error against processor time for every integrator and tolerance."""
     table = record.table("mechanism_tolerance", "mechanism", "program", "method", "tolerance")
     for name in ("andrews", "slider_crank"):
-        for method in ("taylor", "explicit", "implicit"):
+        for method in ("taylor", "implicit"):
             asked: tuple[float, ...]
             if method == "taylor":
                 asked = QUICK_TOLERANCES if record.quick else TOLERANCES
@@ -94,10 +94,9 @@ def tolerances(record: Record) -> None:
 
 def _ours(name: str, method: str, tolerance: float, quick: bool) -> Mapping[str, Any]:
     case = subject(name)
-    backend = "plain" if quick else "auto"
 
     def run() -> tuple[Any, np.ndarray]:
-        made = integrate(case.system, case.times, method=method, tolerance=tolerance, start=case.start, backend=backend)
+        made = integrate(case.system, case.times, method=method, tolerance=tolerance, start=case.start)
         return made, made.q
 
     if method == "taylor" and not quick:
@@ -118,9 +117,7 @@ def starts(record: Record) -> None:
         for _ in range(count):
             theta, omega = _start_with_passage(random)
             system = folding_links(theta, omega)
-            run = lambda s=system: integrate(  # noqa: E731
-                s, times, tolerance=1e-9, backend="plain" if record.quick else "auto"
-            )
+            run = lambda s=system: integrate(s, times, tolerance=1e-9)  # noqa: E731
             run()
             made, cost = measured(run, runs=1 if record.quick else 5)
             other = made.q[:, 5] + made.q[:, 2]
@@ -245,8 +242,7 @@ def chains(record: Record) -> None:
 
     def make(count: int) -> Mapping[str, Any]:
         system, times = chain(count), np.linspace(0.0, 0.02 if record.quick else 1.0, 3)
-        backend = "plain" if record.quick else "auto"
-        run = lambda: integrate(system, times, method="taylor", tolerance=1e-9, backend=backend)  # noqa: E731
+        run = lambda: integrate(system, times, method="taylor", tolerance=1e-9)  # noqa: E731
         run()
         made, cost = measured(run, runs=1 if record.quick else 5, most_s=3.0)
         steps = int(made.statistics["steps"])
@@ -265,28 +261,26 @@ m = load_mechanism(sys.argv[1])
 start, times = m.start(), np.linspace(0.0, 0.03, 301)
 def call():
     t = time.process_time()
-    integrate(m.system, times, tolerance=1e-9, start=start, backend=sys.argv[2]).q
+    integrate(m.system, times, tolerance=1e-9, start=start).q
     return time.process_time() - t
 first = call()
-print(first, min(call() for _ in range(int(sys.argv[3]))))
+print(first, min(call() for _ in range(int(sys.argv[2]))))
 """
 
 
 def calls(record: Record) -> None:
-    """Andrews' mechanism in a fresh process: the first call and later ones, compiled and plain."""
+    """Andrews' mechanism in a fresh process: the first call and later ones."""
     table = record.table("mechanism_calls", "state")
-    cases = [("plain Python", "plain", True), ("kernels in the cache", "compiled", True)]
-    if not record.quick:
-        cases.append(("kernels compiled", "compiled", False))
-    for state, backend, keep in cases[:1] if record.quick else cases:
+    cases = [("kernels in the cache", True), ("kernels compiled", False)]
+    for state, keep in cases[:1] if record.quick else cases:
 
-        def make(backend: str = backend, keep: bool = keep) -> Mapping[str, Any]:
+        def make(keep: bool = keep) -> Mapping[str, Any]:
             with tempfile.TemporaryDirectory(prefix="gearfe-cache-") as empty:
                 env = dict(os.environ, PYTHONPATH=os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
                 if not keep:
                     env["GEARFE_CACHE"] = empty
-                again = "20" if backend == "compiled" and not record.quick else "1"
-                command = [sys.executable, "-c", CALL, str(Path(GEOMETRY / "andrews.toml")), backend, again]
+                again = "1" if record.quick else "20"
+                command = [sys.executable, "-c", CALL, str(Path(GEOMETRY / "andrews.toml")), again]
                 done = subprocess.run(command, check=True, capture_output=True, text=True, env=env, timeout=900)
             first, later = (float(x) for x in done.stdout.split())
             return {"first_call_cpu_s": first, "later_call_cpu_s": later}

@@ -56,14 +56,13 @@ def run_references(record: Record) -> None:
 
 def comparisons(quick: bool) -> Iterator[tuple[str, str, Any]]:
     """What, reference, and the function that compares."""
-    backend = "plain" if quick else "auto"
-    yield "Andrews' mechanism: end state (rad)", "published (IVP test set)", lambda: andrews_end(backend)
+    yield "Andrews' mechanism: end state (rad)", "published (IVP test set)", andrews_end
     for tolerance in (1e-6,) if quick else (1e-9, 1e-12):
         what = f"Andrews' mechanism: seven angles over 0..0.03 s at tolerance {tolerance:g} (rad)"
-        yield what, "binary128 trajectory", lambda t=tolerance: trajectory("andrews", t, backend)
+        yield what, "binary128 trajectory", lambda t=tolerance: trajectory("andrews", t)
     if not quick:
         what = "slider crank: crank angle over 0..10 s through eleven folds at tolerance 1e-9 (rad)"
-        yield what, "binary128 trajectory", lambda: trajectory("slider_crank", 1e-9, backend)
+        yield what, "binary128 trajectory", lambda: trajectory("slider_crank", 1e-9)
     coarsen = 2.0 if quick else 1.0
     for plane, twist in (
         (("strain", 0.05),) if quick else (("strain", 0.05), ("stress", 0.05), ("strain", 0.01), ("strain", 0.5))
@@ -84,10 +83,10 @@ def comparisons(quick: bool) -> Iterator[tuple[str, str, Any]]:
     yield "uniform strain on a distorted mesh of a plane plate", "constant stress (patch test)", lambda: patch("strain")
 
 
-def andrews_end(backend: str) -> Found:
+def andrews_end() -> Found:
     """Our end state at 1e-12 (binary128 stands between: the published one is the less exact of the two)."""
     case = subject("andrews")
-    made = integrate(case.system, [0.0, 0.03], tolerance=1e-12, start=case.start, backend=backend)
+    made = integrate(case.system, [0.0, 0.03], tolerance=1e-12, start=case.start)
     a = made.q[-1, 2::3]
     end = np.array([a[0], a[1] - a[0], a[2], a[3] - a[4], a[4], a[5] - a[6], a[6]])
     off = float(np.abs(end - ANDREWS_END).max())
@@ -95,10 +94,10 @@ def andrews_end(backend: str) -> Found:
     return Found(off, float("nan"), 7, f"the published state itself is {truth:.1e} off the binary128 one")
 
 
-def trajectory(name: str, tolerance: float, backend: str) -> Found:
+def trajectory(name: str, tolerance: float) -> Found:
     """Largest error over the run."""
     case = subject(name)
-    made = integrate(case.system, case.times, tolerance=tolerance, start=case.start, backend=backend)
+    made = integrate(case.system, case.times, tolerance=tolerance, start=case.start)
     promised = {"andrews": tolerance, "slider_crank": 1e-8}[name]
     return Found(case.error(made.q), promised, case.truth.size)
 

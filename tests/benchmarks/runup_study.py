@@ -85,7 +85,7 @@ def truth(variant: str, speed: float, quick: bool) -> np.ndarray:
     model, period = model_at(variant, speed, quick), period_of(variant, speed, quick)
     begin = round((QUICK_LONG if quick else LONG) / period)
     times = np.concatenate([[0.0], period * (begin + np.arange(FINE) / FINE)])
-    made = simulate(model, times, tolerance=1e-10, backend="plain" if quick else "auto")
+    made = simulate(model, times, tolerance=1e-10)
     lines = np.fft.rfft(made.contact_force[1:], axis=0)[: FINE // 2] * (2.0 / FINE)
     lines[0] *= 0.5
     return np.asarray(lines)
@@ -141,7 +141,7 @@ def _transient(
     times, last = last_period(variant, speed, span, quick)
     asked = np.concatenate([times[:1], times[-last:]])
     made, cost = measured(
-        lambda: simulate(model, asked, tolerance=tolerance, backend="plain" if quick else "auto"),
+        lambda: simulate(model, asked, tolerance=tolerance),
         runs=1 if quick else 3,
     )
     return {"error": error_of(made.contact_force[1:], asked[1:], variant, speed, quick), **cost.columns}

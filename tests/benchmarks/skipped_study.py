@@ -119,7 +119,7 @@ def _process(code: str, **extra: str) -> float:
 RIGID = """
 from gearfe.train import simulate
 from tests.benchmarks.subject import train_model, train_times
-simulate(train_model("tutorial", quick=True), train_times(True), backend="plain")
+simulate(train_model("tutorial", quick=True), train_times(True))
 """
 
 
@@ -171,19 +171,19 @@ def lazy_imports(_quick: bool) -> tuple[float, float, str]:
 
 
 def compiled_kernels(quick: bool) -> tuple[float, float, str]:
-    """Andrews' mechanism by the command in plain Python; with the kernels compiled (or loaded) for it."""
+    """Andrews' mechanism with the kernels in the cache; with the kernels compiled for it."""
     code = (
         "from gearfe.mechanisms import load_mechanism\nfrom gearfe.rigid import integrate\n"
         f"m = load_mechanism({str(GEOMETRY / 'andrews.toml')!r})\n"
-        "integrate(m.system, [0.0, 0.03], tolerance=1e-9, start=m.start(), backend=%r).q"
+        "integrate(m.system, [0.0, 0.03], tolerance=1e-9, start=m.start()).q"
     )
-    short = _process(code % "plain")
+    short = _process(code)
     if quick:
         return short, short + _process("import numba"), "loading numba alone"
     with tempfile.TemporaryDirectory() as empty:
         return (
             short,
-            _process(code % "compiled", GEARFE_CACHE=empty),
+            _process(code, GEARFE_CACHE=empty),
             "compiling once; worth it for long or many runs",
         )
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.rigid.compiled import available
 from gearfe.tables.pair import LAWS
 
 from ..script import answered
@@ -118,7 +117,7 @@ def test_equations_for_other_programs_are_those_of_the_mechanisms():
     _, slider_rhs, slider_residual, _ = equations("slider_crank", jit=False)
     case = subject("andrews")
     np.testing.assert_allclose(start[:7], case.start.q[2::3], atol=1e-15)
-    made = integrate(case.system, [0.0, 0.004, 0.011], tolerance=1e-9, start=case.start, backend="plain")
+    made = integrate(case.system, [0.0, 0.004, 0.011], tolerance=1e-9, start=case.start)
     for q, v, a in zip(made.q, made.v, made.a, strict=True):
         state, slope = np.concatenate([q[2::3], v[2::3]]), np.empty(14)
         andrews_rhs(0.0, state, slope)
@@ -153,7 +152,6 @@ def test_equations_for_other_programs_are_those_of_the_mechanisms():
     np.testing.assert_allclose(out[[0, 1, 4, 5]], 0.0, atol=1e-12)
 
 
-@pytest.mark.skipif(not available(), reason="numba is not installed")
 def test_compiled_equations_of_the_train_for_other_programs_are_the_plain_ones():
     import dataclasses
 

@@ -46,11 +46,7 @@ def run_transient(record: Record) -> None:
 def subject(variant: str, quick: bool) -> tuple[Any, np.ndarray, np.ndarray]:
     """Model, output times, and the signals of a run at 1e-12."""
     model, times = train_model(variant, quick=quick), train_times(quick)
-    return model, times, signals_of(simulate(model, times, tolerance=1e-12, backend=_backend(quick)))
-
-
-def _backend(quick: bool) -> str:
-    return "plain" if quick else "auto"
+    return model, times, signals_of(simulate(model, times, tolerance=1e-12))
 
 
 def signals_of(response: Any) -> np.ndarray:
@@ -79,7 +75,7 @@ def tolerances(record: Record) -> None:
     """Error against time, 0..7 ms; the kernels are loaded before."""
     table = record.table("transient_tolerance", "variant", "program", "method", "tolerance")
     for variant in VARIANTS[:1] if record.quick else VARIANTS:
-        for method in ("explicit" if record.quick else "taylor", "implicit"):  # series are compiled
+        for method in ("taylor", "implicit"):
             asked: tuple[float, ...]
             if method != "implicit":
                 asked = QUICK_TOLERANCES if record.quick else TOLERANCES
@@ -96,7 +92,7 @@ def _ours(variant: str, method: str, tolerance: float, quick: bool) -> Mapping[s
     model, times, truth = subject(variant, quick)
 
     def run() -> Any:
-        return simulate(model, times, tolerance=tolerance, method=method, backend=_backend(quick))
+        return simulate(model, times, tolerance=tolerance, method=method)
 
     fast = method != "implicit" and not quick
     made, cost = measured(run, runs=5 if fast else 1, least_s=0.2 if fast else 0.0)
@@ -126,7 +122,7 @@ def _theirs(variant: str, peer: str, method: str, tolerance: float, quick: bool)
         return {"error": float("nan"), "status": str(error)}
     at, states = np.array(answer.pop("times")), np.array(answer.pop("states"))
     if len(at) != len(times) or np.abs(at - times).max() > 1e-12:
-        truth = signals_of(simulate(model, at, tolerance=1e-12, backend=_backend(quick)))
+        truth = signals_of(simulate(model, at, tolerance=1e-12))
     found = states_signals(model, at, states)
     return {**errors_of(found, truth, model), **answer}
 
@@ -154,7 +150,7 @@ def states_signals(model: Any, times: np.ndarray, states: np.ndarray) -> np.ndar
     """The compared signals of states (coordinates, rates) at the output times."""
     if states.shape != (len(times), 2 * model.modal.T.shape[1]):
         return np.zeros((0, 0))
-    trajectory: Any = SimpleNamespace(time=times, method="explicit", dense=SimpleNamespace(state=lambda _: states))
+    trajectory: Any = SimpleNamespace(time=times, method="taylor", dense=SimpleNamespace(state=lambda _: states))
     moved = train_states(model, trajectory)
     push = model.angle(times, 2)[:, None] * model.ratios
     return np.hstack([moved.contact_force, push + moved.a @ model.spin_reference.T, moved.a @ model.axial.T])

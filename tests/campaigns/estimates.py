@@ -118,7 +118,6 @@ def _run_trajectory(case: Case, job_path: Path) -> Found:
     from gearfe.mechanisms.model import load_mechanism
     from gearfe.mechanisms.results import evaluate
     from gearfe.rigid import integrate
-    from gearfe.rigid.taylor import KERNELS
 
     del case
     mechanism = load_mechanism(job_path)
@@ -128,9 +127,8 @@ def _run_trajectory(case: Case, job_path: Path) -> Found:
     if made.status != 0:
         return made.message
     stated = trajectory_error(mechanism, start, evaluate(mechanism, made), mechanism.tolerance).coordinates
-    backend = "compiled" if KERNELS.ready else "plain"
     finest = 1e-12 if made.method == "taylor" else max(1e-11, 1e-5 * mechanism.tolerance)
-    options: dict[str, Any] = {"method": made.method, "start": start, "backend": backend, "raise_on_failure": False}
+    options: dict[str, Any] = {"method": made.method, "start": start, "raise_on_failure": False}
     truth = integrate(mechanism.system, times, tolerance=finest, **options)
     while truth.status != 0 and 10.0 * finest <= FAR_FINER * mechanism.tolerance:
         finest *= 10.0  # redundant loops stop at folds when rounding is all that the tolerance leaves

@@ -22,7 +22,6 @@ from gearfe.mechanisms.job import output_times
 from gearfe.mechanisms.model import Mechanism, load_mechanism
 from gearfe.mechanisms.results import evaluate
 from gearfe.rigid import Start, Trajectory, consistent_start, integrate
-from gearfe.rigid.taylor import KERNELS
 
 from .campaign import Campaign, Case
 from .linkages import GRAVITY, KINDS, linkage
@@ -98,8 +97,7 @@ def _estimate(mechanism: Mechanism, start: Start, made: Trajectory, floor: float
     if tolerance < 1e-9 or made.method != "taylor":
         return []  # no run is far finer than that
     stated = trajectory_error(mechanism, start, evaluate(mechanism, made), tolerance).coordinates
-    backend = "compiled" if KERNELS.ready else "plain"
-    options: dict[str, Any] = {"method": made.method, "start": start, "backend": backend, "tolerance": 1e-12}
+    options: dict[str, Any] = {"method": made.method, "start": start, "tolerance": 1e-12}
     truth = integrate(mechanism.system, made.time, raise_on_failure=False, **options)
     if truth.status != 0:
         return []
@@ -110,9 +108,8 @@ def _estimate(mechanism: Mechanism, start: Start, made: Trajectory, floor: float
 def _backwards(case: Case, mechanism: Mechanism, start: Start, made: Trajectory) -> list[Check]:
     """Run back to the start; chains are chaotic, so errors grow with a rate that the case states."""
     end = consistent_start(mechanism.system, made.reached, q=made.q[-1], v=made.v[-1])
-    backend = "compiled" if KERNELS.ready else "plain"
     options: dict[str, Any] = {"method": made.method, "tolerance": mechanism.tolerance, "start": end}
-    back = integrate(mechanism.system, [made.reached, 0.0], backend=backend, raise_on_failure=False, **options)
+    back = integrate(mechanism.system, [made.reached, 0.0], raise_on_failure=False, **options)
     if back.status != 0:
         return []
     growth = math.exp(min(12.0, float(case.data["growth_per_s"]) * made.reached))
