@@ -35,7 +35,7 @@ class Numbers(NamedTuple):
     out: Any
 functions = (k.doubled, k.entry)
 before = compiled.is_cached(functions, "entry")
-bound = compiled.bind(functions, {}, compiled=True, entries=("entry",))
+bound = compiled.bind(functions, {}, entries=("entry",))
 numbers = Numbers(3.0, np.zeros(1))
 assert bound.entry(Packed(numbers)) == 0 and numbers.out[0] == 7.0
 print(before, compiled.is_cached(functions, "entry"), int("numba" not in sys.modules))

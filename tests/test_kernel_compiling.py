@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +15,8 @@ from gearfe.rigid import compiled
 from gearfe.rigid.lanes import NAMES, Lanes, as_lanes, flat, halves, highest, lanes, total
 from gearfe.rigid.packed import Packed
 from gearfe.typing import Array, IntArray
+
+from .rigid_cases import by_scipy, pendulum
 
 
 class Inner(NamedTuple):
@@ -53,7 +57,7 @@ def sample() -> Outer:
 
 def test_a_block_reads_as_the_named_tuple_it_was_made_from(tmp_path, monkeypatch):
     monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
-    names = compiled.bind((weighted, fill_out), {}, compiled=True, entries=("fill_out",))
+    names = compiled.bind((weighted, fill_out), {}, entries=("fill_out",))
     outer = sample()
     assert names.fill_out(Packed(outer)) == 5
     k = np.arange(4)
@@ -68,7 +72,7 @@ def test_parts_give_what_numba_alone_gives(tmp_path, monkeypatch):
         monkeypatch.setenv("GEARFE_CACHE", str(tmp_path / str(number)))
         if options is not None:
             monkeypatch.setattr(compiled, "part_options", lambda: {})
-        names = compiled.bind((weighted, fill_out), {}, compiled=True, entries=("fill_out",))
+        names = compiled.bind((weighted, fill_out), {}, entries=("fill_out",))
         outer = sample()
         names.fill_out(Packed(outer))
         results.append(outer.out)
@@ -97,7 +101,7 @@ def test_code_in_the_cache_is_found_by_another_process(tmp_path, monkeypatch):
 
 def hits() -> tuple[int, int]:
     """Whether the compiler was needed; what the kernel returned."""
-    names = compiled.bind((weighted, fill_out), {}, compiled=True, entries=("fill_out",))
+    names = compiled.bind((weighted, fill_out), {}, entries=("fill_out",))
     made = names.fill_out(Packed(sample()))
     return int("numba" in sys.modules), made
 
@@ -145,9 +149,7 @@ def test_lanes_compute_as_arrays_do(tmp_path, monkeypatch):
     made = []
     for jit in (False, True):
         sides = Sides(as_lanes(angles), lanes(4, 60, 4), as_lanes(wave), np.zeros(3))
-        names = compiled.bind(
-            (square_order, use_sides), {**NAMES, "np": np}, compiled=jit, entries=("use_sides",) if jit else ()
-        )
+        names = compiled.bind((square_order, use_sides), {**NAMES, "np": np}, entries=("use_sides",) if jit else ())
         assert names.use_sides(Packed(sides) if jit else sides) == 60
         made.append(sides)
     plain, quick = made
@@ -157,3 +159,25 @@ def test_lanes_compute_as_arrays_do(tmp_path, monkeypatch):
     np.testing.assert_allclose(plain.single[:2], [angles[0, 2:].sum(), angles[1].max()], rtol=1e-14)
     assert plain.single[2] == pytest.approx(2.0 * (wave[1, 0] * wave[1, 1]).sum(), rel=1e-14)
     assert np.isnan(quick.out[2, 2, 1])
+
+
+STEPPED = """
+import sys
+import numpy as np
+from gearfe.rigid import integrate
+from tests.rigid_cases import pendulum
+for method in ("taylor", "implicit"):
+    print(repr(integrate(pendulum(), [0.0, 0.2], method=method, tolerance=1e-9).q[-1, 2].item()))
+assert "numba" not in sys.modules
+"""
+
+
+def test_kernels_run_as_python_where_numba_is_switched_off(tmp_path):
+    """NUMBA_DISABLE_JIT: a debugger steps through them; no cache is written, the motion is that of compiled code."""
+    root = Path(__file__).parents[1]
+    env = {**os.environ, "NUMBA_DISABLE_JIT": "1", "GEARFE_CACHE": str(tmp_path), "PYTHONPATH": str(root)}
+    done = subprocess.run([sys.executable, "-c", STEPPED], env=env, capture_output=True, text=True, check=True)
+    times = np.array([0.0, 0.2])
+    exact = by_scipy(pendulum(), times)[0][-1, 2]
+    assert [float(line) for line in done.stdout.split()] == pytest.approx([exact, exact], abs=1e-8)
+    assert not list(tmp_path.rglob("kernels-*"))

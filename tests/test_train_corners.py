@@ -130,7 +130,7 @@ def oscillators(tolerance):
 
     names = {"np": np, "math": math, "LEAST": kernel_modal.LEAST}
     alias = {"order": "law_order", "corner": "law_corner"}
-    kernels = compiled.bind((*kernel_modal.FUNCTIONS, order, corner), names, compiled=False, alias=alias)
+    kernels = compiled.bind((*kernel_modal.FUNCTIONS, order, corner), names, alias=alias)
     eigenvalues, diagonal = np.array([0.0, 4.0, 900.0]), np.array([0.0, 0.0, 1.2])
     state, asked = np.array([0.1, 1.0, 1e-3, 0.5, 0.0, 1.0]), np.linspace(0.25, 4.0, 16)
     equations = kernel_modal.Equations(

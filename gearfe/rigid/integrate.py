@@ -102,7 +102,7 @@ def integrate(
     chosen = chosen_method(system, start, duration) if method == "auto" else method
     options = {"tolerance": tolerance, "longest": longest}
     counted = partial(_counted, start.time, output_times[-1])
-    with np.errstate(over="ignore", invalid="ignore"):  # a state that is not finite has a status of its own
+    with np.errstate(all="ignore"):  # a state that is not finite has a status of its own
         dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps, counted)
         if method == "auto" and chosen == "taylor" and status is Status.STEP_TOO_SMALL and system.linkage is None:
             chosen = "implicit"  # a load has no series at a state on the way

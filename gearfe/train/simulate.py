@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..progress import count, stage
 from ..record_spectrum import FASTEST, OVERSAMPLING
 from ..rigid import IntegrationError, Start, Status, Trajectory, integrate
+from ..rigid.integrate import chosen_method
 from ..typing import Array
 from .kinematics import steady_forces
 from .model import TrainModel
@@ -97,16 +98,17 @@ def simulate_in_pieces(model: TrainModel, times: ArrayLike, **options: Any) -> I
 
 def _pieces(model: TrainModel, t: Array, options: TransientOptions) -> Iterator[TrainResponse]:
     totals, begin, start = _Totals(), 0, model.start
+    if options.method == "auto":
+        options = replace(options, method=chosen_method(model.system, model.start, float(t[-1])))
     finer = None
     if options.estimate:
         finer = _FinerRun(replace(options, tolerance=max(1e-2 * options.tolerance, 1e-13)), model.start)
-    now = options
     for end in _ends(model, t):
         if begin or end < len(t) - 1:
             count(begin, len(t) - 1, "times")
         clocked = clock.perf_counter()
         with np.errstate(over="ignore", invalid="ignore"):
-            trajectory, moved = _run(model, t[begin : end + 1], now, start)
+            trajectory, moved = _run(model, t[begin : end + 1], options, start)
             status, keep, why = _ended(model, trajectory, moved)
         kept = _cut(moved, min(1, begin), keep)
         totals.add(model, trajectory, kept, clock.perf_counter() - clocked)
@@ -122,7 +124,6 @@ def _pieces(model: TrainModel, t: Array, options: TransientOptions) -> Iterator[
             return
         yield response
         begin, start = end, replace(start, time=float(t[end]), q=moved.q[-1].copy(), v=moved.v[-1].copy())
-        now = replace(now, method=trajectory.method)
 
 
 def _ends(model: TrainModel, t: Array) -> Iterator[int]:
@@ -143,7 +144,7 @@ def _run(
     trajectory = integrate(
         model.system,
         t,
-        method=options.method,
+        method=options.method if len(model.modal.eigenvalues) else "implicit",  # which sees that nothing moves
         tolerance=options.tolerance,
         start=start,
         longest=longest,
@@ -226,7 +227,7 @@ class _FinerRun:
         # where the corners of the curves set the steps, a tolerance alone would repeat them
         longest = 0.5 * float(t[-1] - t[0]) / max(1, steps)
         with np.errstate(over="ignore", invalid="ignore"):
-            trajectory, finer = _run(model, t, self.options, self.start, longest)
+            _, finer = _run(model, t, self.options, self.start, longest)
             one = np.hstack([kept.contact_force, kept.a @ model.axial.T])
             two = np.hstack([finer.contact_force, finer.a @ model.axial.T])
         shared, places = np.searchsorted(finer.time, kept.time), np.arange(len(kept.time))
@@ -236,7 +237,6 @@ class _FinerRun:
             self.off = self.size = np.zeros(one.shape[1])
         self.off = np.maximum(self.off, np.abs(one - two).max(axis=0, initial=0.0))
         self.size = np.maximum(self.size, np.abs(two).max(axis=0, initial=0.0))
-        self.options = replace(self.options, method=trajectory.method)
         if len(finer.time) == len(t):
             self.start = replace(self.start, time=float(t[-1]), q=finer.q[-1].copy(), v=finer.v[-1].copy())
 
