@@ -38,7 +38,7 @@ from gearfe.rigid import (
 )
 from gearfe.rigid.beam import Beam
 from gearfe.rigid.beam_link import BeamLink, Section
-from gearfe.rigid.integrate import DECAYED, OVERDAMPED, _run, chosen_method
+from gearfe.rigid.integrate import DECAYED, DECAYED_MODAL, OVERDAMPED, _run, chosen_method
 from gearfe.rigid.modes import fastest_rate
 from gearfe.rigid.start import Start, consistent_start
 from gearfe.stiffness.periodic import periodic_interpolant
@@ -315,7 +315,8 @@ def timed(scene: Scene, method: str, patience: float) -> float:
 HEAD = """# The rule of `auto`: measurements
 
 `method = "auto"` takes collocation where the fastest decay d exceeds {over:g} times the fastest vibration w, and d
-times the duration T exceeds {decayed:g} ([the rule](../integrators.md)). This page compares the rule with both methods.
+times the duration T exceeds {decayed:g}, in trains {modal:g} ([the rule](../integrators.md)). This page compares that
+rule with both methods.
 
 `scripts/measure_rule.py` writes the table: processor seconds at the same tolerance, kernels loaded before, the least
 of three runs where these are short. "> x" means: ended after x seconds, or earlier without reaching the end. Flexible
@@ -369,7 +370,7 @@ def measured(scene: Scene, patience: float) -> Row:
 def page(rows: Sequence[Row], patience: float) -> str:
     """The page of the documentation."""
     both = [row.times_better for row in rows if not row.alone]
-    head = HEAD.format(over=OVERDAMPED, decayed=DECAYED, count=len(both), worst=max(both))
+    head = HEAD.format(over=OVERDAMPED, decayed=DECAYED, modal=DECAYED_MODAL, count=len(both), worst=max(both))
     return head + "".join(row.line(patience) + "\n" for row in rows)
 
 

@@ -36,8 +36,9 @@ METHODS = ("auto", "taylor", *COLLOCATION)
 #: hundred times.
 LOCAL_SHARE = 5e-4
 #: The rule of `auto`: collocation where the fastest decay exceeds so many times the fastest vibration and, times the
-#: duration, this number (docs/development/integrators.md has the measurements).
-OVERDAMPED, DECAYED = 3.0, 4e5
+#: duration, the second number, or the third in modal coordinates, where collocation is not compiled (measured:
+#: docs/development/integrators.md).
+OVERDAMPED, DECAYED, DECAYED_MODAL = 3.0, 2e4, 1e6
 #: Fastest rate times the duration from which on steps of series are below the rounding of the run's time.
 HOPELESS = 1e12
 #: What to write for methods that exist no more.
@@ -157,7 +158,8 @@ def chosen_method(system: System, start: Start, duration: float) -> str:
     if not _has_series(system) or any(element.stiff for element in system.elements):
         return "implicit"
     decay, vibration = _rates(system, start)
-    overdamped = decay > OVERDAMPED * vibration and decay * duration > DECAYED
+    long = DECAYED_MODAL if _modal(system) else DECAYED
+    overdamped = decay > OVERDAMPED * vibration and decay * duration > long
     return "implicit" if overdamped or max(decay, vibration) * duration > HOPELESS else "taylor"
 
 
