@@ -15,7 +15,7 @@ from .gear_oscillator import GearOscillator
 from .mesh_laws import hertzian_law
 from .trains import SPEED, base_radius, changed, curve, train
 
-METHODS = ["taylor", "explicit", "implicit"]
+METHODS = ["taylor", "implicit"]
 RULES = ["always", "in_contact"]
 BACKLASH = 4e-5
 
