@@ -6,13 +6,13 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.rigid import compiled, constant
+from gearfe.rigid import constant
 from gearfe.runup.run_up import steady_state
 from gearfe.train import Bearing, Damping, build_train, simulate
 
 from .trains import ALPHA, SPEED, base_radius, changed, curve, elastic, train
 
-METHOD = "taylor" if compiled.available() else "explicit"
+METHOD = "taylor"
 
 
 def loaded(stages=((20, 30),), *, torque=60.0, **changes):
