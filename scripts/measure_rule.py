@@ -323,6 +323,9 @@ of three runs where these are short. "> x" means: ended after x seconds, or earl
 links have one method only (a dash). On {count} scenes with two methods the rule takes at most {worst:.2f} times the
 better one.
 
+At the bound the methods cost the same only on the average: a damped bar takes 4 ms by series and 13 ms by collocation,
+a linkage of 81 bodies 0.3 s and 0.13 s.
+
 | kind | scene | d/w | d T | taylor (s) | implicit (s) | the rule takes | times the better |
 |---|---|---|---|---|---|---|---|
 """
@@ -369,7 +372,7 @@ def measured(scene: Scene, patience: float) -> Row:
 
 def page(rows: Sequence[Row], patience: float) -> str:
     """The page of the documentation."""
-    both = [row.times_better for row in rows if not row.alone]
+    both = [row.times_better for row in rows if not row.alone and math.isfinite(min(row.taylor, row.implicit))]
     head = HEAD.format(over=OVERDAMPED, decayed=DECAYED, modal=DECAYED_MODAL, count=len(both), worst=max(both))
     return head + "".join(row.line(patience) + "\n" for row in rows)
 

@@ -38,7 +38,7 @@ LOCAL_SHARE = 5e-4
 #: The rule of `auto`: collocation where the fastest decay exceeds so many times the fastest vibration and, times the
 #: duration, the second number, or the third in modal coordinates, where collocation is not compiled (measured:
 #: docs/development/integrators.md).
-OVERDAMPED, DECAYED, DECAYED_MODAL = 3.0, 2e4, 1e6
+OVERDAMPED, DECAYED, DECAYED_MODAL = 3.0, 3e3, 1e6
 #: Fastest rate times the duration from which on steps of series are below the rounding of the run's time.
 HOPELESS = 1e12
 #: What to write for methods that exist no more.
