@@ -75,7 +75,7 @@ def _followed(nodes: Array, tets: IntArray, folded: BoolArray, surface: BoolArra
     for _ in range(LAYERS):
         reached = np.zeros(len(nodes), dtype=bool)
         reached[tets[near]] = True
-        near = reached[tets].any(axis=1)
+        near = np.asarray(reached[tets].any(axis=1))
     free = np.zeros(len(nodes), dtype=bool)
     free[tets[near]] = True
     free[tets[~near]] = False
