@@ -71,7 +71,8 @@ def runup_columns(run: RunUp) -> dict[str, Any]:
 
 def bearing_means(run: RunUp) -> dict[str, Array]:
     """Mean force of the shaft on each bore, and the rms of what swings about it up to the band."""
-    made, states = {}, run.states
+    made: dict[str, Array] = {}
+    states = run.states
     for j, name in enumerate(run.train.model.bores):
         for k, x in enumerate(XYZ):
             lines = [s.bearing[:, j, k] for s in states]

@@ -211,7 +211,8 @@ def _highest(train: CondensedTrain, band_hz: float) -> float:
 
 def _one_by_one(train: CondensedTrain, speeds: Array, made: _Curves, options: dict[str, Any]) -> list[float]:
     """Motions at speeds that have no curve between them, since a torque has a frequency of its own; those not found."""
-    lost, refused = [], []
+    lost: list[float] = []
+    refused: list[tuple[float, str]] = []
     for number, speed in enumerate(speeds.tolist()):
         count(number, len(speeds) - 1, "speeds")
         reason = unmatched(train, speed)

@@ -50,7 +50,7 @@ class BearingLoads:
             Forces of the train on the coordinates, those of `TrainForces`.
         """
         found = acting @ self.of_forces + q @ self.of_places + v @ self.of_rates + a @ self.of_accelerations
-        return found.reshape(len(found), -1, 6)  # type: ignore[return-value]
+        return found.reshape(len(found), -1, 6)
 
 
 def bearing_loads(model: TrainModel) -> BearingLoads:

@@ -98,7 +98,7 @@ def _of_mesh(job: TrainJob, train: GearTrain, table: TrainMeshTable, mesh: GearM
 
 def inherited_lines(entries: dict[str, dict[str, dict[str, Source]]]) -> list[str]:
     """Lines for the terminal: what gears with teeth of their own take from [pair], and meshes from their gears."""
-    lines = []
+    lines: list[str] = []
     taken: dict[str, list[str]] = {}
     for name, found in entries.get("gears", {}).items():
         values = [f"{key} = {x['value']:g}" for key, x in found.items() if x["from"] == "[pair]"]
