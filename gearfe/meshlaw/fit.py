@@ -248,9 +248,9 @@ def _rising(parts: Array, approach: Array, slope: Array, least: float) -> tuple[
     """
     h = np.diff(parts)
     secant = np.diff(approach, axis=1, prepend=0.0) / h - least
-    poor = (secant < 0.0).any(axis=1)
+    poor = np.any(secant < 0.0, axis=1, keepdims=True)
     secant = np.maximum(secant, 0.0)
-    approach = np.where(poor[:, None], np.cumsum((secant + least) * h, axis=1), approach)
+    approach = np.where(poor, np.cumsum((secant + least) * h, axis=1), approach)
     most = 3.0 * secant
     most[:, 0] = 2.0 * secant[:, 0]
     most[:, :-1] = np.minimum(most[:, :-1], 3.0 * secant[:, 1:])
