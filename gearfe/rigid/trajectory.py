@@ -50,9 +50,9 @@ class Trajectory(Shown):
     status : Status
         `Status.DONE` when the end was reached; `message` says it in words.
     method : str
-        The one used; "auto" where it changed over.
+        The one used.
     statistics
-        Scheme, steps, order or evaluations, singular passages, seconds to compile; the choice made; the link without
+        Scheme, steps, order, singular passages, seconds to compile; the link without
         mass that ended the run.
     dense
         Coordinates at any time of the run, by derivative.

@@ -96,7 +96,7 @@ class TrainResponse(ShownTable):
     load_end_s : float
         Time at which all load ramps have ended (s).
     statistics, estimates : mapping
-        ``steps``, ``method``, ``scheme``, ``seconds``, ``compile_seconds``, ``choice``, ``free_coordinates``,
+        ``steps``, ``method``, ``scheme``, ``seconds``, ``compile_seconds``, ``free_coordinates``,
         ``redundant_constraints`` (names),
         ``smallest_contact_force_N``; for each mesh ``friction_coefficients``,
         ``contacts_lost``, ``contacts_regained``, ``share_without_contact``
