@@ -73,7 +73,7 @@ BLOCK, TOLD_BYTES = 1024, 1e9
 MIDDLE = 0.5
 #: Relative to the largest coordinate: a step whose path is straight within this is too short for differences of its
 #: positions to give accelerations or multipliers. (Rounding of positions weighs up to 2e4 times in accelerations.)
-STRAIGHT = 1e-10
+STRAIGHT = 1e-12
 #: A step more than so many times as long as the last one begins anew: speeds and multipliers of a very short step are
 #: rounding over powers of its length.
 MOST_AHEAD = 10.0
