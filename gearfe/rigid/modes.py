@@ -100,7 +100,7 @@ def rates(system: System, start: Start) -> tuple[float, float, float]:
     free = system.units[:, None] * free_motions(G * system.units)
     root = np.linalg.solve(np.linalg.qr(system.mass_root @ free)[1].T, free.T).T  # root^T M root = 1
     K, C = -root.T @ by_q @ root, -root.T @ by_v @ root
-    if K.size == 0:
+    if K.size == 0 or not (np.isfinite(K).all() and np.isfinite(C).all()):  # nothing moves, or a load has no value
         return 0.0, 0.0, 0.0
     damping = np.linalg.eigvals(C) if C.any() else np.zeros(1)
     signs = damping.real < 0.0
