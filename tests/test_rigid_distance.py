@@ -97,7 +97,7 @@ def test_forces_and_slopes_of_a_distance_are_derivatives():
     rate = (made.jacobian(0.0, q + step * v) - made.jacobian(0.0, q - step * v)) / (2 * step)
     np.testing.assert_allclose(made.velocity_terms(0.0, q, v), rate @ v, atol=1e-8)
     bend = [(made.jacobian(0.0, q + d) - made.jacobian(0.0, q - d)).T @ [1.7] / (2 * step) for d in step * np.eye(6)]
-    np.testing.assert_allclose(made.linkage.curvature(q, np.array([1.7])), np.array(bend).T, atol=1e-8)
+    np.testing.assert_allclose(made.elements[0].curvature(q, np.array([1.7])), np.array(bend).T, atol=1e-8)
 
 
 def test_no_distance_at_all_is_refused():

@@ -142,7 +142,7 @@ def test_auto_takes_the_series_with_a_light_coupler():
 
 def with_rod(mass: float, inertia: float, theta: float, omega: float) -> System:
     """Folding links whose rod has another mass."""
-    linkage = folding_links(theta, omega).linkage
+    linkage = folding_links(theta, omega).elements[0]
     bodies = (linkage.bodies[0], replace(linkage.bodies[1], mass=mass, inertia=inertia / 12))
     return System([Linkage(bodies, linkage.joints, linkage.forces)])
 
@@ -179,7 +179,7 @@ def test_a_light_pendulum_on_a_light_coupler_keeps_its_own_mass(share):
     exact = solve_ivp(rhs, (0.0, 1.0), [PHI, RATE, -0.3, 0.0], "DOP853", t_eval=times, rtol=3e-14, atol=1e-14).y
     place, speed = tuple(CRANK * unit(PHI)), tuple(RATE * CRANK * normal(PHI))
     rod = Body("pendulum", share, share * length**2 / 12, (length / 2, 0.0), place, -0.3, speed)
-    linkage = four_bar(0.0, 0.0).linkage
+    linkage = four_bar(0.0, 0.0).elements[0]
     system = System([Linkage((*linkage.bodies, rod), (*linkage.joints, Hinge("pendulum", "coupler")),
                                        linkage.forces)])  # fmt: skip
     run = integrate(system, times, method="taylor", tolerance=1e-12)
@@ -189,7 +189,7 @@ def test_a_light_pendulum_on_a_light_coupler_keeps_its_own_mass(share):
 
 def test_driven_links_without_mass():
     """Only the rocker has mass: the crank's moment is the power of the rocker over the crank's rate."""
-    linkage = four_bar(0.0, 0.0).linkage
+    linkage = four_bar(0.0, 0.0).elements[0]
     bodies = (replace(linkage.bodies[0], mass=0.0, inertia=0.0), *linkage.bodies[1:])
     joints = (*linkage.joints, Prescribed("crank", "rate", constant(RATE), name="motor"))
     times = np.linspace(0.0, 0.4, 5)
@@ -240,7 +240,7 @@ def without(*names: str) -> Callable[[], System]:
     """The four-bar without these joints and with a coupler without mass."""
 
     def make() -> System:
-        linkage = four_bar(0.0, 0.0).linkage
+        linkage = four_bar(0.0, 0.0).elements[0]
         return System([Linkage(linkage.bodies, tuple(j for j in linkage.joints if j.name not in names))])
 
     return make

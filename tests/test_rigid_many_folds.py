@@ -110,7 +110,7 @@ def test_peaucellier_straight_line(tolerance):
 
 def two_linkages(apart: float) -> System:
     """Two uncoupled folding linkages in one linkage, the second one `apart` (rad) ahead."""
-    one, other = (folding_links(angle, 3.0).linkage for angle in (1.0, 1.0 + apart))
+    one, other = (folding_links(angle, 3.0).elements[0] for angle in (1.0, 1.0 + apart))
     name = {"crank": "crank2", "rod": "rod2"}
     bodies = one.bodies + tuple(replace(b, name=name[b.name]) for b in other.bodies)
     joints = one.joints

@@ -112,7 +112,7 @@ def test_passing_singularity_at_the_start_is_not_called_redundant():
 
 def test_two_folds_at_the_same_moment():
     """Two uncoupled linkages in one linkage that fold together."""
-    one = folding_links(1.0, 3.0).linkage
+    one = folding_links(1.0, 3.0).elements[0]
     rename = {"crank": "crank2", "rod": "rod2"}
     from dataclasses import replace
 

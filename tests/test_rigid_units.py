@@ -38,7 +38,7 @@ def scaled(system: System, length: float, mass: float, time: float, change: Chan
     def p(point):  # type: ignore[no-untyped-def]
         return (point[0] * length, point[1] * length)
 
-    linkage = system.linkage
+    linkage = system.elements[0]
     bodies = tuple(
         replace(b, mass=b.mass * mass, inertia=b.inertia * mass * length**2, centre=p(b.centre), position=p(b.position),
                 velocity=(b.velocity[0] * length / time, b.velocity[1] * length / time), rate=b.rate / time)
@@ -75,7 +75,7 @@ def fourbar() -> System:
 
 def light_fourbar() -> System:
     """The middle link has next to no mass."""
-    linkage = fourbar().linkage
+    linkage = fourbar().elements[0]
     bodies = tuple(replace(b, mass=1e-12, inertia=1e-12) if b.name == "b" else b for b in linkage.bodies)
     return System([Linkage(bodies, linkage.joints, linkage.forces)])
 
@@ -106,7 +106,7 @@ def test_the_motion_does_not_depend_on_the_units(make, method, tolerance):
         assert run.status == 0
         assert run.statistics["steps"] == made.statistics["steps"]
         np.testing.assert_allclose(run.q[-1] / other.units, made.q[-1] / system.units, atol=1e-2 * tolerance)
-        force = mass * length / time**2 * np.where(other.linkage.assembly.row_holds_length, 1.0, length)
+        force = mass * length / time**2 * np.where(other.elements[0].assembly.row_holds_length, 1.0, length)
         np.testing.assert_allclose(
             run.multipliers[-1] / force, made.multipliers[-1], rtol=10 * tolerance, atol=10 * tolerance
         )
@@ -160,7 +160,7 @@ def test_what_cannot_close_says_by_how_much_and_where(length):
 @pytest.mark.parametrize("time", [1e-9, 1.0, 1e9])
 def test_a_row_that_is_dependent_until_the_motion_begins_is_no_redundant_one(time):
     """Two links of equal length, folded; the slot at the end is dependent until the prescribed crank turns."""
-    linkage = folding_links(0.0, 0.0).linkage
+    linkage = folding_links(0.0, 0.0).elements[0]
     rise = Prescribed("crank", "angle", smoothed_step(5.0 * time, 2.0 * time, 0.5))
     start = consistent_start(System([Linkage(linkage.bodies, (*linkage.joints, rise))]))
     assert start.freedoms.redundant == ()
@@ -169,7 +169,7 @@ def test_a_row_that_is_dependent_until_the_motion_begins_is_no_redundant_one(tim
 def test_far_from_the_origin_the_rounding_of_coordinates_is_no_gap():
     shift = 1e7
     system = fourbar()
-    linkage = system.linkage
+    linkage = system.elements[0]
     bodies = tuple(replace(b, position=(b.position[0] + shift, b.position[1])) for b in linkage.bodies)
     joints = tuple(
         replace(j, point_b=(j.point_b[0] + shift, j.point_b[1])) if j.b == "ground" else j for j in linkage.joints

@@ -40,7 +40,6 @@ class Formula:
 
     def __init__(self, text: str, label: str, node: Node, allowed: tuple[str, ...], what: str) -> None:
         self.text, self.label, self.node, self.names = text, label, node, sorted(quantities(node), key=str)
-        self.complaint = ""
         for kind, _ in self.names:
             if kind not in allowed:
                 problem = f"uses {kind}; {what} may depend on {', '.join(allowed)}"
@@ -49,17 +48,20 @@ class Formula:
             if not base > 0.0:
                 raise InputError(label, text, f"raises {base:g} to a power that varies", "give a base > 0")
 
-    def at(self, t: float, known: Mapping[tuple[str, str | None], Any]) -> float:
-        """Value at a time; not-a-number where it has none, the complaint then says why."""
+    def at(self, known: Mapping[tuple[str, str | None], Any]) -> float:
+        """Return the value for known quantities; NaN where it has none."""
         try:
             with np.errstate(divide="raise", invalid="raise", over="raise", under="ignore"):
-                made = float(value_of(self.node, known))
+                value = float(value_of(self.node, known))
         except FloatingPointError:
-            made = math.nan
-        if math.isfinite(made):
-            return made
-        self.complaint = f"{self.label} = {self.text!r} at {t:.6g} s: {without_value(self.node, known)}"
-        return math.nan
+            return math.nan
+        return value if math.isfinite(value) else math.nan
+
+    def missing(self, t: float, known: Mapping[tuple[str, str | None], Any]) -> str:
+        """Return why it has no value at a time (s) for known quantities, or an empty string."""
+        if math.isfinite(self.at(known)):
+            return ""
+        return f"{self.label} = {self.text!r} at {t:.6g} s: {without_value(self.node, known)}"
 
 
 def divides(node: Node) -> bool:
@@ -106,8 +108,16 @@ class ExpressionLoad(Formula, StateFunction):
 
     def value(self, t: float, q: Array, v: Array) -> float:
         """Value at a state."""
-        found = self.mechanism.values(set(self.names), q[None, :], v[None, :])
-        return self.at(t, {name: t if name[0] in PLAIN else found[name][0] for name in self.names})
+        return self.at(self._known(t, q, v))
+
+    def problem(self, t: float, q: Array, v: Array) -> str:
+        """Return the expression, the time and the operation without a value, or an empty string."""
+        return self.missing(t, self._known(t, q, v))
+
+    def _known(self, t: float, q: Array, v: Array) -> dict[tuple[str, str | None], Any]:
+        """Values of its quantities at a state."""
+        known = self.mechanism.values(set(self.names), q[None, :], v[None, :])
+        return {name: t if name[0] in PLAIN else known[name][0] for name in self.names}
 
     def pole(self, t: float, value: float) -> str:
         """Expression, time and value."""
@@ -139,12 +149,20 @@ class ExpressionTension(Formula, SpanFunction):
 
     def value(self, t: float, length: float, rate: float) -> float:
         """Tension (N)."""
-        return self.at(t, {(name, None): value for name, value in zip(OF_SPAN, (t, length, rate), strict=True)})
+        return self.at(_of_span(t, length, rate))
+
+    def problem(self, t: float, length: float, rate: float) -> str:
+        """Return the expression, the time and the operation without a value, or an empty string."""
+        return self.missing(t, _of_span(t, length, rate))
 
     def write(self, tape: Tape, length: int, rate: int) -> int:
         """Its register on a tape."""
         known = {"length": length, "length_rate": rate}
         return write_expression(self.node, tape, lambda name: known[name[0]] if name[0] in known else clock(tape))
+
+
+def _of_span(t: float, length: float, rate: float) -> dict[tuple[str, str | None], Any]:
+    return {(name, None): value for name, value in zip(OF_SPAN, (t, length, rate), strict=True)}
 
 
 def _cosine_of_sine(tape: Tape, a: int) -> int:

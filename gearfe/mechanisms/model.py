@@ -253,14 +253,9 @@ class Mechanism:
         return made
 
     def _check_loads(self, start: Start) -> None:
-        for _, load in self.linkage.assembly.state_loads:
-            if not math.isfinite(load.value(start.time, start.q, start.v)):
-                raise InputError("forces", None, f"have no value at the start: {load.complaint}", "mend the expression")
-        q, v = start.q[: self.linkage.size], start.v[: self.linkage.size]
-        force = self.linkage.force(start.time, q, v)
-        for _, law in self.linkage.assembly.tension_laws:
-            if law.complaint and not np.isfinite(force).all():
-                raise InputError("forces", None, f"have no value at the start: {law.complaint}", "mend the expression")
+        state = start.time, start.q, start.v
+        if not np.isfinite(self.system.force(*state)).all() and (problem := self.system.load_problem(*state)):
+            raise InputError("forces", None, f"have no value at the start: {problem}", "correct the expression")
 
     def _forced(self, text: str, target: float, level: int) -> Forced:
         label = f"start.{('positions', 'velocities')[level]} {text!r}"

@@ -20,7 +20,6 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Array
-from .linkage import Linkage
 from .system import System
 
 if TYPE_CHECKING:
@@ -55,13 +54,12 @@ def mass_excess(system: System, time: float, q: Array, v: Array, active: np.ndar
         For a link without mass that nothing with mass holds: its acceleration is undetermined.
     """
     excess = np.zeros(system.size)
-    linkages = _linkages(system)
     bodies, own = _own_masses(system)
     if own.size == 0 or 0.0 < own.max() <= LIGHT * own.min():
         return excess
     G = _gradients_ahead(system, time, q, v, active)
     if own.min() == 0.0:
-        _check_determined(system, linkages, G)
+        _check_determined(system, G)
     carried = _carried(system, G)
     light = carried[:, None] > LIGHT * own
     excess[bodies] = np.where(light, carried[:, None] - own, 0.0) / system.units[bodies] ** 2
@@ -78,17 +76,13 @@ def loose_link(system: System, times: Array, q: Array, v: Array, start: Start) -
     share = _carried(system, _gradients_ahead(system, times[at], q[at], v[at], start.active))[:, None]
     raised = (start.excess * system.units**2)[bodies]
     found = np.where(raised > 0.0, share / np.where(raised > 0.0, raised, 1.0), np.inf).min(axis=1)
-    names = [body.name for linkage in _linkages(system) for body in linkage.bodies]
+    names = [name for element in system.elements for name in element.planar_bodies]
     return names[int(found.argmin())] if found.min() < LOOSE else None
-
-
-def _linkages(system: System) -> list[Linkage]:
-    return [e for e in system.elements if isinstance(e, Linkage)]
 
 
 def _own_masses(system: System) -> tuple[np.ndarray, Array]:
     """Coordinates of the planar bodies and their masses in units that compare, both of shape (bodies, 3)."""
-    numbers = [np.zeros(0, dtype=int), *(system.coordinates(e) for e in _linkages(system))]
+    numbers = [np.zeros(0, dtype=int), *(system.coordinates(e) for e in system.elements if e.planar_bodies)]
     bodies = np.concatenate(numbers).reshape(-1, 3)
     return bodies, (np.diagonal(system.mass) * system.units**2)[bodies]
 
@@ -122,18 +116,16 @@ def _gradients_ahead(system: System, time: float, q: Array, v: Array, active: np
     return np.vstack([G, lost.T @ (gradients(q + step) - gradients(q - step)) / 2e-5])
 
 
-def _check_determined(system: System, linkages: list[Linkage], G: Array) -> None:
+def _check_determined(system: System, G: Array) -> None:
     """Every motion moves some mass; otherwise the link that moves most of what does not is named."""
     held = np.diagonal(system.mass) > 0.0
     rest = free_motions(np.vstack([G, np.eye(system.size)[held]]))
     if rest.shape[1] == 0:
         return
-    size = np.abs(rest).max(axis=1)
-    for linkage in linkages:
-        own = size[system.coordinates(linkage)].reshape(-1, 3).max(axis=1)
-        if own.max() == size.max():
-            body = linkage.bodies[int(own.argmax())]
-            key = "mass" if body.mass == 0.0 else "inertia"
-            problem = "leaves its motion undetermined: it can move while nothing with mass does"
-            cure = "give it mass and inertia, or joints that hold it to links with mass"
-            raise InputError(f"body {body.name!r} {key}", 0.0, problem, cure)
+    bodies, masses = _own_masses(system)
+    names = [name for element in system.elements for name in element.planar_bodies]
+    moved = int(np.abs(rest).max(axis=1)[bodies].max(axis=1).argmax())
+    key = "mass" if masses[moved, 0] == 0.0 else "inertia"
+    problem = "leaves its motion undetermined: it can move while nothing with mass does"
+    cure = "give it mass and inertia, or joints that hold it to links with mass"
+    raise InputError(f"body {names[moved]!r} {key}", 0.0, problem, cure)

@@ -29,9 +29,8 @@ elastic body in
 7. ``constant_jacobian = True`` when g is linear in q with constant coefficients and no time: such rows are
 eliminated at
    set-up by `gearfe.rigid.elimination` where an integrator profits. Absent: treated as any constraint.
-8. Being a `gearfe.rigid.Linkage`: planar bodies, whose joints and forces are written from forms (`gearfe.rigid.forms`).
-   ``method="auto"`` takes the Taylor method where all elements are written (14.) and the system is not overdamped,
-   else the implicit one (`gearfe.rigid.integrate.chosen_method`).
+8. ``algebraic = True``: planar bodies under loads that do not depend on the state, and rows without profiles; and
+   ``steady_forces = True``: its forces depend on no coordinate or velocity.
 9. ``potential(q)``: its potential energy in local coordinates (..., k). Absent: zero. (The kinetic one is 1/2 v M v.)
 10. Being a `LocalForce`: a force along few directions, ``f = W phi(t, W^T q, W^T v)``, with a law that can be compiled.
     Absent: the force is called as it is; collocation then calls Python in every stage.
@@ -51,6 +50,11 @@ eliminated at
 16. ``has_knots = True`` and ``knots(q)``: whole numbers, shape (..., s) in states (..., k), that change where the third
     derivative of a row jumps (knots of a cam's profile). Steps of the implicit method end there. Absent: smooth.
 17. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
+18. Names and places for messages and tables: ``coordinate_names``, ``row_names``, ``row_joint`` (number of the joint
+    of each row), ``turns`` (own coordinates that are angles), ``planar_bodies`` (names of bodies with the coordinates
+    x, y, angle, in order), ``gap_text``. Absent: numbers.
+19. ``load_problem``, ``load_pole``, ``pole_between``: which force has no value, or grows beyond all bounds, at given
+    states. Integrators ask after a step has failed. Absent: empty strings.
 
 An element has no state of its own that changes during a run: integrators call it at trial points in any order.
 """
@@ -78,6 +82,13 @@ class Element:
     touches: tuple[Element, ...] = ()
     constant_jacobian: bool = False
     stiff: bool = False
+    algebraic: bool = False
+    steady_forces: bool = False
+    coordinate_names: tuple[str, ...] = ()
+    turns: tuple[int, ...] = ()
+    planar_bodies: tuple[str, ...] = ()
+    row_names: tuple[str, ...] = ()
+    row_joint: tuple[int, ...] = ()
 
     def mass(self) -> Array:
         """Mass matrix of the own coordinates."""
@@ -106,6 +117,27 @@ class Element:
     def units(self) -> tuple[Array, Array]:
         """Sizes of the own coordinates and of the rows that bounds are relative to."""
         return np.ones(self.size), np.ones(self.rows)
+
+    def numbered(self, pattern: str, count: int) -> list[str]:
+        """Names with numbers, for elements that name nothing themselves."""
+        label = self.name or type(self).__name__
+        return [pattern.format(label, k) for k in range(count)]
+
+    def gap_text(self, gaps: Array, row: int) -> str:
+        """The size of the gap (rows,) at a row, for messages."""
+        return f"{gaps[row]:.3g}"
+
+    def load_problem(self, t: float, q: Array, v: Array) -> str:  # noqa: ARG002
+        """Why its force has no value at a state, or an empty string."""
+        return ""
+
+    def load_pole(self, t: float, q: Array, v: Array) -> str:  # noqa: ARG002
+        """Which of its forces grows beyond all bounds at a state, or an empty string."""
+        return ""
+
+    def pole_between(self, before: tuple[float, Array, Array], after: tuple[float, Array, Array]) -> str:  # noqa: ARG002
+        """Which of its forces has a pole between two states (t, q, v), or an empty string."""
+        return ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,6 +51,8 @@ class Corners:
         self.control = control
         self.system = system if system is not None and system.pieced else None
         self.profiled = system if system is not None and system.has_knots else None
+        #: Which load has no value, or grows beyond all bounds, where the run cannot go on.
+        self.load_problem = ""
         self.near = max(PASSING * tolerance, 1e-12) * max(control.span, abs(control.t))
 
     @property
@@ -72,14 +74,16 @@ class Corners:
             return False
         low, high, ends = found
         distance = low * abs(h)
-        if _pole(system, t, h, path, low):
+        if grows := _pole(system, t, h, path, low):
+            self.load_problem = system.load_pole(*grows)
             goal, room = POLE_NEARER * distance, POLE_SHARE * self.control.span
         elif ends:
             goal, room = distance, self.near
         else:
             goal, room = (distance - 0.5 * self.near if distance > self.near else 2.0 * self.near), -1.0
         if distance <= room:
-            system.blame(t + high * h, *path(high))  # a load that has no value there says so
+            beyond = (t + high * h, *path(high))
+            self.load_problem = system.load_problem(*beyond) or system.load_pole(*beyond) or self.load_problem
             self.control.fail(Status.NOT_FINITE, 1.0)
             self.control.status = Status.NOT_FINITE
         elif goal < abs(h):
@@ -123,37 +127,37 @@ def _knot(system: System, path: Path) -> float:
     return high
 
 
-def _pole(system: System, t: float, h: float, path: Path, x: float) -> bool:
-    """Whether the forces have a pole at the share x of the step; their loads then say so."""
+def _pole(system: System, t: float, h: float, path: Path, x: float) -> tuple[float, Array, Array] | None:
+    """The state (t, q, v) nearest to a pole that forces have at the share x of the step; None where they have none."""
     side = -x if x > 0.5 else 1.0 - x
     sizes = []
     for distance in POLE_AT:
         place = x + distance * side
         there = (t + place * h, *path(place))
         sizes.append(float(np.abs(system.force(*there)).max()))
-    if not all(near > POLE * far for far, near in itertools.pairwise(sizes)):
-        return False
-    system.blame(*there)
-    return True
+    return there if all(near > POLE * far for far, near in itertools.pairwise(sizes)) else None
 
 
-def blame_ahead(system: System, t: float, state: tuple[Array, Array, Array], span: float) -> None:
-    """Let loads that have no value, or a pole, in the state (q, q', q'') at t or a share of `span` (s) ahead say so."""
+def load_problem_ahead(system: System, t: float, state: tuple[Array, Array, Array], span: float) -> str:
+    """Return which load has no value, or a pole, in the state (q, q', q'') at t or a share of `span` (s) ahead."""
     if not np.isfinite(state).all():
-        return
+        return ""
     q, v, a = state
     with np.errstate(all="ignore"):
-        system.blame(t, q, v)
+        if problem := system.load_problem(t, q, v) or system.load_pole(t, q, v):
+            return problem
         for reach in np.multiply(AHEAD, span):
 
             def path(x: float | Array, reach: float = float(reach)) -> tuple[Array, Array]:
                 way = np.asarray(x)[..., None] * reach
                 return q + way * v, v + way * a
 
-            if not system.complaint:
-                system.blame(t + reach, *path(1.0))
-            if not system.complaint and (found := _corner(system, t, reach, path)) is not None:
-                _pole(system, t, reach, path, found[0])
+            later = (t + reach, *path(1.0))
+            if problem := system.load_problem(*later) or system.load_pole(*later):
+                return problem
+            if (found := _corner(system, t, reach, path)) and (grows := _pole(system, t, reach, path, found[0])):
+                return system.load_pole(*grows)
+    return ""
 
 
 def quiet_speeds(c: Array, v: Array, V: Array, vn: Array, scale: Array) -> Array:

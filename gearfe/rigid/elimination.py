@@ -71,14 +71,8 @@ def is_linear(system: System) -> bool:
 
 
 def modal_coordinates(system: System) -> ModalCoordinates:
-    """Modal coordinates of a system whose joints are all linear and constant; redundant rows do no harm.
-
-    They are made once and stay with the system.
-    """
-    known: ModalCoordinates | None = system.__dict__.get("_modal_coordinates")
-    if known is None:
-        known = system.__dict__["_modal_coordinates"] = _modal_coordinates(system)
-    return known
+    """Modal coordinates of a system whose joints are all linear and constant; redundant rows do no harm."""
+    return system.once("modal coordinates", lambda: _modal_coordinates(system))
 
 
 def _modal_coordinates(system: System) -> ModalCoordinates:

@@ -6,6 +6,7 @@ it known to mechanism files.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
@@ -25,10 +26,8 @@ class StateFunction(ABC):
 
     Values, slopes and corners follow from its registers on a tape; a load that cannot be written is a `LocalForce`, or
     the ``force`` of another element (`gearfe.rigid.contract`). Where it has no value, a step is made shorter and
-    the run ends at last; `value` is not-a-number there, and sets `complaint`, which says why.
+    the run ends at last; `value` is NaN there, and `problem` says why.
     """
-
-    complaint: str = ""
 
     @abstractmethod
     def write(self, bodies: BodyVariables) -> int:
@@ -38,15 +37,17 @@ class StateFunction(ABC):
     def value(self, t: float, q: Array, v: Array) -> float:
         """f at a state, for messages."""
 
+    def problem(self, t: float, q: Array, v: Array) -> str:
+        """Return why it has no value at a state, or an empty string."""
+        return "" if math.isfinite(self.value(t, q, v)) else f"a load has no value at {t:.6g} s"
+
     def pole(self, t: float, value: float) -> str:
-        """What is to be said where it grows beyond all bounds."""
+        """Return the message for a load that grows beyond all bounds."""
         return f"a load grows beyond {value:.1g} at {t:.6g} s"
 
 
 class SpanFunction(ABC):
     """A tension T(t, L, L') between two points by their distance L (m) and its rate L' (m/s); as `StateFunction`."""
-
-    complaint: str = ""
 
     @abstractmethod
     def write(self, tape: Tape, length: int, rate: int) -> int:
@@ -55,6 +56,10 @@ class SpanFunction(ABC):
     @abstractmethod
     def value(self, t: float, length: float, rate: float) -> float:
         """T (N), positive where it pulls, for messages."""
+
+    def problem(self, t: float, length: float, rate: float) -> str:
+        """Return why it has no value, or an empty string."""
+        return "" if math.isfinite(self.value(t, length, rate)) else f"a tension has no value at {t:.6g} s"
 
 
 class Along(NamedTuple):

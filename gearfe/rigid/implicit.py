@@ -141,11 +141,8 @@ class Stepper:
         if program is None:
             self._step: Callable[[], int] = lambda: _numpy_step()(elements, self.w, tab)
         else:
-            known = system.__dict__.setdefault("_bands", {})
-            rows = start.active.tobytes()
-            if rows not in known:
-                known[rows] = narrow_band(program)
-            self._held = packed(equations(program, known[rows], s, elements.stresses)), packed(self.w), packed(tab)
+            band = system.once(("band", start.active.tobytes()), lambda: narrow_band(program))
+            self._held = packed(equations(program, band, s, elements.stresses)), packed(self.w), packed(tab)
             self.w.now[1] = self.w.limit[0] = 1.0
             self.compile_seconds = KERNELS.load(lambda: KERNELS.compiled.collocation_step(*self._held))
             self._step = KERNELS.compiled.collocation_step.on(*self._held)
@@ -252,6 +249,8 @@ class Stepper:
         }
         if self.compiled:
             counts["compile_seconds"] = self.compile_seconds
+        if corners.load_problem and control.status is not Status.DONE:
+            counts["load_problem"] = corners.load_problem
         return dense, control.status, {
             **counts, "steps": control.accepted, "newton_iterations": newton, "rejected": control.rejected,
         }  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,9 @@ from ..typing import Array
 from . import taylor
 from .carried import loose_link
 from .collocation import GAUSS, RADAU
-from .corners import blame_ahead
+from .corners import load_problem_ahead
 from .dense import Dense
 from .elimination import is_linear, modal_coordinates
-from .linkage import Linkage
 from .modal import series_force
 from .start import Start, consistent_start
 from .steps import Status, Watch
@@ -105,7 +104,7 @@ def integrate(
     counted = partial(_counted, start.time, output_times[-1])
     with np.errstate(all="ignore"):  # a state that is not finite has a status of its own
         dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps, counted)
-        if method == "auto" and chosen == "taylor" and status is Status.STEP_TOO_SMALL and system.linkage is None:
+        if method == "auto" and chosen == "taylor" and status is Status.STEP_TOO_SMALL and not system.algebraic:
             chosen = "implicit"  # a load has no series at a state on the way
             dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps, counted)
     sign = 1.0 if output_times[-1] >= output_times[0] else -1.0
@@ -116,15 +115,15 @@ def integrate(
     if status in UNFINISHED and len(dense.times) > 1:
         last = dense.times[-6:]  # the very last ones may be beyond all numbers
         end, (q, v, a) = float(last[-1]), (dense(last[-1:], k)[0] for k in range(3))
-        blame_ahead(system, end, (q, v, a), float(output_times[-1]) - start.time)
-        link = loose_link(system, last, dense(last, 0), dense(last, 1), start)
-        statistics = statistics if link is None else {**statistics, "loose_link": link}
-        if link is None and (why := locked(system, end, q, start.active)):
+        ahead = float(output_times[-1]) - start.time
+        if problem := statistics.get("load_problem") or load_problem_ahead(system, end, (q, v, a), ahead):
+            statistics = {**statistics, "load_problem": problem}
+        elif link := loose_link(system, last, dense(last, 0), dense(last, 1), start):
+            statistics = {**statistics, "loose_link": link}
+        elif why := locked(system, end, q, start.active):
             statistics = {**statistics, "locked": why}
         elif cause := short_steps(system, start, end, q, v, float(np.abs(np.diff(last)).mean())):
             statistics = {**statistics, "short_steps": cause}
-    if status is not Status.DONE and (why := system.complaint):
-        statistics = {**statistics, "complaint": why}
     made = Trajectory(system, start, kept, status, chosen, statistics, dense)
     if raise_on_failure and made.status is not Status.DONE:
         raise IntegrationError(made, made.message, made.reached, float(output_times[-1]))
@@ -146,7 +145,7 @@ def _dropped_rows_hold(system: System, start: Start, dense: Dense, tolerance: fl
     times = np.append(times, dense.times[-1])
     states = dense(times, 0)
     gaps = [np.abs(system.residual(t, q) / system.row_units).max() for t, q in zip(times, states, strict=True)]
-    scale = 1.0 if system.linkage is not None else max(1.0, float(np.abs(states / system.units).max()))
+    scale = 1.0 if system.algebraic else max(1.0, float(np.abs(states / system.units).max()))
     return bool(max(gaps) <= max(1e-8, 1e3 * tolerance) * scale)
 
 
@@ -170,17 +169,15 @@ def _has_series(system: System) -> bool:
 
 def _modal(system: System) -> bool:
     """Whether series are those of modal coordinates."""
-    return is_linear(system) and not any(isinstance(e, Linkage) for e in system.elements)
+    return is_linear(system) and not any(element.planar_bodies for element in system.elements)
 
 
+@lru_cache(maxsize=4)
 def _rates(system: System, start: Start) -> tuple[float, float]:
-    """Fastest decay and vibration (1/s) at a start; those of the last one asked for are remembered."""
+    """Fastest decay and vibration (1/s) at a start; an error estimate asks again for the same."""
     from .modes import fastest_rate
 
-    known: tuple[Start, tuple[float, float]] | None = system.__dict__.get("_rate")
-    if known is None or known[0] is not start:
-        known = system.__dict__["_rate"] = (start, fastest_rate(system, start))
-    return known[1]
+    return fastest_rate(system, start)
 
 
 def _run(
@@ -210,10 +207,7 @@ def _run(
 
 
 def _default_start(system: System, time: float) -> Start:
-    known: dict[float, Start] = system.__dict__.setdefault("_starts", {})
-    if time not in known:
-        known[time] = consistent_start(system, time)
-    return known[time]
+    return system.once(("start", time), lambda: consistent_start(system, time))
 
 
 def _check(times: np.ndarray, method: str, tolerance: float) -> None:

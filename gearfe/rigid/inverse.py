@@ -45,8 +45,8 @@ def prescribed_motion(system: System, start: Start, times: Array) -> Trajectory:
             break
     for t, (q, v, _) in zip(done, states, strict=True):
         if not np.isfinite(system.force(t, q, v)).all():
-            why = system.complaint or f"at {t:.6g} s"
-            raise InputError("forces", None, f"have no value on the way: {why}", "mend the expression")
+            why = system.load_problem(t, q, v) or f"at {t:.6g} s"
+            raise InputError("forces", None, f"have no value on the way: {why}", "correct the expression")
     statistics: dict[str, Any] = {"scheme": "closed positions", "steps": len(done) - 1}
     if status is not Status.DONE and (why := locked(system, done[-1], states[-1][0], start.active)):
         statistics["locked"] = why

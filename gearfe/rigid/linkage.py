@@ -6,6 +6,7 @@ and vectors have affine components; the tension T along a span D pulls with (T /
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
@@ -23,6 +24,9 @@ from .planar import Body, body_numbers
 from .tape import Tape
 from .timefunctions import TimeFunction
 from .written import TapeValues, Written
+
+#: A load beyond this value (N, N m) where a run ends has a pole there.
+POLE = 1e7
 
 
 class Affine(NamedTuple):
@@ -195,6 +199,10 @@ class Linkage(Written):
             f is not None and not (isinstance(f, TimeFunction) and f.steady) for f in loads
         )
         self.driven = any(row.motion is not None for row in self.assembly.rows)
+        self.planar_bodies = tuple(body.name for body in bodies)
+        self.row_joint = self.assembly.row_joint
+        self.coordinate_names = tuple(f"{b}_{c}" for b in self.planar_bodies for c in ("x_m", "y_m", "angle_rad"))
+        self.turns = tuple(range(2, self.size, 3))
 
     def mass(self) -> Array:
         """Diagonal of masses and inertias."""
@@ -209,6 +217,15 @@ class Linkage(Written):
         length = self.assembly.length
         return np.tile([length, length, 1.0], len(self.bodies)), np.where(self.assembly.row_holds_length, length, 1.0)
 
+    def gap_text(self, gaps: Array, row: int) -> str:
+        """The gap of the joint that a row belongs to: in its unit and relative to the mechanism's length."""
+        joint, lengths = self.row_joint, self.assembly.row_holds_length
+        if not lengths[row]:
+            return f"{gaps[row]:.3g} rad"
+        same = [r for r in range(len(gaps)) if joint[r] == joint[row] and lengths[r]]
+        gap, length = float(np.linalg.norm(gaps[same])), self.assembly.length
+        return f"{gap:.3g} m ({gap / length:.2g} of the mechanism's length, {length:.3g} m)"
+
     @property
     def algebraic(self) -> bool:
         """Whether loads do not depend on the state, and no constraint has a profile."""
@@ -216,9 +233,9 @@ class Linkage(Written):
         return not (self.assembly.state_loads or self.assembly.tension_laws or profiles)
 
     @property
-    def springy(self) -> bool:
-        """Whether it has springs or dampers."""
-        return bool(self._spring.size or self._along.any())
+    def steady_forces(self) -> bool:
+        """Whether forces depend on no coordinate or velocity."""
+        return self.algebraic and not (self._spring.size or self._along.any())
 
     def write(self, tape: Tape, places: IntArray) -> bool:
         """The linkage on a tape, see `gearfe.rigid.contract`."""
@@ -261,7 +278,7 @@ class Linkage(Written):
         return self.values.force_slopes(q, v, self._registers(t, q, v))
 
     def _registers(self, t: float | Array, q: Array, v: Array) -> Array:
-        """Registers in states (..., size); springs without a direction are refused, loads without a value say so."""
+        """Registers in states (..., size); springs without a direction are refused."""
         R, seen = self.values.registers(t, q, v), self.observed
         pointless = self._pointed & (R[seen.span] == 0.0).all(axis=0).T
         if pointless.any():
@@ -269,13 +286,6 @@ class Linkage(Written):
             cure = "move its points apart, or give it neither a free length nor damping"
             first = int(pointless.any(axis=tuple(range(pointless.ndim - 1))).argmax())
             raise InputError(self.assembly.springs[first][0], None, problem, cure)
-        for k, load in self.assembly.state_loads:
-            for at in map(tuple, np.argwhere(~np.isfinite(R[seen.load[k]]))[:1]):
-                load.value(float(np.broadcast_to(t, q.shape[:-1])[at]), q[at], v[at])
-        for k, law in self.assembly.tension_laws:
-            for at in map(tuple, np.argwhere(~np.isfinite(R[seen.law[k]]))[:1]):
-                length, rate = (x.T[k][at] for x in self._lengths(R))
-                law.value(float(np.broadcast_to(t, q.shape[:-1])[at]), float(length), float(rate))
         return R
 
     def _lengths(self, R: Array) -> tuple[Array, Array]:
@@ -302,12 +312,31 @@ class Linkage(Written):
         """Pieces of the profiles that joints are on, shape (..., profiles)."""
         return self.values.knots(q)
 
-    def load_pieces(self, load: StateFunction, t: float, q: Array, v: Array) -> IntArray:
-        """Those of one load."""
-        tape = Tape(self.size)
-        load.write(BodyVariables(tape, np.arange(self.size)))
-        alone = TapeValues(tape)
-        return alone.pieces(alone.registers(t, q, v))
+    def load_problem(self, t: float, q: Array, v: Array) -> str:
+        """Return which load or law of a spring has no value at a state, and why, or an empty string."""
+        problems = (load.problem(t, q, v) for _, load in self.assembly.state_loads)
+        if self.assembly.tension_laws:
+            lengths, rates = self._lengths(self.values.registers(t, q, v))
+            springs = (law.problem(t, float(lengths[k]), float(rates[k])) for k, law in self.assembly.tension_laws)
+            problems = itertools.chain(problems, springs)
+        return next(filter(None, problems), "")
+
+    def load_pole(self, t: float, q: Array, v: Array) -> str:
+        """Return that the largest load grows beyond all bounds, or an empty string where it is below `POLE`."""
+        sizes = [(abs(load.value(t, q, v)), load) for _, load in self.assembly.state_loads]
+        size, largest = max(sizes, key=lambda pair: pair[0], default=(0.0, None))
+        return "" if largest is None or not size > POLE else largest.pole(t, size)
+
+    def pole_between(self, before: tuple[float, Array, Array], after: tuple[float, Array, Array]) -> str:
+        """Return which load leaves a smooth piece at a pole between two states (t, q, v), or an empty string."""
+        for _, load in self.assembly.state_loads:
+            tape = Tape(self.size)
+            load.write(BodyVariables(tape, np.arange(self.size)))
+            alone = TapeValues(tape)
+            one, two = (alone.pieces(alone.registers(*state)) for state in (before, after))
+            if (one != two).any():
+                return load.pole(before[0], abs(load.value(*before)))
+        return ""
 
     def power(self, t: Array, q: Array, v: Array) -> Array:
         """Power of the loads that vary less the loss in dampers (W), at times (k,) of states (k, n)."""

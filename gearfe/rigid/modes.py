@@ -83,8 +83,7 @@ def modes(system: System, start: Start, rest: Equilibrium, count: int) -> Modes:
 
 def fastest_rate(system: System, start: Start) -> tuple[float, float]:
     """Fastest decay (1/s) and fastest vibration (rad/s) of the free motion in a state."""
-    planar = system.linkage
-    if not (system.linear or (bool(system.forces) if planar is None else planar.springy)):
+    if not (system.linear or any(not element.steady_forces for element, _ in system.forces)):
         return 0.0, 0.0
     growth, decay, vibration = rates(system, start)
     return max(growth, decay), vibration

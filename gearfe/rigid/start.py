@@ -55,7 +55,7 @@ class Freedoms:
         return self.coordinates - self.constraints + len(self.redundant) - self.hidden
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Start:
     """A consistent state: time, coordinates, velocities, freedoms; `active` marks the rows that are not redundant.
 
@@ -334,15 +334,13 @@ def _worst_gap(system: System, time: float, q: Array) -> tuple[str, str]:
     if not len(gap):
         return "", "nothing"
     worst = int((gap / system.row_units).argmax())
-    name, much, planar = system.row_names()[worst], float(gap[worst]), system.linkage
-    if planar is None:
-        return name, f"{much:.3g}"
-    joint, lengths = planar.assembly.row_joint, planar.assembly.row_holds_length
-    if not lengths[worst]:
-        return name, f"{much:.3g} rad"
-    same = [r for r in range(len(gap)) if joint[r] == joint[worst] and lengths[r]]
-    much, length = float(np.linalg.norm(gap[same])), planar.assembly.length
-    return name, f"{much:.3g} m ({much / length:.2g} of the mechanism's length, {length:.3g} m)"
+    first = 0
+    for element, _ in system.joints:
+        if worst < first + element.rows:
+            own = gap[first : first + element.rows]
+            return system.row_names()[worst], element.gap_text(own, worst - first)
+        first += element.rows
+    raise IndexError(worst)
 
 
 def _at_odds(system: System, time: float, q: Array, forced: Sequence[Forced], blamed: Forced) -> Forced | None:

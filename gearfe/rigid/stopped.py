@@ -14,7 +14,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..typing import Array, BoolArray
-from .linkage import Linkage
 from .modes import rates
 from .start import Start
 from .system import System
@@ -75,10 +74,8 @@ def _links_in_line(system: System, time: float, q: Array, carried: Array, drivin
     for element, index in system.joints:
         rows = slice(at_rows, at_rows + element.rows)
         at_rows += element.rows
-        if not isinstance(element, Linkage):
-            continue
-        joints = np.array(element.assembly.row_joint)
-        for number, body in enumerate(element.bodies):
+        joints = np.array(element.row_joint)
+        for number, body in enumerate(element.planar_bodies):
             own = index[3 * number : 3 * number + 3]
             pull = carried[rows, None] * gradients[rows][:, own] * system.units[own]
             ends = np.array([pull[joints == joint].sum(axis=0) for joint in np.unique(joints)])
@@ -86,7 +83,7 @@ def _links_in_line(system: System, time: float, q: Array, carried: Array, drivin
             loaded = np.abs(ends).max(axis=1) > PART * np.abs(pull).max(initial=0.0)
             driven = (driving[rows] & (pull != 0.0).any(axis=1)).any()
             if not driven and loaded.sum() == 2 and (sizes[loaded] > PART * sizes.max()).all():
-                found.append((body.name, ends[loaded][0, :2] / sizes[loaded][0]))
+                found.append((body, ends[loaded][0, :2] / sizes[loaded][0]))
     groups = [[name for name, (x, y) in found if abs(x * along[1] - y * along[0]) < IN_LINE] for _, along in found]
     return max(groups, key=len, default=[])
 

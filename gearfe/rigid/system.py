@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import cached_property
-from typing import Any
+from threading import RLock
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..errors import InputError
 from ..typing import Array, IntArray
 from .contract import Element
-from .forces import StateFunction
-from .linkage import Linkage
 from .tape import Program, Tape
 from .written import Written
 
-#: A load beyond this value (N, N m) where a run ends has a pole there.
-POLE = 1e7
+T = TypeVar("T")
+_MAKING = RLock()
 
 
 class System:
@@ -32,6 +31,7 @@ class System:
 
     def __init__(self, elements: Sequence[Element]) -> None:
         self.elements = tuple(elements)
+        self._known: dict[Hashable, Any] = {}
         if not any(e.size for e in self.elements):
             raise InputError("elements", None, "nothing can move", "give the system at least one body")
         place: dict[int, np.ndarray] = {}
@@ -81,10 +81,27 @@ class System:
         #: Which coordinates are angles of bodies.
         self.turns = np.zeros(total, dtype=bool)
         for element in self.elements:
-            if isinstance(element, Linkage):
-                self.turns[place[id(element)][2::3]] = True
+            self.turns[place[id(element)][list(element.turns)]] = True
         breaks = [getattr(e, "breaks", ()) for e in self.elements]
         self.breaks = np.unique(np.concatenate([np.asarray(b, dtype=float) for b in breaks])) if breaks else np.zeros(0)
+
+    def once(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Data that follow from the system alone, made when they are first asked for; safe between threads.
+
+        Integrators keep constant tables with the system by this. What changes during a run does not belong here.
+
+        Parameters
+        ----------
+        key : hashable
+            Name of the data, with what else they depend on.
+        make : callable
+            Makes them.
+        """
+        with _MAKING:
+            if key not in self._known:
+                self._known[key] = make()
+            known: T = self._known[key]
+            return known
 
     @cached_property
     def inverse_mass(self) -> Array:
@@ -109,10 +126,9 @@ class System:
         return root
 
     @property
-    def linkage(self) -> Linkage | None:
-        """The linkage when the system is nothing else, and under no loads that depend on the state."""
-        one = self.elements[0] if len(self.elements) == 1 else None
-        return one if isinstance(one, Linkage) and one.algebraic else None
+    def algebraic(self) -> bool:
+        """Whether all elements are algebraic (`gearfe.rigid.contract`)."""
+        return all(element.algebraic for element in self.elements)
 
     def coordinates(self, element: Element) -> np.ndarray:
         """Numbers of the coordinates that `element` owns."""
@@ -137,40 +153,21 @@ class System:
             np.add.at(by_v, np.ix_(index, index), local[1])
         return by_q, by_v
 
-    @property
-    def complaint(self) -> str:
-        """What the first load without a value says."""
-        return next((law.complaint for law in self._laws if law.complaint), "")
+    def load_problem(self, t: float, q: Array, v: Array) -> str:
+        """Return which load has no value at a state, and why, or an empty string."""
+        return next(filter(None, (e.load_problem(t, q[i], v[i]) for e, i in self.forces)), "")
 
-    @cached_property
-    def _laws(self) -> list[Any]:
-        parts = [e.assembly for e in self.elements if isinstance(e, Linkage)]
-        return [law for part in parts for _, law in (*part.state_loads, *part.tension_laws)]
+    def load_pole(self, t: float, q: Array, v: Array) -> str:
+        """Return which load grows beyond all bounds at a state, or an empty string."""
+        return next(filter(None, (e.load_pole(t, q[i], v[i]) for e, i in self.forces)), "")
 
-    @cached_property
-    def _loads(self) -> list[tuple[Linkage, StateFunction, np.ndarray]]:
-        parts = [(e, i) for e, i in self.forces if isinstance(e, Linkage)]
-        return [(e, load, i) for e, i in parts for _, load in e.assembly.state_loads]
-
-    def forget_complaints(self) -> None:
-        """Before a state is tried of which they shall speak."""
-        for law in self._laws:
-            law.complaint = ""
-
-    def blame(self, t: float, q: Array, v: Array) -> None:
-        """Let loads that are not finite there, and the largest if it has a pole, say so."""
-        self.force(t, q, v)
-        sizes = [abs(load.value(t, q[index], v[index])) for _, load, index in self._loads]
-        if max(sizes, default=0.0) > POLE:
-            largest = self._loads[int(np.argmax(sizes))][1]
-            largest.complaint = largest.complaint or largest.pole(t, max(sizes))
-
-    def blame_between(self, one: tuple[float, Array, Array], two: tuple[float, Array, Array]) -> None:
-        """Let the load that has a pole between two states (t, q, v) say so."""
-        for linkage, load, index in self._loads:
-            before, after = ((t, q[index], v[index]) for t, q, v in (one, two))
-            if (linkage.load_pieces(load, *before) != linkage.load_pieces(load, *after)).any():
-                load.complaint = load.pole(one[0], abs(load.value(*before)))
+    def pole_between(self, before: tuple[float, Array, Array], after: tuple[float, Array, Array]) -> str:
+        """Return which load has a pole between two states (t, q, v), or an empty string."""
+        for element, index in self.forces:
+            states = ((t, q[index], v[index]) for t, q, v in (before, after))
+            if pole := element.pole_between(*states):
+                return pole
+        return ""
 
     @cached_property
     def pieced(self) -> bool:
@@ -257,23 +254,11 @@ class System:
 
     def coordinate_names(self) -> list[str]:
         """Names of all coordinates: body and coordinate with its unit, or element and number."""
-        names: list[str] = []
-        for element in self.elements:
-            label = element.name or type(element).__name__
-            if isinstance(element, Linkage):
-                names += [f"{b.name}_{c}" for b in element.bodies for c in ("x_m", "y_m", "angle_rad")]
-            else:
-                names += [f"{label}_{k}" for k in range(element.size)]
-        return names
+        return [name for e in self.elements for name in e.coordinate_names or e.numbered("{}_{}", e.size)]
 
     def row_names(self) -> list[str]:
         """What each constraint holds, for messages."""
-        names: list[str] = []
-        for element, _ in self.joints:
-            own: Any = getattr(element, "row_names", None)
-            label = element.name or type(element).__name__
-            names += list(own) if own else [f"{label} ({k})" for k in range(element.rows)]
-        return names
+        return [name for e, _ in self.joints for name in e.row_names or e.numbered("{} ({})", e.rows)]
 
     def acceleration(
         self, t: float, q: Array, v: Array, active: np.ndarray | None = None, excess: Array | None = None

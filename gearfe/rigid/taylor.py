@@ -23,7 +23,7 @@ from . import (
     kernel_tape,
 )
 from .compiled import packed
-from .corners import blame_ahead
+from .corners import load_problem_ahead
 from .dense import Polynomials
 from .row_tables import Equations, row_tables
 from .start import Start
@@ -132,28 +132,40 @@ def work_space(tb: Equations, order: int) -> Work:
     return Work._make(arrays)
 
 
-class Prepared(NamedTuple):
-    """Tables and work space of a system at one order, and both as kernels get them."""
+class Run(NamedTuple):
+    """One run of a system at one order: constant tables, which all runs share, and a work space of its own.
+
+    `handed` are tables and work space as the kernels get them. Making a work space takes as long as a short run, so one
+    that a run has left (`spare`) serves the next.
+    """
 
     system: System
     tables: Equations
     order: int
     work: Work
     handed: tuple[Any, Any]
+    spare: list[tuple[Work, Any]]
 
 
-def prepare(system: System, start: Start, order: int) -> Prepared:
-    """What runs of one system at one order share; they stay with it."""
+def prepare(system: System, start: Start, order: int) -> Run:
+    """Tables of a system, made once, and a work space that no other run uses."""
     program = system.series
     assert program is not None  # the caller asks before
     light = np.flatnonzero(start.excess)
-    known: dict[tuple[Any, ...], Prepared] = system.__dict__.setdefault("_prepared", {})
-    key = order, light.tobytes(), start.excess[light].tobytes()
-    if key not in known:
+
+    def made() -> tuple[Equations, Any]:
         tables = row_tables(program, system.inverse_of(start.excess), start.excess)
+        return tables, packed(tables)
+
+    key = light.tobytes(), start.excess[light].tobytes()
+    tables, handed = system.once(("row tables", *key), made)
+    spare: list[tuple[Work, Any]] = system.once(("spare work", order, *key), list)
+    try:
+        work, packed_work = spare.pop()
+    except IndexError:
         work = work_space(tables, order)
-        known[key] = Prepared(system, tables, order, work, (packed(tables), packed(work)))
-    return known[key]
+        packed_work = packed(work)
+    return Run(system, tables, order, work, (handed, packed_work), spare)
 
 
 def first_pieces(tables: Equations, w: Work, t: float, forward: bool) -> bool:
@@ -165,7 +177,7 @@ def first_pieces(tables: Equations, w: Work, t: float, forward: bool) -> bool:
     return bool(python.set_pieces(program, w.P, w.R0, w.TF, w.pieces))
 
 
-def load_kernels(prepared: Prepared, run: kernel_steps.Run) -> float:
+def load_kernels(prepared: Run, run: kernel_steps.Run) -> float:
     """Compile the kernels, or load them, by a run of no length; seconds that this took."""
     width = prepared.work.q.size
     times, coefficients = np.zeros(2), np.zeros((1, run.order + 1, width))
@@ -191,14 +203,14 @@ def order_for(tolerance: float) -> int:
 
 
 def run_taylor(
-    shared: Prepared, start: Start, end: float, *, tolerance: float, longest: float = math.inf, most: int = 1_000_000,
+    shared: Run, start: Start, end: float, *, tolerance: float, longest: float = math.inf, most: int = 1_000_000,
     watch: Watch | None = None,
 ) -> tuple[Polynomials, Status, dict[str, Any]]:  # fmt: skip
     """Integrate from the consistent start to the time `end`; (dense output, status, statistics).
 
     `tolerance` is that of the last terms.
     """
-    system, tables, order, w, both = shared
+    system, tables, order, w, both, _ = shared
     t0 = start.time
     w.q[:], w.v[:], w.base[:] = start.q, start.v, ~start.active
     sign = 1.0 if end >= t0 else -1.0
@@ -236,30 +248,32 @@ def run_taylor(
             fill, (t0, end), lambda: (w.q, w.v), room=FIRST_STEPS,
             largest=max(FIRST_STEPS, MOST_NUMBERS // ((order + 1) * width)), most=most, watch=look,
         )  # fmt: skip
+    problem = ""
     if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE):
-        status = _because_of_loads(shared, run, float(state[kernel_run.TIME]), status)
+        problem = _load_problem(shared, run, float(state[kernel_run.TIME]), status)
+        status = Status.NOT_FINITE if problem else status
+    shared.spare.append((w, both[1]))
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
     series = np.concatenate([p[1] for p in parts]) if len(parts) > 1 else parts[0][1]
     dense = Polynomials(ends, series, sampler, t0)
-    statistics = {
+    statistics: dict[str, Any] = {
         "scheme": "Taylor series",
         "steps": done,
         "order": order,
         "compile_seconds": compiling,
         "singular_passages": ends[np.flatnonzero(np.concatenate([p[2] for p in parts]))],
     }
+    if problem:
+        statistics["load_problem"] = problem
     return dense, status, statistics
 
 
-def _because_of_loads(shared: Prepared, run: kernel_steps.Run, t: float, status: Status) -> Status:
-    """Why a run ended at the state in the work space: not finite where loads have no value there, or just beyond, or a
-    pole within the step; they say so."""
-    system, tables, order, w, _ = shared
+def _load_problem(shared: Run, run: kernel_steps.Run, t: float, status: Status) -> str:
+    """Return which load has no value at the state in the work space, or just beyond, or a pole within the step."""
+    system, tables, order, w, _, _ = shared
     python = KERNELS.python
-    system.forget_complaints()
-    blame_ahead(system, t, (w.q, w.v, 2.0 * w.Z[: len(w.q), 2]), run.end - run.begin)
-    if system.complaint:
-        return Status.NOT_FINITE
+    if problem := load_problem_ahead(system, t, (w.q, w.v, 2.0 * w.Z[: len(w.q), 2]), run.end - run.begin):
+        return problem
     with np.errstate(all="ignore"):
         size = run.sign * python.step_length(tables, w, run)
         h, where = python.leaves(tables.program, w.R, w.pieces, order - 1, size)
@@ -268,8 +282,8 @@ def _because_of_loads(shared: Prepared, run: kernel_steps.Run, t: float, status:
             for place in (h * (1.0 - NEAR_POLE), h * (1.0 + NEAR_POLE)):
                 python.evaluate(w.Z, order, place, w.qn, w.vn)
                 states.append((t + place, w.qn.copy(), w.vn.copy()))
-            system.blame_between(*states)
-    return status
+            return system.pole_between(*states)
+    return ""
 
 
 def sampler(times: Array, coefficients: Array, sign: float, t: Array, derivative: int, out: Array) -> None:

@@ -110,9 +110,9 @@ class Trajectory(Shown):
     @property
     def message(self) -> str:
         """The status in words, with its cause where one is known: a load, a locked position, a link without mass."""
-        link, complaint = self.statistics.get("loose_link"), self.statistics.get("complaint")
-        if complaint is not None:
-            return f"{self.status.message}: {complaint}"
+        link, problem = self.statistics.get("loose_link"), self.statistics.get("load_problem")
+        if problem is not None:
+            return f"{self.status.message}: {problem}"
         if "locked" in self.statistics:
             return str(self.statistics["locked"])
         if "short_steps" in self.statistics:

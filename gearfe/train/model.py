@@ -321,11 +321,9 @@ def _damped(train: GearTrain, elements: list[Element], bodies: list[Element]) ->
     back = modal.T.T @ system.mass
     whole = LinearForce(tuple(bodies), back.T @ (factors[:, None] * back), np.zeros_like(system.mass), "modal damping")
     damped = System([*elements, whole])
-    made = replace(modal, system=damped, damping=modal.damping + np.diag(factors))
-    damped.__dict__["_modal_coordinates"] = (
-        made  # the modes are those without damping, and its matrix stays exactly diagonal
-    )
-    return damped, made
+    # the modes are those without damping, and its matrix stays exactly diagonal
+    in_modes = replace(modal, system=damped, damping=modal.damping + np.diag(factors))
+    return damped, damped.once("modal coordinates", lambda: in_modes)
 
 
 def _start(train: GearTrain, system: System, shafts: tuple[RigidShaft, ...], first: IntArray) -> Start:
