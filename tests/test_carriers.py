@@ -261,9 +261,10 @@ def test_lengths_that_cannot_be(length: Any, text: str) -> None:
         made(actuator(length))
 
 
+@pytest.mark.parametrize("to_point", [None, [0.15, -0.07]])
 @pytest.mark.parametrize("coordinate", ["x", "y"])
-def test_a_coordinate_in_the_frame_of_a_body_that_turns(coordinate: str) -> None:
-    """The point's place seen from the frame's origin, not from its mass centre."""
+def test_a_coordinate_in_the_frame_of_a_body_that_turns(coordinate: str, to_point: list[float] | None) -> None:
+    """The point's place seen from the frame's origin, not from its mass centre, or from `to_point`."""
     frame = body(0.3, 0.2, centre_m=[0.2, 0.1], angle_rad=0.4, rate_rad_per_s=1.5)
     raw: dict[str, Any] = {
         "run": {"end_s": 0.5, "step_s": 0.05},
@@ -280,9 +281,12 @@ def test_a_coordinate_in_the_frame_of_a_body_that_turns(coordinate: str) -> None
         },
     }
     raw["bodies"]["load"]["points_m"] = {"P": [0.1, -0.1]}
+    raw["bodies"]["frame"]["points_m"] = {"O": to_point or [0.0, 0.0]}
+    if to_point is not None:
+        raw["joints"]["given"]["to_point"] = to_point
     raw["outputs"] = [
-        {"name": "x", "value": "cos(angle(frame))*(x(load.P)-x(frame)) + sin(angle(frame))*(y(load.P)-y(frame))"},
-        {"name": "y", "value": "cos(angle(frame))*(y(load.P)-y(frame)) - sin(angle(frame))*(x(load.P)-x(frame))"},
+        {"name": "x", "value": "cos(angle(frame))*(x(load.P)-x(frame.O)) + sin(angle(frame))*(y(load.P)-y(frame.O))"},
+        {"name": "y", "value": "cos(angle(frame))*(y(load.P)-y(frame.O)) - sin(angle(frame))*(x(load.P)-x(frame.O))"},
     ]
     solved = solve(made(raw))
     time = solved.results.trajectory.time

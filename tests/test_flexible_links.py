@@ -11,7 +11,7 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.errors import InputError
-from gearfe.mechanisms import evaluate, load_mechanism
+from gearfe.mechanisms import evaluate, load_mechanism, solve
 from gearfe.mechanisms.results import reactions
 from gearfe.rigid import integrate
 
@@ -151,6 +151,39 @@ moment_N_m = 0.0
     mechanism = load_mechanism(write(tmp_path, text))
     run = integrate(mechanism.system, [0.0, 0.05], start=mechanism.start(), tolerance=1e-6)
     assert np.abs(run.q[-1] - run.q[0]).max() < 1e-12
+
+
+@pytest.mark.parametrize("place", ['body = "arm.tip"', 'body = "arm"\npoint = "lug"'])
+@pytest.mark.parametrize("flexible", ["true", "false"])
+def test_a_point_says_which_section_an_angle_is_of(tmp_path: Path, place: str, flexible: str) -> None:
+    """Where the link is rigid, all sections turn alike."""
+    swing = "{ polynomial = [0.0, 0.0, 0.5] }"
+    text = CANTILEVER.split("[joints.clamp]", maxsplit=1)[0].replace(
+        "[bodies.arm]", f"[bodies.arm]\nflexible = {flexible}"
+    )
+    text += f"""
+[joints.hold]
+type = "hinge"
+body = "arm"
+[joints.turn]
+type = "prescribed"
+{place}
+coordinate = "angle"
+motion = {swing}
+[[outputs]]
+name = "tip_rad"
+value = "angle(arm.tip)"
+[[outputs]]
+name = "root_rad"
+value = "angle(arm)"
+"""
+    if flexible == "false":
+        text = text.replace('"angle(arm.tip)"', '"angle(arm)"')
+    results = solve(load_mechanism(write(tmp_path, text))).results
+    time = results.trajectory.time
+    np.testing.assert_allclose(results.outputs["tip_rad"], 0.5 * time**2, atol=1e-6)
+    bent = float(np.abs(results.outputs["root_rad"] - results.outputs["tip_rad"]).max())
+    assert bent == 0.0 if flexible == "false" else bent > 1e-4
 
 
 @pytest.mark.parametrize(

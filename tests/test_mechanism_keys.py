@@ -100,6 +100,8 @@ REFUSED = {
     ("cam angle", "point"): "has no part in an angle",
     ("prescribed angle", "point"): "has no part in an angle",
     ("prescribed rate", "point"): "has no part in an angle",
+    ("prescribed angle", "to_point"): "has no part in an angle",
+    ("prescribed rate", "to_point"): "has no part in an angle",
     ("spring without stiffness", "free_length_m"): "says nothing without stiffness",
     ("y damper", "reference"): "says nothing without stiffness",
     ("x spring", "to"): "only an angle can be relative",

@@ -93,7 +93,7 @@ def part_of(
                 pointed=point in kind.fields,
             )
             values[kind.fields[body]] = made[0]
-            if point in kind.fields:
+            if point in kind.fields and not _selects_section(file, table, getattr(table, body)):
                 values[kind.fields[point]] = made[1]
     for key, field_name in kind.fields.items():
         value = getattr(table, key)
@@ -124,6 +124,12 @@ def part_of(
         if wrong is None:
             raise
         raise InputError(f"{label}.{wrong}", error.value, error.problem, error.cure) from None
+
+
+def _selects_section(file: MechanismFile, table: JointTable | ForceTable, where: str) -> bool:
+    """Whether a point of `where` only says whose angle is meant: that of a link's section, or interface, there."""
+    body = file.bodies.get(where.partition(".")[0])
+    return body is not None and body.shape is not None and getattr(table, "coordinate", None) in ("angle", "rate")
 
 
 def _check_length(length: TimeFunction, end: float, label: str) -> None:

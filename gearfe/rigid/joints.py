@@ -197,7 +197,8 @@ class Prescribed(Joint):
     """A motion given as a function of time: one constraint.
 
     `coordinate` is ``"angle"`` (rad, relative to body `relative_to`), ``"rate"`` (rad/s, likewise; the angle starts
-    from the start pose), or ``"x"`` or ``"y"`` (m, of the point `point`, in the frame of body `relative_to`).
+    from the start pose), or ``"x"`` or ``"y"`` (m, of the point `point`, seen from the point `origin` of body
+    `relative_to`, along its axes).
     """
 
     body: str
@@ -205,23 +206,23 @@ class Prescribed(Joint):
     function: TimeFunction
     relative_to: str = GROUND
     point: Point = (0.0, 0.0)
+    origin: Point = (0.0, 0.0)
     name: str = ""
 
     def __post_init__(self) -> None:
         if self.coordinate not in ("angle", "rate", "x", "y"):
             where = f"prescribed motion {self.name!r} coordinate"
             raise InputError(where, self.coordinate, "must be one of angle, rate, x, y", "choose one of these")
-        if self.coordinate in ("angle", "rate") and self.point != (0.0, 0.0):
-            where = f"prescribed motion {self.name!r} point"
-            raise InputError(where, self.point, "has no part in an angle", "remove it, or prescribe x or y")
+        for key in ("point", "origin"):
+            if self.coordinate in ("angle", "rate") and getattr(self, key) != (0.0, 0.0):
+                where = f"prescribed motion {self.name!r} {key}"
+                raise InputError(where, getattr(self, key), "has no part in an angle", "remove it, or prescribe x or y")
 
     def rows(self, frames: Frames) -> list[Row]:
         """The coordinate less its function of time."""
         if self.coordinate in ("x", "y"):
             along = (1.0, 0.0) if self.coordinate == "x" else (0.0, 1.0)
-            gap = frames.point(self.body, self.point)
-            if self.relative_to != GROUND:
-                gap = gap - frames.point(self.relative_to, (0.0, 0.0))
+            gap = frames.point(self.body, self.point) - frames.point(self.relative_to, self.origin)
             return [Row(self.coordinate, frames.direction(self.relative_to, along).dot(gap), self.function)]
         motion = self.function
         if self.coordinate == "rate":

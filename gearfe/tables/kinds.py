@@ -77,7 +77,10 @@ JOINTS: dict[str, Kind] = {
     ),
     "prescribed": Kind(
         "gearfe.rigid.joints:Prescribed",
-        {"body": "body", "to": "relative_to", "point": "point", "coordinate": "coordinate", "motion": "function"},
+        {
+            "body": "body", "to": "relative_to", "point": "point", "to_point": "origin", "coordinate": "coordinate",
+            "motion": "function",
+        },
         ("coordinate", "motion"),
     ),
 }  # fmt: skip
