@@ -317,11 +317,25 @@ def test_all_forms_of_gmsh_files(version, tmp_path) -> None:
         assert np.ptp(mesh.nodes[mesh.group("both", "g")], axis=0) == pytest.approx([3.0, 2.0, 1.0])
 
 
+BEFORE = {"blank line": b"\n", "mark of UTF-8": b"\xef\xbb\xbf", "comments": b"$Comments\nby hand\n$EndComments\n"}
+
+
+@pytest.mark.parametrize("before", BEFORE)
+def test_what_may_stand_before_a_gmsh_file(before, tmp_path) -> None:
+    """With a blank line or a mark before it, gmsh itself takes the file for a script."""
+    base = by_gmsh(tmp_path, 4.1)
+    path = tmp_path / "a.msh"
+    path.write_bytes(BEFORE[before] + path.read_bytes())
+    mesh = read_mesh_file(path, "mesh", 1.0)
+    np.testing.assert_array_equal(mesh.nodes[mesh.tets], base.nodes[base.tets])
+    assert mesh.groups.keys() == base.groups.keys()
+
+
 SCRIPT = 'SystemCall "touch {0}";\n'
 
 
 @pytest.mark.parametrize("ending", ["msh", "unv", "med", "mesh"])
-@pytest.mark.parametrize("before", ["", "// ", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n", "    -1\n"])
+@pytest.mark.parametrize("before", ["", "// ", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n", "\n$Comments\n", "    -1\n"])
 def test_no_mesh_file_runs_code(ending, before, tmp_path) -> None:
     """gmsh runs scripts of its language whatever the ending is."""
     mark = tmp_path / "ran"

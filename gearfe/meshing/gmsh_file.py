@@ -25,7 +25,7 @@ from .source import SourceMesh
 ENDINGS = (".msh", ".unv", ".med", ".mesh")
 #: What a file of each kind begins with; first words of scripts of gmsh's language are none of these.
 _HEADS = {
-    ".msh": (b"$MeshFormat", b"$NOD"),
+    ".msh": (b"$MeshFormat", b"$NOD", b"$Comments"),
     ".med": (b"\x89HDF\r\n\x1a\n",),
     ".unv": (b"-1",),
     ".mesh": (b"MeshVersionFormatted", b"#"),
@@ -39,6 +39,8 @@ KINDS = {
 }
 #: Address space of the reading process (bytes): its libraries, and times the size of the file.
 _LIBRARIES, _TIMES = 3 << 30, 100
+#: What editors put before the first word: blanks, the mark of UTF-8. With either, gmsh takes a .msh for a script.
+_BLANKS, _MARK = b" \t\r\n", b"\xef\xbb\xbf"
 #: Exit code for a message on the standard error, in contrast to a crash.
 _REFUSED = 3
 
@@ -54,13 +56,16 @@ def read_by_gmsh(path: Path, field: str) -> SourceMesh:
     ending = path.suffix.lower()
     with path.open("rb") as stream:
         head = stream.read(4096)
-    if not head.lstrip(b" \t\r\n").startswith(_HEADS[ending]):
+    before = len(head) - len(head.removeprefix(_MARK).lstrip(_BLANKS)) if ending == ".msh" else 0
+    if not head[before:].lstrip(_BLANKS).startswith(_HEADS[ending]):
         names = " or ".join(repr(one.decode("latin-1")) for one in _HEADS[ending])
         problem = f"is no {ending} file: it begins with {head[:20]!r}, not with {names}"
         raise InputError(field, path.name, problem, "export the mesh again; scripts and CAD models are no meshes")
     with tempfile.TemporaryDirectory(prefix="gearfe-") as folder:
         alone, arrays = Path(folder) / f"mesh{ending}", Path(folder) / "arrays.npz"
-        shutil.copyfile(path, alone)
+        with path.open("rb") as source, alone.open("wb") as copy:
+            source.seek(before)
+            shutil.copyfileobj(source, copy)
         command = "import sys; sys.path[:0] = sys.argv[1:2]; from gearfe.meshing.gmsh_file import main; main()"
         run = subprocess.run(
             [sys.executable, "-P", "-c", command, str(Path(__file__).parents[2]), str(alone), str(arrays)],
