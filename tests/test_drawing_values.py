@@ -67,7 +67,10 @@ def test_drawing_values_are_the_gears() -> None:
             {"tip_diameter_mm": 95.0},
             r"pair.pinion.tip_diameter_mm = 95.0: makes addendum 3.48333: the tooth is pointed",
         ),
-        ({"root_diameter_mm": 75.0}, r"pair.pinion.root_diameter_mm = 75.0: makes dedendum -0.15: must be"),
+        (
+            {"root_diameter_mm": 75.0},
+            r"pair.pinion.root_diameter_mm = 75.0: makes dedendum -0.15: is too small: must be < 74.1 mm",
+        ),
     ],
 )
 def test_mistakes_name_the_drawing_value(keys, told) -> None:

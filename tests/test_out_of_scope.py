@@ -11,6 +11,7 @@ import pytest
 from gearfe.cli import main
 from gearfe.config import read_toml
 from gearfe.errors import LONGEST_MESSAGE, OUT_OF_SCOPE, InputError
+from gearfe.gear.curves import inverse_inv
 from gearfe.mechanisms.suspects import suspects
 from gearfe.tables.pair import GearTable, PairTable, ToothFormTable
 from gearfe.tables.train import TrainShaftTable, TrainTable
@@ -108,9 +109,21 @@ def pointed_diameter_mm() -> float:
     return 40.0 * math.cos(alpha) / math.cos(low)
 
 
+def diameter_of_one_pair_mm() -> float:
+    """Tip diameter from which on the pinion reaches one base pitch of path beside the mate's tip of 404 mm."""
+    alpha, base = math.radians(20.0), math.cos(math.radians(20.0))
+    working = inverse_inv(math.tan(alpha) - alpha + 2.0 * math.tan(alpha) * 0.2 / 220)
+    length = 220.0 * base * math.tan(working)
+    mate = math.sqrt(202.0**2 - (200.0 * base) ** 2)
+    return 2.0 * math.hypot(20.0 * base, 2.0 * math.pi * base + length - mate)
+
+
 @pytest.mark.parametrize(
     ("drawn", "bound"),
     [
+        ("tip_diameter_mm = 40.7", "must be > 40.8 mm; use a larger tip_diameter_mm"),  # d + 2 x m
+        ("tip_diameter_mm = 41.0", f"must be >= {diameter_of_one_pair_mm():.6g} mm; use a larger tip_diameter_mm"),
+        ("root_diameter_mm = 41.0", "must be < 40.8 mm; use a smaller root_diameter_mm"),
         ("tip_diameter_mm = 49.5", f"must be < {pointed_diameter_mm():.6g} mm; use a smaller tip_diameter_mm"),
         ("root_diameter_mm = 0.5", "must be > 1 mm; use a larger root_diameter_mm"),  # half a module of rim
         ("span_mm = 5.0\nspan_teeth = 3", "mm; use a larger span_mm"),

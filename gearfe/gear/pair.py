@@ -332,14 +332,14 @@ def _of_drawn(error: InputError, table: PairTable, side: str, drawn: str, made: 
     form, module = table.tooth_form(side), table.module_mm_of(side)
     shift = float(form["profile_shift"])
     if drawn != "tip_diameter_mm":  # these fall as the dedendum and the thinning grow
-        sign = {"<": ">", ">": "<"}[sign]
+        sign = {"<": ">", ">": "<", ">=": "<="}[sign]
     if drawn == "span_mm":
         angle = math.radians(form["pressure_angle_deg"])
         whole = module * nominal_span(own.teeth, shift, angle, given(own.span_teeth, "span_teeth"))
         limit = whole - 1e-3 * bound * math.cos(angle)
     else:
         limit = module * (own.teeth + 2.0 * shift + 2.0 * (bound if drawn == "tip_diameter_mm" else -bound))
-    cure = f"use a {'smaller' if sign == '<' else 'larger'} {drawn}"
+    cure = f"use a {'smaller' if '<' in sign else 'larger'} {drawn}"
     return InputError(field, value, f"{made}: {error.reason}: must be {sign} {limit:.6g} mm", cure)
 
 

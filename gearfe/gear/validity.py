@@ -97,6 +97,8 @@ def _check(name: str, value: float, low: float, high: float, closed: bool) -> No
     number = not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
     if number and (low <= value <= high if closed else low < value < high):
         return
+    if number and not closed and value <= low:  # a bound that a drawing value states in its own quantity
+        raise InputError(name, value, "is too small", "correct it", (">", low, ""))
     signs = (">=", "<=") if closed else (">", "<")
     limits = [f"{sign} {limit:g}" for sign, limit in zip(signs, (low, high), strict=True) if math.isfinite(limit)]
     raise InputError(name, value, "must be a finite number" + "".join(f", {limit}" for limit in limits), "correct it")
@@ -184,8 +186,12 @@ def _check_ratio(pair: MeshGeometry) -> None:
         problem = f"gives a contact ratio of {nominal:.4g}, must be >= 1"
         if pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch:
             raise InputError("centre_distance", pair.centre_distance, problem, "use a smaller centre distance")
-        cure = "use more addendum, less tip_shortening, more teeth or a smaller pressure angle"
-        raise InputError("pinion.addendum", pair.pinion.addendum, problem, cure)
+        problem, cure = f"gives a contact ratio of {nominal:.4g} < 1", "use less tip_shortening, or more teeth"
+        name = min(("pinion", "wheel"), key=lambda name: getattr(pair, name).addendum)
+        gear: Gear = getattr(pair, name)
+        roll = gear.profile.tip_roll + (1.0 - nominal) * pair.base_pitch
+        more = (math.hypot(gear.base_radius, roll) - gear.tip_radius) / gear.module
+        raise InputError(f"{name}.addendum", gear.addendum, problem, cure, (">=", gear.addendum + more, ""))
     if active >= 1.0:
         return
     rounded = _tips_ratio(pair, rounded=True)
