@@ -18,9 +18,9 @@ LONGEST_WORD, LONGEST_MESSAGE = 200, 2000
 
 #: Words in names of gear jobs that no table knows -> what is out of scope, and what there is instead.
 OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
-    r"heli(x|cal)|skew|herringbone|overlap_ratio|normal_module|transverse_(module|pressure)":
+    r"heli(x|cal)|^beta(_|$)|skew|herringbone|overlap_ratio|normal_module|transverse_(module|pressure)":
         ("helical gears", "spur gears only"),
-    r"internal|ring_gear|annulus": ("internal gears", "external spur gears only"),
+    r"internal|(^|_)ring(_|$)|annulus": ("internal gears", "external spur gears only"),
     r"planet|carrier|sun(_|$)|epicyclic": ("planetary gears", "spur gears on fixed shafts only"),
     r"bevel|hypoid|cone_angle|pitch_cone|miter": ("bevel gears", "spur gears only"),
     r"worm|lead_angle": ("worm gears", "spur gears only"),

@@ -33,7 +33,9 @@ def refused(capsys: pytest.CaptureFixture[str], *line: str) -> str:
     ("change", "what"),
     [
         ("pair.helix_angle_deg=15", "helical gears"),
+        ("pair.beta_deg=15", "helical gears"),
         ("pair.wheel.internal=true", "internal gears"),
+        ("pair.wheel.ring=true", "internal gears"),
         ("train.planets=3", "planetary gears"),
         ("train.carrier='arm'", "planetary gears"),
         ("pair.pinion.cone_angle_deg=30", "bevel gears"),
