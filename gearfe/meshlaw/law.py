@@ -181,9 +181,14 @@ class MeshLaw:
 
     def touching(self, angles: ArrayLike, shifts: ArrayLike = 0.0) -> Array:
         """Approach (m) at which the first pair touches; `shifts` as in `__call__`."""
+        first: Array = self.pair_touches(angles, shifts).min(axis=1)
+        return first
+
+    def pair_touches(self, angles: ArrayLike, shifts: ArrayLike = 0.0) -> Array:
+        """Approaches (m) at which the pairs in the slots touch at pinion angles (n,), shape (n, slots)."""
         _, cell, z = self.locate(np.asarray(angles, dtype=float))
-        found: Array = (_powers(self.touch[:, cell], z[None])[0].T + np.asarray(shifts, dtype=float)).min(axis=1)
-        return found
+        touch: Array = _powers(self.touch[:, cell], z[None])[0].T + np.asarray(shifts, dtype=float)
+        return touch
 
     def __call__(
         self, angles: ArrayLike, approaches: ArrayLike, shifts: ArrayLike = 0.0, begin: Array | None = None

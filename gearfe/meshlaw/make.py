@@ -25,13 +25,18 @@ CELLS, PLACES = 12, (0.25, 0.75)
 #: Approaches beyond the first touch, in parts of the largest: small ones show how a pair comes into contact.
 DEPTHS = (0.0025, 0.008, 0.025, 0.06, 0.12, 0.2, 0.32, 0.5, 0.75, 1.0)
 #: Places and approaches at which the law is held against contacts: beside the nodes, where kinks are; between `DEPTHS`.
-HELD_PLACES, HELD_DEPTHS = (0.1, 0.9), (0.0045, 0.039, 0.155, 0.4, 0.87)
+HELD_PLACES, HELD_DEPTHS = (0.1, 0.9), (0.0015, 0.0045, 0.039, 0.155, 0.4, 0.87)
+#: It is held against contacts also where a further pair touches by these parts of the reach after the first one, found
+#: among so many samples of each cell.
+LATE, CHANGE_SAMPLES = (0.01, 0.1, 0.4, 0.9), 100
 #: Error of force and torque there from which on a cell is halved, in parts of them, or of this part of the largest
 #: where that is more: what contacts on elements of the default sizes err by (0.11 % in the shipped pair).
 TOLERANCE, LEAST_FORCE = 1e-3, 0.1
 #: Error of the touching curve's cubics (parts of the reach) from which on a cell is halved, a tenth of `TOLERANCE`, as
 #: forces of a tenth of the largest count; and how often: a few cells at the ends of the path need it.
 CLOSE, TOUCH_HALVINGS = 1e-4, 8
+#: Where in a cell (parts of its width) the touching curve's cubics are compared with the curve.
+TOUCH_PLACES = (0.25, 0.5, 0.75)
 #: How often a cell is halved for its forces.
 HALVINGS = 3
 #: Least reach (m): what contact solutions are off by (`gearfe.meshlaw.fit.NOISE`) is then 1 % of it.
@@ -56,37 +61,42 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
         For forces that contact solutions do not reach.
     """
     geometry = pair.pair
-    reach = _reach(pair, force)
-    if reach < LEAST_REACH:
-        reach, force = LEAST_REACH, force * LEAST_REACH / reach
+    radius = geometry.wheel.base_radius
+    reach = max(_reach(pair, force), LEAST_REACH)
     nodes, slots = _nodes(pair, reach)
     C = coupling_curve(pair, _phases(nodes, slots), reach)
     known: list[PairForces] = []
 
-    def solve(places: Sequence[float], depths: Sequence[float]) -> Positions:
-        """Contacts in all cells at parts of their width, and at parts of the reach; their pair forces become known."""
-        angles = (begin[:, None] + width[:, None] * np.array(places)).ravel()
+    def solve(angles: Array, depths: Sequence[float]) -> Positions:
+        """Contacts at pinion angles and at parts of the reach; their pair forces become known."""
         met, first = _touching(pair, angles)
-        twists = first[:, None] + reach * np.array(depths) / geometry.wheel.base_radius
+        twists = first[:, None] + reach * np.array(depths) / radius
         solved = solve_half_plane(pair, np.repeat(angles, len(depths)), twists.ravel())
         known.append(pair_forces(pair, solved, met, C))
         return solved
 
     begin, width, error = nodes[:-1], np.diff(nodes), 0.0
     for rest in range(HALVINGS, -1, -1):
-        solve(PLACES, DEPTHS)
+        solve(_places(begin, width, PLACES), DEPTHS)
         law = fit_law(
             joined(known),
             touch_curve(pair, _phases(nodes, slots)),
             C,
             cells=len(nodes) - 1,
             hertz=0.5 * pair.compliance / pair.width,
-            base_radii=(geometry.pinion.base_radius, geometry.wheel.base_radius),
+            base_radii=(geometry.pinion.base_radius, radius),
             reach=reach,
         )
-        off = (
-            _misses(law, pair, solve(HELD_PLACES, HELD_DEPTHS), LEAST_FORCE * force).reshape(len(begin), -1).max(axis=1)
-        )
+        order = np.argsort(begin)
+        begin, width = begin[order], width[order]
+        changes = _changes(law)
+        cell = np.searchsorted(begin, changes, side="right") - 1
+        inside = (cell >= 0) & (changes < (begin + width)[cell])
+        held = np.concatenate([_places(begin, width, HELD_PLACES), changes[inside]])
+        cell = np.concatenate([np.repeat(np.arange(len(begin)), len(HELD_PLACES)), cell[inside]])
+        misses = _misses(law, pair, solve(held, HELD_DEPTHS), LEAST_FORCE * force)
+        off = np.zeros(len(begin))
+        np.maximum.at(off, np.repeat(cell, len(HELD_DEPTHS)), misses)
         coarse = (off > tolerance) & (rest > 0)
         error = max(error, float(off[~coarse].max(initial=0.0)))
         if not coarse.any():
@@ -97,6 +107,27 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
         problem = f"has contact solutions from which no mesh law for forces up to {force:.6g} N can be made"
         raise InputError("force", force, problem, "ask for a law up to larger forces, or change the reliefs")
     return replace(law, backlash=geometry.normal_backlash, error=error)
+
+
+def _places(begin: Array, width: Array, parts: Sequence[float]) -> Array:
+    """Angles (rad) at these parts of the width of each cell, cell by cell."""
+    angles: Array = (begin[:, None] + width[:, None] * np.array(parts)).ravel()
+    return angles
+
+
+def _changes(law: MeshLaw) -> Array:
+    """Angles (rad) of one mesh cycle at which a further pair touches at `LATE` parts of the reach after the first one.
+
+    Between these the loaded pairs change; under light loads that is a small part of a cell.
+    """
+    angles = _places(law.nodes[:-1], np.diff(law.nodes), np.arange(CHANGE_SAMPLES) / CHANGE_SAMPLES)
+    touch = law.pair_touches(angles)
+    late = (touch - touch.min(axis=1, keepdims=True)) / law.reach
+    changes = []
+    for part in LATE:
+        sample, _ = np.nonzero((late[1:] > part) != (late[:-1] > part))
+        changes.append(0.5 * (angles[sample] + angles[sample + 1]))
+    return np.unique(np.concatenate(changes))
 
 
 def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) -> Array:
@@ -231,7 +262,7 @@ def _nodes(pair: HalfPlanePair, reach: float) -> tuple[Array, int]:
     even = even[np.abs(even[:, None] - corners).min(axis=1, initial=np.inf) > NEAR * width]
     nodes = begin + np.sort(np.concatenate([[0.0, cycle], corners, even]))
     for _ in range(TOUCH_HALVINGS):
-        off = _midway(pair, nodes, slots, BEYOND * reach)
+        off = _touch_error(pair, nodes, slots, BEYOND * reach)
         coarse = np.flatnonzero(off > CLOSE * reach)
         if not len(coarse):
             break
@@ -249,17 +280,24 @@ def _kinks(pair: HalfPlanePair) -> set[float]:
     return {s for s in made if start < s < end}
 
 
-def _midway(pair: HalfPlanePair, nodes: Array, slots: int, reach: float) -> Array:
-    """Error of the cubics of t in the middle of each cell of the phase (m), the largest over the slots."""
+def _touch_error(pair: HalfPlanePair, nodes: Array, slots: int, reach: float) -> Array:
+    """Error of the cubics of t in each cell of the phase (m), the largest over the slots.
+
+    A cell counts where a pair can be loaded in it, within the reach of the first touch, by its true t or by its cubic.
+    """
     ends = _phases(nodes, slots)
-    middle = 0.5 * (ends[1:] + ends[:-1])
-    true = touch_curve(pair, middle).value
-    late = _late(pair, middle)
-    c = touch_cubics(touch_curve(pair, ends))
-    z = middle - ends[:-1]
-    off = np.abs(c[:, 0] + z * (c[:, 1] + z * (c[:, 2] + z * c[:, 3])) - true)
-    found: Array = np.where(late < reach, off, 0.0).reshape(slots, -1).max(axis=0)
-    return found
+    cubics = touch_cubics(touch_curve(pair, ends)).T
+    late = _late(pair, ends)
+    least, largest = np.minimum(late[1:], late[:-1]), np.zeros(len(ends) - 1)
+    for part in TOUCH_PLACES:
+        z = part * np.diff(ends)
+        phases = ends[:-1] + z
+        off = cubics[0] + z * (cubics[1] + z * (cubics[2] + z * cubics[3])) - touch_curve(pair, phases).value
+        late = _late(pair, phases)
+        least = np.minimum(least, np.minimum(late, late + off))
+        largest = np.maximum(largest, np.abs(off))
+    error: Array = np.where(least < reach, largest, 0.0).reshape(slots, -1).max(axis=0)
+    return error
 
 
 def _phases(nodes: Array, slots: int) -> Array:
