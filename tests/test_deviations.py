@@ -10,10 +10,11 @@ import pytest
 from gearfe import InputError
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gear.deviation import Deviation, total
-from gearfe.gear.face import NOMINAL, ToothDeviations
+from gearfe.gear.face import NOMINAL, ToothDeviations, face_of
 from gearfe.gear.touching import ToothFlanks, touching_curve
 from gearfe.stiffness.sweep import elastic_pair
 
+from .gears import gear as single_gear
 from .gears import pair as gear_pair
 
 PAIR = gear_pair(tip_round=1e-4)
@@ -157,3 +158,16 @@ def test_the_curve_of_one_pair() -> None:
     turn = tuple(1e-4 * (np.arange(20) == 17))
     shifted = touching_curve(PAIR, on + 3 * cycle, number=-3, deviations=(ToothDeviations(turn=turn), NOMINAL[1]))
     assert PAIR.contact_twist - shifted[:-2] == pytest.approx(1e-4 / PAIR.gear_ratio, rel=1e-9)
+
+
+def test_an_undercut_root_follows_the_involute() -> None:
+    """A relieved root leaves no step at the edge of an undercut: the flank is one curve, radii are found on it."""
+    pinion = single_gear(13, pressure_angle=20.0, profile_shift=-0.283, tip_round=1e-4)
+    flank = face_of(pinion).flank
+    relief = Deviation.straight([flank.start, 0.5 * (flank.start + flank.end), flank.end], [-27e-6, 0.0, 0.0])
+    face = face_of(pinion, relief)
+    assert face.undercut
+    steps = [np.diff(one.points(np.array([-1e-9, 0.0])))[0] for one in (face_of(pinion), face)]
+    assert abs(steps[1] - steps[0]) < 1e-9
+    u = np.linspace(-0.45, -0.05, 50)
+    assert face.at_radius(np.abs(face.points(u))) == pytest.approx(u, abs=1e-6)

@@ -100,7 +100,16 @@ class Face:
         for curve, there, start in ((self.round_, u > 1.0, 1.0), (self.root, u < 0.0, -1.0)):
             if curve is not None and there.any():
                 made[there] = getattr(curve, what)(u[there] - start)
+        if what == "point":
+            made = np.where(u < 0.0, made + self.root_offset, made)
         return made
+
+    @cached_property
+    def root_offset(self) -> complex:
+        """Displacement (m) of the root with a deviation: it ends where the involute starts, without a step."""
+        if self.root is None or self.flank.deviation is None:
+            return 0.0
+        return complex((self.flank.point(np.zeros(1)) - self.root.point(np.ones(1)))[0])
 
     @cached_property
     def kinks(self) -> Array:
@@ -122,9 +131,9 @@ class Face:
     def _in_root(self, root: Trochoid, radius: Array) -> Array:
         """Parameter u in the root by Newton's method from a table; the radius grows all along it."""
         v = np.linspace(0.5, 1.0, 65)
-        v = np.interp(radius, np.abs(root.point(v)), v)
+        v = np.interp(radius, np.abs(root.point(v) + self.root_offset), v)
         for _ in range(3):
-            point, along = root.point(v), -1j * root.normal(v)
+            point, along = root.point(v) + self.root_offset, -1j * root.normal(v)
             rate = (point.conj() * along).real / np.abs(point) * root.speed(v)
             v = np.clip(v + (radius - np.abs(point)) / rate, 0.5, 1.0)
         return v - 1.0
