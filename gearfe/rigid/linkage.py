@@ -6,7 +6,6 @@ and vectors have affine components; the tension T along a span D pulls with (T /
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
@@ -203,6 +202,9 @@ class Linkage(Written):
         self.row_joint = self.assembly.row_joint
         self.coordinate_names = tuple(f"{b}_{c}" for b in self.planar_bodies for c in ("x_m", "y_m", "angle_rad"))
         self.turns = tuple(range(2, self.size, 3))
+        profiles = any(row.profile is not None for row in self.assembly.rows)
+        self.algebraic = not (self.assembly.state_loads or self.assembly.tension_laws or profiles)
+        self.steady_forces = self.algebraic and not (self._spring.size or self._along.any())
 
     def mass(self) -> Array:
         """Diagonal of masses and inertias."""
@@ -225,17 +227,6 @@ class Linkage(Written):
         same = [r for r in range(len(gaps)) if joint[r] == joint[row] and lengths[r]]
         gap, length = float(np.linalg.norm(gaps[same])), self.assembly.length
         return f"{gap:.3g} m ({gap / length:.2g} of the mechanism's length, {length:.3g} m)"
-
-    @property
-    def algebraic(self) -> bool:
-        """Whether loads do not depend on the state, and no constraint has a profile."""
-        profiles = any(row.profile is not None for row in self.assembly.rows)
-        return not (self.assembly.state_loads or self.assembly.tension_laws or profiles)
-
-    @property
-    def steady_forces(self) -> bool:
-        """Whether forces depend on no coordinate or velocity."""
-        return self.algebraic and not (self._spring.size or self._along.any())
 
     def write(self, tape: Tape, places: IntArray) -> bool:
         """The linkage on a tape, see `gearfe.rigid.contract`."""
@@ -314,11 +305,10 @@ class Linkage(Written):
 
     def load_problem(self, t: float, q: Array, v: Array) -> str:
         """Return which load or law of a spring has no value at a state, and why, or an empty string."""
-        problems = (load.problem(t, q, v) for _, load in self.assembly.state_loads)
+        problems = [load.problem(t, q, v) for _, load in self.assembly.state_loads]
         if self.assembly.tension_laws:
             lengths, rates = self._lengths(self.values.registers(t, q, v))
-            springs = (law.problem(t, float(lengths[k]), float(rates[k])) for k, law in self.assembly.tension_laws)
-            problems = itertools.chain(problems, springs)
+            problems += [law.problem(t, float(lengths[k]), float(rates[k])) for k, law in self.assembly.tension_laws]
         return next(filter(None, problems), "")
 
     def load_pole(self, t: float, q: Array, v: Array) -> str:
