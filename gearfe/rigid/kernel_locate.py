@@ -23,9 +23,8 @@ from .kernel_singular import (
 )
 
 if TYPE_CHECKING:
-    from .kernel_steps import Run
     from .row_tables import Equations
-    from .taylor import Work
+    from .work_space import Run, Work
 
 #: Pivot of another row at the singular position of one row below which it passes with it (eps^(2/3): at the distance d
 #: between two, rounding leaves eps / d^2 of the velocities, more than taking both for one does).

@@ -16,8 +16,8 @@ from .kernel_tape import curve_orders
 
 if TYPE_CHECKING:
     from .row_tables import Equations
-    from .taylor import Work
     from .timefunctions import Times
+    from .work_space import Work
 
 
 def fill(x: Array, value: float) -> None:

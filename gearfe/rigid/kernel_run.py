@@ -22,9 +22,8 @@ from .kernel_tape import OUTSIDE, curve_forces, horner, is_pole, largest, leaves
 from .steps import Status
 
 if TYPE_CHECKING:
-    from .kernel_steps import Run
     from .row_tables import Equations
-    from .taylor import Work
+    from .work_space import Run, Work
 
 DONE, STEP_TOO_SMALL, MOST_STEPS = int(Status.DONE), int(Status.STEP_TOO_SMALL), int(Status.MOST_STEPS)
 NO_BRANCH, NOT_FINITE, SINGULAR_START = int(Status.NO_BRANCH), int(Status.NOT_FINITE), int(Status.SINGULAR_START)

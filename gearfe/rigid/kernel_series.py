@@ -30,9 +30,8 @@ from .kernel_rows import accelerations, add_transposed, copy, fill, solve, time_
 from .kernel_tape import curve_forces, curve_orders, tape_order
 
 if TYPE_CHECKING:
-    from .kernel_steps import Run
     from .row_tables import Equations
-    from .taylor import Border, Work
+    from .work_space import Border, Run, Work
 
 
 def square_orders(tb: Equations, w: Work, j: int) -> None:

@@ -28,9 +28,8 @@ from .kernel_rows import (
 from .kernel_series import border_solve
 
 if TYPE_CHECKING:
-    from .kernel_steps import Run
     from .row_tables import Equations
-    from .taylor import Border, Work
+    from .work_space import Border, Run, Work
 
 #: Pivot of S relative to its diagonal below which a singular position is looked for.
 NEAR = 0.3

@@ -11,18 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..typing import Array
-
-
-class Run(NamedTuple):
-    """What holds for a whole run."""
-
-    begin: float  # (s)
-    end: float
-    sign: float  # of time
-    order: int
-    tolerance: float  # of the last terms
-    longest: float  # step (s)
-    breaks: Array  # times at which steps end, rising (s)
+from .work_space import Run
 
 
 def series_step(last: float, before: float, run: Run) -> float:

@@ -29,6 +29,7 @@ from .row_tables import Equations, row_tables
 from .start import Start
 from .steps import Status, Watch, run_in_pieces
 from .system import System
+from .work_space import Run, Work, work_space
 
 FUNCTIONS = (
     *kernel_rows.FUNCTIONS, *kernel_tape.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_singular.FUNCTIONS,
@@ -50,89 +51,7 @@ FIRST_STEPS, MOST_NUMBERS = 64, 2_000_000
 NEAR_POLE = 1e-6
 
 
-class Border(NamedTuple):
-    """Rows of a passing singular position; as many as all may pass at once."""
-
-    Z: Array  # (m, m) combinations whose gradient vanishes
-    Y: Array  # (m, m) S_reg^-1 E
-    E: Array  # (m, m) G_reg M^-1 B^T
-    P: Array  # (m, n) G^T Z
-    B: Array  # (m, n) dG^T/dt Z
-    schur: Array  # (m, m) Schur complement of the rows B
-    small: Array  # (m, m)
-    nu: Array  # (m,)
-    drop: IntArray  # (m,) rows left out
-
-
-class Carry(NamedTuple):
-    """Answers of the masses N to k light coordinates, see kernel_series."""
-
-    X: Array  # (k, n) coordinates
-    Y: Array  # (k, m) multipliers
-    W: Array  # (k, m) multipliers of the singular rows
-    lu: Array  # (k, k)
-    own: Array  # (k,)
-
-
-class Work(NamedTuple):
-    """State and scratch arrays; n coordinates, m rows, z variables and s squares' forms, K orders."""
-
-    Z: Array  # (z + s, K) series of the variables
-    H: Array  # (z, K) forces along them
-    L: Array  # (m, K) multipliers
-    R: Array  # (registers, K)
-    TF: Array  # (functions, K)
-    P: Array  # (z + s, 2) variables of one state, and their rates
-    R0: Array  # (registers, 1) there
-    H0: Array  # (z, 1)
-    slope: Array  # (z,) dz/dq
-    bend: Array  # (z,) its rate
-    G: Array  # (entries,) gradients of the rows
-    dG: Array  # (entries,) their rates
-    val: Array  # (m + nnz,) factor
-    diag: Array  # (m,)
-    mu: Array  # (m,)
-    rhs: Array  # (m,)
-    q: Array  # (n,) state reached
-    v: Array
-    qn: Array  # (n,) state at the end of a step
-    vn: Array
-    F: Array
-    u: Array
-    a: Array
-    work: Array
-    dq: Array
-    dv: Array
-    skip: IntArray  # (m,) rows left out here
-    base: IntArray  # (m,) redundant rows: which ones are left out changes along the motion
-    pieces: IntArray  # of the switches
-    border: Border
-    carry: Carry
-
-
-def work_space(tb: Equations, order: int) -> Work:
-    """Scratch arrays for series up to `order`."""
-    program, K = tb.program, order + 3
-    n, m, k = len(program.mass), len(program.rows.constant), len(tb.mass.light)
-    z, registers, functions = n + len(program.curves.sign), len(program.code.op), len(program.times.first) - 1
-    forms, entries = z + len(tb.square.row), len(tb.gradient.column)
-
-    def zeros(*shapes: int | tuple[int, ...]) -> list[Any]:
-        return [np.zeros(shape) for shape in shapes]
-
-    def whole(size: int) -> IntArray:
-        return np.zeros(size, dtype=np.int64)
-
-    border = Border._make([*zeros(*[(m, m)] * 3, *[(m, n)] * 2, *[(m, m)] * 2, m), whole(m)])
-    carry = Carry._make(zeros((k, n), (k, m), (k, m), (k, k), k))
-    series = zeros((forms, K), (z, K), (m, K), (registers, K), (functions, K), (forms, 2), (registers, 1), (z, 1), z, z)
-    rows = zeros(entries, entries, m + len(tb.factor.row), m, m, m)
-    numbers = [whole(m), whole(m), whole(len(program.switches.register))]
-    arrays: list[Any] = [*series, *rows, *zeros(*[n] * 10), *numbers, border, carry]
-    return Work._make(arrays)
-
-
-class Run(NamedTuple):
+class TaylorRun(NamedTuple):
     """One run of a system at one order: constant tables, which all runs share, and a work space of its own.
 
     `handed` are tables and work space as the kernels get them. Making a work space takes as long as a short run, so one
@@ -147,7 +66,7 @@ class Run(NamedTuple):
     spare: list[tuple[Work, Any]]
 
 
-def prepare(system: System, start: Start, order: int) -> Run:
+def prepare(system: System, start: Start, order: int) -> TaylorRun:
     """Tables of a system, made once, and a work space that no other run uses."""
     program = system.series
     assert program is not None  # the caller asks before
@@ -165,7 +84,7 @@ def prepare(system: System, start: Start, order: int) -> Run:
     except IndexError:
         work = work_space(tables, order)
         packed_work = packed(work)
-    return Run(system, tables, order, work, (handed, packed_work), spare)
+    return TaylorRun(system, tables, order, work, (handed, packed_work), spare)
 
 
 def first_pieces(tables: Equations, w: Work, t: float, forward: bool) -> bool:
@@ -177,7 +96,7 @@ def first_pieces(tables: Equations, w: Work, t: float, forward: bool) -> bool:
     return bool(python.set_pieces(program, w.P, w.R0, w.TF, w.pieces))
 
 
-def load_kernels(prepared: Run, run: kernel_steps.Run) -> float:
+def load_kernels(prepared: TaylorRun, run: Run) -> float:
     """Compile the kernels, or load them, by a run of no length; seconds that this took."""
     width = prepared.work.q.size
     times, coefficients = np.zeros(2), np.zeros((1, run.order + 1, width))
@@ -203,7 +122,7 @@ def order_for(tolerance: float) -> int:
 
 
 def run_taylor(
-    shared: Run, start: Start, end: float, *, tolerance: float, longest: float = math.inf, most: int = 1_000_000,
+    shared: TaylorRun, start: Start, end: float, *, tolerance: float, longest: float = math.inf, most: int = 1_000_000,
     watch: Watch | None = None,
 ) -> tuple[Polynomials, Status, dict[str, Any]]:  # fmt: skip
     """Integrate from the consistent start to the time `end`; (dense output, status, statistics).
@@ -214,7 +133,7 @@ def run_taylor(
     t0 = start.time
     w.q[:], w.v[:], w.base[:] = start.q, start.v, ~start.active
     sign = 1.0 if end >= t0 else -1.0
-    run = kernel_steps.Run(t0, end, sign, order, float(tolerance), float(longest), system.breaks)
+    run = Run(t0, end, sign, order, float(tolerance), float(longest), system.breaks)
     state, made = first_state(t0), np.zeros(1, dtype=np.int64)
     with np.errstate(all="ignore"):
         covered = first_pieces(tables, w, t0, sign > 0.0)
@@ -268,7 +187,7 @@ def run_taylor(
     return dense, status, statistics
 
 
-def _load_problem(shared: Run, run: kernel_steps.Run, t: float, status: Status) -> str:
+def _load_problem(shared: TaylorRun, run: Run, t: float, status: Status) -> str:
     """Return which load has no value at the state in the work space, or just beyond, or a pole within the step."""
     system, tables, order, w, _, _ = shared
     python = KERNELS.python
