@@ -24,23 +24,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearfe.mechanisms import load_mechanism
-from gearfe.rigid import (
-    Body,
-    CoordinateSpring,
-    Gravity,
-    Hinge,
-    Linkage,
-    Moment,
-    Slot,
-    Spring,
-    System,
-    constant,
-)
-from gearfe.rigid.beam import Beam
-from gearfe.rigid.beam_link import BeamLink, Section
-from gearfe.rigid.integrate import DECAYED, DECAYED_MODAL, OVERDAMPED, _run, chosen_method
-from gearfe.rigid.modes import fastest_rate
-from gearfe.rigid.start import Start, consistent_start
+from gearfe.multibody import Body, CoordinateSpring, Gravity, Hinge, Linkage, Moment, Slot, Spring, System, constant
+from gearfe.multibody.core.modes import fastest_rate
+from gearfe.multibody.core.start import Start, consistent_start
+from gearfe.multibody.integrators.integrate import DECAYED, DECAYED_MODAL, OVERDAMPED, _run, chosen_method
+from gearfe.multibody.planar.beam import Beam
+from gearfe.multibody.planar.beam_link import BeamLink, Section
 from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import Bearing, Damping, build_train
 from gearfe.vibration.job import job_train, read_train_job

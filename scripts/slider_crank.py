@@ -6,7 +6,8 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from gearfe.rigid import Body, Forced, Gravity, Hinge, Linkage, Slot, System, consistent_start, integrate
+from gearfe.multibody import Body, Forced, Gravity, Hinge, Linkage, Slot, System, consistent_start
+from gearfe.multibody.integrators import integrate
 
 
 def slider_crank(angle: float) -> System:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from gearfe.rigid import Body, Gravity, Hinge, Linkage, Slot, Start, System, consistent_start
+from gearfe.multibody import Body, Gravity, Hinge, Linkage, Slot, Start, System, consistent_start
 
 DATA = Path(__file__).parent / "data"
 G = 9.81

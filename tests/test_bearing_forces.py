@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.rigid import constant
+from gearfe.multibody import constant
 from gearfe.runup.run_up import steady_state
 from gearfe.train import Bearing, Damping, build_train, simulate
 
@@ -100,7 +100,7 @@ def test_each_shaft_is_in_balance(kind):
 
 def motions(model, response):
     """Rates and second rates of the coordinates, from a run of the same model (they are not in the response)."""
-    from gearfe.rigid import integrate
+    from gearfe.multibody.integrators import integrate
     from gearfe.train.states import train_states
 
     run = integrate(model.system, response.time, tolerance=1e-8, method=METHOD, start=model.start)

@@ -14,7 +14,7 @@ from gearfe.errors import InputError
 from gearfe.mechanisms.model import Mechanism, make_mechanism
 from gearfe.mechanisms.results import reactions
 from gearfe.mechanisms.solve import solve
-from gearfe.rigid import Trajectory
+from gearfe.multibody import Trajectory
 from gearfe.tables.mechanism import MechanismFile
 
 ARM = 0.1125

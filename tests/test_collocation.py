@@ -11,7 +11,7 @@ import pytest
 from gearfe.config import build
 from gearfe.mechanisms.model import make_mechanism
 from gearfe.mechanisms.tables import ValueTable
-from gearfe.rigid import (
+from gearfe.multibody import (
     Body,
     Gravity,
     Hinge,
@@ -23,18 +23,18 @@ from gearfe.rigid import (
     consistent_start,
     smoothed_step,
 )
-from gearfe.rigid.beam import Beam
-from gearfe.rigid.beam_link import BeamLink, Section
-from gearfe.rigid.collocation import GAUSS, RADAU, path_matrix, scheme
-from gearfe.rigid.couplings import Cam
-from gearfe.rigid.floating import Floating, FloatingBody, frame_joint
-from gearfe.rigid.implicit import KERNELS, Stepper, equations, narrow_band
-from gearfe.rigid.lanes import as_lanes, lanes
-from gearfe.rigid.numpy_equations import saddle_solver
-from gearfe.rigid.ordering import narrow_order
-from gearfe.rigid.start import Start
-from gearfe.rigid.steps import Status, StepControl, StepLaw
-from gearfe.rigid.turning import TurningFrame
+from gearfe.multibody.compiled.simd import as_lanes, lanes
+from gearfe.multibody.core.start import Start
+from gearfe.multibody.core.steps import Status, StepControl, StepLaw
+from gearfe.multibody.integrators.collocation.numpy_equations import saddle_solver
+from gearfe.multibody.integrators.collocation.run import KERNELS, Stepper, equations, narrow_band
+from gearfe.multibody.integrators.collocation.scheme import GAUSS, RADAU, path_matrix, scheme
+from gearfe.multibody.planar.beam import Beam
+from gearfe.multibody.planar.beam_link import BeamLink, Section
+from gearfe.multibody.planar.couplings import Cam
+from gearfe.multibody.planar.floating import Floating, FloatingBody, frame_joint
+from gearfe.multibody.planar.turning import TurningFrame
+from gearfe.multibody.series.ordering import narrow_order
 from gearfe.tables.mechanism import MechanismFile
 
 

@@ -12,21 +12,11 @@ import pytest
 from gearfe.errors import InputError
 from gearfe.mechanisms import load_mechanism
 from gearfe.mechanisms.results import reactions
-from gearfe.rigid import (
-    Body,
-    Gravity,
-    Hinge,
-    Linkage,
-    Moment,
-    Prismatic,
-    System,
-    consistent_start,
-    constant,
-    integrate,
-)
-from gearfe.rigid.couplings import Belt, GearRatio, Rack
-from gearfe.rigid.forms import Frames
-from gearfe.rigid.joints import Joint, Rolling, Row
+from gearfe.multibody import Body, Gravity, Hinge, Linkage, Moment, Prismatic, System, consistent_start, constant
+from gearfe.multibody.integrators import integrate
+from gearfe.multibody.planar.couplings import Belt, GearRatio, Rack
+from gearfe.multibody.planar.forms import Frames
+from gearfe.multibody.planar.joints import Joint, Rolling, Row
 
 TIMES = np.linspace(0.0, 0.8, 5)
 METHODS = [("taylor", 1e-11), ("implicit", 1e-6)]

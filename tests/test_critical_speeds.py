@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearfe.commands.runup import _report_lines
-from gearfe.rigid import constant
+from gearfe.multibody import constant
 from gearfe.runup import critical
 from gearfe.runup.report import summary
 from gearfe.runup.run_up import run_up

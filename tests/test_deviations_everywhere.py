@@ -20,7 +20,7 @@ from gearfe.gear.face import NOMINAL
 from gearfe.gear.modifications import FlankModification, Relief, tooth_deviations
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshlaw.make import mesh_law
-from gearfe.rigid import constant
+from gearfe.multibody import constant
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.train.kinematics import driving_senses
 from gearfe.train.phases import pair_shifts, tooth_places

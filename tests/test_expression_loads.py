@@ -15,8 +15,9 @@ from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import finer_run
 from gearfe.mechanisms.job import run_mechanism
 from gearfe.mechanisms.loads import ExpressionLoad
-from gearfe.rigid import IntegrationError, integrate
-from gearfe.rigid.inverse import prescribed_motion
+from gearfe.multibody import IntegrationError
+from gearfe.multibody.core.inverse import prescribed_motion
+from gearfe.multibody.integrators import integrate
 
 ROD = """
 [run]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.rigid import compiled
+from gearfe.multibody.compiled import kernels as compiled
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNELS = """
@@ -28,8 +28,8 @@ sys.path.insert(0, sys.argv[1])
 import little_kernels as k
 import numpy as np
 from typing import Any, NamedTuple
-from gearfe.rigid import compiled
-from gearfe.rigid.packed import Packed
+from gearfe.multibody import compiled
+from gearfe.multibody.compiled.packed import Packed
 class Numbers(NamedTuple):
     x: float
     out: Any

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from gearfe.rigid import compiled
-from gearfe.rigid.lanes import NAMES, Lanes, as_lanes, flat, halves, highest, lanes, total
-from gearfe.rigid.packed import Packed
+from gearfe.multibody.compiled import kernels as compiled
+from gearfe.multibody.compiled.packed import Packed
+from gearfe.multibody.compiled.simd import NAMES, Lanes, as_lanes, flat, halves, highest, lanes, total
 from gearfe.typing import Array, IntArray
 
 from .rigid_cases import by_scipy, pendulum
@@ -164,7 +164,7 @@ def test_lanes_compute_as_arrays_do(tmp_path, monkeypatch):
 STEPPED = """
 import sys
 import numpy as np
-from gearfe.rigid import integrate
+from gearfe.multibody import integrate
 from tests.rigid_cases import pendulum
 for method in ("taylor", "implicit"):
     print(repr(integrate(pendulum(), [0.0, 0.2], method=method, tolerance=1e-9).q[-1, 2].item()))

@@ -14,7 +14,7 @@ from gearfe.cli import main
 from gearfe.errors import InputError
 from gearfe.mechanisms import load_mechanism
 from gearfe.mechanisms.rest import run_rest
-from gearfe.rigid import (
+from gearfe.multibody import (
     Body,
     CoordinateSpring,
     Fixed,
@@ -25,14 +25,14 @@ from gearfe.rigid import (
     System,
     consistent_start,
     constant,
-    integrate,
 )
-from gearfe.rigid.beam import Beam
-from gearfe.rigid.beam_link import BeamLink, Section
-from gearfe.rigid.equilibrium import equilibrium
-from gearfe.rigid.inverse import prescribed_motion
-from gearfe.rigid.modes import modes
-from gearfe.rigid.turning import TurningFrame
+from gearfe.multibody.core.equilibrium import equilibrium
+from gearfe.multibody.core.inverse import prescribed_motion
+from gearfe.multibody.core.modes import modes
+from gearfe.multibody.integrators import integrate
+from gearfe.multibody.planar.beam import Beam
+from gearfe.multibody.planar.beam_link import BeamLink, Section
+from gearfe.multibody.planar.turning import TurningFrame
 
 ROD = """
 title = "rod"
@@ -195,7 +195,7 @@ def test_inverse_is_forward_dynamics_of_a_four_bar() -> None:
     crank = next(f.body for f in drive if isinstance(f, Moment))
     k = 3 * linkage.body_index[crank] + 2
     # the angle of the free run as a polynomial of high degree, prescribed instead of the moment
-    from gearfe.rigid import Prescribed, polynomial
+    from gearfe.multibody import Prescribed, polynomial
 
     fine = np.linspace(0.0, 0.01, 200)
     fit = np.polynomial.Chebyshev.fit(fine, free.dense(fine)[:, k], 24).convert(kind=np.polynomial.Polynomial)

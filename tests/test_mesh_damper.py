@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearfe import InputError
-from gearfe.rigid import constant
+from gearfe.multibody import constant
 from gearfe.runup.run_up import steady_state
 from gearfe.train import GearMesh, build_train, simulate
 

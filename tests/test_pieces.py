@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from gearfe.figures.spectra import largest_lines
+from gearfe.multibody import smoothed_step
 from gearfe.progress import Stopwatch
 from gearfe.record_spectrum import finer
-from gearfe.rigid import smoothed_step
 from gearfe.train import Damping, Load, build_train, simulate
 from gearfe.train.response import SAMPLED, joined
 from gearfe.train.simulate import simulate_in_pieces

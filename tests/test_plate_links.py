@@ -22,7 +22,7 @@ from gearfe.errors import InputError
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.plate_reduction import Interface, Plate, reduce_plate
 from gearfe.meshing.plate_mesh import mesh_outline
-from gearfe.rigid import (
+from gearfe.multibody import (
     Body,
     Fixed,
     Gravity,
@@ -33,15 +33,15 @@ from gearfe.rigid import (
     System,
     consistent_start,
     constant,
-    integrate,
     smoothed_step,
 )
-from gearfe.rigid.beam import Beam
-from gearfe.rigid.beam_link import BeamLink, Section
-from gearfe.rigid.equilibrium import equilibrium
-from gearfe.rigid.floating import Floating, frame_joint
-from gearfe.rigid.modes import modes
-from gearfe.rigid.turning import TurningFrame
+from gearfe.multibody.core.equilibrium import equilibrium
+from gearfe.multibody.core.modes import modes
+from gearfe.multibody.integrators import integrate
+from gearfe.multibody.planar.beam import Beam
+from gearfe.multibody.planar.beam_link import BeamLink, Section
+from gearfe.multibody.planar.floating import Floating, frame_joint
+from gearfe.multibody.planar.turning import TurningFrame
 
 from .elastica import elastica
 

@@ -10,9 +10,9 @@ import pytest
 
 from gearfe import progress
 from gearfe.cli import main
+from gearfe.multibody.compiled.kernels import Kernels
+from gearfe.multibody.integrators import integrate
 from gearfe.progress import Display, Stopwatch, _Stage, count, shown, stage
-from gearfe.rigid import integrate
-from gearfe.rigid.compiled import Kernels
 from gearfe.tables.examples import job_file
 
 from .rigid_cases import pendulum

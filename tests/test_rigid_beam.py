@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.rigid import (
+from gearfe.multibody import (
     Body,
     CoordinateSpring,
     Fixed,
@@ -22,13 +22,13 @@ from gearfe.rigid import (
     System,
     consistent_start,
     constant,
-    integrate,
     smoothed_step,
 )
-from gearfe.rigid.beam import Beam
-from gearfe.rigid.beam_link import BeamLink, Section
-from gearfe.rigid.carried import free_motions
-from gearfe.rigid.equilibrium import equilibrium, stiffness_at
+from gearfe.multibody.core.equilibrium import equilibrium, stiffness_at
+from gearfe.multibody.core.mass_regularisation import free_motions
+from gearfe.multibody.integrators import integrate
+from gearfe.multibody.planar.beam import Beam
+from gearfe.multibody.planar.beam_link import BeamLink, Section
 
 from .elastica import elastica
 

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from gearfe.errors import InputError
-from gearfe.rigid import (
+from gearfe.multibody import (
     GROUND,
     Body,
     Element,
@@ -28,12 +28,12 @@ from gearfe.rigid import (
     StateFunction,
     System,
     consistent_start,
-    integrate,
-    taylor,
 )
-from gearfe.rigid.collocation import GAUSS, RADAU, scheme
-from gearfe.rigid.implicit import Stepper
-from gearfe.rigid.modes import fastest_rate
+from gearfe.multibody.core.modes import fastest_rate
+from gearfe.multibody.integrators import integrate
+from gearfe.multibody.integrators.collocation.run import Stepper
+from gearfe.multibody.integrators.collocation.scheme import GAUSS, RADAU, scheme
+from gearfe.multibody.integrators.taylor import run as taylor
 
 from .rigid_cases import pendulum
 

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from gearfe.errors import InputError
-from gearfe.rigid import (
+from gearfe.multibody import (
     Body,
     CoordinateSpring,
     Fixed,
@@ -28,11 +28,11 @@ from gearfe.rigid import (
     System,
     consistent_start,
     constant,
-    integrate,
     polynomial,
     sine,
     smoothed_step,
 )
+from gearfe.multibody.integrators import integrate
 
 from .rigid_cases import G, by_scipy, chain, pendulum, residuals, total_energy
 

@@ -15,7 +15,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gearfe.errors import InputError
-from gearfe.rigid import Body, Gravity, Hinge, Linkage, Prescribed, Prismatic, System, constant, integrate
+from gearfe.multibody import Body, Gravity, Hinge, Linkage, Prescribed, Prismatic, System, constant
+from gearfe.multibody.integrators import integrate
 
 from .rigid_cases import G, folding_links, total_energy
 

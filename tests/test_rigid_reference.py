@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from gearfe.mechanisms import load_mechanism
-from gearfe.rigid import consistent_start, integrate
+from gearfe.multibody import consistent_start
+from gearfe.multibody.integrators import integrate
 
 from .rigid_cases import DATA, by_scipy, chain, folding_links, pendulum, reference, residuals, total_energy
 from .test_rigid_light_links import four_bar

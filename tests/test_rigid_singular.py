@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gearfe.errors import InputError
-from gearfe.rigid import (
+from gearfe.multibody import (
     Body,
     Forced,
     Gravity,
@@ -20,10 +20,10 @@ from gearfe.rigid import (
     Status,
     System,
     consistent_start,
-    integrate,
     polynomial,
 )
-from gearfe.rigid.system import least_norm_solution
+from gearfe.multibody.core.system import least_norm_solution
+from gearfe.multibody.integrators import integrate
 
 from .rigid_cases import G, folding_angle, folding_links, total_energy
 

@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.rigid import Body, Hinge, Linkage, Moment, Prescribed, Slot, System, Trajectory, integrate, polynomial
-from gearfe.rigid.inverse import prescribed_motion
-from gearfe.rigid.start import consistent_start
-from gearfe.rigid.steps import ENDLESS, Pace, Status
+from gearfe.multibody import Body, Hinge, Linkage, Moment, Prescribed, Slot, System, Trajectory, polynomial
+from gearfe.multibody.core.inverse import prescribed_motion
+from gearfe.multibody.core.start import consistent_start
+from gearfe.multibody.core.steps import ENDLESS, Pace, Status
+from gearfe.multibody.integrators import integrate
 
 CRANK, COUPLER, ROCKER, BASE = 2.5, 1.5, 2.5, 3.0
 

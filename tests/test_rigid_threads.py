@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from gearfe.mechanisms import load_mechanism
-from gearfe.rigid import Start, Trajectory, consistent_start, integrate
+from gearfe.multibody import Start, Trajectory, consistent_start
+from gearfe.multibody.integrators import integrate
 
 GEOMETRY = Path(__file__).parents[1] / "geometry"
 TIMES = np.linspace(0.0, 0.03, 31)

@@ -10,18 +10,8 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.rigid import (
-    Body,
-    Gravity,
-    Hinge,
-    Linkage,
-    Prescribed,
-    Slot,
-    System,
-    consistent_start,
-    integrate,
-    smoothed_step,
-)
+from gearfe.multibody import Body, Gravity, Hinge, Linkage, Prescribed, Slot, System, consistent_start, smoothed_step
+from gearfe.multibody.integrators import integrate
 
 from .rigid_cases import G, folding_links
 

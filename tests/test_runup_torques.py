@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.rigid import TimeFunction, constant, sine
+from gearfe.multibody import TimeFunction, constant, sine
 from gearfe.runup.run_up import run_up, steady_state
 from gearfe.train import build_train
 

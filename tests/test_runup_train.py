@@ -14,7 +14,7 @@ import pytest
 from gearfe.cli import main
 from gearfe.errors import InputError
 from gearfe.figures.campbell import signal_of
-from gearfe.rigid import constant
+from gearfe.multibody import constant
 from gearfe.runup.condensed import condense
 from gearfe.runup.critical import crossings
 from gearfe.runup.modes import coupled_modes

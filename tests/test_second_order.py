@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.rigid import (
+from gearfe.multibody import (
     Body,
     Gravity,
     Hinge,
@@ -21,7 +21,7 @@ from gearfe.rigid import (
     count_freedoms,
     polynomial,
 )
-from gearfe.rigid.joints import Joint
+from gearfe.multibody.planar.joints import Joint
 
 
 def system(bodies: list[Body], joints: list[Joint]) -> System:

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from gearfe.mechanisms import load_mechanism
 from gearfe.mechanisms.expressions import compute, parse
 from gearfe.mechanisms.loads import write_expression
-from gearfe.rigid import (
+from gearfe.multibody import (
     Body,
     Gravity,
     Hinge,
@@ -22,10 +22,10 @@ from gearfe.rigid import (
     Status,
     System,
     consistent_start,
-    integrate,
-)  # fmt: skip
-from gearfe.rigid import taylor as route
-from gearfe.rigid.tape import Tape
+)
+from gearfe.multibody.integrators import integrate  # fmt: skip
+from gearfe.multibody.integrators.taylor import run as route
+from gearfe.multibody.series.tape import Tape
 
 from .test_expression_loads import MOMENT, ROD, write
 

@@ -8,10 +8,11 @@ from math import cos, sin
 import numpy as np
 import pytest
 
-from gearfe.rigid import Body, CoordinateSpring, Fixed, Gravity, Hinge, Linkage, System, TimeFunction, integrate
-from gearfe.rigid.beam import Beam
-from gearfe.rigid.beam_link import BeamLink, Section
-from gearfe.rigid.forces import Moment
+from gearfe.multibody import Body, CoordinateSpring, Fixed, Gravity, Hinge, Linkage, System, TimeFunction
+from gearfe.multibody.integrators import integrate
+from gearfe.multibody.planar.beam import Beam
+from gearfe.multibody.planar.beam_link import BeamLink, Section
+from gearfe.multibody.planar.forces import Moment
 
 from .rigid_cases import G, folding_links
 

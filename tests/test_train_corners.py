@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.rigid import TimeFunction, compiled, constant, kernel_modal, smoothed_step
+from gearfe.multibody import TimeFunction, constant, smoothed_step
+from gearfe.multibody.compiled import kernels as compiled
+from gearfe.multibody.integrators.taylor import kernel_modal
 from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import build_train, simulate
 from gearfe.train.corners import leaves, train_corner

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.rigid import constant
+from gearfe.multibody import constant
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, build_train, simulate

@@ -11,7 +11,7 @@ import pytest
 
 from gearfe import steady_state
 from gearfe.errors import InputError
-from gearfe.rigid import TimeFunction, constant, smoothed_step
+from gearfe.multibody import TimeFunction, constant, smoothed_step
 from gearfe.train import Drive, GearMesh, Load, build_train, simulate
 from gearfe.train.kinematics import steady_forces
 from gearfe.vibration.job import job_train, read_train_job

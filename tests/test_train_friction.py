@@ -10,7 +10,7 @@ import pytest
 
 from gearfe.errors import InputError
 from gearfe.gear.pair import MeshGeometry
-from gearfe.rigid import TimeFunction, constant, smoothed_step
+from gearfe.multibody import TimeFunction, constant, smoothed_step
 from gearfe.train import Bearing, Damping, Drive, Load, build_train, simulate
 from gearfe.train.forces import LawFlank, TrainForces
 from gearfe.train.friction import Lubrication, Sliding, smooth_sign

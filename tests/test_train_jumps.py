@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from gearfe.rigid import TimeFunction, constant, smoothed_step
+from gearfe.multibody import TimeFunction, constant, smoothed_step
 from gearfe.runup.run_up import run_up
 from gearfe.train import TrainModel, build_train, simulate
 

@@ -11,7 +11,7 @@ from matplotlib.path import Path as Outline
 
 from gearfe.errors import InputError
 from gearfe.gear.derived import gear_outline
-from gearfe.rigid import constant
+from gearfe.multibody import constant
 from gearfe.train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear, build_train, simulate
 from gearfe.train.kinematics import driving_senses
 from gearfe.train.phases import tooth_places

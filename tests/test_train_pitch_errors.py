@@ -11,7 +11,7 @@ import pytest
 
 from gearfe.errors import InputError
 from gearfe.gear.curves import inv
-from gearfe.rigid import constant, smoothed_step
+from gearfe.multibody import constant, smoothed_step
 from gearfe.train import Damping, GearTrain, build_train, simulate
 from gearfe.train.forces import LawFlank
 from gearfe.train.kinematics import driving_senses

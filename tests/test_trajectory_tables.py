@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from gearfe.errors import MissingLibraryError
-from gearfe.rigid import Body, Gravity, Hinge, Linkage, System, Trajectory, integrate
+from gearfe.multibody import Body, Gravity, Hinge, Linkage, System, Trajectory
+from gearfe.multibody.integrators import integrate
 
 
 def made() -> Trajectory:

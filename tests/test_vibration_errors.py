@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from gearfe.cli import main
+from gearfe.multibody import constant
 from gearfe.record_spectrum import finer
-from gearfe.rigid import constant
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.train import GearTrain, build_train, simulate
 from gearfe.train.model import TrainModel

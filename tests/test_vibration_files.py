@@ -15,8 +15,8 @@ from gearfe.figures.train import TrainPictures
 from gearfe.figures.train_scene import draw_scene, sharp_edges
 from gearfe.housing.attachments import Attachment
 from gearfe.housing.model import Housing
+from gearfe.multibody import constant
 from gearfe.progress import Stopwatch
-from gearfe.rigid import constant
 from gearfe.train import Drive, GearMesh, GearTrain, Shaft, ShaftGear, build_train
 from gearfe.train.kinematics import rolling
 from gearfe.vibration.fields import (

@@ -162,7 +162,7 @@ def test_settings_beside_a_job_and_of_the_user_change_no_picture(tmp_path: Path)
 
 
 COMPILED = """
-from gearfe.rigid.native import import_numba
+from gearfe.multibody.compiled.object_code import import_numba
 numba = import_numba()
 assert numba.njit(lambda x: x + 1)(1) == 2
 assert not numba.config.DISABLE_JIT

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from gearfe.gear.pair import Gear
+from gearfe.multibody import TimeFunction, constant, smoothed_step
 from gearfe.reduction.modal_body import ModalBody
-from gearfe.rigid import TimeFunction, constant, smoothed_step
 from gearfe.stiffness.periodic import PeriodicInterpolant, periodic_interpolant
 from gearfe.train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 

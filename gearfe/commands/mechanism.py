@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..mechanisms.job import Outcome
     from ..mechanisms.model import Mechanism
     from ..mechanisms.results import Results
-    from ..rigid.modes import Modes
+    from ..multibody.core.modes import Modes
 
 #: Keys of [run] that options stand for, beside the end of the run.
 KEYS = ("analysis", "tolerance", "method", "reactions", "modes")

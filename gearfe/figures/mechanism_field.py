@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..mechanisms.model import Mechanism
-from ..rigid import Trajectory
+from ..multibody import Trajectory
 from ..typing import Array, ComplexArray, IntArray
 from .mechanism_scene import draw_backdrop, draw_names, draw_state, link_places, place_of, rigid_ends
 

@@ -11,8 +11,8 @@ import numpy as np
 from ..mechanisms.links import FlexibleLink
 from ..mechanisms.model import Mechanism
 from ..mechanisms.plates import PlateLink
-from ..rigid import GROUND, Prismatic, Slot, Spring, Trajectory
-from ..rigid.joints import Distance
+from ..multibody import GROUND, Prismatic, Slot, Spring, Trajectory
+from ..multibody.planar.joints import Distance
 from ..typing import Array, ComplexArray
 from .style import COLOURS, GREY
 

@@ -11,8 +11,8 @@ import numpy as np
 from .style import BLUE, CYCLE, GREY, ORANGE, RED, legend_beside, new_figure, tidy
 
 if TYPE_CHECKING:
+    from ..multibody.core.trajectory import Trajectory
     from ..reduction.modal_body import ModalBody
-    from ..rigid.trajectory import Trajectory
     from ..spectrum import Spectrum
     from ..stiffness.curve import StiffnessCurve
     from ..train.response import TrainResponse

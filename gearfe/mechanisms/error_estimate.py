@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..multibody import Start, Status, Trajectory
+from ..multibody.integrators import integrate
 from ..progress import stage
-from ..rigid import Start, Status, Trajectory, integrate
 from ..typing import Array
 from .model import Mechanism
 from .results import Results, evaluate

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..files import csv_table
+from ..multibody import Trajectory
 from ..output.vtkhdf import VtkHdfSeries
 from ..progress import stage
-from ..rigid import Trajectory
 from ..typing import Array
 from .model import Mechanism
 from .plates import PlateLink

@@ -11,10 +11,10 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import InputError, given, unknown_name
-from ..rigid.beam import Beam
-from ..rigid.beam_link import BeamLink, Section
-from ..rigid.linkage import Linkage
-from ..rigid.system import System
+from ..multibody.core.system import System
+from ..multibody.planar.beam import Beam
+from ..multibody.planar.beam_link import BeamLink, Section
+from ..multibody.planar.linkage import Linkage
 from ..tables.beam import BeamTable
 from ..tables.mechanism import BodyTable, ForceTable, JointTable, MechanismFile
 from ..typing import Array

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, given
-from ..rigid import SpanFunction, StateFunction, polynomial
-from ..rigid.linkage import Affine, BodyVariables
-from ..rigid.tape import Tape
+from ..multibody import SpanFunction, StateFunction, polynomial
+from ..multibody.planar.linkage import Affine, BodyVariables
+from ..multibody.series.tape import Tape
 from ..typing import Array
 from .expressions import OF_POINT, PLAIN, Node, compute, quantities, value_of, without_value
 from .tables import ValueTable

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, given, unknown_name
-from ..rigid import GROUND, Forced, Linkage, Start, System, consistent_start
-from ..rigid.carried import free_motions
+from ..multibody import GROUND, Forced, Linkage, Start, System, consistent_start
+from ..multibody.core.mass_regularisation import free_motions
 from ..tables.kinds import FORCES, JOINTS
 from ..tables.mechanism import FigureTable, MechanismFile, read_mechanism_file
 from ..typing import Array

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, given, unknown_name
-from ..rigid import GROUND, Body, TimeFunction, constant, polynomial, sine, smoothed_step
-from ..rigid.beam_link import BeamLink
+from ..multibody import GROUND, Body, TimeFunction, constant, polynomial, sine, smoothed_step
+from ..multibody.planar.beam_link import BeamLink
 from ..tables.kinds import Kind
 from ..tables.mechanism import BodyTable, ForceTable, FunctionTable, JointTable, MechanismFile
 from .expressions import parse

@@ -25,7 +25,7 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from ..elasticity import Material, physical_gradients, triangle_rule, triangle_shapes
-from ..rigid.floating import FloatingBody
+from ..multibody.planar.floating import FloatingBody
 from ..typing import Array, IntArray
 
 #: Share of its own energy below which a shape counts as made of others; of the largest derivative, for derivatives.

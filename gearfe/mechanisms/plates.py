@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError, given, unknown_name
+from ..multibody.core.contract import Element
+from ..multibody.planar.bodies import Body
+from ..multibody.planar.floating import Floating, frame_joint
+from ..multibody.planar.linkage import Linkage
 from ..progress import stage
-from ..rigid.contract import Element
-from ..rigid.floating import Floating, frame_joint
-from ..rigid.linkage import Linkage
-from ..rigid.planar import Body
 from ..tables.mechanism import BodyTable
 from ..tables.plate import InterfaceTable, PlateTable
 from ..typing import Array, IntArray

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..files import output_folder, whole_set, write_csv, write_json
+from ..multibody import Start, Status, Trajectory
+from ..multibody.core.dense import Polynomials
+from ..multibody.core.equilibrium import Equilibrium, equilibrium
+from ..multibody.core.modes import Modes, modes
 from ..progress import stage
-from ..rigid import Start, Status, Trajectory
-from ..rigid.dense import Polynomials
-from ..rigid.equilibrium import Equilibrium, equilibrium
-from ..rigid.modes import Modes, modes
 from ..shown import percent
 from ..typing import Array
 from .job import MAY_WRITE, Outcome, write_elastic

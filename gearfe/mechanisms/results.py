@@ -11,8 +11,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import read_text
+from ..multibody import Linkage, Trajectory
 from ..progress import stage
-from ..rigid import Linkage, Trajectory
 from ..typing import Array
 from .expressions import PLAIN, compute, quantities
 from .model import Mechanism

@@ -15,11 +15,12 @@ import numpy as np
 
 from ..config import build, read_toml, set_key
 from ..errors import InputError
+from ..multibody import Start, Trajectory
+from ..multibody.core.equilibrium import Equilibrium, equilibrium
+from ..multibody.core.inverse import prescribed_motion
+from ..multibody.core.modes import Modes, modes
+from ..multibody.integrators import integrate
 from ..progress import one_thread
-from ..rigid import Start, Trajectory, integrate
-from ..rigid.equilibrium import Equilibrium, equilibrium
-from ..rigid.inverse import prescribed_motion
-from ..rigid.modes import Modes, modes
 from ..tables.mechanism import MechanismFile, RunTable
 from ..typing import Array
 from .job import output_times

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import read_text
-from ..rigid import TimeFunction
-from ..rigid.tape import Tape
+from ..multibody import TimeFunction
+from ..multibody.series.tape import Tape
 from ..tables.mechanism import ValueTableTable
 from ..typing import Array
 

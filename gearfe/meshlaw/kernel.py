@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..rigid import compiled
-from ..rigid.packed import Packed
+from ..multibody.compiled import kernels as compiled
+from ..multibody.compiled.packed import Packed
 from ..typing import Array
 
 #: Newton steps for the pair forces, their relative change in the last one: what is left is of the order of its square.

@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..rigid.packed import Packed
+from ..multibody.compiled.packed import Packed
 from ..typing import Array, BoolArray, IntArray
 from . import kernel
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..multibody import constant
 from ..progress import stage
-from ..rigid import constant
 from ..tables.runup import RunUpTable
 from ..train import build_train
 from ..train.gear_train import GearTrain

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..rigid import constant
+from ..multibody import constant
 from ..train.model import TrainModel
 from ..train.response import TrainResponse
 from ..train.simulate import response_of

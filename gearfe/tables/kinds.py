@@ -15,18 +15,18 @@ class Kind(NamedTuple):
     needs: Mapping[str, str] = {}  # key that says nothing alone -> the key that it goes with
 
 
-#: Types of joints. A new one is a class (`gearfe.rigid.joints` says what it provides), and a line here.
+#: Types of joints. A new one is a class (`gearfe.multibody.planar.joints` says what it provides), and a line here.
 JOINTS: dict[str, Kind] = {
     "hinge": Kind(
-        "gearfe.rigid.joints:Hinge", {"body": "a", "to": "b", "point": "point_a", "to_point": "point_b"}
+        "gearfe.multibody.planar.joints:Hinge", {"body": "a", "to": "b", "point": "point_a", "to_point": "point_b"}
     ),
     "slot": Kind(
-        "gearfe.rigid.joints:Slot",
+        "gearfe.multibody.planar.joints:Slot",
         {"body": "body", "to": "line", "point": "point", "to_point": "origin", "direction": "direction"},
         ("direction",),
     ),
     "prismatic": Kind(
-        "gearfe.rigid.joints:Prismatic",
+        "gearfe.multibody.planar.joints:Prismatic",
         {
             "body": "body", "to": "line", "point": "point", "to_point": "origin", "direction": "direction",
             "angle_deg": "angle",
@@ -34,17 +34,17 @@ JOINTS: dict[str, Kind] = {
         ("direction",),
     ),
     "distance": Kind(
-        "gearfe.rigid.joints:Distance",
+        "gearfe.multibody.planar.joints:Distance",
         {"body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "length_m": "length"},
     ),
-    "fixed": Kind("gearfe.rigid.joints:Fixed", {"body": "a", "to": "b"}),
+    "fixed": Kind("gearfe.multibody.planar.joints:Fixed", {"body": "a", "to": "b"}),
     "gear": Kind(
-        "gearfe.rigid.couplings:GearRatio",
+        "gearfe.multibody.planar.couplings:GearRatio",
         {"body": "a", "to": "b", "ratio": "ratio", "carrier": "carrier"},
         ("ratio",),
     ),
     "belt": Kind(
-        "gearfe.rigid.couplings:Belt",
+        "gearfe.multibody.planar.couplings:Belt",
         {
             "body": "a", "to": "b", "radius_m": "radius_a", "to_radius_m": "radius_b", "crossed": "crossed",
             "carrier": "carrier",
@@ -52,7 +52,7 @@ JOINTS: dict[str, Kind] = {
         ("radius_m", "to_radius_m"),
     ),
     "rack": Kind(
-        "gearfe.rigid.couplings:Rack",
+        "gearfe.multibody.planar.couplings:Rack",
         {
             "body": "a", "to": "b", "point": "point", "direction": "direction", "radius_m": "radius",
             "carrier": "carrier",
@@ -60,7 +60,7 @@ JOINTS: dict[str, Kind] = {
         ("radius_m",),
     ),
     "rolling": Kind(
-        "gearfe.rigid.joints:Rolling",
+        "gearfe.multibody.planar.joints:Rolling",
         {
             "body": "body", "to": "line", "point": "point", "to_point": "origin", "direction": "direction",
             "radius_m": "radius",
@@ -68,7 +68,7 @@ JOINTS: dict[str, Kind] = {
         ("radius_m",),
     ),
     "cam": Kind(
-        "gearfe.rigid.couplings:Cam",
+        "gearfe.multibody.planar.couplings:Cam",
         {
             "body": "a", "to": "b", "point": "point", "coordinate": "coordinate", "profile": "profile",
             "carrier": "carrier",
@@ -76,7 +76,7 @@ JOINTS: dict[str, Kind] = {
         ("coordinate", "profile"),
     ),
     "prescribed": Kind(
-        "gearfe.rigid.joints:Prescribed",
+        "gearfe.multibody.planar.joints:Prescribed",
         {
             "body": "body", "to": "relative_to", "point": "point", "to_point": "origin", "coordinate": "coordinate",
             "motion": "function",
@@ -84,13 +84,13 @@ JOINTS: dict[str, Kind] = {
         ("coordinate", "motion"),
     ),
 }  # fmt: skip
-#: Types of forces, likewise (`gearfe.rigid.forces`).
+#: Types of forces, likewise (`gearfe.multibody.planar.forces`).
 FORCES: dict[str, Kind] = {
     "gravity": Kind(
-        "gearfe.rigid.forces:Gravity", {"acceleration_m_per_s2": "acceleration"}, ("acceleration_m_per_s2",)
+        "gearfe.multibody.planar.forces:Gravity", {"acceleration_m_per_s2": "acceleration"}, ("acceleration_m_per_s2",)
     ),
     "spring": Kind(
-        "gearfe.rigid.forces:Spring",
+        "gearfe.multibody.planar.forces:Spring",
         {
             "body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "stiffness": "stiffness",
             "damping": "damping", "free_length_m": "free_length", "tension_N": "law",
@@ -99,7 +99,7 @@ FORCES: dict[str, Kind] = {
         {"free_length_m": "stiffness"},
     ),
     "coordinate_spring": Kind(
-        "gearfe.rigid.forces:CoordinateSpring",
+        "gearfe.multibody.planar.forces:CoordinateSpring",
         {
             "body": "body", "to": "relative_to", "coordinate": "coordinate", "stiffness": "stiffness",
             "damping": "damping", "reference": "reference",
@@ -108,12 +108,16 @@ FORCES: dict[str, Kind] = {
         {"reference": "stiffness"},
     ),
     "force": Kind(
-        "gearfe.rigid.forces:PointForce", {"body": "body", "point": "point", "x_N": "x", "y_N": "y"}, ("body",)
+        "gearfe.multibody.planar.forces:PointForce",
+        {"body": "body", "point": "point", "x_N": "x", "y_N": "y"},
+        ("body",),
     ),
     "moment": Kind(
-        "gearfe.rigid.forces:Moment",
+        "gearfe.multibody.planar.forces:Moment",
         {"body": "body", "to": "reaction", "moment_N_m": "function"},
         ("body", "moment_N_m"),
     ),
-    "turning_frame": Kind("gearfe.rigid.turning:TurningFrame", {"rate_rad_per_s": "rate"}, ("rate_rad_per_s",)),
+    "turning_frame": Kind(
+        "gearfe.multibody.planar.turning:TurningFrame", {"rate_rad_per_s": "rate"}, ("rate_rad_per_s",)
+    ),
 }  # fmt: skip

@@ -22,7 +22,7 @@ import numpy as np
 from ..errors import InputError
 from ..gear.derived import gear_outline
 from ..gear.pair import Gear
-from ..rigid import Element, LinearJoint, ModalBlocks
+from ..multibody import Element, LinearJoint, ModalBlocks
 from ..typing import Array
 from .gear_train import GearTrain, Shaft
 

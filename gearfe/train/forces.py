@@ -31,7 +31,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ..meshlaw.law import MeshForces, MeshLaw
-from ..rigid.timefunctions import TimeFunction
+from ..multibody.series.timefunctions import TimeFunction
 from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array, BoolArray, IntArray
 from .friction import Sliding, smooth_sign

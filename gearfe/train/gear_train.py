@@ -13,8 +13,8 @@ import numpy as np
 from ..errors import InputError
 from ..gear.pair import Gear
 from ..meshlaw.law import MeshLaw
+from ..multibody.series.timefunctions import TimeFunction
 from ..reduction.modal_body import ModalBody
-from ..rigid.timefunctions import TimeFunction
 from ..shown import Facts
 from ..stiffness.curve import StiffnessCurve
 from ..stiffness.periodic import PeriodicInterpolant

@@ -15,7 +15,7 @@ from fractions import Fraction
 import numpy as np
 
 from ..errors import InputError
-from ..rigid.timefunctions import TimeFunction
+from ..multibody.series.timefunctions import TimeFunction
 from ..typing import Array
 from .gear_train import GearTrain
 

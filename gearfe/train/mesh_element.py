@@ -34,7 +34,7 @@ import numpy as np
 
 from ..gear.pair import GearPair
 from ..meshlaw.law import MeshLaw
-from ..rigid import Element, LinearJoint
+from ..multibody import Element, LinearJoint
 from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array, IntArray
 from .elements import LinearForce, RigidShaft

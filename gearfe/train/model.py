@@ -16,9 +16,9 @@ from itertools import islice
 import numpy as np
 
 from ..errors import InputError
+from ..multibody import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
+from ..multibody.core.elimination import ModalCoordinates, modal_coordinates
 from ..reduction.modal_body import ModalBody
-from ..rigid import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
-from ..rigid.elimination import ModalCoordinates, modal_coordinates
 from ..shown import Facts
 from ..typing import Array, IntArray
 from .bearings import BearingLoads, bearing_loads, bore_motion

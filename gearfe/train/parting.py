@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..rigid import Trajectory
+from ..multibody import Trajectory
 from ..typing import Array, BoolArray
 from .forces import LawFlank
 from .model import TrainModel

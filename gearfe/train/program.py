@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..meshlaw.law import stacked_laws
-from ..rigid import SeriesLaw
-from ..rigid.timefunctions import time_arrays
+from ..multibody import SeriesLaw
+from ..multibody.series.timefunctions import time_arrays
 from ..stiffness.periodic import PeriodicInterpolant, curve_arrays
 from ..typing import Array, IntArray
 from . import corners, friction, series

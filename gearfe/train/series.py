@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..meshlaw.law import Laws
-from ..rigid.kernel_rows import time_series
-from ..rigid.timefunctions import Times
+from ..multibody.series.kernel_rows import time_series
+from ..multibody.series.timefunctions import Times
 from ..stiffness.periodic import Curves
 from ..typing import Array, IntArray
 from .friction import product, smoothed_sign

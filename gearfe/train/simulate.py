@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..multibody import IntegrationError, Start, Status, Trajectory
+from ..multibody.integrators import integrate
+from ..multibody.integrators.integrate import chosen_method
 from ..progress import count, stage
 from ..record_spectrum import FASTEST, OVERSAMPLING
-from ..rigid import IntegrationError, Start, Status, Trajectory, integrate
-from ..rigid.integrate import chosen_method
 from ..typing import Array
 from .kinematics import steady_forces
 from .model import TrainModel
@@ -45,7 +46,7 @@ class TransientOptions:
     tolerance
         Of the integration, relative to each coordinate's largest value.
     method
-        ``auto``, ``taylor`` or ``implicit``, see `gearfe.rigid.integrate`.
+        ``auto``, ``taylor`` or ``implicit``, see `gearfe.multibody.integrators.integrate`.
     estimate
         Estimate the errors: of the integration from a second run with a hundredth of the tolerance and shorter steps,
         and of the housing's reduction up to `band_hz` (Hz).

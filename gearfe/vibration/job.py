@@ -19,7 +19,7 @@ from ..errors import InputError, given
 from ..gear.deviation_job import pitch_errors_of
 from ..gear.pair import Gear, GearPair, gear_of_form, in_keys
 from ..meshlaw.law import MeshLaw
-from ..rigid import TimeFunction, smoothed_step
+from ..multibody import TimeFunction, smoothed_step
 from ..stiffness.curve import StiffnessCurve
 from ..tables.housing import HousingTable
 from ..tables.microgeometry import MicrogeometryTable

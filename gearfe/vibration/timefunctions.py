@@ -18,7 +18,7 @@ from numpy.polynomial import chebyshev
 from ..errors import InputError, unknown_name
 from ..expressions import syntax
 from ..files import read_numbers
-from ..rigid import TimeFunction, constant, sine, smoothed_step
+from ..multibody import TimeFunction, constant, sine, smoothed_step
 from ..tables.timefunction import TrainFunctionTable, check_rising
 from ..typing import Array
 

@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearfe.mechanisms import load_mechanism
-from gearfe.rigid import Body, Gravity, Hinge, Linkage, Start, System, integrate
+from gearfe.multibody import Body, Gravity, Hinge, Linkage, Start, System
+from gearfe.multibody.integrators import integrate
 
 from .flexible_study import flexible
 from .peers.process import PeerError, missing, run_python
@@ -146,7 +147,7 @@ def _start_with_passage(random: np.random.Generator) -> tuple[float, float]:
 
 def folding_links(theta: float, omega: float) -> System:
     """Crank and rod, 1 m and 1 kg each, the rod's end on the x axis, on the branch theta2 = -theta1."""
-    from gearfe.rigid import Slot
+    from gearfe.multibody import Slot
 
     c, s = math.cos(theta), math.sin(theta)
     bodies = (
@@ -255,7 +256,7 @@ def chains(record: Record) -> None:
 CALL = """
 import sys, time
 from gearfe.mechanisms import load_mechanism
-from gearfe.rigid import integrate
+from gearfe.multibody import integrate
 import numpy as np
 m = load_mechanism(sys.argv[1])
 start, times = m.start(), np.linspace(0.0, 0.03, 301)

@@ -173,7 +173,7 @@ def lazy_imports(_quick: bool) -> tuple[float, float, str]:
 def compiled_kernels(quick: bool) -> tuple[float, float, str]:
     """Andrews' mechanism with the kernels in the cache; with the kernels compiled for it."""
     code = (
-        "from gearfe.mechanisms import load_mechanism\nfrom gearfe.rigid import integrate\n"
+        "from gearfe.mechanisms import load_mechanism\nfrom gearfe.multibody import integrate\n"
         f"m = load_mechanism({str(GEOMETRY / 'andrews.toml')!r})\n"
         "integrate(m.system, [0.0, 0.03], tolerance=1e-9, start=m.start()).q"
     )

@@ -96,7 +96,7 @@ def train_model(variant: str, *, quick: bool = False, modes: int | None = None, 
     speed
         Of the drive (rad/s), in place of the variant's.
     """
-    from gearfe.rigid import constant
+    from gearfe.multibody import constant
     from gearfe.train import build_train
     from gearfe.vibration.job import job_train, read_train_job, train_body
     from gearfe.vibration.mesh_stiffness import train_curves

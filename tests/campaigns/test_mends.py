@@ -18,8 +18,8 @@ from gearfe.errors import InputError
 from gearfe.files import whole_set
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import trajectory_error
-from gearfe.rigid import integrate
-from gearfe.rigid.timefunctions import smoothed_step
+from gearfe.multibody.integrators import integrate
+from gearfe.multibody.series.timefunctions import smoothed_step
 
 from ..rigid_cases import folding_angle, folding_links, pendulum
 from .campaign import Case, campaign_named

@@ -8,7 +8,7 @@ Andrews' mechanism: seven angles, six closure equations (Hairer & Wanner II, Sec
     M a'' = f(a, a') - G^T \lambda,\qquad G a'' = \gamma(a, a')
 
 with M block-diagonal (only neighbouring angles couple); ``S = G M^-1 G^T`` (6 x 6) is solved by Cholesky. The slider
-crank: two angles, one closure equation. Nothing here comes from `gearfe.rigid`.
+crank: two angles, one closure equation. Nothing here comes from `gearfe.multibody`.
 """
 
 from __future__ import annotations

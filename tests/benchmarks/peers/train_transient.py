@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearfe.rigid.kernel_rows import time_series
-from gearfe.rigid.packed import Packed
-from gearfe.rigid.timefunctions import Times, time_arrays
+from gearfe.multibody.compiled.packed import Packed
+from gearfe.multibody.series.kernel_rows import time_series
+from gearfe.multibody.series.timefunctions import Times, time_arrays
 from gearfe.stiffness.periodic import Curves, curve_arrays
 from gearfe.train.forces import CurveFlank
 
@@ -97,7 +97,7 @@ def plain_rhs(modal: Any) -> Rhs:
 
 def compiled_rhs(modal: Any, forces: Any) -> Rhs:
     """The same in compiled code; `forces` are those of a train whose meshes have stiffness curves."""
-    from gearfe.rigid import compiled
+    from gearfe.multibody.compiled import kernels as compiled
 
     [(force, index)] = modal.system.forces
     names = {"np": np, "math": math}

@@ -1,0 +1,113 @@
+"""Why a run stopped before its end: positions in which a mechanism locks, and what makes the steps short.
+
+With the gradients G of the constraints g(t, q) = 0, velocities follow from ``G v = -dg/dt``. In a locked position G
+loses rank, and the combination w of its rows that vanishes, ``w^T G = 0``, still has a share in the prescribed motion,
+``w^T dg/dt != 0``: no velocity fulfils it. (In a singular position that a mechanism passes, that share is zero.) The
+row forces w hold the links in equilibrium. A link that they load at two points only lies along the line of its force,
+so such links with one common direction are in line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...typing import Array, BoolArray
+from .modes import rates
+from .start import Start
+from .system import System
+
+#: Before a lock the smallest singular value of G falls with the root of the time left; below this share of the next
+#: one G counts as losing rank.
+RANK_LOST = 1e-2
+#: Shares of the largest row force, or of the largest prescribed rate, below which a row takes no part.
+PART = 1e-3
+#: Sine of the angle between the forces of two links below which these are in line.
+IN_LINE = 0.05
+#: Product of a rate and the length of a step from which on the rate explains the step.
+EXPLAINS = 0.1
+
+
+def locked(system: System, time: float, q: Array, active: BoolArray) -> str:
+    """Return why the prescribed motion cannot go on from a state, or an empty string.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    time : float
+        Time (s).
+    q : ndarray, shape (size,)
+        Coordinates at that time.
+    active : ndarray of bool, shape (rows,)
+        Constraints that are not redundant.
+    """
+    rate = (system.rate(time, q) / system.row_units)[active]
+    G = (system.jacobian(time, q) * system.units / system.row_units[:, None])[active]
+    if not (rate.any() and np.isfinite(G).all()):
+        return ""
+    left, sizes, _ = np.linalg.svd(G, full_matrices=False)
+    if len(sizes) < 2 or sizes[-1] > RANK_LOST * sizes[-2]:
+        return ""
+    force = left[:, -1]
+    largest = np.abs(force).max()
+    if abs(force @ rate) <= PART * largest * np.abs(rate).max():
+        return ""
+    carried = np.zeros(system.rows)
+    carried[active] = np.where(np.abs(force) > PART * largest, force, 0.0) / system.row_units[active]
+    driving = carried * system.rate(time, q) != 0.0
+    drive = next(name for name, drives in zip(system.row_names(), driving, strict=True) if drives)
+    links = _links_in_line(system, time, q, carried, driving)
+    where = f" with {' and '.join(links)} in line" if len(links) > 1 else ""
+    return f"the mechanism locks{where} ({drive.partition(' (')[0]} asks for a motion beyond this position)"
+
+
+def _links_in_line(system: System, time: float, q: Array, carried: Array, driving: BoolArray) -> list[str]:
+    """Names of links that row forces load at two joints only, along one common direction: the largest such set.
+
+    Driven links are left out: a drive may act at the same point as the other force.
+    """
+    found: list[tuple[str, Array]] = []
+    at_rows = 0
+    gradients = system.jacobian(time, q)
+    for element, index in system.joints:
+        rows = slice(at_rows, at_rows + element.rows)
+        at_rows += element.rows
+        joints = np.array(element.row_joint)
+        for number, body in enumerate(element.planar_bodies):
+            own = index[3 * number : 3 * number + 3]
+            pull = carried[rows, None] * gradients[rows][:, own] * system.units[own]
+            ends = np.array([pull[joints == joint].sum(axis=0) for joint in np.unique(joints)])
+            sizes = np.linalg.norm(ends[:, :2], axis=1)
+            loaded = np.abs(ends).max(axis=1) > PART * np.abs(pull).max(initial=0.0)
+            driven = (driving[rows] & (pull != 0.0).any(axis=1)).any()
+            if not driven and loaded.sum() == 2 and (sizes[loaded] > PART * sizes.max()).all():
+                found.append((body, ends[loaded][0, :2] / sizes[loaded][0]))
+    groups = [[name for name, (x, y) in found if abs(x * along[1] - y * along[0]) < IN_LINE] for _, along in found]
+    return max(groups, key=len, default=[])
+
+
+def short_steps(system: System, start: Start, time: float, q: Array, v: Array, step: float) -> str:
+    """Return the fastest process in a state where steps (s) are short, or an empty string if none explains them.
+
+    Compared are the turning of bodies, growth and decay by forces that depend on velocities, vibration, and the change
+    of forces over time alone.
+    """
+    if not (np.isfinite(q).all() and np.isfinite(v).all()) or step <= 0.0:
+        return ""
+    state = replace(start, time=time, q=q, v=v)
+    growth, decay, vibration = rates(system, state)
+    force, later = (system.force(time + share * step, q, v) for share in (0.0, 1.0))
+    change = float(np.abs(later - force).max(initial=0.0)) / max(float(np.abs(force).max(initial=0.0)), 1e-300) / step
+    turning = np.where(system.turns, np.abs(v), 0.0)
+    body = system.coordinate_names()[int(turning.argmax())].removesuffix("_angle_rad")
+    causes = {
+        f"a force feeds the motion, which grows e-fold every {1.0 / max(growth, 1e-300):.3g} s": growth,
+        f"a force damps the motion within {1.0 / max(decay, 1e-300):.3g} s": decay,
+        f"it vibrates at {vibration / (2.0 * np.pi):.3g} Hz": vibration,
+        f"a force changes within {1.0 / max(change, 1e-300):.3g} s": change,
+        f"{body} turns at {float(turning.max(initial=0.0)):.3g} rad/s": float(turning.max(initial=0.0)),
+    }
+    explaining = [cause for cause, rate in causes.items() if rate * step > EXPLAINS]
+    return max(explaining, key=lambda cause: causes[cause], default="")

@@ -1,0 +1,419 @@
+"""Implicit integration by collocation: Radau IIA for stiff and flexible systems, Gauss where energy counts.
+
+Steps of `kernel_collocation`, compiled where the system can be written on a tape, with NumPy for elements of any other
+kind; this module chooses their lengths and keeps what they pass through. The order goes with the tolerance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ....progress import announce
+from ....typing import Array
+from ...compiled import simd
+from ...compiled.kernels import Kernels, bind, packed
+from ...core.contract import LocalForce
+from ...core.dense import Polynomials
+from ...core.elimination import in_modes, is_linear, modal_coordinates
+from ...core.start import Start
+from ...core.steps import Status, StepControl, StepLaw, Watch, first_step
+from ...core.system import System
+from ...series import kernel_rows, kernel_tape
+from ...series.ordering import narrow_order
+from ...series.tape import Program
+from ..discontinuities import TRUSTED, Corners, collocated_path, quiet_speeds
+from . import kernel_collocation, kernel_elastic, kernel_equations, kernel_matrices, kernel_stages, numpy_equations
+from .kernel_collocation import SOLVED, Stages
+from .kernel_equations import Band, Equations, Scratch, Wide
+from .numpy_equations import SystemEquations
+from .scheme import RADAU, Collocated, Scheme, path_matrix, powers_of_path, scheme
+
+FUNCTIONS = (
+    kernel_rows.fill,
+    kernel_rows.time_series,
+    *kernel_tape.FUNCTIONS,
+    *kernel_elastic.FUNCTIONS,
+    *kernel_equations.FUNCTIONS,
+    *kernel_matrices.FUNCTIONS,
+    *kernel_stages.FUNCTIONS,
+    kernel_collocation.collocation_step,
+)
+HOT = ("fill", "cauchy", "weighted", "bar_strains", "coordinate", "turned")
+KERNELS = Kernels(
+    FUNCTIONS,
+    {
+        **kernel_rows.GLOBALS,
+        **kernel_tape.NAMES,
+        **kernel_matrices.NAMES,
+        **kernel_collocation.NAMES,
+        **simd.NAMES,
+    },
+    ("collocation_step",),
+    HOT,
+)
+#: Stages of a step (measured: five and nine take as long for the same error).
+STAGES = 7
+#: Steps whose polynomials are made at once; bytes of a run's steps from which on they are told.
+BLOCK, TOLD_BYTES = 1024, 1e9
+#: Share of a step about which its polynomials are written.
+MIDDLE = 0.5
+#: Relative to the largest coordinate: a step whose path is straight within this is too short for differences of its
+#: positions to give accelerations or multipliers. (Rounding of positions weighs up to 2e4 times in accelerations.)
+STRAIGHT = 1e-12
+#: A step more than so many times as long as the last one begins anew: speeds and multipliers of a very short step are
+#: rounding over powers of its length.
+MOST_AHEAD = 10.0
+#: Share of a step that is tried after Newton did not converge.
+NOT_SOLVED_SHARE = 0.3
+#: Rate of Newton's changes with which the next step is as long as the last; it grows with the step.
+EASY = 0.25
+#: Asked tolerance -> that of steps in modal coordinates: accelerations weigh the fast modes more than the state does.
+MODES_SHARE = 0.01
+
+
+@lru_cache(maxsize=1)
+def _numpy_step() -> Any:
+    functions = (*numpy_equations.FUNCTIONS, kernel_collocation.collocation_step)
+    return bind(functions, {**numpy_equations.NAMES, **kernel_collocation.NAMES}).collocation_step
+
+
+def run_implicit(
+    system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
+    watch: Watch | None = None, family: str = RADAU, program: Program | None = None,
+) -> tuple[Polynomials, Status, dict[str, Any]]:  # fmt: skip
+    """Integrate; returns (dense output, status, statistics). Linear constant constraints are eliminated before."""
+    options: dict[str, Any] = {"longest": longest, "most": most}
+    if system.joints and is_linear(system) and all(isinstance(e, LocalForce) for e, _ in system.forces):
+        modal = modal_coordinates(system)
+        if modal.T.shape[1] == 0:  # nothing is left to integrate
+            still = Polynomials(np.array([start.time, times[-1]]), start.q[None, None, :])
+            return still, Status.DONE, {"scheme": "at rest", "steps": 1, "free_coordinates": 0}
+        inner, begin = in_modes(modal, start)
+        local = max(MODES_SHARE * tolerance, 1e-13)
+
+        def watch_modes(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
+            return watch is None or watch(t, steps, lambda: (modal.origin + modal.T @ state()[0], modal.T @ state()[1]))
+
+        within, status, statistics = run_implicit(
+            inner, begin, times, tolerance=local, watch=watch_modes, family=family, **options
+        )
+        coefficients = within.coefficients @ modal.T.T
+        coefficients[:, 0] += modal.origin
+        return replace(within, coefficients=coefficients), status, {**statistics, "free_coordinates": inner.size}
+    step = Stepper(system, start, scheme(family, STAGES), program)
+    return step.run(system, start, times, tolerance, watch, options)
+
+
+class Stepper:
+    """Trial steps of one run, compiled for systems on a tape.
+
+    Parameters
+    ----------
+    system, start
+        What moves.
+    tab : Scheme
+        Stages.
+    program : Program or None
+        The system on a tape without its redundant rows, for compiled steps.
+    """
+
+    def __init__(self, system: System, start: Start, tab: Scheme, program: Program | None = None) -> None:
+        self.tab = tab
+        elements = SystemEquations(system, start)
+        s, n, m = len(tab.c), system.size, int(start.active.sum())
+        self.w = work(s, n, m, elements.stresses, tab.inner + 4)
+        self.w.now[2] = SOLVED
+        self.compiled, self.compile_seconds = program is not None, 0.0
+        if program is None:
+            self._step: Callable[[], int] = lambda: _numpy_step()(elements, self.w, tab)
+        else:
+            band = system.once(("band", start.active.tobytes()), lambda: narrow_band(program))
+            self._held = packed(equations(program, band, s, elements.stresses)), packed(self.w), packed(tab)
+            self.w.now[1] = self.w.limit[0] = 1.0
+            self.compile_seconds = KERNELS.load(lambda: KERNELS.compiled.collocation_step(*self._held))
+            self._step = KERNELS.compiled.collocation_step.on(*self._held)
+        self._powers = np.arange(s + 1.0)
+        p = self._powers[1:] + 1.0
+        self._guess = tab.side.c ** p[:, None] / p[:, None]
+
+    def restart(self, system: System, start: Start, t: float, q: Array, v: Array) -> Array:
+        """The next step begins with a constant acceleration, which is returned."""
+        a, multipliers = system.acceleration(t, q, v, start.active, start.excess)
+        self.w.multipliers[:] = multipliers[start.active]
+        self.w.speeds[:] = 0.0
+        self.w.speeds[1] = a
+        return a
+
+    def keep(self, h: float) -> None:
+        """The step just made is the one before the next."""
+        w, tab = self.w, self.tab
+        found = tab.ahead @ w.V.T
+        w.speeds[: len(found)] = found / h ** self._powers[: len(found), None]
+        w.multipliers[:] = w.L[:, -2]
+
+    def __call__(self, t: float, h: float, q: Array, v: Array, limit: Array) -> int:
+        """See `kernel_collocation.collocation_step`."""
+        w = self.w
+        w.now[:2], w.q[:], w.v[:], w.limit[:] = (t, h), q, v, limit
+        w.guess[1:] = self._guess * h ** (self._powers[1:, None] + 1.0)
+        return self._step()
+
+    def error(self, tolerance: float) -> float:
+        """Of the step just made, over the tolerance."""
+        return max(float(self.w.measures[0]), float(self.w.measures[1]) / tolerance)
+
+    def run(
+        self, system: System, start: Start, times: Array, tolerance: float, watch: Watch | None, options: dict[str, Any]
+    ) -> tuple[Polynomials, Status, dict[str, Any]]:
+        """From the start to the last time, by steps whose errors stay below the tolerance."""
+        w, tab, units = self.w, self.tab, system.units
+        q, v, t, end = start.q.copy(), start.v.copy(), start.time, float(times[-1])
+        a = self.restart(system, start, t, q, v)
+        law = StepLaw(
+            exponent=1.0 / (len(tab.c) + 1), growth=5.0, least_error=1e-8, predictive=True, steady=tab.level == 1
+        )
+        reach = np.maximum(np.abs(q), 1e-300)
+
+        def least() -> Array:
+            size: Array = np.maximum(reach, 1e-3 * units * max(float((reach / units).max()), 1e-12))
+            return size
+
+        floor = least()
+
+        def limit(h: float) -> Array:
+            return tolerance * np.maximum(floor, np.abs(h * v))
+
+        first = first_step(q / units, v / units, a / units, abs(end - t))
+        if law.steady:
+            w.now[2] = 0.0  # to rounding: what Newton's method leaves is a force at random, which the energy follows
+            first = self._steady_step(first, tolerance, (t, float(times[1]) - t, q, v), limit, options["longest"])
+            size = 16.0 * abs(end - t) / first * (w.known.size + w.L.size + w.S.size)  # as it goes, and as it is kept
+            if size > TOLD_BYTES:
+                announce(f"about {abs(end - t) / first:.2g} steps will take {size / 1e9:.2g} GB of memory")
+        control = StepControl(law, (t, end), first, breaks=system.breaks, watch=watch, **options)
+        corners = Corners(system, control, tolerance)
+        ends, known, forces, accelerations, newton = [t], [], [], [a], 0
+
+        def state() -> tuple[Array, Array]:
+            return q, v
+
+        while (h := control.next_step(state)) is not None:
+            count = self(t, h, q, v, limit(h))
+            newton += abs(count)
+            if count <= 0:
+                control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
+                continue
+            error = self.error(tolerance)
+            if corners.cutting and error <= TRUSTED:
+                quiet = quiet_speeds(tab.c, w.v, w.V[:, :-1].T, w.vn, units * float((reach / units).max()) / abs(h))
+                speeds = (tab.speed @ np.vstack([w.v, quiet])) / h ** self._powers[:, None]
+                if corners.cut(t, h, collocated_path(h, powers_of_path(tab.path, w.known, tab.inner), speeds)):
+                    continue
+            if not error <= 1.0:
+                control.reject(error)
+                continue
+            if w.measures[3] > 0.0:  # and the corner there was not found
+                control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
+                continue
+            t = control.accept(error)
+            if not (law.steady or corners.passing(h)):
+                control.trial = min(control.trial, abs(h) * EASY / max(float(w.measures[2]), 1e-3))
+            known.append(w.known.copy())
+            forces.append(np.concatenate((w.L, w.S)))
+            ends.append(t)
+            self.keep(h)
+            q, v = w.qn.copy(), w.vn.copy()
+            if corners.passing(h) or control.trial > MOST_AHEAD * abs(h):
+                accelerations.append(self.restart(system, start, t, q, v))
+            elif not system.stressed:
+                accelerations.append(system.acceleration(t, q, v, start.active, start.excess)[0])
+            reach = np.maximum(reach, np.abs(q))
+            floor = least()
+        dense = self._dense(system, start, np.array(ends), known, forces, accelerations)
+        counts: dict[str, Any] = {
+            "scheme": f"{'Radau IIA' if tab.inner < len(tab.c) else 'Gauss'} of {len(tab.c)} stages"
+        }
+        if self.compiled:
+            counts["compile_seconds"] = self.compile_seconds
+        if corners.load_problem and control.status is not Status.DONE:
+            counts["load_problem"] = corners.load_problem
+        return dense, control.status, {
+            **counts, "steps": control.accepted, "newton_iterations": newton, "rejected": control.rejected,
+        }  # fmt: skip
+
+    def _steady_step(
+        self, first: float, tolerance: float, begin: tuple[float, float, Array, Array],
+        limit: Callable[[float], Array], longest: float,
+    ) -> float:  # fmt: skip
+        """A part of the distance of the output times, about the longest step that the start allows."""
+        t, distance, q, v = begin
+        longest = min(longest, abs(distance))
+        while first < longest:
+            h = math.copysign(first, distance)
+            if self(t, h, q, v, limit(h)) <= 0 or self.error(tolerance) > 1.0:
+                first *= 0.5
+                break
+            first *= 2.0
+        return abs(distance) / math.ceil(abs(distance) / min(first, longest))
+
+    def _dense(
+        self, system: System, start: Start, times: Array, known: list[Array], forces: list[Array],
+        accelerations: list[Array],
+    ) -> Polynomials:  # fmt: skip
+        """Polynomials through the stages of every step and the states at its ends.
+
+        Accelerations of stiff links at the ends are the rounding of their strains; those of others follow from the
+        equations of motion there. In steps that are too short for differences of positions (`STRAIGHT`) accelerations
+        go on a line between these; stiff links keep theirs, and their forces, from the step before.
+        """
+        inner, s = self.tab.inner, len(self.tab.c)
+        if not known:
+            return Polynomials(times, np.zeros((0, *self.w.known.shape)))
+        h = np.diff(times)[:, None, None]
+        path = path_matrix(self.tab.c[:inner], accelerations=not system.stressed, origin=MIDDLE)
+        middles = times[:-1] + MIDDLE * np.diff(times)
+        coefficients = np.empty((len(known), len(path), system.size))
+        carried = [*np.flatnonzero(start.active), *(system.rows + np.arange(self.w.S.shape[0]))]
+        parts = np.zeros((len(known), s, system.rows + self.w.S.shape[0])) if system.stressed else None
+        short, known_ends = np.zeros(len(known), dtype=bool), np.zeros((len(known), 2, system.size))
+        force_path = np.linalg.inv((self.tab.c[:, None] - MIDDLE) ** np.arange(s))
+        for k in range(0, len(known), BLOCK):
+            block = slice(k, k + BLOCK)
+            whole, own = np.array(known[block]), h[block]
+            short[block], known_ends[block] = self._straight(whole, system.units), whole[:, :2]
+            if not system.stressed:
+                a = np.array(accelerations[k : k + BLOCK + 1])[:, None, :]
+                whole = np.concatenate([whole, own**2 * a[:-1], own**2 * a[1:]], axis=1)
+            coefficients[block] = powers_of_path(path, whole, inner) / own ** np.arange(len(path))[:, None]
+            if parts is not None:
+                found = np.array(forces[block])[:, :, :s].transpose(0, 2, 1)
+                parts[block, :, carried] = force_path @ found / own ** np.arange(s)[:, None]
+            known[block] = forces[block] = [self.w.known[:0]] * len(whole)  # their memory is free
+        ends = np.array(accelerations) if parts is None else None
+        for k in np.flatnonzero(short):
+            a = [_before(coefficients, h[:, 0, 0], int(k), short)] * 2 if ends is None else ends[k : k + 2]
+            coefficients[k] = _line_of_accelerations(len(path), h[k, 0, 0], known_ends[k], a)
+            if parts is not None:
+                force = _before(parts, h[:, 0, 0], int(k), short, 0)
+                parts[k], parts[k, 0] = 0.0, force
+        if parts is None:
+            return Polynomials(times, coefficients, origins=middles)
+        return Collocated(times, coefficients, origins=middles, forces=Polynomials(times, parts, origins=middles))
+
+    def _straight(self, known: Array, units: Array) -> Array:
+        """Whether the stages of steps (steps, k, n) are on straight lines within rounding."""
+        begin, speed = known[:, :1], known[:, 1:2]
+        c = self.tab.c[: self.tab.inner, None]
+        bent = np.abs((known[:, 2 : self.tab.inner + 2] - begin - c * speed) / units).max(axis=(1, 2), initial=0.0)
+        return np.asarray(bent <= STRAIGHT * np.abs(begin / units).max(axis=(1, 2), initial=0.0))
+
+
+def _before(coefficients: Array, h: Array, k: int, short: Array, derivative: int = 2) -> Array:
+    """A derivative of polynomials about the middles of steps h (s), just before step k.
+
+    Of the last step without the flag `short`, as Radau's stages are the more exact the nearer to their end; else of the
+    next one at its begin, or zero.
+    """
+    before, behind = np.flatnonzero(~short[:k])[-1:], k + 1 + np.flatnonzero(~short[k + 1 :])[:1]
+    for step, x in ((before, 0.5), (behind, -0.5)):
+        for i in step:
+            powers = [
+                math.perm(j, derivative) * (x * h[i]) ** max(j - derivative, 0) for j in range(coefficients.shape[1])
+            ]
+            return np.asarray(powers @ coefficients[i])
+    return np.zeros(coefficients.shape[2])
+
+
+def _line_of_accelerations(count: int, h: float, begin: Array, a: Array | list[Array]) -> Array:
+    """Coefficients (count, n) about the middle of a step from (q, h v) at its begin, and from q'' at both ends."""
+    middle, slope = 0.5 * (a[0] + a[1]), (a[1] - a[0]) / h
+    v = begin[1] / h + 0.5 * h * (a[0] + 0.25 * h * slope)
+    coefficients = np.zeros((count, len(middle)))
+    coefficients[0] = begin[0] + 0.5 * begin[1] + h * h * (a[0] / 8.0 + h * slope / 48.0)
+    coefficients[1:4] = v, 0.5 * middle, slope / 6.0
+    return coefficients
+
+
+def work(s: int, n: int, m: int, k: int, known: int) -> Stages:
+    """Arrays of a step."""
+    plain = [(3,), (4,), (n,), (n,), (m,), (s + 1, n), (n,)]
+    W = s + 1
+    wide = [(s + 1, W), *[(n, W)] * 4, (m, W), (k, W), *[(n, W), (m, W)] * 3]
+    arrays: list[Array] = [np.zeros(shape) for shape in plain]
+    arrays += [simd.lanes(*shape) for shape in wide]
+    return Stages._make([*arrays, np.zeros((known, n)), np.zeros(n), np.zeros(n)])
+
+
+def equations(program: Program, band: Band, s: int, stresses: int) -> Equations:
+    """A program with the order of its unknowns and work arrays."""
+    n, m, z = len(program.mass), len(program.rows.constant), len(program.mass) + len(program.curves.sign)
+    N, R = n + m, (s + 1) // 2
+    place = program.floats.place
+    widest = int(max([4, *place[:, 1], *place[:, 2]]))
+    width = int(max([4, *(2 * place[:, 1] + 4)]))
+
+    def whole(*shape: int) -> Any:
+        return np.zeros(shape, dtype=np.int64)
+
+    own = Scratch(
+        q=np.zeros(n), v=np.zeros(n), s=np.zeros(stresses), L=np.zeros(m), gap=np.zeros(m), at=np.full(1, np.nan),
+        P=np.zeros((z, 3)), R=np.zeros((len(program.code.op), 3)), TF=np.zeros((len(program.times.first) - 1, 4)),
+        pieces=whole(len(program.switches.register)), H=np.zeros((z, 1)), F=np.zeros(n), D=np.zeros((m, z)),
+        G=np.zeros((m, n)), K=np.zeros((n, n)), C=np.zeros((n, n)), B=simd.lanes(2, N, N, 2, R),
+        over=simd.lanes(2, N, 2, R), scale=simd.lanes(2, R), pivot=whole(2, N), low=whole(2, N), top=whole(2, N),
+        right=whole(N), x=simd.lanes(N, 2, R), law=np.zeros((stresses, width)), slope=np.zeros((3, 4)),
+        by=np.zeros((2, 4, 4)), shapes=np.zeros((4, widest)),
+        pairs=np.zeros((widest, widest)), drift=np.zeros(width), blocks=np.zeros((widest, width)),
+    )  # fmt: skip
+    W = s + 1
+    wide = Wide(
+        P=simd.lanes(z, 2, W), TF=simd.lanes(len(own.TF), 2, W), H=simd.lanes(z, 1, W), F=simd.lanes(n, W),
+        shapes=simd.lanes(2, widest, W), blocks=simd.lanes(widest, width, W),
+    )  # fmt: skip
+    return Equations(program, band, own, wide)
+
+
+def narrow_band(program: Program) -> Band:
+    """Which entries of the matrices may not vanish, and an order of the unknowns in which they lie in a narrow band."""
+    n, m, held = len(program.mass), len(program.rows.constant), np.argwhere(program.mass != 0.0)
+
+    of = np.append(np.arange(n), program.curves.place[:, 0])  # coordinate of each variable
+    rows, code = program.rows, program.code
+    filled = np.zeros((n, n), dtype=bool)
+    filled[tuple(held.T)] = True
+    filled[tuple(program.block.T)] = True
+    filled[of[n:], of[n:]] = True
+    pairs = of[rows.pair[:, 1:]]
+    filled[pairs[:, 0], pairs[:, 1]] = filled[pairs[:, 1], pairs[:, 0]] = True
+    for nodes in program.bars.place:
+        own = (nodes[:, None] + np.arange(3)).ravel()
+        filled[np.ix_(own, own)] = True
+    for first, modes in program.floats.place[:, :2]:
+        own = first + np.arange(2 * modes + 4)
+        filled[np.ix_(own, own)] = True
+    acting = np.unique(of[code.variable])
+    pushed = np.unique(of[code.push[:, 1]])
+    filled[np.ix_(pushed, acting)] = True
+    graph = np.zeros((n + m, n + m), dtype=bool)
+    graph[:n, :n] = filled | filled.T
+    for row, at in ((rows.place[:, 0], of[rows.place[:, 1]]), *((rows.pair[:, 0], p) for p in pairs.T)):
+        graph[n + row, at] = graph[at, n + row] = True
+    place = np.empty(n + m, dtype=np.int64)
+    place[narrow_order(graph)] = np.arange(n + m)
+    entries = np.ascontiguousarray(np.argwhere(filled).astype(np.int64))
+    graph |= np.eye(n + m, dtype=bool)
+    placed = np.zeros_like(graph)
+    placed[np.ix_(place, place)] = graph
+    last = n + m - 1 - placed[:, ::-1].argmax(axis=1)
+    reach = np.maximum.accumulate(last)  # pivots exchange rows up to it
+    first = np.searchsorted(np.maximum.accumulate(reach[reach]), np.arange(n + m))
+    return Band(
+        place, entries, program.mass[tuple(entries.T)], np.ascontiguousarray(held.astype(np.int64)),
+        program.mass[tuple(held.T)], acting, first.astype(np.int64), reach.astype(np.int64), last.astype(np.int64),
+    )  # fmt: skip

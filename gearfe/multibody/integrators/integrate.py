@@ -1,0 +1,223 @@
+"""One call for all integrators: `integrate(system, times, method=..., tolerance=...)`."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...errors import InputError
+from ...progress import count, stage
+from ...typing import Array
+from ..core.dense import Dense
+from ..core.elimination import is_linear, modal_coordinates
+from ..core.mass_regularisation import loose_link
+from ..core.start import Start, consistent_start
+from ..core.steps import Status, Watch
+from ..core.stopped import locked, short_steps
+from ..core.system import System
+from ..core.trajectory import IntegrationError, Trajectory
+from .collocation.scheme import GAUSS, RADAU
+from .discontinuities import load_problem_ahead
+from .taylor import run as taylor
+from .taylor.modal import series_force
+
+Run = tuple[Dense, Status, dict[str, Any]]
+#: Points of collocation by method.
+COLLOCATION = {"implicit": RADAU, "symplectic": GAUSS}
+#: Ends of runs whose cause is looked for.
+UNFINISHED = (Status.STEP_TOO_SMALL, Status.NOT_FINITE, Status.NOT_SOLVED, Status.ENDLESS, Status.MOST_STEPS)
+METHODS = ("auto", "taylor", *COLLOCATION)
+#: Asked tolerance -> largest last term of a Taylor step. The benchmark mechanisms amplify local errors some
+#: hundred times.
+LOCAL_SHARE = 5e-4
+#: The rule of `auto`: collocation where the fastest decay exceeds so many times the fastest vibration and, times the
+#: duration, the second number, or the third in modal coordinates, where collocation is not compiled (measured:
+#: docs/development/integrators.md).
+OVERDAMPED, DECAYED, DECAYED_MODAL = 3.0, 3e3, 1e6
+#: Fastest rate times the duration from which on steps of series are below the rounding of the run's time.
+HOPELESS = 1e12
+#: What to write for methods that exist no more.
+GONE_METHODS = {"explicit": 'explicit was removed: leave the method out, or write "implicit"'}
+
+
+@stage("integrating")
+def integrate(
+    system: System,
+    times: ArrayLike,
+    *,
+    method: str = "auto",
+    tolerance: float = 1e-9,
+    start: Start | None = None,
+    longest: float = math.inf,
+    most_steps: int = 1_000_000,
+    raise_on_failure: bool = True,
+) -> Trajectory:
+    """Integrate a system over the given times.
+
+    Parameters
+    ----------
+    system : System
+        Bodies, joints and forces.
+    times : array_like
+        Times at which results are wanted (s), rising or falling; the first is the start.
+    method : {"auto", "taylor", "implicit", "symplectic"}
+        "taylor": Taylor series of the index-3 equations, where rows and forces can be written on a tape (planar
+        linkages, loads by expression, frames in vectors); in modal coordinates where the constraints are linear and the
+        only force has a law with a series: gear trains. "implicit": collocation at 7 points of Radau IIA, for stiff
+        systems, flexible links and elements without a series. "auto" takes one of these two by a rule
+        (`chosen_method`). "symplectic": collocation at Gauss's points in steps of one length, which keeps the energy
+        where nothing takes any.
+    tolerance : float
+        Accuracy asked for, relative to 1 rad and to the size of the mechanism; 1e-13 to 0.1.
+    start : Start, optional
+        From `consistent_start`; by default the start poses of the bodies, made consistent (and remembered).
+    longest : float
+        Longest step (s).
+    most_steps : int
+        Give up after this number of steps.
+    raise_on_failure : bool
+        Raise where the end is not reached; without it the trajectory as far as it came is returned, with its status.
+
+    Returns
+    -------
+    Trajectory
+        With a status. `Trajectory.method` is the method that ``auto`` took.
+
+    Raises
+    ------
+    IntegrationError
+        For a run that ended early; its ``result`` is the trajectory.
+    InputError
+        For values out of range, and starts that cannot be made consistent.
+    """
+    output_times = np.atleast_1d(np.asarray(times, dtype=float))
+    _check(output_times, method, tolerance)
+    if start is None:
+        start = _default_start(system, float(output_times[0]))
+    duration = abs(float(output_times[-1]) - start.time)
+    chosen = chosen_method(system, start, duration) if method == "auto" else method
+    options = {"tolerance": tolerance, "longest": longest}
+    counted = partial(_counted, start.time, output_times[-1])
+    with np.errstate(all="ignore"):  # a state that is not finite has a status of its own
+        dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps, counted)
+        if method == "auto" and chosen == "taylor" and status is Status.STEP_TOO_SMALL and not system.algebraic:
+            chosen = "implicit"  # a load has no series at a state on the way
+            dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps, counted)
+    sign = 1.0 if output_times[-1] >= output_times[0] else -1.0
+    reached = sign * dense.times[-1] + 1e-12 * abs(dense.times[-1])
+    kept = output_times if status is Status.DONE else output_times[sign * output_times <= reached]
+    if status is Status.DONE and not _dropped_rows_hold(system, start, dense, tolerance):
+        status = Status.REDUNDANT_NOT_MET
+    if status in UNFINISHED and len(dense.times) > 1:
+        last = dense.times[-6:]  # the very last ones may be beyond all numbers
+        end, (q, v, a) = float(last[-1]), (dense(last[-1:], k)[0] for k in range(3))
+        ahead = float(output_times[-1]) - start.time
+        if problem := statistics.get("load_problem") or load_problem_ahead(system, end, (q, v, a), ahead):
+            statistics = {**statistics, "load_problem": problem}
+        elif link := loose_link(system, last, dense(last, 0), dense(last, 1), start):
+            statistics = {**statistics, "loose_link": link}
+        elif why := locked(system, end, q, start.active):
+            statistics = {**statistics, "locked": why}
+        elif cause := short_steps(system, start, end, q, v, float(np.abs(np.diff(last)).mean())):
+            statistics = {**statistics, "short_steps": cause}
+    made = Trajectory(system, start, kept, status, chosen, statistics, dense)
+    if raise_on_failure and made.status is not Status.DONE:
+        raise IntegrationError(made, made.message, made.reached, float(output_times[-1]))
+    return made
+
+
+def _counted(begin: float, end: float, t: float, steps: int, state: Any) -> bool:  # noqa: ARG001 - a `Watch`
+    """Report how far the run is."""
+    count(abs(t - begin), abs(float(end) - begin))
+    return True
+
+
+def _dropped_rows_hold(system: System, start: Start, dense: Dense, tolerance: float) -> bool:
+    """Whether all rows are met along the run, whichever of a redundant set was left out on the way."""
+    left_out = ~start.active
+    if not left_out.any() or len(dense.times) < 2 or is_linear(system):  # constant rows hold as they did at the start
+        return True
+    times = dense.times[:: max(1, len(dense.times) // 50)]
+    times = np.append(times, dense.times[-1])
+    states = dense(times, 0)
+    gaps = [np.abs(system.residual(t, q) / system.row_units).max() for t, q in zip(times, states, strict=True)]
+    scale = 1.0 if system.algebraic else max(1.0, float(np.abs(states / system.units).max()))
+    return bool(max(gaps) <= max(1e-8, 1e3 * tolerance) * scale)
+
+
+def chosen_method(system: System, start: Start, duration: float) -> str:
+    """Return the method that ``auto`` takes for a run of that duration (s), by the rule in docs/integrators.md.
+
+    It depends on the system and its start alone, so the same file has the same digits on every machine.
+    """
+    if not _has_series(system) or any(element.stiff for element in system.elements):
+        return "implicit"
+    decay, vibration = _rates(system, start)
+    long = DECAYED_MODAL if _modal(system) else DECAYED
+    overdamped = decay > OVERDAMPED * vibration and decay * duration > long
+    return "implicit" if overdamped or max(decay, vibration) * duration > HOPELESS else "taylor"
+
+
+def _has_series(system: System) -> bool:
+    """Whether motions are Taylor series: on a tape, or in modal coordinates under a force whose law has one."""
+    return series_force(system) is not None if _modal(system) else system.series is not None
+
+
+def _modal(system: System) -> bool:
+    """Whether series are those of modal coordinates."""
+    return is_linear(system) and not any(element.planar_bodies for element in system.elements)
+
+
+@lru_cache(maxsize=4)
+def _rates(system: System, start: Start) -> tuple[float, float]:
+    """Fastest decay and vibration (1/s) at a start; an error estimate asks again for the same."""
+    from ..core.modes import fastest_rate
+
+    return fastest_rate(system, start)
+
+
+def _run(
+    system: System, method: str, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
+) -> Run:
+    """Integrate by one method."""
+    if method in COLLOCATION:
+        from .collocation.run import run_implicit
+
+        program = None if system.program is None else system.program.without_redundant(start.active)
+        more = options | {"family": COLLOCATION[method], "program": program}
+        return run_implicit(system, start, times, most=most, watch=watch, **more)
+    if _modal(system):
+        from .taylor.modal import run_modal_taylor
+
+        if series_force(system) is None:
+            problem = "needs a linkage, or linear constraints and one force whose law has a series"
+            raise InputError("method", "taylor", problem, "use method='implicit'")
+        return run_modal_taylor(modal_coordinates(system), start, times, most=most, watch=watch, **options)
+    if system.series is None:
+        problem = "needs rows and forces that can be written on a tape (gearfe.multibody.core.contract)"
+        raise InputError("method", "taylor", problem, "use method='implicit'")
+    local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
+    prepared = taylor.prepare(system, start, taylor.order_for(local))
+    end, longest = float(times[-1]), options["longest"]
+    return taylor.run_taylor(prepared, start, end, tolerance=local, longest=longest, most=most, watch=watch)
+
+
+def _default_start(system: System, time: float) -> Start:
+    return system.once(("start", time), lambda: consistent_start(system, time))
+
+
+def _check(times: np.ndarray, method: str, tolerance: float) -> None:
+    if times.size < 2 or not np.isfinite(times).all():
+        raise InputError("times", None, "must be at least two finite numbers", "give the start and the end")
+    steps = np.diff(times)
+    if not ((steps > 0).all() or (steps < 0).all()):
+        raise InputError("times", None, "must rise (or fall) from one to the next", "sort them and drop doubles")
+    if method not in METHODS:
+        cure = GONE_METHODS.get(method, "choose one of these")
+        raise InputError("method", method, "must be one of " + ", ".join(METHODS), cure)
+    if not (math.isfinite(tolerance) and 1e-13 <= tolerance <= 0.1):
+        raise InputError("tolerance", tolerance, "must be from 1e-13 to 0.1", "1e-9 is a good start")
