@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gearfe.mechanisms import evaluate, load_mechanism
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import integrate
 
 FILE = Path(__file__).resolve().parents[1] / "geometry" / "andrews.toml"
 

@@ -33,8 +33,7 @@ Answers = dict[str, tuple[np.ndarray, float]]
 
 def mechanisms() -> Answers:
     """Folding links, a chain, a stiff pendulum; series, Radau IIA and Runge-Kutta; a four-bar at rest."""
-    from gearfe.multibody import Body, CoordinateSpring, Gravity, Hinge, Linkage, System
-    from gearfe.multibody.integrators import integrate
+    from gearfe.multibody import Body, CoordinateSpring, Gravity, Hinge, Linkage, System, integrate
     from tests.rigid_cases import chain, folding_links
 
     rod = Linkage(

@@ -174,7 +174,7 @@ def written(kind: str, name: str, text: str, duration: float, tolerance: float =
     with tempfile.TemporaryDirectory() as folder:
         angle = np.linspace(0.0, 2.0 * math.pi, 49)
         rows = "\n".join(f"{a},{0.02 * (1.0 - math.cos(a))}" for a in angle)
-        (Path(folder) / "lift.csv").write_text("angle,lift\n" + rows + "\n", encoding="utf-8")
+        (Path(folder) / "lift.csv").write_text("angle,lift\n" + rows + "\n", encoding="utf-8", newline="\n")
         path = Path(folder) / "mechanism.toml"
         path.write_text(text, encoding="utf-8")
         made = load_mechanism(path)

@@ -6,8 +6,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from gearfe.multibody import Body, Forced, Gravity, Hinge, Linkage, Slot, System, consistent_start
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import Body, Forced, Gravity, Hinge, Linkage, Slot, System, consistent_start, integrate
 
 
 def slider_crank(angle: float) -> System:

@@ -100,7 +100,7 @@ def test_each_shaft_is_in_balance(kind):
 
 def motions(model, response):
     """Rates and second rates of the coordinates, from a run of the same model (they are not in the response)."""
-    from gearfe.multibody.integrators import integrate
+    from gearfe.multibody import integrate
     from gearfe.train.states import train_states
 
     run = integrate(model.system, response.time, tolerance=1e-8, method=METHOD, start=model.start)

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from gearfe.errors import InputError
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.results import reactions
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import integrate
 
 LIFT, MASS, SPRING, SPEED = 0.02, 0.5, 400.0, 30.0
 CAM = f"""

@@ -12,8 +12,18 @@ import pytest
 from gearfe.errors import InputError
 from gearfe.mechanisms import load_mechanism
 from gearfe.mechanisms.results import reactions
-from gearfe.multibody import Body, Gravity, Hinge, Linkage, Moment, Prismatic, System, consistent_start, constant
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import (
+    Body,
+    Gravity,
+    Hinge,
+    Linkage,
+    Moment,
+    Prismatic,
+    System,
+    consistent_start,
+    constant,
+    integrate,
+)
 from gearfe.multibody.planar.couplings import Belt, GearRatio, Rack
 from gearfe.multibody.planar.forms import Frames
 from gearfe.multibody.planar.joints import Joint, Rolling, Row

@@ -10,7 +10,7 @@ import pytest
 from gearfe.config import build
 from gearfe.mechanisms import evaluate
 from gearfe.mechanisms.model import make_mechanism
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import integrate
 from gearfe.tables.mechanism import MechanismFile
 from tests.benchmarks.peers.exudyn_flexible import tables
 from tests.benchmarks.subject import DATA

@@ -16,8 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearfe.multibody import Element, ModalBlocks, QuadraticJoint, System, consistent_start, polynomial
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import Element, ModalBlocks, QuadraticJoint, System, consistent_start, integrate, polynomial
 
 DATA = json.loads((Path(__file__).parent / "data" / "elastic_slider_crank.json").read_text())
 SI = DATA["data_SI"]

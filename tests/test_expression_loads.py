@@ -15,9 +15,8 @@ from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import finer_run
 from gearfe.mechanisms.job import run_mechanism
 from gearfe.mechanisms.loads import ExpressionLoad
-from gearfe.multibody import IntegrationError
+from gearfe.multibody import IntegrationError, integrate
 from gearfe.multibody.core.inverse import prescribed_motion
-from gearfe.multibody.integrators import integrate
 
 ROD = """
 [run]

@@ -13,7 +13,7 @@ from gearfe.cli import main
 from gearfe.errors import InputError
 from gearfe.mechanisms import evaluate, load_mechanism, solve
 from gearfe.mechanisms.results import reactions
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import integrate
 
 ROOT = Path(__file__).resolve().parents[1]
 

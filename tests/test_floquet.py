@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from gearfe.multibody import constant
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import constant, integrate
 from gearfe.runup.monodromy import flow, kick_times, monodromy
 from gearfe.runup.run_up import steady_state
 from gearfe.runup.train_stability import train_stability

@@ -7,8 +7,17 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.errors import InputError
-from gearfe.multibody import Body, CoordinateSpring, Gravity, Hinge, Linkage, LocalForce, System, consistent_start
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import (
+    Body,
+    CoordinateSpring,
+    Gravity,
+    Hinge,
+    Linkage,
+    LocalForce,
+    System,
+    consistent_start,
+    integrate,
+)
 from gearfe.multibody.integrators.integrate import DECAYED, OVERDAMPED, chosen_method
 from gearfe.multibody.planar.beam import Beam
 from gearfe.multibody.planar.beam_link import BeamLink, Section

@@ -15,7 +15,7 @@ from gearfe.errors import InputError
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.expressions import compute, parse, quantities
 from gearfe.mechanisms.results import reactions, wrapped
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import integrate
 
 from .rigid_cases import reference
 

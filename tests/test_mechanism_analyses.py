@@ -25,11 +25,11 @@ from gearfe.multibody import (
     System,
     consistent_start,
     constant,
+    integrate,
 )
 from gearfe.multibody.core.equilibrium import equilibrium
 from gearfe.multibody.core.inverse import prescribed_motion
 from gearfe.multibody.core.modes import modes
-from gearfe.multibody.integrators import integrate
 from gearfe.multibody.planar.beam import Beam
 from gearfe.multibody.planar.beam_link import BeamLink, Section
 from gearfe.multibody.planar.turning import TurningFrame

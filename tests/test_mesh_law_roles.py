@@ -13,8 +13,7 @@ from gearfe.contact.half_plane import half_plane_pair
 from gearfe.contact.laws import law_named
 from gearfe.meshlaw.law import MeshLaw
 from gearfe.meshlaw.make import mesh_law
-from gearfe.multibody import TimeFunction, constant, smoothed_step
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import TimeFunction, constant, integrate, smoothed_step
 from gearfe.stiffness.sweep import elastic_pair
 from gearfe.train import Damping, GearMesh, Load, build_train, simulate
 from gearfe.train.states import train_states

@@ -10,8 +10,8 @@ import pytest
 
 from gearfe import progress
 from gearfe.cli import main
+from gearfe.multibody import integrate
 from gearfe.multibody.compiled.kernels import Kernels
-from gearfe.multibody.integrators import integrate
 from gearfe.progress import Display, Stopwatch, _Stage, count, shown, stage
 from gearfe.tables.examples import job_file
 

@@ -22,11 +22,11 @@ from gearfe.multibody import (
     System,
     consistent_start,
     constant,
+    integrate,
     smoothed_step,
 )
 from gearfe.multibody.core.equilibrium import equilibrium, stiffness_at
 from gearfe.multibody.core.mass_regularisation import free_motions
-from gearfe.multibody.integrators import integrate
 from gearfe.multibody.planar.beam import Beam
 from gearfe.multibody.planar.beam_link import BeamLink, Section
 

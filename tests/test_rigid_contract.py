@@ -28,9 +28,9 @@ from gearfe.multibody import (
     StateFunction,
     System,
     consistent_start,
+    integrate,
 )
 from gearfe.multibody.core.modes import fastest_rate
-from gearfe.multibody.integrators import integrate
 from gearfe.multibody.integrators.collocation.run import Stepper
 from gearfe.multibody.integrators.collocation.scheme import GAUSS, RADAU, scheme
 from gearfe.multibody.integrators.taylor import run as taylor

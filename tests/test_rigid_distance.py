@@ -12,8 +12,7 @@ from scipy.special import ellipk
 from gearfe.errors import InputError
 from gearfe.mechanisms import load_mechanism
 from gearfe.mechanisms.results import reactions
-from gearfe.multibody import Body, Distance, Gravity, Hinge, Linkage, Slot, System, consistent_start
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import Body, Distance, Gravity, Hinge, Linkage, Slot, System, consistent_start, integrate
 
 from .rigid_cases import G, residuals, total_energy
 

@@ -28,11 +28,11 @@ from gearfe.multibody import (
     System,
     consistent_start,
     constant,
+    integrate,
     polynomial,
     sine,
     smoothed_step,
 )
-from gearfe.multibody.integrators import integrate
 
 from .rigid_cases import G, by_scipy, chain, pendulum, residuals, total_energy
 

@@ -15,8 +15,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gearfe.errors import InputError
-from gearfe.multibody import Body, Gravity, Hinge, Linkage, Prescribed, Prismatic, System, constant
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import Body, Gravity, Hinge, Linkage, Prescribed, Prismatic, System, constant, integrate
 
 from .rigid_cases import G, folding_links, total_energy
 

@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gearfe.multibody import Body, Forced, Gravity, Hinge, Linkage, Start, System, consistent_start
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import Body, Forced, Gravity, Hinge, Linkage, Start, System, consistent_start, integrate
 
 from .rigid_cases import G, folding_angle, folding_links, total_energy
 

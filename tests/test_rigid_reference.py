@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from gearfe.mechanisms import load_mechanism
-from gearfe.multibody import consistent_start
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import consistent_start, integrate
 
 from .rigid_cases import DATA, by_scipy, chain, folding_links, pendulum, reference, residuals, total_energy
 from .test_rigid_light_links import four_bar

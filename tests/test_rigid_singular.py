@@ -20,10 +20,10 @@ from gearfe.multibody import (
     Status,
     System,
     consistent_start,
+    integrate,
     polynomial,
 )
 from gearfe.multibody.core.system import least_norm_solution
-from gearfe.multibody.integrators import integrate
 
 from .rigid_cases import G, folding_angle, folding_links, total_energy
 

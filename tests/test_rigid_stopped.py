@@ -7,11 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.multibody import Body, Hinge, Linkage, Moment, Prescribed, Slot, System, Trajectory, polynomial
+from gearfe.multibody import Body, Hinge, Linkage, Moment, Prescribed, Slot, System, Trajectory, integrate, polynomial
 from gearfe.multibody.core.inverse import prescribed_motion
 from gearfe.multibody.core.start import consistent_start
 from gearfe.multibody.core.steps import ENDLESS, Pace, Status
-from gearfe.multibody.integrators import integrate
 
 CRANK, COUPLER, ROCKER, BASE = 2.5, 1.5, 2.5, 3.0
 

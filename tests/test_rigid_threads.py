@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from gearfe.mechanisms import load_mechanism
-from gearfe.multibody import Start, Trajectory, consistent_start
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import Start, Trajectory, consistent_start, integrate
 
 GEOMETRY = Path(__file__).parents[1] / "geometry"
 TIMES = np.linspace(0.0, 0.03, 31)

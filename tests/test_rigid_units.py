@@ -10,8 +10,18 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.multibody import Body, Gravity, Hinge, Linkage, Prescribed, Slot, System, consistent_start, smoothed_step
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import (
+    Body,
+    Gravity,
+    Hinge,
+    Linkage,
+    Prescribed,
+    Slot,
+    System,
+    consistent_start,
+    integrate,
+    smoothed_step,
+)
 
 from .rigid_cases import G, folding_links
 

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gearfe.multibody import constant
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import constant, integrate
 from gearfe.runup.balance import size_of, widened
 from gearfe.runup.condensed import condense
 from gearfe.runup.report import warnings

@@ -22,8 +22,8 @@ from gearfe.multibody import (
     Status,
     System,
     consistent_start,
+    integrate,
 )
-from gearfe.multibody.integrators import integrate  # fmt: skip
 from gearfe.multibody.integrators.taylor import run as route
 from gearfe.multibody.series.tape import Tape
 

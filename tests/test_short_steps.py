@@ -8,8 +8,7 @@ from math import cos, sin
 import numpy as np
 import pytest
 
-from gearfe.multibody import Body, CoordinateSpring, Fixed, Gravity, Hinge, Linkage, System, TimeFunction
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import Body, CoordinateSpring, Fixed, Gravity, Hinge, Linkage, System, TimeFunction, integrate
 from gearfe.multibody.planar.beam import Beam
 from gearfe.multibody.planar.beam_link import BeamLink, Section
 from gearfe.multibody.planar.forces import Moment

@@ -24,8 +24,7 @@ from gearfe import (
 from gearfe.errors import MissingLibraryError
 from gearfe.figures.results import PICTURES
 from gearfe.mechanisms import load_mechanism
-from gearfe.multibody import constant
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import constant, integrate
 from gearfe.shown import Shown, as_numbers, percent
 from gearfe.spectrum import amplitude_spectrum
 from gearfe.stiffness.sweep import elastic_pair

@@ -11,9 +11,8 @@ from scipy.special import gamma
 
 from gearfe.errors import InputError
 from gearfe.mechanisms import evaluate, load_mechanism
-from gearfe.multibody import IntegrationError
+from gearfe.multibody import IntegrationError, integrate
 from gearfe.multibody.core.equilibrium import equilibrium
-from gearfe.multibody.integrators import integrate
 
 #: A block of 2 kg on a guide along x; the wall is at 0.
 BLOCK = """

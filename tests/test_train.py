@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import InputError
-from gearfe.multibody import IntegrationError, constant, smoothed_step
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import IntegrationError, constant, integrate, smoothed_step
 from gearfe.runup.train_stability import train_stability
 from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, build_train, simulate
 from gearfe.train.elements import outline_moments

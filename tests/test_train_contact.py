@@ -10,8 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from gearfe.errors import InputError
-from gearfe.multibody import TimeFunction, constant, smoothed_step
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import TimeFunction, constant, integrate, smoothed_step
 from gearfe.train import Damping, Drive, Load, build_train, simulate
 from gearfe.train.states import train_states
 from gearfe.train.statics import static_errors

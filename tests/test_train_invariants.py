@@ -8,8 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.multibody import TimeFunction, constant
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import TimeFunction, constant, integrate
 from gearfe.train import Drive, build_train
 from gearfe.train.forces import LawFlank
 from gearfe.train.states import train_states

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson, solve_ivp
 
-from gearfe.multibody import constant
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import constant, integrate
 from gearfe.train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, build_train, simulate
 from gearfe.train.states import train_states
 

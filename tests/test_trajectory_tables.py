@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from gearfe.errors import MissingLibraryError
-from gearfe.multibody import Body, Gravity, Hinge, Linkage, System, Trajectory
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import Body, Gravity, Hinge, Linkage, System, Trajectory, integrate
 
 
 def made() -> Trajectory:

@@ -60,8 +60,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _compile() -> None:
     """Any compiled run leaves the kernels in the cache."""
-    from ..multibody import Body, Hinge, Linkage, System
-    from ..multibody.integrators import integrate
+    from ..multibody import Body, Hinge, Linkage, System, integrate
 
     rod, hinge = Body("rod", 1.0, 1.0, (1.0, 0.0)), Hinge("rod", "ground")
     system = System([Linkage((rod,), (hinge,))])

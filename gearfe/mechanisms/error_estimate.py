@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..multibody import Start, Status, Trajectory
-from ..multibody.integrators import integrate
+from ..multibody import Start, Status, Trajectory, integrate
 from ..progress import stage
 from ..typing import Array
 from .model import Mechanism

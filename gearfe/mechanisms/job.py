@@ -13,10 +13,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import output_folder, whole_set, write_csv, write_json
-from ..multibody import Start, Trajectory
+from ..multibody import Start, Trajectory, integrate
 from ..multibody.core.inverse import prescribed_motion
 from ..multibody.core.mass_regularisation import free_motions
-from ..multibody.integrators import integrate
 from ..progress import stage
 from .error_estimate import TrajectoryError, trajectory_error
 from .model import Mechanism

@@ -15,11 +15,10 @@ import numpy as np
 
 from ..config import build, read_toml, set_key
 from ..errors import InputError
-from ..multibody import Start, Trajectory
+from ..multibody import Start, Trajectory, integrate
 from ..multibody.core.equilibrium import Equilibrium, equilibrium
 from ..multibody.core.inverse import prescribed_motion
 from ..multibody.core.modes import Modes, modes
-from ..multibody.integrators import integrate
 from ..progress import one_thread
 from ..tables.mechanism import MechanismFile, RunTable
 from ..typing import Array

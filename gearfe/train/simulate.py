@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..multibody import IntegrationError, Start, Status, Trajectory
-from ..multibody.integrators import integrate
+from ..multibody import IntegrationError, Start, Status, Trajectory, integrate
 from ..multibody.integrators.integrate import chosen_method
 from ..progress import count, stage
 from ..record_spectrum import FASTEST, OVERSAMPLING

@@ -15,7 +15,7 @@ import numpy as np
 from gearfe.config import build
 from gearfe.mechanisms import evaluate
 from gearfe.mechanisms.model import Mechanism, make_mechanism
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import integrate
 from gearfe.tables.mechanism import MechanismFile
 
 from .peers.exudyn_flexible import REFERENCES, tables

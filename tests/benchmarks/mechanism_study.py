@@ -19,8 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearfe.mechanisms import load_mechanism
-from gearfe.multibody import Body, Gravity, Hinge, Linkage, Start, System
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import Body, Gravity, Hinge, Linkage, Start, System, integrate
 
 from .flexible_study import flexible
 from .peers.process import PeerError, missing, run_python

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearfe.gear.derived import mesh_stiffness, single_stiffness
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import integrate
 from gearfe.stiffness.sweep import sweep_stiffness
 
 from ..housing_meshes import reference_housing

@@ -108,7 +108,7 @@ def test_exponent_of_a_power_law():
 
 def test_equations_for_other_programs_are_those_of_the_mechanisms():
     """Angular accelerations from seven angles and six closures against the general core with 21 coordinates."""
-    from gearfe.multibody.integrators import integrate
+    from gearfe.multibody import integrate
 
     from .mechanism_study import folding_angle, subject
     from .peers.mechanism_equations import equations

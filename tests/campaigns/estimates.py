@@ -117,7 +117,7 @@ def _run_trajectory(case: Case, job_path: Path) -> Found:
     from gearfe.mechanisms.job import output_times
     from gearfe.mechanisms.model import load_mechanism
     from gearfe.mechanisms.results import evaluate
-    from gearfe.multibody.integrators import integrate
+    from gearfe.multibody import integrate
 
     del case
     mechanism = load_mechanism(job_path)

@@ -21,8 +21,7 @@ from gearfe.mechanisms.error_estimate import trajectory_error
 from gearfe.mechanisms.job import output_times
 from gearfe.mechanisms.model import Mechanism, load_mechanism
 from gearfe.mechanisms.results import evaluate
-from gearfe.multibody import Start, Trajectory, consistent_start
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import Start, Trajectory, consistent_start, integrate
 
 from .campaign import Campaign, Case
 from .linkages import GRAVITY, KINDS, linkage

@@ -18,7 +18,7 @@ from gearfe.errors import InputError
 from gearfe.files import whole_set
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import trajectory_error
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import integrate
 from gearfe.multibody.series.timefunctions import smoothed_step
 
 from ..rigid_cases import folding_angle, folding_links, pendulum

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.multibody.integrators import integrate
+from gearfe.multibody import integrate
 from gearfe.runup.train_stability import train_stability
 from gearfe.train import TrainModel, TrainResponse, build_train, simulate
 from gearfe.train.kinematics import steady_forces

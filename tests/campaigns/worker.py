@@ -47,8 +47,7 @@ def run_case(campaign: Campaign, seed: int, number: int) -> Outcome:
 
 def compile_series() -> None:
     """Compile the series of mechanisms with a pendulum, before any run has a limit of time."""
-    from gearfe.multibody import Body, Gravity, Hinge, Linkage, System
-    from gearfe.multibody.integrators import integrate
+    from gearfe.multibody import Body, Gravity, Hinge, Linkage, System, integrate
 
     rod = Body("rod", 1.0, 0.1, (0.5, 0.0), (0.0, 0.0), 1.0)
     linkage = Linkage((rod,), (Hinge("rod", "ground"),), (Gravity((0.0, -9.81)),))

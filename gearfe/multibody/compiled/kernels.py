@@ -107,8 +107,8 @@ def _roots() -> list[Path]:
 def _made_by() -> Iterator[str]:
     """What decides compiled code beside its source: Python, the compiler, the processor."""
     yield sys.version
-    for maker in ("compiled.py", "native.py", "packed.py", "packed_type.py", "lanes.py", "lanes_type.py", "parts.py"):
-        yield Path(__file__).with_name(maker).read_text(encoding="utf-8")
+    for maker in sorted(Path(__file__).parent.glob("*.py")):
+        yield maker.read_text(encoding="utf-8")
     for name in ("numba", "llvmlite"):
         found = importlib.util.find_spec(name)
         place = Path(found.origin).parent / "_version.py" if found is not None and found.origin else None
