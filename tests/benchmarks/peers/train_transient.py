@@ -102,7 +102,7 @@ def compiled_rhs(modal: Any, forces: Any) -> Rhs:
     [(force, index)] = modal.system.forces
     names = {"np": np, "math": math}
     functions = (modal_rhs, time_series, train_law)
-    kernels = compiled.bind(functions, names, compiled=True, entries=("modal_rhs",))
+    kernels = compiled.bind(functions, names, entries=("modal_rhs",))
     W = np.ascontiguousarray((modal.T[index].T @ force.W).T)
     offset = np.atleast_1d(modal.origin[index] @ force.W)
     diagonal = np.diagonal(modal.damping).copy()
