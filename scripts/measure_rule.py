@@ -176,7 +176,7 @@ def written(kind: str, name: str, text: str, duration: float, tolerance: float =
         rows = "\n".join(f"{a},{0.02 * (1.0 - math.cos(a))}" for a in angle)
         (Path(folder) / "lift.csv").write_text("angle,lift\n" + rows + "\n", encoding="utf-8", newline="\n")
         path = Path(folder) / "mechanism.toml"
-        path.write_text(text, encoding="utf-8")
+        path.write_text(text, encoding="utf-8", newline="\n")
         made = load_mechanism(path)
     return Scene(kind, name, made.system, made.start(), duration, tolerance)
 
@@ -380,7 +380,7 @@ def main() -> None:
                 rows.append(measured(scene, args.patience))
                 print(repr(rows[-1]) if args.only else rows[-1].line(args.patience), flush=True)
     if not args.only:
-        PAGE.write_text(page(rows, args.patience), encoding="utf-8")
+        PAGE.write_text(page(rows, args.patience), encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

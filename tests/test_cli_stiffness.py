@@ -347,7 +347,7 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
         return made.with_status(np.where(bad, "not_converged", made.status))
 
     monkeypatch.setattr("gearfe.stiffness.positions.solve_elements", one_fails)
-    options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3", "--no-pictures")
+    options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, "--law", "nitsche", *options]) == 1
     assert [r["status"] for r in rows(tmp_path)] == ["converged", "not_converged", "converged"]
     assert {p.name for p in tmp_path.glob("stress_*.png")} == {"stress_3deg.png", "stress_9deg.png"}

@@ -187,6 +187,7 @@ def test_the_power_of_a_fast_motion():
             "transmission_error",
             "speed",
             "speed_absolute",
+            "drive_torque",
             "acceleration",
             "acceleration_absolute",
         )
