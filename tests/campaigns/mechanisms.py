@@ -74,8 +74,7 @@ def _checks(case: Case, mechanism: Mechanism, start: Start, made: Trajectory) ->
     energy = evaluate(mechanism, made).energy
     total = energy["total_J"]
     scale = max(float(energy["kinetic_J"].max()), float(np.ptp(energy["potential_J"])), 1e-12)
-    linkage = mechanism.system.linkage
-    assert linkage is not None
+    linkage = mechanism.linkage
     few = np.linspace(0, len(made.time) - 1, min(50, len(made.time))).astype(int)
     gap = max(float(np.abs(mechanism.system.residual(made.time[i], made.q[i])).max(initial=0.0)) for i in few)
     checks = [Check("energy", float(np.ptp(total)) / scale, turns * allowed)]
