@@ -14,14 +14,13 @@ from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.contact.laws import PairModel, law_named
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
-from gearfe.gear.deviation import Deviation
-from gearfe.gear.face import ToothDeviations, face_of
 from gearfe.gear.pair import TipRelief
 from gearfe.meshlaw.fit import touch_cubics
 from gearfe.meshlaw.law import MeshLaw
 from gearfe.meshlaw.make import _nodes as phase_nodes
 from gearfe.meshlaw.make import coupling_curve, mesh_law, touch_curve
 from gearfe.meshlaw.store import cached_law, load_law, save_law, write_law_csv
+from gearfe.stiffness.job import read_stiffness_job
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair
@@ -231,29 +230,45 @@ def test_a_lightly_loaded_relieved_pair() -> None:
         assert (off / np.maximum(true, 0.1 * force)).max() < 5e-3
 
 
-def test_touch_is_followed_where_pairs_change_under_light_loads() -> None:
-    """Profile slopes move the kinks of reliefs off the path's nodes, and a light load is carried by a small part of a
-    cell there: t is that of the rigid flanks to 1e-3 of the reach wherever a pair can be loaded.
+#: A light load on a pair whose slopes (`slope_um`) move the kinks of its reliefs off the nodes of the path of contact.
+LIGHT = """
+[pair]
+module_mm = 1.73
+pressure_angle_deg = 22.59
+face_width_mm = 30.0
+addendum = 1.0
+dedendum = 1.26
+rack_tip_radius = 0.096
+wheel = {teeth = 18, bore_diameter_mm = 15.76, profile_shift = -0.0114, tooth_thinning_um = 22.3}
+
+[pair.pinion]
+teeth = 76
+bore_diameter_mm = 29.22
+profile_shift = -0.381
+tip_round_mm = 0.098
+tip_relief_amount_um = 1.1
+tip_relief_length_mm = 0.554
+tip_relief_exponent = 2.0
+
+[microgeometry]
+torques_Nm = [0.000759]
+pinion = {slope_um = 0.186}
+wheel = {slope_um = -1.51, tip_relief_um = 5.32, tip_relief_length_mm = 1.19, tip_relief_shape = "arc"}
+"""
+
+
+def test_touch_is_followed_where_pairs_change_under_light_loads(tmp_path) -> None:
+    """A light load is carried by a small part of a cell where pairs change: the cubics of t are those of the rigid
+    flanks to 1e-3 of the reach wherever a pair can be loaded.
     """
-    form = {"module": 1.73e-3, "width": 30e-3, "tip_round": 0.1e-3}
-    geometry = gear_pair(76, 18, bore=0.3, **form)
-    deviations = []
-    for gear, slope, relief in ((geometry.pinion, 0.2e-6, 1e-6), (geometry.wheel, -1.5e-6, 5e-6)):
-        flank = face_of(gear).flank
-        begin, end = flank.start, flank.end
-        kink = end - 0.3 * (end - begin)
-        heights = [0.0, 0.7 * slope, slope - relief]
-        deviations.append(ToothDeviations((Deviation.straight([begin, kink, end], heights),)))
-    material = Material(5.5e9, 0.36)
-    elastic = elastic_pair(geometry, materials=(material, material), coarsen=2.0)
-    pair = half_plane_pair(elastic).deviated((deviations[0], deviations[1]))
-    reach = 1e-7
+    (tmp_path / "job.toml").write_text(LIGHT, encoding="utf-8")
+    pair = half_plane_pair(read_stiffness_job(tmp_path / "job.toml").elastic())
+    reach, cycle = 1e-7, pair.pair.mesh_cycle
     nodes, slots = phase_nodes(pair, reach)
-    ends = np.append((nodes[:-1] + geometry.mesh_cycle * np.arange(slots)[:, None]).ravel(), nodes[-1])
-    ends[-1] += (slots - 1) * geometry.mesh_cycle
+    ends = np.append((nodes[:-1] + cycle * np.arange(slots)[:, None]).ravel(), nodes[-1] + (slots - 1) * cycle)
     cubics = touch_cubics(touch_curve(pair, ends))
     angles = np.linspace(nodes[0], nodes[-1], 3001)[:-1]
-    phases = (angles + geometry.mesh_cycle * np.arange(slots)[:, None]).ravel()
+    phases = (angles + cycle * np.arange(slots)[:, None]).ravel()
     cell = np.searchsorted(ends, phases, side="right") - 1
     touch = np.sum(cubics[cell] * (phases - ends[cell])[:, None] ** np.arange(4), axis=1).reshape(slots, -1)
     true = touch_curve(pair, phases).value.reshape(slots, -1)
