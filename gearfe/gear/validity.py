@@ -183,12 +183,13 @@ def _tips_ratio(pair: MeshGeometry, *, rounded: bool) -> float:
 def _check_ratio(pair: MeshGeometry) -> None:
     nominal, active = _tips_ratio(pair, rounded=False), pair.contact_ratio_active
     if nominal < 1.0:
+        gear: Gear
         problem = f"gives a contact ratio of {nominal:.4g}, must be >= 1"
         if pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch:
             raise InputError("centre_distance", pair.centre_distance, problem, "use a smaller centre distance")
         problem, cure = f"gives a contact ratio of {nominal:.4g} < 1", "use less tip_shortening, or more teeth"
         name = min(("pinion", "wheel"), key=lambda name: getattr(pair, name).addendum)
-        gear: Gear = getattr(pair, name)
+        gear = getattr(pair, name)
         roll = gear.profile.tip_roll + (1.0 - nominal) * pair.base_pitch
         more = (math.hypot(gear.base_radius, roll) - gear.tip_radius) / gear.module
         raise InputError(f"{name}.addendum", gear.addendum, problem, cure, (">=", gear.addendum + more, ""))
@@ -201,7 +202,7 @@ def _check_ratio(pair: MeshGeometry) -> None:
         raise InputError(f"{name}.tip_round", getattr(pair, name).tip_round, problem, "use a smaller tip round")
     cuts = {name: lost for name, lost in _lost_to_form_points(pair).items() if lost > 0.0}
     name = max(cuts, key=cuts.__getitem__)
-    gear: Gear = getattr(pair, name)
+    gear = getattr(pair, name)
     problem = f"leaves an undercut root that eats the path of contact: contact ratio {active:.4g}, must be >= 1"
     cure = f"use more profile shift (no undercut from {least_shift(gear):.4g} on), more teeth or less dedendum"
     raise InputError(f"{name}.profile_shift", gear.profile_shift, problem, cure)

@@ -109,7 +109,7 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
     return replace(law, backlash=geometry.normal_backlash, error=error)
 
 
-def _places(begin: Array, width: Array, parts: Sequence[float]) -> Array:
+def _places(begin: Array, width: Array, parts: Sequence[float] | Array) -> Array:
     """Angles (rad) at these parts of the width of each cell, cell by cell."""
     angles: Array = (begin[:, None] + width[:, None] * np.array(parts)).ravel()
     return angles

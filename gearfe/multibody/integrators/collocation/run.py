@@ -296,11 +296,11 @@ class Stepper:
                 parts[block, :, carried] = force_path @ found / own ** np.arange(s)[:, None]
             known[block] = forces[block] = [self.w.known[:0]] * len(whole)  # their memory is free
         ends = np.array(accelerations) if parts is None else None
-        for k in np.flatnonzero(short):
-            a = [_before(coefficients, h[:, 0, 0], int(k), short)] * 2 if ends is None else ends[k : k + 2]
-            coefficients[k] = _line_of_accelerations(len(path), h[k, 0, 0], known_ends[k], a)
+        for k in map(int, np.flatnonzero(short)):
+            both = ends[k : k + 2] if ends is not None else np.array([_before(coefficients, h[:, 0, 0], k, short)] * 2)
+            coefficients[k] = _line_of_accelerations(len(path), h[k, 0, 0], known_ends[k], both)
             if parts is not None:
-                force = _before(parts, h[:, 0, 0], int(k), short, 0)
+                force = _before(parts, h[:, 0, 0], k, short, 0)
                 parts[k], parts[k, 0] = 0.0, force
         if parts is None:
             return Polynomials(times, coefficients, origins=middles)
