@@ -28,7 +28,7 @@ sys.path.insert(0, sys.argv[1])
 import little_kernels as k
 import numpy as np
 from typing import Any, NamedTuple
-from gearfe.multibody import compiled
+from gearfe.multibody.compiled import kernels as compiled
 from gearfe.multibody.compiled.packed import Packed
 class Numbers(NamedTuple):
     x: float
