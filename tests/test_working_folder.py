@@ -81,7 +81,7 @@ def hostile(folder: Path, names: set[str]) -> Path:
 
 def jobs(folder: Path) -> None:
     """Jobs for all commands beside them."""
-    for path in (JOBS / "gear_train.toml", JOBS / "slider_crank.toml", *(JOBS.parent / "meshes").glob("box.*")):
+    for path in (JOBS / "gear_train.toml", *JOBS.glob("slider_crank*"), *(JOBS.parent / "meshes").glob("box.*")):
         shutil.copy(path, folder)
     written(folder)
     (folder / "search.toml").write_text(SEARCH)
