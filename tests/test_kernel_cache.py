@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
+import weakref
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import pytest
 
 from gearfe.multibody.compiled import kernels as compiled
+from gearfe.multibody.compiled.object_code import Entry
+from gearfe.multibody.compiled.packed import Layout, Packed
+from gearfe.typing import Array
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNELS = """
@@ -119,3 +127,31 @@ def test_a_command_compiles_them(tmp_path: Path) -> None:
 
     assert "compiling the kernels" in said("cache", "--compile")
     assert "compiling" not in said(*andrews)
+
+
+class Numbers(NamedTuple):
+    """One array, as a block."""
+
+    out: Array
+
+
+class Read(Entry):
+    """An entry without machine code: it takes the addresses of its blocks."""
+
+    def _link(self, layouts: tuple[Layout, ...]) -> Callable[..., int]:
+        return lambda *addresses: len(addresses)
+
+
+def test_a_bound_call_keeps_the_memory_of_its_blocks() -> None:
+    """Machine code has only addresses: with the block freed before the call it wrote into others' memory."""
+    entry = Read("entry", None, lambda _: pytest.fail("nothing is compiled"))
+    block = Packed(Numbers(np.zeros(1)))
+    alive = weakref.ref(block)
+    run = entry.on(block)
+    del block
+    gc.collect()
+    assert alive() is not None
+    assert run() == 1
+    del run
+    gc.collect()
+    assert alive() is None

@@ -43,6 +43,17 @@ class ObjectCode:
     calls: tuple[str, ...]
 
 
+class _Call:
+    """A call of compiled code. It owns its blocks: compiled code knows addresses alone, which keep nothing alive."""
+
+    def __init__(self, function: Callable[..., int], blocks: tuple[Packed, ...]) -> None:
+        self._function, self._blocks = function, blocks
+        self._addresses = [block.address for block in blocks]
+
+    def __call__(self) -> int:
+        return self._function(*self._addresses)
+
+
 @dataclass(eq=False)
 class Entry:
     """A compiled function of blocks that returns an integer; compiled or read for each layout of its blocks.
@@ -68,14 +79,13 @@ class Entry:
         return self.on(*blocks)()
 
     def on(self, *blocks: Packed) -> Callable[[], int]:
-        """The function of these blocks, for many calls."""
+        """The function of these blocks, for many calls; it keeps the blocks, whose memory the compiled code reads."""
         layouts = tuple(block.layout for block in blocks)
         if layouts not in self._linked:
             with _LINKING:
                 if layouts not in self._linked:  # another thread was not first
                     self._linked[layouts] = self._link(layouts)
-        function, addresses = self._linked[layouts], [block.address for block in blocks]
-        return lambda: function(*addresses)
+        return _Call(self._linked[layouts], blocks)
 
     def _link(self, layouts: tuple[Layout, ...]) -> Callable[..., int]:
         path = None if self.folder is None else self.folder / f"{self.name}-{_digest(repr(layouts).encode())[:16]}.o"
