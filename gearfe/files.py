@@ -44,8 +44,10 @@ SUMMARY, KEPT_LATER = "summary.json", ("report.html", "tables.npz", "tables.h5",
 _records: list[list[tuple[Path, list[str]]]] = []
 
 
-def read_text(path: str | Path, field: str) -> str:
+def read_text(path: str | Path, field: str, *, foreign: bool = False) -> str:
     """Text of a file; `field` names it in messages.
+
+    Text of another program (`foreign`) may be Windows-1252 or Latin-1, as comments of older pre-processors are.
 
     Raises
     ------
@@ -72,14 +74,23 @@ def read_text(path: str | Path, field: str) -> str:
     try:
         return raw.removeprefix(codecs.BOM_UTF8).decode()
     except UnicodeDecodeError as error:
+        if foreign:
+            return raw.decode(_single_bytes(raw)[1], "replace")
         raise InputError(field, str(path), *_encoding_problem(raw, error.start)) from None
+
+
+def _single_bytes(raw: bytes) -> tuple[str, str]:
+    """Return the name and codec of text with one byte a character.
+
+    Latin-1 has control characters where Windows-1252 has letters and quotes.
+    """
+    return ("Windows-1252", "cp1252") if any(0x80 <= byte < 0xA0 for byte in raw) else ("Latin-1", "latin-1")
 
 
 def _encoding_problem(raw: bytes, at: int) -> tuple[str, str]:
     """What bytes that are no UTF-8 are, and the cure; the first wrong one stands at `at`."""
     line = raw.count(b"\n", 0, at) + 1
-    # Latin-1 has control characters where Windows-1252 has letters and quotes
-    name, codec = ("Windows-1252", "cp1252") if any(0x80 <= byte < 0xA0 for byte in raw) else ("Latin-1", "latin-1")
+    name, codec = _single_bytes(raw)
     letter = raw[at : at + 1].decode(codec, "replace")
     return f"is not UTF-8 but, it seems, {name}: line {line} has {letter!r} as byte {raw[at]:#x}", "save it as UTF-8"
 

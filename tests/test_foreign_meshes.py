@@ -233,6 +233,8 @@ CARDS = {
     "*NODES": r"did you mean \*NODE",
     "*ELEMENTS, TYPE=C3D10": r"did you mean \*ELEMENT",
     "*ELEMENT, TYPE=MASS\n1, 1": "elements of type MASS are not supported",
+    "*ADJUST, NODE SET=a": r"\*ADJUST makes or moves nodes",
+    "*FOUNDATION\na, F1, 5.": r"\*FOUNDATION adds mass or stiffness",
     "*ELEMENT, TYPE=B31\n1, 1, 2": "elements of type B31 are not supported",
     "*NODE, SYSTEM=S": "system 'S'",
     "*NODE\n1, 5., 5., 5.": "node 1 is defined twice",
@@ -450,6 +452,54 @@ def test_entries_that_are_refused_by_name(entry, plain, tmp_path) -> None:
 
 
 # ---- files that are damaged ----
+
+
+@pytest.mark.parametrize("codec", ["utf-8", "latin-1", "cp1252"])
+@pytest.mark.parametrize("ending", ["inp", "bdf"])
+def test_comments_in_any_encoding(codec, ending, plain, tmp_path) -> None:
+    """Pre-processors write comments, and names of sets, in the encoding of their system."""
+    nodes, tets = plain
+    text = f"** Geh\u00e4use\n*NODE\n{node_lines(nodes)}*ELEMENT, TYPE=C3D10\n{tet_lines(tets)}"
+    text += f"*NSET, NSET=F\u00fc\u00dfe\n{rows(top(nodes))}"
+    path = tmp_path / f"a.{ending}"
+    path.write_bytes((text if ending == "inp" else "$ Geh\u00e4use\n" + bulk(nodes, tets, "", "")).encode(codec))
+    mesh = read_mesh_file(path, "mesh", 1.0)
+    if ending == "inp":
+        same(mesh, plain, "F\u00fc\u00dfe")
+    assert mesh.tets.shape == tets.shape
+
+
+def test_numbers_of_physical_groups_that_meshio_converts(plain, tmp_path) -> None:
+    """gmsh's physical groups become cell data of that name; its numbers of surfaces are no groups."""
+    nodes, tets = plain
+    half = np.where(nodes[tets].mean(axis=1)[:, 0] < 15.0, 1, 2)
+    other = np.ones(len(tets), dtype=int)
+    data = {"gmsh:physical": [half], "gmsh:geometrical": [other]}
+    meshio.write(tmp_path / "a.vtu", meshio.Mesh(nodes, [("tetra10", tets)], cell_data=data))
+    groups = read_mesh_file(tmp_path / "a.vtu", "mesh", 1.0).groups
+    assert groups.keys() == {"1", "2"}
+    np.testing.assert_array_equal(groups["2"], np.unique(tets[half == 2]))
+
+
+def test_marks_are_0_and_1_in_all_blocks_of_a_file(plain, tmp_path) -> None:
+    """An array of numbers that are 1 in one block only is no group."""
+    nodes, tets = plain
+    cells = [("triangle6", tets[:3, [0, 1, 2, 4, 5, 6]]), ("tetra10", tets)]
+    numbers = [np.array([1, 2, 3]), np.ones(len(tets), dtype=int)]
+    marks = [np.array([1, 0, 1]), np.zeros(len(tets), dtype=int)]
+    meshio.write(tmp_path / "a.vtu", meshio.Mesh(nodes, cells, cell_data={"part": numbers, "wall": marks}))
+    groups = read_mesh_file(tmp_path / "a.vtu", "mesh", 1.0).groups
+    assert groups.keys() == {"wall"}
+    np.testing.assert_array_equal(groups["wall"], np.unique(cells[0][1][[0, 2]]))
+
+
+def test_no_bare_word_of_a_library(plain, tmp_path) -> None:
+    """Mixed XDMF of the second order is beyond meshio, which raises KeyError(36)."""
+    nodes, tets = plain
+    cells = [("triangle6", tets[:3, [0, 1, 2, 4, 5, 6]]), ("tetra10", tets)]
+    meshio.write(tmp_path / "a.xdmf", meshio.Mesh(nodes, cells), data_format="XML")
+    with pytest.raises(InputError, match=r"cannot be read as a \.xdmf file \(it has .* that meshio does not know\)"):
+        read_mesh_file(tmp_path / "a.xdmf", "mesh", 1.0)
 
 
 def test_a_node_number_beyond_the_nodes(tmp_path) -> None:

@@ -115,7 +115,7 @@ def read_matrix(path: Path, field: str, initial: str = "K") -> Matrix:
     """
     if path.suffix.lower() in (".op2", ".op4"):
         return _made(_chosen(read_nastran(path, field), path, field, initial), field, path)
-    text = read_text(path, field)
+    text = read_text(path, field, foreign=True)
     if text.lstrip().lower().startswith("%%matrixmarket"):
         return Matrix(_whole(_checked(read_market(text, path, field), field, path)), [])
     if is_substructure(text):

@@ -21,7 +21,7 @@ _RIGID = "delete it: bores are rigid by [[housing.bores]], held faces by [[housi
 _SOLID = "delete it with its elements if it does not matter, or model it by solid elements"
 _MERGE = "merge the meshes so that the parts share their nodes, then delete it"
 REFUSED = {
-    **dict.fromkeys(("NGEN", "NFILL", "NCOPY", "NMAP"), ("makes or moves nodes", _WRITE)),
+    **dict.fromkeys(("NGEN", "NFILL", "NCOPY", "NMAP", "ADJUST"), ("makes or moves nodes", _WRITE)),
     **dict.fromkeys(("ELGEN", "ELCOPY", "SYMMETRICMODELGENERATION", "MODELCHANGE"), ("changes the elements", _WRITE)),
     **dict.fromkeys(("IMPERFECTION", "IMPORT", "IMPORTNODESET", "IMPORTELSET"), ("takes data of another run", _WRITE)),
     **dict.fromkeys(("PARAMETER", "MANIFEST"), ("replaces text of the file", "write numbers and names in full")),
@@ -33,7 +33,17 @@ REFUSED = {
         ("ties nodes to each other", _RIGID),
     ),
     **dict.fromkeys(
-        ("MASS", "ROTARYINERTIA", "NONSTRUCTURALMASS", "SPRING", "DASHPOT", "JOINT", "CONNECTORSECTION", "GAP"),
+        (
+            "MASS",
+            "ROTARYINERTIA",
+            "NONSTRUCTURALMASS",
+            "SPRING",
+            "DASHPOT",
+            "JOINT",
+            "CONNECTORSECTION",
+            "GAP",
+            "FOUNDATION",
+        ),
         ("adds mass or stiffness", _SOLID),
     ),
     **dict.fromkeys(

@@ -72,7 +72,7 @@ def _expanded(path: Path, field: str, inclusion: Callable[[str], Inclusion | Non
     def expand(file: Path, above: tuple[Path, ...]) -> Iterator[Line | Path]:
         nonlocal files, size
         files += 1
-        text = read_text(file, field)
+        text = read_text(file, field, foreign=True)
         size += len(text)
         if files > MOST_FILES or size > LARGEST:
             problem = f"includes more than {MOST_FILES} files or {LARGEST >> 20} MB"

@@ -21,7 +21,9 @@ from ..typing import Array, IntArray
 from .source import SourceMesh
 
 #: Arrays of whole numbers by which formats number groups without a name.
-NUMBERED = ("medit:ref", "nastran:ref", "ref", "cell_tags", "point_tags", "avsucd:material")
+NUMBERED = ("medit:ref", "nastran:ref", "ref", "cell_tags", "point_tags", "avsucd:material", "gmsh:physical")
+#: Arrays of numbers that name no groups.
+OTHER_NUMBERS = ("gmsh:geometrical", "gmsh:dim_tags")
 
 
 def read_by_meshio(path: Path, field: str) -> SourceMesh:
@@ -61,10 +63,14 @@ def read_by_meshio(path: Path, field: str) -> SourceMesh:
             cure = "export .vtu, .msh, .inp, .bdf, .med or .unv, or the CAD model as .step"
             raise InputError(field, path.name, "has an ending that is not known", cure) from None
         lines = [line.strip() for line in [*printed.getvalue().splitlines(), str(error)] if line.strip()]
-        reason = next((line for line in lines if "Couldn't read" not in line and line != "1"), type(error).__name__)
+        # a number or the name of an exception, as meshio prints where it meets an unknown kind, explains nothing
+        reason = next((line for line in lines if "Couldn't read" not in line and len(line.split()) > 1), "")
+        reason = reason or "it has a form, or a kind of element, that meshio does not know"
         problem = f"cannot be read as a {path.suffix} file ({reason[:200]})"
         others = [name for name in (".vtu", ".msh", ".inp", ".bdf") if name != path.suffix.lower()]
         cure = f"the file may be cut short or damaged: export it again, or as {', '.join(others)}"
+        if path.suffix.lower() == ".dat":
+            cure = "name bulk data of Nastran .bdf, and input files of Abaqus or CalculiX .inp"
         raise InputError(field, path.name, problem, cure) from None
 
 
@@ -117,16 +123,21 @@ def _groups(mesh: Any) -> Iterator[tuple[str, IntArray]]:
         for tag, own in (tags or {}).items():
             names.setdefault(int(tag), []).extend(own)
     for key, blocks in mesh.cell_data.items():
-        for block, values in zip(mesh.cells, blocks, strict=False):
-            for name, rows in _rows(key, np.asarray(values), names):
-                yield name, block.data[rows]
+        if len({np.asarray(values).shape[1:] for values in blocks}) != 1:
+            continue
+        begins = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
+        for name, rows in _rows(key, np.concatenate(blocks), names):
+            for block, begin, end in zip(mesh.cells, begins, begins[1:], strict=False):
+                inside = rows[(rows >= begin) & (rows < end)] - begin
+                if len(inside):
+                    yield name, block.data[inside]
     for key, values in mesh.point_data.items():
         yield from _rows(key, np.asarray(values), names)
 
 
 def _rows(key: str, values: Array, names: dict[int, list[str]]) -> Iterator[tuple[str, IntArray]]:
     """Groups of one array: its numbers, where they are known to be groups; else, of marks 0 and 1, its own name."""
-    if values.ndim != 1:
+    if values.ndim != 1 or key in OTHER_NUMBERS:
         return
     if key in NUMBERED:
         for number in np.unique(values[values != 0]):

@@ -54,7 +54,7 @@ def read_measured(job: TrainJob) -> tuple[Measured, ...]:
 def _read(one: MeasuredTable, where: str, folder: Path) -> tuple[Array, Array, bool]:
     """Abscissa, accelerations, and whether they are over the time."""
     if Path(one.file).suffix.lower() in (".uff", ".unv", ".uf58"):
-        return read_universal(read_text(folder / one.file, where), one.number, where)
+        return read_universal(read_text(folder / one.file, where, foreign=True), one.number, where)
     columns = read_numbers(folder / one.file, where, (VALUE,), ("time_s", "frequency_Hz"))
     over = next((name for name in ("time_s", "frequency_Hz") if name in columns), None)
     if over is None:
