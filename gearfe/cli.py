@@ -164,7 +164,7 @@ def _watch_tables() -> list[str]:
     """Print from now on what the writer of tables warns of, which is no success; the list gets these sentences."""
     import warnings
 
-    from .errors import NotFiniteWarning
+    from .errors import NotFiniteWarning, UnitWarning
 
     messages: list[str] = []
     other = warnings.showwarning
@@ -177,13 +177,33 @@ def _watch_tables() -> list[str]:
         print(f"gearfe: warning: {message}", file=sys.stderr)
 
     warnings.simplefilter("always", NotFiniteWarning)
+    warnings.simplefilter("ignore", UnitWarning)  # said by the names of the job's keys
     warnings.showwarning = show
     return messages
+
+
+def _doubt(parsed: argparse.Namespace) -> None:
+    """Print which values of the job look as if they were in another unit: the run may not begin, or not end."""
+    from contextlib import suppress
+
+    from .commands.arguments import job_of
+    from .config import read_toml
+    from .errors import InputError
+    from .suspects import suspects
+
+    job = job_of(parsed)
+    if job is None:
+        return
+    with suppress(InputError):  # the command reports what is wrong with the file
+        for sentence in suspects(read_toml(job)):
+            print(f"gearfe: warning: {sentence}", file=sys.stderr, flush=True)
 
 
 def _run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Namespace, line: list[str]) -> int:
     """Run a command, print as its options say, and keep the results in the requested forms."""
     from .progress import shown
+
+    _doubt(parsed)
 
     as_json, report = getattr(parsed, "json", False), getattr(parsed, "report", False)
     if not (parsed.format or as_json or report or parsed.quiet):

@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 
 from .errors import InputError, nearest, unknown_key
 from .files import read_text
+from .suspects import other_unit
 
 T = TypeVar("T")
 
@@ -366,4 +367,5 @@ def check_range(number: float, label: str, meta: Any) -> None:
             f"of a size up to {largest:.3g}" if largest < abs(number) < math.inf and not (right and number > 0) else ""
         )
         allowed = " and ".join(part for part in ("finite", left, right, size) if part)
-        raise InputError(label, number, f"must be {allowed}", meta.get("doc", ""))
+        cure = other_unit(label.rpartition(".")[2], number) or meta.get("doc", "")
+        raise InputError(label, number, f"must be {allowed}", cure)

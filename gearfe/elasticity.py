@@ -10,12 +10,14 @@ Find :math:`u` with :math:`-\nabla\cdot\sigma(u) = 0`,
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from .errors import InputError
+from .errors import InputError, UnitWarning
+from .suspects import beyond, other_unit
 from .typing import Array, IntArray
 
 Plane = Literal["strain", "stress"]
@@ -39,6 +41,16 @@ class Material:
         nu (-), between -1 and 0.5.
     density
         rho (kg/m3).
+
+    Raises
+    ------
+    InputError
+        For values that no material has.
+
+    Warns
+    -----
+    UnitWarning
+        For values that are likely in another unit.
     """
 
     youngs_modulus: float = 200e9
@@ -51,6 +63,11 @@ class Material:
             value = getattr(self, name)
             if not low < value < high:
                 raise InputError(name, value, f"must lie between {low:g} and {high:g} (both excluded)", "use SI units")
+        for key, value in (("youngs_modulus_GPa", 1e-9 * self.youngs_modulus), ("density_kg_per_m3", self.density)):
+            if other_unit(key, value):
+                name, unit = ("youngs_modulus", "Pa") if key.endswith("GPa") else ("density", "kg/m3")
+                text = f"Material: {name} = {getattr(self, name):g} {unit}, {beyond(key, value)}: use SI units"
+                warnings.warn(text, UnitWarning, stacklevel=3)
 
     @property
     def shear_modulus(self) -> float:

@@ -112,6 +112,10 @@ class NotFiniteWarning(UserWarning):
     """A table that was written holds numbers that are infinite, or none where there must be one."""
 
 
+class UnitWarning(UserWarning):
+    """A value is likely in another unit than that of its argument."""
+
+
 class MissingLibraryError(RuntimeError):
     """A system library or optional package is absent; the message says how to install it."""
 

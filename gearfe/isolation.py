@@ -6,8 +6,8 @@ entry of ``PYTHONPATH`` means it, and child processes do so again (multiprocessi
 Libraries read settings there: matplotlib ``matplotlibrc``, numba ``.numba_config.yaml``, ezdxf ``ezdxf.ini``.
 
 What Python itself loads before the first line of the program is out of reach: some modules of the standard library for
-``python -m gearfe``, and ``sitecustomize`` with a relative ``PYTHONPATH``. The program ``gearfe`` and ``python -P -m
-gearfe`` have no such gap.
+``python -m gearfe``, and ``encodings`` and ``sitecustomize`` with a relative ``PYTHONPATH``. Without such an entry, the
+program ``gearfe`` and ``python -P -m gearfe`` have no such gap.
 
 This module and the package's first lines import nothing that is not loaded already, not even ``__future__``.
 """

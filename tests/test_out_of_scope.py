@@ -10,9 +10,10 @@ import pytest
 
 from gearfe.cli import main
 from gearfe.config import read_toml
-from gearfe.errors import LONGEST_MESSAGE, OUT_OF_SCOPE, InputError
+from gearfe.elasticity import Material
+from gearfe.errors import LONGEST_MESSAGE, OUT_OF_SCOPE, InputError, UnitWarning
 from gearfe.gear.curves import inverse_inv
-from gearfe.mechanisms.suspects import suspects
+from gearfe.suspects import suspects
 from gearfe.tables.pair import GearTable, PairTable, ToothFormTable
 from gearfe.tables.train import TrainShaftTable, TrainTable
 
@@ -188,6 +189,67 @@ def test_units_are_suspected_by_name(
     assert f"gearfe: warning: {remark}" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["andrews", "slider_crank", "elastic_coupler", "elastic_slider_crank"])
-def test_shipped_mechanisms_are_not_suspected(name: str) -> None:
-    assert suspects(read_toml(Path(JOB).parent / f"{name}.toml")) == []
+PAIR = """[pair]
+module_mm = 3.0
+pressure_angle_deg = 20.0
+face_width_mm = 20.0
+pinion = { teeth = 23, bore_diameter_mm = 20.0 }
+wheel = { teeth = 41, bore_diameter_mm = 20.0 }
+[pair.material]
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "remark"),
+    [
+        ("youngs_modulus_GPa = 210000.0", "is stiffer than diamond; if it is in MPa, write 210"),
+        ("youngs_modulus_GPa = 70e9", "is stiffer than diamond; if it is in Pa, write 70"),
+        ("youngs_modulus_GPa = 0.00021", "is softer than rubber"),
+        ("density_kg_per_m3 = 785000", "is denser than any solid"),
+        ("density_kg_per_m3 = 7.85", "is lighter than any solid; if it is in g/cm3, write 7850"),
+        ("density_kg_per_m3 = 7.85e-9", "is lighter than any solid; if it is in t/mm3, write 7850"),
+        ("density_kg_per_m3 = 2.7e-6", "is lighter than any solid; if it is in kg/mm3, write 2700"),
+    ],
+)
+def test_materials_are_suspected_by_name(
+    line: str, remark: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    job = tmp_path / "pair.toml"
+    job.write_text(PAIR + line + "\n", encoding="utf-8")
+    main(["gear", str(job), "--out", str(tmp_path / "out"), "--no-pictures"])
+    errors = capsys.readouterr().err
+    key, number = line.split(" = ")
+    assert f"gearfe: warning: pair.material.{key} = {float(number):g} {remark}" in errors
+    cure = remark.partition("; ")[2]
+    if "error" in errors:  # beyond the range of the key: the error has the same cure
+        assert errors.strip().endswith(cure)
+
+
+@pytest.mark.parametrize("values", [{"youngs_modulus": 210e3}, {"density": 7.85}, {"density": 7.85e-9}])
+def test_materials_of_the_python_interface_are_suspected(values: dict[str, float]) -> None:
+    """The modulus in MPa, and the density in g/cm3 or t/mm3, where SI units are expected."""
+    with pytest.warns(UnitWarning, match="use SI units"):
+        Material(**values)
+
+
+def test_angles_of_joints_that_may_be_degrees() -> None:
+    raw = {
+        "joints": {
+            "drive": {"coordinate": "angle", "motion": {"constant": 45, "step": 90.0, "polynomial": [0.0, 300.0]}},
+            "turn": {"coordinate": "angle", "motion": 20.0 * math.pi},
+            "slide": {"coordinate": "x", "motion": 45.0},
+        },
+        "forces": {"spring": {"coordinate": "angle", "reference": 30.0}},
+        "start": {"positions": {"angle(crank)": 180.0, "x(rod.B)": 12.0}},
+    }
+    names = [text.partition(" = ")[0] for text in suspects(raw)]
+    assert names == [
+        "joints.drive.motion.constant", "joints.drive.motion.step", "forces.spring.reference",
+        "start.positions.angle(crank)",
+    ]  # fmt: skip
+    assert "write 0.785398163 rad" in suspects(raw)[0]
+
+
+def test_no_shipped_job_is_suspected() -> None:
+    for job in sorted(Path(JOB).parent.glob("*.toml")):
+        assert suspects(read_toml(job)) == [], job.name

@@ -47,15 +47,13 @@ def run(args: argparse.Namespace) -> int:
         file = replace(file, run=replace(file.run, sensitivities=tuple(args.sensitivity)))
     file.run.check("run")
 
-    from ..config import read_toml
     from ..files import recorded
     from ..mechanisms.job import run_mechanism
     from ..mechanisms.links import doubts
     from ..mechanisms.model import make_mechanism
-    from ..mechanisms.suspects import suspects
     from ..progress import announce
 
-    for doubt in (*suspects(read_toml(args.file)), *doubts(file)):  # the run may not begin, or not end
+    for doubt in doubts(file):  # the run may not begin, or not end
         announce(f"warning: {doubt}")
     mechanism = make_mechanism(file, Path(args.file))
     run: Callable[..., Outcome]
