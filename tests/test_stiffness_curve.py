@@ -178,3 +178,27 @@ def test_a_file_that_contradicts_itself_one_mesh_cycle_on(tmp_path) -> None:
         StiffnessCurve.from_csv(path, mesh_cycle=math.radians(18.0))
     path.write_text(text.replace("18,5e+08\n20,1e+07", "18,1.001e+08\n20,1e+08"), encoding="utf-8")
     assert StiffnessCurve.from_csv(path, mesh_cycle=math.radians(18.0)).interpolant().mean == pytest.approx(1e8)
+
+
+@pytest.mark.parametrize(
+    ("column", "cells", "message"),
+    [
+        ("mesh_cycle_deg", ("18", "18", "20"), r"mesh_cycle_deg holds 18 and 20, but the whole curve has one value"),
+        ("wheel_base_radius_mm", ("30", "", "31"), r"wheel_base_radius_mm holds 30 and 31"),
+        ("contact_law", ("half_plane", "half_plane", "penalty"), r"contact_law holds half_plane and penalty"),
+        # 1e8 N/m at a base radius of 30 mm are 9e4 N m/rad
+        ("k_torsional_Nm_per_rad", ("9e4", "9e4", "1.8e5"), r"row 3 has k_torsional 180000 N m/rad and k_mesh 1e\+08"),
+    ],
+)
+def test_columns_that_contradict_each_other(column, cells, message, tmp_path) -> None:
+    path = tmp_path / "curve.csv"
+    table = {"pinion_angle_deg": ("0", "6", "12"), "k_mesh_N_per_m": ("1e8",) * 3, "mesh_cycle_deg": ("18",) * 3}
+    table |= {"wheel_base_radius_mm": ("30",) * 3, column: cells}
+    lines = [",".join(row) for row in (table, *zip(*table.values(), strict=True))]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        StiffnessCurve.from_csv(path)
+    table[column] = cells[:1] * 3
+    lines = [",".join(row) for row in (table, *zip(*table.values(), strict=True))]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert StiffnessCurve.from_csv(path).mesh_cycle == pytest.approx(math.radians(18.0))

@@ -26,7 +26,7 @@ from ..errors import InputError, shown, unknown_name
 from ..files import read_csv, write_csv
 from ..shown import ShownTable
 from ..typing import Array, BoolArray, IntArray
-from .periodic import PeriodicInterpolant, ValueAndSlope, check_repeats, periodic_interpolant
+from .periodic import AGREEING, PeriodicInterpolant, ValueAndSlope, check_repeats, periodic_interpolant
 
 #: Suffix of a column name -> factor from SI to that unit; other columns are in SI.
 _FACTORS = {"_deg": 180.0 / math.pi, "_um": 1e6, "_mm": 1e3, "_MPa": 1e-6}
@@ -68,6 +68,8 @@ SOLVED = ("converged", "no_contact")
 EDGES = ("none", "rounded", "singular")
 ROUNDED, SINGULAR = 1, 2
 
+#: Constants of a table differ by no more than rounding to 12 digits (-).
+SAME = 1e-11
 #: Problem of a table without a mesh cycle.
 NO_CYCLE = "does not say what its mesh cycle is"
 
@@ -289,10 +291,7 @@ class StiffnessCurve(ShownTable):
         InputError
             When the file is not such a table, says nothing of the mesh cycle, or contradicts itself one mesh cycle on.
         """
-        columns = read_csv(path, "stiffness curve")
-        curve = cls.from_columns(columns, path, mesh_cycle=mesh_cycle, base_radius=base_radius)
-        check_repeats(curve.pinion_angle, curve.k_mesh, curve.mesh_cycle, str(path))
-        return curve
+        return cls.from_columns(read_csv(path, "stiffness curve"), path, mesh_cycle=mesh_cycle, base_radius=base_radius)
 
     @classmethod
     def from_columns(
@@ -306,18 +305,51 @@ class StiffnessCurve(ShownTable):
         for own, column in COLUMNS.items():
             if column.name in columns and own not in values:
                 found = _values(columns, column, path)
-                values[own] = found[0] if column.constant else found
+                values[own] = _constant(found, column.name, path) if column.constant else found
         if not (math.isfinite(values.get("mesh_cycle", math.nan)) and values["mesh_cycle"] > 0):
             cure = "add a column mesh_cycle_deg (360 deg/pinion teeth), or give mesh_cycle"
             raise InputError("stiffness curve", str(path), NO_CYCLE, cure)
         values.setdefault("status", np.where(np.isfinite(values["k_mesh"]), "converged", "missing"))
         shares = [numbers(columns, name, path) for name in columns if name.startswith(SHARE)]
         values["load_share"] = np.stack(shares, axis=1) if shares else np.zeros((len(values["k_mesh"]), 0))
-        return cls(**values)
+        curve = cls(**values)
+        curve._check_ratio(str(path))
+        check_repeats(curve.pinion_angle, curve.k_mesh, curve.mesh_cycle, str(path))
+        return curve
+
+    def _check_ratio(self, path: str) -> None:
+        """Raise `InputError` where k_torsional and k_mesh do not differ by the factor r_b^2 of the wheel."""
+        rows = np.flatnonzero(np.isfinite(self.k_torsional) & (self.k_mesh > 0.0))
+        if not len(rows):
+            return
+        squares = self.k_torsional[rows] / self.k_mesh[rows]
+        right = self.base_radius**2 if math.isfinite(self.base_radius) else float(np.median(squares))
+        off = np.abs(squares / right - 1.0) if right > 0.0 else np.full(len(rows), np.inf)
+        worst = int(off.argmax())
+        if off[worst] > AGREEING:
+            row = rows[worst]
+            problem = (
+                f"contradicts itself: row {row + 1} has k_torsional {self.k_torsional[row]:.6g} N m/rad and k_mesh "
+                f"{self.k_mesh[row]:.6g} N/m, whose ratio is the squared base radius of the wheel, {right:.6g} m2"
+            )
+            raise InputError("stiffness curve", path, problem, "correct one of the columns, or leave one out")
 
 
 #: Field -> its column, in the order of the table but for the shares.
 COLUMNS: dict[str, Column] = {own.name: own.metadata["column"] for own in fields(StiffnessCurve) if own.metadata}
+
+
+def _constant(values: Array, name: str, path: str | Path) -> Any:
+    """The value that all rows of a column of a constant have; rows without one say nothing."""
+    known = values[np.isfinite(values)] if values.dtype.kind == "f" else values[values != ""]
+    if not len(known):
+        return values[0]
+    other = known != known[0] if values.dtype.kind == "U" else np.abs(known - known[0]) > SAME * np.abs(known[0])
+    if other.any():
+        said = as_text(np.array([known[0], known[int(other.argmax())]]), name)
+        problem = f"column {name} holds {said[0]} and {said[1]}, but the whole curve has one value"
+        raise InputError("stiffness curve", str(path), problem, "write one value on all rows, or split the table")
+    return known[0]
 
 
 def _values(columns: Mapping[str, Sequence[str]], column: Column, path: str | Path) -> Any:
