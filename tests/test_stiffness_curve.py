@@ -27,7 +27,7 @@ def invented(n=20, failed=()):
     def numbers(scale):
         return np.where(bad, np.nan, scale * rng.uniform(0.1, 1.0, n))
 
-    share = rng.uniform(0, 1, n)
+    share, stiffness, radius = rng.uniform(0, 1, n), numbers(1e8), 33.98654e-3
     return StiffnessCurve(
         pinion_angle=np.arange(n) * math.radians(18) / n,
         wheel_angle=-rng.uniform(0, 1, n),
@@ -35,8 +35,8 @@ def invented(n=20, failed=()):
         torque_wheel=numbers(100),
         torque_pinion=numbers(70),
         torque_wheel_reaction=numbers(100),
-        k_torsional=numbers(1e5),
-        k_mesh=numbers(1e8),
+        k_torsional=stiffness * radius**2,
+        k_mesh=stiffness,
         k_tangent=numbers(1e8),
         transmission_error=numbers(1e-5),
         transmission_error_unloaded=rng.uniform(0, 1e-6, n),
@@ -47,7 +47,7 @@ def invented(n=20, failed=()):
         iterations=rng.integers(1, 9, n),
         status=status,
         mesh_cycle=math.radians(18),
-        base_radius=33.98654e-3,
+        base_radius=radius,
         lost_motion=1.234e-4,
     )
 
