@@ -41,7 +41,7 @@ class TrajectoryError:
     Attributes
     ----------
     coordinates
-        Of the worst coordinate, over the run (m or rad); not-a-number when a finer run failed.
+        Of the worst coordinate, over the run (m or rad); NaN if a finer run failed.
     outputs
         Of each output of the file, over the run, in its own unit.
     tolerance
@@ -55,17 +55,34 @@ class TrajectoryError:
 
 @stage("error estimate by finer runs")
 def trajectory_error(mechanism: Mechanism, start: Start, results: Results, tolerance: float) -> TrajectoryError:
-    """Run again twice, finer, from starts perturbed to both sides, and compare at the output times."""
-    made = results.trajectory
+    """Estimate a run's errors from two finer runs, whose starts are perturbed to both sides.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    start : Start
+        Start of the run.
+    results : Results
+        The run with its outputs.
+    tolerance : float
+        Relative tolerance of the run; those of the finer runs follow from it.
+
+    Returns
+    -------
+    error : TrajectoryError
+        Largest differences over the output times, times `SAFETY`; NaN if a finer run fails or ends earlier.
+    """
+    run = results.trajectory
     used = max(tolerance / SHARPER, LEAST_TOLERANCE)
     worst, outputs = 0.0, dict.fromkeys(results.outputs, 0.0)
-    by_q, by_v = rounding(mechanism, start, made)
+    by_q, by_v = rounding(mechanism, start, run)
     if not (np.isfinite(by_q).all() and np.isfinite(by_v).all()):  # a run beyond all numbers
         return TrajectoryError(math.nan, dict.fromkeys(results.outputs, math.nan), used)
     for sign in (1.0, -1.0):
         perturbed = replace(start, q=start.q + sign * by_q, v=start.v + sign * by_v)
-        finer = finer_run(mechanism, perturbed, made, used)
-        if finer is None or len(finer.time) < len(made.time):
+        finer = finer_run(mechanism, perturbed, run, used)
+        if finer is None or len(finer.time) < len(run.time):
             return TrajectoryError(math.nan, dict.fromkeys(results.outputs, math.nan), used)
         with np.errstate(over="ignore", invalid="ignore"):
             other = evaluate(mechanism, finer)
@@ -73,37 +90,55 @@ def trajectory_error(mechanism: Mechanism, start: Start, results: Results, toler
                 off = np.abs(results.outputs[table.name] - other.outputs[table.name])
                 if table.wrap is not None:
                     off = np.minimum(off, table.wrap - off)
-                # np.maximum keeps not-a-number
+                # np.maximum keeps NaN
                 outputs[table.name] = float(np.maximum(outputs[table.name], SAFETY * off.max(initial=0.0)))
-            worst = float(np.maximum(worst, SAFETY * np.abs(made.q - finer.q).max(initial=0.0)))
+            worst = float(np.maximum(worst, SAFETY * np.abs(run.q - finer.q).max(initial=0.0)))
     return TrajectoryError(worst, outputs, used)
 
 
-def rounding(mechanism: Mechanism, start: Start, made: Trajectory) -> tuple[Array, Array]:
-    """What rounding adds to the coordinates and velocities over the steps of a run, with signs drawn once."""
+def rounding(mechanism: Mechanism, start: Start, run: Trajectory) -> tuple[Array, Array]:
+    """Return what rounding adds to coordinates and velocities over a run's steps, with random signs drawn once."""
     unit = mechanism.system.units
-    walk = np.finfo(float).eps * math.sqrt(len(made.dense.times))
+    walk = np.finfo(float).eps * math.sqrt(len(run.dense.times))
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (2, start.q.size))
     with np.errstate(over="ignore", invalid="ignore"):
-        sizes = np.maximum(unit, np.abs(made.q).max(axis=0)), np.abs(made.v).max(axis=0)
+        sizes = np.maximum(unit, np.abs(run.q).max(axis=0)), np.abs(run.v).max(axis=0)
         by_q, by_v = walk * signs * sizes
     return by_q, by_v
 
 
-def finer_run(mechanism: Mechanism, start: Start, made: Trajectory, tolerance: float) -> Trajectory | None:
-    """The run with that tolerance and shorter steps; None where it cannot be made."""
-    ends: Array = np.asarray(made.dense.times)
-    if len(ends) < 2 or len(made.time) < 2:
+def finer_run(mechanism: Mechanism, start: Start, run: Trajectory, tolerance: float) -> Trajectory | None:
+    """Repeat a run with another tolerance and shorter steps.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    start : Start
+        Start of the finer run.
+    run : Trajectory
+        Run whose steps and output times are the measure.
+    tolerance : float
+        Relative tolerance of the finer run.
+
+    Returns
+    -------
+    finer : Trajectory or None
+        At the same output times, or as far as it came; None if the run has fewer than two times or the finer one cannot
+        start.
+    """
+    ends: Array = np.asarray(run.dense.times)
+    if len(ends) < 2 or len(run.time) < 2:
         return None
     steps = np.abs(np.diff(ends))
     # a step that both runs take is an error that both make
     usual = float(steps.min() if tolerance < SHARPEST else np.median(steps))
     longest = max(SHORTER * usual, float(steps.mean()) / MOST_STEPS)  # a run that failed ends with many short ones
-    options: dict[str, Any] = {"method": made.method, "start": start, "longest": longest}
+    options: dict[str, Any] = {"method": run.method, "start": start, "longest": longest}
     options["raise_on_failure"] = False
-    if made.status is not Status.DONE:
+    if run.status is not Status.DONE:
         options["most_steps"] = int(GIVEN_UP * len(ends)) + 100
     try:
-        return integrate(mechanism.system, made.time, tolerance=tolerance, **options)
+        return integrate(mechanism.system, run.time, tolerance=tolerance, **options)
     except InputError:
         return None

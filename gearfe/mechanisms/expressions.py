@@ -64,14 +64,23 @@ class Node:
 def parse(
     text: str, label: str, tables: Mapping[str, Table] | None = None, *, known: Sequence[str] = (*PLAIN, *NAMED)
 ) -> Node:
-    """Syntax tree of `text`; `label` names it in messages, `tables` are functions of one number by name.
+    """Return the syntax tree of an arithmetic expression.
 
-    `known` are the quantities that messages offer for an unknown name; those without a body beside `PLAIN` are read.
+    Parameters
+    ----------
+    text : str
+        The expression.
+    label : str
+        Name of its key in messages.
+    tables : mapping, optional
+        Functions of one number by name.
+    known : sequence of str
+        Quantities that messages offer for an unknown name. Those that take no body extend `PLAIN`.
 
     Raises
     ------
     InputError
-        When it is not arithmetic on named quantities.
+        If the text is not arithmetic on named quantities.
     """
     functions, where = tables or {}, f"{label} = {text!r}"
     plain, named = [q for q in known if q not in NAMED], [q for q in known if q in NAMED]

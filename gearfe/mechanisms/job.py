@@ -56,10 +56,34 @@ def run_mechanism(
     draw: Callable[[Path, Results], None] | None = None,
     slopes: Sensitivities | None = None,
 ) -> Outcome:
-    """Integrate, write ``trajectory.csv``, ``energy.csv``, ``summary.json`` and what else is asked.
+    """Integrate a mechanism and write ``trajectory.csv``, ``energy.csv``, ``summary.json`` and what else is asked.
 
-    All files appear together, or none. With `estimate` two finer runs tell how far off it is; `draw` adds pictures to
-    the folder, `slopes` sensitivities.csv.
+    All files appear together, or none.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    out : path
+        Folder of the files.
+    tolerance : float, optional
+        Relative tolerance of the integration; that of the file by default.
+    method : str, optional
+        ``auto``, ``taylor`` or ``implicit``; that of the file by default.
+    until : float, optional
+        End of the run (s); that of the file by default.
+    estimate : bool
+        Whether two finer runs estimate the errors.
+    draw : callable, optional
+        ``draw(folder, results)`` adds pictures to the folder.
+    slopes : Sensitivities, optional
+        Written to ``sensitivities.csv``.
+
+    Raises
+    ------
+    InputError
+        If the end is not positive, gives too many rows or lies after the end of a table over time, if the method does
+        not suit flexible links, or if no step can be made from the start.
     """
     began = clock.perf_counter()
     run = mechanism.file.run
@@ -72,7 +96,7 @@ def run_mechanism(
         problem = f"is after the end of a table over time, {mechanism.known_until:g} s"
         raise InputError("run.end_s", end, problem, "end the run before, or extend the table")
     if draw is not None:
-        reference_table(mechanism)  # a mistake in it is told before the run
+        reference_table(mechanism)  # report a mistake in it before the run
     folder = output_folder(out)
     start = mechanism.start()
     read = clock.perf_counter()
@@ -98,14 +122,14 @@ def run_mechanism(
         results = evaluate(mechanism, trajectory)
     error = trajectory_error(mechanism, start, results, tolerance) if estimate else None
     estimated = clock.perf_counter()
-    with whole_set(folder, MAY_WRITE) as made:
-        warnings = tuple(write_tables(made, mechanism, results, run.reactions))
-        write_elastic(made, mechanism, trajectory)
+    with whole_set(folder, MAY_WRITE) as draft:
+        warnings = tuple(_write_tables(draft, mechanism, results, run.reactions))
+        write_elastic(draft, mechanism, trajectory)
         if slopes is not None:
-            write_csv(made / "sensitivities.csv", slopes.table())
+            write_csv(draft / "sensitivities.csv", slopes.table())
         written = clock.perf_counter()
         if draw is not None:
-            draw(made, results)
+            draw(draft, results)
         timings = {
             "read_s": read - began,
             "compile_s": compiling,
@@ -116,7 +140,7 @@ def run_mechanism(
         }
         summary = summarise(mechanism, start, results, tolerance, timings, error)
         summary["warnings"] = list(warnings)
-        write_json(made / "summary.json", summary)
+        write_json(draft / "summary.json", summary)
     done = trajectory.status == 0
     stopped = "" if done else f"the run stopped at {trajectory.reached:g} s of {end:g} s: {trajectory.message}"
     return Outcome(done and not warnings, _text(summary), summary, warnings, stopped)
@@ -133,8 +157,8 @@ def output_times(end: float, step: float) -> np.ndarray:
 
 
 @stage("tables")
-def write_tables(folder: Path, mechanism: Mechanism, results: Results, with_reactions: bool) -> list[str]:
-    """trajectory.csv, energy.csv and, when asked, reactions.csv; what is warned of their numbers."""
+def _write_tables(folder: Path, mechanism: Mechanism, results: Results, with_reactions: bool) -> list[str]:
+    """Write trajectory.csv, energy.csv and, when asked, reactions.csv; return warnings about their numbers."""
     time: Any = results.trajectory.time
     outputs: dict[str, Any] = {**results.outputs}
     energy: dict[str, Any] = {**results.energy}
@@ -154,7 +178,23 @@ def summarise(
     timings: dict,
     error: TrajectoryError | None = None,
 ) -> dict[str, Any]:
-    """Content of summary.json."""
+    """Return the content of summary.json.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    start : Start
+        Start of the run, with the count of freedoms.
+    results : Results
+        The run with its outputs.
+    tolerance : float
+        Relative tolerance of the run.
+    timings : dict
+        Name -> time that a part of the work took (s).
+    error : TrajectoryError, optional
+        Estimated errors; None if they were not estimated.
+    """
     linkage = mechanism.linkage
     trajectory = results.trajectory
     freedoms = start.freedoms

@@ -166,7 +166,24 @@ def flexible_links(file: MechanismFile, planar: Linkage, links: dict[str, BeamLi
 
 
 def bent_start(links: Mapping[str, FlexibleLink | PlateLink], system: System, rigid: Linkage, state: Array) -> Array:
-    """Coordinates (of the system, shape (2, size): q and v) in which the links move as rigid ones do."""
+    """Return coordinates and rates in which the flexible links move as rigid ones do.
+
+    Parameters
+    ----------
+    links : mapping
+        Flexible links by name.
+    system : System
+        System with the flexible links, a linkage first.
+    rigid : Linkage
+        The same mechanism with rigid links.
+    state : ndarray, shape (2, 3 * bodies)
+        Coordinates and rates of the rigid linkage (m, rad; m/s, rad/s).
+
+    Returns
+    -------
+    q, v : ndarray, shape (2, size)
+        Coordinates and rates of the system, stacked.
+    """
     planar = system.elements[0]
     assert isinstance(planar, Linkage)
     out = np.stack([system.start_q, system.start_v])
@@ -176,8 +193,8 @@ def bent_start(links: Mapping[str, FlexibleLink | PlateLink], system: System, ri
         (x, y, angle), (vx, vy, w) = state[:, k : k + 3]
         link = links.get(body.name)
         if link is None:
-            at = 3 * index[body.name]
-            out[:, at : at + 3] = state[:, k : k + 3]
+            first = 3 * index[body.name]
+            out[:, first : first + 3] = state[:, k : k + 3]
             continue
         c, s = math.cos(angle), math.sin(angle)
         arms = link.beam.link.stations + 0j if isinstance(link, FlexibleLink) else link.part.plate.body.centres

@@ -114,24 +114,43 @@ class Mechanism:
     def values(
         self, needed: set[tuple[str, str | None]], q: Any, v: Any = None, a: Any = None, sections: Any = None
     ) -> Any:
-        """Quantities of bodies, joints and points for states of shape (n, size).
+        """Return quantities of bodies, joints, points and flexible links for n states.
 
-        `sections`: link -> forces at its nodes, shape (n, nodes, 3); from the states where not given.
+        Parameters
+        ----------
+        needed : set of (str, str or None)
+            Quantities by name and argument; those of the whole mechanism (`PLAIN`) are skipped.
+        q : ndarray, shape (n, size)
+            Coordinates (m, rad).
+        v, a : ndarray, shape (n, size), optional
+            Their first and second rates, for quantities that need them.
+        sections : mapping, optional
+            Stresses of flexible links by name, as in `Results.sections`; computed from the states by default.
+
+        Returns
+        -------
+        values : dict
+            (name, argument) -> ndarray, shape (n,), in SI units.
+
+        Raises
+        ------
+        InputError
+            For unknown names, and for quantities that a link does not have.
         """
-        found = {}
+        values = {}
         for kind, what in needed:
             if kind in PLAIN:
                 continue
             where = given(what, f"expression {kind}")
             if kind in OF_SECTION or kind in OF_LINK:
-                found[kind, what] = self._of_link(kind, where, q, v, sections)
+                values[kind, what] = self._of_link(kind, where, q, v, sections)
             elif kind in OF_POINT:
                 x, y = self._point_values(kind, where, q, v, a)
-                found[kind, what] = x if kind.endswith("x") else y
+                values[kind, what] = x if kind.endswith("x") else y
             else:
                 source = {"angle": q, "rate": v, "angular_acceleration": a}[kind]
-                found[kind, what] = self._angle(where, source)
-        return found
+                values[kind, what] = self._angle(where, source)
+        return values
 
     def _angle(self, what: str, source: Array) -> Array:
         total = np.zeros(len(source))

@@ -32,6 +32,24 @@ Links = Mapping[str, BeamLink | PlatePart]
 
 
 def body_of(file: MechanismFile, name: str, t: BodyTable, parts: Mapping[str, PlatePart]) -> Body:
+    """Return a rigid body from its table; a link is taken as rigid.
+
+    Parameters
+    ----------
+    file : MechanismFile
+        The file, whose other tables a beam may name.
+    name : str
+        Name of the body.
+    t : BodyTable
+        Its table.
+    parts : mapping
+        Links of finite elements by name.
+
+    Raises
+    ------
+    InputError
+        If mass or moment of inertia is missing.
+    """
     if t.beam is not None:
         return link_of(file, name, t).rigid()
     if t.plate is not None:
@@ -79,12 +97,35 @@ def part_of(
     table: JointTable | ForceTable,
     kind: Kind,
 ) -> Any:
-    """Joint or force from its table: the class of its type, the keys as its fields, what is not given by default."""
+    """Return a joint or force from its table: the class of its type, with the keys as fields.
+
+    Parameters
+    ----------
+    file : MechanismFile
+        The file, for bodies and their points.
+    links : mapping
+        Flexible links by name.
+    tables : mapping
+        Tables of values by name.
+    label : str
+        ``joints.NAME`` or ``forces.NAME``, for messages.
+    name : str
+        Name of the joint or force.
+    table : JointTable or ForceTable
+        Its keys.
+    kind : Kind
+        Class of its type, and the field of each key.
+
+    Raises
+    ------
+    InputError
+        For unknown names, and for values that the class refuses; the message names the key.
+    """
     module, _, cls = kind.reference.partition(":")
     values: dict[str, Any] = {}
     for body, point in (("body", "point"), ("to", "to_point")):
         if body in kind.fields and getattr(table, body) is not None:
-            made = _place(
+            place = _place(
                 file,
                 links,
                 getattr(table, body),
@@ -92,9 +133,9 @@ def part_of(
                 f"{label}.{point}",
                 pointed=point in kind.fields,
             )
-            values[kind.fields[body]] = made[0]
+            values[kind.fields[body]] = place[0]
             if point in kind.fields and not _selects_section(file, table, getattr(table, body)):
-                values[kind.fields[point]] = made[1]
+                values[kind.fields[point]] = place[1]
     for key, field_name in kind.fields.items():
         value = getattr(table, key)
         if key in ("body", "to", "point", "to_point"):
@@ -160,8 +201,25 @@ def _profile(name: str, tables: Mapping[str, ValueTable], label: str) -> ValueTa
 def time_function(
     table: FunctionTable, tables: Mapping[str, ValueTable], label: str, *, smooth: bool = False
 ) -> TimeFunction:
-    """Function of time from its keys; a `smooth` one must not jump in speed."""
-    made = constant(table.constant)
+    """Return a function of time from its keys: constant, table, polynomial, step and sine add up.
+
+    Parameters
+    ----------
+    table : FunctionTable
+        The keys.
+    tables : mapping
+        Tables of values by name.
+    label : str
+        Name of the key in messages.
+    smooth : bool
+        Whether a jump in the first derivative is refused, as for a prescribed motion.
+
+    Raises
+    ------
+    InputError
+        For an unknown table, one that is periodic or begins after the start, and one that jumps if `smooth`.
+    """
+    total = constant(table.constant)
     if table.table is not None:
         if table.table not in tables:
             raise unknown_name(f"{label}.table", table.table, tables)
@@ -173,16 +231,18 @@ def time_function(
             raise InputError(f"{label}.table", table.table, "would make the speed of a prescribed motion jump", cure)
         if known.x[0] > 0.0:
             raise InputError(f"{label}.table", table.table, f"begins at {known.x[0]:g} s, after the run", "begin at 0")
-        made = known.over_time() if table.constant == 0.0 else known.over_time() + made
+        total = known.over_time() if table.constant == 0.0 else known.over_time() + total
     if table.polynomial:
-        made = made + polynomial(table.polynomial, table.origin_s)
+        total = total + polynomial(table.polynomial, table.origin_s)
     if table.step is not None:
-        made = made + smoothed_step(table.step_centre_s, given(table.step_width_s, f"{label}.step_width_s"), table.step)
+        total = total + smoothed_step(
+            table.step_centre_s, given(table.step_width_s, f"{label}.step_width_s"), table.step
+        )
     if table.sine is not None:
-        made = made + sine(
+        total = total + sine(
             table.sine, 2 * math.pi * given(table.frequency_hz, f"{label}.frequency_hz"), math.radians(table.phase_deg)
         )
-    return made
+    return total
 
 
 def known_until(file: MechanismFile, tables: Mapping[str, ValueTable]) -> float:

@@ -103,15 +103,37 @@ def reduce_plate(
     points: Array, triangles: IntArray, thickness: float, material: Material, damping: float,
     interfaces: list[Interface], count: int,
 ) -> Plate:  # fmt: skip
-    """Condense a mesh; `count` vibrations with the interfaces held."""
-    made = _operators(points, triangles, thickness, material)
+    """Condense a plane-stress mesh to its interfaces and a few modes, see the module's docstring.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        Nodes (m).
+    triangles : ndarray of int, shape (m, 6)
+        Nodes of the second-order triangles: corners, then mid-sides.
+    thickness : float
+        Thickness (m).
+    material : Material
+        Elasticity and density.
+    damping : float
+        Kelvin-Voigt time tau (s).
+    interfaces : list of Interface
+        Rigid sets of nodes; the frame goes with the first.
+    count : int
+        Number of vibrations with all interfaces held that are kept.
+
+    References
+    ----------
+    R. R. Craig, M. C. C. Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968).
+    """
+    elements = _operators(points, triangles, thickness, material)
     n, Z = len(points), points[:, 0] + 1j * points[:, 1]
-    volume = sparse.diags(made.weight)
+    volume = sparse.diags(elements.weight)
     density = material.density
-    M = density * made.values.T @ volume @ made.values  # by complex displacements
+    M = density * elements.values.T @ volume @ elements.values  # by complex displacements
     first = sparse.csr_matrix(np.array([[1.0, 0, 0, 0], [0, 0, 0, 1.0], [0, 1.0, 1.0, 0]]))
-    linear = sparse.kron(sparse.identity(len(made.weight)), first).tocsr() @ made.gradient
-    stiff = linear.T @ sparse.kron(volume, sparse.csr_matrix(made.law)) @ linear
+    linear = sparse.kron(sparse.identity(len(elements.weight)), first).tocsr() @ elements.gradient
+    stiff = linear.T @ sparse.kron(volume, sparse.csr_matrix(elements.law)) @ linear
     held = np.zeros(n, dtype=bool)
     for interface in interfaces:
         held[interface.nodes] = True
@@ -128,16 +150,16 @@ def reduce_plate(
     if len(interfaces) > 1:
         static -= answer(stiff @ static)
     mass = sparse.kron(M, sparse.identity(2)).tocsr()
-    own = mass[free][:, free]
-    inverse = LinearOperator(own.shape, matvec=inner.solve)
+    free_mass = mass[free][:, free]
+    inverse = LinearOperator(free_mass.shape, matvec=inner.solve)
     start = np.ones(len(free))
-    _, lowest = eigsh(stiff[free][:, free], count, own, sigma=0.0, which="LM", OPinv=inverse, v0=start)
+    _, lowest = eigsh(stiff[free][:, free], count, free_mass, sigma=0.0, which="LM", OPinv=inverse, v0=start)
     vibrations = np.zeros((2 * n, count))
     vibrations[free] = lowest
     loads = _real(np.stack([np.ones(n), 1j * np.ones(n), Z, 1j * Z], axis=1))
     bent = np.hstack([static, _independent(np.hstack([vibrations, answer(mass @ loads)]), stiff)])
     omega, shapes = _principal(bent, stiff, mass)
-    more, widths = _derivatives(made, shapes, interfaces, Z)
+    more, widths = _derivatives(elements, shapes, interfaces, Z)
     more = widths + answer(more - stiff @ widths)
     more = _independent(more, stiff, shapes, SMALL)
     omega, shapes = _principal(np.hstack([shapes, more]), stiff, mass)
@@ -149,7 +171,7 @@ def reduce_plate(
     matrix[2:, 2:] += np.diag(MASSLESS * matrix.diagonal()[2:])
     total, moment = float(matrix[0, 0].real), matrix[0, 1]
     centre = complex(moment / total)
-    e, recovery = _strain_basis(made, shapes)
+    e, recovery = _strain_basis(elements, shapes)
     r = shapes.shape[1]
     body = FloatingBody(
         mass=0.5 * (matrix + matrix.conj().T), linear=e[:, :r], quadratic=_symmetric(e[:, r:], r),

@@ -33,11 +33,26 @@ def run_rest(
     draw: Callable[[Path, Results, Modes | None], None] | None = None,
     slopes: Sensitivities | None = None,
 ) -> Outcome:
-    """Find the equilibrium downhill from the start, and modes where the file asks for them; all files, or none.
+    """Find the equilibrium, and modes if the file asks for them, and write all files or none.
 
     ``equilibrium.csv`` has the outputs, ``bodies.csv`` the poses, ``reactions.csv`` the forces of the joints,
-    ``modes.csv`` frequencies and damping, ``shapes.csv`` the motions; `draw` adds pictures to the folder, `slopes`
-    sensitivities.csv.
+    ``modes.csv`` frequencies and damping, ``shapes.csv`` the motions.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    out : path
+        Folder of the files.
+    draw : callable, optional
+        ``draw(folder, results, modes)`` adds pictures to the folder; modes is None for an equilibrium alone.
+    slopes : Sensitivities, optional
+        Written to ``sensitivities.csv``.
+
+    Raises
+    ------
+    InputError
+        If no stable equilibrium is found downhill from the start, or joints prescribe a motion.
     """
     began = clock.perf_counter()
     folder = output_folder(out)
@@ -46,22 +61,22 @@ def run_rest(
         rest = equilibrium(mechanism.system, start)
     results = evaluate(mechanism, at_rest(mechanism, start, rest))
     with_modes = mechanism.file.run.analysis == "modes"
-    found = modes(mechanism.system, start, rest, mechanism.file.run.modes) if with_modes else None
-    with whole_set(folder, MAY_WRITE) as made:
-        warned = write_csv(made / "equilibrium.csv", dict(results.outputs), gaps=False) if results.outputs else []
-        write_csv(made / "bodies.csv", _poses(mechanism, rest.q))
-        write_csv(made / "reactions.csv", dict(reactions(mechanism, results.trajectory)))
-        if found is not None:
-            _write_modes(made, mechanism, found)
-        write_elastic(made, mechanism, results.trajectory)
+    vibrations = modes(mechanism.system, start, rest, mechanism.file.run.modes) if with_modes else None
+    with whole_set(folder, MAY_WRITE) as draft:
+        warned = write_csv(draft / "equilibrium.csv", dict(results.outputs), gaps=False) if results.outputs else []
+        write_csv(draft / "bodies.csv", _poses(mechanism, rest.q))
+        write_csv(draft / "reactions.csv", dict(reactions(mechanism, results.trajectory)))
+        if vibrations is not None:
+            _write_modes(draft, mechanism, vibrations)
+        write_elastic(draft, mechanism, results.trajectory)
         if slopes is not None:
-            write_csv(made / "sensitivities.csv", slopes.table())
+            write_csv(draft / "sensitivities.csv", slopes.table())
         if draw is not None:
-            draw(made, results, found)
-        summary = summarise_rest(mechanism, start, rest, results, found)
+            draw(draft, results, vibrations)
+        summary = summarise_rest(mechanism, start, rest, results, vibrations)
         summary["timings"] = {"whole_s": clock.perf_counter() - began}
         summary["warnings"] = list(warned)
-        write_json(made / "summary.json", summary)
+        write_json(draft / "summary.json", summary)
     return Outcome(not warned, _text(summary), summary, tuple(warned))
 
 
@@ -85,23 +100,23 @@ def _poses(mechanism: Mechanism, q: Array) -> dict[str, Any]:
     return {"body": names, "x_m": np.array(x), "y_m": np.array(y), "angle_rad": np.array(angle)}
 
 
-def mode_columns(found: Modes) -> dict[str, Any]:
+def mode_columns(vibrations: Modes) -> dict[str, Any]:
     """Columns of modes.csv."""
     return {
-        "mode": np.arange(1, len(found.rates) + 1),
-        "frequency_Hz": found.frequencies,
-        "damping_ratio": found.damping_ratios,
-        "damped_frequency_Hz": found.rates.imag / (2 * np.pi),
-        "decay_per_s": -found.rates.real,
+        "mode": np.arange(1, len(vibrations.rates) + 1),
+        "frequency_Hz": vibrations.frequencies,
+        "damping_ratio": vibrations.damping_ratios,
+        "damped_frequency_Hz": vibrations.rates.imag / (2 * np.pi),
+        "decay_per_s": -vibrations.rates.real,
     }
 
 
-def _write_modes(folder: Path, mechanism: Mechanism, found: Modes) -> None:
-    columns = mode_columns(found)
-    number, count = columns["mode"], len(found.rates)
+def _write_modes(folder: Path, mechanism: Mechanism, vibrations: Modes) -> None:
+    columns = mode_columns(vibrations)
+    number, count = columns["mode"], len(vibrations.rates)
     write_csv(folder / "modes.csv", columns)
     bodies = [body.name for body in mechanism.linkage.bodies]
-    shapes = found.shapes[:, : mechanism.linkage.size].reshape(count, -1, 3)
+    shapes = vibrations.shapes[:, : mechanism.linkage.size].reshape(count, -1, 3)
     rows: dict[str, Any] = {"mode": np.repeat(number, len(bodies)), "body": bodies * count}
     for k, name in enumerate(("x_m", "y_m", "angle_rad")):
         rows[name] = shapes[:, :, k].real.ravel()
@@ -110,10 +125,24 @@ def _write_modes(folder: Path, mechanism: Mechanism, found: Modes) -> None:
 
 
 def summarise_rest(
-    mechanism: Mechanism, start: Start, rest: Equilibrium, results: Results, found: Modes | None
+    mechanism: Mechanism, start: Start, rest: Equilibrium, results: Results, vibrations: Modes | None
 ) -> dict[str, Any]:
-    """Content of summary.json."""
-    made: dict[str, Any] = {
+    """Return the content of summary.json.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    start : Start
+        Start, with the count of freedoms.
+    rest : Equilibrium
+        The state of rest.
+    results : Results
+        Its outputs and energies.
+    vibrations : Modes or None
+        Vibrations about it; None for an equilibrium alone.
+    """
+    summary: dict[str, Any] = {
         "title": mechanism.file.title,
         "analysis": mechanism.file.run.analysis,
         "steps": rest.steps,
@@ -122,10 +151,10 @@ def summarise_rest(
         "potential_J": float(results.energy["potential_J"][0]),
         "outputs": {name: float(column[0]) for name, column in results.outputs.items()},
     }
-    if found is not None:
-        made["frequencies_Hz"] = found.frequencies
-        made["damping_ratios"] = found.damping_ratios
-    return made
+    if vibrations is not None:
+        summary["frequencies_Hz"] = vibrations.frequencies
+        summary["damping_ratios"] = vibrations.damping_ratios
+    return summary
 
 
 def _text(summary: dict[str, Any]) -> str:

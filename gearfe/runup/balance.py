@@ -196,7 +196,21 @@ def widened(amplitudes: ComplexArray, count: int) -> ComplexArray:
 def evaluate(
     system: Oscillator, speed: float, places: ComplexArray, lattice: Lattice, flexibility: ComplexArray
 ) -> Evaluated:
-    """What is left of the equations."""
+    """Evaluate the residual r_k of the equations, and the forces, at given amplitudes.
+
+    Parameters
+    ----------
+    system : Oscillator
+        The oscillator.
+    speed : float
+        Speed of the drive (rad/s).
+    places : ndarray of complex, shape (K + 1, m)
+        Amplitudes of the freedoms (m, rad).
+    lattice : Lattice
+        Samples at which the forces are evaluated, of K harmonics at least.
+    flexibility : ndarray of complex, shape (K + 1, m, m)
+        H at the harmonics, see `flexibility_of`.
+    """
     turning = 1j * system.omega(speed, len(places) - 1)[:, None]
     u, du = lattice.synthesis(places), lattice.synthesis(turning * places)
     pushes = system.forces(lattice.theta, speed, u, du)
@@ -224,7 +238,24 @@ def unpacked(x: Array, scale: Array) -> ComplexArray:
 
 
 def product(system: Oscillator, speed: float, at: Evaluated, flexibility: ComplexArray) -> Callable[[Array], Array]:
-    """Change of the residual for a change of the amplitudes, both `packed`: the Jacobian, without a matrix."""
+    """Return the Jacobian of the residual as a function of a change of the amplitudes.
+
+    Parameters
+    ----------
+    system : Oscillator
+        The oscillator.
+    speed : float
+        Speed of the drive (rad/s).
+    at : Evaluated
+        The equations at the amplitudes of linearisation.
+    flexibility : ndarray of complex, shape (K + 1, m, m)
+        H at the harmonics, see `flexibility_of`.
+
+    Returns
+    -------
+    changed : callable
+        Change of the amplitudes -> change of the residual; real vectors as of `packed`.
+    """
     lattice, scale, count = at.lattice, system.scale, len(at.residual)
     by, rate, momentum = at.pushes.by_place, at.pushes.by_rate, at.pushes.momentum_by_place
     turning = 1j * system.omega(speed, count - 1)[:, None]
@@ -256,16 +287,28 @@ def size_of(amplitudes: ComplexArray, scale: Array) -> float:
 def solve(
     system: Oscillator, speed: float, guess: ComplexArray, tolerance: float, *, near: bool = False
 ) -> tuple[Orbit, Evaluated]:
-    """Steady motion at a speed, from a guess, without an error estimate; and the equations there.
+    """Find the steady motion at a speed from a guess, without an error estimate.
 
     Parameters
     ----------
-    guess : (K + 1, m)
-        Amplitudes to begin with.
-    tolerance
+    system : Oscillator
+        The oscillator.
+    speed : float
+        Speed of the drive (rad/s).
+    guess : ndarray of complex, shape (K + 1, m)
+        Amplitudes from which Newton's method starts (m, rad).
+    tolerance : float
         Of the error in the end, in parts of the scale.
-    near
-        Only a motion in the guess's own range of convergence: one step that contracts too little ends the search.
+    near : bool
+        Whether the search ends at a step that contracts too little: only a motion in the guess's own range of
+        convergence.
+
+    Returns
+    -------
+    orbit : Orbit
+        Best motion that was reached; `Orbit.found` is true if it solves the equations.
+    at : Evaluated
+        The equations there.
     """
     count = len(guess) - 1
     H, lattice, scale = flexibility_of(system, speed, count), system.lattice(count), system.scale
@@ -314,7 +357,25 @@ def error_of(system: Oscillator, orbit: Orbit, at: Evaluated) -> tuple[float, Co
 
 
 def settled(system: Oscillator, orbit: Orbit, at: Evaluated, tolerance: float) -> Orbit:
-    """An orbit with as many harmonics as its error estimate needs to meet a tolerance."""
+    """Add harmonics to an orbit until its error estimate meets a tolerance.
+
+    Parameters
+    ----------
+    system : Oscillator
+        The oscillator.
+    orbit : Orbit
+        A solution of the equations.
+    at : Evaluated
+        The equations there.
+    tolerance : float
+        Of the error estimate, in parts of the scale.
+
+    Returns
+    -------
+    orbit : Orbit
+        With its error estimate, above the tolerance if the most harmonics do not suffice; not found if a solution with
+        more harmonics was lost.
+    """
     while orbit.found:
         error, guess = error_of(system, orbit, at)
         orbit = replace(orbit, error=error)

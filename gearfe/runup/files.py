@@ -50,14 +50,31 @@ def write_runup(
     folder: Path, run: RunUp, choice: RunUpChoice, *, draw: Pictures | None, watch: Any,
     further: Mapping[str, Any], unstable: InstabilityMap | None = None,
 ) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
-    """Write tables, pictures and the summary; returns the summary and the names of the files.
+    """Write tables, pictures and the summary of a run-up, all or none.
 
     Parameters
     ----------
-    further
+    folder : Path
+        Folder of the files.
+    run : RunUp
+        The run-up.
+    choice : RunUpChoice
+        What is written.
+    draw : Pictures or None
+        Draws the pictures; None: there are none.
+    watch : Stopwatch
+        Measures the stages.
+    further : mapping
         Entries of the summary that describe the job.
-    unstable
-        Map of parametric instability, or None.
+    unstable : InstabilityMap, optional
+        Map of parametric instability.
+
+    Returns
+    -------
+    summary : dict
+        Content of summary.json.
+    names : list of str
+        Names of the files.
     """
     multiples, model = choice.multiples, run.train.model
     bore = model.bores.index(attachment_to_draw(model.bores, choice.attachment, model.train))
@@ -76,8 +93,8 @@ def write_runup(
         if choice.fields:
             with watch.stage("fields"):
                 write_modes(target, model, mesh_modes(critical.modes, len(model.meshes), STRONG))
-        made = {**further, **report.summary(run, critical), "warnings": report.warnings(run)}
-        made["timings_s"] = dict(watch.seconds)
-        write_json(target / "summary.json", made)
+        summary = {**further, **report.summary(run, critical), "warnings": report.warnings(run)}
+        summary["timings_s"] = dict(watch.seconds)
+        write_json(target / "summary.json", summary)
         names = sorted(path.name for path in target.iterdir())
-    return made, names
+    return summary, names

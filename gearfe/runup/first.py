@@ -38,7 +38,24 @@ class Growing(Oscillator):
 
 
 def first_motion(system: Oscillator, speed: float, *, tolerance: float, highest: float) -> Orbit | None:
-    """Steady motion at a speed, or None where none was found; parameters as of `gearfe.runup.follow.follow`."""
+    """Find a steady motion at a speed without a guess, see the module's docstring.
+
+    Parameters
+    ----------
+    system : Oscillator
+        The oscillator.
+    speed : float
+        Speed of the drive (rad/s).
+    tolerance : float
+        Of the error estimate, in parts of the scale.
+    highest : float
+        Angular frequency (rad/s) that the harmonics reach at least.
+
+    Returns
+    -------
+    orbit : Orbit or None
+        None if no motion was found.
+    """
 
     def forces(theta: Array, _part: float, u: Array, du: Array) -> Pushes:
         return system.forces(theta, speed, u, du)

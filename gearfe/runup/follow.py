@@ -102,15 +102,19 @@ class _Place(NamedTuple):
 def follow(
     system: Oscillator, speeds: Sequence[float] | Array, start: Orbit, *, tolerance: float, highest: float,
 ) -> Curve:  # fmt: skip
-    """Along the curve of solutions from an orbit at the first of the speeds, until it passes the first or the last one.
+    """Follow the curve of solutions from an orbit at the first speed until it passes the first or last speed.
 
     Parameters
     ----------
-    speeds
+    system : Oscillator
+        The oscillator.
+    speeds : array_like, shape (n,)
         Asked speeds (rad/s), rising or falling in size.
-    tolerance
-        Of the error estimate of each orbit.
-    highest
+    start : Orbit
+        A solution at the first of them.
+    tolerance : float
+        Of the error estimate of each orbit, in parts of the scale.
+    highest : float
         Angular frequency (rad/s) that the harmonics reach at least.
     """
     walk = _Walk(system, np.asarray(speeds, dtype=float), tolerance, highest)

@@ -24,12 +24,23 @@ from .run_up import RunUp, run_up
 def solved(
     job: TrainJob, table: RunUpTable, curves: Sequence[str] = (), *, watch: Any
 ) -> tuple[RunUp, InstabilityMap | None]:
-    """Steady states of the train of a job, and its map of parametric instability if the table has loads for one.
+    """Return the steady states of a job's train, and its instability map if the table has loads for one.
+
+    Parameters
+    ----------
+    job : TrainJob
+        The train's job.
+    table : RunUpTable
+        Speeds, tolerance, band and loads.
+    curves : sequence of str
+        CSV files of stiffness curves instead of computed ones: one for all meshes, or one for each mesh.
+    watch : Stopwatch
+        Measures the stages.
 
     Raises
     ------
     InputError
-        Where no periodic motion was found at any of the speeds, and for what a train or a run-up refuses.
+        If no periodic motion is found at any of the speeds, and for what a train or a run-up refuses.
     """
     with watch.stage("curves"):
         stiffness = train_curves(job, curves)
@@ -42,16 +53,16 @@ def solved(
     band = table.band_Hz or (5000.0 if job.housing is None else job.housing.reduction.band_Hz)
     with watch.stage("steady states"), stage("steady states"):
         options: dict[str, Any] = {"tolerance": table.tolerance, "band_hz": band, "stability": table.stability}
-        made = run_up(model, speeds, **options)
-    if not made.states:
+        run = run_up(model, speeds, **options)
+    if not run.states:
         value = [table.speed_start_rad_per_s, table.speed_stop_rad_per_s]
-        problem = "; ".join(["has no periodic motion that was found at any of the speeds", *made.notes])
+        problem = "; ".join(["has no periodic motion that was found at any of the speeds", *run.notes])
         raise InputError("runup", value, problem, "add damping, or look at a transient: gearfe vibration")
     unstable = None
     if table.instability_loads:
         with watch.stage("instability"), stage("instability"):
-            unstable = instability_map(made.train, speeds, table.instability_loads)
-    return made, unstable
+            unstable = instability_map(run.train, speeds, table.instability_loads)
+    return run, unstable
 
 
 def described(job: TrainJob, table: RunUpTable, train: GearTrain) -> dict[str, Any]:

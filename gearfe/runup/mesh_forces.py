@@ -116,7 +116,19 @@ class MeshForces:
     _pairs: dict[tuple[int, int], Array] = field(default_factory=dict, repr=False)
 
     def flank(self, number: int, theta: Array, speed: float, u: Array, du: Array) -> FlankForces:
-        """One flank at phases theta (S, n) and a speed of the drive (rad/s), freedoms and rates (S, m)."""
+        """Return the forces of one flank at S places of the phases.
+
+        Parameters
+        ----------
+        number : int
+            Number of the flank.
+        theta : ndarray, shape (S, n)
+            Phases of the motion (rad).
+        speed : float
+            Speed of the drive (rad/s).
+        u, du : ndarray, shape (S, m)
+            Freedoms (m, rad) and their rates (m/s, rad/s).
+        """
         flank, rubs = self.flanks[number], self.rubbing[number]
         along, turn, across, spin = self.freedoms[number]
         phase = flank.sense * (flank.ratio * (theta @ self.turns[number]) + u[:, turn]) + flank.phase

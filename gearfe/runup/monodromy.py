@@ -90,18 +90,25 @@ def kick_times(edges: Array) -> Array:
 
 
 def monodromy(constant: Flow, edges: Array, directions: Array, reads: Array, strengths: Array) -> Array:
-    """Map of the state (scale y, v) over the period.
+    """Return the map of the state (scale y, v) over the time of the steps.
 
     Parameters
     ----------
-    edges : (steps + 1,)
+    constant : Flow
+        Flow of the constant part.
+    edges : ndarray, shape (steps + 1,)
         Step ends (s), even.
-    directions : (n, d)
+    directions : ndarray, shape (n, d)
         W, accelerations.
-    reads : (2n, p)
+    reads : ndarray, shape (2n, p)
         What the periodic part depends on, as rows on (y, v).
-    strengths : (steps, stages, d, p)
+    strengths : ndarray, shape (steps, stages, d, p)
         C at the kicks.
+
+    Returns
+    -------
+    matrix : ndarray, shape (2n, 2n)
+        Monodromy matrix.
     """
     n = len(directions)
     into = constant.into @ np.vstack([np.zeros_like(directions), directions])

@@ -27,15 +27,27 @@ RPM = 30.0 / math.pi
 def tables(
     run: RunUp, critical: CriticalSpeeds, multiples: int, unstable: InstabilityMap | None = None
 ) -> dict[str, dict[str, Any]]:
-    """Columns of all tables, by the names of their files."""
-    made = {
+    """Return the columns of all tables by the names of their files.
+
+    Parameters
+    ----------
+    run : RunUp
+        The run-up.
+    critical : CriticalSpeeds
+        Its modes and critical speeds.
+    multiples : int
+        Highest multiple of the mesh frequencies among the orders.
+    unstable : InstabilityMap, optional
+        Map of parametric instability.
+    """
+    columns = {
         "runup": runup_columns(run),
         "orders": order_columns(run, multiples),
         "waterfall": waterfall_columns(run),
         "modes": mode_columns(critical.modes),
         "critical_speeds": critical_columns(critical),
     }
-    return made if unstable is None else {**made, "instability": instability_columns(unstable)}
+    return columns if unstable is None else {**columns, "instability": instability_columns(unstable)}
 
 
 def runup_columns(run: RunUp) -> dict[str, Any]:

@@ -118,7 +118,19 @@ class SteadyState:
 def steady_result(
     train: CondensedTrain, orbit: Orbit, branch: int, multipliers: ComplexArray | None = None
 ) -> SteadyState:
-    """Evaluate an orbit."""
+    """Evaluate forces, transmission errors, accelerations, bearing loads and power of an orbit.
+
+    Parameters
+    ----------
+    train : CondensedTrain
+        The train.
+    orbit : Orbit
+        Its motion at the freedoms of the meshes.
+    branch : int
+        Number of the branch, see `SteadyState`.
+    multipliers : ndarray of complex, shape (2 modes,), optional
+        Floquet multipliers; None if they were not computed.
+    """
     system, model = train.system, train.model
     count = orbit.harmonics
     omega, lattice = system.omega(orbit.speed, count), system.lattice(count)
@@ -143,7 +155,6 @@ def steady_result(
     if train.radiation_of_modes is not None:
         square = (modal.conj() * real_times(modal, train.radiation_of_modes)).sum(axis=1).real
         power = 0.5 * AIR_IMPEDANCE * omega**2 * np.maximum(square, 0.0)
-    bearing = _bearing(train, orbit, omega, modal)
     bearing = _bearing(train, orbit, omega, modal)
     second = 2.0 * math.pi / abs(orbit.speed)  # of one turn
     waves, _ = torus.harmonics(system.periods, count)

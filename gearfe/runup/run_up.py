@@ -146,16 +146,18 @@ def run_up(
     model: TrainModel, speeds: ArrayLike, *, tolerance: float = 1e-3, band_hz: float = 5000.0, stability: bool = True,
     executor: Executor | None = None,
 ) -> RunUp:  # fmt: skip
-    """Steady states of a train along a range of speeds, round the turning points of their curve.
+    """Find the steady states of a train along a range of speeds, round the turning points of their curve.
 
     Parameters
     ----------
+    model : TrainModel
+        The train.
     speeds : array_like, shape (n,)
         Speeds of the drive (rad/s), all of one sign, rising or falling in size.
     tolerance, band_hz, stability
         See `steady_state`.
-    executor
-        Computes multipliers beside each other; None: one after the other.
+    executor : Executor, optional
+        Computes multipliers in parallel; None: one after the other.
 
     Raises
     ------

@@ -117,7 +117,7 @@ def _multipliers(
     system: Oscillator, orbit: Orbit, span: Window, reached: float, steps: int
 ) -> tuple[ComplexArray, bool]:
     """Multipliers with so many steps, and whether derivatives jump."""
-    theta, u, du = along(system, orbit, span.turns, steps)
+    theta, u, du = _along(system, orbit, span.turns, steps)
     pushes = system.forces(theta, orbit.speed, u, du)
     A, B = pushes.by_place, pushes.by_rate
     order = np.argsort(kick_times(np.linspace(0.0, 1.0, steps + 1)).ravel(), kind="stable")  # kicks step back, too
@@ -144,15 +144,15 @@ def _with_momentum(A: Array, B: Array | None, momentum: Array, step: float) -> t
     return A + np.repeat(change, len(KICKS), axis=0), momentum if B is None else B + momentum, bool(change.any())
 
 
-def along(system: Oscillator, orbit: Orbit, turns: float, steps: int) -> tuple[Array, Array, Array]:
-    """Phases (S, n), freedoms and their rates (S, m) at the kicks of so many steps over some turns of the drive."""
+def _along(system: Oscillator, orbit: Orbit, turns: float, steps: int) -> tuple[Array, Array, Array]:
+    """Return phases (S, n), and freedoms and rates (S, m), at the kicks over some turns of the drive."""
     waves, _ = torus.harmonics(system.periods, orbit.harmonics)
     speeds = 2.0 * math.pi * turns / steps / np.array(system.turns)  # of the phases, in a step
     line = waves @ speeds
     both = np.hstack([orbit.places, 1j * system.omega(orbit.speed, orbit.harmonics)[:, None] * orbit.places])
     begin = np.exp(1j * np.arange(steps)[:, None] * line)
-    found = np.stack([(begin @ (np.exp(1j * place * line)[:, None] * both)).real for place in PLACES], axis=1)
-    u, du = np.split(found.reshape(steps * len(PLACES), -1), 2, axis=1)
+    values = np.stack([(begin @ (np.exp(1j * place * line)[:, None] * both)).real for place in PLACES], axis=1)
+    u, du = np.split(values.reshape(steps * len(PLACES), -1), 2, axis=1)
     return kicks(system, turns, steps), u, du
 
 
@@ -170,14 +170,29 @@ def strengths(linear: Linear, A: Array) -> Array:
 def around(
     system: Oscillator, speed: float, A: Array, B: Array | None, kept: BoolArray, span: Window, *, damped: bool = True
 ) -> ComplexArray:
-    """Multipliers for the derivatives A, B of the forces at `kicks` over a time, the largest modulus first.
+    """Return the multipliers for given derivatives of the forces at `kicks`, the largest modulus first.
 
     Parameters
     ----------
-    kept : (n,)
+    system : Oscillator
+        The oscillator, for its linear part.
+    speed : float
+        Speed of the drive (rad/s).
+    A : ndarray, shape (S, m, m)
+        Derivatives of the forces with the freedoms.
+    B : ndarray, shape (S, m, m), or None
+        Derivatives with their rates; None: there are none.
+    kept : ndarray of bool, shape (n,)
         Modes that are integrated; the others yield as they do at rest.
-    damped
-        False: without the damping of the linear part.
+    span : Window
+        Time over which the multipliers are made.
+    damped : bool
+        Whether the linear part has its damping.
+
+    Returns
+    -------
+    multipliers : ndarray of complex, shape (2 n,)
+        Of shape (1,) and NaN if the growth over `span` and over half of it disagree.
     """
     linear, m = system.linear, system.linear.size
     second = 2.0 * math.pi / abs(speed)  # of one turn
@@ -186,8 +201,8 @@ def around(
     places, tilts = linear.places[kept], linear.tilts[kept]
     D = linear.damping if damped else np.zeros_like(linear.damping)
     # what the other modes yield at once: u = P y + R f, f = A u
-    rest = linear.places[~kept].T @ (linear.places[~kept] / linear.squares[~kept, None])
-    A = A @ np.linalg.inv(np.eye(m) - rest @ A)
+    static = linear.places[~kept].T @ (linear.places[~kept] / linear.squares[~kept, None])
+    A = A @ np.linalg.inv(np.eye(m) - static @ A)
     both = np.concatenate([A, np.zeros_like(A) if B is None else B], axis=2).reshape(-1, stages, m, 2 * m)
     none = np.zeros_like(places)
     reads = np.block([[places, none], [none, places]])
@@ -196,16 +211,16 @@ def around(
         turning = speed * tilts @ linear.gyroscopic @ tilts.T
         constant = flow(linear.squares[kept], D[np.ix_(kept, kept)] - turning, edges[-1])
 
-        def found(first: int, last: int) -> Array:
+        def map_over(first: int, last: int) -> Array:
             return monodromy(constant, edges[first : last + 1], places, reads, both[first:last])
 
         if span.half is None:
-            return _sorted(found(0, len(edges) - 1), free, edges[-1])
+            return _sorted(map_over(0, len(edges) - 1), free, edges[-1])
         middle = round(span.half / span.turns * (len(edges) - 1))
-        X = found(0, middle)
-        one, two = _sorted(X, free, edges[middle]), _sorted(found(middle, len(edges) - 1) @ X, free, edges[-1])
-    growth, before = math.log(abs(two[0])) / edges[-1], math.log(abs(one[0])) / edges[middle]
-    return two if abs(growth) > abs(growth - before) else np.array([math.nan + 0j])
+        X = map_over(0, middle)
+        half, whole = _sorted(X, free, edges[middle]), _sorted(map_over(middle, len(edges) - 1) @ X, free, edges[-1])
+    growth, before = math.log(abs(whole[0])) / edges[-1], math.log(abs(half[0])) / edges[middle]
+    return whole if abs(growth) > abs(growth - before) else np.array([math.nan + 0j])
 
 
 def _sorted(X: Array, free: tuple[Array, Array], time: float) -> ComplexArray:

@@ -19,15 +19,34 @@ SAMPLES = 6
 
 
 def train_corner(last: int, limit: float, p: Program, memory: Array, pieces: IntArray, ahead: bool) -> float:
-    """Where x, up to `limit`, first takes something off its cell; 2 when nothing does.
+    """Find the first x at which a watched series leaves its cell.
 
-    `ahead`: a little past the place to which the phases go at their present rate; pieces stay. Otherwise what is off
-    its cell there goes on to the next.
+    Without `ahead`, what is off its cell at that x goes on to the next cell: memory and pieces change.
+
+    Parameters
+    ----------
+    last : int
+        Highest order of the series that counts.
+    limit : float
+        Largest x that is searched, in parts of the trial step.
+    p : Program
+        Tables of the train's forces.
+    memory : ndarray, shape (rows, orders)
+        Series over x; row numbers as in `gearfe.train.series`.
+    pieces : ndarray of int, shape (whole numbers,)
+        Cells that the flanks are on.
+    ahead : bool
+        Whether to predict the end of a phase's cell from orders 0 and 1, a little beyond it, and leave the pieces.
+
+    Returns
+    -------
+    x : float
+        First x at which a series leaves its cell; 2 if none does up to `limit`.
     """
     nearest = 2.0
     for w in range(p.watches.shape[0]):
-        low, high, slack = bounds(w, p, pieces)
-        row = watched(w, p, pieces)
+        low, high, slack = _bounds(w, p, pieces)
+        row = _watched(w, p, pieces)
         if not ahead:
             nearest = min(nearest, leaves(memory, row, last, low, high, slack, min(limit, nearest)))
         elif p.watches[w, 0] == PHASE and memory[row, 1] != 0.0:
@@ -35,22 +54,22 @@ def train_corner(last: int, limit: float, p: Program, memory: Array, pieces: Int
             nearest = min(nearest, max(0.0, way) / abs(memory[row, 1]))
     if not ahead:
         for w in range(p.watches.shape[0]):
-            go_on(w, last, min(limit, nearest), nearest <= limit, p, memory, pieces)
+            _go_on(w, last, min(limit, nearest), nearest <= limit, p, memory, pieces)
     return nearest
 
 
-def watched(w: int, p: Program, pieces: IntArray) -> int:
-    """Row of what is watched: of a pair its force, or its gap."""
+def _watched(w: int, p: Program, pieces: IntArray) -> int:
+    """Return the row of a watched series: of a tooth pair its force, or its gap."""
     k = p.watches[w, 1]
     row = p.watches[w, 2]
     if p.watches[w, 0] == PAIR:
-        bears = pieces[p.places.piece[k] + PER_FLANK + p.watches[w, 3]] >= 0
-        return row + F if bears else row + GAP
+        loaded = pieces[p.places.piece[k] + PER_FLANK + p.watches[w, 3]] >= 0
+        return row + F if loaded else row + GAP
     return row
 
 
-def bounds(w: int, p: Program, pieces: IntArray) -> tuple[float, float, float]:
-    """Cell of what is watched, and how much beyond it counts as none."""
+def _bounds(w: int, p: Program, pieces: IntArray) -> tuple[float, float, float]:
+    """Return the lower and upper bound of a watched series' cell, and the excess beyond them that is rounding."""
     kind = p.watches[w, 0]
     k = p.watches[w, 1]
     at = p.places.piece[k]
@@ -77,15 +96,15 @@ def bounds(w: int, p: Program, pieces: IntArray) -> tuple[float, float, float]:
     return (0.0, 1e300, slack) if pieces[at + 2] >= 0 else (-1e300, 0.0, slack)
 
 
-def go_on(w: int, last: int, x: float, corner: bool, p: Program, memory: Array, pieces: IntArray) -> None:
-    """Keep the pair forces at x for the next step; where x is a corner, go on to the cell beyond it."""
+def _go_on(w: int, last: int, x: float, corner: bool, p: Program, memory: Array, pieces: IntArray) -> None:
+    """Keep the pair forces at x for the next step; at a corner, go on to the next cell."""
     kind = p.watches[w, 0]
     k = p.watches[w, 1]
     at = p.places.piece[k]
     row = p.places.row[k]
     slot = p.watches[w, 3]
-    low, high, slack = bounds(w, p, pieces)
-    value, slope = polynomial(memory, watched(w, p, pieces), last, x)
+    low, high, slack = _bounds(w, p, pieces)
+    value, slope = _polynomial(memory, _watched(w, p, pieces), last, x)
     up = corner and slope > 0.0 and value >= high - slack
     down = corner and slope < 0.0 and value <= low + slack
     if kind == PAIR:
@@ -123,44 +142,68 @@ def go_on(w: int, last: int, x: float, corner: bool, p: Program, memory: Array, 
 
 
 def leaves(memory: Array, row: int, last: int, low: float, high: float, slack: float, limit: float) -> float:
-    """Where x, up to `limit`, first takes the series in a row of the memory out of [low, high]; 2 when it stays.
+    """Find the first x up to `limit` at which a series leaves the interval [low, high].
 
-    It is looked at in a few places; between two of them at its turning point, where tangents allow it to pass there.
+    The series is sampled at `SAMPLES` places, and at its turning point between two of them if tangents allow it to
+    leave the interval there.
+
+    Parameters
+    ----------
+    memory : ndarray, shape (rows, orders)
+        Series over x.
+    row : int
+        Row of the series.
+    last : int
+        Highest order that counts.
+    low, high : float
+        Bounds of the interval, in the unit of the series. A series that starts outside and moves inwards does not
+        leave.
+    slack : float
+        Excess beyond a bound that counts as rounding, in the same unit.
+    limit : float
+        Largest x that is searched, in parts of the trial step.
+
+    Returns
+    -------
+    x : float
+        Where the series passes a bound; 2 if it stays inside.
     """
     before = 0.0
     value = memory[row, 0]
     slope = memory[row, 1]
-    if slope < 0.0:  # one that begins a rounding or a slack outside, on its way in, does not leave there
+    if slope < 0.0:  # a series that begins a rounding or a slack outside and moves inwards does not leave there
         high = max(high, value)
     else:
         low = min(low, value)
     for i in range(SAMPLES):
         end = limit * (i + 1) / SAMPLES
-        there, rate = polynomial(memory, row, last, end)
+        end_value, end_slope = _polynomial(memory, row, last, end)
         x = end
-        found = there
-        one = value + slope * (end - before)
-        two = there - rate * (end - before)
-        above = slope > 0.0 and rate < 0.0 and there <= high + slack and min(one, two) > high + slack
-        below = slope < 0.0 and rate > 0.0 and there >= low - slack and max(one, two) < low - slack
+        extreme = end_value
+        tangent = value + slope * (end - before)
+        end_tangent = end_value - end_slope * (end - before)
+        above = slope > 0.0 and end_slope < 0.0 and end_value <= high + slack
+        above = above and min(tangent, end_tangent) > high + slack
+        below = slope < 0.0 and end_slope > 0.0 and end_value >= low - slack
+        below = below and max(tangent, end_tangent) < low - slack
         if above or below:
-            x, found = turning(memory, row, last, before, end, above)
-        if found > high + slack or found < low - slack:
-            over = found > high + slack
-            return crossing(memory, row, last, (before, x), high if over else low, over, 1e-3 * slack)
+            x, extreme = _turning(memory, row, last, before, end, above)
+        if extreme > high + slack or extreme < low - slack:
+            over = extreme > high + slack
+            return _crossing(memory, row, last, (before, x), high if over else low, over, 1e-3 * slack)
         before = end
-        value = there
-        slope = rate
+        value = end_value
+        slope = end_slope
     return 2.0
 
 
-def turning(memory: Array, row: int, last: int, begin: float, end: float, rises: bool) -> tuple[float, float]:
-    """Place and value where the slope of a series changes its sign."""
+def _turning(memory: Array, row: int, last: int, begin: float, end: float, rises: bool) -> tuple[float, float]:
+    """Find x and value where the slope of a series changes its sign, by bisection."""
     x = 0.5 * (begin + end)
     value = 0.0
     for _ in range(40):
         x = 0.5 * (begin + end)
-        value, slope = polynomial(memory, row, last, x)
+        value, slope = _polynomial(memory, row, last, x)
         if (slope > 0.0) == rises:
             begin = x
         else:
@@ -168,14 +211,14 @@ def turning(memory: Array, row: int, last: int, begin: float, end: float, rises:
     return x, value
 
 
-def crossing(
+def _crossing(
     memory: Array, row: int, last: int, between: tuple[float, float], goal: float, rises: bool, close: float
 ) -> float:
-    """Where a series passes `goal` between two places: Newton's method, kept between them by halving."""
+    """Find x at which a series passes `goal` between two places by Newton's method, safeguarded by bisection."""
     begin, end = between
     x = end
     for _ in range(80):
-        value, slope = polynomial(memory, row, last, x)
+        value, slope = _polynomial(memory, row, last, x)
         if (value > goal) == rises:
             end = x
         else:
@@ -188,8 +231,8 @@ def crossing(
     return x
 
 
-def polynomial(memory: Array, row: int, last: int, x: float) -> tuple[float, float]:
-    """Value and slope at x of the series in a row of the memory."""
+def _polynomial(memory: Array, row: int, last: int, x: float) -> tuple[float, float]:
+    """Return value and slope at x of the series in a row of the memory (Horner)."""
     value = 0.0
     slope = 0.0
     for j in range(last, -1, -1):
@@ -198,4 +241,4 @@ def polynomial(memory: Array, row: int, last: int, x: float) -> tuple[float, flo
     return value, slope
 
 
-FUNCTIONS = (watched, bounds, go_on, leaves, turning, crossing, polynomial)
+FUNCTIONS = (_watched, _bounds, _go_on, leaves, _turning, _crossing, _polynomial)

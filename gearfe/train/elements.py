@@ -83,8 +83,8 @@ def rotor(train: GearTrain, shaft: Shaft) -> Rotor:
     transverse = float((table[:, 2] + table[:, 0] * (table[:, 3] - along) ** 2).sum())
     centre = point + (along - float(point @ axis)) * axis
     given = (shaft.mass, shaft.polar_inertia, shaft.transverse_inertia)
-    made = (float(total), float(table[:, 1].sum()), transverse)
-    mass, polar, transverse = (m if g is None else g for g, m in zip(given, made, strict=True))
+    computed = (float(total), float(table[:, 1].sum()), transverse)
+    mass, polar, transverse = (m if g is None else g for g, m in zip(given, computed, strict=True))
     return Rotor(mass, polar, transverse, centre)
 
 
@@ -135,12 +135,23 @@ class LinearForce(Element):
 
 
 def bore_rows(shaft: RigidShaft, point: Array, frame: Array, bore: Array | None) -> Array:
-    """Motion of shaft against bore: along e1, a, e2 and tilt about e1, e2; shape (5, 6 or 6 + N).
+    """Return the motion of a shaft relative to a bore: along e1, a, e2 and tilt about e1, e2.
 
     Parameters
     ----------
-    bore : (N, 6) or None
+    shaft : RigidShaft
+        The shaft.
+    point : ndarray, shape (3,)
+        Reference point of the bore, on the shaft's axis (m).
+    frame : ndarray, shape (3, 3)
+        Rows e1, e2, a: directions of the train.
+    bore : ndarray, shape (N, 6), or None
         Selects the bore's coordinates from the housing's; None for a rigid housing.
+
+    Returns
+    -------
+    rows : ndarray, shape (5, 6) or (5, 6 + N)
+        Relative displacements and tilts per unit coordinate of shaft and housing.
     """
     e1, e2, a = frame
     directions = np.array([e1, a, e2])
@@ -158,7 +169,19 @@ def bore_rows(shaft: RigidShaft, point: Array, frame: Array, bore: Array | None)
 
 
 def hinge(shaft: RigidShaft, housing: ModalBlocks | None, rows: Array, name: str) -> LinearJoint:
-    """Shaft and bore move alike but for the spin: five constraints."""
+    """Return the ideal bearing of a shaft in a bore: five constraints that leave the spin free.
+
+    Parameters
+    ----------
+    shaft : RigidShaft
+        The shaft.
+    housing : ModalBlocks or None
+        Body with the bore; None for a rigid housing.
+    rows : ndarray, shape (5, 6) or (5, 6 + N)
+        Motion of the shaft relative to the bore per unit coordinate, see `bore_rows`.
+    name : str
+        Name in messages.
+    """
     touches: tuple[Element, ...] = (shaft,) if housing is None else (shaft, housing)
     return LinearJoint(touches, rows, np.zeros(len(rows)), name=name)
 
@@ -166,6 +189,24 @@ def hinge(shaft: RigidShaft, housing: ModalBlocks | None, rows: Array, name: str
 def bearing(
     shaft: RigidShaft, housing: ModalBlocks | None, rows: Array, stiffness: Array, damping: Array, name: str
 ) -> LinearForce:
-    """Springs and dampers along the five rows."""
+    """Return the springs and dampers of a bearing along the five relative motions of shaft and bore.
+
+    With the rows R, K = R^T diag(stiffness) R and C = R^T diag(damping) R.
+
+    Parameters
+    ----------
+    shaft : RigidShaft
+        The shaft.
+    housing : ModalBlocks or None
+        Body with the bore; None for a rigid housing.
+    rows : ndarray, shape (5, 6) or (5, 6 + N)
+        R: motion of the shaft relative to the bore per unit coordinate, see `bore_rows`.
+    stiffness : ndarray, shape (5,)
+        Along e1, a, e2 (N/m) and about e1, e2 (N m/rad).
+    damping : ndarray, shape (5,)
+        In the same order (N s/m, N m s/rad).
+    name : str
+        Name in messages.
+    """
     touches: tuple[Element, ...] = (shaft,) if housing is None else (shaft, housing)
     return LinearForce(touches, rows.T @ (damping[:, None] * rows), rows.T @ (stiffness[:, None] * rows), name)

@@ -106,7 +106,19 @@ class MeshFlank(ABC):
 
     @abstractmethod
     def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:
-        """Forces at phases (rad) and approaches beyond the gap (m), (n,); `begin` as of `MeshLaw`."""
+        """Return the flank's forces and their derivatives at n times.
+
+        Parameters
+        ----------
+        phase : ndarray, shape (n,)
+            Phase of the mesh (rad).
+        approach : ndarray, shape (n,)
+            Approach beyond the gap (m).
+        slip : Slip
+            Rates of the motion, and the friction.
+        begin : ndarray, shape (n, slots), optional
+            Pair forces (N) from which the law's iteration starts, and which it overwrites, see `MeshLaw`.
+        """
 
     @abstractmethod
     def bears(self, phase: Array, approach: Array) -> BoolArray:
@@ -131,7 +143,19 @@ class CurveFlank(MeshFlank):
     mean_damping: float = 0.0
 
     def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:  # noqa: ARG002
-        """Forces at phases (rad) and approaches beyond the gap (m), (n,)."""
+        """Return the forces of a stiffness curve and of its contact damper at n times.
+
+        Parameters
+        ----------
+        phase : ndarray, shape (n,)
+            Phase of the mesh (rad).
+        approach : ndarray, shape (n,)
+            Approach beyond the gap (m).
+        slip : Slip
+            Rates of the motion; the damper uses that of the approach.
+        begin : ndarray, optional
+            Not used: a curve has no pair forces.
+        """
         k, slope = self.curve(phase)
         bears = self.bears(phase, approach)
         force, tangent, cross = (np.where(bears, x, 0.0) for x in (k * approach, k, slope * approach))
@@ -171,34 +195,51 @@ class LawFlank(MeshFlank):
         return np.asarray(self.shifts[self.law.pair_numbers(phase) % len(self.shifts)])
 
     def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:
-        """Forces at phases (rad) and approaches beyond the gap (m), (n,); `begin` as of `MeshLaw`."""
-        made = self.law(phase, approach, self.shifts_at(phase), begin)
+        """Return the forces of a mesh law, with damping and friction, at n times.
+
+        Parameters
+        ----------
+        phase : ndarray, shape (n,)
+            Phase of the mesh (rad).
+        approach : ndarray, shape (n,)
+            Approach beyond the gap (m).
+        slip : Slip
+            Rates of the motion, and the friction.
+        begin : ndarray, shape (n, slots), optional
+            Pair forces (N) from which the law's iteration starts, and which it overwrites, see `MeshLaw`.
+
+        Raises
+        ------
+        ArithmeticError
+            If the pair forces do not settle; with `begin` their sum is NaN instead.
+        """
+        loads = self.law(phase, approach, self.shifts_at(phase), begin)
         push = 1.0 + self.damping * slip.rates[:, 0]
         more = np.where(push > 0.0, self.damping, 0.0)
         push = np.maximum(push, 0.0)
         return FlankForces(
-            made.force * push, made.tangent * push, made.cross * push, made.force <= 0.0, made.beyond,
-            made.force * more if self.damping > 0.0 else None, made.moment, made.cross, made.bend,
-            None if slip.sliding is None else self._drag(phase, made, slip, slip.sliding, push, more),
+            loads.force * push, loads.tangent * push, loads.cross * push, loads.force <= 0.0, loads.beyond,
+            loads.force * more if self.damping > 0.0 else None, loads.moment, loads.cross, loads.bend,
+            None if slip.sliding is None else self._drag(phase, loads, slip, slip.sliding, push, more),
         )  # fmt: skip
 
-    def _drag(self, phase: Array, made: MeshForces, slip: Slip, one: Sliding, push: Array, more: Array) -> Drag:
+    def _drag(self, phase: Array, loads: MeshForces, slip: Slip, sliding: Sliding, push: Array, more: Array) -> Drag:
         """Friction of `gearfe.train.friction` with its derivatives."""
-        pairs, slopes = made.pair_forces, made.pair_slopes
-        arm = one.radius * (self.law.pair_phases(phase) - one.pitch_phase)
-        turning = (one.ratio * slip.rate + slip.rates[:, 2])[:, None]
+        pairs, slopes = loads.pair_forces, loads.pair_slopes
+        arm = sliding.radius * (self.law.pair_phases(phase) - sliding.pitch_phase)
+        turning = (sliding.ratio * slip.rate + slip.rates[:, 2])[:, None]
         speed = slip.rates[:, 1, None] + arm * turning
-        share, slope = smooth_sign(speed / one.speed)
-        steep = one.coefficient * pairs * push[:, None] * slope / one.speed
-        pulls = one.coefficient * share
+        share, slope = smooth_sign(speed / sliding.speed)
+        steep = sliding.coefficient * pairs * push[:, None] * slope / sliding.speed
+        pulls = sliding.coefficient * share
         drag = pulls * pairs * push[:, None]
         arms = np.stack([np.ones_like(arm), arm])  # of the force and of its moment
 
         def summed(x: Array) -> Array:
             return np.asarray((arms * x).sum(axis=2).T)
 
-        by_phase = summed(pulls * slopes[1] * push[:, None] + steep * one.radius * turning)
-        by_phase[:, 1] += one.radius * drag.sum(axis=1)
+        by_phase = summed(pulls * slopes[1] * push[:, None] + steep * sliding.radius * turning)
+        by_phase[:, 1] += sliding.radius * drag.sum(axis=1)
         return Drag(
             summed(drag), summed(pulls * slopes[0] * push[:, None]), by_phase, summed(pulls * pairs * more[:, None]),
             summed(steep), summed(steep * arm), (drag * speed).sum(axis=1),
@@ -239,12 +280,13 @@ class TrainForces:
 
     def of_flanks(self, t: Array, u: Array, du: Array) -> list[FlankForces]:
         """Forces of each flank at the times t (n,), u and du of shape (n, directions)."""
-        angle, rate, made = self.angle(t), self.angle(t, 1), []
+        angle, rate, forces = self.angle(t), self.angle(t, 1), []
         for flank in self.flanks:
-            one = flank.sliding
-            moves = [flank.direction, *((flank.direction, flank.turn) if one is None else (one.across, one.spin))]
-            made.append(flank.forces(*flank.phase_and_approach(angle, u), Slip(rate, du[:, moves], one)))
-        return made
+            sliding = flank.sliding
+            across = (flank.direction, flank.turn) if sliding is None else (sliding.across, sliding.spin)
+            slip = Slip(rate, du[:, [flank.direction, *across]], sliding)
+            forces.append(flank.forces(*flank.phase_and_approach(angle, u), slip))
+        return forces
 
     def __call__(self, t: Array, u: Array, du: Array, flanks: list[FlankForces] | None = None) -> Array:
         """Forces at the times t (n,), u and du of shape (n, directions); shape (n, directions).

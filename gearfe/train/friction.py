@@ -54,7 +54,17 @@ def smooth_sign(x: Array) -> tuple[Array, Array]:
 
 
 def product(j: int, a: int, b: int, memory: Array) -> float:
-    """Order j of the product of two rows (Cauchy)."""
+    """Return order j of the product of two series by Cauchy's rule, sum_k a_k b_(j-k).
+
+    Parameters
+    ----------
+    j : int
+        Order.
+    a, b : int
+        Rows of the factors.
+    memory : ndarray, shape (rows, orders)
+        Series over x.
+    """
     value = 0.0
     for k in range(j + 1):
         value += memory[a, k] * memory[b, j - k]
@@ -62,9 +72,22 @@ def product(j: int, a: int, b: int, memory: Array) -> float:
 
 
 def smoothed_sign(j: int, x: int, row: int, piece: int, memory: Array, pieces: IntArray) -> None:
-    """Order j of s(x) in a row, of x2 and of s / x in the next ones; a range that is not known follows from x.
+    """Write order j of the smoothed sign s(x), and of its factors x^2 and s/x, into three rows.
 
-    The range, -1, 0 (within +-1) or 1, is the whole number `piece`.
+    Parameters
+    ----------
+    j : int
+        Order.
+    x : int
+        Row of the argument, v/v0.
+    row : int
+        Row of s(x); x^2 and s/x are in the next two.
+    piece : int
+        Place of the range of x among the pieces: -1, 0 (within +-1) or 1. `UNKNOWN` is resolved from x at order 0.
+    memory : ndarray, shape (rows, orders)
+        Series over the step.
+    pieces : ndarray of int, shape (whole numbers,)
+        Cells that the flanks are on.
     """
     if j == 0 and pieces[piece] == UNKNOWN:
         pieces[piece] = 1 if memory[x, 0] > 1.0 else -1 if memory[x, 0] < -1.0 else 0

@@ -217,28 +217,45 @@ class OperatingPoint:
 
 
 def mesh_line(train: GearTrain, mesh: GearMesh, shafts: Shafts, running: OperatingPoint) -> MeshLine:
-    """Line of action of a mesh in a train."""
+    """Return the line of action of a mesh in a train, with its constant stiffness and damping.
+
+    Parameters
+    ----------
+    train : GearTrain
+        The train.
+    mesh : GearMesh
+        One of its meshes.
+    shafts : Shafts
+        Bodies, and the numbers of their coordinates.
+    running : OperatingPoint
+        Driving sense, phase, force, speed and pitch errors of the mesh.
+
+    Raises
+    ------
+    InputError
+        If friction follows from the lubrication and the gears stand still.
+    """
     first, size, ratios, sense, force = shafts.first, shafts.size, shafts.ratios, running.sense, running.force
-    one, two = train.gear(mesh.driver), train.gear(mesh.driven)
-    i, j = train.shaft_number(one.shaft), train.shaft_number(two.shaft)
+    driver, driven = train.gear(mesh.driver), train.gear(mesh.driven)
+    i, j = train.shaft_number(driver.shaft), train.shaft_number(driven.shaft)
     a = train.frame[2]
-    pair = GearPair(one.gear, two.gear, mesh.centre_distance)
+    pair = GearPair(driver.gear, driven.gear, mesh.centre_distance)
     alpha = pair.working_pressure_angle
-    base = np.array(train.shaft(one.shaft).point)
-    arm = np.array(train.shaft(two.shaft).point) - base
+    base = np.array(train.shaft(driver.shaft).point)
+    arm = np.array(train.shaft(driven.shaft).point) - base
     arm = arm - (arm @ a) * a
     distance = float(np.linalg.norm(arm))
     across = arm / distance
     along = np.cross(a, across)
-    low = max(g.along - 0.5 * g.gear.face_width for g in (one, two))
-    high = min(g.along + 0.5 * g.gear.face_width for g in (one, two))
+    low = max(g.along - 0.5 * g.gear.face_width for g in (driver, driven))
+    high = min(g.along + 0.5 * g.gear.face_width for g in (driver, driven))
     centre = base + (0.5 * (low + high) - float(base @ a)) * a
     point = centre + pair.pinion_working_radius * across
 
-    def relative(line: Array, on_one: Array, on_two: Array) -> Array:
+    def relative(line: Array, on_driver: Array, on_driven: Array) -> Array:
         row = np.zeros(size)
-        row[first[i] : first[i] + 6] += line @ shafts.bodies[i].point_rows(on_one, train.frame)
-        row[first[j] : first[j] + 6] -= line @ shafts.bodies[j].point_rows(on_two, train.frame)
+        row[first[i] : first[i] + 6] += line @ shafts.bodies[i].point_rows(on_driver, train.frame)
+        row[first[j] : first[j] + 6] -= line @ shafts.bodies[j].point_rows(on_driven, train.frame)
         return row
 
     line = math.cos(alpha) * sense * along + math.sin(alpha) * across
@@ -280,7 +297,7 @@ def mesh_line(train: GearTrain, mesh: GearMesh, shafts: Shafts, running: Operati
         ratio=ratios[i],
         sense=sense,
         phase=running.phase,
-        module=one.gear.module,
+        module=driver.gear.module,
         slides=slides,
         sliding=_sliding(mesh, pair, force, (ratios[i], ratios[j]), running.speed),
         shifts=running.shifts,

@@ -163,15 +163,28 @@ def _check(join: _Join, found: dict[str, float], room: float) -> None:
 
 
 def pair_shifts(train: GearTrain, mesh: GearMesh, sense: float, places: ToothPlaces) -> tuple[Array, Array]:
-    r"""How much later the tooth pairs of a mesh touch by the pitch errors of its gears (m): driving and back flanks.
+    """Return how much later the tooth pairs of a mesh touch because of the gears' pitch errors.
 
     Pair k is the k-th tooth of the driver behind the one whose place is the phase. It meets the driver's tooth
     :math:`s(k + m_1)` and the driven gear's :math:`m_2 - s k`, with m1, m2 from the places at the start, and touches
     later by :math:`-(e_1 + e_2)`. On the back flanks all is seen from the other side, with the sense -s.
 
+    Parameters
+    ----------
+    train : GearTrain
+        The train, whose gears have the pitch errors.
+    mesh : GearMesh
+        One of its meshes.
+    sense : float
+        +1 or -1: the driver turns about the train's axis or against it.
+    places : ToothPlaces
+        Angles of the teeth at the start.
+
     Returns
     -------
-    Arrays of the length of a period, the least common multiple of the numbers of teeth, or (1,) without errors.
+    driving, back : ndarray, shape (L,)
+        Shifts (m) of the pairs on the driving and on the back flanks. L is a period of the pairs, the least common
+        multiple of the numbers of teeth, or 1 without errors.
     """
     join = _join(train, mesh, sense)
     return _shifts(train, join, places, join.sense), _shifts(train, join, places, -join.sense)

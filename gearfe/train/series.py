@@ -105,9 +105,29 @@ class Program(NamedTuple):
 
 
 def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array) -> None:
-    """Order j of the forces over x, time t + s x, from the orders up to j + 1 of u; see the module's docstring."""
+    """Write order j of the train's forces over x, at time t + s x; see the module's docstring.
+
+    Parameters
+    ----------
+    j : int
+        Order; all lower ones have been computed, 0 starts the step.
+    t : float
+        Time at the start of the step (s).
+    s : float
+        Trial step (s), negative backwards in time.
+    u : ndarray, shape (directions, orders)
+        Series of the motion along the directions, known up to order j + 1.
+    p : Program
+        Tables of the train's forces.
+    memory : ndarray, shape (rows, orders)
+        Series of the step; order j is written.
+    pieces : ndarray of int, shape (whole numbers,)
+        Cells that the flanks are on.
+    out : ndarray, shape (directions,)
+        Order j of the forces (N, N m).
+    """
     if j == 0:
-        step_begins(t, s, p, memory, pieces)
+        _step_begins(t, s, p, memory, pieces)
     rate = (j + 1) / s
     for i in range(out.shape[0]):
         out[i] = 0.0
@@ -134,31 +154,31 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
         out[d] += p.flanks.mean[k] * u[d, j]
         out[d] += p.flanks.mean_damping[k] * rate * u[d, j + 1]
         if p.places.curve[k] < 0:
-            contact(j, k, rate, u, p, memory, pieces, out)
+            _contact(j, k, rate, u, p, memory, pieces, out)
         else:
-            memory[row + STIFFNESS, j] = cubic(j, row, row + CELL, 0, memory)
+            memory[row + STIFFNESS, j] = _cubic(j, row, row + CELL, 0, memory)
             if pieces[p.places.piece[k] + 2] >= 0:
                 out[d] -= product(j, row + STIFFNESS, row + DELTA, memory)
                 out[d] -= p.flanks.damping[k] * rate * u[d, j + 1]
 
 
-def cubic(j: int, z: int, numbers: int, column: int, memory: Array) -> float:
-    """Order j of a cubic of the phase in row z, whose square and cube follow it."""
+def _cubic(j: int, z: int, numbers: int, column: int, memory: Array) -> float:
+    """Return order j of a cubic of the phase in row z; its square and cube are in the next rows."""
     value = memory[numbers, column + 1] * memory[z, j] + memory[numbers, column + 2] * memory[z + 1, j]
     value += memory[numbers, column + 3] * memory[z + 2, j]
     return value + memory[numbers, column] if j == 0 else value
 
 
-def cubic_slope(j: int, z: int, numbers: int, column: int, memory: Array) -> float:
-    """Order j of the slope of that cubic."""
+def _cubic_slope(j: int, z: int, numbers: int, column: int, memory: Array) -> float:
+    """Return order j of the slope of a cubic of the phase in row z."""
     value = 2.0 * memory[numbers, column + 2] * memory[z, j] + 3.0 * memory[numbers, column + 3] * memory[z + 1, j]
     return value + memory[numbers, column + 1] if j == 0 else value
 
 
-def contact(
+def _contact(
     j: int, k: int, rate: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array
 ) -> None:  # fmt: skip
-    """Order j of the forces of flank k with a mesh law; its pair forces are solved for."""
+    """Add order j of the forces of flank k with a mesh law, after solving for its pair forces."""
     slots = p.laws.touch.shape[1]
     row = p.places.row[k]
     at = p.places.piece[k] + PER_FLANK
@@ -169,81 +189,81 @@ def contact(
         memory[row + DAMPED, 0] += 1.0
     settled = False
     for _ in range(NEWTON):  # for order 0 alone, whose forces then are those that make the gaps vanish
-        gaps(j, slots, memory, row, pieces, at)
+        _gaps(j, slots, memory, row, pieces, at)
         if settled:
             break
-        change = pair_forces(j, slots, memory, row, pieces, at)
+        change = _pair_forces(j, slots, memory, row, pieces, at)
         if j > 0:
             break
         settled = change <= CHANGED
     moment = 0.0
     couple = row + SLOTS + PER_SLOT * slots
     for slot in range(slots):
-        own = row + SLOTS + PER_SLOT * slot
-        bears = pieces[at + slot] >= 0
-        if bears:
-            memory[own + RISE, j] = cubic_slope(j, row, own + TOUCHES, 0, memory)
-            memory[own + E4, j] = cubic_slope(j, row, own + ENERGIES, 16, memory)
-            moment += product(j, own + FULL, own + RISE, memory)
+        pair = row + SLOTS + PER_SLOT * slot
+        loaded = pieces[at + slot] >= 0
+        if loaded:
+            memory[pair + RISE, j] = _cubic_slope(j, row, pair + TOUCHES, 0, memory)
+            memory[pair + E4, j] = _cubic_slope(j, row, pair + ENERGIES, 16, memory)
+            moment += product(j, pair + FULL, pair + RISE, memory)
             for power in range(3, -1, -1):  # Horner over f of the energy's slope
-                slope = cubic_slope(j, row, own + ENERGIES, 4 * power, memory)
-                slope += product(j, own + E1 + power, own + F, memory)
+                slope = _cubic_slope(j, row, pair + ENERGIES, 4 * power, memory)
+                slope += product(j, pair + E1 + power, pair + F, memory)
                 if power > 0:
-                    memory[own + E1 + power - 1, j] = slope
+                    memory[pair + E1 + power - 1, j] = slope
                 else:
                     moment += slope
-            memory[own + NORMAL, j] = product(j, own + FULL, row + DAMPED, memory)
+            memory[pair + NORMAL, j] = product(j, pair + FULL, row + DAMPED, memory)
             if pieces[at - 1] >= 0:
-                out[d] -= memory[own + NORMAL, j]
+                out[d] -= memory[pair + NORMAL, j]
         for up in range(slot + 1, slots):
-            if bears and pieces[at + up] >= 0:
+            if loaded and pieces[at + up] >= 0:
                 other = row + SLOTS + PER_SLOT * up
-                memory[couple + COUPLE_SLOPE, j] = cubic_slope(j, row, couple + NUMBERS, 0, memory)
-                memory[couple + BOTH, j] = product(j, own + FULL, other + FULL, memory)
+                memory[couple + COUPLE_SLOPE, j] = _cubic_slope(j, row, couple + NUMBERS, 0, memory)
+                memory[couple + BOTH, j] = product(j, pair + FULL, other + FULL, memory)
                 moment += product(j, couple + COUPLE_SLOPE, couple + BOTH, memory)
             couple += PER_COUPLE
     out[turn] += p.flanks.sense[k] * moment
     if p.slides.coefficient[k] > 0.0:
-        friction(j, k, rate, u, p, memory, pieces, out)
+        _friction(j, k, rate, u, p, memory, pieces, out)
 
 
-def gaps(j: int, slots: int, memory: Array, row: int, pieces: IntArray, at: int) -> None:
-    """Order j of what the gap of each pair lacks, with the pair forces known so far."""
+def _gaps(j: int, slots: int, memory: Array, row: int, pieces: IntArray, at: int) -> None:
+    """Write order j of the residual of each pair's equation, with the pair forces known so far."""
     for slot in range(slots):
-        own = row + SLOTS + PER_SLOT * slot
+        pair = row + SLOTS + PER_SLOT * slot
         if j == 0:
-            memory[own + F, 0] = memory[own + FULL, 0] - memory[own + TOUCHES, ORIGIN]
+            memory[pair + F, 0] = memory[pair + FULL, 0] - memory[pair + TOUCHES, ORIGIN]
         else:
-            memory[own + F, j] = 0.0
-            memory[own + FULL, j] = 0.0
-        gap = memory[row + DELTA, j] - cubic(j, row, own + TOUCHES, 0, memory)
+            memory[pair + F, j] = 0.0
+            memory[pair + FULL, j] = 0.0
+        gap = memory[row + DELTA, j] - _cubic(j, row, pair + TOUCHES, 0, memory)
         if pieces[at + slot] >= 0:  # less Lambda, by Horner over f
-            memory[own + H3, j] = 4.0 * cubic(j, row, own + ENERGIES, 16, memory)
+            memory[pair + H3, j] = 4.0 * _cubic(j, row, pair + ENERGIES, 16, memory)
             for power in range(3, 0, -1):
-                value = power * cubic(j, row, own + ENERGIES, 4 * power, memory)
-                value += product(j, own + H1 + power - 1, own + F, memory)
+                value = power * _cubic(j, row, pair + ENERGIES, 4 * power, memory)
+                value += product(j, pair + H1 + power - 1, pair + F, memory)
                 if power > 1:
-                    memory[own + H1 + power - 2, j] = value
+                    memory[pair + H1 + power - 2, j] = value
                 else:
                     gap -= value
-        memory[own + GAP, j] = gap
+        memory[pair + GAP, j] = gap
     couple = row + SLOTS + PER_SLOT * slots
     for low in range(slots):
-        own = row + SLOTS + PER_SLOT * low
+        pair = row + SLOTS + PER_SLOT * low
         for up in range(low + 1, slots):
             other = row + SLOTS + PER_SLOT * up
-            memory[couple, j] = cubic(j, row, couple + NUMBERS, 0, memory)
+            memory[couple, j] = _cubic(j, row, couple + NUMBERS, 0, memory)
             if pieces[at + up] >= 0:
-                memory[own + GAP, j] -= product(j, couple, other + FULL, memory)
+                memory[pair + GAP, j] -= product(j, couple, other + FULL, memory)
             if pieces[at + low] >= 0:
-                memory[other + GAP, j] -= product(j, couple, own + FULL, memory)
+                memory[other + GAP, j] -= product(j, couple, pair + FULL, memory)
             couple += PER_COUPLE
 
 
-def friction(
+def _friction(
     j: int, k: int, rate: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array
 ) -> None:  # fmt: skip
-    """Order j of the friction of flank k, whose pair forces are known."""
+    """Add order j of the friction of flank k, whose pair forces are known."""
     slots = p.laws.touch.shape[1]
     row = p.places.row[k]
     at = p.places.piece[k] + PER_FLANK
@@ -252,21 +272,21 @@ def friction(
     scale = rate / p.slides.speed[k]
     memory[row + SPIN, j] = scale * (p.slides.ratio[k] * memory[0, j + 1] + u[spin, j + 1])
     for slot in range(slots):
-        own = row + SLOTS + PER_SLOT * slot
-        memory[own + SPEED, j] = scale * u[across, j + 1]
+        pair = row + SLOTS + PER_SLOT * slot
+        memory[pair + SPEED, j] = scale * u[across, j + 1]
         if pieces[at + slot] < 0:
             continue
-        memory[own + ARM, j] = cubic(j, row, own + LEVER, 0, memory)
-        memory[own + SPEED, j] += product(j, own + ARM, row + SPIN, memory)
-        smoothed_sign(j, own + SPEED, own + SIGN, at + slots + slot, memory, pieces)
+        memory[pair + ARM, j] = _cubic(j, row, pair + LEVER, 0, memory)
+        memory[pair + SPEED, j] += product(j, pair + ARM, row + SPIN, memory)
+        smoothed_sign(j, pair + SPEED, pair + SIGN, at + slots + slot, memory, pieces)
         if pieces[at - 1] >= 0:
-            memory[own + DRAG, j] = p.slides.coefficient[k] * product(j, own + NORMAL, own + SIGN, memory)
-            out[across] -= memory[own + DRAG, j]
-            out[spin] -= product(j, own + DRAG, own + ARM, memory)
+            memory[pair + DRAG, j] = p.slides.coefficient[k] * product(j, pair + NORMAL, pair + SIGN, memory)
+            out[across] -= memory[pair + DRAG, j]
+            out[spin] -= product(j, pair + DRAG, pair + ARM, memory)
 
 
-def step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray) -> None:
-    """Functions of time, and the numbers of the cells that the flanks are on, for a step."""
+def _step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray) -> None:
+    """Write the functions of time, and the coefficients of the cells that the flanks are on, for a step."""
     time_series(p.times, t, s > 0.0, memory.shape[1], memory)
     for k in range(p.times.first.shape[0] - 1):
         scale = 1.0
@@ -291,45 +311,45 @@ def step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray)
         memory[row + CELL, ORIGIN] = p.laws.nodes[law, cell] + pieces[at] * cycle
         couple = row + SLOTS + PER_SLOT * slots + NUMBERS
         for slot in range(slots):
-            own = row + SLOTS + PER_SLOT * slot
+            pair = row + SLOTS + PER_SLOT * slot
             part = pieces[at + PER_FLANK + slot]
-            memory[own + FULL, 0] = memory[row + BEFORE, slot] if part >= 0 else 0.0
-            memory[own + TOUCHES, ORIGIN] = p.laws.forces[law, part] if part >= 0 else 0.0
+            memory[pair + FULL, 0] = memory[row + BEFORE, slot] if part >= 0 else 0.0
+            memory[pair + TOUCHES, ORIGIN] = p.laws.forces[law, part] if part >= 0 else 0.0
             for a in range(4):
-                memory[own + TOUCHES, a] = p.laws.touch[law, slot, cell, a]
+                memory[pair + TOUCHES, a] = p.laws.touch[law, slot, cell, a]
             period = p.places.shifted[k + 1] - p.places.shifted[k]
             number = (slot - pieces[at]) % period  # of the pair
-            memory[own + TOUCHES, 0] += p.places.shifts[p.places.shifted[k] + number]
+            memory[pair + TOUCHES, 0] += p.places.shifts[p.places.shifted[k] + number]
             for power in range(5):
                 for a in range(4):
                     if part >= 0:
-                        memory[own + ENERGIES, 4 * power + a] = p.laws.energies[law, slot, cell, part, power, a]
+                        memory[pair + ENERGIES, 4 * power + a] = p.laws.energies[law, slot, cell, part, power, a]
             for up in range(slot + 1, slots):
                 for a in range(4):
                     memory[couple, a] = p.laws.coupling[law, slot * slots + up, cell, a]
                 couple += PER_COUPLE
             begin = p.laws.nodes[law, cell] + slot * cycle - p.slides.pitch_phase[k]
-            memory[own + LEVER, 0] = p.slides.radius[k] * begin
-            memory[own + LEVER, 1] = p.slides.radius[k]
+            memory[pair + LEVER, 0] = p.slides.radius[k] * begin
+            memory[pair + LEVER, 1] = p.slides.radius[k]
 
 
-def pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, at: int) -> float:
-    """Order j of the pair forces from what their gaps lack, J f = gap; for j = 0 a step of Newton's method.
+def _pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, at: int) -> float:
+    """Solve J f = residual for order j of the pair forces.
 
-    Returns the largest change, relative to the largest force.
+    For j = 0 this is a step of Newton's method. Returns the largest change, relative to the largest force.
     """
     column = max(j, 1)  # column 0 is the state at which J is taken
     J = row + JACOBIAN
     couple = row + SLOTS + PER_SLOT * slots
     for low in range(slots):
-        own = row + SLOTS + PER_SLOT * low
-        bears = pieces[at + low] >= 0
-        f = memory[own + F, 0]
-        slope = memory[own + H1, 0] + f * (memory[own + H2, 0] + f * memory[own + H3, 0])
-        memory[J, low * slots + low] = slope if bears else 1.0
-        memory[own + F, column] = memory[own + GAP, j] if bears else 0.0
+        pair = row + SLOTS + PER_SLOT * low
+        loaded = pieces[at + low] >= 0
+        f = memory[pair + F, 0]
+        slope = memory[pair + H1, 0] + f * (memory[pair + H2, 0] + f * memory[pair + H3, 0])
+        memory[J, low * slots + low] = slope if loaded else 1.0
+        memory[pair + F, column] = memory[pair + GAP, j] if loaded else 0.0
         for up in range(low + 1, slots):
-            both = bears and pieces[at + up] >= 0
+            both = loaded and pieces[at + up] >= 0
             memory[J, low * slots + up] = memory[couple, 0] if both else 0.0
             memory[J, up * slots + low] = memory[J, low * slots + up]
             couple += PER_COUPLE
@@ -338,36 +358,36 @@ def pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, a
             factor = memory[J, b * slots + a] / memory[J, a * slots + a]
             for c in range(a, slots):
                 memory[J, b * slots + c] -= factor * memory[J, a * slots + c]
-            one = row + SLOTS + PER_SLOT * a + F
-            memory[one + PER_SLOT * (b - a), column] -= factor * memory[one, column]
+            force = row + SLOTS + PER_SLOT * a + F
+            memory[force + PER_SLOT * (b - a), column] -= factor * memory[force, column]
     change = 0.0
     largest = 1e-300
     for a in range(slots - 1, -1, -1):
-        own = row + SLOTS + PER_SLOT * a
+        pair = row + SLOTS + PER_SLOT * a
         for c in range(a + 1, slots):
-            memory[own + F, column] -= memory[J, a * slots + c] * memory[own + PER_SLOT * (c - a) + F, column]
-        memory[own + F, column] /= memory[J, a * slots + a]
-        f = memory[own + F, column]
-        memory[own + FULL, j] += f
+            memory[pair + F, column] -= memory[J, a * slots + c] * memory[pair + PER_SLOT * (c - a) + F, column]
+        memory[pair + F, column] /= memory[J, a * slots + a]
+        f = memory[pair + F, column]
+        memory[pair + FULL, j] += f
         change = max(change, abs(f))
-        largest = max(largest, abs(memory[own + FULL, 0]))
+        largest = max(largest, abs(memory[pair + FULL, 0]))
     if j == 0:
         return change / largest
     couple = row + SLOTS + PER_SLOT * slots
     for low in range(slots):  # what depends on the forces
-        own = row + SLOTS + PER_SLOT * low
-        f = memory[own + F, j]
-        bend = f * memory[own + H3, 0]
-        memory[own + H2, j] += bend
-        memory[own + H1, j] += f * memory[own + H2, 0] + memory[own + F, 0] * bend
+        pair = row + SLOTS + PER_SLOT * low
+        f = memory[pair + F, j]
+        bend = f * memory[pair + H3, 0]
+        memory[pair + H2, j] += bend
+        memory[pair + H1, j] += f * memory[pair + H2, 0] + memory[pair + F, 0] * bend
         for up in range(low + 1, slots):
             other = row + SLOTS + PER_SLOT * up
-            memory[own + GAP, j] -= memory[couple, 0] * memory[other + F, j]
+            memory[pair + GAP, j] -= memory[couple, 0] * memory[other + F, j]
             memory[other + GAP, j] -= memory[couple, 0] * f
             couple += PER_COUPLE
     return 0.0
 
 
 FUNCTIONS = (
-    step_begins, product, cubic, cubic_slope, contact, gaps, friction, smoothed_sign, pair_forces, time_series,
+    _step_begins, product, _cubic, _cubic_slope, _contact, _gaps, _friction, smoothed_sign, _pair_forces, time_series,
 )  # fmt: skip

@@ -316,7 +316,21 @@ def _cut(moved: TrainStates, first: int, keep: int) -> TrainStates:
 def response_of(
     model: TrainModel, moved: TrainStates, status: str, reached: float, statistics: dict[str, Any]
 ) -> TrainResponse:
-    """A motion as a response, without estimates."""
+    """Return a motion as a response, without error estimates.
+
+    Parameters
+    ----------
+    model : TrainModel
+        The train.
+    moved : TrainStates
+        Its states at n times.
+    status : str
+        ``done``, or why the run ended early.
+    reached : float
+        Time that was reached (s).
+    statistics : dict
+        Counts of the integration.
+    """
     train, t = model.train, moved.time
     spin = [int(i) + 5 for i in model.first]
     rate, push = (model.angle(t, k)[:, None] * model.ratios for k in (1, 2))

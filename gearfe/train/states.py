@@ -64,7 +64,7 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     acting = model.forces(t, u, du, flanks) @ W.T
     if by_modes:
         a = (modal.constant - y * modal.eigenvalues - dy @ modal.damping.T + acting @ modal.T) @ modal.T.T
-    multipliers = joint_multipliers(model, q, v, a, acting)
+    multipliers = _joint_multipliers(model, q, v, a, acting)
     drive = model.train.driven
     if drive.stiffness is None:
         push = -multipliers["drive"]
@@ -72,7 +72,7 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
         row = model.spin_reference[model.train.shaft_number(drive.shaft)]
         push = -drive.stiffness * (q @ row) - drive.damping * (v @ row)
     rows = np.array([line.row for line in model.meshes]).reshape(-1, q.shape[1])
-    force, drag, loss, apart = contact_forces(model, v, flanks, multipliers)
+    force, drag, loss, apart = _contact_forces(model, v, flanks, multipliers)
     drivers = [line.driver for line in model.meshes]
     spin = [int(model.first[i]) + 5 for i in drivers]
     speed = model.angle(t, 1)[:, None] * model.ratios[drivers] + v[:, spin]
@@ -81,41 +81,43 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     return TrainStates(t, q, v, a, force, q @ rows.T, apart, push, power, loss, model.bearings(q, v, a, acting))
 
 
-def contact_forces(
+def _contact_forces(
     model: TrainModel, v: Array, flanks: list[FlankForces], multipliers: dict[str, Array]
 ) -> tuple[Array, Array, Array, BoolArray]:
-    """Of each mesh F (N): spring and damper, or the multiplier of a rigid mesh; of back flanks negative. Then of its
-    friction the torque against the driver (N m) and the power that it takes (W), and whether its teeth are apart.
+    """Return force, friction torque and power, and contact loss of each mesh, all of shape (n, meshes).
+
+    The force (N) is that of spring and damper, or the multiplier of a rigid mesh; on back flanks it is negative. The
+    torque (N m) acts against the driver; the power (W) is what friction dissipates.
     """
     out, torque, power = np.zeros((3, len(v), len(model.meshes)))
     apart = np.zeros(out.shape, dtype=bool)
-    found = iter(flanks)
+    flank_forces = iter(flanks)
     for i, line in enumerate(model.meshes):
         if line.rigid:
             out[:, i] = multipliers[f"mesh {line.name}"]
             continue
         apart[:, i] = not line.pulls
         for side in (1.0,) if line.backlash is None else (1.0, -1.0):
-            made = next(found)
-            out[:, i] += side * made.force
-            apart[:, i] &= made.force == 0.0
-            if line.sliding is not None and made.drag is not None:
-                torque[:, i] += made.drag.value @ np.array([line.sliding.arm, 1.0])
-                power[:, i] += made.drag.power
+            forces = next(flank_forces)
+            out[:, i] += side * forces.force
+            apart[:, i] &= forces.force == 0.0
+            if line.sliding is not None and forces.drag is not None:
+                torque[:, i] += forces.drag.value @ np.array([line.sliding.arm, 1.0])
+                power[:, i] += forces.drag.power
         if not line.in_contact:
             out[:, i] += line.damping * (v @ line.row)
     return out, torque, power, apart
 
 
-def joint_multipliers(model: TrainModel, q: Array, v: Array, a: Array, acting: Array) -> dict[str, Array]:
-    """Multipliers (n,) of the joints with one row, the rigid drive and rigid meshes: the least ones where joints are
-    redundant; `acting` are the forces of the train on the coordinates, (n, size).
+def _joint_multipliers(model: TrainModel, q: Array, v: Array, a: Array, acting: Array) -> dict[str, Array]:
+    """Return the multipliers (n,) of the joints with one row, the rigid drive and rigid meshes, by name.
 
+    They are the least ones if joints are redundant; `acting` are the forces of the train on the coordinates, (n, size).
     From ``M a = f - G^T lambda``, so the force on the coordinates is ``-G^T lambda``.
     """
     system = model.system
     rows = np.cumsum([0, *(element.rows for element, _ in system.joints)])
     single = {element.name: row for (element, _), row in zip(system.joints, rows, strict=False) if element.rows == 1}
     P = model.multipliers_of_forces[:, list(single.values())]
-    found = acting @ P - v @ (system.damping.T @ P) - q @ (system.stiffness @ P) - a @ (system.mass @ P)
-    return dict(zip(single, found.T, strict=True))
+    multipliers = acting @ P - v @ (system.damping.T @ P) - q @ (system.stiffness @ P) - a @ (system.mass @ P)
+    return dict(zip(single, multipliers.T, strict=True))
