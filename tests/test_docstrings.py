@@ -12,7 +12,9 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "gearfe"
 #: Parts of the package that are checked.
-CHECKED = ("train", "mechanisms", "runup")
+CHECKED = (
+    "train", "mechanisms", "runup", "multibody/core", "multibody/planar", "multibody/integrators", "multibody/compiled",
+)  # fmt: skip
 #: Functions with fewer parameters may describe them in a sentence.
 MANY = 4
 FILES = sorted(file for part in CHECKED for file in (PACKAGE / part).rglob("*.py"))
@@ -61,8 +63,9 @@ def test_sections_name_every_parameter(file: Path) -> None:
     assert missing(file) == {}
 
 
-def test_the_packages_are_found() -> None:
-    assert {file.relative_to(PACKAGE).parts[0] for file in FILES} == set(CHECKED)
+@pytest.mark.parametrize("part", CHECKED)
+def test_the_parts_are_found(part: str) -> None:
+    assert any(file.is_relative_to(PACKAGE / part) for file in FILES)
 
 
 @pytest.mark.parametrize(

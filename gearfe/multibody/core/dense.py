@@ -73,7 +73,15 @@ class Polynomials:
 
 
 def hermite(times: Array, q: Array, v: Array, a: Array) -> Polynomials:
-    """Polynomials of degree 5 through coordinates, velocities, accelerations (steps + 1, size) of the steps' ends."""
+    """Return the polynomials of degree 5 through the states at the ends of steps.
+
+    Parameters
+    ----------
+    times : ndarray, shape (steps + 1,)
+        Ends of the steps (s).
+    q, v, a : ndarray, shape (steps + 1, size)
+        Coordinates, velocities and accelerations there.
+    """
     h = np.diff(times)[:, None]
     q0, v0, a0 = q[:-1], h * v[:-1], h * h * a[:-1]
     d = q[1:] - q0 - v0 - a0 / 2

@@ -105,7 +105,24 @@ def check_rests(system: System, t: float, q: Array) -> None:
 
 
 def stiffness_at(system: System, t: float, q: Array, multipliers: Array) -> Array:
-    """K = -df/dq + d(G^T lambda)/dq at rest, shape (size, size)."""
+    """Return the stiffness K = -df/dq + d(G^T lambda)/dq at rest.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    t : float
+        Time (s).
+    q : ndarray, shape (size,)
+        Coordinates at rest.
+    multipliers : ndarray, shape (rows,)
+        Constraint forces lambda there.
+
+    Returns
+    -------
+    K : ndarray, shape (size, size)
+        With respect to the coordinates.
+    """
     return system.curvature(t, q, multipliers) - system.force_jacobian(t, q, np.zeros(system.size))[0]
 
 

@@ -46,7 +46,23 @@ def free_motions(G: Array) -> Array:
 
 
 def mass_excess(system: System, time: float, q: Array, v: Array, active: np.ndarray) -> Array:
-    """Mass (kg, kg m2) by which the elimination raises the coordinates of light links, shape (size,).
+    """Return the mass by which the elimination raises the coordinates of light links.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    time : float
+        Time of the state (s).
+    q, v : ndarray, shape (size,)
+        Coordinates and velocities that meet the constraints.
+    active : ndarray of bool, shape (rows,)
+        Constraints that are not redundant.
+
+    Returns
+    -------
+    excess : ndarray, shape (size,)
+        Mass (kg) or moment of inertia (kg m2); 0 for links that are not light.
 
     Raises
     ------
@@ -67,7 +83,24 @@ def mass_excess(system: System, time: float, q: Array, v: Array, active: np.ndar
 
 
 def loose_link(system: System, times: Array, q: Array, v: Array, start: Start) -> str | None:
-    """Name of the light link that carries next to nothing in the last finite one of these states, if there is one."""
+    """Return the name of the light link that carries next to nothing in the last finite state.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    times : ndarray, shape (n,)
+        Times of the states (s).
+    q, v : ndarray, shape (n, size)
+        Coordinates and velocities.
+    start : Start
+        Start of the run, with the excess of light links.
+
+    Returns
+    -------
+    name : str or None
+        None if no state is finite, no link is light, or all of them carry mass.
+    """
     finite = np.flatnonzero(np.isfinite(q).all(axis=1) & np.isfinite(v).all(axis=1))
     if not start.excess.any() or not len(finite):
         return None

@@ -52,12 +52,23 @@ class Modes:
 
 
 def modes(system: System, start: Start, rest: Equilibrium, count: int) -> Modes:
-    """The `count` slowest small motions about the equilibrium `rest`.
+    """Compute the slowest small motions about an equilibrium.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    start : Start
+        Time, and the constraints that are not redundant.
+    rest : Equilibrium
+        The state of rest.
+    count : int
+        Largest number of motions.
 
     Raises
     ------
     InputError
-        When joints prescribe a motion: the state does not rest.
+        If joints prescribe a motion: the state does not rest.
     """
     t, active, units = start.time, start.active, system.units
     check_rests(system, t, rest.q)

@@ -39,17 +39,33 @@ def hidden_freedoms(system: System, time: float, q: Array) -> tuple[int, int]:
 
 
 def motions_of_second_order(system: System, time: float, q: Array, count: int) -> list[Array]:
-    """At most so many random motions that the constraints allow to second order, in coordinates that compare.
+    """Return random motions that the constraints allow to second order.
 
-    Their largest component is 1. In a position where branches meet each is along one of these: w^T H(v, v) = 0 by
-    Gauss-Newton steps on the unit sphere of the motions that the gradients leave free. None is found where the forms
-    let nothing move.
+    In a position where branches meet each is along one of these: w^T H(v, v) = 0 by Gauss-Newton steps on the unit
+    sphere of the motions that the gradients leave free.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    time : float
+        Time (s).
+    q : ndarray, shape (size,)
+        Coordinates that meet the constraints.
+    count : int
+        Largest number of motions.
+
+    Returns
+    -------
+    motions : list of ndarray, shape (size,)
+        In coordinates that compare, the largest component 1; zero if the gradients leave nothing free, fewer or none if
+        the forms let nothing move.
     """
     free, forms = _forms(system, time, q)
     if not free.shape[1]:
         return [np.zeros(system.size)] * count
     random = np.random.default_rng(5)
-    found: list[Array] = []
+    motions: list[Array] = []
     for _ in range(8 * count):
         y = random.standard_normal((free.shape[1],))
         for _ in range(STEPS if forms.size else 0):
@@ -60,10 +76,10 @@ def motions_of_second_order(system: System, time: float, q: Array, count: int) -
         y = np.asarray(y / np.linalg.norm(y))
         if np.abs(forms @ y @ y).max(initial=0.0) <= ALLOWED:
             v = free @ y
-            found.append(v / np.abs(v).max())
-        if len(found) == count:
+            motions.append(v / np.abs(v).max())
+        if len(motions) == count:
             break
-    return found
+    return motions
 
 
 def _forms(system: System, time: float, q: Array) -> tuple[Array, Array]:

@@ -80,16 +80,27 @@ def consistent_start(
     positions: Sequence[Forced] = (),
     velocities: Sequence[Forced] = (),
 ) -> Start:
-    """State near (q, v) that meets the constraints and the forced values.
+    """Return a state near (q, v) that meets the constraints and the forced values.
 
     The coordinates are guesses: they close on the branch next to them (`close`). Velocities change least in the mass
     norm.
 
+    Parameters
+    ----------
+    system : System
+        The system.
+    time : float
+        Time of the start (s).
+    q, v : ndarray, shape (size,), optional
+        Coordinates and velocities; those of the elements by default.
+    positions, velocities : sequence of Forced
+        Values that must hold.
+
     Raises
     ------
     InputError
-        When a loop cannot close, forced values contradict the constraints, or constraints are singular in every
-        position; the message names them.
+        If a loop cannot close, forced values contradict the constraints, or constraints are singular in every position;
+        the message names them.
     """
     q = np.array(system.start_q if q is None else q, dtype=float)
     v = np.array(system.start_v if v is None else v, dtype=float)
@@ -110,7 +121,7 @@ def consistent_start(
 
 def count_freedoms(system: System, time: float, q: Array) -> Freedoms:
     """Redundant rows: dependent at the start and at neighbours on the constraint manifold; freedoms that are hidden."""
-    here = dependent_rows(system, time, q)
+    here = _dependent_rows(system, time, q)
     if not here and _regular(system, time, q):
         return Freedoms(system.size, system.rows)
     random = np.random.default_rng(5)
@@ -126,7 +137,7 @@ def count_freedoms(system: System, time: float, q: Array) -> Freedoms:
             continue
         tried += 1
         place = at, found
-        there = dependent_rows(system, at, found)
+        there = _dependent_rows(system, at, found)
         hidden.append(hidden_freedoms(system, at, found)[1])
         if len(there) < len(fewest):
             fewest = there
@@ -135,7 +146,7 @@ def count_freedoms(system: System, time: float, q: Array) -> Freedoms:
     if not motions:
         hidden = [hidden_freedoms(system, time, q)[0]]
     if min(hidden, default=0):
-        barely = tuple(dependent_rows(system, *place, share=np.sqrt(SINGULAR)))
+        barely = tuple(_dependent_rows(system, *place, share=np.sqrt(SINGULAR)))
         return Freedoms(system.size, system.rows - len(barely), (), (), min(hidden), barely)
     passing = tuple(r for r in here if r not in fewest)
     return Freedoms(system.size, system.rows, tuple(fewest), passing[: len(here) - len(fewest)])
@@ -180,38 +191,56 @@ def _independent(B: Array) -> bool:
         return False
 
 
-def dependent_rows(system: System, time: float, q: Array, share: float = DEPENDENT) -> list[int]:
-    """Rows of G of which less than a `share` is left by the ones before them, in coordinates and rows that compare."""
+def _dependent_rows(system: System, time: float, q: Array, share: float = DEPENDENT) -> list[int]:
+    """Return the rows of G of which the rows before leave less than `share`, in coordinates and rows that compare."""
     if system.rows == 0:
         return []
     B = _comparable_rows(system, time, q)
     if share == DEPENDENT and _independent(B):
         return []
     basis = np.zeros((0, B.shape[1]))
-    found = []
+    dependent = []
     for r, row in enumerate(B):
-        rest = row - basis.T @ (basis @ row)
-        rest -= basis.T @ (basis @ rest)
-        size = float(np.linalg.norm(rest))
+        left = row - basis.T @ (basis @ row)
+        left -= basis.T @ (basis @ left)
+        size = float(np.linalg.norm(left))
         if size < share:
-            found.append(r)
+            dependent.append(r)
         else:
-            basis = np.vstack([basis, rest / size])
-    return found
+            basis = np.vstack([basis, left / size])
+    return dependent
 
 
 def close(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tuple[Array, Array]:
-    """The closed position nearest to the guess q, or the least gap found; the gaps of all rows in their units.
+    """Find the closed position nearest to a guess, or the position of least gap.
 
     Gauss-Newton with least changes in coordinates divided by their units. Levenberg's damping keeps a body from turning
     by more than `TURN` in one step, which stays on the branch of the guess, and makes every step lessen the gaps.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    time : float
+        Time (s).
+    q : ndarray, shape (size,)
+        Guess of the coordinates.
+    forced : sequence of Forced
+        Values that must hold, too.
+
+    Returns
+    -------
+    q : ndarray, shape (size,)
+        Coordinates.
+    gap : ndarray, shape (rows + forced,)
+        Sizes of the gaps of all rows and forced values, in their units.
     """
     sizes = np.concatenate([system.row_units, [_forced_unit(system, f, q) for f in forced]])
 
-    def rest(state: Array) -> Array:
+    def gaps(state: Array) -> Array:
         return np.concatenate([system.residual(time, state), [f.value(state) - f.target for f in forced]]) / sizes
 
-    best, gap = q.copy(), rest(q)
+    best, gap = q.copy(), gaps(q)
     size, damping = float(np.linalg.norm(gap)), 0.0
     for _ in range(MOST_STEPS):
         if not 1e-15 < size < math.inf:
@@ -230,8 +259,8 @@ def close(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tu
             turn = float(np.abs(change[system.turns]).max(initial=0.0))
             if turn <= 1.01 * TURN:
                 trial = best - system.units * change
-                new = rest(trial)
-                reached = float(np.linalg.norm(new))
+                trial_gap = gaps(trial)
+                reached = float(np.linalg.norm(trial_gap))
                 if reached < size:
                     break
                 damping = max(4.0 * damping, 1e-3 * largest)
@@ -239,7 +268,7 @@ def close(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tu
                 damping = max(damping * min(turn / TURN, 4.0), 1e-3 * largest)
         else:
             break
-        before, best, gap, size = size, trial, new, reached
+        before, best, gap, size = size, trial, trial_gap, reached
         damping = 0.0 if damping < 1e-2 * largest else 0.25 * damping
         if size > 0.5 * before and size < 1e-13:
             break
@@ -259,10 +288,25 @@ def closes(system: System, q: Array, gap: Array) -> bool:
 
 
 def least_change(system: System, G: Array, right: Array, sizes: Array) -> Array:
-    """The change of least mass norm with G change = right, in the least-squares sense where G has lost rank.
+    """Return the change of least mass norm with G change = right.
 
-    The rows are divided by their `sizes`. Links may be without mass. Not-a-number where the rows or the right side are
-    not finite: the callers look at what comes back.
+    It is that of least squares if G has lost rank. Links may be without mass.
+
+    Parameters
+    ----------
+    system : System
+        The system, for its masses and units.
+    G : ndarray, shape (k, size)
+        Gradients.
+    right : ndarray, shape (k,)
+        Right-hand side.
+    sizes : ndarray, shape (k,)
+        Units by which the rows are divided.
+
+    Returns
+    -------
+    change : ndarray, shape (size,)
+        NaN if the rows or the right-hand side are not finite.
     """
     if not (np.isfinite(G).all() and np.isfinite(right).all()):
         return np.full(system.size, np.nan)
@@ -274,9 +318,23 @@ def least_change(system: System, G: Array, right: Array, sizes: Array) -> Array:
 
 
 def on_constraints(system: System, t: float, q: Array, v: Array, active: np.ndarray) -> tuple[Array, Array]:
-    """State beside the constraints moved onto g = 0 and G v = -dg/dt by the least changes in the mass norm.
+    """Move a state onto g = 0 and G v = -dg/dt by the least changes in the mass norm.
 
-    Rows that are redundant follow by themselves.
+    Parameters
+    ----------
+    system : System
+        The system.
+    t : float
+        Time (s).
+    q, v : ndarray, shape (size,)
+        Coordinates and velocities next to the constraints.
+    active : ndarray of bool, shape (rows,)
+        Constraints that are not redundant; the others follow by themselves.
+
+    Returns
+    -------
+    q, v : ndarray, shape (size,)
+        Coordinates and velocities on the constraints.
     """
     if system.rows == 0:
         return q, v
@@ -293,12 +351,12 @@ def on_constraints(system: System, t: float, q: Array, v: Array, active: np.ndar
 def _positions(system: System, time: float, q: Array, forced: Sequence[Forced]) -> Array:
     if system.rows == 0 and not forced:
         return q
-    found, gap = assemble_near(system, time, q, forced)
+    found, gap = _assemble_near(system, time, q, forced)
     if closes(system, found, gap):
         return found
     name, much = _worst_gap(system, time, found)
     if forced:
-        free, alone = assemble_near(system, time, q, ())
+        free, alone = _assemble_near(system, time, q, ())
         if closes(system, free, alone):
             sizes = [_forced_unit(system, f, q) for f in forced]
             off = max(range(len(forced)), key=lambda k: abs(forced[k].value(free) - forced[k].target) / sizes[k])
@@ -311,8 +369,8 @@ def _positions(system: System, time: float, q: Array, forced: Sequence[Forced]) 
     raise InputError(name, None, f"the loop cannot close: a residual of {much} is left", cure)
 
 
-def assemble_near(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tuple[Array, Array]:
-    """As `close`; where that ends in a least gap that is none, the nearest of what closes from guesses beside q."""
+def _assemble_near(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tuple[Array, Array]:
+    """Return the result of `close`, or the nearest position that closes from guesses near q."""
     found, gap = close(system, time, q, forced)
     if closes(system, found, gap) or not np.isfinite(gap).all():
         return found, gap
@@ -348,7 +406,7 @@ def _at_odds(system: System, time: float, q: Array, forced: Sequence[Forced], bl
     """The other forced value that `blamed` contradicts: without it the rest can be met, and `blamed` alone, too."""
 
     def met(some: Sequence[Forced]) -> bool:
-        return closes(system, *assemble_near(system, time, q, some))
+        return closes(system, *_assemble_near(system, time, q, some))
 
     if len(forced) < 2 or not met([blamed]):
         return None

@@ -260,9 +260,23 @@ def run_in_pieces(
 
 
 def first_step(q: Array, v: Array, a: Array, span: float) -> float:
-    """A careful first step from coordinates, velocities, accelerations in units that compare: a hundredth of the time
-    in which the speeds change by themselves, or the one from rest in which the accelerations move the coordinates by
-    5e-9 of themselves."""
+    """Return a careful first step from the state at the start.
+
+    It is a hundredth of the time in which the speeds change by themselves, or the one from rest in which the
+    accelerations move the coordinates by 5e-9 of themselves.
+
+    Parameters
+    ----------
+    q, v, a : ndarray, shape (size,)
+        Coordinates, velocities and accelerations, divided by the units of the coordinates.
+    span : float
+        Length of the run (s).
+
+    Returns
+    -------
+    step : float
+        Between 1e-9 and 1e-3 of the span (s).
+    """
     far, speed, pull = (float(abs(x).max(initial=0.0)) for x in (q, v, a))
     guess = 1e-3 * span
     if pull > 0.0:

@@ -89,10 +89,28 @@ def _links_in_line(system: System, time: float, q: Array, carried: Array, drivin
 
 
 def short_steps(system: System, start: Start, time: float, q: Array, v: Array, step: float) -> str:
-    """Return the fastest process in a state where steps (s) are short, or an empty string if none explains them.
+    """Return the fastest process in a state where steps are short, in words.
 
     Compared are the turning of bodies, growth and decay by forces that depend on velocities, vibration, and the change
     of forces over time alone.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    start : Start
+        Start of the run.
+    time : float
+        Time of the state (s).
+    q, v : ndarray, shape (size,)
+        Coordinates and velocities there.
+    step : float
+        Length of the steps (s).
+
+    Returns
+    -------
+    cause : str
+        Empty if no process explains the steps, or the state is not finite.
     """
     if not (np.isfinite(q).all() and np.isfinite(v).all()) or step <= 0.0:
         return ""

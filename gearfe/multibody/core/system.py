@@ -135,8 +135,22 @@ class System:
         return self.index[self.elements.index(element)][: element.size]
 
     def force(self, t: float | Array, q: Array, v: Array, *, stressed: bool = True) -> Array:
-        """All applied forces, the linear parts included, with those of `stressed` elements or without, in states
-        (..., size)."""
+        """Return all applied forces, those of constant stiffness and damping included.
+
+        Parameters
+        ----------
+        t : float or ndarray, shape (...)
+            Times (s).
+        q, v : ndarray, shape (..., size)
+            Coordinates and velocities.
+        stressed : bool
+            Whether elements whose stresses the implicit method takes as unknowns are included.
+
+        Returns
+        -------
+        force : ndarray, shape (..., size)
+            Along the coordinates (N, N m).
+        """
         total = -(v @ self.damping.T + q @ self.stiffness.T) if self.linear else np.zeros(q.shape)
         for element, index in self.forces if stressed else self._others:
             places: Any = (..., index)  # may repeat
@@ -144,10 +158,25 @@ class System:
         return total
 
     def force_jacobian(self, t: float, q: Array, v: Array, *, stressed: bool = True) -> tuple[Array, Array]:
-        """(df/dq, df/dv); finite differences for elements that do not provide theirs."""
+        """Return the derivatives of the forces, by finite differences for elements without their own.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+        q, v : ndarray, shape (size,)
+            Coordinates and velocities.
+        stressed : bool
+            Whether elements whose stresses the implicit method takes as unknowns are included.
+
+        Returns
+        -------
+        by_q, by_v : ndarray, shape (size, size)
+            df/dq and df/dv.
+        """
         by_q, by_v = -self.stiffness, -self.damping  # new arrays
         for element, index in self.forces if stressed else self._others:
-            local = element_jacobian(element, t, q[index], v[index])
+            local = _element_jacobian(element, t, q[index], v[index])
             by_q, by_v = by_q.copy(), by_v.copy()
             np.add.at(by_q, np.ix_(index, index), local[0])
             np.add.at(by_v, np.ix_(index, index), local[1])
@@ -263,10 +292,27 @@ class System:
     def acceleration(
         self, t: float, q: Array, v: Array, active: np.ndarray | None = None, excess: Array | None = None
     ) -> tuple[Array, Array]:
-        """Accelerations and multipliers at a consistent state; rows that are not `active` carry none.
+        """Return accelerations and multipliers at a consistent state.
 
-        `excess` is that of the start (`multibody.core.mass_regularisation`), which the elimination needs where links
-        are light.
+        From M a + G^T lambda = f and G a = -(velocity terms).
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+        q, v : ndarray, shape (size,)
+            Coordinates and velocities that meet the constraints.
+        active : ndarray of bool, shape (rows,), optional
+            Constraints that are not redundant, all by default; the others have no multipliers.
+        excess : ndarray, shape (size,), optional
+            Mass by which the elimination raises light links, that of the start (`multibody.core.mass_regularisation`).
+
+        Returns
+        -------
+        a : ndarray, shape (size,)
+            Accelerations.
+        multipliers : ndarray, shape (rows,)
+            Constraint forces lambda; 0 for rows that are not active.
         """
         f = self.force(t, q, v)
         extra = np.zeros(self.size) if excess is None or not excess.any() else excess
@@ -303,10 +349,22 @@ class System:
 
 
 def in_states(element: Element, function: Any, t: float | Array, *states: Array) -> Array:
-    """A function of an element in one state, or in those at several times."""
+    """Evaluate a function of an element in one state, or in those at several times.
+
+    Parameters
+    ----------
+    element : Element
+        The element; one that is written on a tape takes all times at once.
+    function : callable
+        ``function(t, *states)``.
+    t : float or ndarray, shape (n,)
+        Times (s).
+    *states : ndarray, shape (size,) or (n, size)
+        Coordinates, or coordinates and velocities.
+    """
     if np.ndim(t) == 0 or isinstance(element, Written):
         return np.asarray(function(t, *states), dtype=float)
-    return np.array([function(*one) for one in zip(np.asarray(t), *states, strict=True)])
+    return np.array([function(*state) for state in zip(np.asarray(t), *states, strict=True)])
 
 
 def own_motion(answers: Array, light: np.ndarray) -> tuple[Array, Array]:
@@ -352,11 +410,11 @@ def least_norm_solution(S: Array, right: Array, least: float) -> Array:
     return np.asarray((x.T / scale).T, dtype=float)
 
 
-def element_jacobian(element: Element, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-    """(df/dq, df/dv) of one element, by central differences when it has none."""
-    own: Any = getattr(element, "force_jacobian", None)
-    if own is not None:
-        return own(t, q, v)
+def _element_jacobian(element: Element, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+    """Return (df/dq, df/dv) of one element, by central differences if it has none."""
+    jacobian: Any = getattr(element, "force_jacobian", None)
+    if jacobian is not None:
+        return jacobian(t, q, v)
     force: Any = element.force  # type: ignore[attr-defined]
     return differences(lambda x: force(t, x, v), q), differences(lambda x: force(t, q, x), v)
 

@@ -139,7 +139,24 @@ def _pole(system: System, t: float, h: float, path: Path, x: float) -> tuple[flo
 
 
 def load_problem_ahead(system: System, t: float, state: tuple[Array, Array, Array], span: float) -> str:
-    """Return which load has no value, or a pole, in the state (q, q', q'') at t or a share of `span` (s) ahead."""
+    """Return which load has no value, or a pole, at a state or shortly after it.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    t : float
+        Time of the state (s).
+    state : tuple of ndarray, shape (size,)
+        Coordinates, velocities and accelerations.
+    span : float
+        Length of the run (s); shares `AHEAD` of it are searched.
+
+    Returns
+    -------
+    problem : str
+        Empty if no load has one, or the state is not finite.
+    """
     if not np.isfinite(state).all():
         return ""
     q, v, a = state
@@ -161,10 +178,23 @@ def load_problem_ahead(system: System, t: float, state: tuple[Array, Array, Arra
 
 
 def quiet_speeds(c: Array, v: Array, V: Array, vn: Array, scale: Array) -> Array:
-    """Speeds V (s, n) at the shares c of a step, those on the line from v to vn that are off it by rounding alone.
+    """Replace speeds at the stages that are off a straight line by rounding alone with those of the line.
 
     They are differences of positions over the step: with short ones no more than rounding. Those of the ends keep the
-    constraints. `scale` (n,) is the size of positions over the step's length.
+    constraints.
+
+    Parameters
+    ----------
+    c : ndarray, shape (s,)
+        Shares of the step at the stages.
+    v : ndarray, shape (n,)
+        Speeds at the begin of the step.
+    V : ndarray, shape (s, n)
+        Speeds at the stages.
+    vn : ndarray, shape (n,)
+        Speeds at the end of the step.
+    scale : ndarray, shape (n,)
+        Size of the positions over the length of the step.
     """
     line = v + c[:, None] * (vn - v)
     return np.where(np.abs(V - line) < ROUNDING * scale, line, V)

@@ -64,7 +64,21 @@ class BodyVariables:
     def point(
         self, body: int, weight: float, x: float, y: float, into: tuple[Affine, Affine] | None = None
     ) -> tuple[Affine, Affine]:
-        """Components of ``weight (x, y) + R(theta) (x, y)``, added to others."""
+        """Return the components of ``weight (x_b, y_b) + R(theta) (x, y)``, added to others.
+
+        (x_b, y_b) is the body's mass centre and theta its angle.
+
+        Parameters
+        ----------
+        body : int
+            Number of the body; the number of bodies stands for the ground.
+        weight : float
+            Factor of the mass centre: 1 for a point of the body, 0 for a direction.
+        x, y : float
+            Vector in the frame of the body (m).
+        into : pair of Affine, optional
+            Components to which these are added.
+        """
         one, two = into if into is not None else (None, None)
         across = self.affine(body, (weight, 0.0, 0.0, x, -y), one)
         return across, self.affine(body, (0.0, weight, 0.0, y, x), two)

@@ -35,7 +35,21 @@ def bar_strains(bars: Bars, p: int, q: Array) -> Any:
 
 
 def add_bars(bars: Bars, q: Lanes, v: Lanes, S: Lanes, law: Array, F: Lanes) -> None:
-    """Forces of all beams; S := their stresses."""
+    """Add the forces of all beams at all stages, and replace the stresses by those of the strains.
+
+    Parameters
+    ----------
+    bars : Bars
+        Gauss points of the beams.
+    q, v : SIMD, shape (n, W)
+        Coordinates and velocities.
+    S : SIMD, shape (k, W)
+        Stresses: axial force (N), shear force (N), bending moment (N m) of each point; changed.
+    law : ndarray, shape (k, widest)
+        Derivatives of the stresses by x', y', theta, theta', as `add_bar_tangents` left them.
+    F : SIMD, shape (n, W)
+        Forces on the coordinates (N, N m); changed.
+    """
     for p in range(bars.place.shape[0]):
         dx, dy, angle, curl = bar_strains(bars, p, q)
         c = np.cos(angle)
@@ -74,7 +88,21 @@ def add_bars(bars: Bars, q: Lanes, v: Lanes, S: Lanes, law: Array, F: Lanes) -> 
 
 
 def add_bar_tangents(bars: Bars, q: Array, v: Array, S: Array, own: Scratch, K: Array, C: Array) -> None:
-    """Their derivatives by coordinates and velocities; law := C de/dz."""
+    """Add the derivatives of the beams' forces by coordinates and velocities, in one state.
+
+    Parameters
+    ----------
+    bars : Bars
+        Gauss points of the beams.
+    q, v : ndarray, shape (n,)
+        Coordinates and velocities.
+    S : ndarray, shape (k,)
+        Stresses.
+    own : Scratch
+        Work arrays; ``own.law`` becomes the derivatives of the stresses by x', y', theta, theta'.
+    K, C : ndarray, shape (n, n)
+        dF/dq and dF/dv; changed.
+    """
     slope, by, rate, law = own.slope, own.by[0], own.by[1], own.law
     for p in range(bars.place.shape[0]):
         dx, dy, angle, _ = bar_strains(bars, p, q)
@@ -142,7 +170,19 @@ def add_bar_tangents(bars: Bars, q: Array, v: Array, S: Array, own: Scratch, K: 
 
 
 def bar_changes(bars: Bars, dq: Lanes, dv: Lanes, law: Array, S: Lanes) -> None:
-    """Changes of the stresses with those of coordinates and velocities."""
+    """Add the changes of the beams' stresses with those of coordinates and velocities.
+
+    Parameters
+    ----------
+    bars : Bars
+        Gauss points of the beams.
+    dq, dv : SIMD, shape (n, W)
+        Changes of coordinates and velocities.
+    law : ndarray, shape (k, widest)
+        Derivatives of the stresses, see `add_bar_tangents`.
+    S : SIMD, shape (k, W)
+        Stresses; changed.
+    """
     for p in range(bars.place.shape[0]):
         x, y, turn, bend = bar_strains(bars, p, dq)
         if bars.damping[p] > 0.0:
@@ -156,9 +196,12 @@ def bar_changes(bars: Bars, dq: Lanes, dv: Lanes, law: Array, S: Lanes) -> None:
             S[at] += law[at, 0] * x + law[at, 1] * y + law[at, 2] * turn + law[at, 3] * bend
 
 
-def float_slopes(floats: Floats, b: int, q: Array, shapes: Array, blocks: Array) -> None:
-    """blocks := derivatives of the strains by the coordinates (s, size), shapes[0] the shares of the modes, shapes[1]
-    L + Q eta / 2 times eta: the strains."""
+def _float_slopes(floats: Floats, b: int, q: Array, shapes: Array, blocks: Array) -> None:
+    """Write the strains of a body in a floating frame, and their derivatives by the coordinates.
+
+    The derivatives go to blocks (s, size), the shares eta of the modes to shapes[0], the strains (L + Q eta / 2) eta to
+    shapes[1].
+    """
     first, r, size = floats.place[b, 0], floats.place[b, 1], 2 * floats.place[b, 1] + 4
     eta, e = shapes[0], shapes[1]
     for k in range(r):
@@ -186,9 +229,27 @@ def float_slopes(floats: Floats, b: int, q: Array, shapes: Array, blocks: Array)
 def add_floats(
     floats: Floats, q: Lanes, v: Lanes, S: Lanes, law: Array, shapes: Lanes, blocks: Lanes, F: Lanes
 ) -> None:
-    """Forces of all bodies in floating frames; S := their stresses."""
+    """Add the forces of bodies in floating frames at all stages, and replace the stresses by those of the strains.
+
+    Parameters
+    ----------
+    floats : Floats
+        The bodies.
+    q, v : SIMD, shape (n, W)
+        Coordinates and velocities.
+    S : SIMD, shape (k, W)
+        Stresses in the basis of strain energy (J^0.5); changed.
+    law : ndarray, shape (k, widest)
+        Derivatives of the stresses by the body's coordinates, as `add_float_tangents` left them.
+    shapes : SIMD, shape (2, widest, W)
+        Scratch: shares of the modes, and strains.
+    blocks : SIMD, shape (strains, coordinates, W)
+        Scratch: derivatives of the strains.
+    F : SIMD, shape (n, W)
+        Forces on the coordinates; changed.
+    """
     for b in range(floats.place.shape[0]):
-        float_slopes(floats, b, q, shapes, blocks)
+        _float_slopes(floats, b, q, shapes, blocks)
         first, size, at = floats.place[b, 0], 2 * floats.place[b, 1] + 4, floats.place[b, 5]
         for s in range(floats.place[b, 2]):
             stress = 1.0 * shapes[1, s]
@@ -202,9 +263,23 @@ def add_floats(
 
 
 def add_float_tangents(floats: Floats, q: Array, v: Array, S: Array, own: Scratch, K: Array, C: Array) -> None:
-    """Their derivatives by coordinates and velocities; law := de/dq."""
+    """Add the derivatives of these bodies' forces by coordinates and velocities, in one state.
+
+    Parameters
+    ----------
+    floats : Floats
+        Bodies in floating frames.
+    q, v : ndarray, shape (n,)
+        Coordinates and velocities.
+    S : ndarray, shape (k,)
+        Stresses.
+    own : Scratch
+        Work arrays; ``own.law`` becomes the derivatives of the stresses by the body's coordinates.
+    K, C : ndarray, shape (n, n)
+        dF/dq and dF/dv; changed.
+    """
     for b in range(floats.place.shape[0]):
-        float_slopes(floats, b, q, own.shapes, own.blocks)
+        _float_slopes(floats, b, q, own.shapes, own.blocks)
         first, r, strains = floats.place[b, 0], floats.place[b, 1], floats.place[b, 2]
         at = floats.place[b, 5]
         size = 2 * r + 4
@@ -243,15 +318,15 @@ def add_float_tangents(floats: Floats, q: Array, v: Array, S: Array, own: Scratc
                     C[first + i, first + j] -= tau * value * own.blocks[s, j]
         for k in range(r):
             for m in range(r):
-                add_share_product(first, k, m, q, -pairs[k, m], K)
+                _add_share_product(first, k, m, q, -pairs[k, m], K)
             for c in range(2):
                 p = first + 4 + 2 * k + c
                 K[p, first + 2 + c] -= pull[k]
                 K[first + 2 + c, p] -= pull[k]
 
 
-def add_share_product(first: int, k: int, m: int, q: Array, factor: float, K: Array) -> None:
-    """K += factor (d eta_k / dq)^T (d eta_m / dq)."""
+def _add_share_product(first: int, k: int, m: int, q: Array, factor: float, K: Array) -> None:
+    """Add factor (d eta_k / dq)^T (d eta_m / dq) to K."""
     for c in range(2):
         one = first + 4 + 2 * k + c
         for e in range(2):
@@ -263,7 +338,19 @@ def add_share_product(first: int, k: int, m: int, q: Array, factor: float, K: Ar
 
 
 def float_changes(floats: Floats, dq: Lanes, dv: Lanes, law: Array, S: Lanes) -> None:
-    """Changes of the stresses with those of coordinates and velocities."""
+    """Add the changes of the bodies' stresses with those of coordinates and velocities.
+
+    Parameters
+    ----------
+    floats : Floats
+        Bodies in floating frames.
+    dq, dv : SIMD, shape (n, W)
+        Changes of coordinates and velocities.
+    law : ndarray, shape (k, widest)
+        Derivatives of the stresses, see `add_float_tangents`.
+    S : SIMD, shape (k, W)
+        Stresses; changed.
+    """
     for b in range(floats.place.shape[0]):
         first, at = floats.place[b, 0], floats.place[b, 5]
         for s in range(floats.place[b, 2]):
@@ -272,6 +359,6 @@ def float_changes(floats: Floats, dq: Lanes, dv: Lanes, law: Array, S: Lanes) ->
 
 
 FUNCTIONS = (
-    bar_strains, add_bars, add_bar_tangents, bar_changes, float_slopes, add_floats, add_share_product,
+    bar_strains, add_bars, add_bar_tangents, bar_changes, _float_slopes, add_floats, _add_share_product,
     add_float_tangents, float_changes,
 )  # fmt: skip

@@ -96,7 +96,21 @@ class Equations(NamedTuple):
 
 
 def row_orders(tb: Program, Z: Array, TF: Array, k: int, out: Array) -> None:
-    """Order k of all rows."""
+    """Write order k of the series of all rows.
+
+    Parameters
+    ----------
+    tb : Program
+        The system.
+    Z : ndarray or SIMD, shape (z, orders[, W])
+        Series of the variables, at one place or at all stages.
+    TF : ndarray or SIMD, shape (functions, orders[, W])
+        Series of the functions of time.
+    k : int
+        Order.
+    out : ndarray or SIMD, shape (m[, W])
+        Order k of the rows.
+    """
     rows = tb.rows
     for r in range(rows.constant.shape[0]):
         out[r] = rows.constant[r] if k == 0 else 0.0
@@ -188,7 +202,19 @@ def registers_push(eq: Equations, k: int, F: Array) -> None:
 
 
 def lane_times(eq: Equations, places: Array, t: float, h: float) -> None:
-    """Functions of time and their rates at places of the step, of which the last is its begin."""
+    """Write the functions of time and their rates at all stages of a step.
+
+    Parameters
+    ----------
+    eq : Equations
+        The system; ``eq.wide.TF`` changes.
+    places : ndarray, shape (W,)
+        Shares of the step at the stages, last the 0 of its begin.
+    t : float
+        Time at the begin (s).
+    h : float
+        Step (s), negative backwards in time.
+    """
     TF, values = eq.own.TF, flat(eq.wide.TF)
     last = places.shape[0] - 1
     for i in range(last + 1):
@@ -257,7 +283,24 @@ def stages(eq: Equations, w: Stages, tab: Scheme) -> None:
 
 
 def linearise(eq: Equations, w: Stages, i: int, t: float) -> bool:
-    """Tangents and rows at a stage; whether they are finite."""
+    """Write the tangents K and C and the gradients G of the rows at a stage.
+
+    Parameters
+    ----------
+    eq : Equations
+        The system; ``eq.own`` changes.
+    w : Stages
+        State and unknowns of the step.
+    i : int
+        Number of the stage.
+    t : float
+        Its time (s).
+
+    Returns
+    -------
+    finite : bool
+        Whether the tangents are finite.
+    """
     tb, own, band = eq.program, eq.own, eq.band
     K, C, P, D, q, v, L = own.K, own.C, own.P, own.D, own.q, own.v, own.L
     n = q.shape[0]

@@ -31,10 +31,27 @@ DIAGONAL = 0.1
 def factorise_band(
     B: Lanes, over: Lanes, reach: IntArray, pivot: IntArray, low: IntArray, top: IntArray, right: IntArray
 ) -> bool:
-    """B := L U; False where a pivot vanishes.
+    """Factorise the band matrices B = L U in place, with pivots for all matrices alike.
 
-    `over` (N, 2) becomes 1 / pivot, `low` the last row of a column of L, `top` the first row of one of U; `reach` is
-    the last row that a column may come to, `right` the last column of each row, which changes.
+    Parameters
+    ----------
+    B : SIMD, shape (N, N, 2, R)
+        Matrices by columns, real and imaginary parts; becomes L and U.
+    over : SIMD, shape (N, 2, R)
+        Reciprocals of the pivots; written.
+    reach : ndarray of int, shape (N,)
+        Last row that a column may come to.
+    pivot : ndarray of int, shape (N,)
+        Row exchanged with each row; written.
+    low, top : ndarray of int, shape (N,)
+        Last row of each column of L, and first row of each column of U; written.
+    right : ndarray of int, shape (N,)
+        Last column of each row; changed.
+
+    Returns
+    -------
+    regular : bool
+        False if a pivot vanishes.
     """
     size = B.shape[0]
     for j in range(size):
@@ -91,7 +108,19 @@ def factorise_band(
 
 
 def solve_band(B: Lanes, over: Lanes, pivot: IntArray, low: IntArray, top: IntArray, x: Lanes) -> None:
-    """x := B^-1 x, shape (N, 2) of real and imaginary parts."""
+    """Replace x by B^-1 x with the factors of `factorise_band`.
+
+    Parameters
+    ----------
+    B : SIMD, shape (N, N, 2, R)
+        L and U.
+    over : SIMD, shape (N, 2, R)
+        Reciprocals of the pivots.
+    pivot, low, top : ndarray of int, shape (N,)
+        As `factorise_band` left them.
+    x : SIMD, shape (N, 2, R)
+        Right-hand side, then solution; real and imaginary parts.
+    """
     size = B.shape[0]
     for c in range(size):
         best = pivot[c]
@@ -116,7 +145,26 @@ def solve_band(B: Lanes, over: Lanes, pivot: IntArray, low: IntArray, top: IntAr
 
 
 def assemble(eq: Equations, k: int, x: Any, y: Any, tangents: float) -> bool:
-    """Factor k := that of the matrices with mu/h = x + i y, in units that compare; with the tangents, or without."""
+    """Assemble and factorise the matrices of all eigenvalues, in units that compare.
+
+    With z = x + i y they are [[z^2 M - z C - K, G^T], [G, 0]], K and C the derivatives of the forces.
+
+    Parameters
+    ----------
+    eq : Equations
+        The system, with K, C and G of one state; the factors in ``eq.own`` change.
+    k : int
+        Number of the factor: `STEP` or `MASS`.
+    x, y : SIMD, shape (R,)
+        Real and imaginary part of mu/h (1/s); for the matrix of masses 1 and 0.
+    tangents : float
+        Factor of K and C: 1, or 0 for the matrix of masses.
+
+    Returns
+    -------
+    regular : bool
+        False if a pivot vanishes.
+    """
     tb, own, band = eq.program, eq.own, eq.band
     unit, place, G = tb.unit, band.place, own.G
     B = own.B[k]
@@ -234,5 +282,15 @@ def solve_mass(eq: Equations, force: Array, gap: Array) -> None:
         gap[r] = found[place[n + r], 0, 0] * scale / tb.rows.unit[r]
 
 
-FUNCTIONS = (factorise_band, solve_band, assemble, factorise, factorise_mass, across, solve_systems, solve, solve_mass)
+FUNCTIONS = (
+    factorise_band,
+    solve_band,
+    assemble,
+    factorise,
+    factorise_mass,
+    across,
+    solve_systems,
+    solve,
+    solve_mass,
+)
 NAMES = {"STEP": STEP, "MASS": MASS, "DIAGONAL": DIAGONAL}

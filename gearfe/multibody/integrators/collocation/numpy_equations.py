@@ -70,7 +70,24 @@ def stages(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
 
 
 def linearise(eq: SystemEquations, w: Stages, i: int, t: float) -> bool:
-    """Tangents and rows at a stage; whether they are finite."""
+    """Compute the tangents of the forces and the gradients of the rows at a stage.
+
+    Parameters
+    ----------
+    eq : SystemEquations
+        The system; its matrices change.
+    w : Stages
+        State and unknowns of the step.
+    i : int
+        Number of the stage.
+    t : float
+        Its time (s).
+
+    Returns
+    -------
+    finite : bool
+        Whether state and matrices are finite.
+    """
     system, q, v = eq.system, w.Q[:, i].view(np.ndarray), w.V[:, i].view(np.ndarray)
     if not (np.isfinite(q).all() and np.isfinite(v).all()):
         return False
@@ -160,9 +177,24 @@ def project(eq: SystemEquations, w: Stages, tab: Scheme) -> None:  # noqa: ARG00
 def saddle_solver(
     top: Array, G: Array, units: Array, row_units: Array
 ) -> Callable[[Array, Array], tuple[Array, Array]] | None:
-    """Solver of [[top, G^T], [G, 0]], scaled by the units of coordinates and rows; sparse when it is large.
+    """Factorise [[top, G^T], [G, 0]], scaled by the units of coordinates and rows; sparse if it is large.
 
-    None where the matrix is singular.
+    Parameters
+    ----------
+    top : ndarray, shape (n, n)
+        Block of the coordinates, real or complex.
+    G : ndarray, shape (m, n)
+        Gradients of the rows.
+    units : ndarray, shape (n,)
+        Units of the coordinates.
+    row_units : ndarray, shape (m,)
+        Units of the rows.
+
+    Returns
+    -------
+    solve : callable or None
+        ``solve(force, gap)`` returns the change of the coordinates (n,) and the multipliers (m,); None if the matrix is
+        singular.
     """
     n, m = len(top), len(G)
     top, G = top * np.outer(units, units), G * units / row_units[:, None]

@@ -87,7 +87,38 @@ def run_implicit(
     system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
     watch: Watch | None = None, family: str = RADAU, program: Program | None = None,
 ) -> tuple[Polynomials, Status, dict[str, Any]]:  # fmt: skip
-    """Integrate; returns (dense output, status, statistics). Linear constant constraints are eliminated before."""
+    """Integrate by collocation, in modal coordinates if constraints and elements are linear.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    start : Start
+        Consistent start.
+    times : ndarray, shape (t,)
+        Output times (s); the run goes from the start to the last.
+    tolerance : float
+        Of each step, relative to the largest value of each coordinate.
+    longest : float
+        Longest step (s).
+    most : int
+        Largest number of steps.
+    watch : Watch, optional
+        Called after every step; may end the run.
+    family : str
+        ``Radau IIA`` or ``Gauss``.
+    program : Program, optional
+        The system on a tape without its redundant rows, for compiled steps.
+
+    Returns
+    -------
+    dense : Polynomials
+        Coordinates over time.
+    status : Status
+        Why the run ended.
+    statistics : dict
+        Scheme, steps, iterations and rejected steps.
+    """
     options: dict[str, Any] = {"longest": longest, "most": most}
     if system.joints and is_linear(system) and all(isinstance(e, LocalForce) for e, _ in system.forces):
         modal = modal_coordinates(system)
@@ -127,7 +158,7 @@ class Stepper:
         self.tab = tab
         elements = SystemEquations(system, start)
         s, n, m = len(tab.c), system.size, int(start.active.sum())
-        self.w = work(s, n, m, elements.stresses, tab.inner + 4)
+        self.w = _work(s, n, m, elements.stresses, tab.inner + 4)
         self.w.now[2] = SOLVED
         self.compiled, self.compile_seconds = program is not None, 0.0
         if program is None:
@@ -143,7 +174,24 @@ class Stepper:
         self._guess = tab.side.c ** p[:, None] / p[:, None]
 
     def restart(self, system: System, start: Start, t: float, q: Array, v: Array) -> Array:
-        """The next step begins with a constant acceleration, which is returned."""
+        """Begin anew at a state: the guess of the next step has a constant acceleration.
+
+        Parameters
+        ----------
+        system : System
+            The system.
+        start : Start
+            Start of the run, with the active rows and the excess of light links.
+        t : float
+            Time (s).
+        q, v : ndarray, shape (size,)
+            Coordinates and velocities.
+
+        Returns
+        -------
+        a : ndarray, shape (size,)
+            The acceleration.
+        """
         a, multipliers = system.acceleration(t, q, v, start.active, start.excess)
         self.w.multipliers[:] = multipliers[start.active]
         self.w.speeds[:] = 0.0
@@ -171,7 +219,28 @@ class Stepper:
     def run(
         self, system: System, start: Start, times: Array, tolerance: float, watch: Watch | None, options: dict[str, Any]
     ) -> tuple[Polynomials, Status, dict[str, Any]]:
-        """From the start to the last time, by steps whose errors stay below the tolerance."""
+        """Step from the start to the last time with errors below the tolerance.
+
+        Parameters
+        ----------
+        system : System
+            The system.
+        start : Start
+            Consistent start.
+        times : ndarray, shape (t,)
+            Output times (s).
+        tolerance : float
+            Of each step, relative to the largest value of each coordinate.
+        watch : Watch or None
+            Called after every step; may end the run.
+        options : dict
+            ``longest`` step (s) and ``most`` steps, for `StepControl`.
+
+        Returns
+        -------
+        dense, status, statistics
+            As of `run_implicit`.
+        """
         w, tab, units = self.w, self.tab, system.units
         q, v, t, end = start.q.copy(), start.v.copy(), start.time, float(times[-1])
         a = self.restart(system, start, t, q, v)
@@ -340,8 +409,8 @@ def _line_of_accelerations(count: int, h: float, begin: Array, a: Array | list[A
     return coefficients
 
 
-def work(s: int, n: int, m: int, k: int, known: int) -> Stages:
-    """Arrays of a step."""
+def _work(s: int, n: int, m: int, k: int, known: int) -> Stages:
+    """Return the arrays of a step: s stages, n coordinates, m rows, k stresses."""
     plain = [(3,), (4,), (n,), (n,), (m,), (s + 1, n), (n,)]
     W = s + 1
     wide = [(s + 1, W), *[(n, W)] * 4, (m, W), (k, W), *[(n, W), (m, W)] * 3]
@@ -351,7 +420,19 @@ def work(s: int, n: int, m: int, k: int, known: int) -> Stages:
 
 
 def equations(program: Program, band: Band, s: int, stresses: int) -> Equations:
-    """A program with the order of its unknowns and work arrays."""
+    """Return a program with the order of its unknowns and work arrays.
+
+    Parameters
+    ----------
+    program : Program
+        The system on a tape.
+    band : Band
+        Order of the unknowns and entries of the matrices.
+    s : int
+        Number of stages.
+    stresses : int
+        Number of stresses that are unknowns.
+    """
     n, m, z = len(program.mass), len(program.rows.constant), len(program.mass) + len(program.curves.sign)
     N, R = n + m, (s + 1) // 2
     place = program.floats.place

@@ -37,25 +37,49 @@ def time_to_singular(tb: Equations, w: Work, p: int) -> float:
 
 
 def locate(tb: Equations, w: Work, run: Run, t: float, guess: float, reach: float, where: int) -> tuple[int, float]:
-    """Time (from the point of expansion) of the singular position near `guess`; count = 0 when there is none.
+    """Find the passing singular position near a guess, and the rows that pass together there.
 
     Newton on: regular rows of g = 0, z^T G v = 0, and time such that B . G^T z = 0. It is a true crossing when z^T g
     vanishes there too; a near miss (rod a little longer than the crank) leaves a residual and is integrated as usual.
     All rows that pass at the same moment take part: those with pivots below `TOGETHER` near the singular position of
     the first one, less those that keep a gradient where the others have none.
+
+    Parameters
+    ----------
+    tb : Equations
+        The system.
+    w : Work
+        Series about the time t in ``w.Z``; the state found is in ``w.qn``, ``w.vn``, the rows have ``w.skip`` = 2.
+    run : Run
+        What holds for the whole run.
+    t : float
+        Time of the expansion (s).
+    guess : float
+        Guess of the time from there (s).
+    reach : float
+        Largest distance from the guess (s).
+    where : int
+        Row that passes.
+
+    Returns
+    -------
+    count : int
+        Number of rows that pass; 0 if there is no such position.
+    h : float
+        Time of the position from the expansion (s).
     """
-    count, h = meet(tb, w, run, guess, reach, where)
+    count, h = _meet(tb, w, run, guess, reach, where)
     for _ in range(count):
-        count, h = converge(tb, w, run, t, h, guess, reach)
-        if count == 0 or not split(tb, w, count, where):
+        count, h = _converge(tb, w, run, t, h, guess, reach)
+        if count == 0 or not _split(tb, w, count, where):
             break
     if count == 0 or not passes(tb, w, count):
         return 0, h
     return count, h
 
 
-def meet(tb: Equations, w: Work, run: Run, guess: float, reach: float, where: int) -> tuple[int, float]:
-    """Number of rows (w.skip = 2) that pass about when the row `where` does, and its time along the series."""
+def _meet(tb: Equations, w: Work, run: Run, guess: float, reach: float, where: int) -> tuple[int, float]:
+    """Return the number of rows (w.skip = 2) that pass with the row `where`, and its time along the series."""
     h = guess
     for _ in range(30):
         copy(w.base, w.skip)
@@ -80,8 +104,8 @@ def meet(tb: Equations, w: Work, run: Run, guess: float, reach: float, where: in
     return 0, h
 
 
-def converge(tb: Equations, w: Work, run: Run, t: float, h: float, guess: float, reach: float) -> tuple[int, float]:
-    """Newton of `locate` from the time h for the rows with w.skip = 2."""
+def _converge(tb: Equations, w: Work, run: Run, t: float, h: float, guess: float, reach: float) -> tuple[int, float]:
+    """Converge to the singular position of the rows with w.skip = 2 from the time h: Newton of `locate`."""
     border, q, v = w.border, w.qn, w.vn
     n = q.shape[0]
     fill(w.dq, 0.0)
@@ -97,7 +121,7 @@ def converge(tb: Equations, w: Work, run: Run, t: float, h: float, guess: float,
         # position: g_reg and z^T (G v - df/dt)
         time_series(tb.program.times, t + h, run.sign > 0.0, 3, w.TF)
         times_gradients(tb, w.G, v, w.mu)
-        add_rates(tb, w, 1, -1.0, w.mu)
+        _add_rates(tb, w, 1, -1.0, w.mu)
         for p in range(count):
             border.nu[p] = combination(border, p, w.mu)
         residuals(tb, w, w.mu)
@@ -107,11 +131,11 @@ def converge(tb: Equations, w: Work, run: Run, t: float, h: float, guess: float,
             w.dq[i] += q[i] - w.work[i]
         # velocity: G_reg v - df/dt and half of z^T g'' (linear in v along B)
         times_gradients(tb, w.dG, v, w.mu)
-        add_rates(tb, w, 2, -2.0, w.mu)
+        _add_rates(tb, w, 2, -2.0, w.mu)
         for p in range(count):
             border.nu[p] = 0.5 * combination(border, p, w.mu)
         times_gradients(tb, w.G, v, w.mu)
-        add_rates(tb, w, 1, -1.0, w.mu)
+        _add_rates(tb, w, 1, -1.0, w.mu)
         copy(v, w.work)
         border_change(tb, w, count, v)
         for i in range(n):
@@ -125,17 +149,16 @@ def converge(tb: Equations, w: Work, run: Run, t: float, h: float, guess: float,
     return 0, h
 
 
-def add_rates(tb: Equations, w: Work, order: int, factor: float, out: Array) -> None:
-    """out += factor times the coefficient `order` of every row's time function."""
+def _add_rates(tb: Equations, w: Work, order: int, factor: float, out: Array) -> None:
+    """Add `factor` times the coefficient `order` of every row's time function to `out`."""
     motion = tb.program.rows.motion
     for r in range(out.shape[0]):
         if motion[r] >= 0:
             out[r] += factor * w.TF[motion[r], order]
 
 
-def split(tb: Equations, w: Work, count: int, where: int) -> bool:
-    """Whether some rows pass at another moment than the row `where`; then those that pass with it (w.skip = 2) are
-    left."""
+def _split(tb: Equations, w: Work, count: int, where: int) -> bool:
+    """Keep only rows that pass with the row `where` (w.skip = 2); return whether any row was released."""
     border = w.border
     worst = 0.0
     own = 0.0
@@ -206,5 +229,5 @@ def passes(tb: Equations, w: Work, count: int) -> bool:
     return True
 
 
-FUNCTIONS = (moved_state, time_to_singular, locate, meet, converge, add_rates, split, exchange, passes)
+FUNCTIONS = (moved_state, time_to_singular, locate, _meet, _converge, _add_rates, _split, exchange, passes)
 NAMES = {"SAME": SAME}

@@ -78,8 +78,11 @@ law_order: Callable[[int, float, float, Array, Any, Array, IntArray, Array], Non
 law_corner: Callable[[int, float, Any, Array, IntArray, bool], float] = _unbound
 
 
-def project(W: Array, y: Array, j: int, out: Array) -> None:
-    """out[k, j] = sum_i W[k, i] y[j, i]; four directions at a time, so that y is read once for all."""
+def _project(W: Array, y: Array, j: int, out: Array) -> None:
+    """Write out[k, j] = sum_i W[k, i] y[j, i].
+
+    Four directions are summed at a time, so that y is read once for all.
+    """
     n = y.shape[1]
     rows = W.shape[0]
     p = 0
@@ -101,8 +104,8 @@ def project(W: Array, y: Array, j: int, out: Array) -> None:
         p += 1
 
 
-def add_forces(W: Array, force: Array, factor: float, y: Array, row: int) -> None:
-    """y[row] += factor W^T force, directions without force left out."""
+def _add_forces(W: Array, force: Array, factor: float, y: Array, row: int) -> None:
+    """Add factor W^T force to y[row], skipping directions without force."""
     n = y.shape[1]
     p = 0
     rows = W.shape[0]
@@ -124,8 +127,8 @@ def add_forces(W: Array, force: Array, factor: float, y: Array, row: int) -> Non
         p = second + 1
 
 
-def next_order(run: Equations, force: Array, s: float, y: Array, j: int) -> None:
-    """Order j + 2 of the coordinates."""
+def _next_order(run: Equations, force: Array, s: float, y: Array, j: int) -> None:
+    """Write order j + 2 of the coordinates."""
     eigenvalues, diagonal, constant, damping = run.eigenvalues, run.diagonal, run.constant, run.damping
     n = eigenvalues.shape[0]
     below = 1.0 / ((j + 2.0) * (j + 1.0))
@@ -142,11 +145,11 @@ def next_order(run: Equations, force: Array, s: float, y: Array, j: int) -> None
             for k in range(n):
                 value += damping[i, k] * y[j + 1, k]
             y[j + 2, i] -= slope * (value - diagonal[i] * y[j + 1, i])
-    add_forces(run.W, force, square, y, j + 2)
+    _add_forces(run.W, force, square, y, j + 2)
 
 
-def evaluate(y: Array, last: int, x: float, s: float, value: Array, rate: Array) -> None:
-    """Coordinates and velocities at x (Horner)."""
+def _evaluate(y: Array, last: int, x: float, s: float, value: Array, rate: Array) -> None:
+    """Write coordinates and velocities at x (Horner)."""
     n = y.shape[1]
     for i in range(n):
         value[i] = y[last, i]
@@ -168,8 +171,11 @@ def widen(w: Work, step: float) -> None:
         pull[i] = max(pull[i], abs(rate[i] - state[n + i]) / step)
 
 
-def set_weights(eigenvalues: Array, reach: Array, pull: Array, tolerance: float, weight: Array) -> None:
-    """1 / limit of each coordinate: `tolerance` of its largest value, and of what its largest acceleration makes."""
+def _set_weights(eigenvalues: Array, reach: Array, pull: Array, tolerance: float, weight: Array) -> None:
+    """Write 1 / limit of each coordinate.
+
+    The limit is `tolerance` of its largest value, and of what its largest acceleration makes of it.
+    """
     n = eigenvalues.shape[0]
     far = 0.0
     strong = 0.0
@@ -183,8 +189,8 @@ def set_weights(eigenvalues: Array, reach: Array, pull: Array, tolerance: float,
         weight[i] = 1.0 / (tolerance * limit + 1e-100)
 
 
-def velocity_term(y: Array, j: int, power: float, weight: Array) -> float:
-    """Size of the term j of the velocity, over the trial step, in parts of the limits."""
+def _velocity_term(y: Array, j: int, power: float, weight: Array) -> float:
+    """Return the size of term j of the velocity, over the trial step, in parts of the limits."""
     size = 0.0
     for i in range(weight.shape[0]):
         off = y[j, i] * weight[i]
@@ -192,10 +198,13 @@ def velocity_term(y: Array, j: int, power: float, weight: Array) -> float:
     return j * math.sqrt(size) * power
 
 
-def last_size(y: Array, last: int, end: float, weight: Array) -> float:
-    """Size of the last term, or of the one before if that asks for a shorter step: a series may be even or odd."""
-    size = velocity_term(y, last, end**last, weight)
-    before = velocity_term(y, last - 1, end ** (last - 1), weight)
+def _last_size(y: Array, last: int, end: float, weight: Array) -> float:
+    """Return the size of the last term, or of the one before if that asks for a shorter step.
+
+    A series may be even or odd.
+    """
+    size = _velocity_term(y, last, end**last, weight)
+    before = _velocity_term(y, last - 1, end ** (last - 1), weight)
     return max(size, before ** (last / (last - 1.0)))
 
 
@@ -235,10 +244,10 @@ def modal_steps(run: Equations, w: Work, out: Output) -> int:
         for i in range(n):
             y[0, i] = state[i]
             y[1, i] = s * state[n + i]
-        project(W, y, 0, u)
+        _project(W, y, 0, u)
         for p in range(W.shape[0]):
             u[p, 0] += offset[p]
-        set_weights(eigenvalues, reach, pull, tolerance, weight)
+        _set_weights(eigenvalues, reach, pull, tolerance, weight)
         end = 1.0
         power = 1.0
         last = most
@@ -246,14 +255,14 @@ def modal_steps(run: Equations, w: Work, out: Output) -> int:
         before = 1e300
         largest = 0.0
         for j in range(most - 1):
-            project(W, y, j + 1, u)
+            _project(W, y, j + 1, u)
             law_order(j, t, s, u, law, memory, pieces, force)
-            next_order(run, force, s, y, j)
+            _next_order(run, force, s, y, j)
             if j == 1:
                 end = min(1.0, law_corner(1, 1.0, law, memory, pieces, True))
                 power = end * end
             power *= end
-            size = velocity_term(y, j + 2, power, weight)
+            size = _velocity_term(y, j + 2, power, weight)
             if size < 1.0 and before < 1.0 and j >= LEAST - 2:
                 last = j + 2
                 break
@@ -269,12 +278,12 @@ def modal_steps(run: Equations, w: Work, out: Output) -> int:
                 break
             continue
         x = end
-        size = last_size(y, last, end, weight)
+        size = _last_size(y, last, end, weight)
         if 1.0 <= size < 1e-3 * largest:  # the sum holds: the motion itself tells its size, as at a start from rest
-            evaluate(y, last, end, s, value, rate)
+            _evaluate(y, last, end, s, value, rate)
             widen(w, end * step)
-            set_weights(eigenvalues, reach, pull, tolerance, weight)
-            size = last_size(y, last, end, weight)
+            _set_weights(eigenvalues, reach, pull, tolerance, weight)
+            size = _last_size(y, last, end, weight)
         if size > 1.0:  # too long: as far as the last term allows
             x = end * size ** (-1.0 / last)
         if still < 20:  # corners that the law does not get past are no reason to stand still
@@ -291,12 +300,12 @@ def modal_steps(run: Equations, w: Work, out: Output) -> int:
         if (fixed and x == 1.0) or abs(goal - ends) <= 1e-13 * max(abs(goal), abs(t1 - begin)):
             ends = goal
         while at < output_times.shape[0] and sign * (output_times[at] - ends) <= 0.0:
-            evaluate(y, last, (output_times[at] - t) / s, s, value, rate)
+            _evaluate(y, last, (output_times[at] - t) / s, s, value, rate)
             for i in range(n):
                 found[at, i] = value[i]
                 found[at, n + i] = rate[i]
             at += 1
-        evaluate(y, last, x, s, value, rate)
+        _evaluate(y, last, x, s, value, rate)
         widen(w, x * step)
         for i in range(n):
             state[i] = Y[count, i] = value[i]
@@ -322,13 +331,13 @@ def work_space(law: tuple[Array, IntArray], state: Array, directions: int) -> Wo
 
 FUNCTIONS = (
     next_goal,
-    project,
-    add_forces,
-    next_order,
-    evaluate,
+    _project,
+    _add_forces,
+    _next_order,
+    _evaluate,
     widen,
-    set_weights,
-    velocity_term,
-    last_size,
+    _set_weights,
+    _velocity_term,
+    _last_size,
     modal_steps,
 )

@@ -79,8 +79,8 @@ def clear_series(w: Work) -> None:
         w.Z[i, 1] = w.v[i]
 
 
-def singular_behind(tb: Equations, w: Work, run: Run, t: float, ahead: float, where: int) -> tuple[int, float]:
-    """A start just past a singular position begins on it: (singular rows, time from the start to it)."""
+def _singular_behind(tb: Equations, w: Work, run: Run, t: float, ahead: float, where: int) -> tuple[int, float]:
+    """Find the singular position just behind a start: (singular rows, time from the start to it)."""
     copy(w.base, w.skip)
     expand(tb, w, run, t, 0)
     if abs(ahead) > step_length(tb, w, run):
@@ -92,9 +92,31 @@ def singular_behind(tb: Equations, w: Work, run: Run, t: float, ahead: float, wh
 
 
 def begin(tb: Equations, w: Work, run: Run, t: float) -> tuple[int, float, float, int, int]:
-    """Consistent start beside a singular position: (singular rows, time shift, time to the one ahead, its row, status).
+    """Find a consistent start next to a singular position; the state is then in w.q, w.v.
 
-    The state is in w.q, w.v.
+    Parameters
+    ----------
+    tb : Equations
+        The system.
+    w : Work
+        State of the start in ``w.q``, ``w.v``; changed.
+    run : Run
+        What holds for the whole run.
+    t : float
+        Time of the start (s).
+
+    Returns
+    -------
+    singular : int
+        Number of rows that are singular there.
+    shift : float
+        Time from t to the state (s).
+    ahead : float
+        Time to the singular position ahead (s); infinite for none.
+    row : int
+        Row that passes there, -1 for none.
+    status : int
+        `DONE`, or `NO_BRANCH` if the velocity selects no branch.
     """
     while True:
         least, where = factor_at(tb, w, w.q)
@@ -115,7 +137,7 @@ def begin(tb: Equations, w: Work, run: Run, t: float) -> tuple[int, float, float
     project(tb, w, run, t, w.q, w.v)
     ahead, where = next_singular(tb, w, run, w.v, -np.inf, np.inf)
     if where >= 0 and run.sign * ahead < 0.0:
-        count, found = singular_behind(tb, w, run, t, ahead, where)
+        count, found = _singular_behind(tb, w, run, t, ahead, where)
         if count > 0:
             copy(w.qn, w.q)
             copy(w.vn, w.v)
@@ -137,10 +159,10 @@ def turned(tb: Equations, w: Work) -> float:
     return most - least
 
 
-def singular_within(tb: Equations, w: Work, run: Run, h: float, low: float, high: float) -> tuple[float, int]:
-    """First singular position of the series within low < sign tau < high, from looks inside the step: (time, row).
+def _singular_within(tb: Equations, w: Work, run: Run, h: float, low: float, high: float) -> tuple[float, int]:
+    """Find the first singular position of the series within low < sign tau < high: (time, row).
 
-    The row is -1 where there is none.
+    It is searched from several places inside the step. The row is -1 if there is none.
     """
     evaluate(w.Z, run.order, h, w.qn, w.vn)
     looks = int(np.ceil(turned(tb, w) / FAR))
@@ -156,8 +178,8 @@ def singular_within(tb: Equations, w: Work, run: Run, h: float, low: float, high
     return np.inf, -1
 
 
-def land(tb: Equations, w: Work, run: Run, state: Array, h: float, close: float) -> tuple[float, int, float, int, int]:
-    """End of a step of at most |h|: (step, singular rows there, time to the next ones, their row, status).
+def _land(tb: Equations, w: Work, run: Run, state: Array, h: float, close: float) -> tuple[float, int, float, int, int]:
+    """End a step of at most |h|: (step, singular rows there, time to the next ones, their row, status).
 
     The state there is in w.qn, w.vn.
 
@@ -170,7 +192,7 @@ def land(tb: Equations, w: Work, run: Run, state: Array, h: float, close: float)
     for _ in range(40 + 4 * base.shape[0]):
         lowest = max(passed, 1e-3 * abs(h)) if state[SINGULAR] > 0.0 else passed
         near = max(1.3 * abs(h), close)
-        guess, where = singular_within(tb, w, run, h, lowest, near)
+        guess, where = _singular_within(tb, w, run, h, lowest, near)
         evaluate(w.Z, run.order, h, w.qn, w.vn)
         first, least = project(tb, w, run, t + h, w.qn, w.vn)
         tau, after = next_singular(tb, w, run, w.vn, lowest - abs(h), np.inf)
@@ -204,11 +226,11 @@ def land(tb: Equations, w: Work, run: Run, state: Array, h: float, close: float)
     return h, 0, np.inf, -1, STEP_TOO_SMALL
 
 
-def defect(tb: Equations, w: Work, run: Run, t: float, h: float, singular: int) -> float:
-    """Most that the series are off within the step h, by the forces there: in units of the coordinates.
+def _defect(tb: Equations, w: Work, run: Run, t: float, h: float, singular: int) -> float:
+    """Return the largest error of the series within the step h by the forces there, in units of the coordinates.
 
-    Terms of a series do not tell of what is too small to be in them: tanh(100) is 1 to the last digit, but it is none
-    of its neighbours'. With the factor at the end of the step, where so many rows are singular.
+    Terms of a series do not show what is too small to be in them: tanh(100) is 1 to the last digit, but it is none
+    of its neighbours'. The factor is that at the end of the step, with `singular` rows.
     """
     program = tb.program
     P, F, code, switches = w.P, w.F, program.code, program.switches
@@ -266,9 +288,23 @@ class Output(NamedTuple):
 
 
 def integrate_series(tb: Equations, w: Work, run: Run, out: Output) -> int:
-    """Integrate from (w.q, w.v) to run.end, or until the output is full; call again with the same state to go on.
+    """Integrate from (w.q, w.v) to run.end, or until the output is full.
 
-    Returns the status. SINGULAR_START asks for `begin` (rare, so it stays in Python) before the next call.
+    Parameters
+    ----------
+    tb : Equations
+        The system.
+    w : Work
+        State and scratch arrays; call again with the same ones to go on.
+    run : Run
+        What holds for the whole run.
+    out : Output
+        Steps and their series, and the state of the run.
+
+    Returns
+    -------
+    status : int
+        Of `Status`; SINGULAR_START asks for `begin` (rare, so it stays in Python) before the next call.
     """
     state, T, C, singular = out.state, out.times, out.coefficients, out.singular
     sign, pieces, switches, order = run.sign, w.pieces, tb.program.switches, run.order
@@ -321,7 +357,7 @@ def integrate_series(tb: Equations, w: Work, run: Run, out: Output) -> int:
             limit = h
             if where >= 0:
                 close = min(close, abs(h))
-            h, rows_there, ahead, row, status = land(tb, w, run, state, limit, close)
+            h, rows_there, ahead, row, status = _land(tb, w, run, state, limit, close)
             if status != DONE:
                 break
             if rows_there == 0:
@@ -331,7 +367,7 @@ def integrate_series(tb: Equations, w: Work, run: Run, out: Output) -> int:
             if tb.program.code.checked.shape[0] == 0:
                 off = 0.0
                 break
-            off = defect(tb, w, run, t, h, rows_there)
+            off = _defect(tb, w, run, t, h, rows_there)
             if off < bound:
                 break
             h *= SHORTER
@@ -370,8 +406,8 @@ def integrate_series(tb: Equations, w: Work, run: Run, out: Output) -> int:
     return status
 
 
-FUNCTIONS = (step_length, turned, singular_within, land, defect, integrate_series)
-STARTERS = (clear_series, singular_behind, begin)
+FUNCTIONS = (step_length, turned, _singular_within, _land, _defect, integrate_series)
+STARTERS = (clear_series, _singular_behind, begin)
 NAMES = {
     "DONE": DONE, "STEP_TOO_SMALL": STEP_TOO_SMALL, "MOST_STEPS": MOST_STEPS, "NO_BRANCH": NO_BRANCH,
     "NOT_FINITE": NOT_FINITE, "SINGULAR_START": SINGULAR_START, "TIME": TIME, "SINGULAR": SINGULAR, "AHEAD": AHEAD,

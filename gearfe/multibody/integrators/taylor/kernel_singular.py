@@ -39,7 +39,19 @@ TOGETHER = 1e-6
 
 
 def evaluate(Z: Array, order: int, h: float, q: Array, v: Array) -> None:
-    """State of the series at t0 + h."""
+    """Write the state of a series at t0 + h.
+
+    Parameters
+    ----------
+    Z : ndarray, shape (variables, orders)
+        Series of the variables, coordinates first.
+    order : int
+        Highest order that counts.
+    h : float
+        Time from the expansion (s).
+    q, v : ndarray, shape (n,)
+        Coordinates and velocities; written.
+    """
     for i in range(q.shape[0]):
         value = Z[i, order]
         rate = 0.0
@@ -57,9 +69,27 @@ def factor_at(tb: Equations, w: Work, q: Array) -> tuple[float, int]:
 
 
 def project(tb: Equations, w: Work, run: Run, t: float, q: Array, v: Array) -> tuple[float, float]:
-    """Onto g = 0 and G v = df/dt by the smallest change in the mass norm; w.G, w.val, w.diag belong to the new point.
+    """Move a state onto g = 0 and G v = df/dt by the smallest change in the mass norm.
 
-    Returns the first position change relative to the length (and 1 rad), and the least pivot ratio.
+    Parameters
+    ----------
+    tb : Equations
+        The system.
+    w : Work
+        Scratch arrays; ``w.G``, ``w.val``, ``w.diag`` then belong to the new state.
+    run : Run
+        What holds for the whole run.
+    t : float
+        Time (s).
+    q, v : ndarray, shape (n,)
+        Coordinates and velocities; changed.
+
+    Returns
+    -------
+    first : float
+        First change of the coordinates in their units; infinite if the projection does not converge.
+    least : float
+        Least pivot ratio.
     """
     rows = tb.program.rows
     time_series(tb.program.times, t, run.sign > 0.0, 3, w.TF)
@@ -129,13 +159,31 @@ def row_square(tb: Equations, w: Work, r: int) -> float:
 
 
 def next_singular(tb: Equations, w: Work, run: Run, v: Array, low: float, high: float) -> tuple[float, int]:
-    """First singular position from here within low < sign tau < high, judged from all small pivots: (tau, row).
+    """Estimate the first singular position from here within low < sign tau < high.
 
-    The row is -1 where there is none.
+    It is judged from all small pivots. For each such row z = S^-1 e_row, p = G^T z. It stands on the gradients of all
+    other rows, so only the part of B = dG^T/dt z across them moves it: what is left of B without all rows, and the part
+    along p. Were the row's passing to remove p, most of that part would be along p.
 
-    For each such row z = S^-1 e_row, p = G^T z. It stands on the gradients of all other rows, so only the part of
-    B = dG^T/dt z across them moves it: what is left of B without all rows, and the part along p. Were the row's passing
-    to remove p, most of that part would be along p.
+    Parameters
+    ----------
+    tb : Equations
+        The system.
+    w : Work
+        Gradients and factor at the state.
+    run : Run
+        What holds for the whole run.
+    v : ndarray, shape (n,)
+        Velocities there.
+    low, high : float
+        Bounds of the time in the direction of travel (s).
+
+    Returns
+    -------
+    tau : float
+        Time from here (s); infinite for none.
+    row : int
+        Row that passes, -1 for none.
     """
     z, sign = w.rhs, run.sign
     m = w.mu.shape[0]
@@ -178,9 +226,25 @@ def next_singular(tb: Equations, w: Work, run: Run, v: Array, low: float, high: 
 
 
 def singular_frame(tb: Equations, w: Work, q: Array, v: Array, bound: float) -> int:
-    """Z, B, the bordered system and p = G^T Z (in border.P) of the rows with w.skip = 2, which are left out.
+    """Set up the bordered system of the singular rows: Z, B and p = G^T Z in w.border.
 
-    Rows with pivots below `bound` join them. Returns their number (0 when the bordered system is singular, too).
+    The rows with w.skip = 2 are left out of the factor, and rows with pivots below `bound` join them.
+
+    Parameters
+    ----------
+    tb : Equations
+        The system.
+    w : Work
+        Scratch arrays; gradients, factor and border change.
+    q, v : ndarray, shape (n,)
+        Coordinates and velocities.
+    bound : float
+        Pivot ratio below which a row joins.
+
+    Returns
+    -------
+    count : int
+        Number of singular rows; 0 if the bordered system is singular, too.
     """
     border = w.border
     m = w.mu.shape[0]
@@ -240,8 +304,24 @@ def border_share(tb: Equations, border: Border, count: int) -> float:
 
 
 def border_change(tb: Equations, w: Work, count: int, x: Array) -> float:
-    """x -= the smallest change that lowers [G_reg; B] x by (w.mu, border.nu); returns its largest entry, in units of
-    the coordinates."""
+    """Lower [G_reg; B] x by (w.mu, border.nu) with the smallest change of x in the mass norm.
+
+    Parameters
+    ----------
+    tb : Equations
+        The system.
+    w : Work
+        Factor, border and right-hand sides; changed.
+    count : int
+        Number of singular rows.
+    x : ndarray, shape (n,)
+        Coordinates or velocities; changed.
+
+    Returns
+    -------
+    largest : float
+        Largest entry of the change, in units of the coordinates.
+    """
     border = w.border
     for r in range(w.mu.shape[0]):
         if w.skip[r] != 0:

@@ -25,7 +25,19 @@ def series_step(last: float, before: float, run: Run) -> float:
 
 
 def next_goal(breaks: Array, t: float, end: float, sign: float) -> float:
-    """The first break after the time t, or the end of the run."""
+    """Return the first break after a time, or the end of the run (s).
+
+    Parameters
+    ----------
+    breaks : ndarray, shape (b,)
+        Times at which steps end, rising (s).
+    t : float
+        Time (s).
+    end : float
+        End of the run (s).
+    sign : float
+        1 forwards in time, -1 backwards.
+    """
     count = breaks.shape[0]
     rounding = 1e-13 * max(abs(t), abs(end - t))
     low = 0

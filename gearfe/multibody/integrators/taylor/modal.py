@@ -34,7 +34,34 @@ def run_modal_taylor(
     modal: ModalCoordinates, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
     watch: Watch | None = None,
 ) -> tuple[Dense, Status, dict[str, Any]]:  # fmt: skip
-    """Integrate by Taylor series in compiled code; returns (dense output, status, statistics)."""
+    """Integrate by Taylor series in modal coordinates, in compiled code.
+
+    Parameters
+    ----------
+    modal : ModalCoordinates
+        Modal coordinates of the system, whose only force has a series.
+    start : Start
+        Consistent start.
+    times : ndarray, shape (t,)
+        Output times (s); the run goes from the start to the last.
+    tolerance : float
+        Of each step, relative to the largest value of each modal coordinate.
+    longest : float
+        Longest step (s).
+    most : int
+        Largest number of steps.
+    watch : Watch, optional
+        Called between pieces of the run; may end it.
+
+    Returns
+    -------
+    dense : SeriesPieces
+        Coordinates over time.
+    status : Status
+        Why the run ended.
+    statistics : dict
+        Scheme, steps and orders.
+    """
     found = series_force(modal.system)
     assert found is not None  # the caller asks before
     n = modal.T.shape[1]
@@ -104,7 +131,36 @@ class SeriesRun:
         self, t0: float, y0: Array, t1: float, output_times: Array, most: int,
         watch: Watch | None = None,
     ) -> tuple[Array, Array, Array, Status, int]:  # fmt: skip
-        """(step ends, states there, states at the asked times passed, status, orders computed)."""
+        """Integrate from a state and keep the states at the asked times.
+
+        Parameters
+        ----------
+        t0 : float
+            Time at the begin (s).
+        y0 : ndarray, shape (2 n,)
+            Modal coordinates, then velocities there.
+        t1 : float
+            Time at the end (s).
+        output_times : ndarray, shape (a,)
+            Asked times in order of travel (s).
+        most : int
+            Largest number of steps.
+        watch : Watch, optional
+            Called between pieces of the run; may end it.
+
+        Returns
+        -------
+        ends : ndarray, shape (steps + 1,)
+            Ends of the steps (s).
+        states : ndarray, shape (steps + 1, 2 n)
+            States there.
+        found : ndarray, shape (reached, 2 n)
+            States at the asked times that were reached.
+        status : Status
+            Why the run ended.
+        orders : int
+            Number of orders computed.
+        """
         modal, series = self.modal, self.series
         n = modal.T.shape[1]
         W = np.ascontiguousarray((modal.T[self.index].T @ self.force.W).T)

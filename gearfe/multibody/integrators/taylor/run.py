@@ -80,8 +80,8 @@ def prepare(system: System, start: Start, order: int) -> TaylorRun:
     return TaylorRun(system, tables, order, work, (handed, packed_work), spare)
 
 
-def first_pieces(tables: Equations, w: Work, t: float, forward: bool) -> bool:
-    """Pieces of all switches at the state in w; whether every table has a value there."""
+def _first_pieces(tables: Equations, w: Work, t: float, forward: bool) -> bool:
+    """Set the pieces of all switches at the state in w; return whether every table has a value there."""
     python, program = KERNELS.python, tables.program
     python.time_series(program.times, t, forward, 2, w.TF)
     python.variables(tables, w, w.q)
@@ -99,7 +99,7 @@ def load_kernels(prepared: TaylorRun, run: Run) -> float:
     def nothing() -> None:
         out = kernel_run.Output(state, times, coefficients, *np.zeros((2, 1), dtype=np.int64))
         KERNELS.compiled.integrate_series(*prepared.handed, packed(run), packed(out))
-        sampler(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, width)))
+        _sampler(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, width)))
 
     return KERNELS.load(nothing)
 
@@ -118,9 +118,33 @@ def run_taylor(
     shared: TaylorRun, start: Start, end: float, *, tolerance: float, longest: float = math.inf, most: int = 1_000_000,
     watch: Watch | None = None,
 ) -> tuple[Polynomials, Status, dict[str, Any]]:  # fmt: skip
-    """Integrate from the consistent start to the time `end`; (dense output, status, statistics).
+    """Integrate from the consistent start to the time `end` by Taylor series.
 
-    `tolerance` is that of the last terms.
+    Parameters
+    ----------
+    shared : TaylorRun
+        Tables of the system and a work space, see `prepare`.
+    start : Start
+        Consistent start.
+    end : float
+        Time at the end (s).
+    tolerance : float
+        Of the last terms of the series, in units of the coordinates.
+    longest : float
+        Longest step (s).
+    most : int
+        Largest number of steps.
+    watch : Watch, optional
+        Called between pieces of the run; may end it.
+
+    Returns
+    -------
+    dense : Polynomials
+        Coordinates over time.
+    status : Status
+        Why the run ended.
+    statistics : dict
+        Scheme, steps, order, times of singular passages.
     """
     system, tables, order, w, both, _ = shared
     t0 = start.time
@@ -129,7 +153,7 @@ def run_taylor(
     run = Run(t0, end, sign, order, float(tolerance), float(longest), system.breaks)
     state, made = first_state(t0), np.zeros(1, dtype=np.int64)
     with np.errstate(all="ignore"):
-        covered = first_pieces(tables, w, t0, sign > 0.0)
+        covered = _first_pieces(tables, w, t0, sign > 0.0)
     compiling = load_kernels(shared, run)
     advance, handed = KERNELS.compiled.integrate_series, (*both, packed(run))
     width = w.q.size
@@ -167,7 +191,7 @@ def run_taylor(
     shared.spare.append((w, both[1]))
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
     series = np.concatenate([p[1] for p in parts]) if len(parts) > 1 else parts[0][1]
-    dense = Polynomials(ends, series, sampler, t0)
+    dense = Polynomials(ends, series, _sampler, t0)
     statistics: dict[str, Any] = {
         "scheme": "Taylor series",
         "steps": done,
@@ -198,6 +222,6 @@ def _load_problem(shared: TaylorRun, run: Run, t: float, status: Status) -> str:
     return ""
 
 
-def sampler(times: Array, coefficients: Array, sign: float, t: Array, derivative: int, out: Array) -> None:
-    """Compiled sums of the polynomials, see `Polynomials`."""
+def _sampler(times: Array, coefficients: Array, sign: float, t: Array, derivative: int, out: Array) -> None:
+    """Evaluate the polynomials of a run by compiled code, see `Polynomials`."""
     KERNELS.compiled.sample(packed(kernel_steps.Samples(times, coefficients, sign, t, derivative, out)))
