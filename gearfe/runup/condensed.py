@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..gear.pair import MeshGeometry
 from ..train.forces import Flank
 from ..train.friction import Lubrication
-from ..train.kinematics import drive_sense, fastest, mesh_phases, steady_forces
+from ..train.kinematics import drive_sense, fastest, mesh_phases
 from ..train.model import TrainModel
 from ..train.simulate import DIVERGED
 from ..typing import Array
@@ -92,9 +92,10 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
         that nothing holds.
     """
     _check(model)
-    modal, phases = model.modal, mesh_phases(model.rolling.cycles, shared)
+    modal, rolled = model.modal, model.kinematics
+    phases = mesh_phases(rolled.cycles, shared)
     if len(phases) > MOST_PHASES:
-        problem = f"need {len(phases)} phases of their own, more than {MOST_PHASES}: {model.rolling.note}"
+        problem = f"need {len(phases)} phases of their own, more than {MOST_PHASES}: {rolled.note}"
         raise InputError("train.meshes", None, problem, "look at it with gearfe vibration")
     phases = _with_torques(model, phases, shared, speeds)
     turns = [turns for turns, _ in phases]
@@ -114,12 +115,12 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
         np.array([g.polar * g.ratio for g in gyros]),
     )  # fmt: skip
     sense = drive_sense(model.train.driven.speed) or 1.0
-    steady = steady_forces(model.train)
+    steady = model.kinematics.steady_forces
     ends = np.cumsum([0, *map(len, model.sides)]).tolist()
     of_mesh = tuple(tuple(range(a, b)) for a, b in itertools.pairwise(ends))
     mesh_of = {number: mesh for mesh, numbers in enumerate(of_mesh) for number in numbers}
     rubbing = [_rubbing(model, flank, mesh_of[i], float(steady[mesh_of[i]])) for i, flank in enumerate(flanks)]
-    orders = np.array([[int(c * t) * (i in at) for t, at in phases] for i, c in enumerate(model.rolling.cycles)])
+    orders = np.array([[int(c * t) * (i in at) for t, at in phases] for i, c in enumerate(rolled.cycles)])
     of_flank = np.array([np.where(orders[mesh_of[i]] > 0, [float(t) for t in turns], 0.0) for i in range(len(flanks))])
     whole = np.array([float(t) for t in turns])
     torques = [SwingingTorque(used.index(direction), *wave, whole) for direction, wave in swinging]
@@ -186,7 +187,7 @@ def _with_torques(
     model: TrainModel, phases: list[tuple[Fraction, list[int]]], shared: int, speeds: Sequence[float]
 ) -> list[tuple[Fraction, list[int]]]:
     """Phases whose periods hold whole cycles of the torques that oscillate, at as many of the speeds as can be."""
-    cycles = model.rolling.cycles
+    cycles = model.kinematics.cycles
     for omega in {wave[1] for _, function in model.torques for wave in function.sines}:
         for speed in speeds:
             for number, (turns, meshes) in enumerate(phases):
@@ -204,7 +205,7 @@ def unmatched(train: CondensedTrain, speed: float) -> str:
     for torque in train.forces.torques:
         if torque.waves(speed) is None:
             hertz = torque.omega / (2.0 * math.pi)
-            meshes = float(train.model.rolling.cycles[0]) * abs(speed) / (2.0 * math.pi)
+            meshes = float(train.model.kinematics.cycles[0]) * abs(speed) / (2.0 * math.pi)
             said = f"a torque oscillates with {hertz:.9g} Hz, {hertz / meshes:.9g} times the frequency of mesh 1"
             return f"{said}: the motion does not repeat within {SHARED} mesh cycles"
     return ""

@@ -90,7 +90,7 @@ def critical_speeds(run: RunUp, multiples: int) -> CriticalSpeeds:
     highest = (1.0 + NEAR) * max(run.band_hz, *(float(state.frequency.max()) for state in run.states))
     cuts = {cut.waves: cut for cut in orders(run, multiples)}
     for mesh in meshes:
-        once = float(run.train.model.rolling.cycles[mesh]) * float(np.abs(run.speeds).min()) / (2.0 * math.pi)
+        once = float(run.train.model.kinematics.cycles[mesh]) * float(np.abs(run.speeds).min()) / (2.0 * math.pi)
         most = min(MOST_MULTIPLES, math.ceil(highest / once))
         for cut in multiples_of(run, mesh, most)[multiples:]:
             known = cuts.get(cut.waves)

@@ -24,7 +24,7 @@ class OrderCut(NamedTuple):
 
 def multiples_of(run: RunUp, mesh: int, multiples: int) -> list[OrderCut]:
     """The first multiples of a mesh frequency."""
-    cycles, waves = float(run.train.model.rolling.cycles[mesh]), np.array(run.train.system.orders[mesh])
+    cycles, waves = float(run.train.model.kinematics.cycles[mesh]), np.array(run.train.system.orders[mesh])
     return [
         OrderCut(tuple((a * waves).tolist()), a * cycles, (f"{a} x mesh {mesh + 1}",), mesh, a)
         for a in range(1, multiples + 1)

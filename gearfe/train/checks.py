@@ -13,8 +13,6 @@ from ..meshlaw.law import MeshLaw
 from ..stiffness.periodic import PeriodicInterpolant
 from .friction import check_friction
 from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
-from .kinematics import driving_senses
-from .phases import tooth_places
 from .statics import check_flanks, one_sided
 
 #: Agreement of lengths and angles that count as equal (relative).
@@ -43,7 +41,7 @@ def check_layout(train: GearTrain) -> None:
         _check_mesh(train, mesh)
     _check_room(train)
     _check_damping(train)
-    tooth_places(train, driving_senses(train))
+    _ = train.kinematics  # which refuses trains that cannot roll or be assembled
 
 
 def _names(kind: str, names: list[str]) -> None:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from ..errors import InputError
-from ..gear.pair import Gear
+from ..gear.pair import Gear, MeshGeometry
 from ..meshlaw.law import MeshLaw
 from ..multibody.series.timefunctions import TimeFunction
 from ..reduction.modal_body import ModalBody
@@ -20,6 +21,8 @@ from ..stiffness.curve import StiffnessCurve
 from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array
 from .friction import Lubrication
+from .kinematics import Kinematics, kinematics
+from .layout import Layout, Link, PitchErrors, Wheel
 
 Vector = tuple[float, float, float]
 #: When the damper of a mesh acts.
@@ -76,7 +79,7 @@ class ShaftGear:
     pitch_errors : (left, right), each a tuple of z numbers, or empty
         How much earlier the flanks of each tooth touch along the line of action (m): index deviations times the cosine
         of the pressure angle; a displaced tooth has opposite values on its sides. Teeth count about the axis of the
-        train, from the one that stands at the gear's angle in `gearfe.train.phases.tooth_places`. Left flanks drive
+        train, from the one that stands at the gear's angle in `gearfe.train.kinematics.Kinematics`. Left flanks drive
         where the driver turns about the axis. For meshes with a law.
     """
 
@@ -85,7 +88,7 @@ class ShaftGear:
     along: float
     gear: Gear
     density: float = 7850.0
-    pitch_errors: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    pitch_errors: PitchErrors = ((), ())
 
 
 @dataclass(frozen=True)
@@ -288,6 +291,36 @@ class GearTrain(Facts):
         return self.drive
 
     @property
+    def layout(self) -> Layout:
+        """What the kinematics follow from, as values."""
+        gears = {
+            g.name: Wheel(g.name, self.shaft_number(g.shaft), g.gear.teeth, g.gear.base_radius, _tuples(g.pitch_errors))
+            for g in self.gears
+        }
+        loads = tuple((self.shaft_number(load.shaft), load.torque) for load in self.loads)
+        meshes = tuple(self._link(mesh, gears[mesh.driver], gears[mesh.driven]) for mesh in self.meshes)
+        names, driven = tuple(shaft.name for shaft in self.shafts), self.shaft_number(self.driven.shaft)
+        return Layout(names, driven, self.driven.speed, tuple(gears.values()), meshes, loads)
+
+    def _link(self, mesh: GearMesh, driver: Wheel, driven: Wheel) -> Link:
+        one, two = self.gear(mesh.driver), self.gear(mesh.driven)
+        arm = self.frame[:2] @ (np.array(self.shaft(two.shaft).point) - np.array(self.shaft(one.shaft).point))
+        twist = MeshGeometry(one.gear, two.gear, mesh.centre_distance).contact_twist
+        towards, distance = math.atan2(arm[1], arm[0]), float(np.linalg.norm(arm))
+        return Link(mesh.name, driver, driven, towards, distance, twist, mesh.phase)
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """Ratios, senses, phases and steady forces; trains of equal layout share them.
+
+        Raises
+        ------
+        InputError
+            For a train without a drive, and for what `gearfe.train.kinematics.kinematics` refuses.
+        """
+        return kinematics(self.layout)
+
+    @property
     def bore_points(self) -> dict[str, Array]:
         """Name -> reference point of each bore (m)."""
         if self.housing is None:
@@ -314,3 +347,9 @@ class GearTrain(Facts):
     def gear(self, name: str) -> ShaftGear:
         """The gear of that name."""
         return next(g for g in self.gears if g.name == name)
+
+
+def _tuples(errors: PitchErrors) -> PitchErrors:
+    """Pitch errors as values, whatever sequences they are."""
+    left, right = (tuple(float(error) for error in side) for side in errors)
+    return left, right

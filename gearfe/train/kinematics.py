@@ -1,31 +1,34 @@
-r"""Rolling of a train: ratios of the shafts to the drive, mesh frequencies, the common period of all meshes.
+r"""Kinematics of a train: ratios of the shafts, driving senses, common period, teeth at the start, steady forces.
 
 With :math:`\Delta\varphi_2 = -(z_1/z_2)\,\Delta\varphi_1` at each mesh all ratios are rational, so the common period
 is exact: a mesh repeats after :math:`1/(|g| z)` turns of the drive (g the ratio of its driver, z the driver's teeth),
-and fractions have a least common multiple.
+and fractions have a least common multiple. In steady running the moments about the axis of each shaft that is not
+driven balance: base radius times force at each mesh.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 
 from ..errors import InputError
 from ..multibody.series.timefunctions import TimeFunction
 from ..typing import Array
-from .gear_train import GearTrain
+from .layout import Layout
+from .phases import pair_shifts, tooth_places
 
 #: A common period of more cycles of the fastest mesh than this is of no practical use.
 MOST_CYCLES = 200
 
 
-@dataclass(frozen=True)
-class Rolling:
-    """Kinematics of a train.
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """How a train rolls, and the forces of its meshes in steady running.
 
     Attributes
     ----------
@@ -37,54 +40,82 @@ class Rolling:
         Turns of the drive after which all meshes are in phase again, the teeth with pitch errors, too; None beyond
         `MOST_CYCLES`.
     note
-        Why there is none.
+        Why there is no common period, or nothing.
+    senses
+        For each mesh, +1 or -1: sense about the axis in which the driver pushes, that of its rotation. Where the drive
+        stands still, it follows from the loads.
+    steady_forces : ndarray, shape (meshes,)
+        Force of each mesh (N) under the final torques of the loads, without inertia; negative presses the back flanks.
+        In a loop of gears those of least squares: statics alone do not determine them.
+    angles
+        Gear -> angle (rad) of the middle of one of its teeth at the start, about the axis from the first direction e1.
+    phases
+        For each mesh, the driver's rotation (rad) past a tooth on the line of centres at the start, in its driving
+        sense.
+    shifts
+        For each mesh how much later the pairs of its driving and of its back flanks touch (m), see
+        `gearfe.train.phases.pair_shifts`.
     """
 
     ratios: tuple[Fraction, ...]
     cycles: tuple[Fraction, ...]
     common_turns: Fraction | None
-    note: str = ""
+    note: str
+    senses: tuple[float, ...]
+    steady_forces: Array
+    angles: Mapping[str, float]
+    phases: tuple[float, ...]
+    shifts: tuple[tuple[Array, Array], ...]
 
 
-def rolling(train: GearTrain) -> Rolling:
-    """Ratios and common period.
+@lru_cache(maxsize=32)
+def kinematics(layout: Layout) -> Kinematics:
+    """Kinematics of a layout; `gearfe.train.GearTrain.kinematics` are those of a train.
+
+    Raises
+    ------
+    InputError
+        For shafts that neither drive nor mesh hold, loops of gears whose ratios contradict each other, and what
+        `gearfe.train.phases.tooth_places` refuses.
+    """
+    ratios = rolling(layout)
+    cycles = tuple(abs(ratios[mesh.driver.shaft]) * mesh.driver.teeth for mesh in layout.meshes)
+    uneven = [gear.shaft for gear in layout.gears if any(gear.pitch_errors)]
+    common, note = _common((*cycles, *(abs(ratios[shaft]) for shaft in uneven)))
+    senses, forces = _senses_and_forces(layout, ratios)
+    forces.setflags(write=False)
+    places = tooth_places(layout, senses)
+    shifts = tuple(pair_shifts(mesh, sense, places) for mesh, sense in zip(layout.meshes, senses, strict=True))
+    return Kinematics(ratios, cycles, common, note, senses, forces, places.angles, places.phases, shifts)
+
+
+def rolling(layout: Layout) -> tuple[Fraction, ...]:
+    """Speed of each shaft for unit speed of the drive.
 
     Raises
     ------
     InputError
         For shafts that neither drive nor mesh hold, and for loops of gears whose ratios contradict each other.
     """
-    known = {train.driven.shaft: Fraction(1)}
-    links = []
-    for mesh in train.meshes:
-        one, two = train.gear(mesh.driver), train.gear(mesh.driven)
-        links.append((mesh.name, one.shaft, two.shaft, Fraction(-one.gear.teeth, two.gear.teeth)))
-    for _ in train.shafts:
-        for name, driver, driven, ratio in links:
+    known = {layout.driven: Fraction(1)}
+    for _ in layout.shafts:
+        for mesh in layout.meshes:
+            driver, driven = mesh.driver.shaft, mesh.driven.shaft
+            ratio = Fraction(-mesh.driver.teeth, mesh.driven.teeth)
             for first, second, factor in ((driver, driven, ratio), (driven, driver, 1 / ratio)):
                 if first not in known:
                     continue
-                made = known[first] * factor
-                if known.setdefault(second, made) != made:
-                    problem = f"closes a loop that cannot turn: shaft {second!r} would need two speeds"
+                speed = known[first] * factor
+                if known.setdefault(second, speed) != speed:
+                    problem = f"closes a loop that cannot turn: shaft {layout.shafts[second]!r} would need two speeds"
                     raise InputError(
-                        f"mesh {name!r}", None, problem, "take a gear out of the loop, or change its teeth"
+                        f"mesh {mesh.name!r}", None, problem, "take a gear out of the loop, or change its teeth"
                     )
-    for shaft in train.shafts:
-        if shaft.name not in known:
+    for number, name in enumerate(layout.shafts):
+        if number not in known:
             problem = "is held by nothing: neither the drive nor a mesh connects it to the train"
-            raise InputError(f"shaft {shaft.name!r}", None, problem, "add a mesh between its gears and the train's")
-    cycles = tuple(
-        abs(known[train.gear(mesh.driver).shaft]) * train.gear(mesh.driver).gear.teeth for mesh in train.meshes
-    )
-    uneven = [g.shaft for g in train.gears if any(g.pitch_errors)]
-    common, note = _common((*cycles, *(abs(known[shaft]) for shaft in uneven)))
-    return Rolling(tuple(known[s.name] for s in train.shafts), cycles, common, note)
-
-
-def shaft_ratios(train: GearTrain) -> dict[str, Fraction]:
-    """Shaft -> its speed for unit speed of the drive."""
-    return dict(zip((s.name for s in train.shafts), rolling(train).ratios, strict=True))
+            raise InputError(f"shaft {name!r}", None, problem, "add a mesh between its gears and the train's")
+    return tuple(known[number] for number in range(len(layout.shafts)))
 
 
 def mesh_phases(cycles: Sequence[Fraction], most: int) -> list[tuple[Fraction, list[int]]]:
@@ -99,17 +130,17 @@ def mesh_phases(cycles: Sequence[Fraction], most: int) -> list[tuple[Fraction, l
     -------
     For each group the turns of the drive after which it repeats, and the numbers of its meshes.
     """
-    made: list[tuple[Fraction, list[int]]] = []
+    groups: list[tuple[Fraction, list[int]]] = []
     for mesh, own in enumerate(cycles):
-        for number, (_, others) in enumerate(made):
+        for number, (_, others) in enumerate(groups):
             together = [*(cycles[i] for i in others), own]
             turns = _repeating(together)
             if turns * max(together) <= most:
-                made[number] = turns, [*others, mesh]
+                groups[number] = turns, [*others, mesh]
                 break
         else:
-            made.append((1 / own, [mesh]))
-    return made
+            groups.append((1 / own, [mesh]))
+    return groups
 
 
 def _repeating(cycles: Sequence[Fraction]) -> Fraction:
@@ -130,56 +161,43 @@ def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
     return turns, ""
 
 
-def steady_forces(train: GearTrain) -> Array:
-    """Force of each mesh (N) under the final torques of the loads, without inertia; shape (meshes,).
-
-    At every shaft that is not driven the moments about the axis balance, base radius times force at each mesh. In a
-    loop of gears the forces of least squares are returned: statics alone do not determine them.
-    """
-    return balanced_forces(train, driving_senses(train), load_torques(train, [load_end(train)]))[:, 0]
-
-
-def load_end(train: GearTrain) -> float:
-    """Time at which all load ramps have ended (s)."""
-    return max((b for load in train.loads for b in load.torque.breaks), default=0.0)
-
-
-def load_torques(train: GearTrain, times: Sequence[float] | Array) -> Array:
-    """Torque of the loads on each shaft without its oscillating part (N m), shape (shafts, times)."""
-    found = np.zeros((len(train.shafts), len(times)))
-    for load in train.loads:
-        found[train.shaft_number(load.shaft)] += replace(load.torque, sines=())(times)
-    return found
-
-
-def balanced_forces(train: GearTrain, senses: Sequence[float], torques: Array) -> Array:
-    """Mesh forces (N), shape (meshes, n), that balance the torques (N m) on the shafts, shape (shafts, n)."""
-    arms = np.zeros((len(train.shafts), len(train.meshes)))
-    for column, (mesh, sense) in enumerate(zip(train.meshes, senses, strict=True)):
-        for gear in (train.gear(mesh.driver), train.gear(mesh.driven)):
-            arms[train.shaft_number(gear.shaft), column] += sense * gear.gear.base_radius
-    free = [k for k, shaft in enumerate(train.shafts) if shaft.name != train.driven.shaft]
-    return np.asarray(np.linalg.lstsq(arms[free], torques[free], rcond=None)[0])
-
-
-def driving_senses(train: GearTrain) -> tuple[float, ...]:
-    """For each mesh, +1 or -1: sense about the axis in which the driver pushes, that of its rotation.
-
-    Where the drive stands still, it follows from the loads.
-    """
-    ratios = shaft_ratios(train)
-    made = tuple(math.copysign(1.0, ratios[train.gear(mesh.driver).shaft]) for mesh in train.meshes)
-    sense = drive_sense(train.driven.speed)
+def _senses_and_forces(layout: Layout, ratios: Sequence[Fraction]) -> tuple[tuple[float, ...], Array]:
+    """Driving senses, and steady forces (N), see `Kinematics`."""
+    rolled = tuple(math.copysign(1.0, ratios[mesh.driver.shaft]) for mesh in layout.meshes)
+    forces = balanced_forces(layout, rolled, load_torques(layout, [load_end(layout)]))[:, 0]
+    sense = drive_sense(layout.speed)
     if sense == 0.0:
-        pressing = balanced_forces(train, made, load_torques(train, [load_end(train)])).sum()
-        sense = math.copysign(1.0, pressing)
-    return tuple(sense * s for s in made)
+        sense = math.copysign(1.0, forces.sum())
+    return tuple(sense * s for s in rolled), sense * forces
+
+
+def load_end(layout: Layout) -> float:
+    """Time at which all load ramps have ended (s)."""
+    return max((b for _, torque in layout.loads for b in torque.breaks), default=0.0)
+
+
+def load_torques(layout: Layout, times: Sequence[float] | Array) -> Array:
+    """Torque of the loads on each shaft without its oscillating part (N m), shape (shafts, times)."""
+    torques = np.zeros((len(layout.shafts), len(times)))
+    for shaft, torque in layout.loads:
+        torques[shaft] += replace(torque, sines=())(times)
+    return torques
+
+
+def balanced_forces(layout: Layout, senses: Sequence[float], torques: Array) -> Array:
+    """Mesh forces (N), shape (meshes, n), that balance the torques (N m) on the shafts, shape (shafts, n)."""
+    arms = np.zeros((len(layout.shafts), len(layout.meshes)))
+    for column, (mesh, sense) in enumerate(zip(layout.meshes, senses, strict=True)):
+        for gear in (mesh.driver, mesh.driven):
+            arms[gear.shaft, column] += sense * gear.base_radius
+    free = [shaft for shaft in range(len(layout.shafts)) if shaft != layout.driven]
+    return np.asarray(np.linalg.lstsq(arms[free], torques[free], rcond=None)[0])
 
 
 def drive_sense(speed: TimeFunction) -> float:
     """Sense in which the drive turns: that of its first speed that is not zero; 0 where it stands still."""
-    found = [float(speed(t)) for t in _sample_times(speed)]
-    return next((math.copysign(1.0, s) for s in found if s != 0.0), 0.0)
+    speeds = [float(speed(t)) for t in _sample_times(speed)]
+    return next((math.copysign(1.0, s) for s in speeds if s != 0.0), 0.0)
 
 
 def fastest(speed: TimeFunction) -> float:

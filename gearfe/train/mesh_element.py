@@ -206,7 +206,7 @@ class Shafts:
 @dataclass(frozen=True)
 class OperatingPoint:
     """Of a mesh: driving sense of its driver, phase of its teeth (rad), force in steady running (N), largest speed of
-    the drive (rad/s), and what `pair_shifts` says.
+    the drive (rad/s), and the shifts of its tooth pairs.
     """
 
     sense: float

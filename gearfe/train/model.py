@@ -26,9 +26,8 @@ from .checks import check_train
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge, rotor
 from .forces import Flank, Gyro, TrainForces, derivative
 from .gear_train import Drive, GearTrain
-from .kinematics import Rolling, driving_senses, fastest, load_end, rolling, steady_forces
+from .kinematics import Kinematics, fastest, load_end
 from .mesh_element import MeshLine, OperatingPoint, Shafts, mesh_line
-from .phases import pair_shifts, tooth_places
 from .program import train_series
 
 
@@ -38,8 +37,8 @@ class TrainModel(Facts):
 
     Attributes
     ----------
-    train, rolling
-        What it was made from; its kinematics.
+    train
+        What it was made from.
     system, modal, start
         System of the rigid core, its minimal coordinates, its start.
     angle
@@ -63,7 +62,6 @@ class TrainModel(Facts):
     """
 
     train: GearTrain
-    rolling: Rolling
     system: System
     modal: ModalCoordinates
     start: Start
@@ -91,9 +89,14 @@ class TrainModel(Facts):
         }
 
     @property
+    def kinematics(self) -> Kinematics:
+        """Those of the train."""
+        return self.train.kinematics
+
+    @property
     def ratios(self) -> Array:
         """Speed of each shaft for unit speed of the drive."""
-        return np.array([float(r) for r in self.rolling.ratios])
+        return np.array([float(r) for r in self.kinematics.ratios])
 
     @property
     def steady_speed(self) -> float:
@@ -109,7 +112,7 @@ class TrainModel(Facts):
     @property
     def load_end(self) -> float:
         """Time at which all load ramps have ended (s)."""
-        return load_end(self.train)
+        return load_end(self.train.layout)
 
     @property
     def coupled_frequencies_hz(self) -> Array:
@@ -158,10 +161,9 @@ def on_body(model: TrainModel, body: ModalBody) -> TrainModel:
 
 def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel:
     """The model of a train that is checked; `lines` are its meshes where they are known."""
-    kinematics = rolling(train)
     angle = train.driven.speed.integral(0.0, 0.0)
     housing = _housing(train)
-    ratios = [float(r) for r in kinematics.ratios]
+    ratios = [float(r) for r in train.kinematics.ratios]
     begin = float(train.driven.speed(0.0))
     shafts = tuple(
         RigidShaft(
@@ -187,7 +189,6 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
     system, modal = _damped(train, elements, bodies)
     return TrainModel(
         train=train,
-        rolling=kinematics,
         system=system,
         modal=modal,
         start=_start(train, system, shafts, first),
@@ -206,11 +207,12 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
 
 
 def _mesh_lines(train: GearTrain, placed: Shafts) -> tuple[MeshLine, ...]:
-    senses = driving_senses(train)
-    places, speed = tooth_places(train, senses), fastest(train.driven.speed)
+    rolled, speed = train.kinematics, fastest(train.driven.speed)
     points = (
-        OperatingPoint(sense, phase, float(force), speed, pair_shifts(train, mesh, sense, places))
-        for mesh, sense, phase, force in zip(train.meshes, senses, places.phases, steady_forces(train), strict=True)
+        OperatingPoint(sense, phase, float(force), speed, shifts)
+        for sense, phase, force, shifts in zip(
+            rolled.senses, rolled.phases, rolled.steady_forces, rolled.shifts, strict=True
+        )
     )
     return tuple(mesh_line(train, mesh, placed, point) for mesh, point in zip(train.meshes, points, strict=True))
 

@@ -17,7 +17,6 @@ from ..multibody.integrators.integrate import chosen_method
 from ..progress import count, stage
 from ..record_spectrum import FASTEST, OVERSAMPLING
 from ..typing import Array
-from .kinematics import steady_forces
 from .model import TrainModel
 from .parting import Parting, apart_in_steps, beyond_law, parted
 from .response import TrainResponse, joined
@@ -196,7 +195,7 @@ class _Totals:
             "free_coordinates": model.modal.T.shape[1],
             "redundant_constraints": redundant_names(model),
             "smallest_contact_force_N": self.least.tolist(),
-            "steady_forces_N": steady_forces(model.train).tolist(),
+            "steady_forces_N": model.kinematics.steady_forces.tolist(),
             "flanks": [line.description for line in model.meshes],
             "friction_coefficients": [0.0 if x.sliding is None else x.sliding.coefficient for x in model.meshes],
             **parted(self.parting, [line.rigid or line.pulls for line in model.meshes]),
@@ -270,7 +269,7 @@ def _whole(
 
 def _loose(model: TrainModel) -> list[str]:
     """Sentences about meshes whose teeth may part and that nothing presses together in steady running."""
-    forces = np.abs(steady_forces(model.train))
+    forces = np.abs(model.kinematics.steady_forces)
     return [
         f"no load keeps the teeth of mesh {line.name} in contact: what they do depends on how they begin, and without "
         "damping it does not settle"
@@ -336,7 +335,7 @@ def response_of(
     rate, push = (model.angle(t, k)[:, None] * model.ratios for k in (1, 2))
     bodies = 0 if model.housing is None else model.housing.size
     poses, centres = _gear_poses(model, moved)
-    speed, common = abs(model.steady_speed), model.rolling.common_turns
+    speed, common = abs(model.steady_speed), train.kinematics.common_turns
     steady = train.drive.speed.ends if train.drive else False
     return TrainResponse(
         time=t,
@@ -364,7 +363,7 @@ def response_of(
         modal=moved.q[:, :bodies] if bodies else None,
         modal_velocity=moved.v[:, :bodies] if bodies else None,
         modal_acceleration=moved.a[:, :bodies] if bodies else None,
-        mesh_frequencies_Hz=np.array([float(c) for c in model.rolling.cycles]) * speed / (2 * math.pi),
+        mesh_frequencies_Hz=np.array([float(c) for c in train.kinematics.cycles]) * speed / (2 * math.pi),
         shaft_frequencies_Hz=np.abs(model.ratios) * speed / (2 * math.pi),
         common_period_s=float(common) * 2 * math.pi / speed if common and speed and steady else None,
         coupled_frequencies_Hz=model.coupled_frequencies_hz,

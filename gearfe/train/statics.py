@@ -19,16 +19,7 @@ from ..meshlaw.law import MeshLaw
 from ..typing import Array, BoolArray
 from .elements import rotor
 from .gear_train import GearMesh, GearTrain
-from .kinematics import (
-    balanced_forces,
-    drive_sense,
-    driving_senses,
-    load_torques,
-    rolling,
-    shaft_ratios,
-    steady_forces,
-)
-from .phases import pair_shifts, tooth_places
+from .kinematics import balanced_forces, drive_sense, load_torques
 
 #: Times in each piece of the loads and of the drive.
 SAMPLES = 64
@@ -47,15 +38,15 @@ def check_flanks(train: GearTrain, single: BoolArray) -> None:
     if not train.loads or not train.meshes:
         return
     times = _times(train)
-    senses = driving_senses(train)
-    loads = balanced_forces(train, senses, load_torques(train, times))
-    whole = loads + balanced_forces(train, senses, _inertia(train, times))
+    layout, senses = train.layout, train.kinematics.senses
+    loads = balanced_forces(layout, senses, load_torques(layout, times))
+    whole = loads + balanced_forces(layout, senses, _inertia(train, times))
     least = -ROUND_OFF * float(np.abs(loads).max())
     wrong = (loads < least) & (whole < least) & single[:, None]
     if wrong.any():
         at = int(np.argmin(np.where(wrong, loads, np.inf).min(axis=0)))
         mesh = int(np.argmin(np.where(wrong[:, at], loads[:, at], np.inf)))
-        raise _back_flank_error(train, mesh, float(times[at]), senses)
+        raise _back_flank_error(train, mesh, float(times[at]))
 
 
 def one_sided(train: GearTrain) -> BoolArray:
@@ -77,19 +68,19 @@ def _inertia(train: GearTrain, times: Array) -> Array:
     """Torque of inertia of each shaft as it rolls with the drive (N m), shape (shafts, times)."""
     push = replace(train.driven.speed, sines=())(times, 1)
     polar = [rotor(train, shaft).polar for shaft in train.shafts]
-    return -np.outer(np.multiply(polar, [float(r) for r in rolling(train).ratios]), push)
+    return -np.outer(np.multiply(polar, [float(r) for r in train.kinematics.ratios]), push)
 
 
-def _back_flank_error(train: GearTrain, number: int, time: float, senses: tuple[float, ...]) -> InputError:
+def _back_flank_error(train: GearTrain, number: int, time: float) -> InputError:
     """The load that does most to press the back flanks of a mesh, and what to change."""
-    mesh = train.meshes[number]
+    mesh, layout, senses = train.meshes[number], train.layout, train.kinematics.senses
     alone = [
-        float(balanced_forces(train, senses, load_torques(replace(train, loads=(load,)), [time]))[number, 0])
-        for load in train.loads
+        float(balanced_forces(layout, senses, load_torques(replace(layout, loads=(load,)), [time]))[number, 0])
+        for load in layout.loads
     ]
     load = train.loads[int(np.argmin(alone))]
     torque = float(replace(load.torque, sines=())(time))
-    speed = float(shaft_ratios(train)[load.shaft]) * drive_sense(train.driven.speed)
+    speed = float(train.kinematics.ratios[train.shaft_number(load.shaft)]) * drive_sense(train.driven.speed)
     when = f" at {1e3 * time:.4g} ms" if time > 0.0 else ""
     force = f"by statics the force of mesh {mesh.name!r} is {min(alone):.6g} N{when}"
     flanks = f"it would press the back flanks, whose stiffness is not known: {force}"
@@ -111,16 +102,13 @@ def static_errors(train: GearTrain, angle: Array) -> tuple[Array | None, ...]:
     A force that presses the back flanks makes the mirrored approach behind the backlash. None also where a force is
     beyond what a law is known for, or presses flanks of which nothing is known.
     """
-    senses, ratios = driving_senses(train), shaft_ratios(train)
-    places = tooth_places(train, senses)
-    made: list[Array | None] = []
-    for mesh, sense, phase, force in zip(
-        train.meshes, senses, places.phases, steady_forces(train).tolist(), strict=True
-    ):
-        ratio = float(ratios[train.gear(mesh.driver).shaft])
-        shifts = pair_shifts(train, mesh, sense, places)
-        made.append(_approach(mesh, force, sense * ratio * angle + phase, shifts))
-    return tuple(made)
+    rolled = train.kinematics
+    errors: list[Array | None] = []
+    for number, mesh in enumerate(train.meshes):
+        ratio = float(rolled.ratios[train.shaft_number(train.gear(mesh.driver).shaft)])
+        phase = rolled.senses[number] * ratio * angle + rolled.phases[number]
+        errors.append(_approach(mesh, float(rolled.steady_forces[number]), phase, rolled.shifts[number]))
+    return tuple(errors)
 
 
 def _approach(mesh: GearMesh, force: float, phase: Array, shifts: tuple[Array, Array]) -> Array | None:

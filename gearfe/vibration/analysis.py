@@ -14,7 +14,6 @@ from ..files import write_csv
 from ..spectrum import Waterfall
 from ..train import build_train
 from ..train.gear_train import GearTrain
-from ..train.kinematics import rolling
 from ..train.response import TrainResponse
 from ..typing import Array
 from .job import TrainJob
@@ -85,7 +84,7 @@ class Analysis:
         self.table, self.train, self.every, self.start = job.spectrum, train, every, start
         self._step = 1e-6 * job.table.step_us
         self.measured = read_measured(job)
-        turning = rolling(train)
+        turning = train.kinematics
         #: turns of the first shaft for one of the drive
         self.ratio = float(turning.ratios[0])
         self.mesh_orders = np.array([float(c) for c in turning.cycles]) / abs(self.ratio)

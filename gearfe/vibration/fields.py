@@ -22,8 +22,6 @@ from ..output.vtkhdf import VtkHdfSeries
 from ..progress import count
 from ..reduction.modal_body import ModalBody
 from ..train.gear_train import GearTrain, ShaftGear
-from ..train.kinematics import driving_senses, shaft_ratios
-from ..train.phases import tooth_places
 from ..train.response import TrainResponse
 from ..typing import Array, IntArray
 
@@ -92,8 +90,7 @@ def cylinder_surface(radius: float, low: float, high: float) -> tuple[Array, Int
 def solids(train: GearTrain, response: TrainResponse, *, per_segment: int = 2) -> tuple[Solid, ...]:
     """Surfaces of all gears and of the shafts that carry them, where they stand at the start."""
     frame = train.frame
-    senses = driving_senses(train) if train.drive is not None else (1.0,) * len(train.meshes)
-    angles = tooth_places(train, senses).angles
+    angles = train.kinematics.angles
     found = []
     carried: set[str] = set()
     for gear in train.gears:
@@ -118,7 +115,7 @@ def moved(solid: Solid, response: TrainResponse, frame: Array, step: int, exagge
 
 def rolled(solid: Solid, train: GearTrain, response: TrainResponse, step: int) -> Array:
     """(n, 3) points of a surface at an output step, had all shafts only rolled with the drive: no vibration."""
-    ratio = float(shaft_ratios(train)[train.gears[solid.gear].shaft])
+    ratio = float(train.kinematics.ratios[train.shaft_number(train.gears[solid.gear].shaft)])
     centre = response.gear_centres[solid.gear]
     return np.asarray(
         centre + _turned(solid.points - centre, train.frame[2], ratio * float(response.drive_angle[step]))

@@ -18,7 +18,6 @@ from ..meshlaw.law import MeshLaw
 from ..progress import stage
 from ..stiffness.curve import NO_CYCLE, StiffnessCurve
 from ..train.gear_train import GearMesh, GearTrain
-from ..train.kinematics import driving_senses, steady_forces
 from .job import Stiffness, TrainJob, back_flanks, job_train
 
 if TYPE_CHECKING:
@@ -85,7 +84,7 @@ def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
 def _carried_torque(train: GearTrain, number: int) -> float:
     """Torque (N m) at the driven gear of a mesh in steady running, without sign."""
     driven = train.gear(train.meshes[number].driven).gear
-    return abs(float(steady_forces(train)[number])) * driven.base_radius
+    return abs(float(train.kinematics.steady_forces[number])) * driven.base_radius
 
 
 def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> StiffnessCurve:
@@ -179,7 +178,7 @@ def _deviations(
         return NOMINAL, NOMINAL
     mesh, sides = train.meshes[number], {g.name: g.gear for g in job.table.gears}
     gears = (sides[mesh.driver], sides[mesh.driven])
-    flanks = ("left", "right") if driving_senses(train)[number] > 0.0 else ("right", "left")
+    flanks = ("left", "right") if train.kinematics.senses[number] > 0.0 else ("right", "left")
     driving, back = (
         deviations_of(job.microgeometry, pair, job.path.parent, flank=flank, gears=gears) for flank in flanks
     )

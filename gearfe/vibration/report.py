@@ -12,7 +12,6 @@ from ..meshlaw.law import MeshLaw
 from ..spectrum import OrderLine, nearest_line, order_lines, peaks
 from ..stiffness.curve import StiffnessCurve
 from ..train.gear_train import GearTrain
-from ..train.kinematics import steady_forces
 from ..train.mesh_element import LEAST_REFERENCE, PHASES
 from ..train.response import TrainResponse
 from ..typing import Array
@@ -176,7 +175,7 @@ def stiffness_ranges(train: GearTrain) -> dict[str, tuple[float | None, float | 
     mesh.
     """
     found: dict[str, tuple[float | None, float | None]] = {}
-    for mesh, steady in zip(train.meshes, steady_forces(train), strict=True):
+    for mesh, steady in zip(train.meshes, train.kinematics.steady_forces, strict=True):
         given = mesh.stiffness
         if given is None or isinstance(given, float | int):
             found[mesh.name] = (given, given)

@@ -11,9 +11,7 @@ from ..cache import versions
 from ..record_spectrum import finer, subdivided
 from ..train import build_train
 from ..train.gear_train import GearTrain
-from ..train.kinematics import driving_senses
 from ..train.model import TrainModel
-from ..train.phases import tooth_places
 from ..train.response import TrainResponse
 from ..train.simulate import simulate_in_pieces
 from .follow import TrainRun
@@ -81,8 +79,7 @@ def described(job: TrainJob, train: GearTrain) -> dict[str, Any]:
         "inherited": inherited(job, train),
         "mesh_stiffness_N_per_m": stiffness_ranges(train),
         "mesh_phases_deg": {
-            mesh.name: math.degrees(phase)
-            for mesh, phase in zip(train.meshes, tooth_places(train, driving_senses(train)).phases, strict=True)
+            mesh.name: math.degrees(phase) for mesh, phase in zip(train.meshes, train.kinematics.phases, strict=True)
         },
         "job": {"train": asdict(job.table), "stiffness": asdict(job.stiffness)},
         "versions": versions(),
