@@ -22,8 +22,6 @@ from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshlaw.make import mesh_law
 from gearfe.multibody import constant
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
-from gearfe.train.kinematics import driving_senses
-from gearfe.train.phases import pair_shifts, tooth_places
 from gearfe.train.statics import static_errors
 from gearfe.vibration.job import job_train, read_train_job
 from gearfe.vibration.mesh_stiffness import train_curves
@@ -226,8 +224,7 @@ def test_pitch_errors_of_a_train_displace_its_teeth(tmp_path) -> None:
     left, right = next(g.pitch_errors for g in train.gears if g.gear.teeth == 20)
     assert left == pytest.approx(1e-6 * math.cos(PAIR.pinion.pressure_angle) * np.array(values))
     assert right == pytest.approx(-np.array(left))
-    (mesh,), (sense,) = train.meshes, driving_senses(train)
-    driving, back = pair_shifts(train, mesh, sense, tooth_places(train, (sense,)))
+    ((driving, back),) = train.kinematics.shifts
     assert len(driving) == len(back) == 60
     assert np.sort(back) == pytest.approx(np.sort(-driving))
     assert np.ptp(driving) > 9e-6

@@ -15,7 +15,6 @@ from gearfe.multibody import IntegrationError, constant, integrate, smoothed_ste
 from gearfe.runup.train_stability import train_stability
 from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, build_train, simulate
 from gearfe.train.elements import outline_moments
-from gearfe.train.kinematics import rolling, steady_forces
 from gearfe.train.states import train_states
 
 from .full_model import full_model
@@ -44,8 +43,8 @@ def test_mean_forces_and_their_ratio_over_whole_periods(stages: list[tuple[int, 
         train(stages, stiffness=stiffness, damping=Damping(ratio=0.03), ys=[0.012, -0.0, -0.012][: len(stages)])
     )
     model = build_train(gear_train)
-    assert steady_forces(gear_train) == pytest.approx(expected, rel=1e-12)
-    cycles = model.rolling.common_turns
+    assert gear_train.kinematics.steady_forces == pytest.approx(expected, rel=1e-12)
+    cycles = model.kinematics.common_turns
     assert cycles is not None or not periodic
     period = float(cycles) * 2 * math.pi / SPEED if cycles is not None and periodic else 1e-3
     count = math.ceil((0.03 if periodic else 0.09) / period)
@@ -318,5 +317,5 @@ def test_reduced_against_full_housing_in_the_coupled_transient() -> None:
 
 
 def test_periods_of_other_trains() -> None:
-    assert rolling(train([(17, 34)])).common_turns == pytest.approx(1 / 17)
-    assert rolling(train([(20, 30), (30, 20)])).common_turns == pytest.approx(1 / 20)
+    assert train([(17, 34)]).kinematics.common_turns == pytest.approx(1 / 17)
+    assert train([(20, 30), (30, 20)]).kinematics.common_turns == pytest.approx(1 / 20)

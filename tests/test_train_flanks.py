@@ -13,7 +13,6 @@ from gearfe import steady_state
 from gearfe.errors import InputError
 from gearfe.multibody import TimeFunction, constant, smoothed_step
 from gearfe.train import Drive, GearMesh, Load, build_train, simulate
-from gearfe.train.kinematics import steady_forces
 from gearfe.vibration.job import job_train, read_train_job
 from gearfe.vibration.mesh_stiffness import train_curves
 
@@ -59,7 +58,7 @@ def test_a_load_that_drives_works_on_back_flanks_that_are_known(tmp_path: Path) 
     made = simulate(build_train(job_train(job, train_curves(job))), job.times, tolerance=job.table.tolerance)
     assert made.contact_force[-1, 0] == pytest.approx(-force, rel=0.2)
     mapped = wrong.replace("stiffness_N_per_m = 2e8", "") + PAIR
-    assert steady_forces(job_train(read_train_job(written(tmp_path, mapped)))) == pytest.approx([-force])
+    assert job_train(read_train_job(written(tmp_path, mapped))).kinematics.steady_forces == pytest.approx([-force])
     for change in (("thinning_um = 20.0", "thinning_um = 0.0"), ('driven = "b"', 'driven = "b"\nlaw = "curve"')):
         with pytest.raises(InputError, match="drives the train"):
             job_train(read_train_job(written(tmp_path, mapped.replace(*change))))
@@ -92,7 +91,7 @@ def test_several_loads_are_summed_at_all_times() -> None:
     with pytest.raises(InputError, match=r"load on 's2' torque_Nm = 100.*mesh 'd1-g1'"):
         build_train(both)
     helped = loaded(-100.0, -30.0, shafts=("s2", "s1"))  # the middle load drives, and the last one holds it
-    assert steady_forces(helped)[0] == pytest.approx((100.0 * 2 / 3 - 30.0) / base_radius(30))
+    assert helped.kinematics.steady_forces[0] == pytest.approx((100.0 * 2 / 3 - 30.0) / base_radius(30))
     build_train(helped)
     with pytest.raises(InputError, match=r"load on 's1' torque_Nm = -70.*mesh 'd0-g0' is -2"):
         build_train(loaded(-100.0, -70.0, shafts=("s2", "s1")))

@@ -16,7 +16,6 @@ from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.tables.pair import PairTable
 from gearfe.tables.train import TrainCurvesTable, TrainGearTable
 from gearfe.train import build_train, simulate
-from gearfe.train.kinematics import steady_forces
 from gearfe.vibration.job import bore_places, job_train, read_train_job, train_gear
 from gearfe.vibration.mesh_stiffness import train_curves
 
@@ -90,10 +89,12 @@ def test_the_shipped_job_is_what_it_says() -> None:
     assert len(job.times) == 201
     assert job.times[-1] == pytest.approx(7e-3)
     train = job_train(job)
-    assert steady_forces(train) == pytest.approx([1961.56, 2942.34], rel=1e-5)  # 100 N m/33.987 mm, and 2/3 of it
+    assert train.kinematics.steady_forces == pytest.approx(
+        [1961.56, 2942.34], rel=1e-5
+    )  # 100 N m/33.987 mm, and 2/3 of it
     assert [g.along for g in train.gears] == [0.010, 0.010, -0.002, -0.002]
     model = build_train(train)
-    assert model.rolling.common_turns == pytest.approx(0.15)
+    assert model.kinematics.common_turns == pytest.approx(0.15)
     assert simulate(model, job.times).speed[0] == pytest.approx([600.0, -400.0, 266.6667], rel=1e-6)
 
 

@@ -13,8 +13,6 @@ from gearfe.errors import InputError
 from gearfe.gear.derived import gear_outline
 from gearfe.multibody import constant
 from gearfe.train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear, build_train, simulate
-from gearfe.train.kinematics import driving_senses
-from gearfe.train.phases import tooth_places
 
 from .trains import MODULE, changed, curve, gear
 
@@ -50,8 +48,8 @@ def apart(one: int, two: int, more: float = 0.0) -> float:
 
 def meets(gear_train: GearTrain, number: int, turned: float) -> bool:
     """Whether the teeth of a mesh overlap with the driver turned by so much in its driving sense."""
-    senses = driving_senses(gear_train)
-    angles, mesh = tooth_places(gear_train, senses).angles, gear_train.meshes[number]
+    senses, angles = gear_train.kinematics.senses, gear_train.kinematics.angles
+    mesh = gear_train.meshes[number]
     items = [gear_train.gear(name) for name in (mesh.driver, mesh.driven)]
     centres = [1e3 * gear_train.frame[:2] @ np.array(gear_train.shaft(item.shaft).point) for item in items]
     sectors = []
@@ -165,7 +163,7 @@ def test_driver_and_driven_exchange_their_roles() -> None:
     for number in range(2):
         assert [line.phase for line in build_train(back).meshes][number] >= 0.0
         assert meets(back, number, 1e-4)
-    angles = tooth_places(back, driving_senses(back)).angles
+    angles = back.kinematics.angles
     towards = math.atan2(*(back.frame[:2] @ np.array([0.0, 0.0, -apart(20, 30)]))[::-1])
     left = math.remainder(angles["g1"] - towards, 2 * math.pi / 30) * build_train(back).meshes[1].sense
     assert math.remainder(left - build_train(back).meshes[1].phase, 2 * math.pi / 30) == pytest.approx(0.0, abs=1e-12)

@@ -14,9 +14,7 @@ from gearfe.gear.curves import inv
 from gearfe.multibody import constant, smoothed_step
 from gearfe.train import Damping, GearTrain, build_train, simulate
 from gearfe.train.forces import LawFlank
-from gearfe.train.kinematics import driving_senses
 from gearfe.train.model import TrainModel
-from gearfe.train.phases import tooth_places
 from gearfe.train.statics import static_errors
 
 from .mesh_laws import hertzian_law
@@ -42,8 +40,8 @@ def facing(gear_train: GearTrain, number: int, side: float, turned: float, psi: 
     s = r_b (theta + alpha_w), theta the angle at which its involute leaves the base circle; both gears' rolls make up
     the length a sin(alpha_w) where they touch. `psi` is the angle of the driver's tooth that is asked for.
     """
-    mesh, sense = gear_train.meshes[number], driving_senses(gear_train)[number]
-    places = tooth_places(gear_train, driving_senses(gear_train)).angles
+    mesh, sense = gear_train.meshes[number], gear_train.kinematics.senses[number]
+    places = gear_train.kinematics.angles
     one, two = gear_train.gear(mesh.driver), gear_train.gear(mesh.driven)
     arm = np.subtract(gear_train.shaft(two.shaft).point, gear_train.shaft(one.shaft).point)
     towards = math.atan2(gear_train.frame[1] @ arm, gear_train.frame[0] @ arm)

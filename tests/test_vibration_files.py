@@ -18,7 +18,6 @@ from gearfe.housing.model import Housing
 from gearfe.multibody import constant
 from gearfe.progress import Stopwatch
 from gearfe.train import Drive, GearMesh, GearTrain, Shaft, ShaftGear, build_train
-from gearfe.train.kinematics import rolling
 from gearfe.vibration.fields import (
     frames,
     gear_surface,
@@ -266,7 +265,7 @@ def test_smooth_rolling_is_no_vibration(train):
     angle = np.zeros(COUNT)
     angle[3] = 0.7
     pose = np.zeros((COUNT, 4, 6))
-    ratios = rolling(train).ratios
+    ratios = train.kinematics.ratios
     shafts = [shaft.name for shaft in train.shafts]
     for g, gear in enumerate(train.gears):
         pose[:, g, 3:] = np.outer(float(ratios[shafts.index(gear.shaft)]) * angle, train.frame[2])

@@ -12,6 +12,7 @@ import cmath
 import itertools
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -157,6 +158,7 @@ class ToothProfile:
         return np.concatenate(parts)
 
 
+@lru_cache(maxsize=256)
 def tooth_profile(gear: Gear) -> ToothProfile:
     """Exact left half profile of a tooth.
 

@@ -15,7 +15,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from numbers import Real
 from typing import Any
 
 from ..errors import InputError, given
@@ -254,7 +255,7 @@ class GearPair(MeshGeometry, Shown):
         pinion, wheel = _gear_from_table(table, "pinion"), _gear_from_table(table, "wheel")
         distance = table.centre_distance_mm
         try:
-            return cls(pinion, wheel, None if distance is None else distance * 1e-3)
+            return gear_pair(pinion, wheel, None if distance is None else distance * 1e-3)
         except InputError as error:
             side, _, name = error.field.rpartition(".") if error.field.startswith(("pinion", "wheel")) else ("", "", "")
             raise _renamed(error, table, side, name or error.field) from None
@@ -273,6 +274,24 @@ KEYS: dict[str, tuple[str, float]] = {
     "tooth_thinning": ("tooth_thinning_um", 1e-6),
     "centre_distance": ("centre_distance_mm", 1e-3),
 }
+
+
+def gear_pair(pinion: Gear, wheel: Gear, centre_distance: float | None = None) -> GearPair:
+    """A checked pair; equal gears at an equal centre distance (m) share one.
+
+    Raises
+    ------
+    InputError
+        For gears that cannot run together.
+    """
+    if centre_distance is not None and not isinstance(centre_distance, Real):
+        return GearPair(pinion, wheel, centre_distance)  # which refuses it
+    return _shared_pair(pinion, wheel, centre_distance)
+
+
+@lru_cache(maxsize=256)
+def _shared_pair(pinion: Gear, wheel: Gear, centre_distance: float | None) -> GearPair:
+    return GearPair(pinion, wheel, centre_distance)
 
 
 def _gear_from_table(table: PairTable, side: str) -> Gear:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..multibody import constant
 from ..progress import stage
 from ..tables.runup import RunUpTable
 from ..train import build_train
@@ -42,14 +41,14 @@ def solved(
     InputError
         If no periodic motion is found at any of the speeds, and for what a train or a run-up refuses.
     """
+    speeds = np.linspace(table.speed_start_rad_per_s, table.speed_stop_rad_per_s, table.speeds)
+    job = at_speed(job, float(speeds[0]))
     with watch.stage("curves"):
         stiffness = train_curves(job, curves)
     with watch.stage("housing"):
         body = train_body(job)
     with watch.stage("model"):
-        train = job_train(job, stiffness, body)
-        speeds = np.linspace(table.speed_start_rad_per_s, table.speed_stop_rad_per_s, table.speeds)
-        model = build_train(replace(train, drive=replace(train.driven, speed=constant(float(speeds[0])))))
+        model = build_train(job_train(job, stiffness, body))
     band = table.band_Hz or (5000.0 if job.housing is None else job.housing.reduction.band_Hz)
     with watch.stage("steady states"), stage("steady states"):
         options: dict[str, Any] = {"tolerance": table.tolerance, "band_hz": band, "stability": table.stability}
@@ -63,6 +62,14 @@ def solved(
         with watch.stage("instability"), stage("instability"):
             unstable = instability_map(run.train, speeds, table.instability_loads)
     return run, unstable
+
+
+def at_speed(job: TrainJob, speed: float) -> TrainJob:
+    """The job with a constant speed of its drive (rad/s), whose sense decides which flanks drive."""
+    if job.table.drive is None:
+        return job
+    drive = replace(job.table.drive, speed_rad_per_s=speed, ramp_width_ms=None)
+    return replace(job, table=replace(job.table, drive=drive))
 
 
 def described(job: TrainJob, table: RunUpTable, train: GearTrain) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import InputError, unknown_name
-from ..gear.pair import GearPair, in_keys
+from ..gear.pair import gear_pair, in_keys
 from ..meshlaw.law import MeshLaw
 from ..stiffness.periodic import PeriodicInterpolant
 from .friction import check_friction
@@ -144,7 +144,7 @@ def _check_mesh(train: GearTrain, mesh: GearMesh) -> None:
     if one.shaft == two.shaft:
         raise InputError(label, None, f"both gears are on shaft {one.shaft!r}", "mesh gears of two shafts")
     try:
-        expected = GearPair(one.gear, two.gear, mesh.centre_distance).working_centre_distance
+        expected = gear_pair(one.gear, two.gear, mesh.centre_distance).working_centre_distance
     except InputError as error:
         side, _, name = error.field.rpartition(".")
         error = InputError(name, error.value, error.problem, error.cure)

@@ -32,7 +32,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..gear.pair import GearPair
+from ..gear.pair import GearPair, gear_pair
 from ..meshlaw.law import MeshLaw
 from ..multibody import Element, LinearJoint
 from ..stiffness.periodic import PeriodicInterpolant
@@ -239,7 +239,7 @@ def mesh_line(train: GearTrain, mesh: GearMesh, shafts: Shafts, running: Operati
     driver, driven = train.gear(mesh.driver), train.gear(mesh.driven)
     i, j = train.shaft_number(driver.shaft), train.shaft_number(driven.shaft)
     a = train.frame[2]
-    pair = GearPair(driver.gear, driven.gear, mesh.centre_distance)
+    pair = gear_pair(driver.gear, driven.gear, mesh.centre_distance)
     alpha = pair.working_pressure_angle
     base = np.array(train.shaft(driver.shaft).point)
     arm = np.array(train.shaft(driven.shaft).point) - base

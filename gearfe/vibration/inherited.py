@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..gear.pair import GearPair
+from ..gear.pair import gear_pair
 from ..tables.pair import PairTable, tooth_form
 from ..tables.train import TrainGearTable, TrainMeshTable
 from ..train.gear_train import GearMesh, GearTrain
@@ -65,7 +65,7 @@ def _of_mesh(job: TrainJob, train: GearTrain, table: TrainMeshTable, mesh: GearM
     given = next((k for k in ("curve", "stiffness_N_per_m", "rigid") if getattr(table, k)), "")
     law = "" if given else (table.law or job.table.curves.law)
     curves = f"[train.variants.{job.table.variant}.curves]" if job.table.variant else "[train.curves]"
-    pair = GearPair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
+    pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
     if law and table.law is None:
         found["law"] = _value(law, curves)
     if law == "curve" or table.curve:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError, given
 from ..gear.deviation_job import pitch_errors_of
-from ..gear.pair import Gear, GearPair, gear_of_form, in_keys
+from ..gear.pair import Gear, GearPair, gear_of_form, gear_pair, in_keys
 from ..meshlaw.law import MeshLaw
 from ..multibody import TimeFunction, smoothed_step
 from ..stiffness.curve import StiffnessCurve
@@ -62,6 +63,30 @@ class TrainJob:
     microgeometry: MicrogeometryTable | None = None
     spectrum: SpectrumTable = field(default_factory=SpectrumTable)
 
+    @cached_property
+    def gears_of_pair(self) -> GearPair:
+        """The gears of [pair].
+
+        Raises
+        ------
+        InputError
+            For gears that cannot run together, and a file without the table.
+        """
+        return GearPair.from_table(given(self.pair, "pair"))
+
+    @cached_property
+    def rigid_train(self) -> GearTrain:
+        """The train with rigid meshes that rub nothing, in a rigid housing: enough for kinematics and statics.
+
+        Raises
+        ------
+        InputError
+            For mistakes in the train, and loads that press flanks of which nothing is known.
+        """
+        train = _rigid_train(self)
+        _check_rigid(self, train)
+        return train
+
     @property
     def times(self) -> Array:
         """Output times (s), from 0 to the end, the end included where the steps meet it."""
@@ -99,10 +124,23 @@ def train_body(job: TrainJob) -> ModalBody | None:
 
 
 def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: ModalBody | None = None) -> GearTrain:
-    """The train of a job with the stiffness of each mesh and its reduced housing.
+    """The train of a job with the stiffness of each mesh and its reduced housing; without `curves` its rigid train.
 
-    Without `curves` its meshes are rigid and rub nothing: enough for kinematics and statics.
+    Raises
+    ------
+    InputError
+        For what `TrainJob.rigid_train` refuses, and pitch errors that cannot be read.
     """
+    train = job.rigid_train
+    if curves is not None:
+        rows = zip(train.meshes, job.table.meshes, curves, strict=True)
+        meshes = tuple(replace(mesh, stiffness=curve, friction=_friction(table)) for mesh, table, curve in rows)
+        gears = tuple(_uneven(job, gear, table.gear) for gear, table in zip(train.gears, job.table.gears, strict=True))
+        train = replace(train, gears=gears, meshes=meshes)
+    return train if body is None else replace(train, housing=body, rigid_bores={})
+
+
+def _rigid_train(job: TrainJob) -> GearTrain:
     t = job.table
     shafts = tuple(
         Shaft(
@@ -123,12 +161,7 @@ def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
         ShaftGear(g.name, g.shaft, 1e-3 * g.y_mm, train_gear(job, g, f"train.gears[{i}]"), _density(job, g))
         for i, g in enumerate(t.gears)
     )
-    if curves is not None and job.microgeometry is not None:
-        gears = tuple(_uneven(job, made, g.gear) for made, g in zip(gears, t.gears, strict=True))
-    if curves is None:
-        meshes = tuple(_mesh(job, m, None, 0.0) for m in t.meshes)
-    else:
-        meshes = tuple(_mesh(job, m, c, _friction(m)) for m, c in zip(t.meshes, curves, strict=True))
+    meshes = tuple(_mesh(job, m) for m in t.meshes)
     drive = None
     if t.drive is not None:
         ramp = (t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
@@ -144,26 +177,16 @@ def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
         for i, x in enumerate(t.loads)
     )
     damping = Damping(t.damping.ratio, t.damping.rayleigh_alpha_per_s, t.damping.rayleigh_beta_s, t.damping.gyroscopic)
-    train = GearTrain(
-        shafts,
-        gears,
-        meshes,
-        drive,
-        loads,
-        body,
-        {} if body is not None else _rigid_bores(job),
-        tuple(Bearing(str(b.attachment), b.stiffness, b.damping) for b in t.bearings),
-        damping,
-    )
-    if curves is None:
-        from ..train.checks import check_flanks, check_layout
+    bearings = tuple(Bearing(str(b.attachment), b.stiffness, b.damping) for b in t.bearings)
+    return GearTrain(shafts, gears, meshes, drive, loads, None, _rigid_bores(job), bearings, damping)
 
-        bare = replace(
-            train, meshes=tuple(replace(mesh, backlash=None, damping=0.0, damping_acts=None) for mesh in meshes)
-        )
-        check_layout(bare)
-        check_flanks(bare, np.array([not back_flanks(job, train, i) for i in range(len(meshes))], dtype=bool))
-    return train
+
+def _check_rigid(job: TrainJob, train: GearTrain) -> None:
+    from ..train.checks import check_flanks, check_layout
+
+    meshes = tuple(replace(mesh, backlash=None, damping=0.0, damping_acts=None) for mesh in train.meshes)
+    check_layout(replace(train, meshes=meshes))
+    check_flanks(train, np.array([not back_flanks(job, train, i) for i in range(len(meshes))], dtype=bool))
 
 
 def back_flanks(job: TrainJob, train: GearTrain, number: int) -> bool:
@@ -173,7 +196,7 @@ def back_flanks(job: TrainJob, train: GearTrain, number: int) -> bool:
         return True
     if table.rigid or table.curve or table.stiffness_N_per_m or (table.law or job.table.curves.law) != "map":
         return False
-    pair = GearPair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
+    pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
     return pair.normal_backlash > 0.0
 
 
@@ -185,8 +208,7 @@ def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:
             raise InputError(
                 f"{where}.gear", table.gear, "needs a table [pair]", "add it, or give teeth, module_mm, ..."
             )
-        made = GearPair.from_table(pair)
-        return made.pinion if table.gear == "pinion" else made.wheel
+        return job.gears_of_pair.pinion if table.gear == "pinion" else job.gears_of_pair.wheel
 
     sources = (table,) if pair is None else (table, pair)
     form, modules = tooth_form(*sources), (source.module_mm for source in sources)
@@ -217,7 +239,7 @@ def _density(job: TrainJob, table: TrainGearTable) -> float:
     return (job.pair.material_of(table.gear) if table.gear else job.pair.material).density_kg_per_m3
 
 
-def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness, friction: float | Lubrication) -> GearMesh:
+def _mesh(job: TrainJob, table: TrainMeshTable) -> GearMesh:
     distance = table.centre_distance_mm
     if distance is None and job.pair is not None and job.pair.centre_distance_mm is not None:
         sides = {g.name: g.gear for g in job.table.gears}
@@ -226,14 +248,13 @@ def _mesh(job: TrainJob, table: TrainMeshTable, stiffness: Stiffness, friction: 
     return GearMesh(
         table.driver,
         table.driven,
-        stiffness,
+        None,
         None if table.phase_deg is None else math.radians(table.phase_deg),
         table.damping_N_s_per_m,
         job.table.curves.interpolation,
         None if distance is None else 1e-3 * distance,
         None if table.backlash_um is None else 1e-6 * table.backlash_um,
-        friction,
-        table.damping_acts,
+        damping_acts=table.damping_acts,
     )
 
 

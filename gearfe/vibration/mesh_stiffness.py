@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InputError, given
 from ..gear.deviation_job import deviations_of
 from ..gear.face import NOMINAL, ToothDeviations
-from ..gear.pair import GearPair
+from ..gear.pair import GearPair, gear_pair
 from ..meshlaw.law import MeshLaw
 from ..progress import stage
 from ..stiffness.curve import NO_CYCLE, StiffnessCurve
@@ -93,7 +93,7 @@ def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool
 
     mesh = train.meshes[number]
     one, two = train.gear(mesh.driver).gear, train.gear(mesh.driven).gear
-    pair = GearPair(one, two, mesh.centre_distance)
+    pair = gear_pair(one, two, mesh.centre_distance)
     if job.pair is None:
         problem = "has no stiffness: there is no table [pair] to compute it with"
         raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
@@ -138,7 +138,7 @@ def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) 
         problem = "carries no torque in steady running, so nothing tells for which torques to make its law"
         raise InputError(f"mesh {mesh.name!r} law_torque_Nm", None, problem, "give law_torque_Nm")
     one, two, distance, materials = gears(mesh)
-    pair = GearPair(one, two, distance)
+    pair = gear_pair(one, two, distance)
     tables = StiffnessJob(job.pair, job.stiffness, pair)
     deviations, back = _deviations(job, train, number, pair, HalfPlane())
     model = replace(tables.model, materials=materials, law=HalfPlane(), deviations=deviations)

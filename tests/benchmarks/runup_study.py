@@ -75,7 +75,7 @@ def model_at(variant: str, speed: float, quick: bool) -> Any:
 
 def period_of(variant: str, speed: float, quick: bool) -> float:
     """Common period of the meshes (s)."""
-    turns = model_at(variant, speed, quick).rolling.common_turns
+    turns = model_at(variant, speed, quick).kinematics.common_turns
     return 2.0 * np.pi * float(turns) / speed
 
 

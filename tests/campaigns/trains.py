@@ -26,7 +26,6 @@ import numpy as np
 from gearfe.multibody import integrate
 from gearfe.runup.train_stability import train_stability
 from gearfe.train import TrainModel, TrainResponse, build_train, simulate
-from gearfe.train.kinematics import steady_forces
 from gearfe.train.states import train_states
 from gearfe.vibration.job import job_train, read_train_job, train_body
 from gearfe.vibration.mesh_stiffness import train_curves
@@ -134,7 +133,7 @@ def _settled(model: TrainModel, made: TrainResponse, measures: dict[str, Any]) -
     half, end = 0.5 * model.train.damping.alpha, float(made.time[-1])
     measures["step_rad"] = float(f"{own.max(initial=0.0) * end / max(1, int(made.statistics['steps'])):.3g}")
     slowest = half - math.sqrt(max(half**2 - float(own.min(initial=half)) ** 2, 0.0))  # less when it creeps
-    off = np.abs(np.abs(made.contact_force[-1]) / np.abs(steady_forces(model.train)) - 1.0)
+    off = np.abs(np.abs(made.contact_force[-1]) / np.abs(model.kinematics.steady_forces) - 1.0)
     left = 100.0 * math.exp(-slowest * end) + 30.0 * float(measures["tolerance"])
     return [Check("settled", float(off.max()), 1e-8 + left)]
 
@@ -148,7 +147,7 @@ def _mean_force(train: Any, made: Any) -> list[Check]:
     count = int(0.25 * made.time[-1] / period) * round(period / step)
     if count < 50 or abs(period / step - round(period / step)) > 1e-6:
         return []
-    wanted = np.abs(steady_forces(train))
+    wanted = np.abs(train.kinematics.steady_forces)
     mean = np.abs(made.contact_force[-count:].mean(axis=0))
     swing = np.ptp(made.contact_force[-count:], axis=0)
     # what is left of the start after the run, and the mean of a sampled swing
@@ -175,9 +174,9 @@ def _symmetry(made: TrainResponse, reflect: Any) -> list[Check]:
 
 def _floquet(model: TrainModel, measures: dict[str, Any]) -> Finding:
     made = train_stability(model)
-    found, turns = made.multipliers, model.rolling.common_turns
+    found, turns = made.multipliers, model.kinematics.common_turns
     if found is None or turns is None:
-        return Finding("refused", f"no multipliers: {made.note or model.rolling.note}", (), measures)
+        return Finding("refused", f"no multipliers: {made.note or model.kinematics.note}", (), measures)
     largest = abs(found[0])
     period = float(turns) * 2 * math.pi / abs(model.steady_speed)
     times = period * np.arange(PERIODS + 1)
