@@ -18,16 +18,26 @@ LONGEST_WORD, LONGEST_MESSAGE = 200, 2000
 
 #: Words in names of gear jobs that no table knows -> what is out of scope, and what there is instead.
 OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
-    r"heli(x|cal)|^beta(_|$)|skew|herringbone|overlap_ratio|normal_module|transverse_(module|pressure)":
+    r"heli(x|cal)|^beta(_|$)|skew|herringbone|overlap_ratio|(normal|transverse)_(module|pressure)|^m_?t(_|$)|alpha_?t":
         ("helical gears", "spur gears only"),
     r"internal|(^|_)ring(_|$)|annulus": ("internal gears", "external spur gears only"),
     r"planet|carrier|sun(_|$)|epicyclic": ("planetary gears", "spur gears on fixed shafts only"),
-    r"bevel|hypoid|cone_angle|pitch_cone|miter": ("bevel gears", "spur gears only"),
+    r"bevel|hypoid|cone_(angle|dist)|pitch_cone|miter|spiral|^zerol": ("bevel gears", "spur gears only"),
     r"worm|lead_angle": ("worm gears", "spur gears only"),
+    r"crossed|(shaft|axis|axes)_angle|non_parallel": ("shafts that are not parallel", "spur gears only"),
+    r"asymmetric|(drive|coast)_(side_)?(pressure|flank|angle)": ("asymmetric teeth", "symmetric spur gears only"),
+    r"cyclo|circular_arc|novikov|beveloid|tooth_(form|profile)|profile_type|non_?involute":
+        ("teeth of another form", "involute spur gears only"),
+    r"^rack(_gear)?$|^spline|face_gear|crown_gear": ("racks, splines and face gears", "pairs of spur gears only"),
+    r"temperature|thermal|heat|conductiv|expansion": ("temperatures", "elastic spur gears without heat only"),
+    r"yield|plastic|creep|hardening|damage|fatigue|wear":
+        ("materials that yield, creep or wear", "spur gears of linear elastic material only"),
+    r"(web|rim|hub|spoke)_": ("webs and thin rims", "spur gears with a solid body on a rigid bore only"),
     r"crown|barrel|lead_(mod|corr|dev|slope)|misalign|face_load|end_relief|flank_line|parallelism|slope_deviation":
         ("modifications and loads that vary along the face width", "spur gears only (profiles: [microgeometry])"),
     r"tors\w*_stiff|stiff\w*_tors|bending_stiff|(elastic|flexible|compliant)_shaft|shaft_(stiff|elastic|compl|flex)|"
     r"shear_modulus": ("elastic shafts", "spur gears on rigid shafts only"),
+    r"bearing_(stiff|damp|clear|play)": ("elastic bearings", "spur gears on rigid shafts in a housing only"),
 }  # fmt: skip
 #: Tables of gear jobs.
 GEAR_TABLES = ("pair", "stiffness", "loadmap", "microgeometry", "train", "runup")
@@ -148,11 +158,18 @@ def unknown_key(where: str, key: str, value: object, known: Iterable[str], *, fi
                 given = None if isinstance(value, (dict, list)) else value
                 problem = f"{what} are not supported: {only}"
                 return InputError(f"{where}.{key}" if where else f"[{key}]", given, problem, "leave it out")
+        if meant := _symbol(key, known):
+            return InputError(field or where, None, f"unknown name {shown(key)}", meant)
     return unknown_name(field or where or "job file", key, known)
 
 
 #: Names of other programs and of textbooks -> those of expressions here.
 SYNONYMS = {
+    **dict.fromkeys(("revolute", "pin", "pivot", "rotational"), "hinge"),
+    **dict.fromkeys(("slider", "translational", "sliding", "prism"), "prismatic"),
+    **dict.fromkeys(("weld", "welded", "rigid", "clamp"), "fixed"),
+    **dict.fromkeys(("motor", "actuator", "drive", "driver"), "prescribed"),
+    **dict.fromkeys(("rod", "link", "bar"), "distance"),
     **dict.fromkeys(("theta", "phi", "alpha", "beta", "psi", "rotation", "rot"), "angle"),
     **dict.fromkeys(("omega", "w", "angular_velocity", "thetadot", "theta_dot", "phidot", "phi_dot"), "rate"),
     **{
@@ -165,6 +182,37 @@ SYNONYMS = {
         "arctan2": "atan2",
     },
 }
+
+
+#: Symbols of gear technology (ISO 21771, ISO 6336) and other names -> keys of gear jobs; units at the end do not count.
+SYMBOLS = {
+    **dict.fromkeys(("z", "number_of_teeth", "teeth_number", "teeth_count", "n_teeth"), "teeth"),
+    **dict.fromkeys(("m", "mn", "m_n", "modul", "diametral_pitch", "dp"), "module_mm"),
+    **dict.fromkeys(("alpha", "alpha_n", "alphan", "phi"), "pressure_angle_deg"),
+    **dict.fromkeys(("b", "width", "facewidth"), "face_width_mm"),
+    **dict.fromkeys(("x", "addendum_modification", "shift"), "profile_shift"),
+    **dict.fromkeys(("a", "a_w", "aw", "axis_distance", "shaft_distance"), "centre_distance_mm"),
+    **dict.fromkeys(("d", "pitch_circle", "reference_diameter"), "pitch_diameter_mm"),
+    **dict.fromkeys(("d_a", "da", "outer_diameter", "outside_diameter"), "tip_diameter_mm"),
+    **dict.fromkeys(("d_f", "df"), "root_diameter_mm"),
+    **dict.fromkeys(("d_b", "hole_diameter", "inner_diameter", "shaft_diameter"), "bore_diameter_mm"),
+    **dict.fromkeys(("h_a", "ha", "h_ap"), "addendum"),
+    **dict.fromkeys(("h_f", "hf", "h_fp"), "dedendum"),
+    **dict.fromkeys(("rho_f", "rho_fp", "tip_radius_of_rack"), "rack_tip_radius"),
+    **dict.fromkeys(("e", "elastic_modulus", "young"), "youngs_modulus_GPa"),
+    **dict.fromkeys(("nu", "poisson", "ny"), "poisson_ratio"),
+    "rho": "density_kg_per_m3",
+    **dict.fromkeys(("t", "moment", "load"), "torque_Nm"),
+    **dict.fromkeys(("omega", "n", "rpm", "speed_rpm"), "speed_rad_per_s"),
+}
+_UNIT = re.compile(r"_(mm|um|m|deg|rad|[gmk]?pa|nm?|knm|nmm|rpm|per_inch|(t|k?g)_per_[cm]?m3)$")
+
+
+def _symbol(key: str, known: Iterable[str]) -> str:
+    """Question for the key that a symbol of gear technology stands for, with or without a unit or number."""
+    stem = _UNIT.sub("", key.lower())
+    meant = SYMBOLS.get(key.lower()) or SYMBOLS.get(stem) or SYMBOLS.get(stem.rstrip("_12"))
+    return f"did you mean {meant!r}?" if meant in set(known) else ""
 
 
 def nearest(name: str, choices: Iterable[str]) -> str:

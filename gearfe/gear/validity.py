@@ -14,6 +14,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
@@ -156,8 +157,12 @@ def _check_distance(pair: MeshGeometry) -> None:
         shift = pinion.profile_shift + wheel.profile_shift
         least = -0.5 * (pinion.teeth + wheel.teeth) * inv(alpha) / math.tan(alpha)
         if shift <= least:
-            problem = f"leaves no working pressure angle: the sum of both profile shifts must be > {least:.6g}"
-            raise InputError("pinion.profile_shift", pinion.profile_shift, problem, "use larger profile shifts")
+            limit = (">", least - wheel.profile_shift, "")
+            problem, cure = (
+                f"leaves no working pressure angle (sum of both: > {least:.6g})",
+                "use larger profile shifts",
+            )
+            raise InputError("pinion.profile_shift", pinion.profile_shift, problem, cure, limit)
         return
     a = pair.centre_distance
     if isinstance(a, bool) or not isinstance(a, Real) or not math.isfinite(a) or a <= lowest:
@@ -184,10 +189,13 @@ def _check_ratio(pair: MeshGeometry) -> None:
     nominal, active = _tips_ratio(pair, rounded=False), pair.contact_ratio_active
     if nominal < 1.0:
         gear: Gear
-        problem = f"gives a contact ratio of {nominal:.4g}, must be >= 1"
-        if pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch:
-            raise InputError("centre_distance", pair.centre_distance, problem, "use a smaller centre distance")
         problem, cure = f"gives a contact ratio of {nominal:.4g} < 1", "use less tip_shortening, or more teeth"
+        # the distance of the points of tangency that leaves one base pitch between the tips
+        tangent = pair.tangent_length - (1.0 - nominal) * pair.base_pitch
+        if pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch and tangent > 0.0:
+            most = math.hypot(tangent, pair.pinion.base_radius + pair.wheel.base_radius)
+            limit = ("<=", 1e3 * most, "mm")
+            raise InputError("centre_distance", pair.centre_distance, problem, "use a smaller centre distance", limit)
         name = min(("pinion", "wheel"), key=lambda name: getattr(pair, name).addendum)
         gear = getattr(pair, name)
         roll = gear.profile.tip_roll + (1.0 - nominal) * pair.base_pitch
@@ -198,14 +206,27 @@ def _check_ratio(pair: MeshGeometry) -> None:
     rounded = _tips_ratio(pair, rounded=True)
     if rounded < 1.0:
         name = "pinion" if pair.pinion.tip_round >= pair.wheel.tip_round else "wheel"
-        problem = f"leaves a contact ratio of {rounded:.4g}, must be >= 1"
-        raise InputError(f"{name}.tip_round", getattr(pair, name).tip_round, problem, "use a smaller tip round")
+        gear = getattr(pair, name)
+        problem, cure = f"leaves a contact ratio of {rounded:.4g} < 1", "use a smaller tip round"
+        limit = _largest_round(gear, gear.profile.round_roll + (1.0 - rounded) * pair.base_pitch)
+        raise InputError(f"{name}.tip_round", gear.tip_round, problem, cure, limit)
     cuts = {name: lost for name, lost in _lost_to_form_points(pair).items() if lost > 0.0}
     name = max(cuts, key=cuts.__getitem__)
     gear = getattr(pair, name)
     problem = f"leaves an undercut root that eats the path of contact: contact ratio {active:.4g}, must be >= 1"
     cure = f"use more profile shift (no undercut from {least_shift(gear):.4g} on), more teeth or less dedendum"
     raise InputError(f"{name}.profile_shift", gear.profile_shift, problem, cure)
+
+
+def _largest_round(gear: Gear, roll: float) -> tuple[str, float, str] | None:
+    """Limit of a tip round that begins at a roll length (m) or farther out; None where no round does."""
+    least, most = LEAST_ROUND * gear.module, gear.tip_round
+    if replace(gear, tip_round=least).profile.round_roll < roll:
+        return None
+    while most - least > 1e-9 * gear.module:
+        middle = 0.5 * (least + most)
+        least, most = (middle, most) if replace(gear, tip_round=middle).profile.round_roll >= roll else (least, middle)
+    return ("<=", 1e3 * least, "mm")
 
 
 def _lost_to_form_points(pair: MeshGeometry) -> dict[str, float]:
