@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .loadmap.sweep import sweep_loads
     from .reduction.modal_body import ModalBody
     from .runup.run_up import run_up, steady_state
+    from .stiffness.check import StiffnessCheck, check_positions
     from .stiffness.curve import StiffnessCurve
     from .stiffness.sweep import sweep_stiffness
     from .study.job import read_study, run_study
@@ -37,11 +38,13 @@ _PUBLIC: dict[str, str] = {
     "Material": "elasticity",
     "ModalBody": "reduction.modal_body",
     "Search": "study.search",
+    "StiffnessCheck": "stiffness.check",
     "StiffnessCurve": "stiffness.curve",
     "TrainModel": "train",
     "TrainResponse": "train",
     "GearTrain": "train",
     "build_train": "train",
+    "check_positions": "stiffness.check",
     "housing_from_job": "housing.build",
     "read_study": "study.job",
     "run_study": "study.job",
@@ -63,11 +66,13 @@ __all__ = [
     "Material",
     "ModalBody",
     "Search",
+    "StiffnessCheck",
     "StiffnessCurve",
     "TrainModel",
     "TrainResponse",
     "__version__",
     "build_train",
+    "check_positions",
     "housing_from_job",
     "read_study",
     "run_study",

@@ -16,9 +16,10 @@ from gearfe.contact.elements import solve_elements
 from gearfe.contact.flank import flank_of, normal_stress_rows
 from gearfe.contact.laws import ContactLaw, PairModel
 from gearfe.contact.position import FlankLoads, Positions
+from gearfe.contact.whole_gears.bodies import Bodies, ElasticBody
 
+from .contact_problems import chain
 from .solving import given_positions
-from .verification.bodies import Bodies, ElasticBody
 
 Array = NDArray[Any]
 
@@ -28,13 +29,13 @@ TEETH, CENTRES = 8, 40.0
 
 def condensed_body(body: ElasticBody, surface: str, held: Mapping[str, tuple[bool, bool]], points: int) -> GearBody:
     """Compliance of the boundary `surface` with some components of other boundaries held at zero."""
-    chain = body.chain(surface)
+    edges = chain(body, surface)
     mesh: Any = SimpleNamespace(
         points=body.points,
         triangles=body.triangles,
-        contact_edges=lambda: chain,
+        contact_edges=lambda: edges,
         teeth=TEETH,
-        boundaries={"flank_left": chain[::-1, ::-1]},
+        boundaries={"flank_left": edges[::-1, ::-1]},
     )
     flank = flank_of(mesh, points)
     bodies = Bodies((body,))

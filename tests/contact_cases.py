@@ -7,11 +7,10 @@ from functools import cache
 
 from gearfe.contact.compliance import GearBody, MeshingPair, gear_body
 from gearfe.contact.laws import ContactLaw, PairModel
+from gearfe.contact.whole_gears.pair import ElasticGear, WholePair
 from gearfe.elasticity import Material, Plane
 from gearfe.gear.pair import Gear, GearPair, TipRelief
 from gearfe.meshing.tooth_sector import SectorMesh, sector_mesh, sector_recipes
-
-from .verification.whole_pair import ElasticGear, WholePair
 
 WIDTH = 10e-3
 STEEL = Material(200e9, 0.30)
@@ -63,7 +62,7 @@ def condensed(name: str, coarsen: float, plane: Plane, law: ContactLaw, points: 
 
 @cache
 def whole(name: str, coarsen: float, plane: Plane) -> WholePair:
-    """The pair on the monolithic route."""
+    """The pair as whole gears."""
     pinion, wheel = meshes(name, coarsen)
     return WholePair(
         ElasticGear(pinion, STEEL, plane, WIDTH),

@@ -140,7 +140,7 @@ def test_a_housing_without_bores_has_no_reduction_error():
         ('route = "direct"', "stiffness.route = 'direct': is gone"),
         ('law_sides = "pinion"', "stiffness.law_sides = 'pinion': is gone"),
         ("nitsche_theta = -1", "stiffness.nitsche_theta = -1: is gone: theta is 0; leave it out"),
-        ('law = "exact"', "stiffness.law = 'exact': is a law of the tests' whole-gear route alone; use half_plane"),
+        ('law = "exact"', "stiffness.law = 'exact': is gone; use half_plane"),
     ],
 )
 def test_keys_that_are_gone_say_what_to_write_instead(tmp_path, capsys, line, said):

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from gearfe.contact.flank import OFF_END, Projection, edge_nodes, edge_shapes, project
-
-from .verification.problem import nearest_places
+from gearfe.contact.whole_gears.problem import nearest_places
 
 EDGES = 4
 STEP = 1e-5

@@ -1,27 +1,22 @@
-"""The verification route's contact forms: tangents are derivatives, energies give symmetric ones."""
+"""The contact forms of whole gears: tangents are derivatives, energies give symmetric ones."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from gearfe.contact.laws import ElementLaw, Penalty
+from gearfe.contact.laws import ElementLaw, Nitsche, Penalty
+from gearfe.contact.whole_gears import forms
+from gearfe.contact.whole_gears.bodies import Bodies
+from gearfe.contact.whole_gears.contact_state import contact_at
+from gearfe.contact.whole_gears.problem import ContactProblem
 from gearfe.elasticity import Material
 from gearfe.errors import InputError
 
+from .contact_problems import contact_problem
 from .structured import block
-from .verification import forms
-from .verification.bodies import Bodies
-from .verification.contact_state import contact_at
-from .verification.laws import Exact, Nitsche, theta_of
-from .verification.problem import ContactProblem, contact_problem
 
-LAWS = [
-    Nitsche(sides="pinion"),
-    Nitsche(20.0, sides="pinion", theta=1),
-    Nitsche(sides="pinion", theta=-1),
-    Penalty(1e12, "pinion"),
-]
+LAWS = [Nitsche(sides="pinion"), Penalty(1e12, "pinion")]
 
 
 def pressed(law: ElementLaw, right: float) -> tuple[ContactProblem, np.ndarray, np.ndarray]:
@@ -38,7 +33,7 @@ def pressed(law: ElementLaw, right: float) -> tuple[ContactProblem, np.ndarray, 
     return problem, u, d
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: f"{law.name} {theta_of(law)}")
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 @pytest.mark.parametrize("right", [0.9, 1.02], ids=["inside", "past the end"])
 def test_tangent_is_the_derivative_of_the_contact_forces(law: ElementLaw, right: float) -> None:
     problem, u, d = pressed(law, right)
@@ -50,15 +45,15 @@ def test_tangent_is_the_derivative_of_the_contact_forces(law: ElementLaw, right:
     np.testing.assert_allclose(state.tangent() @ d, rate, rtol=0, atol=1e-6 * np.abs(rate).max())
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: f"{law.name} {theta_of(law)}")
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 def test_only_laws_with_an_energy_have_a_symmetric_tangent(law: ElementLaw) -> None:
     problem, u, _ = pressed(law, 0.9)
     tangent = contact_at(problem, u).tangent()
     skew = abs(tangent - tangent.T).max() / abs(tangent).max()
-    assert (skew < 1e-12) == (law.name == "penalty" or theta_of(law) == 1)
+    assert (skew < 1e-12) == (law.name == "penalty")
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: f"{law.name} {theta_of(law)}")
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 def test_one_call_assembles_what_scikit_fem_assembles(law: ElementLaw) -> None:
     problem, u, _ = pressed(law, 1.02)
     state = contact_at(problem, u)
@@ -66,17 +61,9 @@ def test_one_call_assembles_what_scikit_fem_assembles(law: ElementLaw) -> None:
     assert abs(state.tangent() - expected).max() < 1e-13 * abs(expected).max()
 
 
-def test_the_rate_of_the_gap_is_its_derivative() -> None:
-    problem, u, d = pressed(Exact("pinion"), 0.9)
-    state, step = contact_at(problem, u), 1e-6
-    ahead, behind = (contact_at(problem, u + way * step * d).projection.gap for way in (1, -1))
-    rate = (ahead - behind) / (2 * step)
-    np.testing.assert_allclose(state.rows(forms.gap_change) @ d / state.points.weight, rate, atol=1e-7)
-
-
 def test_contact_forces_carry_no_resultant() -> None:
-    """[v] of a rigid translation is zero, and so is sigma_n of it."""
-    problem, u, _ = pressed(Nitsche(sides="pinion", theta=-1), 0.9)
+    """[v] of a rigid translation is zero."""
+    problem, u, _ = pressed(Nitsche(sides="pinion"), 0.9)
     forces = contact_at(problem, u).forces[problem.unknowns]
     assert np.abs(forces.sum(axis=0)).max() < 1e-12 * np.abs(forces).sum()
 
@@ -84,10 +71,8 @@ def test_contact_forces_carry_no_resultant() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Nitsche(theta=2), "theta = 2: must be 1, 0 or -1"),  # type: ignore[arg-type]
         (lambda: Nitsche(gamma0=0.0), "gamma0 = 0.0: must be finite and > 0"),
         (lambda: Penalty(-1.0), "stiffness = -1.0: must be finite and > 0"),
-        (lambda: Exact("both"), "sides = 'both': must be one of tip, pinion, wheel"),
     ],
 )
 def test_laws_that_do_not_exist(make, message: str) -> None:

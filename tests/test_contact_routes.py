@@ -7,12 +7,12 @@ import pytest
 from scipy.sparse import coo_matrix
 
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
+from gearfe.contact.whole_gears.position import solve_position as solve_whole
 from gearfe.elasticity import element_stiffness
 from gearfe.meshing.whole_gear import whole_gear
 
 from .contact_cases import STEEL, WIDTH, condensed, meshes, whole
 from .solving import peak_pressure, solve_position
-from .verification.monolithic import solve_monolithic
 
 COARSE = 5.0
 
@@ -37,7 +37,7 @@ def test_both_routes_give_the_same_position(
 ) -> None:
     place = math.radians(angle), math.radians(twist)
     small = solve_position(condensed(name, COARSE, plane, law), *place)  # type: ignore[arg-type]
-    full = solve_monolithic(whole(name, COARSE, plane), law, *place)
+    full = solve_whole(whole(name, COARSE, plane), law, *place)
     assert small.status == full.status == "converged"
     assert np.count_nonzero(small.contacts.torque_wheel > 1e-3 * small.torque_wheel) == pairs
     assert full.peak_pressure == pytest.approx(peak_pressure(small), rel=1e-8)
@@ -48,7 +48,7 @@ def test_both_routes_give_the_same_position(
 def test_without_twist_nothing_touches_on_either_route() -> None:
     apart = math.radians(5.0), math.radians(-0.05)
     assert solve_position(condensed("sharp", COARSE, "strain", Nitsche()), *apart).status == "no_contact"
-    assert solve_monolithic(whole("sharp", COARSE, "strain"), Nitsche(), *apart).status == "no_contact"
+    assert solve_whole(whole("sharp", COARSE, "strain"), Nitsche(), *apart).status == "no_contact"
 
 
 def test_whole_gear_is_closed_and_made_of_turned_sectors() -> None:

@@ -1,4 +1,4 @@
-"""Whole gears of Saint Venant-Kirchhoff bodies: balance of moments, and the condensed route's cheap form."""
+"""Whole gears of Saint Venant-Kirchhoff bodies: balance of moments, and the first-order share of condensed gears."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfe.contact import laws
 from gearfe.contact.compliance import NEIGHBOURS, MeshingPair, finite_strain_shares, gear_body
-from gearfe.contact.laws import PairModel
+from gearfe.contact.laws import Nitsche, PairModel
+from gearfe.contact.whole_gears.pair import ElasticGear, WholePair
+from gearfe.contact.whole_gears.position import solve_position
 from gearfe.elasticity import Material
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
@@ -18,9 +19,6 @@ from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
 from .contact_cases import whole
 from .solving import solve_positions
 from .test_patch import PRESS, two_blocks
-from .verification.laws import Nitsche
-from .verification.monolithic import solve_monolithic
-from .verification.whole_pair import ElasticGear, WholePair
 
 
 def test_tangent_is_the_derivative_of_the_forces() -> None:
@@ -42,15 +40,15 @@ def test_moments_balance_in_the_deformed_place() -> None:
     the contact forces. Small strain fulfils it in the undeformed place only."""
     pair = whole("modified", 10.0, "strain")
     place = math.radians(10.0), math.radians(0.3)
-    small = solve_monolithic(pair, Nitsche(), *place)
-    finite = solve_monolithic(replace(pair, kinematics="finite"), Nitsche(), *place, tolerance=1e-9)
+    small = solve_position(pair, Nitsche(), *place)
+    finite = solve_position(replace(pair, kinematics="finite"), Nitsche(), *place, tolerance=1e-9)
     assert small.status == finite.status == "converged"
     assert finite.torque_wheel_reaction == pytest.approx(finite.torque_wheel, rel=1e-8)
     assert abs(small.torque_wheel_reaction / small.torque_wheel - 1) > 1e-4
 
 
 def both_routes(angle_deg: float, twist_deg: float, neighbours: int = NEIGHBOURS) -> tuple[float, float]:
-    """Finite strain's share of the torque, first-order on the condensed route and true from the monolithic one.
+    """Finite strain's share of the torque, first-order on condensed gears and true on whole ones.
 
     20/30 pair with rounded tips on the same mesh; at 4 deg two tooth pairs carry, at 13 deg one (at 0.05 deg).
     """
@@ -62,12 +60,12 @@ def both_routes(angle_deg: float, twist_deg: float, neighbours: int = NEIGHBOURS
     ]
     steel, width = Material(), 10e-3
     bodies = [gear_body(mesh, steel, "strain", width) for mesh in meshes]
-    condensed = MeshingPair(pair, bodies[0], bodies[1], PairModel(law=laws.Nitsche()))
+    condensed = MeshingPair(pair, bodies[0], bodies[1], PairModel(law=Nitsche()))
     pinion, wheel = (ElasticGear(mesh, steel, "strain", width) for mesh in meshes)
     full = WholePair(pinion, wheel, pair.working_centre_distance, width, kinematics="finite")
     place = math.radians(angle_deg), math.radians(twist_deg)
     found = solve_positions(condensed, [place[0]], place[1])
-    finite = solve_monolithic(full, Nitsche(), *place, tolerance=1e-8)
+    finite = solve_position(full, Nitsche(), *place, tolerance=1e-8)
     assert finite.status == "converged"
     share = finite_strain_shares(condensed, found, neighbours)[0]
     return float(share), finite.torque_wheel / float(found.torque_wheel[0]) - 1

@@ -36,6 +36,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="parameter of a law of another package; may stand several times",
     )
     add_removed(parser, {**StiffnessTable.REMOVED, "animate": ("has another name", "write --animation")})
+    parser.add_argument(
+        "--check",
+        type=int,
+        nargs="+",
+        metavar="N",
+        help="solve these positions again on whole gears, with all their unknowns, and compare: rows of the table, "
+        "counted from 1; minutes each on the default mesh",
+    )
     parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimate")
     parser.add_argument(
         "--range", type=float, metavar="X", help="end of the colours in the pictures of --fields (MPa; default: chosen)"
@@ -95,6 +103,11 @@ def run(args: argparse.Namespace) -> int:
             from ..stiffness.fields_output import angle_numbers
 
             angle_numbers(np.degrees(sweep["angles"]), chosen)
+        if args.check is not None:
+            from ..stiffness.check import checked_rows, whole_law
+
+            checked_rows(args.check, len(sweep["angles"]), "--check")
+            whole_law(job.model, "--check")
     folder = output_folder(args.out)
     elastic = job.elastic(watch=watch)
     if args.fields is not None:
@@ -103,10 +116,19 @@ def run(args: argparse.Namespace) -> int:
         announce(size_note(elastic, np.degrees(sweep["angles"]), chosen))
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, **sweep)
     watch.seconds.update(curve.timings)
+    check = None
+    if args.check is not None:
+        from ..stiffness.check import check_positions
+
+        with watch.stage("check"):
+            check = check_positions(curve, job.pair, args.check, job.model, kinematics=sweep["kinematics"])
     found = summary(job, curve, watch.seconds)
-    with whole_set(folder, ("stiffness.png", "fields.vtkhdf", "stress_*deg.png", "pressure.*")) as made:
+    may_write = ("stiffness.png", "stiffness_check.csv", "fields.vtkhdf", "stress_*deg.png", "pressure.*")
+    with whole_set(folder, may_write) as made:
         with watch.stage("table"):
             curve.to_csv(made / "stiffness.csv")
+            if check is not None:
+                check.to_csv(made / "stiffness_check.csv")
         if args.fields is not None:
             with watch.stage("fields"):
                 from ..stiffness.fields_output import write_fields
@@ -134,8 +156,12 @@ def run(args: argparse.Namespace) -> int:
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / "summary.json", found)
         names = sorted(path.name for path in made.iterdir())
-    print_results(report_lines(job, curve, found), folder, names, watch.seconds, warnings(job, curve))
-    return 1 if curve.failed.any() else 0
+    lines, sentences = report_lines(job, curve, found), warnings(job, curve)
+    if check is not None:
+        lines += check.lines()
+        sentences += check.warnings()
+    print_results(lines, folder, names, watch.seconds, sentences)
+    return 1 if curve.failed.any() or (check is not None and check.failed.any()) else 0
 
 
 def field_angle(text: str) -> str | float:

@@ -9,8 +9,7 @@ the gap in place of its negative)
     a(u, v) = \int_{\Gamma_C} p\,\delta g(v), \qquad p = \max(0,\; -\gamma g - s\,\sigma_n).
 
 The part :math:`\Gamma_C` is the contact surface (round of the tip included) of the gears on the law's `sides`; with
-both gears on it, each takes half of the integral. The variants theta = 1 and -1, and exact multipliers, are laws of the
-tests' whole-gear route alone (`tests.verification.laws`).
+both gears on it, each takes half of the integral. `gearfe.contact.whole_gears` solves the same on whole gears.
 
 **On half-planes** (half_plane): `gearfe.contact.half_plane`, without contact elements.
 

@@ -172,7 +172,7 @@ LAWS: dict[str, str] = {
 #: Group of entry points in which other packages name theirs.
 GROUP = "gearfe.laws"
 #: Names of laws that were, and what to write instead.
-REMOVED = {"exact": ("is a law of the tests' whole-gear route alone", "use half_plane")}
+REMOVED = {"exact": ("is gone", "use half_plane")}
 
 
 def known_laws() -> dict[str, str]:

@@ -186,9 +186,8 @@ def _patch(points: np.ndarray, triangles: np.ndarray, which: str) -> Found:
     from scipy.sparse.linalg import spsolve
     from skfem import CellBasis, ElementTriP2, ElementVector, MeshTri, MeshTri2
 
+    from gearfe.contact.whole_gears.bodies import stiffness_form
     from gearfe.elasticity import Material
-
-    from ..verification.bodies import stiffness_form
 
     if which == "strain":  # straight sides, distorted inside: second-order elements hold linear fields exactly there
         mesh: Any = MeshTri.init_tensor(np.linspace(0, 1, 5) ** 1.3, np.linspace(0, 1, 5) ** 0.8)

@@ -1,4 +1,4 @@
-"""Mesh stiffness: time against error of element sizes and laws; the verification route; stages, positions, loads.
+"""Mesh stiffness: time against error of element sizes and laws; whole gears; stages, positions, loads.
 
 Errors are those of k_mesh against a converged run: the same positions on a far finer mesh (``REFERENCE``), by Nitsche's
 law. Where its elements do not resolve the contact, the half-plane law on that mesh is what there is.
@@ -31,7 +31,7 @@ SIZES, QUICK_SIZES = (2.8, 2.0, 1.4, 1.0, 0.7, 0.5), (2.8, 2.0)
 POSITIONS, QUICK_POSITIONS = (18, 40, 400, 4000), (3, 6)
 #: Twists (deg).
 TWISTS, QUICK_TWISTS = (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5), (0.05, 0.2)
-#: `coarsen` and positions of the verification route; its time is that of so few positions.
+#: `coarsen` and positions of the whole gears; their time is that of so few positions.
 WHOLE_SIZES, QUICK_WHOLE_SIZES = (2.8, 2.0), ()
 WHOLE_ANGLES = (4.0,)
 TWIST = math.radians(0.05)
@@ -113,7 +113,7 @@ def sizes(record: Record) -> None:
 
 
 def verification(record: Record) -> None:
-    """Condensed gears against the verification route, small strain: a position each, set-up and solution apart."""
+    """Condensed gears against whole gears, small strain: a position each, set-up and solution apart."""
     table, pair = record.table("sweep_verification", "model", "coarsen"), shipped_pair()
     at = tuple(np.radians(WHOLE_ANGLES[:1] if record.quick else WHOLE_ANGLES))
 
@@ -126,11 +126,11 @@ def verification(record: Record) -> None:
         return {"error": found["error"], "setup_cpu_s": setup.cpu_s, "position_cpu_s": cost.cpu_s / len(at)}
 
     def whole(coarsen: float) -> Mapping[str, Any]:
-        from ..verification.laws import Nitsche
-        from ..verification.monolithic import solve_monolithic
+        from gearfe.contact.laws import Nitsche
+        from gearfe.contact.whole_gears.position import solve_position
 
-        gears, setup = measured(lambda: whole_pair(pair, coarsen), runs=1)
-        solved, cost = measured(lambda: [solve_monolithic(gears, Nitsche(), a, TWIST) for a in at], runs=1)
+        gears, setup = measured(lambda: assembled_pair(pair, coarsen), runs=1)
+        solved, cost = measured(lambda: [solve_position(gears, Nitsche(), a, TWIST) for a in at], runs=1)
         torque = np.array([position.torque_wheel for position in solved])
         truth = converged(record.quick, TWIST, False, at)
         error = float(np.max(np.abs(torque / truth.torque_wheel - 1.0)))
@@ -144,18 +144,12 @@ def verification(record: Record) -> None:
             record.row(table, {"model": name, "coarsen": coarsen}, partial(make, coarsen))
 
 
-def whole_pair(pair: GearPair, coarsen: float) -> Any:
+def assembled_pair(pair: GearPair, coarsen: float) -> Any:
     """Both whole gears, assembled (plane strain, steel)."""
-    from gearfe.elasticity import Material
+    from gearfe.contact.laws import Nitsche, PairModel
+    from gearfe.contact.whole_gears.pair import whole_pair
 
-    from ..verification.whole_pair import ElasticGear, WholePair
-
-    made = [
-        ElasticGear(sector_mesh(gear, recipe), Material(), "strain", gear.face_width)
-        for gear, recipe in zip((pair.pinion, pair.wheel), sector_recipes(pair, coarsen=coarsen), strict=True)
-    ]
-    width = min(gear.face_width for gear in (pair.pinion, pair.wheel))
-    gears = WholePair(made[0], made[1], pair.working_centre_distance, width)
+    gears = whole_pair(pair, PairModel(law=Nitsche(), coarsen=coarsen))
     _ = gears.bodies.stiffness  # assembled on first use, shared by all positions
     return gears
 

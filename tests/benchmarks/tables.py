@@ -148,9 +148,9 @@ SECTIONS: tuple[Section, ...] = (
     ),
     Section(
         "sweep_verification",
-        "Mesh stiffness: the verification route",
+        "Mesh stiffness: whole gears",
         "One position at small strain on gears condensed to their flanks, and on whole gears with all unknowns at "
-        "once (`tests.verification`), the same elements.",
+        "once (`gearfe.contact.whole_gears`), the same elements.",
         {
             "model": ("model", PLAIN),
             "coarsen": ("`coarsen`", digits),

@@ -1,10 +1,10 @@
 r"""Quadrature points on slave edges: a Gauss rule on each edge, or on each of its segments.
 
-The pressure's virtual work is smooth between the points of a slave edge that face vertices of the mate, and has a kink
-there: the mate's shape functions and its normal are only continuous. A Gauss rule across such a kink does not give
-the mate what it takes from the slave (a uniform pressure on a flat interface is then not a solution); on the segments
-between them it does (Puso & Laursen, *Comput. Methods Appl. Mech. Eng.* 193, 2004; Farah, Popp & Wall, *Comput. Mech.*
-55, 2015, compare both). A vertex :math:`x_v` with the blended normal :math:`n_v` faces the slave point with
+The virtual work of the pressure is smooth between the points of a slave edge that face vertices of the mate, and has a
+kink there: shape functions and normal of the mate are only continuous. With a Gauss rule across such a kink a uniform
+pressure on a flat interface is no solution; with one on each segment between the kinks it is (Puso & Laursen, *Comput.
+Methods Appl. Mech. Eng.* 193, 2004; Farah, Popp & Wall, *Comput. Mech.* 55, 2015, compare both). A vertex :math:`x_v`
+with the blended normal :math:`n_v` faces the slave point with
 
 .. math:: (x_s(\xi) - x_v) \times n_v = 0,
 
@@ -19,22 +19,22 @@ from typing import Literal
 
 import numpy as np
 
-from gearfe.contact.flank import gauss_rule
-from gearfe.typing import Array, IntArray
+from ...typing import Array, IntArray
+from ..flank import gauss_rule
 
 Quadrature = Literal["points", "segments"]
 
-#: Segments shorter than this part of an edge are left out.
+#: Length (edges) below which a segment is left out: rounding of the breaks.
 SHORTEST = 1e-9
 
 
 def whole_edges(edge: IntArray, count: int) -> tuple[IntArray, Array, Array]:
-    """Edge, place on it (0 to 1) and weight (1 in sum) of the points of a Gauss rule on each edge."""
+    """Return edge, place on it (0 to 1) and weight (1 in sum) of the points of a Gauss rule on each edge."""
     return _gauss(edge, np.zeros(len(edge)), np.ones(len(edge)), count)
 
 
 def segments(edge: IntArray, slave: Array, mate: Array, count: int) -> tuple[IntArray, Array, Array]:
-    """The same with a Gauss rule on each segment.
+    """Return edge, place on it and weight of the points of a Gauss rule on each segment.
 
     Parameters
     ----------
@@ -44,6 +44,8 @@ def segments(edge: IntArray, slave: Array, mate: Array, count: int) -> tuple[Int
         Present places of the nodes of all slave edges (m).
     mate : ndarray, shape (2 f + 1, 2)
         Present places of the nodes of the mate's chain (m).
+    count
+        Points on each segment.
     """
     cut, xi = breaks(slave[edge], mate)
     pieces = np.concatenate([np.stack([edge, 0 * edge], axis=1), np.stack([edge[cut], xi], axis=1)])
@@ -60,7 +62,7 @@ def _gauss(edge: IntArray, start: Array, end: Array, count: int) -> tuple[IntArr
 
 
 def breaks(slave: Array, mate: Array) -> tuple[IntArray, Array]:
-    """Slave edges and places on them (0 to 1) that face the vertices and the ends of the mate's chain."""
+    """Return slave edges and places on them (0 to 1) that face vertices and ends of the mate's chain."""
     vertices, normals = mate[::2], _vertex_normals(mate)
     x0, x1, x2 = slave[:, 0], slave[:, 1], slave[:, 2]
     linear, quadratic = 4 * x1 - 3 * x0 - x2, 2 * (x0 - 2 * x1 + x2)
@@ -72,15 +74,15 @@ def breaks(slave: Array, mate: Array) -> tuple[IntArray, Array]:
         q = -0.5 * (b + np.where(b < 0, -1.0, 1.0) * np.sqrt(b * b - 4 * a * c))
         roots = np.stack([c / q, q / a])
     reach = np.linalg.norm(np.ptp(mate, axis=0))
-    _, vertex, edge = found = np.nonzero(np.isfinite(roots) & (roots > 0) & (roots < 1))
-    xi = roots[found][:, None]
+    _, vertex, edge = inside = np.nonzero(np.isfinite(roots) & (roots > 0) & (roots < 1))
+    xi = roots[inside][:, None]
     apart = x0[edge] + xi * (linear[edge] + xi * quadratic[edge]) - vertices[vertex]
     near = np.linalg.norm(apart, axis=1) < reach
     return edge[near], xi[near, 0]
 
 
 def _vertex_normals(chain: Array) -> Array:
-    """Normals at the vertices of a chain, blended as `gearfe.contact.flank` does, shape (f + 1, 2)."""
+    """Return normals at the vertices of a chain, blended as `gearfe.contact.flank` does, shape (f + 1, 2)."""
     x0, x1, x2 = chain[:-2:2], chain[1:-1:2], chain[2::2]
     at_start, at_end = _normal(4 * x1 - 3 * x0 - x2), _normal(x0 - 4 * x1 + 3 * x2)
     mean = at_end[:-1] + at_start[1:]

@@ -1,4 +1,4 @@
-r"""What bodies do inside: forces, tangent and surface stress, at small strain or of Saint Venant-Kirchhoff.
+r"""Internal forces, tangent and surface stress of bodies, at small strain or of Saint Venant-Kirchhoff.
 
 Small strain: :math:`\sigma = C:\varepsilon(u)` on the undeformed bodies. Finite strain, total Lagrangian, with
 :math:`F = I + \nabla u`, :math:`E = \tfrac12(F^T F - I)`, :math:`S = C:E` (Bonet & Wood, *Nonlinear Continuum Mechanics
@@ -8,11 +8,11 @@ for Finite Element Analysis*, 2008, sec. 6.4),
     f(v) = \int F S : \nabla v, \qquad
     K(u, v) = \int \mathrm{sym}(F^T\nabla u) : C : \mathrm{sym}(F^T\nabla v) + (\nabla u\, S):\nabla v .
 
-The reference is each body as it stands, undeformed; the material does not notice that turn. Plane stress takes the
-reduced lambda of small strain.
+The reference is each undeformed body in its present place: the material is isotropic, so its turn changes nothing.
+Plane stress takes the reduced lambda of small strain.
 
 The normal stress that Nitsche's law compares with the pressure is :math:`n_0\cdot\sigma n_0` at small strain. At finite
-strain the pressure acts on the undeformed area along the mate's present normal n, so it is
+strain the pressure acts on the undeformed area along the present normal n of the mate, so it is
 :math:`-n\cdot F S\, n_0`. Its change with n is left out of the tangent: without friction F S n_0 is parallel to n at
 the solution.
 """
@@ -27,8 +27,7 @@ import numpy as np
 from skfem import BilinearForm, LinearForm
 from skfem.helpers import ddot, dot, eye, grad, mul, prod, trace, transpose
 
-from gearfe.typing import Array
-
+from ...typing import Array
 from .bodies import Bodies
 
 Kinematics = Literal["small", "finite"]
@@ -41,32 +40,27 @@ class SmallStrain:
     stiffness: Any
 
     def forces(self, u: Array) -> Array:
-        """Internal forces (N)."""
+        """Return the internal forces (N)."""
         return np.asarray(self.stiffness @ u)
 
-    def tangent(self, u: Array) -> Any:
-        """Their derivative, sparse (N/m)."""
+    def tangent(self, u: Array) -> Any:  # noqa: ARG002
+        """Return their derivative, sparse (N/m)."""
         return self.stiffness
 
-    def surface_stress(self, h: Array, n: Array, n0: Array, lam: Array, mu: Array) -> tuple[Array, Array]:
-        """sigma_n = n0 . sigma n0 at points of the surface, and P with delta sigma_n = P : grad v.
+    def surface_stress(self, h: Array, n: Array, n0: Array, lam: Array, mu: Array) -> tuple[Array, Array]:  # noqa: ARG002
+        """Return sigma_n = n0 . sigma n0 at points of the surface, and P with delta sigma_n = P : grad v.
 
         Parameters
         ----------
         h : ndarray, shape (2, 2, q, 1)
             grad u.
         n, n0 : ndarray, shape (2, q, 1)
-            The mate's present normal and the outward normal of the undeformed surface.
+            Present normal of the mate, and outward normal of the undeformed surface.
         lam, mu : ndarray, shape (q, 1)
             Lame constants (Pa).
         """
-        rate = linear_stress_rate(n0, lam, mu)
+        rate = np.asarray(eye(lam, 2) + 2 * mu * prod(n0, n0))
         return ddot(rate, h), rate
-
-
-def linear_stress_rate(n0: Array, lam: Array, mu: Array) -> Array:
-    """P = lam I + 2 mu n0 n0: n0 . sigma n0 = P : grad u."""
-    return np.asarray(eye(lam, 2) + 2 * mu * prod(n0, n0))
 
 
 @LinearForm
@@ -84,7 +78,7 @@ def internal_tangent(u: Any, v: Any, w: Any) -> Any:
 
 @dataclass(frozen=True)
 class SaintVenantKirchhoff:
-    """Hyperelastic bodies; `mesh` has them in their present places, undeformed."""
+    """Hyperelastic bodies; `mesh` holds them undeformed, in their present places."""
 
     bodies: Bodies
     mesh: Any
@@ -95,11 +89,11 @@ class SaintVenantKirchhoff:
         return self.bodies.bases(self.mesh)
 
     def forces(self, u: Array) -> Array:
-        """Internal forces (N)."""
+        """Return the internal forces (N)."""
         return np.asarray(self._assembled(internal_work, u))
 
     def tangent(self, u: Array) -> Any:
-        """Their derivative, sparse (N/m)."""
+        """Return their derivative, sparse (N/m)."""
         return self._assembled(internal_tangent, u)
 
     def _assembled(self, form: Any, u: Array) -> Any:
@@ -119,14 +113,14 @@ class SaintVenantKirchhoff:
 
 
 def deformation(h: Array, lam: Any, mu: Any) -> tuple[Array, Array]:
-    """F = I + grad u and S = C : E of h = grad u."""
-    one = eye(np.ones(h.shape[2:]), 2)
-    f = one + h
-    return f, isotropic(0.5 * (mul(transpose(f), f) - one), lam, mu)
+    """Return F = I + grad u and S = C : E of h = grad u."""
+    identity = eye(np.ones(h.shape[2:]), 2)
+    f = identity + h
+    return f, isotropic(0.5 * (mul(transpose(f), f) - identity), lam, mu)
 
 
 def isotropic(strain: Array, lam: Any, mu: Any) -> Array:
-    """C : E = lam tr(E) I + 2 mu E."""
+    """Return C : E = lam tr(E) I + 2 mu E."""
     return np.asarray(eye(lam * trace(strain), 2) + 2 * mu * strain)
 
 

@@ -1,12 +1,12 @@
-r"""The contact's weak form as scikit-fem forms on pairs of points.
+r"""The weak form of the contact as scikit-fem forms on pairs of points.
 
 A contact point x_s of one body and its closest point x_m on the deformed mate, :math:`x_s - x_m(\xi) = g\,n(\xi)`, form
-a pair; fields of the first carry the index s, those of the second m. For all v (`tests.verification.laws`)
+a pair; fields of the first carry the index s, those of the second m. Find u such that for all v (Chouly, Mlika &
+Renard, *Numer. Math.* 139, 2018, with theta = 0 and the gap g instead of its negative; gamma and s are those of
+`gearfe.contact.laws`)
 
 .. math::
-    a(u, v) - \int \frac{\theta}{\gamma}\,\sigma_n(u)\,\sigma_n(v)
-    = \ell(v) + \int p\; n\cdot[v] + \int \frac{\theta}{\gamma}\,p\,\sigma_n(v), \qquad
-    [v] = v_s - v_m, \qquad p = \max(0,\; -\gamma g - s\,\sigma_n) .
+    a(u, v) = \ell(v) + \int p\; n\cdot[v], \qquad [v] = v_s - v_m, \qquad p = \max(0,\; -\gamma g - s\,\sigma_n) .
 
 With the mate's tangent :math:`a = x_m'`, :math:`N = n\cdot\delta x_m'` and :math:`\kappa = -a\cdot n'` the variations
 are (Laursen, *Computational Contact and Impact Mechanics*, 2002, ch. 5, in two dimensions)
@@ -18,9 +18,9 @@ are (Laursen, *Computational Contact and Impact Mechanics*, 2002, ch. 5, in two 
     (N_\Delta\,\delta\xi + N_\delta\,\Delta\xi + \kappa\,\delta\xi\,\Delta\xi) .
 
 The normal is blended between edges (`gearfe.contact.flank`), hence the small n . a; its kinks are left out of the
-last formula. In the forms `w` holds, at each pair: g, n, a, kappa; X_xi = dX/dxi of the mate's undeformed edge; gamma,
-s and theta; stress_rate P, with which delta sigma_n = P : grad v_s (`tests.verification.constitution`); p; active,
-H(p); and share, the part of a point's stretch of surface that faces the mate, which changes with xi at its sharp end.
+last formula. In the forms `w` holds, at each pair: g, n, a, kappa; X_xi = dX/dxi of the mate's undeformed edge; gamma
+and s; stress_rate P, with which delta sigma_n = P : grad v_s (`.constitution`); p; active, H(p); share, the part of the
+stretch of surface of a point that faces the mate; and share_rate, its change with xi at the mate's sharp end.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def tilt(v_m: Any, w: Any) -> Any:
 
 
 def slide(v_s: Any, v_m: Any, w: Any) -> Any:
-    """delta xi, how the closest point moves along the mate."""
+    """delta xi, the motion of the closest point along the mate."""
     return (dot(w.a, v_s - v_m) + w.g * tilt(v_m, w)) / (dot(w.a, w.a) - w.g * w.kappa)
 
 
@@ -81,33 +81,8 @@ def pressure_work(v_s: Any, v_m: Any, w: Any) -> Any:
     return w.share * w.p * normal_jump(v_s, v_m, w)
 
 
-@LinearForm
-def stress_work(v_s: Any, v_m: Any, w: Any) -> Any:
-    """theta/gamma p sigma_n(v)."""
-    return w.share * w.p * w.theta / w.gamma * normal_stress_rate(v_s, w)
-
-
 @BilinearForm
 def contact_tangent(u_s: Any, u_m: Any, v_s: Any, v_m: Any, w: Any) -> Any:
-    """Derivative of both."""
+    """Derivative of the work of the pressure."""
     rate = w.share * pressure_rate(u_s, u_m, w) + w.share_rate * slide(u_s, u_m, w) * w.p
-    tested = normal_jump(v_s, v_m, w) + w.theta / w.gamma * normal_stress_rate(v_s, w)
-    return rate * tested + w.share * w.p * turning(u_s, u_m, v_s, v_m, w)
-
-
-@BilinearForm
-def stress_term(u: Any, v: Any, w: Any) -> Any:
-    """theta/gamma sigma_n(u) sigma_n(v)."""
-    return w.theta / w.gamma * normal_stress_rate(u, w) * normal_stress_rate(v, w)
-
-
-@LinearForm
-def gap_change(v_s: Any, v_m: Any, w: Any) -> Any:
-    """delta g where the surface faces the mate."""
-    return w.share * gap_rate(v_s, v_m, w)
-
-
-@LinearForm
-def unit_pressure_work(v_s: Any, v_m: Any, w: Any) -> Any:
-    """n . [v] where the surface faces the mate."""
-    return w.share * normal_jump(v_s, v_m, w)
+    return rate * normal_jump(v_s, v_m, w) + w.share * w.p * turning(u_s, u_m, v_s, v_m, w)
