@@ -15,7 +15,7 @@ import math
 import tomllib
 import types
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,6 +25,9 @@ from .files import read_text
 from .suspects import other_unit
 
 T = TypeVar("T")
+
+#: Of a removed key: what became of it, and what to write instead, which may depend on its value.
+Removed = tuple[str, str | Callable[[Any], str]]
 
 #: No number in everyday units is larger: the fourth powers of such numbers overflow; whole ones have 64 bits in arrays.
 LARGEST, LARGEST_WHOLE = 1e75, 2**63 - 1
@@ -161,8 +164,8 @@ def build(cls: type[T], table: Any, where: str) -> T:
 
     Understands ``int``, ``float``, ``bool``, ``str``, ``X | None``, ``tuple[X, ...]``, fixed tuples, ``dict[str, X]``,
     and nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields, and
-    ``REMOVED``: key that was -> what became of it, and what to write instead; and ``SHORT``: the key that a text in
-    place of the table stands for.
+    ``REMOVED``: removed key -> what became of it, and what to write instead (see `Removed`); and ``SHORT``: the key
+    that a text instead of the table stands for.
 
     Raises
     ------
@@ -188,7 +191,8 @@ def _built(cls: type[T], table: Any, where: str) -> T:
             _convert(hints[name], table[name], _joined(where, name), spec.metadata)
     for key in table:
         if key in getattr(cls, "REMOVED", ()):
-            raise InputError(_joined(where, key), table[key], *kind.REMOVED[key])
+            problem, cure = kind.REMOVED[key]
+            raise InputError(_joined(where, key), table[key], problem, cure(table[key]) if callable(cure) else cure)
         if key not in fields:
             raise unknown_key(where, key, table[key], fields)
     values: dict[str, Any] = {}

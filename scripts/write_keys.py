@@ -25,9 +25,10 @@ left out.
 def reference_page() -> str:
     """Markdown of all tables, each nested one below the one that holds it."""
     parts = [HEAD]
+    top = {table_class(name): name for name in TABLES}
     for name in TABLES:
         parts.append(f"## `[{name}]`\n")
-        parts += _sections(table_class(name), name, {})
+        parts += _sections(table_class(name), name, dict(top))
     parts.append("## Mechanism files\n")
     parts += _sections(MechanismFile, "", {})
     return "\n".join(parts).rstrip("\n") + "\n"

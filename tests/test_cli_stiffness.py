@@ -171,6 +171,22 @@ def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatc
     assert np.isfinite(curve.interpolate(math.radians(4)).value)
 
 
+def test_the_load_of_a_variant_of_the_train(tmp_path, capsys):
+    """The published one of the shipped job: 0.5 degrees by Nitsche's law, as with these options."""
+    options = ["--coarsen", "3", "--angles", "2", "6", "14", "--no-estimate", "--no-pictures"]
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path / "a"), "--variant", "tutorial", *options]) == 0
+    given = ["--twist-deg", "0.5", "--law", "nitsche"]
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path / "b"), *given, *options]) == 0
+    assert (tmp_path / "a" / "stiffness.csv").read_text() == (tmp_path / "b" / "stiffness.csv").read_text()
+    assert {(r["law"], r["twist_deg"]) for r in rows(tmp_path / "a")} == {("nitsche", "0.5")}
+    job = json.loads((tmp_path / "a" / "summary.json").read_text())["job"]["stiffness"]
+    assert (job["twist_deg"], job["torque_Nm"], job["law"]) == (0.5, None, "nitsche")
+    capsys.readouterr()
+    assert main(["stiffness", str(JOB), "--variant", "tutorals"]) == 2
+    assert "variant = 'tutorals'" in (said := capsys.readouterr().err)
+    assert "did you mean 'tutorial'" in said
+
+
 def test_a_position_without_contact_is_told(tmp_path, capsys):
     job = tmp_path / "job.toml"
     job.write_text(JOB.read_text().replace("\n[pair]\n", "\n[pair]\ncentre_distance_mm = 62.6\n"))
@@ -187,8 +203,8 @@ def test_a_position_without_contact_is_told(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"twist_deg": None}, "no load: neither twist_deg nor torque_Nm"),
-        ({"torque_Nm": 100}, "stands beside twist_deg"),
+        ({"torque_Nm": None}, "no load: neither twist_deg nor torque_Nm"),
+        ({"twist_deg": 0.5}, "stands beside twist_deg"),
         ({"twist_deg": -0.5}, "stiffness.twist_deg = -0.5: must be finite and > 0"),
         ({"twist_deg": "true"}, "must be a number"),
         ({"twsit_deg": 0.5}, "did you mean 'twist_deg'?"),
@@ -200,7 +216,7 @@ def test_a_position_without_contact_is_told(tmp_path, capsys):
         ({"angle_step_deg": 1e-6, "angle_stop_deg": None}, "angle_step_deg = 1e-06: makes more than 100000 positions"),
         ({"coarsen": 50.0}, "coarsen = 50.0: must be finite and >= 0.2 and <= 5"),
         ({"interpolation": '"spline"'}, "must be one of cubic, linear"),
-        ({"twist_deg": 8.0}, "half a pitch of the wheel"),
+        ({"torque_Nm": None, "twist_deg": 8.0}, "half a pitch of the wheel"),
     ],
 )
 def test_mistakes_in_the_file(tmp_path, capsys, changes, message):
@@ -322,7 +338,7 @@ def test_as_a_process(tmp_path):
 
 def test_the_script(tmp_path):
     script = [sys.executable, str(ROOT / "scripts" / "stiffness_sweep.py")]
-    job = job_with(tmp_path, twist_deg=0.3, coarsen=3, angle_stop_deg=4)
+    job = job_with(tmp_path, torque_Nm=None, twist_deg=0.3, coarsen=3, angle_stop_deg=4)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [*script, str(job), str(tmp_path / "k.csv")], capture_output=True, text=True, env=environment, check=False

@@ -147,7 +147,7 @@ def test_a_curve_from_a_file(job, tmp_path):
 def test_a_mesh_law_with_friction(job, tmp_path, capsys):
     """75 N m at 400 rad/s leave the mesh: what comes in is that and the loss, in table, summary and on the terminal."""
     text = SMALL.replace(
-        "stiffness_N_per_m = 1e8\ndamping_N_s_per_m = 2000.0", "friction = 0.05\nlaw_torque_Nm = 200.0"
+        "stiffness_N_per_m = 1e8\ndamping_N_s_per_m = 2000.0", "friction = 0.05\nmesh_model_torque_Nm = 200.0"
     )
     job.write_text(text + "[train.damping]\nratio = 0.05\n")
     out = tmp_path / "out"
@@ -188,7 +188,7 @@ def test_teeth_that_part_are_told(job, tmp_path, capsys):
     steady = 20.0 / (37.5e-3 * math.cos(math.radians(25.0)))
     assert contact["dynamic_factors"][0] == pytest.approx(np.abs(force).max() / steady, rel=1e-9)
     assert contact["flanks"] == ["both flanks, 30 um of normal backlash"]
-    job.write_text(SMALL.replace("stiffness_N_per_m = 1e8", "law_torque_Nm = 200.0").replace("= 75.0", "= 0.0"))
+    job.write_text(SMALL.replace("stiffness_N_per_m = 1e8", "mesh_model_torque_Nm = 200.0").replace("= 75.0", "= 0.0"))
     assert main(["vibration", str(job), "--out", str(out), "--no-estimate", "--no-pictures"]) == 0
     assert "no load keeps the teeth of mesh pinion-wheel in contact" in capsys.readouterr().err
     (flanks,) = json.loads((out / "summary.json").read_text())["contact"]["flanks"]

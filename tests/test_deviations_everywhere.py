@@ -167,7 +167,7 @@ def train_text(more: str, **curves: str) -> str:
 def test_a_train_takes_the_flanks_that_drive(tmp_path) -> None:
     """The drive turns against the axis, so the right flanks bear: relief on the left ones changes nothing."""
     relief = "[microgeometry.pinion.{}]\ntip_relief_um = 20.0\ntip_relief_length_mm = 3.0\n"
-    curves = {"law": '"curve"', "load": '"torque"', "positions": "8"}
+    curves = {"mesh_model": '"variable_stiffness"', "load": '"torque"', "positions": "8"}
     found = {}
     for side in ("none", "left", "right"):
         job = tmp_path / f"{side}.toml"
@@ -194,7 +194,7 @@ def test_a_train_takes_the_pitch_errors_of_its_teeth(sign, tmp_path) -> None:
         for side in ("left", "right"):
             values = ", ".join(f"{x:.3f}" for x in rng.uniform(-6.0, 6.0, teeth))
             lists += f"[microgeometry.{name}.{side}]\npitch_um = [{values}]\n"
-    text = train_text(lists, law='"map"').replace("= -300.0", f"= {sign * 300.0}")
+    text = train_text(lists, mesh_model='"potential"').replace("= -300.0", f"= {sign * 300.0}")
     path = tmp_path / "job.toml"
     path.write_text(text.replace("torque_Nm = -30.0", f"torque_Nm = {sign * torque}"))
     job = read_train_job(path)
@@ -218,7 +218,7 @@ def test_pitch_errors_of_a_train_displace_its_teeth(tmp_path) -> None:
     """Back flanks touch as much later as driving ones touch earlier; in the mesh, too, for pairs of such teeth."""
     values = [round(5.0 * math.sin(j), 3) for j in range(20)]
     path = tmp_path / "job.toml"
-    text = train_text(f"[microgeometry.pinion]\npitch_um = {values}\n", law='"map"')
+    text = train_text(f"[microgeometry.pinion]\npitch_um = {values}\n", mesh_model='"potential"')
     path.write_text(text.replace("tip_round_mm = 0.1", "tip_round_mm = 0.1\ntooth_thinning_um = 50.0"))
     train = job_train(read_train_job(path), (2e8,))
     left, right = next(g.pitch_errors for g in train.gears if g.gear.teeth == 20)
@@ -234,7 +234,7 @@ def test_back_flanks_have_their_own_microgeometry(tmp_path) -> None:
     """Loads of both signs against contact solutions: relief on the left flanks, crowning on the right ones."""
     torque, thin = 30.0, "tip_round_mm = 0.1\ntooth_thinning_um = 50.0"
     sides = "[microgeometry.pinion.left]\ntip_relief_um = 8.0\ntip_relief_length_mm = 3.0\n"
-    text = train_text(sides + "[microgeometry.wheel.right]\ncrowning_um = 5.0\n", law='"map"')
+    text = train_text(sides + "[microgeometry.wheel.right]\ncrowning_um = 5.0\n", mesh_model='"potential"')
     path = tmp_path / "job.toml"
     path.write_text(text.replace("tip_round_mm = 0.1", thin))
     job = read_train_job(path)
@@ -256,16 +256,16 @@ def test_back_flanks_have_their_own_microgeometry(tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("more", "law", "told"),
+    ("more", "model", "told"),
     [
-        ("[microgeometry.pinion]\npitch_class = 7\n", "curve", 'stand unevenly.*law = "map"'),
-        ("[microgeometry.pinion]\npitch_um = [1.0, 2.0]\n", "map", "one entry for each of the 20 teeth"),
-        ("[microgeometry.pinion.left]\ncrowning_um = 5.0\n", "curve", "left and right flanks differ"),
+        ("[microgeometry.pinion]\npitch_class = 7\n", "variable_stiffness", 'stand unevenly.*mesh_model = "potential"'),
+        ("[microgeometry.pinion]\npitch_um = [1.0, 2.0]\n", "potential", "one entry for each of the 20 teeth"),
+        ("[microgeometry.pinion.left]\ncrowning_um = 5.0\n", "variable_stiffness", "left and right flanks differ"),
     ],
 )
-def test_what_a_train_refuses(more, law, told, tmp_path) -> None:
+def test_what_a_train_refuses(more, model, told, tmp_path) -> None:
     job = tmp_path / "job.toml"
-    text = train_text(more, law=f'"{law}"')
+    text = train_text(more, mesh_model=f'"{model}"')
     job.write_text(text.replace("[[train.meshes]]", "[[train.meshes]]\nbacklash_um = 20.0"))
     with pytest.raises(InputError, match=told):
         train_curves(read_train_job(job))

@@ -72,7 +72,7 @@ def test_a_gear_of_its_own_says_what_it_takes_from_the_pair(entries):
 
 def test_a_mesh_says_where_law_material_damping_and_backlash_come_from(entries):
     second = entries["meshes"]["g3-g4"]
-    assert second["law"] == {"value": "map", "from": "[train.curves]"}
+    assert second["mesh_model"] == {"value": "potential", "from": "[train.curves]"}
     assert second["youngs_modulus_GPa of driver"]["from"] == "[pair.material]"
     assert second["rayleigh_beta_s"] == {"value": 1e-6, "from": "[train.damping]"}
     # 40 um off the arc of both gears' teeth, along the line of action

@@ -11,8 +11,10 @@ import pytest
 
 from gearfe import LoadMap, sweep_loads, sweep_stiffness
 from gearfe.cli import main
+from gearfe.config import load_job
 from gearfe.errors import InputError
 from gearfe.loadmap.load_map import RootMap
+from gearfe.stiffness.job import read_stiffness_job
 from gearfe.stiffness.sweep import elastic_pair
 from gearfe.vibration.job import read_train_job
 from gearfe.vibration.mesh_stiffness import train_curves
@@ -115,14 +117,14 @@ def test_torques_that_are_none(gears, elastic, torques):
 
 def test_a_train_names_what_stands_for_a_load_map(tmp_path):
     (tmp_path / "job.toml").write_text(SMALL.replace("stiffness_N_per_m = 2e8", 'load_map = "map.csv"') + BORES)
-    with pytest.raises(InputError, match=r"load_map = 'map.csv': is gone.*law = \"curve\".*curve"):
+    with pytest.raises(InputError, match=r"load_map = 'map.csv': is gone.*mesh_model = \"variable_stiffness\".*curve"):
         read_train_job(tmp_path / "job.toml")
 
 
 def test_backlash_and_law_of_the_job_reach_maps_and_trains(tmp_path):
     """A pair with backlash: k of the map and of the train's own curve is that of a sweep, by the job's law."""
     text = JOB.read_text().replace("\n[pair]\n", "\n[pair]\ncentre_distance_mm = 62.6\n")
-    text = text.replace('\nlaw = "nitsche"', '\nlaw = "half_plane"\ncoarsen = 3.0\nkinematics = "small"\n#')
+    text = text.replace("\n[stiffness]\n", '\n[stiffness]\ncoarsen = 3.0\nkinematics = "small"\n')
     text = text.replace("x_mm = 62.5\n", "x_mm = 62.6\n").replace("x_mm = 125.0\n", "x_mm = 125.2\n")
     text = text.replace("positions = 36", "positions = 8")
     (tmp_path / "job.toml").write_text(text)
@@ -186,6 +188,17 @@ def test_the_command(tmp_path, capsys):
     assert summary["job"]["loadmap"]["torque_count"] == 4
     assert 0 < summary["root_stress_error_estimate"] < 0.02
     assert (out / "loadmap.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_steel_bears_the_loads_of_the_shipped_job():
+    """sigma_Hlim = 1500 and sigma_FE = 2 sigma_Flim = 1000 N/mm2: case-hardened steel, ISO 6336-5, grade MQ."""
+    tables = load_job(JOB, ("pair", "stiffness", "loadmap", "train"))
+    largest = tables["loadmap"].torque_stop_Nm
+    assert tables["stiffness"].torque_Nm == -tables["train"].loads[0].torque_Nm <= largest
+    job = read_stiffness_job(JOB)
+    made = sweep_loads(job.pair, [largest], job.model, coarsen=2.0, root_stress=True)
+    assert 500e6 < np.nanmax(made.curves[0].peak_pressure) < 1500e6
+    assert 100e6 < made.root.largest.max() < 1000e6
 
 
 @pytest.mark.parametrize(

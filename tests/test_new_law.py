@@ -73,7 +73,8 @@ def test_in_python(springs: type) -> None:
 
 def test_in_a_job_file_and_on_the_command_line(springs: type, tmp_path: Path) -> None:
     job = tmp_path / "job.toml"
-    text = JOB.read_text().replace('law = "nitsche"', 'law = "springs"\nlaw_parameters = { bed = 300.0 }\n#')
+    line = 'law = "springs"\nlaw_parameters = { bed = 300.0 }'
+    text = JOB.read_text().replace("\n[stiffness]\n", f"\n[stiffness]\n{line}\n")
     job.write_text(text)
     assert read_stiffness_job(job).law == springs(300.0)
     options = ["--twist-deg", "0.1", "--angles", "2", "6", "8", "--no-pictures", "--no-estimate"]

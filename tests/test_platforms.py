@@ -160,7 +160,7 @@ def test_a_case_that_is_written_on_another_drive(tmp_path: Path, monkeypatch: py
         raise ValueError(f"path is on mount {path!r}, start on mount {start!r}")
 
     (tmp_path / "curve.csv").write_text("x\n", encoding="utf-8")
-    raw = {"train": {"meshes": [{"curve": "curve.csv", "law": "curve"}]}}
+    raw = {"train": {"meshes": [{"curve": "curve.csv", "mesh_model": "variable_stiffness"}]}}
     monkeypatch.setattr(os.path, "relpath", another_drive)
     (mesh,) = job_beside(raw, tmp_path, tmp_path / "elsewhere")["train"]["meshes"]
-    assert mesh == {"curve": (tmp_path / "curve.csv").resolve().as_posix(), "law": "curve"}
+    assert mesh == {"curve": (tmp_path / "curve.csv").resolve().as_posix(), "mesh_model": "variable_stiffness"}

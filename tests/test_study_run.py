@@ -213,7 +213,7 @@ def test_a_train_in_a_rigid_housing(tmp_path):
     raw["train"] |= {"housing": "rigid", "duration_ms": 0.7, "method": "taylor"}
     for name in ("variant", "variants"):
         raw["train"].pop(name)
-    raw["train"]["curves"] = {"law": "curve", "load": "stiffness"}
+    raw["train"]["curves"] = {"mesh_model": "variable_stiffness", "load": "stiffness"}
     raw["stiffness"] = {"twist_deg": 0.05, "law": "half_plane", "coarsen": 2.0, "angle_step_deg": 3.0}
     raw["study"] = {
         "job": "vibration", "design": "factorial", "parameters": {"train.drive.speed_rad_per_s": [300.0, 500.0]},

@@ -204,7 +204,7 @@ def test_a_law_that_does_not_reach_says_what_to_ask_for():
     made = simulate(build_train(gear_train), np.linspace(0.0, 2e-3, 101), raise_on_failure=False)
     assert made.status == "beyond the mesh law"
     assert made.time_reached < 1.2e-3
-    assert any("N m" in warning and "law_torque_Nm" in warning for warning in made.warnings)
+    assert any("N m" in warning and "mesh_model_torque_Nm" in warning for warning in made.warnings)
 
 
 def runge_kutta(model, times, tolerance):  # type: ignore[no-untyped-def]

@@ -59,14 +59,19 @@ def test_a_load_that_drives_works_on_back_flanks_that_are_known(tmp_path: Path) 
     assert made.contact_force[-1, 0] == pytest.approx(-force, rel=0.2)
     mapped = wrong.replace("stiffness_N_per_m = 2e8", "") + PAIR
     assert job_train(read_train_job(written(tmp_path, mapped))).kinematics.steady_forces == pytest.approx([-force])
-    for change in (("thinning_um = 20.0", "thinning_um = 0.0"), ('driven = "b"', 'driven = "b"\nlaw = "curve"')):
+    for change in (
+        ("thinning_um = 20.0", "thinning_um = 0.0"),
+        ('driven = "b"', 'driven = "b"\nmesh_model = "variable_stiffness"'),
+    ):
         with pytest.raises(InputError, match="drives the train"):
             job_train(read_train_job(written(tmp_path, mapped.replace(*change))))
 
 
 def test_a_load_beyond_every_contact_names_the_mesh(tmp_path: Path) -> None:
     text = SMALL.replace("stiffness_N_per_m = 2e8", "").replace("torque_Nm = -30.0", "torque_Nm = -3e5") + BORES + PAIR
-    with pytest.raises(InputError, match=r"mesh 'a-b' law_torque_Nm = 1500000.*no contact solution.*smaller load"):
+    with pytest.raises(
+        InputError, match=r"mesh 'a-b' mesh_model_torque_Nm = 1500000.*no contact solution.*smaller load"
+    ):
         train_curves(read_train_job(written(tmp_path, text)))
 
 
@@ -132,10 +137,10 @@ def test_what_is_no_mistake() -> None:
         assert made.contact_force.min() >= -1e-9
 
 
-@pytest.mark.parametrize("kind", ["curve", "map"])
+@pytest.mark.parametrize("kind", ["stiffness", "potential"])
 def test_steady_states_on_back_flanks_begin_behind_the_backlash(tmp_path: Path, kind: str) -> None:
     """Slow motions carry the force of statics, of the load and of the opposite one, and the teeth stay in contact."""
-    text = SMALL + BORES if kind == "curve" else SMALL.replace("stiffness_N_per_m = 2e8", "") + BORES + PAIR
+    text = SMALL + BORES if kind == "stiffness" else SMALL.replace("stiffness_N_per_m = 2e8", "") + BORES + PAIR
     text = text.replace("= 2e8", "= 2e8\nbacklash_um = 20.0").replace("ratio = 0.05", "ratio = 0.2")
     job = read_train_job(written(tmp_path, text))
     curves = train_curves(job)

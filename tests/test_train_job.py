@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from gearfe.config import build, load_job
 from gearfe.errors import InputError
 from gearfe.gear.pair import GearPair
 from gearfe.stiffness.curve import StiffnessCurve
-from gearfe.tables.pair import PairTable
+from gearfe.tables.pair import PairTable, StiffnessTable
 from gearfe.tables.train import TrainCurvesTable, TrainGearTable
 from gearfe.train import build_train, simulate
 from gearfe.vibration.job import bore_places, job_train, read_train_job, train_gear
@@ -101,7 +102,8 @@ def test_the_shipped_job_is_what_it_says() -> None:
 def test_variants_differ_in_curves_and_damping() -> None:
     standard, tutorial, operating = (read_train_job(SHIPPED, name).table for name in (None, "tutorial", "operating"))
     assert (standard.curves, standard.damping.ratio) == (TrainCurvesTable(), 0.0)  # mesh laws are the default
-    assert (standard.curves.law, tutorial.curves.law, operating.curves.law) == ("map", "curve", "curve")
+    models = [table.curves.mesh_model for table in (standard, tutorial, operating)]
+    assert models == ["potential", "variable_stiffness", "variable_stiffness"]
     assert math.pi * 2000.0 * standard.damping.rayleigh_beta_s == pytest.approx(0.01, rel=0.01)  # 1 % at 2 kHz
     assert (tutorial.curves.interpolation, tutorial.curves.load, tutorial.damping.ratio) == ("linear", "stiffness", 0.0)
     assert (operating.curves.interpolation, operating.curves.load, operating.damping.ratio) == ("cubic", "torque", 0.01)
@@ -184,9 +186,14 @@ def built(path: Path) -> None:
         ("stiffness_N_per_m = 2e8", "[train.curves]\npositions = 36", "curves.positions = 36: is of stiffness curves"),
         ("2e8", "2e8\nfriction = 0.6", "friction = 0.6: must be"),
         ("2e8", "2e8\nfriction = 0.06", "needs a mesh law"),
-        ("2e8", "2e8\nlaw = 'map'", "contradicts stiffness_N_per_m"),
+        ("2e8", "2e8\nmesh_model = 'potential'", "contradicts stiffness_N_per_m"),
+        ("stiffness_N_per_m = 2e8", "curve = 'k.csv'\nmesh_model = 'mean_stiffness'", "mesh_model.* contradicts curve"),
         ("2e8", "2e8\nbacklash_um = -1.0", "wedged mesh"),
-        ("stiffness_N_per_m = 2e8", "friction = 0.06\n[train.curves]\nlaw = 'curve'", "needs a mesh law, but"),
+        (
+            "stiffness_N_per_m = 2e8",
+            "friction = 0.06\n[train.curves]\nmesh_model = 'variable_stiffness'",
+            "needs a mesh law, but",
+        ),
         ("stiffness_N_per_m = 2e8", "roughness_um = 0.5", "oil_viscosity_mPa_s: is required beside roughness_um"),
         (
             "stiffness_N_per_m = 2e8",
@@ -200,6 +207,63 @@ def test_mistakes_in_a_file(tmp_path: Path, old: str, new: str, words: str) -> N
     path = written(tmp_path, SMALL.replace(old, new, 1) + BORES)
     with pytest.raises(InputError, match=words):
         built(path)
+
+
+MODELS = 'write mesh_model = "potential" or "variable_stiffness" or "mean_stiffness"'
+
+
+@pytest.mark.parametrize("where", ["train.curves", "train.variants.V.curves", "train.meshes[0]"])
+@pytest.mark.parametrize(
+    ("line", "cure"),
+    [
+        ("law = 'map'", 'write mesh_model = "potential"'),
+        ("law = 'curve'", 'write mesh_model = "variable_stiffness"'),
+        ("law = 'linear'", 'write mesh_model = "mean_stiffness"'),
+        ("law = 'nitsche'", MODELS),
+        ("law = 1", MODELS),
+        ("mesh_model = 'map'", 'write mesh_model = "potential"'),
+        ("mesh_model = 'curve'", 'write mesh_model = "variable_stiffness"'),
+        ("mesh_model = 'linear'", 'write mesh_model = "mean_stiffness"'),
+        ("mesh_model = 'potentail'", "did you mean 'potential'"),
+    ],
+)
+def test_removed_keys_and_values_of_mesh_models_name_the_new_line(
+    tmp_path: Path, where: str, line: str, cure: str
+) -> None:
+    """The contact law is the only thing that `law` names; a mesh of a train has a model."""
+    in_mesh = where == "train.meshes[0]"
+    text = SMALL.replace("= 2e8", f"= 2e8\n{line}") if in_mesh else f"{SMALL}{BORES}[{where}]\n{line}\n"
+    key = line.partition(" ")[0]
+    with pytest.raises(InputError, match=re.escape(f"{where}.{key} = ") + ".*" + re.escape(cure)):
+        read_train_job(written(tmp_path, text))
+
+
+def test_the_removed_key_of_the_largest_torque_names_the_new_line(tmp_path: Path) -> None:
+    text = SMALL.replace("stiffness_N_per_m = 2e8", "law_torque_Nm = 450.5") + BORES
+    with pytest.raises(InputError, match=r"meshes\[0\].law_torque_Nm = 450.5.*write mesh_model_torque_Nm = 450.5"):
+        read_train_job(written(tmp_path, text))
+
+
+def test_keys_of_a_variant_win_over_those_of_the_stiffness_table(tmp_path: Path) -> None:
+    """The others are shared, and a load of either kind is instead of the shared one."""
+    shared = "[stiffness]\ntorque_Nm = 20.0\ncoarsen = 2.0\nlaw = 'penalty'\n"
+    own = "[train.variants.A.stiffness]\ntwist_deg = 0.3\nlaw = 'half_plane'\n[train.variants.B.curves]\n"
+    path = written(tmp_path, shared + SMALL + BORES + own)
+    found = {name: read_train_job(path, name).stiffness for name in ("", "A", "B")}
+    assert found[""] == found["B"] == StiffnessTable(torque_Nm=20.0, coarsen=2.0, law="penalty")
+    assert found["A"] == StiffnessTable(twist_deg=0.3, coarsen=2.0, law="half_plane")
+    with pytest.raises(InputError, match=r"train.variants.A.stiffness.coarsen = 9.0: must be finite and >= 0.2"):
+        read_train_job(written(tmp_path, SMALL + BORES + "[train.variants.A.stiffness]\ncoarsen = 9.0\n"))
+    both = "[train.variants.A.stiffness]\ntwist_deg = 0.3\ntorque_Nm = 1.0\n"
+    with pytest.raises(InputError, match=r"train.variants.A.stiffness.torque_Nm = 1.0: stands beside twist_deg"):
+        read_train_job(written(tmp_path, SMALL + BORES + both))
+
+
+def test_the_shipped_tutorial_is_the_published_load_by_nitsche() -> None:
+    """0.5 degrees; the curve's positions and the gears are shared with [stiffness], whose law is the default."""
+    shared, tutorial = (read_train_job(SHIPPED, name).stiffness for name in ("", "tutorial"))
+    assert (shared.torque_Nm, shared.twist_deg, shared.law) == (100.0, None, "half_plane")
+    assert tutorial == dataclasses.replace(shared, torque_Nm=None, twist_deg=0.5, law="nitsche")
 
 
 def test_missing_bores_are_named(tmp_path: Path) -> None:

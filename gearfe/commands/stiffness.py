@@ -10,7 +10,7 @@ from typing import Any
 
 from ..config import check_range
 from ..progress import announce
-from ..tables.pair import StiffnessTable, check_law
+from ..tables.pair import LOADS, StiffnessTable, check_law
 from .arguments import add_folder, add_job, add_keys, add_removed, check_option, number, print_results, with_keys
 
 #: Keys of the [stiffness] table that options stand for, beside the load and the angles.
@@ -18,13 +18,13 @@ KEYS = (
     "law", "nitsche_gamma0", "penalty_stiffness_N_per_mm3", "plane", "kinematics", "twist_from", "points_per_edge",
     "coarsen", "flank_coarsen", "solve_all", "interpolation",
 )  # fmt: skip
-LOADS = ("twist_deg", "torque_Nm")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "job", "job file with the tables [pair] and [stiffness]")
     add_folder(parser)
+    parser.add_argument("--variant", metavar="NAME", help="variant of [train] whose [stiffness] holds")
     add_keys(parser.add_mutually_exclusive_group(), StiffnessTable, *LOADS)
     parser.add_argument("--angles", type=float, nargs=3, metavar=("START", "STEP", "STOP"), help="pinion angles (deg)")
     add_keys(parser, StiffnessTable, *KEYS)
@@ -70,11 +70,16 @@ def run(args: argparse.Namespace) -> int:
     if args.range is not None:
         check_range(args.range, "--range", {"above": 0.0, "doc": "end of the colours (MPa)"})
     started = time.perf_counter()
-    from ..config import load_job
+    from ..config import job_tables, read_toml
     from ..errors import InputError
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load
-    tables = load_job(args.job, ("pair",), ("stiffness", "microgeometry"))
+    raw = read_toml(args.job)
+    tables = job_tables(raw, args.job, ("pair",), ("stiffness", "microgeometry"))
+    if args.variant is not None:
+        from ..tables.train import variant_stiffness
+
+        tables["stiffness"] = variant_stiffness(raw, args.variant)
     tables["stiffness"] = overridden(tables.get("stiffness", StiffnessTable()), args)
     given = args.fields or []
     chosen = [value for value in given if value != "all"] or None  # pinion angles (deg); None: all

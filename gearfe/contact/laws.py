@@ -192,7 +192,7 @@ def check_alike(deviations: tuple[ToothDeviations, ToothDeviations]) -> None:
             problem = f"its teeth {what}: curves and mesh laws are of one mesh cycle that repeats"
             cure = (
                 "leave out pitch errors, measured teeth that differ, and waves that are no multiple of the teeth; "
-                'gearfe loadmap takes them, and pitch errors also trains with law = "map"'
+                'gearfe loadmap takes them, and pitch errors also trains with mesh_model = "potential"'
             )
             raise InputError(f"deviations of the {name}", None, problem, cure)
 

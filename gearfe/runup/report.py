@@ -291,13 +291,13 @@ def warnings(run: RunUp) -> list[str]:
             if least < 0.0:
                 found.append(
                     f"mesh {line.name} pulls: {least:.5g} N at {speed:.6g} rad/s; the spring acts both ways, real "
-                    'teeth would part there: write law = "map" or backlash_um'
+                    'teeth would part there: write mesh_model = "potential" or backlash_um'
                 )
     beyond = [s.speed for s in run.states if s.beyond]
     if beyond:
         found.append(
             f"at {len(beyond)} of {len(run.states)} states, the first at {beyond[0]:.6g} rad/s, a mesh goes beyond "
-            "what its law is known for: write a larger law_torque_Nm in [[train.meshes]]"
+            "what its law is known for: write a larger mesh_model_torque_Nm in [[train.meshes]]"
         )
     held = {s.speed for s in run.states if s.stable is not False}
     lost = sorted({s.speed for s in run.states} & set(run.speeds.tolist()) - held, key=abs)

@@ -67,7 +67,7 @@ TRAIN: dict[str, Any] = {
             "shaft": "output", "attachment": "3", "torque_Nm": 75.0, "ramp_centre_ms": 0.5, "ramp_width_ms": 1.0,
         },
     ],
-    "curves": {"law": "map"},
+    "curves": {"mesh_model": "potential"},
     "damping": {"ratio": 0.01},
 }  # fmt: skip
 

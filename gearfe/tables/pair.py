@@ -225,6 +225,10 @@ def check_flank_coarsen(coarsen: float, flank_coarsen: float, field: str) -> Non
         raise InputError(field, flank_coarsen, problem, "1 leaves the flanks to coarsen")
 
 
+#: Keys of [stiffness] that give its load, at most one of them.
+LOADS = ("twist_deg", "torque_Nm")
+
+
 @dataclass(frozen=True)
 class StiffnessTable:
     """Load, positions, model and mesh of a rotation sweep."""

@@ -5,17 +5,38 @@ All shafts run along y, in the frame of the housing. Lengths in millimetres; spe
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-from ..config import job_tables, quantity, read_toml
+from ..config import Removed, build, job_tables, quantity, read_toml
 from ..errors import InputError, unknown_name
 from .mechanism import GONE_METHODS
-from .pair import ToothFormTable
+from .pair import LOADS, StiffnessTable, ToothFormTable
 from .timefunction import TrainFunctionTable
 
 Five = tuple[float, float, float, float, float]
+
+#: What a mesh is made of unless its stiffness is given.
+POTENTIAL, VARIABLE, MEAN = MESH_MODELS = ("potential", "variable_stiffness", "mean_stiffness")
+#: Former name of a mesh model -> its name.
+FORMER_MODELS = {"map": POTENTIAL, "curve": VARIABLE, "linear": MEAN}
+#: Former name of a mesh model -> what to write instead.
+GONE_MODELS = {former: f'write mesh_model = "{name}"' for former, name in FORMER_MODELS.items()}
+
+
+def _mesh_model_for(law: object) -> str:
+    """Return the line that replaces the removed key ``law`` of a mesh or of the curves."""
+    names = " or ".join(f'"{name}"' for name in MESH_MODELS)
+    return GONE_MODELS.get(str(law), f"write mesh_model = {names}")
+
+
+#: Why meshes and curves have no key ``law``.
+LAW_REMOVED: Removed = (
+    "names the contact law, a key of [stiffness]; what a mesh is made of is its model",
+    _mesh_model_for,
+)
 
 
 @dataclass(frozen=True)
@@ -89,29 +110,34 @@ class TrainMeshTable:
         None,
         choices=("always", "in_contact"),
         doc="when the damper of the mesh acts, its part of rayleigh_beta_s included: always, or in_contact, only while "
-        "teeth bear (with a map in proportion to the force); left out: in_contact with a map, always with a curve",
+        "teeth are in contact (with a potential in proportion to the force); left out: in_contact with a potential, "
+        "always with a stiffness",
     )
     centre_distance_mm: float | None = quantity(
         None, above=0.0, doc="working centre distance (mm); left out: no backlash"
     )
-    law: str | None = quantity(
+    mesh_model: str | None = quantity(
         None,
-        choices=("map", "curve", "linear"),
-        doc="map: mesh law with transmission error and separation; curve: k(phi) delta; linear: mean of that curve; "
-        "left out: that of [train.curves]",
+        choices=MESH_MODELS,
+        gone=GONE_MODELS,
+        doc="potential: mesh law with transmission error and separation; variable_stiffness: k(phi) delta; "
+        "mean_stiffness: the mean of k over the mesh cycle; left out: that of [train.curves]",
     )
-    law_torque_Nm: float | None = quantity(
+    mesh_model_torque_Nm: float | None = quantity(
         None,
         above=0.0,
-        doc="largest torque at the driven gear that the mesh law is made for; left out: 5 times the steady one",
+        doc="largest torque at the driven gear that the potential is made for; left out: 5 times the steady one",
     )
     backlash_um: float | None = quantity(
         None,
-        doc="normal backlash (um); left out: with a map that of the gears, or no back flanks where they have none; "
-        "with a curve or a constant a spring that acts both ways",
+        doc="normal backlash (um); left out: with a potential that of the gears, or no back flanks where they have "
+        "none; with a stiffness a spring that acts both ways",
     )
     friction: float | None = quantity(
-        None, low=0.0, high=0.5, doc="coefficient of friction of the teeth, with a map; left out: none, or by the oil"
+        None,
+        low=0.0,
+        high=0.5,
+        doc="coefficient of friction of the teeth, with a potential; left out: none, or by the oil",
     )
     oil_viscosity_mPa_s: float | None = quantity(
         None, above=0.0, doc="viscosity of the oil: mean coefficient of friction by Schlenk (ISO/TR 14179-2), instead"
@@ -122,12 +148,15 @@ class TrainMeshTable:
     stiffness_N_per_m: float | None = quantity(None, above=0.0, doc="constant stiffness (N/m)")
     rigid: bool = quantity(False, doc="true: an ideal rigid mesh, a constraint")
 
-    #: Key that was: what became of it, and what to write instead.
-    REMOVED: ClassVar[dict[str, tuple[str, str]]] = {
+    #: Removed keys, see `gearfe.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {
         "load_map": (
             "is gone: trains solve the contacts of their meshes themselves",
-            'leave it out (law = "curve": the curve at the mesh\'s torque), or give a file of gearfe stiffness: curve',
+            'leave it out (mesh_model = "variable_stiffness": the curve at the mesh\'s torque), or give a file of '
+            "gearfe stiffness: curve",
         ),
+        "law": LAW_REMOVED,
+        "law_torque_Nm": ("has another name", lambda torque: f"write mesh_model_torque_Nm = {torque}"),
     }
 
     def check(self, where: str) -> None:
@@ -137,9 +166,9 @@ class TrainMeshTable:
             raise InputError(
                 f"{where}.{given[1]}", getattr(self, given[1]), f"stands beside {given[0]}", "leave one out"
             )
-        if given and self.law == "map":
-            cure = f'write law = "curve", or leave {given[0]} out: a map is made of contact solutions'
-            raise InputError(f"{where}.law", self.law, f"contradicts {given[0]}", cure)
+        if given and self.mesh_model is not None and (given[0], self.mesh_model) != ("curve", VARIABLE):
+            cure = f"leave mesh_model out, or leave {given[0]} out: a mesh model is computed from contact solutions"
+            raise InputError(f"{where}.mesh_model", self.mesh_model, f"contradicts {given[0]}", cure)
         oil = [k for k in ("oil_viscosity_mPa_s", "roughness_um", "oil_factor") if getattr(self, k) is not None]
         if oil and self.friction is not None:
             problem = f"stands beside friction = {self.friction:g}"
@@ -147,10 +176,10 @@ class TrainMeshTable:
         for key in ("oil_viscosity_mPa_s", "roughness_um"):
             if oil and getattr(self, key) is None:
                 raise InputError(f"{where}.{key}", None, f"is required beside {oil[0]}", "add it")
-        if (oil or self.friction) and (given or self.law in ("curve", "linear")):
+        if (oil or self.friction) and (given or self.mesh_model in (VARIABLE, MEAN)):
             key = oil[0] if oil else "friction"
-            problem = "needs a mesh law: a curve does not tell how tooth pairs share the load"
-            cure = 'write law = "map", or leave friction out'
+            problem = "needs a mesh law: a stiffness does not say how tooth pairs share the load"
+            cure = 'write mesh_model = "potential", or leave friction out'
             raise InputError(f"{where}.{key}", getattr(self, key), problem, cure)
         if self.backlash_um is not None and self.backlash_um < 0.0:
             problem = "must be >= 0 um: less is a wedged mesh, whose flanks all bear without a load"
@@ -238,10 +267,11 @@ class TrainRigidBoreTable:
 class TrainCurvesTable:
     """What computed meshes are made of: mesh laws, or stiffness curves and how these are computed and read."""
 
-    law: str = quantity(
-        "map",
-        choices=("map", "curve", "linear"),
-        doc="of meshes that are computed: map, curve or linear, see [[train.meshes]]",
+    mesh_model: str = quantity(
+        POTENTIAL,
+        choices=MESH_MODELS,
+        gone=GONE_MODELS,
+        doc="of meshes that are computed: potential, variable_stiffness or mean_stiffness, see [[train.meshes]]",
     )
     load: str | None = quantity(
         None,
@@ -254,6 +284,9 @@ class TrainCurvesTable:
     interpolation: str = quantity(
         "cubic", choices=("cubic", "linear"), doc="between the positions: cubic (monotone) or linear"
     )
+
+    #: Removed keys, see `gearfe.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {"law": LAW_REMOVED}
 
 
 @dataclass(frozen=True)
@@ -268,10 +301,11 @@ class TrainDampingTable:
 
 @dataclass(frozen=True)
 class TrainVariantTable:
-    """A named alternative to [train.curves] and [train.damping]."""
+    """A named alternative to [train.curves] and [train.damping]; keys of its `stiffness` win over [stiffness]."""
 
     curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.variants.NAME.curves]")  # noqa: RUF009
     damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.variants.NAME.damping]")  # noqa: RUF009
+    stiffness: StiffnessTable | None = quantity(None, doc="keys that win over those of [stiffness]")  # noqa: RUF009
 
 
 @dataclass(frozen=True)
@@ -311,20 +345,28 @@ class TrainTable:
             self.chosen(self.variant)
         self._check_names(where)
 
-    def check_laws(self) -> None:
-        """Nothing that is given for stiffness curves stands beside mesh laws alone, nor friction beside curves."""
-        given = ("curve", "stiffness_N_per_m", "rigid")
-        computed = [m.law or self.curves.law for m in self.meshes if not any(getattr(m, k) for k in given)]
+    def model_of(self, mesh: TrainMeshTable) -> str:
+        """Return the mesh model of a mesh, an empty text for one whose stiffness is given."""
+        if mesh.curve or mesh.stiffness_N_per_m or mesh.rigid:
+            return ""
+        return mesh.mesh_model or self.curves.mesh_model
+
+    def check_models(self) -> None:
+        """Raise `InputError` for keys of stiffness curves where all meshes have mesh laws, and friction without one."""
+        computed = {self.model_of(mesh) for mesh in self.meshes} - {""}
         for key in ("load", "positions"):
             value = getattr(self.curves, key)
-            if value is not None and computed and set(computed) == {"map"}:
-                cure = 'leave it out, or write law = "curve" beside it for k(phi) delta'
-                problem = 'is of stiffness curves, but the meshes have mesh laws (law = "map", the default)'
+            if value is not None and computed == {POTENTIAL}:
+                cure = 'leave it out, or write mesh_model = "variable_stiffness" beside it for k(phi) delta'
+                problem = (
+                    'is of stiffness curves, but the meshes have mesh laws (mesh_model = "potential", the default)'
+                )
                 raise InputError(f"train.curves.{key}", value, problem, cure)
         for i, mesh in enumerate(self.meshes):
-            if (mesh.friction or mesh.roughness_um) and (mesh.law or self.curves.law) != "map":
-                problem = f"needs a mesh law, but law = {self.curves.law!r} in train.curves"
-                raise InputError(f"train.meshes[{i}].friction", mesh.friction, problem, 'write law = "map" in the mesh')
+            if (mesh.friction or mesh.roughness_um) and self.model_of(mesh) != POTENTIAL:
+                problem = f"needs a mesh law, but mesh_model = {self.curves.mesh_model!r} in train.curves"
+                cure = 'write mesh_model = "potential" in the mesh'
+                raise InputError(f"train.meshes[{i}].friction", mesh.friction, problem, cure)
 
     def _check_names(self, where: str) -> None:
         """Names of shafts and gears are unique, and references to them exist."""
@@ -347,8 +389,7 @@ class TrainTable:
         """The table with the curves and damping of a variant; an empty name leaves it as it stands."""
         if not name:
             return self
-        if name not in self.variants:
-            raise unknown_name("variant", name, self.variants)
+        check_variant(name, self.variants)
         return replace(self, curves=self.variants[name].curves, damping=self.variants[name].damping, variant=name)
 
 
@@ -368,7 +409,32 @@ def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = No
     tables = job_tables(raw, path, ("train",), ("pair", "stiffness", "microgeometry", "housing", "spectrum"))
     table: TrainTable = tables["train"]
     table = table.chosen(table.variant if variant is None else variant)
-    table.check_laws()
+    table.check_models()
+    if table.variant:
+        tables["stiffness"] = variant_stiffness(raw, table.variant)
     if table.housing == "elastic" and "housing" not in tables:
         raise InputError("train.housing", "elastic", "needs a table [housing]", 'add it, or write housing = "rigid"')
     return {**tables, "train": table}
+
+
+def check_variant(name: str, variants: Mapping[str, Any]) -> None:
+    """Raise `InputError` for a variant that the job file does not describe."""
+    if name not in variants:
+        raise unknown_name("variant", name, variants)
+
+
+def variant_stiffness(raw: Mapping[str, Any], name: str) -> StiffnessTable:
+    """Return [stiffness] of the parsed tables with the keys that variant `name` of [train] has instead.
+
+    Raises
+    ------
+    InputError
+        For a variant that the file does not describe, and mistakes in its keys.
+    """
+    variants = raw.get("train", {}).get("variants", {})
+    check_variant(name, variants)
+    shared, own = raw.get("stiffness", {}), variants[name].get("stiffness", {})
+    if not own.keys().isdisjoint(LOADS):
+        shared = {key: value for key, value in shared.items() if key not in LOADS}
+    where = f"train.variants.{name}.stiffness" if own else "stiffness"
+    return build(StiffnessTable, {**shared, **own}, where)

@@ -191,7 +191,8 @@ def _check_pitch_errors(label: str, gear: ShaftGear, law: bool) -> None:
     for errors in gear.pitch_errors:
         if errors and not law:
             problem = f"has teeth with pitch errors on gear {gear.name!r}, which curves and rigid meshes do not know"
-            raise InputError(label, None, problem, 'take a mesh law (law = "map"), or leave the pitch errors out')
+            cure = 'take a mesh law (mesh_model = "potential"), or leave the pitch errors out'
+            raise InputError(label, None, problem, cure)
         if len(errors) not in (0, gear.gear.teeth) or not np.isfinite(errors).all():
             problem = f"must be finite, one for each of the {gear.gear.teeth} teeth of gear {gear.name!r}, or none"
             raise InputError("pitch_errors", len(errors), problem, "give as many as the gear has teeth")

@@ -96,7 +96,8 @@ def beyond_law(model: TrainModel, moved: TrainStates) -> tuple[int, str] | None:
                 why = (
                     f"; at {1e3 * moved.time[at]:.6g} ms mesh {line.name} reaches {force:.4g} N, which is "
                     f"{force * radius:.4g} N m at the driven gear, and its law is known up to {most:.4g} N and "
-                    f"{most * radius:.4g} N m: write law_torque_Nm = {1.5 * force * radius:.3g} in [[train.meshes]]"
+                    f"{most * radius:.4g} N m: write mesh_model_torque_Nm = {1.5 * force * radius:.3g} in "
+                    "[[train.meshes]]"
                 )
                 first = at, why
     return first

@@ -1,7 +1,7 @@
 """Values that gears and meshes of a train take from elsewhere: other tables, the gears themselves, defaults.
 
-A gear of its own takes keys that it lacks from [pair]; a mesh takes its law, material, damping and backlash from other
-tables or its gears. The summary names each such value with its source, so that nothing is inherited unseen.
+A gear of its own takes keys that it lacks from [pair]; a mesh takes its model, material, damping and backlash from
+other tables or its gears. The summary names each such value with its source, so that nothing is inherited unseen.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 
 from ..gear.pair import gear_pair
 from ..tables.pair import PairTable, tooth_form
-from ..tables.train import TrainGearTable, TrainMeshTable
+from ..tables.train import POTENTIAL, VARIABLE, TrainGearTable, TrainMeshTable
 from ..train.gear_train import GearMesh, GearTrain
 from .job import TrainJob
 
@@ -62,15 +62,14 @@ def _material_source(pair: PairTable, side: str) -> str:
 def _of_mesh(job: TrainJob, train: GearTrain, table: TrainMeshTable, mesh: GearMesh) -> dict[str, Source]:
     """What a mesh takes from other tables and its gears, and its defaults."""
     found: dict[str, Source] = {}
-    given = next((k for k in ("curve", "stiffness_N_per_m", "rigid") if getattr(table, k)), "")
-    law = "" if given else (table.law or job.table.curves.law)
+    model = job.table.model_of(table)
     curves = f"[train.variants.{job.table.variant}.curves]" if job.table.variant else "[train.curves]"
     pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
-    if law and table.law is None:
-        found["law"] = _value(law, curves)
-    if law == "curve" or table.curve:
+    if model and table.mesh_model is None:
+        found["mesh_model"] = _value(model, curves)
+    if model == VARIABLE or table.curve:
         found["interpolation"] = _value(job.table.curves.interpolation, curves)
-    if law and job.pair is not None:
+    if model and job.pair is not None:
         sides = {g.name: g.gear for g in job.table.gears}
         for role in ("driver", "driven"):
             side = sides[getattr(table, role)]
@@ -78,12 +77,12 @@ def _of_mesh(job: TrainJob, train: GearTrain, table: TrainMeshTable, mesh: GearM
             found[f"youngs_modulus_GPa of {role}"] = _value(
                 material.youngs_modulus_GPa, _material_source(job.pair, side)
             )
-        found["plane"] = _value(job.stiffness.plane, "[stiffness]")
+        found["plane"] = _value(job.stiffness.plane, _stiffness_source(job))
     if table.centre_distance_mm is None:
         source = "the gears, without backlash" if mesh.centre_distance is None else "[pair]"
         found["centre_distance_mm"] = _value(1e3 * pair.working_centre_distance, source)
     if table.backlash_um is None and not table.rigid:
-        if law == "map":
+        if model == POTENTIAL:
             source = "tooth_thinning_um of the gears and the centre distance"
             found["backlash_um"] = _value(1e6 * max(pair.normal_backlash, 0.0), source)
         else:
@@ -94,6 +93,13 @@ def _of_mesh(job: TrainJob, train: GearTrain, table: TrainMeshTable, mesh: GearM
     if job.table.damping.rayleigh_beta_s > 0.0 and not table.rigid:
         found["rayleigh_beta_s"] = _value(job.table.damping.rayleigh_beta_s, damping)
     return found
+
+
+def _stiffness_source(job: TrainJob) -> str:
+    """Tables that the keys of [stiffness] come from."""
+    name = job.table.variant
+    own = bool(name) and job.table.variants[name].stiffness is not None
+    return f"[stiffness] and [train.variants.{name}.stiffness]" if own else "[stiffness]"
 
 
 def inherited_lines(entries: dict[str, dict[str, dict[str, Source]]]) -> list[str]:

@@ -27,7 +27,7 @@ from ..tables.microgeometry import MicrogeometryTable
 from ..tables.pair import REQUIRED, PairTable, StiffnessTable, tooth_form
 from ..tables.spectrum import SpectrumTable
 from ..tables.timefunction import TrainFunctionTable
-from ..tables.train import TrainGearTable, TrainMeshTable, TrainTable, read_train_tables
+from ..tables.train import POTENTIAL, TrainGearTable, TrainMeshTable, TrainTable, read_train_tables
 from ..train.friction import Lubrication
 from ..train.gear_train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from ..typing import Array
@@ -49,7 +49,9 @@ class TrainJob:
         The job file; curves that it names lie beside it.
     table
         [train], with the chosen variant's curves and damping.
-    pair, stiffness, housing, microgeometry
+    stiffness
+        [stiffness], with the keys that the variant has instead.
+    pair, housing, microgeometry
         The other tables, None where the file has none.
     spectrum
         [spectrum], with its defaults where the file has none.
@@ -194,7 +196,7 @@ def back_flanks(job: TrainJob, train: GearTrain, number: int) -> bool:
     table, mesh = job.table.meshes[number], train.meshes[number]
     if table.backlash_um is not None:
         return True
-    if table.rigid or table.curve or table.stiffness_N_per_m or (table.law or job.table.curves.law) != "map":
+    if job.table.model_of(table) != POTENTIAL:
         return False
     pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
     return pair.normal_backlash > 0.0

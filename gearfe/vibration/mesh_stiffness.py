@@ -17,6 +17,7 @@ from ..gear.pair import GearPair, gear_pair
 from ..meshlaw.law import MeshLaw
 from ..progress import stage
 from ..stiffness.curve import NO_CYCLE, StiffnessCurve
+from ..tables.train import MEAN, POTENTIAL
 from ..train.gear_train import GearMesh, GearTrain
 from .job import Stiffness, TrainJob, back_flanks, job_train
 
@@ -62,12 +63,12 @@ def train_curves(
             found.append(mesh.stiffness_N_per_m)
         elif mesh.curve is not None:
             found.append(_read_curve(job.path.parent / mesh.curve, teeth))
-        elif (mesh.law or job.table.curves.law) == "map":
+        elif job.table.model_of(mesh) == POTENTIAL:
             found.append(_computed_law(job, train, number, estimate))
         else:
             curve = _computed_curve(job, train, number, estimate)
-            linear = (mesh.law or job.table.curves.law) == "linear"
-            found.append(curve.interpolant("k_mesh", method="cubic").mean if linear else curve)
+            constant = job.table.model_of(mesh) == MEAN
+            found.append(curve.interpolant("k_mesh", method="cubic").mean if constant else curve)
     return tuple(found)
 
 
@@ -133,10 +134,10 @@ def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) 
         raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
     alike = [i for i, other in enumerate(train.meshes) if gears(other) == gears(mesh)]
     steady = max(_carried_torque(train, i) for i in alike)
-    most = table.law_torque_Nm or ROOM * steady
+    most = table.mesh_model_torque_Nm or ROOM * steady
     if not most > 0.0:
-        problem = "carries no torque in steady running, so nothing tells for which torques to make its law"
-        raise InputError(f"mesh {mesh.name!r} law_torque_Nm", None, problem, "give law_torque_Nm")
+        problem = "carries no torque in steady running, so the range of its mesh law is unknown"
+        raise InputError(f"mesh {mesh.name!r} mesh_model_torque_Nm", None, problem, "give mesh_model_torque_Nm")
     one, two, distance, materials = gears(mesh)
     pair = gear_pair(one, two, distance)
     tables = StiffnessJob(job.pair, job.stiffness, pair)
@@ -152,8 +153,8 @@ def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) 
             if error.field != "force":
                 raise
             problem = f"is the largest of its law ({ROOM:g} times the steady one where none is given): {error.problem}"
-            label = f"mesh {mesh.name!r} law_torque_Nm"
-            raise InputError(label, float(f"{most:.6g}"), problem, "give a smaller load, or law_torque_Nm") from None
+            label, cure = f"mesh {mesh.name!r} mesh_model_torque_Nm", "give a smaller load, or mesh_model_torque_Nm"
+            raise InputError(label, float(f"{most:.6g}"), problem, cure) from None
         if not estimate:
             return law
         angles = pair.mesh_cycle * np.arange(ESTIMATED) / ESTIMATED
@@ -182,7 +183,7 @@ def _deviations(
     driving, back = (
         deviations_of(job.microgeometry, pair, job.path.parent, flank=flank, gears=gears) for flank in flanks
     )
-    mapped = (job.table.meshes[number].law or job.table.curves.law) == "map"
+    mapped = job.table.model_of(job.table.meshes[number]) == POTENTIAL
     if mapped:  # pitch errors are the train's own
         driving, back = ((replace(a, turn=(0.0,)), replace(b, turn=(0.0,))) for a, b in (driving, back))
     from ..contact.laws import check_alike, check_deviations
@@ -194,7 +195,8 @@ def _deviations(
         check_deviations(one, law)
     if back != driving and not mapped:
         problem = f"left and right flanks differ, but mesh {mesh.name!r} has one curve for both"
-        raise InputError("microgeometry", None, problem, 'write law = "map", or give the mesh no backlash')
+        cure = 'write mesh_model = "potential", or give the mesh no backlash'
+        raise InputError("microgeometry", None, problem, cure)
     return driving, back
 
 

@@ -67,7 +67,7 @@ def base_jobs() -> dict[str, BaseJob]:
         {"attachment": name, "x_mm": x, "y_mm": y}
         for name, x, y in (("1", 0.0, 33.0), ("2", 0.0, -33.0), ("3", 62.5, 33.0), ("4", 62.5, -33.0))
     ]
-    train["curves"] = {"law": "curve", "load": "stiffness"}
+    train["curves"] = {"mesh_model": "variable_stiffness", "load": "stiffness"}
     housing = {**HOUSING, "mesh": {"size_mm": 20.0}, "reduction": {"modes": 5}}
     plain = ("--no-pictures", "--no-floquet", "--no-estimate")
     return {
