@@ -183,7 +183,7 @@ def test_the_load_of_a_variant_of_the_train(tmp_path, capsys):
     assert (job["twist_deg"], job["torque_Nm"], job["law"]) == (0.5, None, "nitsche")
     capsys.readouterr()
     assert main(["stiffness", str(JOB), "--variant", "tutorals"]) == 2
-    assert "variant = 'tutorals'" in (said := capsys.readouterr().err)
+    assert "unknown name 'tutorals'" in (said := capsys.readouterr().err)
     assert "did you mean 'tutorial'" in said
 
 
