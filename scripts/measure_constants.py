@@ -34,7 +34,7 @@ CONSTANTS: dict[str, dict[str, tuple[Any, Any]]] = {
         "SEARCHES": (6, 24), "AHEAD": (5e-4, 2e-3), "STEPS": (20, 60),
         "SHARPEST": (0.01, 0.04),
     },
-    "gear.touching": {"NEAR": (5e-4, 2e-3), "STEEPEST": (0.1, 0.4)},
+    "gear.first_contact": {"NEAR": (5e-4, 2e-3), "STEEPEST": (0.1, 0.4)},
     "contact.elements": {"AHEAD": (5e-5, 2e-4), "BESIDE": (3, 10), "CHORD": (1e-4, 1e-2), "STEPS": (30, 80)},
 }  # fmt: skip
 #: Modules whose constants the condensed gears depend on.

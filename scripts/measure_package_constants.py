@@ -78,7 +78,7 @@ def laws() -> Answers:
 
     law = mesh_law(half_plane_pair(coarse_gears(HalfPlane())), 2000.0)
     angle, depth = np.tile(law.cycle * np.linspace(0.0, 1.0, 40), 3), np.repeat([0.7e-6, 5e-6, 20e-6], 40)
-    found = law(angle, law.touching(angle) + depth)
+    found = law(angle, law.first_contact(angle) + depth)
     return {
         "force": (found.force, law.error),
         "torque": (law.base_radii[0] * found.force + found.moment, law.error),
@@ -187,9 +187,9 @@ ROOMS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
     "solid": (housings, ()),
     "prisms": (housings, ()),
     "meshing.housing_mesh": (housings, ()),
-    "gear": (gears, ("pitch_", "modif", "deviation", "face", "touching", "derived", "validity", "LARGEST")),
+    "gear": (gears, ("pitch_", "modif", "deviation", "face", "first_contact", "derived", "validity", "LARGEST")),
     "gear.face": (curves, ()),
-    "gear.touching": (curves, ()),
+    "gear.first_contact": (curves, ()),
     "stiffness": (curves, ("SIDE_BY_SIDE", "report")),
     "loadmap": (curves, ("MOST_CELLS",)),
     "meshing.tooth_sector": (curves, ("RECIPE",)),

@@ -38,7 +38,7 @@ def angles_of(pair: GearPair, count: int) -> np.ndarray:
     return (np.arange(count) + 0.37) * pair.mesh_cycle / count
 
 
-def reached_marks(law: HalfPlanePair, contacts: Contacts) -> NDArray[np.str_]:
+def reached_marks(contact_model: HalfPlanePair, contacts: Contacts) -> NDArray[np.str_]:
     """The highest of the marks that the pressure of each contact reaches, or nothing, shape (m,).
 
     A pressure ends within a panel beside the middle of its last one.
@@ -46,6 +46,6 @@ def reached_marks(law: HalfPlanePair, contacts: Contacts) -> NDArray[np.str_]:
     bears = (contacts.pressure > 0)[:, None]
     low = np.where(bears, contacts.panel_arc - contacts.width[:, None], np.inf).min(axis=2, keepdims=True)
     high = np.where(bears, contacts.panel_arc + contacts.width[:, None], -np.inf).max(axis=2, keepdims=True)
-    met = marks_met(law, law.teeth.flank(contacts.pair), low, high)
-    names = np.append("", law.marks[0])
+    met = marks_met(contact_model, contact_model.teeth.flank(contacts.pair), low, high)
+    names = np.append("", contact_model.marks[0])
     return np.asarray(names[(met * np.arange(1, len(names))).max(axis=1)])

@@ -91,15 +91,15 @@ def test_light_loads_follow_hertz_down_to_what_rounding_and_the_tables_of_flanks
     pair = gears.pair(23, 61, pressure_angle=20.0, tip_round=1.5e-4, width=22e-3)
     solver = position_solver(elastic_pair(pair, law="half_plane"))
     angles = np.arange(24) * pair.mesh_cycle / 24
-    touch, torques = solver.law.touching_twists(angles), 10.0 ** np.arange(-6, -1)
+    touch, torques = solver.contact_model.first_contact_twists(angles), 10.0 ** np.arange(-6, -1)
     made = [at_torques(solver, angles, np.full(24, torque)) for torque in torques]
     assert all(set(one.status) == {"converged"} for one in made)
     single = np.bincount(made[-1].contacts.position, minlength=24) == 1
     assert single.sum() > 5
     yields = np.array([(one.twist - touch) / torque for one, torque in zip(made, torques, strict=True)])
-    slope = solver.law.compliance / (2 * solver.law.width * pair.wheel.base_radius**2)
+    slope = solver.contact_model.compliance / (2 * solver.contact_model.width * pair.wheel.base_radius**2)
     off = np.abs((yields - yields[-1] + slope * np.log(torques / torques[-1])[:, None]) / yields)
-    told = [unseen_twists(solver.law, one) * one.tangent / one.torque_wheel for one in made]
+    told = [unseen_twists(solver.contact_model, one) * one.tangent / one.torque_wheel for one in made]
     assert (off < np.array(told) + 1e-5)[:, single].all()  # windows follow the contact by a panel
     assert np.max(told[1]) < 0.01
 

@@ -11,7 +11,7 @@ from gearfe import InputError
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gear.deviation import Deviation, total
 from gearfe.gear.face import NOMINAL, ToothDeviations, face_of
-from gearfe.gear.touching import ToothFlanks, touching_curve
+from gearfe.gear.first_contact import ToothFlanks, first_contact_curve
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import gear as single_gear
@@ -93,8 +93,8 @@ def test_a_turned_tooth_is_an_even_layer(law) -> None:
         layered.append(ToothDeviations((None, layer(h)), profile=tuple(on.astype(int))))
     angles = np.linspace(-4, 4, 60) * PAIR.mesh_cycle + 0.1  # both teeth come by
     one, other = law.deviated(tuple(turned)), law.deviated(tuple(layered))
-    found, expected = one.teeth.touching(angles), other.teeth.touching(angles)
-    plain = law.teeth.touching(angles)
+    found, expected = one.teeth.first_contacts(angles), other.teeth.first_contacts(angles)
+    plain = law.teeth.first_contacts(angles)
     path = ((plain.place > 0.02) & (plain.place < 0.98)).all(axis=1)
     assert found.twist[path] == pytest.approx(expected.twist[path], abs=1e-10 / PAIR.wheel.base_radius)
     touched = (plain.twist - found.twist)[path] * PAIR.wheel.base_radius
@@ -141,7 +141,7 @@ def test_the_full_period_comes_again(law) -> None:
         (ToothDeviations(turn=tuple(1e-4 * np.arange(20) / 20)), ToothDeviations(turn=tuple([1e-5] + [0] * 29)))
     )
     angles = np.array([0.03, 0.2])
-    touch = [bad.teeth.touching(angles + n * PAIR.mesh_cycle) for n in (0, 60, 20)]
+    touch = [bad.teeth.first_contacts(angles + n * PAIR.mesh_cycle) for n in (0, 60, 20)]
     assert touch[0].twist == pytest.approx(touch[1].twist, abs=1e-14)
     assert np.abs(touch[0].twist - touch[2].twist).max() > 9e-6
 
@@ -151,12 +151,14 @@ def test_the_curve_of_one_pair() -> None:
     cycle = PAIR.mesh_cycle
     start, end = (PAIR.pinion_angle_at(s) for s in PAIR.path_limits())
     on = np.linspace(start + 0.01, end - 0.01, 20)
-    assert touching_curve(PAIR, on) == pytest.approx(PAIR.contact_twist, abs=1e-14)
+    assert first_contact_curve(PAIR, on) == pytest.approx(PAIR.contact_twist, abs=1e-14)
     angles = np.linspace(start - 0.15, end + 0.15, 41)
-    assert touching_curve(PAIR, angles) == pytest.approx(touching_curve(PAIR, angles + 3 * cycle, number=-3), abs=1e-13)
-    assert np.isinf(touching_curve(PAIR, np.array([math.pi])))
+    assert first_contact_curve(PAIR, angles) == pytest.approx(
+        first_contact_curve(PAIR, angles + 3 * cycle, number=-3), abs=1e-13
+    )
+    assert np.isinf(first_contact_curve(PAIR, np.array([math.pi])))
     turn = tuple(1e-4 * (np.arange(20) == 17))
-    shifted = touching_curve(PAIR, on + 3 * cycle, number=-3, deviations=(ToothDeviations(turn=turn), NOMINAL[1]))
+    shifted = first_contact_curve(PAIR, on + 3 * cycle, number=-3, deviations=(ToothDeviations(turn=turn), NOMINAL[1]))
     assert PAIR.contact_twist - shifted[:-2] == pytest.approx(1e-4 / PAIR.gear_ratio, rel=1e-9)
 
 

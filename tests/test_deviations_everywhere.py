@@ -207,7 +207,7 @@ def test_a_train_takes_the_pitch_errors_of_its_teeth(sign, tmp_path) -> None:
     (static,) = static_errors(train, sign * found.pinion_angle)
     expected = found.transmission_error
     assert np.ptp(expected) > 8e-6
-    # an error turns its tooth by up to 2.4e-4 rad, too, which a shift of the touching curve leaves out: it shows where
+    # an error turns its tooth by up to 2.4e-4 rad, too, which a shift of its first contact leaves out: it shows where
     # a tooth comes in ahead of its path by its tip, and t is steep
     off = np.abs(static - expected)
     assert np.quantile(off, 0.95) < 0.05e-6

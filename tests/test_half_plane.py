@@ -102,10 +102,10 @@ def test_hertz_at_the_pitch_point(name: str, degrees: float) -> None:
     # where the pitch point is contacted: the pinion's flank meets it at the roll length r_b tan(working angle)
     roll = pair.pinion.base_radius * math.tan(pair.working_pressure_angle)
     angles = np.linspace(0, pair.mesh_cycle, 400, endpoint=False)
-    touching = law.teeth.touching(angles)
+    first_contact = law.teeth.first_contacts(angles)
     face = law.sides[0].face
     u = (roll - face.flank.start) / (face.flank.end - face.flank.start)
-    angle = touching.angle[np.argmin(np.abs(touching.place[:, 0] - u))]
+    angle = first_contact.angle[np.argmin(np.abs(first_contact.place[:, 0] - u))]
     contacts = solve_half_plane(law, angle, math.radians(degrees)).contacts
     k = int(np.argmin(np.abs(law.sides[0].face.parameter_at(contacts.arc[:, 0]) - u)))
     one, two = (one.base_radius * math.tan(pair.working_pressure_angle) for one in (pair.pinion, pair.wheel))
@@ -228,7 +228,7 @@ def test_no_jump_at_the_last_station() -> None:
 def test_forces_that_stand_still_by_chance_are_no_solution() -> None:
     """Places and widths count too: the first step moves the contacts by micrometres."""
     law, twist = law_of("rounded"), np.array([math.radians(0.05)])
-    setting, state = first_state(law, twist, law.teeth.touching(np.array([0.1])).take([0]))
+    setting, state = first_state(law, twist, law.teeth.first_contacts(np.array([0.1])).take([0]))
     made = step(setting, state)
     assert np.abs(made.place).max() > 1e-6
     still = replace(state, force=made.next.force)

@@ -10,8 +10,8 @@ import pytest
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gear.deviation import Deviation
 from gearfe.gear.face import ToothDeviations, face_of
+from gearfe.gear.first_contact import Faces
 from gearfe.gear.pair import TipRelief
-from gearfe.gear.touching import Faces
 from gearfe.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair
@@ -33,7 +33,7 @@ def test_relief_as_a_deviation() -> None:
         without = half_plane_pair(elastic)
         expected = half_plane_pair(elastic_pair(relieved, law="half_plane"))
         angles = angles_of(plain, 16)
-        touch = [law.teeth.touching(angles).twist for law in (found, expected)]
+        touch = [law.teeth.first_contacts(angles).twist for law in (found, expected)]
         assert touch[0] == pytest.approx(touch[1], abs=2e-8 if form else 1e-9)
         for degrees in (0.02, 0.2):
             one, two, three = (
@@ -53,7 +53,7 @@ def test_an_even_deviation_turns_the_wheel() -> None:
     elastic = elastic_pair(pair, law="half_plane")
     law = half_plane_pair(elastic).deviated((layer, ToothDeviations()))
     angles = angles_of(pair, 7)
-    found, expected = law.teeth.touching(angles), plain.teeth.touching(angles)
+    found, expected = law.teeth.first_contacts(angles), plain.teeth.first_contacts(angles)
     on_path = ((expected.place > 0.05) & (expected.place < 0.95)).all(axis=1)
     assert on_path.sum() >= 7
     earlier = height / pair.wheel.base_radius

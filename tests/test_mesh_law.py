@@ -47,7 +47,7 @@ def places(law: MeshLaw, count: int, least: float = 0.3e-6):
     rng = np.random.default_rng(7)
     angle = rng.uniform(-1.0, 1.0, count)
     depth = np.exp(rng.uniform(math.log(least), math.log(0.95 * law.reach), count))
-    return angle, law.touching(angle) + depth
+    return angle, law.first_contact(angle) + depth
 
 
 def test_law_meets_contact_solutions_that_it_was_not_made_from(law, solver):
@@ -63,7 +63,7 @@ def test_law_meets_contact_solutions_that_it_was_not_made_from(law, solver):
     off = np.abs(found.force - force)[usual] / DESIGN
     assert off.max() < 3e-3
     assert np.quantile(off, 0.9) < 1e-3
-    heavy = approach - law.touching(angle) > 5e-6
+    heavy = approach - law.first_contact(angle) > 5e-6
     assert np.abs(found.tangent * radius**2 / solved.tangent - 1)[heavy].max() < 1e-2
     moment = solved.torque_pinion - solved.torque_wheel / PAIR.gear_ratio
     assert np.abs(found.moment - moment).max() < 2e-3 * solved.torque_pinion.max()
@@ -140,15 +140,15 @@ def test_force_and_moment_are_the_derivatives_of_the_energy(law):
 
 def test_touch_is_that_of_the_rigid_flanks(law, solver):
     angle = np.linspace(0.0, PAIR.mesh_cycle, 100)
-    met = solver.teeth.touching(angle)
+    met = solver.teeth.first_contacts(angle)
     first = np.full(len(angle), np.inf)
     np.minimum.at(first, met.position, PAIR.wheel.base_radius * (met.twist - PAIR.contact_twist))
-    assert law.touching(angle) == pytest.approx(first, abs=1e-11)
+    assert law.first_contact(angle) == pytest.approx(first, abs=1e-11)
 
 
 def test_nothing_bears_before_the_touch_and_no_pair_pulls(law):
     angle, approach = places(law, 300)
-    apart = law(angle, law.touching(angle) - 1e-9)
+    apart = law(angle, law.first_contact(angle) - 1e-9)
     assert (apart.force == 0).all()
     assert (apart.moment == 0).all()
     assert (apart.tangent == 0).all()
@@ -221,12 +221,12 @@ def test_a_lightly_loaded_relieved_pair() -> None:
     angles = law.nodes[0] + law.cycle * np.linspace(0.0, 1.0, 301)
     depths = law.reach * np.array([1e-3, 0.03, 0.3, 1.0])
     for depth in depths:
-        assert (law(angles, law.touching(angles) + depth).force > 0.0).all()
+        assert (law(angles, law.first_contact(angles) + depth).force > 0.0).all()
     some = angles[3::17]
     for depth in depths[1:]:
-        twist = (law.touching(some) + depth) / pair.pair.wheel.base_radius + pair.pair.contact_twist
+        twist = (law.first_contact(some) + depth) / pair.pair.wheel.base_radius + pair.pair.contact_twist
         true = solve_half_plane(pair, some, twist).torque_wheel / pair.pair.wheel.base_radius
-        off = np.abs(law(some, law.touching(some) + depth).force - true)
+        off = np.abs(law(some, law.first_contact(some) + depth).force - true)
         assert (off / np.maximum(true, 0.1 * force)).max() < 5e-3
 
 

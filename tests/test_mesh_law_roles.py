@@ -91,7 +91,7 @@ def test_the_grid_of_the_cells_does_not_matter() -> None:
     made = {cells: hertzian_law(relief=relief, cells=cells) for cells in counts}
     angle = np.random.default_rng(1).uniform(-0.45 * CYCLE, 0.45 * CYCLE, 2000)
     true = 0.5 * relief * (1 - np.cos(20 * angle))
-    off = [np.abs(made[cells].touching(angle) - true).max() for cells in counts]
+    off = [np.abs(made[cells].first_contact(angle) - true).max() for cells in counts]
     assert (np.divide(off[:-1], off[1:]) > 12.0).all()
     forces = []
     for cells in counts:

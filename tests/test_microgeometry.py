@@ -47,7 +47,7 @@ def test_a_pitch_error_sine_is_the_unloaded_error(elastic) -> None:
     bad = half_plane_pair(elastic).deviated((ToothDeviations(turn=pitch_errors.turns(PINION, index)), NOMINAL[1]))
     assert bad.mesh_cycles == 60
     angles = np.arange(60 * 8) * PAIR.mesh_cycle / 8
-    found = bad.teeth.touching(angles)
+    found = bad.teeth.first_contacts(angles)
     first = np.full(len(angles), np.inf)
     np.minimum.at(first, found.position, found.twist)
     leads = found.take(np.flatnonzero(found.twist == first[found.position]))

@@ -154,6 +154,6 @@ def test_a_torque_in_a_jump_is_given_up_soon():
     for goal, status in ((1001.0, "torque_not_reached"), (999.0, "converged"), (1003.0, "converged")):
         asked.clear()
         first = solve(np.zeros(1, dtype=int), np.array([0.7e-3]))
-        found = twists_for_torque(solve, first, np.array([goal]), touching=np.zeros(1), most=0.1)
+        found = twists_for_torque(solve, first, np.array([goal]), first_contact=np.zeros(1), most=0.1)
         assert list(found.status) == [status]
         assert len(asked) <= 15

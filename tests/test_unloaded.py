@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from gearfe.gear.first_contact import ToothFlanks
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.gear.spur_gear import TipRelief
-from gearfe.gear.touching import ToothFlanks
 
 from .gears import pair
 from .unloaded import unloaded_twist
@@ -117,7 +117,7 @@ def test_an_undercut_root_is_touched_below_its_edge(undercut):
             at = np.interp(np.abs(seen), np.abs(wheel)[order], np.angle(wheel)[order], left=np.nan, right=np.nan)
             apart = np.angle(seen * np.exp(-1j * (frame + at)))
             expected[i] = min(expected[i], np.nanmin(np.where(np.isfinite(apart), apart, np.inf)))
-    found = ToothFlanks(gears).touching(angles)
+    found = ToothFlanks(gears).first_contacts(angles)
     least = unloaded_twist(gears, angles)
     first = found.twist == least[found.position]
     gear = 0 if undercut == "pinion" else 1

@@ -117,7 +117,7 @@ def test_a_pressure_that_ends_at_a_cut_hides_no_contact() -> None:
     )
     law = half_plane_pair(elastic_pair(gears)).deviated((wave(gears.pinion, 138, 2e-6), PLAIN))
     angle = np.full(1, 1.37 * gears.mesh_cycle / 24)
-    twist, step = law.touching_twists(angle) + math.radians(0.05), math.radians(1e-5)
+    twist, step = law.first_contact_twists(angle) + math.radians(0.05), math.radians(1e-5)
     found = solve_half_plane(law, np.repeat(angle, 3), twist + step * np.arange(-1, 2))
     assert set(found.status) == {"converged"}
     assert most_zones(found) == 2
@@ -127,7 +127,7 @@ def test_a_pressure_that_ends_at_a_cut_hides_no_contact() -> None:
 def test_light_load_touches_where_the_rigid_flanks_do() -> None:
     """One contact at the crest that meets first, with Hertz's width for the curvatures there."""
     law = law_of(200, 1e-5)
-    met = law.teeth.touching(np.radians([3.0]))
+    met = law.teeth.first_contacts(np.radians([3.0]))
     k = int(np.argmin(met.twist))
     contacts = solve_half_plane(law, met.angle[k], met.twist[k] + 1e-7).contacts
     assert len(contacts) == 1

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gearfe.gear.first_contact import ToothFlanks
 from gearfe.gear.pair import MeshGeometry
-from gearfe.gear.touching import ToothFlanks
 
 Array = NDArray[np.float64]
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 def unloaded_twist(pair: MeshGeometry, pinion_angles: ArrayLike) -> Array:
     """Twist of the wheel (rad) at which the rigid driving flanks just touch; 0 faces a pinion tooth with a wheel space.
 
-    The least over all tooth pairs (`gearfe.gear.touching`).
+    The least over all tooth pairs (`gearfe.gear.first_contact`).
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def unloaded_twist(pair: MeshGeometry, pinion_angles: ArrayLike) -> Array:
     ndarray, shape (n,)
     """
     angles = np.asarray(pinion_angles, dtype=float)
-    found = ToothFlanks(pair).touching(angles)
+    found = ToothFlanks(pair).first_contacts(angles)
     least = np.full(len(angles), math.inf)
     np.minimum.at(least, found.position, found.twist)
     return least

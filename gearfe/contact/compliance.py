@@ -29,9 +29,9 @@ from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from ..elasticity import Material, Plane, element_stiffness, finite_strain_rates
 from ..errors import InputError
 from ..gear.face import ToothDeviations
+from ..gear.first_contact import WAY
 from ..gear.pair import GearPair
 from ..gear.spur_gear import Gear
-from ..gear.touching import WAY
 from ..meshing.tooth_sector import SectorMesh
 from ..multifrontal import Factor, condense
 from ..typing import Array, IntArray

@@ -6,9 +6,9 @@ A line load f per width at the arc t of a tooth moves the flank of the tooth k s
     u(s) = w\,H_k(s,t)\,f - \delta_{k0}\,\tfrac{1}{E'}\Big(\tfrac2\pi\ln|s-t|\,I + W\ln(y(s)+y(t))\Big) f
 
 with the width w and the surface of a half-plane and of a wedge (`.panels`), y the distance from the corner in which
-flank and tip circle meet, virtual under a tip round. What is left, H, is smooth: no load is near it any more. It is
-known from the finite-element answers to elliptic bumps of pressure at some fifteen stations, less the bracket under the
-same bumps,
+flank and tip circle meet, virtual under a tip round. What is left, the far-field influence H, is smooth: no load is
+near it any more. It is known from the finite-element answers to elliptic bumps of pressure at some fifteen stations,
+less the bracket under the same bumps,
 
 .. math::
     H_k(s_i, s_j) = b_i^T C^{FE}_k b_j
@@ -62,7 +62,7 @@ class FlankCompliance:
         W in the tooth's axes (-).
     stations, bumps : ndarray, shape (k,)
         Arc lengths of the stations and half widths of their bumps (m).
-    smooth : dict of int to ndarray, shape (2k, 2k)
+    far_field : dict of int to ndarray, shape (2k, 2k)
         Step -> H between the stations of teeth so many steps apart, tooth axes, xy by station (m/N).
     """
 
@@ -72,7 +72,7 @@ class FlankCompliance:
     wedge: Array
     stations: Array
     bumps: Array
-    smooth: dict[int, Array]
+    far_field: dict[int, Array]
 
     def distance(self, s: Array) -> Array:
         """Distance y (m) of the flank at arc lengths s (m) from the corner."""
@@ -179,9 +179,9 @@ def flank_compliance(gear: Gear, body: GearBody) -> FlankCompliance:
     stations, bumps, nodal = _stations(body.flank, float(face.arc[0]), module)
     loads = np.kron(nodal, np.eye(2))
     sides = loads @ body.interface
-    smooth = {step: sides @ body.coupling[step % body.teeth] @ sides.T for step in range(-REACH, REACH + 1)}
-    made = FlankCompliance(face, inverse_modulus, corner, wedge, stations, bumps, smooth)
-    smooth[0] = smooth[0] + loads @ body.own @ loads.T + inverse_modulus / body.width * _local(made)
+    far_field = {step: sides @ body.coupling[step % body.teeth] @ sides.T for step in range(-REACH, REACH + 1)}
+    made = FlankCompliance(face, inverse_modulus, corner, wedge, stations, bumps, far_field)
+    far_field[0] = far_field[0] + loads @ body.own @ loads.T + inverse_modulus / body.width * _local(made)
     body.compliances[gear] = made
     return made
 

@@ -1,13 +1,13 @@
 r"""One contact law for every load: finite elements for the teeth, half-planes for the contacts, exact moved flanks.
 
-Teeth and rims move the faces by the smooth influence H of `.flank_compliance`; the contact itself is that of
+Teeth and rims move the faces by the far-field influence H of `.flank_compliance`; the contact itself is that of
 half-planes and wedges on panels, which no mesh resolves. (Vijayakar, *Int. J. Numer. Meth. Eng.* 31, 1991, joins a
 finite-element and a half-space solution at a depth below the contact; here they join in the influence function.)
 
 **One position.** Every contact has a centre O with the common normal n, and panels at x along the tangent over the
 window in which the gap may close; a tooth pair has as many contacts as it bears on stretches of its flanks (`.zones`;
 `.half_plane_pair` has their mutual terms). With the pressure p, its force per width :math:`F=\int p`, the gap g
-between the faces as moved by the loads :math:`F_0` of the step before (`gearfe.gear.touching`),
+between the faces as moved by the loads :math:`F_0` of the step before (`gearfe.gear.first_contact`),
 
 .. math::
     p \ge 0,\qquad g(x) + \frac{2}{\pi}\Big(\frac1{E_1'}+\frac1{E_2'}\Big)\int -\ln|x-\xi|\,p\,d\xi
@@ -38,10 +38,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..gear.touching import Touching
+from ..gear.first_contact import FirstContacts
 from ..typing import Array, BoolArray, IntArray
 from .half_plane_pair import HalfPlanePair, half_plane_pair
-from .half_plane_step import SMALL, WINDOW, Setting, State, Step, cross, reference_approach, smooth_influence, step
+from .half_plane_step import SMALL, WINDOW, Setting, State, Step, cross, far_field_influence, reference_approach, step
 from .panels import PANELS, Couplings, unilateral
 from .position import STATUS, TORQUES, Contacts, Positions, in_batches, joined, of_positions, taken
 from .zones import completed
@@ -52,15 +52,15 @@ __all__ = ["HalfPlanePair", "half_plane_pair", "solve_half_plane"]
 TWIST_STEPS, FORCE_ROUNDS, SHARPEST = 7, 2, 0.02
 
 
-def unloaded(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Setting, State]:
+def unloaded(contact_model: HalfPlanePair, twists: Array, found: FirstContacts) -> tuple[Setting, State]:
     """Tooth pairs where their rigid flanks touch, at twists (rad) of their positions, without forces."""
     frames = found.frames + twists[found.position, None] * np.arange(2)
     nothing, count = np.zeros(len(found)), len(found)
-    return Setting(law, found, np.exp(1j * frames)), State(
+    return Setting(contact_model, found, np.exp(1j * frames)), State(
         centre=found.point,
         normal=found.normal,
-        arc=law.arc_at(found.flank, found.place),
-        ends=law.tables.ends[found.flank],
+        arc=contact_model.arc_at(found.flank, found.place),
+        ends=contact_model.tables.ends[found.flank],
         force=nothing,
         variance=nothing,
         low=nothing,
@@ -70,20 +70,20 @@ def unloaded(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Settin
     )
 
 
-def smooth_compliance(setting: Setting, state: State) -> Array:
+def far_field_compliance(setting: Setting, state: State) -> Array:
     """T by couple (m2/N)."""
     normal = state.normal[:, None] / setting.turn
-    return smooth_influence(setting.law, setting.couples, normal, state.arc, state.variance).compliance
+    return far_field_influence(setting.contact_model, setting.couples, normal, state.arc, state.variance).compliance
 
 
 def hertz(setting: Setting, state: State, force: Array) -> tuple[Array, Array]:
     """How contacts yield by themselves (m2/N) and half widths (m) for forces per width (N/m), all of shape (p,)."""
-    law, normal = setting.law, state.normal[:, None] / setting.turn
-    blunt = np.minimum(setting.found.curvature, 1 / (SHARPEST * law.pair.pinion.module))
-    b = np.sqrt(2 * law.compliance * np.maximum(force, SMALL) / blunt)
-    along = law.inverse_modulus * (law.wedge(normal) * normal.conj()).real
+    contact_model, normal = setting.contact_model, state.normal[:, None] / setting.turn
+    blunt = np.minimum(setting.found.curvature, 1 / (SHARPEST * contact_model.pair.pinion.module))
+    b = np.sqrt(2 * contact_model.compliance * np.maximum(force, SMALL) / blunt)
+    along = contact_model.inverse_modulus * (contact_model.wedge(normal) * normal.conj()).real
     y = np.maximum(setting.distances(state.arc[:, :, None])[:, :, 0], b[:, None])
-    return law.compliance * (0.5 - np.log(0.5 * b)) - (along * np.log(2 * y)).sum(axis=1), b
+    return contact_model.compliance * (0.5 - np.log(0.5 * b)) - (along * np.log(2 * y)).sum(axis=1), b
 
 
 def shared(couples: Couplings, T: Array, own: Array, overlap: Array, on: BoolArray, *, held: bool = False) -> Array:
@@ -94,34 +94,34 @@ def shared(couples: Couplings, T: Array, own: Array, overlap: Array, on: BoolArr
     return unilateral(couples, own[:, None, None], T, width, -overlap[:, None], on[:, None], held=held)[0][:, 0]
 
 
-def first_state(law: HalfPlanePair, twists: Array, found: Touching) -> tuple[Setting, State]:
+def first_state(contact_model: HalfPlanePair, twists: Array, found: FirstContacts) -> tuple[Setting, State]:
     """What the iteration for all tooth pairs begins with at twists (rad) of the positions."""
-    setting, state = unloaded(law, twists, found)
-    T = smooth_compliance(setting, state)
+    setting, state = unloaded(contact_model, twists, found)
+    T = far_field_compliance(setting, state)
     overlap = found.arm[:, 1] * (twists[found.position] - found.twist)
-    force = np.maximum(overlap, 0.0) / reference_approach(law)
+    force = np.maximum(overlap, 0.0) / reference_approach(contact_model)
     for _ in range(FORCE_ROUNDS):
         own, b = hertz(setting, state, force)
         force = np.maximum(shared(setting.couples, T, own, overlap, overlap > 0), 0.0)
     return setting, replace(state, force=force, variance=0.25 * b**2)
 
 
-def expected_twists(law: HalfPlanePair, torques: Array, touching: Touching) -> Array:
+def expected_twists(contact_model: HalfPlanePair, torques: Array, first_contact: FirstContacts) -> Array:
     """Twists (rad) at which n positions are expected to carry torques (N m) > 0, shape (n,); infinite where nothing can
     touch.
 
     Parameters
     ----------
-    touching
-        What `law.touching` says of their angles.
+    first_contact
+        `HalfPlanePair.first_contacts` of their angles.
     """
-    numbers, position = np.unique(touching.position, return_inverse=True)
-    found, goal, arm = replace(touching, position=position), torques[numbers], touching.arm[:, 1]
+    numbers, position = np.unique(first_contact.position, return_inverse=True)
+    found, goal, arm = replace(first_contact, position=position), torques[numbers], first_contact.arm[:, 1]
     touch, twist = np.full((2, len(numbers)), np.inf)
     np.minimum.at(touch, position, found.twist)
-    setting, state = unloaded(law, touch, found)
-    couples, T = setting.couples, smooth_compliance(setting, state)
-    force = goal[position] / (arm * law.width)
+    setting, state = unloaded(contact_model, touch, found)
+    couples, T = setting.couples, far_field_compliance(setting, state)
+    force = goal[position] / (arm * contact_model.width)
     alone = touch[position] + force * (hertz(setting, state, force)[0] + T[couples.own]) / arm
     np.minimum.at(twist, position, np.maximum(alone, touch[position]))
     for _ in range(TWIST_STEPS):
@@ -129,7 +129,7 @@ def expected_twists(law: HalfPlanePair, torques: Array, touching: Touching) -> A
         overlap = arm * (twist[position] - found.twist)
         force = shared(couples, T, own, overlap, overlap > 0)
         rate = shared(couples, T, own, arm, force > 0, held=True)
-        torque, slope = (couples.total(one * arm) * law.width for one in (force, rate))
+        torque, slope = (couples.total(one * arm) * contact_model.width for one in (force, rate))
         twist = np.maximum(twist + (goal - torque) / np.maximum(slope, 1e-300), touch + 0.1 * (twist - touch))
     made = np.full(len(torques), np.inf)
     made[numbers] = twist
@@ -150,7 +150,7 @@ HELD_STEPS, TOLERANCE = 3, 1e-6
 AHEAD, LEAST_AHEAD = 1e-3, 1e-10
 
 
-def solve_half_plane(law: HalfPlanePair, pinion_angles: ArrayLike, twists: ArrayLike) -> Positions:
+def solve_half_plane(contact_model: HalfPlanePair, pinion_angles: ArrayLike, twists: ArrayLike) -> Positions:
     """Solve the contact of a gear pair at several positions.
 
     Parameters
@@ -162,9 +162,11 @@ def solve_half_plane(law: HalfPlanePair, pinion_angles: ArrayLike, twists: Array
     """
     angles = np.array(pinion_angles, dtype=float, ndmin=1)
     twist = np.array(np.broadcast_to(np.asarray(twists, dtype=float), angles.shape))
-    met = law.touching(angles)
+    met = contact_model.first_contacts(angles)
     met = taken(met, met.twist < twist[met.position])
-    return in_batches(lambda part: _batch(law, angles[part], twist[part], of_positions(met, part)), len(angles))
+    return in_batches(
+        lambda part: _batch(contact_model, angles[part], twist[part], of_positions(met, part)), len(angles)
+    )
 
 
 def _kept(setting: Setting, state: State, positions: BoolArray) -> tuple[Setting, State]:
@@ -183,14 +185,14 @@ def _joined(parts: Sequence[tuple[Setting, State]]) -> tuple[Setting, State]:
     settings, states = zip(*parts, strict=True)
     found, turn = joined([one.found for one in settings]), np.concatenate([one.turn for one in settings])
     order = np.lexsort((found.pair, found.position))
-    return Setting(settings[0].law, found, turn).take(order), taken(joined(states), order)
+    return Setting(settings[0].contact_model, found, turn).take(order), taken(joined(states), order)
 
 
-def _batch(law: HalfPlanePair, angles: Array, twists: Array, found: Touching) -> Positions:
+def _batch(contact_model: HalfPlanePair, angles: Array, twists: Array, found: FirstContacts) -> Positions:
     status, iterations = np.full(len(angles), "no_contact", dtype=STATUS), np.zeros(len(angles), dtype=np.int64)
     numbers: dict[str, Any] = {name: np.zeros(len(angles)) for name in (*TORQUES, "energy")}
     solved: list[Contacts] = []
-    open_ = first_state(law, twists, found)  # positions to be solved
+    open_ = first_state(contact_model, twists, found)  # positions to be solved
     for _ in range(ROUNDS):
         near, open_ = _approached(*open_, iterations)
         iterations[near[0].numbers] += HELD_STEPS
@@ -242,7 +244,7 @@ def _finished(
     ahead = np.maximum(AHEAD * (twists[numbers] - touch), LEAST_AHEAD)
     further = setting.turn * np.exp(1j * ahead[couples.position, None] * np.arange(2))
     later = replace(found, position=found.position + len(twists))
-    both = Setting(setting.law, joined([found, later]), np.concatenate([setting.turn, further]))
+    both = Setting(setting.contact_model, joined([found, later]), np.concatenate([setting.turn, further]))
     after = joined([start, start])
     for _ in range(HELD_STEPS):
         state, made = after, step(both, after, search=False, held=True)
@@ -264,13 +266,13 @@ def _finished(
 
 def _contacts(setting: Setting, state: State, made: Step) -> Contacts:
     """All contacts of a step, also those without load; their rates are not known yet."""
-    law, one = setting.law, made.next
-    force, unknown = one.force * law.width, np.full(len(one.force), np.nan)
+    contact_model, one = setting.contact_model, made.next
+    force, unknown = one.force * contact_model.width, np.full(len(one.force), np.nan)
     return Contacts(
         position=setting.found.position,
         pair=setting.found.pair,
         force=force,
-        torque_wheel=-force * cross(one.centre - law.hub[1], state.normal),
+        torque_wheel=-force * cross(one.centre - contact_model.hub[1], state.normal),
         point=one.centre,
         normal=state.normal,
         arc=one.arc,
@@ -294,11 +296,13 @@ def _sums(setting: Setting, contacts: Contacts, energy: Array) -> dict[str, Arra
         "torque_wheel": couples.total(contacts.torque_wheel),
         "torque_pinion": couples.total(force * cross(contacts.point, normal)),
         "torque_wheel_reaction": couples.total(-force * cross(wheel, normal)),
-        "energy": couples.total(energy * setting.law.width),
+        "energy": couples.total(energy * setting.contact_model.width),
     }
 
 
-def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array) -> tuple[Array, IntArray, Array]:
+def coupling_compliances(
+    contact_model: HalfPlanePair, pinion_angles: Array, twists: Array
+) -> tuple[Array, IntArray, Array]:
     """Compliance between tooth pairs through the gear bodies, for all couples of pairs that touch at given twists.
 
     Returns
@@ -307,10 +311,10 @@ def coupling_compliances(law: HalfPlanePair, pinion_angles: Array, twists: Array
         Pinion angle of the tooth of the couple's lower pair (rad), teeth between both pairs, and the approach of the
         gears at one pair by a unit force on the other (m/N); forces count as moments on the wheel over its base radius.
     """
-    met = law.touching(pinion_angles)
+    met = contact_model.first_contacts(pinion_angles)
     met = met.take(np.flatnonzero(met.twist < twists[met.position]))
-    setting, state = unloaded(law, twists, met)
-    couples, arm = setting.couples, met.arm[:, 1] / law.pair.wheel.base_radius
-    found = smooth_compliance(setting, state) / (law.width * arm[couples.first] * arm[couples.second])
-    upper, own = couples.step > 0, met.angle + met.pair * law.pair.mesh_cycle
+    setting, state = unloaded(contact_model, twists, met)
+    couples, arm = setting.couples, met.arm[:, 1] / contact_model.pair.wheel.base_radius
+    found = far_field_compliance(setting, state) / (contact_model.width * arm[couples.first] * arm[couples.second])
+    upper, own = couples.step > 0, met.angle + met.pair * contact_model.pair.mesh_cycle
     return own[couples.second[upper]], couples.step[upper], found[upper]

@@ -1,7 +1,8 @@
 r"""A gear pair as the half-plane law sees it: its flanks, what loads on them do, and tables of both.
 
-**Neighbours.** Two contacts i and j on the same two teeth have, besides the smooth influence H (`.flank_compliance`),
-the half-plane and the wedge between them. A load :math:`f_j n_j` at the arc t moves the face at s by
+**Neighbours.** Two contacts i and j on the same two teeth have, besides the far-field influence H
+(`.flank_compliance`), the half-plane and the wedge between them. A load :math:`f_j n_j` at the arc t moves the face
+at s by
 
 .. math:: u(s) = -\tfrac1{E'}\Big(\tfrac2\pi\ln|s-t|\,n_j + W n_j\ln(y(s)+y(t))\Big) f_j .
 
@@ -22,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gear.face import NOMINAL, FlankTables, ToothDeviations, flank_tables
+from ..gear.first_contact import FirstContacts, ToothFlanks
 from ..gear.pair import GearPair
-from ..gear.touching import ToothFlanks, Touching
 from ..typing import Array, ComplexArray, IntArray
 from .compliance import MeshingPair
 from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliance, shapes_of
@@ -33,7 +34,7 @@ from .position import BATCH, joined, of_positions
 #: Places at which both faces of a contact are compared where they have no deviations, and besides for each piece of a
 #: deviation.
 PLACES, PER_PIECE = 32, 2
-#: Pinion angles of a mesh cycle at which flanks with deviations are looked at for their first touch.
+#: Pinion angles of a mesh cycle at which flanks with deviations are looked at for their first contact.
 LOOKS = 24
 #: Distance (m) from a kink at which its sides' tangents are taken.
 BESIDE = 1e-9
@@ -48,7 +49,7 @@ class HalfPlanePair:
     pair
         Geometry.
     teeth
-        Working flanks of all teeth, where their first touch is searched for.
+        Working flanks of all teeth, where their first contact is searched for.
     sides
         Compliance of pinion's and wheel's flank, without deviations.
     width
@@ -66,13 +67,13 @@ class HalfPlanePair:
         alike = all(one.alike for one in self.teeth.deviations)
         return 1 if alike else math.lcm(self.pair.pinion.teeth, self.pair.wheel.teeth)
 
-    def touching(self, angles: Array) -> Touching:
-        """Tooth pairs whose rigid flanks can meet at pinion angles (rad), by position; searched for once an angle."""
-        known = self._touched
+    def first_contacts(self, angles: Array) -> FirstContacts:
+        """First contacts of the tooth pairs at pinion angles (rad), by position; searched for once per angle."""
+        known = self._known_contacts
         new = np.setdiff1d(angles, np.concatenate([np.zeros(0), *(at for at, _ in known)]))
         for start in range(0, len(new) if known else max(1, len(new)), BATCH):
             part = new[start : start + BATCH]
-            found, before = self.teeth.touching(part), sum(len(at) for at, _ in known)
+            found, before = self.teeth.first_contacts(part), sum(len(at) for at, _ in known)
             known.append((part, replace(found, position=found.position + before)))
         every = np.concatenate([at for at, _ in known])
         known[:] = [(every, joined([met for _, met in known]))]
@@ -80,26 +81,26 @@ class HalfPlanePair:
         return of_positions(known[0][1], order[np.searchsorted(every, angles, sorter=order)])
 
     @cached_property
-    def _touched(self) -> list[tuple[Array, Touching]]:
+    def _known_contacts(self) -> list[tuple[Array, FirstContacts]]:
         return []
 
-    def touching_twists(self, angles: Array) -> Array:
+    def first_contact_twists(self, angles: Array) -> Array:
         """Twists (rad) at which the rigid gears just touch, infinite where they never do, shape (n,)."""
-        found = self.touching(angles)
+        found = self.first_contacts(angles)
         made = np.full(len(angles), np.inf)
         np.minimum.at(made, found.position, found.twist)
         return made
 
-    def first_touch(self, angles: Array) -> float:
+    def first_contact_twist(self, angles: Array) -> float:
         """Twist (rad) that stiffness counts from: where unmodified flanks touch, or before, what stands out of them.
 
-        The first touch of the mesh cycle, these pinion angles (rad) among it.
+        The first contact of the mesh cycle, these pinion angles (rad) among it.
         """
         free = self.pair.contact_twist
         if self.teeth.deviations == NOMINAL:
             return free
         every = np.concatenate([angles, self.pair.mesh_cycle * np.arange(LOOKS) / LOOKS])
-        return float(min(free, self.touching_twists(every).min()))
+        return float(min(free, self.first_contact_twists(every).min()))
 
     @cached_property
     def tables(self) -> FlankTables:
@@ -211,8 +212,8 @@ class HalfPlanePair:
             for gear, side in enumerate(self.sides):
                 n = len(side.stations)
                 for step in range(-steps, steps + 1):
-                    smooth = side.smooth[step if gear == 0 else -step]
-                    made[gear, :n, :, step + steps, :n] = self.width * smooth.T.reshape(n, 2, n, 2)
+                    far_field = side.far_field[step if gear == 0 else -step]
+                    made[gear, :n, :, step + steps, :n] = self.width * far_field.T.reshape(n, 2, n, 2)
             self._influences[steps] = made.reshape(2, 2 * k, -1)
         return self._influences[steps]
 
@@ -232,7 +233,9 @@ def half_plane_pair(elastic: MeshingPair) -> HalfPlanePair:
     return HalfPlanePair(pair, ToothFlanks(pair, elastic.deviations), (pinion, wheel), elastic.width)
 
 
-def local_influence(law: HalfPlanePair, couples: Couplings, normal: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+def local_influence(
+    contact_model: HalfPlanePair, couples: Couplings, normal: ComplexArray
+) -> tuple[ComplexArray, ComplexArray]:
     """What a unit force per width along the normal of the second contact does to the face at the first: by the
     half-plane, per ln of their distance, and by the wedge, per ln(y + y), both of shape (q, 2) (m2/N).
 
@@ -243,8 +246,8 @@ def local_influence(law: HalfPlanePair, couples: Couplings, normal: ComplexArray
     normal : ndarray of complex, shape (p, 2)
         n in the teeth's axes.
     """
-    seen, load = -law.inverse_modulus * normal[couples.first].conj(), normal[couples.second]
-    return 2 / np.pi * seen * load, seen * law.wedge(load)
+    seen, load = -contact_model.inverse_modulus * normal[couples.first].conj(), normal[couples.second]
+    return 2 / np.pi * seen * load, seen * contact_model.wedge(load)
 
 
 def panel_influence(

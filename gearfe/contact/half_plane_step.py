@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..gear.face import FlankTables
-from ..gear.touching import LOOK, WAY, Faces, Touching, windows
+from ..gear.first_contact import LOOK, WAY, Faces, FirstContacts, windows
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .half_plane_pair import HalfPlanePair, local_influence, panel_influence
 from .panels import (
@@ -52,16 +52,16 @@ class Setting:
 
     Attributes
     ----------
-    law
-        The pair.
+    contact_model
+        The pair as the half-plane law sees it.
     found
         Where the rigid flanks of the contacts' tooth pairs first touch, sorted by position, pair and place.
     turn : ndarray of complex, shape (p, 2)
         Turn of the teeth: tooth axes to global ones.
     """
 
-    law: HalfPlanePair
-    found: Touching
+    contact_model: HalfPlanePair
+    found: FirstContacts
     turn: ComplexArray
 
     @cached_property
@@ -77,12 +77,12 @@ class Setting:
     @cached_property
     def tables(self) -> FlankTables:
         """Both flanks of each contact."""
-        return self.law.tables.of(self.found.flank)
+        return self.contact_model.tables.of(self.found.flank)
 
     @cached_property
     def corner(self) -> ComplexArray:
         """Their corners (m), shape (p, 2)."""
-        return np.asarray(self.law.corner[self.found.flank])
+        return np.asarray(self.contact_model.corner[self.found.flank])
 
     def distances(self, arcs: Array) -> Array:
         """Distances y (m) of the faces at arcs (m) of shape (p, 2, n) from their corners."""
@@ -90,7 +90,7 @@ class Setting:
 
     def take(self, contacts: IntArray) -> Setting:
         """Only some of the contacts."""
-        return Setting(self.law, taken(self.found, contacts), self.turn[contacts])
+        return Setting(self.contact_model, taken(self.found, contacts), self.turn[contacts])
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,8 @@ class State:
 
 
 @dataclass(frozen=True)
-class Smooth:
-    """Influence of the loads of contacts along n on the smooth displacements of the faces, in c couples.
+class FarField:
+    """Influence of the loads of contacts along n on the far-field displacements of the faces, in c couples.
 
     Attributes
     ----------
@@ -193,30 +193,30 @@ def cross(a: ComplexArray, b: ComplexArray) -> Array:
     return np.asarray((np.conj(a) * b).imag)
 
 
-def smooth_influence(
-    law: HalfPlanePair, couples: Couplings, normal: ComplexArray, arc: Array, variance: Array
-) -> Smooth:
+def far_field_influence(
+    contact_model: HalfPlanePair, couples: Couplings, normal: ComplexArray, arc: Array, variance: Array
+) -> FarField:
     r"""H at the arcs (m) and along the normals (tooth axes) of all contacts, both of shape (p, 2).
 
     The bumps average over their widths, the contacts have widths of their own: with the variances v of the pressures
     (m2), shape (p,), and a^2/4 of the bumps, H on one tooth is more by
     :math:`\tfrac12(v_i-\tfrac14a_i^2)\,\partial_{ss}H+\tfrac12(v_j-\tfrac14a_j^2)\,\partial_{tt}H` along the normals.
     """
-    shapes = law.shapes.at(arc)
+    shapes = contact_model.shapes.at(arc)
     values = shapes[:, :, 0]
-    at_stations = answers(law, values, normal, couples)
+    at_stations = answers(contact_model, values, normal, couples)
     moved = (shapes.take(couples.first, axis=0) @ at_stations.view(float)).view(complex)[..., 0]
-    excess = variance[:, None] - np.einsum("pgk,gk->pg", values, law.bump_squares)
+    excess = variance[:, None] - np.einsum("pgk,gk->pg", values, contact_model.bump_squares)
     along = normal.take(couples.first, axis=0)
     bent = moved[:, :, 2] * excess.take(couples.first, axis=0) * (couples.step == 0)[:, None]
     half = 0.5 * (bent * along.conj()).real
     here = moved[:, :, 0] + bent + along * (half.take(couples.back, axis=0) - half)
-    return Smooth(here, moved[:, :, 1], (here * along.conj()).real.sum(axis=1))
+    return FarField(here, moved[:, :, 1], (here * along.conj()).real.sum(axis=1))
 
 
-def answers(law: HalfPlanePair, values: Array, normal: ComplexArray, couples: Couplings) -> ComplexArray:
-    """Smooth displacements at the stations of the first tooth of each couple by a unit force per width along the normal
-    of the second contact, shape (c, 2, k, 1), tooth axes (m2/N).
+def answers(contact_model: HalfPlanePair, values: Array, normal: ComplexArray, couples: Couplings) -> ComplexArray:
+    """Far-field displacements at the stations of the first tooth of each couple by a unit force per width along the
+    normal of the second contact, shape (c, 2, k, 1), tooth axes (m2/N).
 
     Parameters
     ----------
@@ -229,14 +229,14 @@ def answers(law: HalfPlanePair, values: Array, normal: ComplexArray, couples: Co
     load = (values[..., None] * normal.view(float).reshape(count, 2, 1, 2)).reshape(count, 2, 2 * k)
     furthest = int(np.abs(couples.step).max(initial=0))
     wide = 2 * furthest + 1
-    answer = np.matmul(load.swapaxes(0, 1), law.influence(furthest)).reshape(2, count * wide, k, 2)
+    answer = np.matmul(load.swapaxes(0, 1), contact_model.influence(furthest)).reshape(2, count * wide, k, 2)
     columns = couples.second * wide + couples.step + furthest
     return answer.take(columns, axis=1).swapaxes(0, 1).view(complex)
 
 
-def reference_approach(law: HalfPlanePair) -> float:
+def reference_approach(contact_model: HalfPlanePair) -> float:
     """Approach of both faces by a unit force per width of a usual contact (m2/N)."""
-    return float(law.compliance * (0.5 - np.log(0.5 * REFERENCE_WIDTH * law.pair.pinion.module)))
+    return float(contact_model.compliance * (0.5 - np.log(0.5 * REFERENCE_WIDTH * contact_model.pair.pinion.module)))
 
 
 def step(setting: Setting, state: State, *, search: bool = True, held: bool = False) -> Step:
@@ -249,24 +249,29 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     held
         Whether the bearing panels stay, so that the step is a smooth function of its state.
     """
-    law, couples, tables, corner = setting.law, setting.couples, setting.tables, setting.corner
+    contact_model, couples, tables, corner = setting.contact_model, setting.couples, setting.tables, setting.corner
     normal, force = state.normal[:, None] / setting.turn, state.force
     beside = couples.beside
-    smooth = smooth_influence(law, couples, normal, state.arc, state.variance)
+    far_field = far_field_influence(contact_model, couples, normal, state.arc, state.variance)
     y, far = _distances(setting, state.arc)
     load = (force[:, None] * SIGN).take(couples.second, axis=0)
-    displaced, stretch = couples.sums(smooth.moved * load), couples.sums(smooth.slope * load)
-    plane, wedge = near = local_influence(law, beside, normal)
+    displaced, stretch = couples.sums(far_field.moved * load), couples.sums(far_field.slope * load)
+    plane, wedge = near = local_influence(contact_model, beside, normal)
     i, j = beside.first, beside.second
     apart = np.maximum(np.abs(state.arc[i] - state.arc[j]), LEAST_DISTANCE)
     across = (plane.imag * np.log(apart) + wedge.imag * np.log(y[i] + y[j])) * (force[:, None] * SIGN)[j]
     turn = setting.turn / state.normal[:, None]
-    offset = (law.hub - state.centre[:, None]) / state.normal[:, None] + turn * displaced + 1j * beside.sums(across)
+    offset = (
+        (contact_model.hub - state.centre[:, None]) / state.normal[:, None]
+        + turn * displaced
+        + 1j * beside.sums(across)
+    )
     faces = Faces(turn, offset, stretch, state.arc)
 
     low, high, found = state.low, state.high, None
     if search:
-        module, softness = law.pair.pinion.module, 0.2 * law.compliance  # half width squared of a usual contact
+        module = contact_model.pair.pinion.module
+        softness = 0.2 * contact_model.compliance  # half width squared of a usual contact
         least = LEAST_FORCE * couples.total(force)[couples.position] + LEAST_WIDTH**2 * module / softness
         floor = np.maximum(force, least)
         scale, reach = np.sqrt(softness * module * floor), faces.range(tables, state.ends)
@@ -275,7 +280,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
         gap = heights[:, 1] - heights[:, 0]
         if len(beside.first) > len(force):
             gap += _opened(setting, state, near, arcs)
-        found = windows(look, heights, gap, state.reach * law.compliance * floor)
+        found = windows(look, heights, gap, state.reach * contact_model.compliance * floor)
         low, high = found.low, np.maximum(found.high, found.low + 2e-4 * scale)
     half = 0.5 * (high - low)
     x = np.zeros((len(half), PANELS + 1))  # at last O itself
@@ -284,16 +289,16 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     arc, height = arcs[:, :, PANELS], 0.5 * (heights[:, 0, PANELS] + heights[:, 1, PANELS])
     x, width, arcs, heights = x[:, :PANELS], half[:, None] * WIDTHS, arcs[:, :, :PANELS], heights[:, :, :PANELS]
     gap = heights[:, 1] - heights[:, 0]
-    if law.kinks[0].shape[1]:
+    if contact_model.kinks[0].shape[1]:
         gap += _mean_over_kinks(setting, arcs, width)
     y = np.maximum(np.abs(points[:, :, :PANELS] - corner[:, :, None]), LEAST_DISTANCE)
     local = panel_influence(near, beside, (arcs, y), (arcs, y, width))
     K = local[:, 0] + local[:, 1]
     own = slice(None) if len(K) == len(half) else beside.own  # a slice is not copied
-    K[own] += influence(half, law.compliance)
+    K[own] += influence(half, contact_model.compliance)
     bearing = state.bearing if state.bearing.any() else first_guess(gap)
-    free = gap - couples.sums(smooth.compliance * force.take(couples.second))[:, None]  # the gap holds these forces
-    p, approach, settled = unilateral(couples, K, smooth.compliance, width, free, bearing, held=held)
+    free = gap - couples.sums(far_field.compliance * force.take(couples.second))[:, None]  # the gap holds these forces
+    p, approach, settled = unilateral(couples, K, far_field.compliance, width, free, bearing, held=held)
     force = (p * width).sum(axis=1)
     loaded = force > 0
     shares = p * width / np.where(loaded, force, 1.0)[:, None]
@@ -332,7 +337,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
     return Step(following, p, settled, low, high, outgrown, x, width, arcs, place, energy, changed)
 
 
-def unseen_force(law: HalfPlanePair) -> float:
+def unseen_force(contact_model: HalfPlanePair) -> float:
     r"""Force per width (N/m) that rounding of the gears' angles makes of none: :math:`r_b\,\Delta\varphi` over the
     approach of a usual contact.
 
@@ -340,7 +345,7 @@ def unseen_force(law: HalfPlanePair) -> float:
     units of these, change by about as much: with :math:`b^2\kappa = 2CF` a gap tilted by e over b moves its place by
     :math:`e/(b\kappa)`, which is :math:`e/(2CF)` of b.
     """
-    return ANGLE_ROUNDING * law.pair.wheel.base_radius / reference_approach(law)
+    return ANGLE_ROUNDING * contact_model.pair.wheel.base_radius / reference_approach(contact_model)
 
 
 def change(setting: Setting, state: State, new: State, place: Array) -> Array:
@@ -352,7 +357,7 @@ def change(setting: Setting, state: State, new: State, place: Array) -> Array:
     moved = (new.variance > 0) * (0.5 * np.abs(place) / np.sqrt(safe) + np.abs(1 - state.variance / safe))
     all_ = np.abs(new.force - state.force) + MOVED * new.force * moved
     force = np.maximum(couples.total(new.force), SMALL)
-    unseen = unseen_force(setting.law)
+    unseen = unseen_force(setting.contact_model)
     return np.maximum(couples.total(all_) - np.where(unseen < MOST_UNSEEN * force, unseen, 0.0), 0.0) / force
 
 
@@ -373,7 +378,7 @@ def _mean_over_kinks(setting: Setting, arcs: Array, width: Array) -> Array:
     """How much larger the mean gap of a panel is than that at its middle where a kink of a face lies in it, (m), shape
     (p, n): with the gap at the middle, pressures would swing with the places of the kinks among the panels.
     """
-    places, angles = (values[setting.found.flank][:, :, None] for values in setting.law.kinks)
+    places, angles = (values[setting.found.flank][:, :, None] for values in setting.contact_model.kinks)
     inside = np.maximum(0.5 * width[:, None, :, None] - np.abs(arcs[..., None] - places), 0.0)
     return np.asarray((angles * inside**2).sum(axis=(1, 3)) / (2 * width))
 
@@ -383,5 +388,5 @@ def _distances(setting: Setting, arc: Array) -> tuple[Array, Array]:
     distance from all edges, both of shape (p, 2).
     """
     y = setting.distances(arc[:, :, None])[:, :, 0]
-    near = 1 / y**2 + setting.law.undercut / np.maximum(np.abs(arc), LEAST_DISTANCE) ** 2
+    near = 1 / y**2 + setting.contact_model.undercut / np.maximum(np.abs(arc), LEAST_DISTANCE) ** 2
     return y, near[:, ::-1] / near.sum(axis=1, keepdims=True)

@@ -222,7 +222,7 @@ def unilateral(
         Whether the set of panels that bear was found.
     """
     pairs, n = couples.beside, gap.shape[1]
-    z, K, smooth = pairs.slots, pairs.matrices(K), couples.matrices(T[:, None, None])
+    z, K, far_field = pairs.slots, pairs.matrices(K), couples.matrices(T[:, None, None])
     right = np.zeros((len(gap), n, z + 1))
     right[:, :, 0] = -gap
     right[np.arange(len(gap)), :, 1 + pairs.slot] = 1
@@ -237,9 +237,9 @@ def unilateral(
         answers = pairs.parts(made)
         forces = (width[:, None] @ answers)[:, 0]
         yields[beside] = forces[pairs.first, column]
-        system = np.eye(couples.slots) + couples.matrices(yields[:, None, None]) @ smooth
+        system = np.eye(couples.slots) + couples.matrices(yields[:, None, None]) @ far_field
         found = np.linalg.solve(system, couples.vectors(forces[:, :1])[:, :, None])
-        even = couples.parts((smooth @ found)[:, :, 0])
+        even = couples.parts((far_field @ found)[:, :, 0])
         back = pairs.vectors(even)[pairs.position]
         pressure = answers[:, :, 0] - (answers[:, :, 1:] @ back[:, :, None])[:, :, 0]
         approach = pairs.parts((K @ pairs.vectors(pressure)[:, :, None])[:, :, 0]) + even

@@ -13,8 +13,8 @@ Contacts of one pair act on each other exactly as the panels of one window do (`
 or less is another discretisation of the same pressure, and no other answer.
 
 **The gap of the deformed faces** over all of their length, seen from a contact's centre along its normal n, is that of
-the rigid faces (`gearfe.gear.touching`) and :math:`n\cdot(u_2-u_1)`: u by the smooth influence of all pairs of the
-position, by the half-planes and wedges of the pair's own contacts. It is of the first order in the
+the rigid faces (`gearfe.gear.first_contact`) and :math:`n\cdot(u_2-u_1)`: u by the far-field influence of all pairs of
+the position, by the half-planes and wedges of the pair's own contacts. It is of the first order in the
 displacements, which is enough to look with: a contact that is added by mistake carries no force.
 """
 
@@ -24,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..gear.touching import WAY, Faces
+from ..gear.first_contact import WAY, Faces
 from ..typing import Array, BoolArray, IntArray
 from .half_plane_pair import local_influence
 from .half_plane_step import SIGN, WIDER, WINDOW, Setting, State, Step, answers, reference_approach
@@ -50,7 +50,7 @@ def completed(setting: Setting, state: State, made: Step) -> tuple[Setting, Stat
     bearing = made.pressure > 0
     cut = {int(i): _split(state, made, int(i)) for i in np.flatnonzero(_stretches(bearing) > 1)}
     x, arcs, gap = _gaps(setting, state)
-    bound = -MISSED * reference_approach(setting.law) * couples.total(state.force)[couples.position]
+    bound = -MISSED * reference_approach(setting.contact_model) * couples.total(state.force)[couples.position]
     sides = _beyond(made, x)
     for i in np.flatnonzero((sides.any(axis=0) & (gap < 0)).any(axis=1)).tolist():
         exact = gap[i] + _beside_ellipses(setting, state, made, i, arcs[i, 0])
@@ -107,21 +107,21 @@ def _gaps(setting: Setting, state: State) -> tuple[Array, Array, Array]:
     """Places x over the stretches of flank of all contacts, shape (p, m), the faces' arcs there, shape (p, 2, m), and
     the gap of the deformed faces under elliptic pressures, shape (p, m), all in m.
     """
-    law, couples, tables = setting.law, setting.couples, setting.tables
+    contact_model, couples, tables = setting.contact_model, setting.couples, setting.tables
     turn, normal = setting.turn / state.normal[:, None], state.normal[:, None] / setting.turn
-    rigid = (law.hub - state.centre[:, None]) / state.normal[:, None]
+    rigid = (contact_model.hub - state.centre[:, None]) / state.normal[:, None]
     faces = Faces(turn, rigid, np.zeros_like(turn), state.arc)
     low, high = faces.range(tables, state.ends)
-    x = low[:, None] + (high - low)[:, None] * law.looked_at
+    x = low[:, None] + (high - low)[:, None] * contact_model.looked_at
     arcs = state.arc[:, :, None] + WAY[:, None] * x[:, None]  # nearly
     arcs = np.minimum(np.maximum(arcs, tables.low), tables.high)
-    each = answers(law, law.shapes.at(state.arc)[:, :, 0], normal, couples)[..., 0]
+    each = answers(contact_model, contact_model.shapes.at(state.arc)[:, :, 0], normal, couples)[..., 0]
     load = state.force[couples.second][:, None, None] * SIGN[:, None]
-    moved = law.shapes.along(couples.sums(each * load), arcs)
+    moved = contact_model.shapes.along(couples.sums(each * load), arcs)
     beside = couples.beside
     i, j = beside.first, beside.second
     load = (state.force[:, None] * SIGN)[j]
-    plane, wedge = ((one * load)[:, :, None] for one in local_influence(law, beside, normal))
+    plane, wedge = ((one * load)[:, :, None] for one in local_influence(contact_model, beside, normal))
     y, at = setting.distances(arcs), setting.distances(state.arc[:, :, None])
     logs = mean_log(arcs[i] - state.arc[j][:, :, None], _half_widths(state)[j, None, None])
     seen = moved * turn[:, :, None] + beside.sums(plane * logs + wedge * np.log(y[i] + at[j]))
@@ -144,7 +144,7 @@ def _beside_ellipses(setting: Setting, state: State, made: Step, i: int, arcs: A
     half, apart = 0.5 * made.width[own], arcs[:, None, None] - made.arcs[own, 0]
     logs = ((log_integral(apart + half) - log_integral(apart - half)) * made.pressure[own]).sum(axis=2)
     ellipses = state.force[own] * mean_log(arcs[:, None] - state.arc[own, 0], _half_widths(state)[own])
-    return np.asarray(setting.law.compliance * (ellipses - logs).sum(axis=1))
+    return np.asarray(setting.contact_model.compliance * (ellipses - logs).sum(axis=1))
 
 
 def _added(
@@ -173,7 +173,7 @@ def _added(
             continue
         new, nothing = _copies(own, 0, x[[k]]), np.zeros(1)
         new.ends[0, 0, 1 - way] = own.ends[0, 0, way] = arcs[between[np.argmax(gap[between])]]
-        force = -gap[[k]] / reference_approach(setting.law)
+        force = -gap[[k]] / reference_approach(setting.contact_model)
         reach = np.array([WINDOW])
         parts.append(replace(new, force=force, variance=nothing, low=nothing, high=nothing, reach=reach))
     return joined([own, *parts])

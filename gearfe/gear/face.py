@@ -1,8 +1,9 @@
 r"""The working flank of a tooth, root, involute with its relief, and tip round, by a parameter and by its arc length;
 and which flanks the teeth of a gear have.
 
-Roots take no part in the touching of rigid flanks, but where one is undercut: the involute then starts with an edge,
-which can bear as a sharp tip does, and the mate's tip passes so close below it that the root may be touched first.
+Roots take no part in the first contact of rigid flanks, except where one is undercut: the involute then starts with an
+edge, which can bear as a sharp tip does, and the mate's tip passes so close below it that the root may be touched
+first.
 
 **By arc length** it is one tabulated curve. Between knots on the exact curve, points are cubic in the arc length s with
 the exact points and unit tangents at both ends (Hermite): with :math:`\tau = s - s_i`,

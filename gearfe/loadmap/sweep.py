@@ -89,15 +89,15 @@ def sweep_loads(
         elastic = elastic_pair(pair, model, watch=watch, **changes)
     solver, cycles = position_solver(elastic), 0
     if angles is None:
-        cycles = solver.law.mesh_cycles if mesh_cycles is None else mesh_cycles
+        cycles = solver.contact_model.mesh_cycles if mesh_cycles is None else mesh_cycles
         angles = np.arange(positions * cycles) * pair.mesh_cycle / positions
     requested, finite = requested_angles(pair, angles, ANGLES, kinematics)
-    solved_angles, source = distinct_phases(requested, pair.mesh_cycle * solver.law.mesh_cycles)
+    solved_angles, source = distinct_phases(requested, pair.mesh_cycle * solver.contact_model.mesh_cycles)
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"
         raise InputError("torques", len(goals), problem, "use fewer torques or positions, or state mesh_cycles")
     with watch.stage("unloaded flanks"):
-        solver.law.touching(solved_angles)
+        solver.contact_model.first_contacts(solved_angles)
     roots = None
     if root_stress:
         from .root_stress import pair_roots
@@ -187,7 +187,7 @@ def _room(
     Seen from the other side the pinion turns the other way.
     """
     pair, radius = solver.pair, solver.pair.wheel.base_radius
-    behind = radius * (solver.law.deviated(back).touching_twists(-angles) - pair.contact_twist)
+    behind = radius * (solver.contact_model.deviated(back).first_contact_twists(-angles) - pair.contact_twist)
     error = radius * (found.twist - pair.contact_twist)
     room = pair.normal_backlash + np.tile(behind, len(found) // len(angles)) + error
     return behind, np.where(found.status == "converged", room, np.nan)
@@ -195,7 +195,7 @@ def _room(
 
 def _check_contact(made: LoadMap, solver: PositionSolver) -> None:
     """Raise `InputError` where a tooth pair carries nothing on its whole path: at the least torque, if at any."""
-    cycles, period, geometry = made.mesh_cycles, solver.law.mesh_cycles, solver.pair
+    cycles, period, geometry = made.mesh_cycles, solver.contact_model.mesh_cycles, solver.pair
     if not cycles or period == 1 or made.failed[0].any():
         return
     whole = cycles % period == 0
@@ -209,7 +209,7 @@ def _check_contact(made: LoadMap, solver: PositionSolver) -> None:
     lost = sorted(expected - set(number(made.pairs[0].pair).tolist()))
     if not lost:
         return
-    curve, met = made.curves[0], solver.law.touching(made.pinion_angle)
+    curve, met = made.curves[0], solver.contact_model.first_contacts(made.pinion_angle)
     rows = np.flatnonzero(number(met.pair) == lost[0])
     position, twist = met.position[rows], met.twist[rows] - geometry.contact_twist
     gap = twist - curve.twist[position]  # of rigid flanks; loaded neighbours move a tooth away, too

@@ -108,7 +108,7 @@ class MeshLaw:
     backlash
         Normal backlash of the pair's geometry (m).
     reach
-        Approach beyond the first touch (m) up to which the law is known.
+        Approach beyond the first contact (m) up to which the law is known.
     error
         Estimate of the relative error of its forces; not-a-number where there is none.
     back
@@ -160,7 +160,7 @@ class MeshLaw:
 
     def most(self, angles: ArrayLike, shifts: ArrayLike = 0.0) -> Array:
         """Mesh force (N) up to which the law is known at pinion angles (n,); `shifts` as in `__call__`."""
-        return self(angles, self.touching(angles, shifts) + self.reach, shifts).force
+        return self(angles, self.first_contact(angles, shifts) + self.reach, shifts).force
 
     def locate(self, angles: Array) -> tuple[IntArray, IntArray, Array]:
         """Mesh cycle, cell and angle beyond its first node (rad)."""
@@ -179,7 +179,7 @@ class MeshLaw:
         """Numbers k of the tooth pairs in the slots at pinion angles (n,), shape (n, slots)."""
         return np.asarray(np.arange(self.slots) - self.locate(np.asarray(angles, dtype=float))[0][:, None])
 
-    def touching(self, angles: ArrayLike, shifts: ArrayLike = 0.0) -> Array:
+    def first_contact(self, angles: ArrayLike, shifts: ArrayLike = 0.0) -> Array:
         """Approach (m) at which the first pair touches; `shifts` as in `__call__`."""
         first: Array = self.pair_touches(angles, shifts).min(axis=1)
         return first
@@ -224,7 +224,7 @@ class MeshLaw:
         angle, force = np.broadcast_arrays(
             np.atleast_1d(np.asarray(angles, dtype=float)), np.asarray(forces, dtype=float)
         )
-        first, most = self.touching(angle, shifts), self.most(angle, shifts)
+        first, most = self.first_contact(angle, shifts), self.most(angle, shifts)
         low, high = first.copy(), first + self.reach
         if (force > most).any():
             raise InputError(

@@ -15,7 +15,7 @@ from ..contact.half_plane import (
 )
 from ..contact.position import Positions, joined
 from ..errors import InputError
-from ..gear.touching import Touching
+from ..gear.first_contact import FirstContacts
 from ..typing import Array, IntArray
 from .fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
 from .law import NO_CONTACT, MeshLaw
@@ -32,10 +32,10 @@ LATE, CHANGE_SAMPLES = (0.01, 0.1, 0.4, 0.9), 100
 #: Error of force and torque there from which on a cell is halved, in parts of them, or of this part of the largest
 #: where that is more: what contacts on elements of the default sizes err by (0.11 % in the shipped pair).
 TOLERANCE, LEAST_FORCE = 1e-3, 0.1
-#: Error of the touching curve's cubics (parts of the reach) from which on a cell is halved, a tenth of `TOLERANCE`, as
-#: forces of a tenth of the largest count; and how often: a few cells at the ends of the path need it.
+#: Error of the first-contact curve's cubics (parts of the reach) from which on a cell is halved, a tenth of
+#: `TOLERANCE`, as forces of a tenth of the largest count; and how often: a few cells at the ends of the path need it.
 CLOSE, TOUCH_HALVINGS = 1e-4, 8
-#: Where in a cell (parts of its width) the touching curve's cubics are compared with the curve.
+#: Where in a cell (parts of its width) the first-contact curve's cubics are compared with the curve.
 TOUCH_PLACES = (0.25, 0.5, 0.75)
 #: How often a cell is halved for its forces.
 HALVINGS = 3
@@ -45,8 +45,8 @@ LEAST_REACH = 1e-7
 BEYOND = 1.1
 #: Pinion angles at which the approach is searched for that makes the largest force.
 ANGLES = 6
-#: Corners of the touching curve are nodes; others are left out so near to them, and of corners so near to each other
-#: one stays (parts of a cell).
+#: Corners of the first-contact curve are nodes; others are left out so near to them, and of corners so near to each
+#: other one stays (parts of a cell).
 NEAR, SAME = 0.4, 0.02
 
 
@@ -69,7 +69,7 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
 
     def solve(angles: Array, depths: Sequence[float]) -> Positions:
         """Contacts at pinion angles and at parts of the reach; their pair forces become known."""
-        met, first = _touching(pair, angles)
+        met, first = _first_contacts(pair, angles)
         twists = first[:, None] + reach * np.array(depths) / radius
         solved = solve_half_plane(pair, np.repeat(angles, len(depths)), twists.ravel())
         known.append(pair_forces(pair, solved, met, C))
@@ -145,7 +145,7 @@ def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) 
     return np.where(np.isfinite(force), missed, 0.0)  # some contacts are not solved, as of flanks with short waves
 
 
-def pair_forces(pair: HalfPlanePair, solved: Positions, met: Touching, coupling: Sequence[Couple]) -> PairForces:
+def pair_forces(pair: HalfPlanePair, solved: Positions, met: FirstContacts, coupling: Sequence[Couple]) -> PairForces:
     """Forces and approaches of the loaded pairs in contact solutions; forces are the wheel's torques over r_b2."""
     radius = pair.pair.wheel.base_radius
     c = solved.contacts
@@ -168,7 +168,7 @@ def touch_curve(pair: HalfPlanePair, phases: Array) -> TouchCurve:
     """t and its slope at pinion angles of a pair's own tooth (rad), from where the rigid driving flanks touch."""
     geometry = pair.pair
     radius = geometry.wheel.base_radius
-    met = pair.teeth.touching(phases)
+    met = pair.teeth.first_contacts(phases)
     own = np.flatnonzero(met.pair == 0)
     value, slope = np.full(len(phases), NO_CONTACT), np.zeros(len(phases))
     at = met.position[own]
@@ -179,7 +179,7 @@ def touch_curve(pair: HalfPlanePair, phases: Array) -> TouchCurve:
 
 def _late(pair: HalfPlanePair, phases: Array) -> Array:
     """How much later (m) than the first pair there a pair touches, at pinion angles of its own tooth (rad)."""
-    met, first = _touching(pair, phases)
+    met, first = _first_contacts(pair, phases)
     own = np.flatnonzero(met.pair == 0)
     late = np.full(len(phases), NO_CONTACT)
     late[met.position[own]] = pair.pair.wheel.base_radius * (met.twist[own] - first[met.position[own]])
@@ -190,7 +190,7 @@ def coupling_curve(pair: HalfPlanePair, phases: Array, reach: float) -> list[Cou
     """C of pairs one, two, ... teeth apart over the angle of the lower pair's tooth; 0 beyond its ends."""
     cycle, radius = pair.pair.mesh_cycle, pair.pair.wheel.base_radius
     angles = phases[phases < phases[0] + cycle * (1 - 1e-9)]
-    _, first = _touching(pair, angles)
+    _, first = _first_contacts(pair, angles)
     angle, apart, compliance = coupling_compliances(pair, angles, first + BEYOND * reach / radius)
     made = []
     for number in range(1, int(apart.max(initial=0)) + 1):
@@ -204,15 +204,15 @@ def coupling_curve(pair: HalfPlanePair, phases: Array, reach: float) -> list[Cou
     return made
 
 
-def _touching(pair: HalfPlanePair, angles: Array) -> tuple[Touching, Array]:
+def _first_contacts(pair: HalfPlanePair, angles: Array) -> tuple[FirstContacts, Array]:
     """All touches at pinion angles, and the first twist at each (rad)."""
-    met = pair.teeth.touching(angles)
+    met = pair.teeth.first_contacts(angles)
     first = np.full(len(angles), np.inf)
     np.minimum.at(first, met.position, met.twist)
     return met, first
 
 
-def _of_pairs(met: Touching, angle: Array, number: IntArray) -> Array:
+def _of_pairs(met: FirstContacts, angle: Array, number: IntArray) -> Array:
     """Twists (rad) at which pairs touch, by pinion angle and pair number."""
     known = {(a, k): t for a, k, t in zip(met.angle.tolist(), met.pair.tolist(), met.twist.tolist(), strict=True)}
     return np.array([known[a, k] for a, k in zip(angle.tolist(), number.tolist(), strict=True)])
@@ -223,7 +223,7 @@ def _reach(pair: HalfPlanePair, force: float) -> float:
     geometry = pair.pair
     radius = geometry.wheel.base_radius
     angles = geometry.mesh_cycle * np.arange(ANGLES) / ANGLES
-    _, first = _touching(pair, angles)
+    _, first = _first_contacts(pair, angles)
     reach = 1e-2 * geometry.pinion.module
     for _ in range(4):
         solved = solve_half_plane(pair, angles, first + reach / radius)

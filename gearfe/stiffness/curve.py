@@ -114,7 +114,7 @@ class StiffnessCurve(ShownTable):
         Moment of the bore reactions of the small-strain wheel (N m).
     k_torsional
         torque_wheel/twist (N m/rad); zero where nothing touches. Where deviations stand out of the flanks, the twist
-        counts from their first touch in the mesh cycle here and in `k_mesh`.
+        counts from their first contact in the mesh cycle here and in `k_mesh`.
     k_mesh, k_tangent
         torque_wheel/twist/r_b^2 and d torque_wheel/d twist/r_b^2, along the line of action (N/m).
     transmission_error, transmission_error_unloaded

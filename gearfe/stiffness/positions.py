@@ -59,15 +59,15 @@ NEARLY = 1e-4
 NOT_REACHED = "torque_not_reached"
 
 
-def newton_twist(twist: Array, touching: Array, torque: Array, tangent: Array, goal: Array) -> Array:
+def newton_twist(twist: Array, first_contact: Array, torque: Array, tangent: Array, goal: Array) -> Array:
     """Newton's step above, shape (n,) (rad); not-a-number without a torque."""
     with np.errstate(all="ignore"):
-        delta = twist - touching
-        return np.asarray(touching + delta * (goal / torque) ** (torque / (delta * tangent)))
+        delta = twist - first_contact
+        return np.asarray(first_contact + delta * (goal / torque) ** (torque / (delta * tangent)))
 
 
 def twists_for_torque(
-    solve: Callable[[IntArray, Array], Positions], found: Positions, goal: Array, *, touching: Array, most: float
+    solve: Callable[[IntArray, Array], Positions], found: Positions, goal: Array, *, first_contact: Array, most: float
 ) -> Positions:
     """Bring positions nearly (`NEARLY`) to the torques `goal`, shape (n,), > 0 (N m); iterations are those of all.
 
@@ -77,12 +77,12 @@ def twists_for_torque(
         ``solve(numbers, twists)`` gives the positions of these numbers.
     found
         Solutions at first guesses of the twist.
-    touching : ndarray, shape (n,)
+    first_contact : ndarray, shape (n,)
         Twists (rad) at which the rigid flanks touch.
     most
         Largest twist tried (rad).
     """
-    low, high = touching.copy(), np.full(len(goal), np.inf)
+    low, high = first_contact.copy(), np.full(len(goal), np.inf)
     for solutions in range(MAX_SOLUTIONS + 1):
         twist, torque = found.twist, found.torque_wheel
         miss, seen = torque - goal, np.nan_to_num(ANGLE_ROUNDING * found.tangent)
@@ -90,8 +90,8 @@ def twists_for_torque(
         if len(open_) == 0 or solutions == MAX_SOLUTIONS:
             break
         low, high = np.where(miss < 0, twist, low), np.where(miss > 0, twist, high)
-        step = newton_twist(twist, touching, torque, found.tangent, goal)
-        between = np.where(np.isfinite(high), 0.5 * (low + high), np.clip(2 * twist - touching, twist, most))
+        step = newton_twist(twist, first_contact, torque, found.tangent, goal)
+        between = np.where(np.isfinite(high), 0.5 * (low + high), np.clip(2 * twist - first_contact, twist, most))
         step = np.where((low < step) & (step < high), np.minimum(step, most), between)
         made = solve(open_, step[open_])
         found = found.replaced(open_, replace(made, iterations=made.iterations + found.iterations[open_]))
@@ -110,20 +110,20 @@ class PositionSolver:
     ----------
     elastic
         The gears.
-    law
-        Them as the half-plane law sees them.
+    contact_model
+        The gears as the half-plane law sees them.
     on_elements
         Whether the law is one on the finite elements of the flanks; it starts from the half-plane law's loads.
     """
 
     elastic: MeshingPair
-    law: HalfPlanePair
+    contact_model: HalfPlanePair
     on_elements: bool
 
     @property
     def pair(self) -> GearPair:
         """Geometry of the gears."""
-        return self.law.pair
+        return self.contact_model.pair
 
     @property
     def half_plane(self) -> PositionSolver:
@@ -143,7 +143,7 @@ class PositionSolver:
         """
         every = np.arange(len(angles))
         if not self.on_elements:
-            return self._with_loads(solve_half_plane(self.law, angles, twists), kept)
+            return self._with_loads(solve_half_plane(self.contact_model, angles, twists), kept)
         expected = self.half_plane.solve(angles, twists, every)
         thin = (expected.status == "converged") & (self.elements_per_contact(expected) < 1.0)
         expected = expected.with_status(np.where(thin, "under_resolved", expected.status))
@@ -205,7 +205,7 @@ def at_torques(
         Numbers of the positions with loads; all have them where finite strain counts.
     """
     kept = np.arange(len(angles)) if finite else kept
-    touching, most = solver.law.touching_twists(angles), math.pi / solver.pair.wheel.teeth
+    first_contact, most = solver.contact_model.first_contact_twists(angles), math.pi / solver.pair.wheel.teeth
 
     def solve(numbers: IntArray, twists: Array) -> Positions:
         return solver.solve(angles[numbers], twists, np.flatnonzero(np.isin(numbers, kept)))
@@ -213,18 +213,18 @@ def at_torques(
     if solver.on_elements:
         first = at_torques(solver.half_plane, angles, torques).twist
     else:
-        first = expected_twists(solver.law, torques, solver.law.touching(angles))
+        first = expected_twists(solver.contact_model, torques, solver.contact_model.first_contacts(angles))
     found = solve(np.arange(len(angles)), np.minimum(first, most))
-    found = twists_for_torque(solve, found, torques, touching=touching, most=most)
+    found = twists_for_torque(solve, found, torques, first_contact=first_contact, most=most)
     if finite:
         share = finite_strain_shares(solver.elastic, found)
         share = share / (1 + share)
-        found = twists_for_torque(solve, found, torques / (1 + share), touching=touching, most=most)
+        found = twists_for_torque(solve, found, torques / (1 + share), first_contact=first_contact, most=most)
         found = found.raised(share)
-    return closed(found, torques, touching)
+    return closed(found, torques, first_contact)
 
 
-def closed(found: Positions, goal: Array, touching: Array) -> Positions:
+def closed(found: Positions, goal: Array, first_contact: Array) -> Positions:
     """Positions whose torques are nearly the goals, brought there by the last small step of their twists.
 
     Moments change with the torque, the energy by the work, loads and contacts of the half-plane law at their own rates.
@@ -233,7 +233,7 @@ def closed(found: Positions, goal: Array, touching: Array) -> Positions:
     factor = np.where(good, goal / np.where(good, found.torque_wheel, 1.0), 1.0)
     moments = {name: getattr(found, name) * factor for name in TORQUES if name != "tangent"}
     moments["torque_wheel"] = np.where(good, goal, found.torque_wheel)
-    twist = newton_twist(found.twist, touching, found.torque_wheel, found.tangent, goal)
+    twist = newton_twist(found.twist, first_contact, found.torque_wheel, found.tangent, goal)
     twist = np.where(good, twist, found.twist)
     by = twist - found.twist
     energy = found.energy + 0.5 * (found.torque_wheel + moments["torque_wheel"]) * by
@@ -247,8 +247,8 @@ def closed(found: Positions, goal: Array, touching: Array) -> Positions:
 
 def checked_contact(solver: PositionSolver, found: Positions) -> Positions:
     """Mark positions without contact whose exact rigid flanks overlap, and take all numbers off failed ones."""
-    touching = solver.law.touching_twists(found.pinion_angle)
-    overlap = (found.status == "no_contact") & (found.twist > touching + ANGLE_ROUNDING)
+    first_contact = solver.contact_model.first_contact_twists(found.pinion_angle)
+    overlap = (found.status == "no_contact") & (found.twist > first_contact + ANGLE_ROUNDING)
     return found.with_status(np.where(overlap, "not_converged", found.status))
 
 
@@ -288,16 +288,16 @@ def curve_error(solver: PositionSolver, coarse: MeshingPair, solved: Positions, 
     again = at_twists(position_solver(coarse).half_plane, own.pinion_angle, own.twist, finite=finite)
     single = np.abs(again.torque_wheel / own.torque_wheel - 1) / (COARSENING**ORDER - 1)
     error += np.fmax(single, COVERAGE * np.sqrt(np.nanmean(single**2)))
-    made[numbers] = error + unseen_twists(solver.law, own) * np.abs(chosen.tangent / chosen.torque_wheel)
+    made[numbers] = error + unseen_twists(solver.contact_model, own) * np.abs(chosen.tangent / chosen.torque_wheel)
     return made
 
 
-def unseen_twists(law: HalfPlanePair, found: Positions) -> Array:
+def unseen_twists(contact_model: HalfPlanePair, found: Positions) -> Array:
     """Twists (rad) from the touch that mean nothing at positions of the half-plane law, shape (n,): the rounding of the
     gears' angles, and what the tabulated flanks miss of the exact ones, whose touch it is.
     """
     contacts, worst = found.contacts, np.zeros(len(found))
-    tables = law.tables.of(law.teeth.flank(contacts.pair))
+    tables = contact_model.tables.of(contact_model.teeth.flank(contacts.pair))
     missed = tables.misses.take(tables.piece_at(contacts.arc[:, :, None])).sum(axis=(1, 2))
     np.maximum.at(worst, contacts.position, missed)
-    return ANGLE_ROUNDING + worst / law.pair.wheel.base_radius
+    return ANGLE_ROUNDING + worst / contact_model.pair.wheel.base_radius

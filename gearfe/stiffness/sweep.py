@@ -166,7 +166,7 @@ def sweep_stiffness(
         check_torque(pair, elastic.model, load)
     solver = position_solver(elastic)
     with watch.stage("unloaded flanks"):
-        solver.law.touching(solved_angles)
+        solver.contact_model.first_contacts(solved_angles)
     with watch.stage("positions"), one_thread():
         solve = at_twists if torque is None else at_torques
         solved = solve(solver, solved_angles, np.full(len(solved_angles), load), finite=finite)
@@ -228,7 +228,7 @@ def assembled_curve(
     failed = ~np.isin(solved.status, SOLVED)
     total = np.where(failed & searched, np.nan, solved.twist)
     twist, torque = total - lost, solved.torque_wheel
-    deflection = total - solver.law.first_touch(solved.pinion_angle)
+    deflection = total - solver.contact_model.first_contact_twist(solved.pinion_angle)
     stiffness = np.divide(torque, deflection, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
     cycles = np.round((requested - solved.pinion_angle) / pair.mesh_cycle).astype(np.int64)
     leading, shares = load_shares(solved)
@@ -244,7 +244,7 @@ def assembled_curve(
         k_mesh=stiffness / radius**2,
         k_tangent=solved.tangent / radius**2,
         transmission_error=twist * radius,
-        transmission_error_unloaded=(solver.law.touching_twists(solved.pinion_angle) - lost) * radius,
+        transmission_error_unloaded=(solver.contact_model.first_contact_twists(solved.pinion_angle) - lost) * radius,
         leading_pair=leading - cycles,
         load_share=shares,
         teeth_in_contact=np.where(failed, -1, (shares > 0).sum(axis=1)),
@@ -253,7 +253,7 @@ def assembled_curve(
         law=np.full(len(source), law.name),
         contact_law=law_text(law),
         beyond_validity=np.where(np.isnan(twist), -1, overlaps(pair, twist) > MOST_OVERLAP),
-        mesh_cycle=pair.mesh_cycle * solver.law.mesh_cycles,
+        mesh_cycle=pair.mesh_cycle * solver.contact_model.mesh_cycles,
         base_radius=radius,
         lost_motion=lost,
         **contact_pressures(solved, loads),
@@ -294,23 +294,24 @@ class PairLoads:
 
 def pair_loads(solver: PositionSolver, found: Positions) -> PairLoads:
     """Loaded tooth pairs of positions."""
-    elastic, contacts, touching = solver.elastic, found.contacts, solver.law.touching(found.pinion_angle)
-    met, pairs = ((np.stack([one.position, one.pair], axis=1) @ [1 << 32, 1]) for one in (touching, contacts))
+    elastic, contacts = solver.elastic, found.contacts
+    first_contact = solver.contact_model.first_contacts(found.pinion_angle)
+    met, pairs = ((np.stack([one.position, one.pair], axis=1) @ [1 << 32, 1]) for one in (first_contact, contacts))
     k = np.minimum(np.searchsorted(met, pairs), len(met) - 1)
     known = np.flatnonzero((contacts.torque_wheel > 0) & (met[k] == pairs))
     k, position, width = k[known], contacts.position[known], contacts.half_width[known]
-    force = contacts.torque_wheel[known] / (touching.arm[k, 1] * elastic.width)
-    curvature, flat = touching.curvature[k], np.isfinite(touching.curvature[k])
-    flank, half = touching.flank[k], width[:, None, None]
-    middle = solver.law.arc_at(flank, touching.place[k])[:, :, None]
-    reached = marks_met(solver.law, flank, middle - half, middle + half)
-    rounded = solver.law.marks[0] == "round"
+    force = contacts.torque_wheel[known] / (first_contact.arm[k, 1] * elastic.width)
+    curvature, flat = first_contact.curvature[k], np.isfinite(first_contact.curvature[k])
+    flank, half = first_contact.flank[k], width[:, None, None]
+    middle = solver.contact_model.arc_at(flank, first_contact.place[k])[:, :, None]
+    reached = marks_met(solver.contact_model, flank, middle - half, middle + half)
+    rounded = solver.contact_model.marks[0] == "round"
     bears = np.where(reached[:, rounded].any(axis=1), ROUNDED, 0)
     bears[reached[:, ~rounded].any(axis=1)] = SINGULAR
     several = np.unique(pairs[known], return_inverse=True, return_counts=True)
     bears[several[2][several[1]] > 1] = ROUNDED  # not where the rigid flanks touch first, nor with one ellipse
     bears[~flat] = SINGULAR  # it touches at the corner itself, however narrow the contact
-    hertz = np.sqrt(force / solver.law.inverse_modulus.sum() * np.where(flat, curvature, 0.0) / math.pi)
+    hertz = np.sqrt(force / solver.contact_model.inverse_modulus.sum() * np.where(flat, curvature, 0.0) / math.pi)
     blunted = 2 * force / (math.pi * np.hypot(width, BLUNTING * solver.pair.pinion.module))
     off = np.abs(width * math.pi * hertz / (2 * force) - 1)
     if elastic.deviations != NOMINAL:  # waves shorter than the contact say nothing of its pressure; its width does
@@ -320,7 +321,7 @@ def pair_loads(solver: PositionSolver, found: Positions) -> PairLoads:
         pair=contacts.pair[known],
         force=force * elastic.width,
         share=contacts.torque_wheel[known] / found.torque_wheel[position],
-        roll=_rolls(solver.law, flank, contacts.arc[known]),
+        roll=_rolls(solver.contact_model, flank, contacts.arc[known]),
         half_width=width,
         pressure=np.where(bears > 0, blunted, hertz),
         error=off,
@@ -328,22 +329,22 @@ def pair_loads(solver: PositionSolver, found: Positions) -> PairLoads:
     )
 
 
-def _rolls(law: HalfPlanePair, flank: IntArray, arc: Array) -> Array:
+def _rolls(contact_model: HalfPlanePair, flank: IntArray, arc: Array) -> Array:
     """Roll lengths (m) at arcs (m) of the flanks `flank`, all of shape (q, 2); not-a-number off the involutes."""
     made = np.full(arc.shape, np.nan)
     for i in np.unique(flank):
-        face, here = law.teeth.faces[i], np.nonzero(flank == i)
+        face, here = contact_model.teeth.faces[i], np.nonzero(flank == i)
         u = face.parameter_at(arc[here])
         on = (u >= 0) & (u <= 1)
         made[tuple(one[on] for one in here)] = face.flank.roll(u[on])
     return made
 
 
-def marks_met(law: HalfPlanePair, flank: IntArray, low: Array, high: Array) -> BoolArray:
+def marks_met(contact_model: HalfPlanePair, flank: IntArray, low: Array, high: Array) -> BoolArray:
     """Which of `HalfPlanePair.marks` lie between the arcs low and high (m), shape (m, 2, 1), of contacts on the flanks
     `flank`, shape (m, 2): shape (m, k).
     """
-    _, of, (first, last) = law.marks
+    _, of, (first, last) = contact_model.marks
     return np.asarray(((flank[:, :, None] == of) & (low <= last) & (high >= first)).any(axis=1))
 
 

@@ -186,7 +186,7 @@ class LawFlank(MeshFlank):
 
     def bears(self, phase: Array, approach: Array) -> BoolArray:
         """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
-        return np.asarray(approach > self.law.touching(phase, self.shifts_at(phase)))
+        return np.asarray(approach > self.law.first_contact(phase, self.shifts_at(phase)))
 
     def shifts_at(self, phase: Array) -> Array:
         """Shifts (m) of the pairs in the law's slots at phases (n,), shape (n, slots), or (1,) of all pairs."""

@@ -88,7 +88,7 @@ def beyond_law(model: TrainModel, moved: TrainStates) -> tuple[int, str] | None:
             if not isinstance(flank, LawFlank):
                 continue
             phase, approach = flank.phase_and_approach(model.angle(moved.time), u)
-            past = approach > flank.law.touching(phase, flank.shifts_at(phase)) + flank.law.reach
+            past = approach > flank.law.first_contact(phase, flank.shifts_at(phase)) + flank.law.reach
             if past.any() and (first is None or int(np.argmax(past)) < first[0]):
                 at = int(np.argmax(past))
                 force, most = abs(float(moved.contact_force[at, i])), flank.law.largest_force

@@ -73,7 +73,7 @@ def run(case: Case, folder: Path) -> Finding:
     law = mesh_law(pair, force)
     angles = law.nodes[0] + law.cycle * random.uniform(0.0, 1.0, PLACES)
     depths = law.reach * np.exp(random.uniform(math.log(1e-4), 0.0, PLACES))
-    first = law.touching(angles)
+    first = law.first_contact(angles)
     forces = law(angles, first + depths).force
     angles, approach = angles[:TRUTHS], (first + depths)[:TRUTHS]
     truth = solve_half_plane(pair, angles, approach / job.pair.wheel.base_radius + job.pair.contact_twist)

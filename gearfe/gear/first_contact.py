@@ -1,4 +1,4 @@
-r"""Where and when do the rigid driving flanks of each tooth pair first touch? Exact curves, to rounding.
+r"""First contact of the rigid driving flanks of each tooth pair: place and twist on exact curves, to rounding.
 
 About the wheel's centre every point of the wheel's flank moves on a circle. With the polar angles of the pinion's
 flank, seen from there, :math:`\varphi_1(u)` at its parameter u, and of the wheel's flank at the same radius and zero
@@ -45,8 +45,8 @@ SETTLED = 4e-14
 
 
 @dataclass(frozen=True)
-class Touching:
-    """Tooth pairs whose rigid flanks meet, n of them over all positions; pinion and wheel in second axes.
+class FirstContacts:
+    """First contacts of n tooth pairs whose rigid flanks meet over all positions; pinion and wheel in second axes.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Touching:
     twist : ndarray, shape (n,)
         Twist of the wheel at which the pair touches (rad).
     place : ndarray, shape (n, 2)
-        Parameters u of the touching points on pinion and wheel.
+        Parameters u of the points of contact on pinion and wheel.
     point, normal : ndarray of complex, shape (n,)
         Point of contact and common normal out of the pinion, global axes.
     arm : ndarray, shape (n, 2)
@@ -84,9 +84,9 @@ class Touching:
     flank: IntArray
     frames: Array
 
-    def take(self, index: Any) -> Touching:
+    def take(self, index: Any) -> FirstContacts:
         """The pairs `index`."""
-        return Touching(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+        return FirstContacts(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
     def __len__(self) -> int:
         return len(self.pair)
@@ -130,12 +130,12 @@ class ToothFlanks:
         angles = (self.pair.tooth_angle(gear, tooth, angle, twist) for gear, tooth in enumerate(teeth))
         return np.stack([one + error for one, error in zip(angles, errors, strict=True)], axis=1)
 
-    def touching(self, angles: Array) -> Touching:
-        """First touch of every tooth pair that can meet at the given pinion angles (rad), shape (p,)."""
-        return self.first_touch(*candidates(self.pair, np.asarray(angles, dtype=float)))
+    def first_contacts(self, angles: Array) -> FirstContacts:
+        """Return the first contact of every tooth pair that can meet at the given pinion angles (rad), shape (p,)."""
+        return self.first_contacts_of(*candidates(self.pair, np.asarray(angles, dtype=float)))
 
-    def first_touch(self, position: IntArray, angle: Array, number: IntArray) -> Touching:
-        """First touch of the tooth pairs `number` at pinion angles (rad), of those of them that meet, shape (n,).
+    def first_contacts_of(self, position: IntArray, angle: Array, number: IntArray) -> FirstContacts:
+        """Return the first contact of the tooth pairs `number` at pinion angles (rad), shape (n,), where they meet.
 
         Positions are in rising order, and the numbers of each of them.
         """
@@ -160,7 +160,7 @@ class ToothFlanks:
             normal[rows], curvature[rows] = np.where(bend > mate_bend, *normals[::-1]), bent + mate_bent
             least[rows], places[rows] = twist, np.stack([u, mate], axis=1)
         arm = np.stack([_cross(point, normal), -_cross(point - a, normal)], axis=1)
-        every = Touching(position, number, angle, least, places, point, normal, arm, curvature, flank, frames)
+        every = FirstContacts(position, number, angle, least, places, point, normal, arm, curvature, flank, frames)
         return every.take(np.isfinite(least))
 
 
@@ -237,7 +237,7 @@ def _cross(a: ComplexArray, b: ComplexArray) -> Array:
     return np.asarray((np.conj(a) * b).imag)
 
 
-def touching_curve(
+def first_contact_curve(
     pair: MeshGeometry,
     angles: Array,
     *,
@@ -252,7 +252,7 @@ def touching_curve(
     """
     place = np.asarray(angles, dtype=float)
     numbers = np.full(len(place), number, dtype=np.int64)
-    found = ToothFlanks(pair, deviations).first_touch(np.arange(len(place)), place, numbers)
+    found = ToothFlanks(pair, deviations).first_contacts_of(np.arange(len(place)), place, numbers)
     made = np.full(len(place), np.inf)
     made[found.position] = found.twist
     return made
