@@ -53,7 +53,7 @@ TWIST_STEPS, FORCE_ROUNDS, SHARPEST = 7, 2, 0.02
 
 
 def unloaded(contact_model: HalfPlanePair, twists: Array, found: FirstContacts) -> tuple[Setting, State]:
-    """Tooth pairs where their rigid flanks touch, at twists (rad) of their positions, without forces."""
+    """Return the unloaded state of all candidate tooth pairs at the twists (rad) of their positions."""
     frames = found.frames + twists[found.position, None] * np.arange(2)
     nothing, count = np.zeros(len(found)), len(found)
     return Setting(contact_model, found, np.exp(1j * frames)), State(
@@ -71,7 +71,7 @@ def unloaded(contact_model: HalfPlanePair, twists: Array, found: FirstContacts) 
 
 
 def far_field_compliance(setting: Setting, state: State) -> Array:
-    """T by couple (m2/N)."""
+    """Return the far-field compliance T of all couples of contacts (m2/N)."""
     normal = state.normal[:, None] / setting.turn
     return far_field_influence(setting.contact_model, setting.couples, normal, state.arc, state.variance).compliance
 
@@ -95,7 +95,7 @@ def shared(couples: Couplings, T: Array, own: Array, overlap: Array, on: BoolArr
 
 
 def first_state(contact_model: HalfPlanePair, twists: Array, found: FirstContacts) -> tuple[Setting, State]:
-    """What the iteration for all tooth pairs begins with at twists (rad) of the positions."""
+    """Return the initial state of the iteration: Hertzian forces that take up the overlap at the twists (rad)."""
     setting, state = unloaded(contact_model, twists, found)
     T = far_field_compliance(setting, state)
     overlap = found.arm[:, 1] * (twists[found.position] - found.twist)
@@ -107,8 +107,9 @@ def first_state(contact_model: HalfPlanePair, twists: Array, found: FirstContact
 
 
 def expected_twists(contact_model: HalfPlanePair, torques: Array, first_contact: FirstContacts) -> Array:
-    """Twists (rad) at which n positions are expected to carry torques (N m) > 0, shape (n,); infinite where nothing can
-    touch.
+    """Return the twists (rad) at which n positions should carry torques (N m) > 0, shape (n,).
+
+    They are infinite where no flanks can touch.
 
     Parameters
     ----------
