@@ -9,11 +9,11 @@ from __future__ import annotations
 import sys
 
 from gearfe.files import output_folder, write_csv
+from gearfe.gearbox.job import job_train, read_train_job, train_body
+from gearfe.gearbox.mesh_stiffness import train_curves
 from gearfe.record_spectrum import finer
 from gearfe.train import build_train, simulate
 from gearfe.vibration.follow import RunningMean
-from gearfe.vibration.job import job_train, read_train_job, train_body
-from gearfe.vibration.mesh_stiffness import train_curves
 from gearfe.vibration.spectra import response_columns, spectra
 
 

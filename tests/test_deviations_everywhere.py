@@ -18,13 +18,13 @@ from gearfe.gear import pitch_errors
 from gearfe.gear.deviation_job import deviations_of
 from gearfe.gear.face import NOMINAL
 from gearfe.gear.modifications import FlankModification, Relief, tooth_deviations
+from gearfe.gearbox.job import job_train, read_train_job
+from gearfe.gearbox.mesh_stiffness import train_curves
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.meshlaw.make import mesh_law
 from gearfe.multibody import constant
 from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.train.statics import static_errors
-from gearfe.vibration.job import job_train, read_train_job
-from gearfe.vibration.mesh_stiffness import train_curves
 
 from .gears import pair as gear_pair
 from .test_train_job import BORES, SMALL

@@ -2,9 +2,9 @@
 
 import pytest
 
+from gearfe.gearbox.inherited import inherited, inherited_lines
+from gearfe.gearbox.job import job_train, read_train_job
 from gearfe.train import build_train
-from gearfe.vibration.inherited import inherited, inherited_lines
-from gearfe.vibration.job import job_train, read_train_job
 
 JOB = """
 [pair]

@@ -16,6 +16,8 @@ import pytest
 from gearfe.cli import main
 from gearfe.config import build
 from gearfe.errors import InputError
+from gearfe.gearbox.job import bore_places, job_train, read_train_job, train_body
+from gearfe.gearbox.mesh_stiffness import train_curves
 from gearfe.housing.attachments import Bore
 from gearfe.housing.body import reduced_housing
 from gearfe.housing.build import housing_from_job, housing_from_table
@@ -25,8 +27,6 @@ from gearfe.meshing.mesh_file import read_mesh_file
 from gearfe.meshing.session import gmsh_session
 from gearfe.tables.housing import HousingTable
 from gearfe.train import build_train
-from gearfe.vibration.job import bore_places, job_train, read_train_job, train_body
-from gearfe.vibration.mesh_stiffness import train_curves
 
 MESHES = Path(__file__).parent.parent / "meshes"
 BORES = [{"group": f"bore_{i}"} for i in (1, 2, 3, 4)]

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from gearfe.gearbox.radiation import RadiatedPower, instantaneous_power, power_level
 from gearfe.housing.meshes import Tetrahedra
-from gearfe.vibration.radiation import RadiatedPower, instantaneous_power, power_level
 from gearfe.vibration.spectra import spectra
 
 from .housing_meshes import box

@@ -15,6 +15,8 @@ from scipy.sparse import coo_array
 from gearfe.cli import main
 from gearfe.config import build
 from gearfe.errors import InputError
+from gearfe.gearbox.job import bore_places, job_train, read_train_job, train_body
+from gearfe.gearbox.mesh_stiffness import train_curves
 from gearfe.housing.body import reduced_housing
 from gearfe.housing.build import housing_from_job
 from gearfe.housing.superelement import read_matrix, superelement, write_matrix
@@ -22,8 +24,6 @@ from gearfe.reduction.error import accelerances
 from gearfe.reduction.modal_body import ModalBody
 from gearfe.tables.housing import HousingTable, SuperelementTable
 from gearfe.train import build_train
-from gearfe.vibration.job import bore_places, job_train, read_train_job, train_body
-from gearfe.vibration.mesh_stiffness import train_curves
 
 from .nastran import Output2, output4_binary, output4_text
 

@@ -13,12 +13,12 @@ import pytest
 from gearfe.config import build, load_job
 from gearfe.errors import InputError
 from gearfe.gear.pair import GearPair
+from gearfe.gearbox.job import bore_places, job_train, read_train_job, train_gear
+from gearfe.gearbox.mesh_stiffness import train_curves
 from gearfe.stiffness.curve import StiffnessCurve
 from gearfe.tables.pair import PairTable, StiffnessTable
 from gearfe.tables.train import TrainCurvesTable, TrainGearTable
 from gearfe.train import build_train, simulate
-from gearfe.vibration.job import bore_places, job_train, read_train_job, train_gear
-from gearfe.vibration.mesh_stiffness import train_curves
 
 SHIPPED = Path(__file__).parent.parent / "geometry" / "gear_train.toml"
 

@@ -14,11 +14,11 @@ import pytest
 from gearfe.errors import InputError
 from gearfe.gear.involute import tooth_profile
 from gearfe.gear.pair import _shared_pair, gear_pair
+from gearfe.gearbox.job import TrainJob, read_train_job
 from gearfe.progress import Stopwatch
 from gearfe.runup.job import at_speed, solved
 from gearfe.tables.runup import RunUpTable
 from gearfe.train.kinematics import kinematics
-from gearfe.vibration.job import TrainJob, read_train_job
 from gearfe.vibration.run import simulated
 
 from .trains import changed, gear, train

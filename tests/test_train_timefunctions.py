@@ -10,8 +10,8 @@ import pytest
 from gearfe.cli import main
 from gearfe.config import build
 from gearfe.errors import InputError
+from gearfe.gearbox.timefunctions import PIECES, fitted, time_function
 from gearfe.tables.timefunction import TrainFunctionTable
-from gearfe.vibration.timefunctions import PIECES, fitted, time_function
 
 from .test_cli_vibration import SMALL
 

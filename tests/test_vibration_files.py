@@ -13,12 +13,7 @@ import pytest
 from gearfe.errors import InputError, NotFiniteWarning
 from gearfe.figures.train import TrainPictures
 from gearfe.figures.train_scene import draw_scene, sharp_edges
-from gearfe.housing.attachments import Attachment
-from gearfe.housing.model import Housing
-from gearfe.multibody import constant
-from gearfe.progress import Stopwatch
-from gearfe.train import Drive, GearMesh, GearTrain, Shaft, ShaftGear, build_train
-from gearfe.vibration.fields import (
+from gearfe.gearbox.fields import (
     frames,
     gear_surface,
     moved,
@@ -26,8 +21,14 @@ from gearfe.vibration.fields import (
     write_gears,
     write_housing,
 )
+from gearfe.gearbox.stability import Stability
+from gearfe.housing.attachments import Attachment
+from gearfe.housing.model import Housing
+from gearfe.multibody import constant
+from gearfe.progress import Stopwatch
+from gearfe.train import Drive, GearMesh, GearTrain, Shaft, ShaftGear, build_train
 from gearfe.vibration.files import OutputChoice, write_run
-from gearfe.vibration.follow import RunningMean, Stability, TrainRun
+from gearfe.vibration.follow import RunningMean, TrainRun
 from gearfe.vibration.report import lines_of
 from gearfe.vibration.spectra import response_columns, spectra
 

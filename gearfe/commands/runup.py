@@ -39,10 +39,10 @@ def run(args: argparse.Namespace) -> int:
         table = replace(table, stability=False)
 
     from ..files import output_folder
+    from ..gearbox.job import train_job
     from ..progress import Stopwatch
     from ..runup.files import RunUpChoice, write_runup
     from ..runup.job import described, solved
-    from ..vibration.job import train_job
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("reading"):
@@ -75,7 +75,7 @@ def _own_table(job: str) -> RunUpTable:
 
 def _report_lines(summary: dict[str, Any]) -> list[str]:
     """Lines for the terminal."""
-    from ..vibration.inherited import inherited_lines
+    from ..gearbox.inherited import inherited_lines
 
     lines = [
         f"{summary['speeds_reached']} of {summary['speeds']} speeds, {summary['steady_states']} steady states; largest "

@@ -72,10 +72,10 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--band", args.band, "must be two rising frequencies >= 0", "as --band 200 4000")
 
     from ..files import output_folder
+    from ..gearbox.job import train_job
     from ..progress import Stopwatch
     from ..vibration.analysis import Analysis, record_start
     from ..vibration.files import OutputChoice, check_choice, write_run
-    from ..vibration.job import train_job
     from ..vibration.run import simulated
 
     watch = Stopwatch({"program start": time.perf_counter() - started}, started)
@@ -140,7 +140,7 @@ def title(table: TrainTable, *, driven: bool = True) -> str:
 
 def report_lines(response: TrainResponse, train: GearTrain, written: Written, choice: OutputChoice) -> list[str]:
     """Lines for the terminal."""
-    from ..vibration.inherited import inherited_lines
+    from ..gearbox.inherited import inherited_lines
 
     summary = written.summary
     lines = [*_mesh_lines(response, train, summary), *_contact_lines(summary)]
@@ -214,8 +214,8 @@ def _contact_lines(summary: Mapping[str, Any]) -> list[str]:
 def _spectrum_lines(response: TrainResponse, train: GearTrain, written: Written, choice: OutputChoice) -> list[str]:
     """Resolution, the largest lines at the attachment of the pictures, radiated power."""
     from ..errors import given
+    from ..gearbox.report import attachment_to_draw
     from ..vibration.errors import with_error
-    from ..vibration.report import attachment_to_draw
 
     made, summary = given(written.spectra, "spectra"), written.summary
     lines = [

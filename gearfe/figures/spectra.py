@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..gearbox.radiation import RadiatedPower
 from ..spectrum import nearest_line, peaks
 from ..train.response import TrainResponse
 from ..typing import Array
 from ..vibration.analysis import Analysed
-from ..vibration.radiation import RadiatedPower
 from ..vibration.report import lines_of, settled
 from ..vibration.short_time import OrderTracks
 from ..vibration.spectra import TrainSpectra

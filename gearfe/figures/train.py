@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from ..gearbox.fields import frames
 from ..train.gear_train import GearTrain
 from ..train.response import TrainResponse
 from ..train.statics import static_errors
 from ..typing import Array, IntArray
 from ..vibration.analysis import Analysed
-from ..vibration.fields import frames
 from ..vibration.follow import Followed
 from ..vibration.report import attachment_acceleration
 from ..vibration.spectra import TrainSpectra

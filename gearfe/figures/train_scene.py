@@ -30,7 +30,7 @@ _STILL, _FILM = (2000, 1440), (720, 520)
 
 
 def draw_scene(path: str | Path, arrays: Mapping[str, Array], title: str, most: float | None = None) -> str:
-    """Draw what `gearfe.vibration.fields.frames` gives: one step into a ``.png``, several into an animated ``.gif``.
+    """Draw what `gearfe.gearbox.fields.frames` gives: one step into a ``.png``, several into an animated ``.gif``.
 
     Parameters
     ----------

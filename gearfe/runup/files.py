@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ..files import whole_set, write_csv, write_json
+from ..gearbox.report import attachment_to_draw
 from ..output.arrays import save_arrays
-from ..vibration.report import attachment_to_draw
 from . import report
 from .critical import CriticalSpeeds, critical_speeds
 from .instability import InstabilityMap

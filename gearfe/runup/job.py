@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..gearbox.inherited import inherited
+from ..gearbox.job import TrainJob, job_train, train_body
+from ..gearbox.mesh_stiffness import train_curves
 from ..progress import stage
 from ..tables.runup import RunUpTable
 from ..train import build_train
 from ..train.gear_train import GearTrain
-from ..vibration.inherited import inherited
-from ..vibration.job import TrainJob, job_train, train_body
-from ..vibration.mesh_stiffness import train_curves
 from .instability import InstabilityMap, instability_map
 from .run_up import RunUp, run_up
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..gear.derived import dynamic_factor
 from ..gear.pair import MeshGeometry
+from ..gearbox.radiation import power_level
 from ..train.response import XYZ
 from ..typing import Array, IntArray
-from ..vibration.radiation import power_level
 from . import torus
 from .critical import CriticalSpeeds, largest_force, peaks_of
 from .instability import InstabilityMap

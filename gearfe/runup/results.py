@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..gearbox.radiation import AIR_IMPEDANCE
 from ..typing import Array, ComplexArray, IntArray
-from ..vibration.radiation import AIR_IMPEDANCE
 from . import torus
 from .balance import Orbit
 from .condensed import CondensedTrain

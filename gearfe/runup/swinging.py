@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ..gearbox.fields import write_gears, write_housing
 from ..multibody import constant
 from ..train.model import TrainModel
 from ..train.response import TrainResponse
 from ..train.simulate import response_of
 from ..train.states import TrainStates
 from ..typing import Array
-from ..vibration.fields import write_gears, write_housing
 from .modes import CoupledModes
 
 #: Pictures of one period.

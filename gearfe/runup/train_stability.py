@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
+from ..gearbox.stability import Stability
 from ..progress import one_thread
 from ..train.model import TrainModel
-from ..vibration.follow import Stability
 from .condensed import condense
 from .run_up import steady_state
 from .stability import multipliers

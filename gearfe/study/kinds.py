@@ -90,10 +90,10 @@ def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
 
 
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
+    from ..gearbox.job import train_job
     from ..tables.train import train_tables
     from ..vibration.analysis import Analysis, record_start
     from ..vibration.files import OutputChoice, write_run
-    from ..vibration.job import train_job
     from ..vibration.run import simulated
 
     job, watch = train_job(path, train_tables(raw, path)), Stopwatch()
@@ -111,11 +111,11 @@ def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
 
 
 def _runup(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
+    from ..gearbox.job import train_job
     from ..runup import report
     from ..runup.critical import critical_speeds
     from ..runup.job import described, solved
     from ..tables.train import train_tables
-    from ..vibration.job import train_job
 
     table, job = job_tables(raw, path, ("runup",))["runup"], train_job(path, train_tables(raw, path))
     run, unstable = solved(job, table, watch=Stopwatch())

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from ..files import write_csv
+from ..gearbox.job import TrainJob
 from ..spectrum import Waterfall
 from ..train import build_train
 from ..train.gear_train import GearTrain
 from ..train.response import TrainResponse
 from ..typing import Array
-from .job import TrainJob
 from .measured import Measured, read_measured
 from .run import repeater
 from .short_time import OrderTracks, Tracked, averaged, check_part, check_turns, order_tracks, short_time, steady_from

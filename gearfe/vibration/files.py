@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError, given
 from ..files import whole_set, write_csv, write_json
+from ..gearbox.report import attachment_to_draw
 from ..progress import Stopwatch
 from ..train.gear_train import GearTrain
 from ..train.model import TrainModel
@@ -20,7 +21,7 @@ from ..typing import Array, IntArray
 from . import analysis
 from .errors import Run, with_errors
 from .follow import Followed, TrainRun, follow
-from .report import attachment_to_draw, train_summary
+from .report import train_summary
 from .spectra import TrainRecord, TrainSpectra, record
 
 #: Frames of the animation, and steps of the field files at most.
@@ -274,7 +275,7 @@ def _fields(
     draw: Pictures | None,
 ) -> list[str]:
     """Write and draw the fields of the response at the output times of `field_steps`."""
-    from .fields import write_gears, write_housing
+    from ..gearbox.fields import write_gears, write_housing
 
     steps = field_steps(times, choice)
     series, still, film = (np.searchsorted(steps, some) for some in _shown(times, choice))

@@ -12,48 +12,16 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import Table, csv_table
-from ..shown import percent
+from ..gearbox.stability import NOT_COMPUTED, Stability
 from ..train.model import TrainModel
 from ..train.response import TrainResponse, joined
-from ..typing import Array, ComplexArray, IntArray
+from ..typing import Array, IntArray
 from .spectra import TrainRecord, TrainSpectra, response_columns
 
 #: Parts of the curves in a picture: more than it has columns of pixels.
 DRAWN = 4000
-#: A multiplier's modulus beyond 1 by less than this is no instability.
-ROUND_OFF = 1e-6
 #: Samples that a spline through a piece shares with the piece before.
 _SHARED = 3
-
-
-@dataclass(frozen=True, eq=False)
-class Stability:
-    """Whether small motions beside the steady one of a train die out.
-
-    Attributes
-    ----------
-    multipliers : (2 modes,) or None
-        Floquet multipliers, largest modulus first; None where there are none, `note` says why.
-    time
-        Over which they are made (s): the common period of the meshes.
-    note
-        Why there are none, or nothing.
-    """
-
-    multipliers: ComplexArray | None = None
-    time: float = 0.0
-    note: str = ""
-
-    @property
-    def warnings(self) -> list[str]:
-        """A sentence where the motion is unstable."""
-        growth = 0.0 if self.multipliers is None else abs(self.multipliers[0]) - 1.0
-        if growth <= ROUND_OFF:
-            return []
-        return [
-            f"the train is parametrically unstable: its vibration grows by {percent(growth, 3)} every "
-            f"{1e3 * self.time:.4g} ms; add damping, or change the speed"
-        ]
 
 
 @dataclass(frozen=True)
@@ -86,7 +54,7 @@ class TrainRun:
     further: Mapping[str, Any] = field(default_factory=dict)
     again: Callable[[TrainModel, str], Callable[[Array], Iterable[TrainResponse]]] | None = None
     band_hz: float = 5000.0
-    stability: Stability = Stability(note="not computed")
+    stability: Stability = NOT_COMPUTED
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,10 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..files import read_numbers, read_text
+from ..gearbox.job import TrainJob
 from ..spectrum import amplitude_spectrum, uniform_step
 from ..tables.spectrum import MeasuredTable
 from ..typing import Array
-from .job import TrainJob
 
 VALUE = "acceleration_m_per_s2"
 

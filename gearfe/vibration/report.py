@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from ..errors import unknown_name
+from ..gearbox.stability import Stability
 from ..meshlaw.law import MeshLaw
 from ..spectrum import OrderLine, nearest_line, order_lines, peaks
 from ..stiffness.curve import StiffnessCurve
@@ -15,7 +15,7 @@ from ..train.gear_train import GearTrain
 from ..train.mesh_element import LEAST_REFERENCE, PHASES
 from ..train.response import TrainResponse
 from ..typing import Array
-from .follow import Followed, Stability
+from .follow import Followed
 from .spectra import TrainSpectra
 
 #: Lines that the summary names for each signal.
@@ -188,14 +188,6 @@ def stiffness_ranges(train: GearTrain) -> dict[str, tuple[float | None, float | 
             values = given.k_mesh if isinstance(given, StiffnessCurve) else given.values
             found[mesh.name] = (float(np.nanmin(values)), float(np.nanmax(values)))
     return found
-
-
-def attachment_to_draw(names: Sequence[str], chosen: str | None, train: GearTrain) -> str:
-    """Name of the attachment in the pictures: the chosen one, else the bore that carries the load's reaction."""
-    if chosen is not None and chosen not in names:
-        raise unknown_name("--attachment", chosen, names)
-    loaded = next((load.bore for load in train.loads if load.bore is not None), None)
-    return chosen or (loaded if loaded is not None and loaded in names else names[-1])
 
 
 def attachment_acceleration(response: TrainResponse, attachment: str) -> Array:

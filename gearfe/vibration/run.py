@@ -8,6 +8,9 @@ from dataclasses import asdict
 from typing import Any
 
 from ..cache import versions
+from ..gearbox.inherited import inherited
+from ..gearbox.job import TrainJob, job_train, train_body
+from ..gearbox.mesh_stiffness import train_curves
 from ..record_spectrum import finer, subdivided
 from ..train import build_train
 from ..train.gear_train import GearTrain
@@ -15,9 +18,6 @@ from ..train.model import TrainModel
 from ..train.response import TrainResponse
 from ..train.simulate import simulate_in_pieces
 from .follow import TrainRun
-from .inherited import inherited
-from .job import TrainJob, job_train, train_body
-from .mesh_stiffness import train_curves
 from .report import stiffness_ranges
 
 #: Tolerance that suffices for errors: forces and accelerations are within a hundredth of it.

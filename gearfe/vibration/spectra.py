@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..gearbox.radiation import AIR_IMPEDANCE, RadiatedPower, instantaneous_power
 from ..record_spectrum import FASTEST, RecordSpectrum
 from ..spectrum import Spectrum, uniform_step
 from ..train.response import TrainResponse
 from ..typing import Array, ComplexArray
-from .radiation import AIR_IMPEDANCE, RadiatedPower, instantaneous_power
 
 #: Columns of response.csv that are no signals of the spectrum.
 NO_SIGNALS = ("time_s", "drive_angle_deg", "instantaneous_radiated_power_W", "band_limited")

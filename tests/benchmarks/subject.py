@@ -96,10 +96,10 @@ def train_model(variant: str, *, quick: bool = False, modes: int | None = None, 
     speed
         Of the drive (rad/s), in place of the variant's.
     """
+    from gearfe.gearbox.job import job_train, read_train_job, train_body
+    from gearfe.gearbox.mesh_stiffness import train_curves
     from gearfe.multibody import constant
     from gearfe.train import build_train
-    from gearfe.vibration.job import job_train, read_train_job, train_body
-    from gearfe.vibration.mesh_stiffness import train_curves
 
     parting = variant == "parting"
     job = read_train_job(given_file(GEOMETRY / "gear_train.toml"), "operating" if parting else variant)

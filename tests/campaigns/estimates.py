@@ -152,9 +152,9 @@ def _draw_response(random: np.random.Generator, number: int, kind: str) -> Case:
 
 def _run_response(case: Case, job_path: Path) -> Found:
     """Worst error of a contact force over the run, relative to its largest value."""
+    from gearfe.gearbox.job import job_train, read_train_job
+    from gearfe.gearbox.mesh_stiffness import train_curves
     from gearfe.train import build_train, simulate
-    from gearfe.vibration.job import job_train, read_train_job
-    from gearfe.vibration.mesh_stiffness import train_curves
 
     del case
     job = read_train_job(job_path)
