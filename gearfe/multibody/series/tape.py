@@ -154,7 +154,23 @@ class Tape:
     def bars(
         self, place: IntArray, shape: Array, slope: Array, weight: Array, stiffness: Array, damping: float
     ) -> None:
-        """Gauss points of a beam, as `Bars` has them; the stiffness, shape (3,), is that of all."""
+        """Add the Gauss points of a beam.
+
+        Parameters
+        ----------
+        place : ndarray of int, shape (p, 4)
+            Coordinate x of the four nodes of each point; y and angle follow it.
+        shape : ndarray, shape (p, 4)
+            Shape functions.
+        slope : ndarray, shape (p, 4)
+            Their derivatives with the arc length (1/m).
+        weight : ndarray, shape (p,)
+            Weights of the quadrature (m).
+        stiffness : ndarray, shape (3,)
+            Axial EA (N), shear (N) and bending EI (N m2), of all points.
+        damping : float
+            Kelvin-Voigt time (s).
+        """
         count = len(place)
         numbers = self.stresses + 3 * np.arange(count)
         self._bars.append(
@@ -163,7 +179,19 @@ class Tape:
         self.stresses += 3 * count
 
     def floating(self, first: int, linear: Array, quadratic: Array, damping: float) -> None:
-        """A body in a floating frame whose coordinates begin at `first`; L and Q of `floating.FloatingBody`."""
+        """Add a body in a floating frame, see `floating.FloatingBody`.
+
+        Parameters
+        ----------
+        first : int
+            Number of its first coordinate.
+        linear : ndarray, shape (s, r)
+            L.
+        quadratic : ndarray, shape (s, r, r)
+            Q.
+        damping : float
+            Kelvin-Voigt time (s).
+        """
         self._floats.append(((first, *linear.shape[::-1], self.stresses), linear, quadratic, damping))
         self.stresses += len(linear)
 
@@ -176,7 +204,15 @@ class Tape:
         return at, at + 1
 
     def curve(self, coordinate: int, knots: Array, entries: Array, period: float = 0.0) -> int:
-        """Variable that is a table (as of `table`) of a coordinate."""
+        """Return the variable that is a table of a coordinate.
+
+        Parameters
+        ----------
+        coordinate : int
+            Number of the coordinate.
+        knots, entries, period
+            As of `table`.
+        """
         key = (coordinate, knots.tobytes(), entries.tobytes(), period)
         if key not in self._curves:
             at = self._curves[key] = self.size + len(self._curve_rows)
@@ -188,7 +224,21 @@ class Tape:
         self, terms: Terms, products: Sequence[tuple[int, int, float]] = (), constant: float = 0.0,
         motion: TimeFunction | None = None, unit: float = 1.0,
     ) -> None:  # fmt: skip
-        """A constraint."""
+        """Add a constraint: terms + products + constant - motion(t) = 0.
+
+        Parameters
+        ----------
+        terms : mapping
+            Variable -> factor.
+        products : sequence of (int, int, float)
+            Two variables and the factor of their product.
+        constant : float
+            Constant term.
+        motion : TimeFunction, optional
+            Prescribed value over time.
+        unit : float
+            Size of the row that counts as much as 1 rad.
+        """
         self._rows.append((terms, products, constant, -1 if motion is None else self._numbered(motion), unit))
 
     def push(self, register: int, terms: Terms, *, told: bool = False) -> None:
@@ -217,7 +267,19 @@ class Tape:
 
     # operations -----------------------------------------------------------------------------------------------
     def sum(self, a: int, b: int = -1, *, f: float = 1.0, g: float = 1.0, c: float = 0.0) -> int:
-        """f a + g b + c."""
+        """Return the register of f a + g b + c.
+
+        Parameters
+        ----------
+        a : int
+            Register.
+        b : int
+            Another register, -1 for none.
+        f, g : float
+            Their factors.
+        c : float
+            Constant term.
+        """
         return self._register(SUM, a, b, factors=(f, g if b >= 0 else 0.0, c))
 
     def mul(self, a: int, b: int) -> int:
@@ -292,7 +354,19 @@ class Tape:
         return self.sum(self.sum(a, b, f=0.5, g=0.5), gap, g=0.5 * sign)
 
     def table(self, a: int, knots: Array, entries: Array, period: float = 0.0) -> int:
-        """Piecewise cubic in a with those coefficients (knots - 1, 4) of powers of a - knot, highest first."""
+        """Return the register of a piecewise cubic in a.
+
+        Parameters
+        ----------
+        a : int
+            Register of the argument.
+        knots : ndarray, shape (k,)
+            Ends of the pieces, rising.
+        entries : ndarray, shape (k - 1, 4)
+            Coefficients of powers of the argument less the lower knot, highest first.
+        period : float
+            Period of the argument; 0 for none.
+        """
         number = self._table(a, knots, entries, period)
         shifted = self._append(SHIFT, a, number)
         made = self._append(ENTRY, number, 0)
@@ -335,7 +409,15 @@ class Tape:
         return len(self._switches) - 1
 
     def program(self, mass: Array, damping: Array, stiffness: Array, unit: Array) -> Program:
-        """Everything written, with the constant matrices of the system."""
+        """Return all that was written, with the constant matrices of the system.
+
+        Parameters
+        ----------
+        mass, damping, stiffness : ndarray, shape (n, n)
+            Constant matrices.
+        unit : ndarray, shape (n,)
+            Units of the coordinates.
+        """
         linear = [(r, i, f) for r, row in enumerate(self._rows) for i, f in row[0].items() if f != 0.0]
         products = [(r, i, j, f) for r, row in enumerate(self._rows) for i, j, f in row[1] if f != 0.0]
         rows = Rows(
