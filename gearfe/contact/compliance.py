@@ -131,14 +131,25 @@ def gear_body(
 
     Parameters
     ----------
-    thickness
+    mesh : SectorMesh
+        Mesh of one tooth sector.
+    material : Material
+        Elasticity of the gear.
+    plane : str
+        ``stress`` or ``strain``.
+    thickness : float
         Face width (m).
-    points_per_edge
+    points_per_edge : int
         Quadrature points on each contact edge.
-    with_stress
+    with_stress : bool
         Whether the normal stress on the contact surface is wanted (Nitsche's law needs it).
-    width
+    width : float, optional
         Width of the contact (m), the narrower gear's; by default `thickness`.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If an element of the mesh is inside out.
     """
     flank = flank_of(mesh, points_per_edge)
     width = thickness if width is None else width
@@ -245,7 +256,19 @@ class MeshingPair:
         return self.pinion, self.wheel
 
     def tooth_angle(self, gear: int, tooth: Any, pinion_angle: Any, twist: Any) -> Any:
-        """Angle (rad) of the frame of a tooth of the pinion (gear 0) or wheel (gear 1); numbers or arrays."""
+        """Return the angle (rad) of the frame of a tooth, see `MeshGeometry.tooth_angle`.
+
+        Parameters
+        ----------
+        gear : int
+            0 for the pinion, 1 for the wheel.
+        tooth : int or ndarray
+            Number of the tooth.
+        pinion_angle : float or ndarray
+            Pinion angle (rad).
+        twist : float or ndarray
+            Twist of the wheel from the centred position (rad).
+        """
         return self.gears.tooth_angle(gear, tooth, pinion_angle, twist)
 
 
@@ -258,18 +281,23 @@ def turn(angle: float) -> Array:
 def sector_displacements(
     body: GearBody, loads: FlankLoads, position: IntArray, tooth: IntArray, *, rates: bool = False
 ) -> Array:
-    """Nodal displacements of c sectors, by their teeth, in the axes of each (m).
+    """Return the nodal displacements of c tooth sectors in the axes of their teeth.
 
     Parameters
     ----------
+    body : GearBody
+        The condensed gear.
+    loads : FlankLoads
+        Loads on its flanks.
     position, tooth : ndarray, shape (c,)
         Number of the position, and of the tooth.
-    rates
+    rates : bool
         Whether their derivatives with respect to the twist (m/rad) follow, another c.
 
     Returns
     -------
-    ndarray, shape (nodes, 2, c or 2 c)
+    displacements : ndarray, shape (nodes, 2, c or 2 c)
+        In m; rates in m/rad.
     """
     of, load, step = loads.felt(position, tooth, body.teeth)
     parts = []
@@ -315,7 +343,7 @@ def _extra_torques(pair: MeshingPair, gear: int, found: Positions, neighbours: i
 def flank_loads(
     elastic: MeshingPair, contacts: Contacts, angles: Array, twists: Array
 ) -> tuple[FlankLoads, FlankLoads]:
-    """Loads on the flanks of pinion and wheel: for fields, root stress and finite strain.
+    """Return the loads on the flanks of pinion and wheel: for fields, root stress and finite strain.
 
     They are the consistent ones of the pressures on the panels, at their places on the deformed flanks and along the
     common normal. Displacements recovered from them are those of the teeth; nearer to a contact than an element or two
@@ -323,7 +351,9 @@ def flank_loads(
 
     Parameters
     ----------
-    contacts
+    elastic : MeshingPair
+        The condensed gears.
+    contacts : Contacts
         m loaded pairs.
     angles, twists : ndarray, shape (n,)
         Pinion angles and twists from the centred position (rad) of the positions that they are of.

@@ -295,7 +295,23 @@ class ProjectedPoints:
 def projected(
     batch: Batch, turn: ComplexArray, displacement: ComplexArray, stress: Array, place: Array, points: IntArray
 ) -> ProjectedPoints:
-    """The contact points `points` from starting places, with windows turned by `turn` and nodes displaced."""
+    """Project contact points onto the mates' displaced surfaces.
+
+    Parameters
+    ----------
+    batch : Batch
+        Positions side by side.
+    turn : ndarray of complex, shape (W,)
+        Unit numbers that turn tooth axes to global ones.
+    displacement : ndarray of complex, shape (n,)
+        Displacements of the nodes, tooth axes (m).
+    stress : ndarray, shape (points,)
+        Normal stresses at the points (Pa).
+    place : ndarray, shape (q,)
+        Foot points from which the projection starts, on the mates' chains of edges.
+    points : ndarray of int, shape (points,)
+        Numbers of the contact points.
+    """
     placed, own = batch.placed(displacement, turn), batch.owner[points]
     mate, half_stretch = batch.mate[own], batch.end_weighting[points]
     found = project(batch.slaves(placed, points), placed, batch.counts, mate, place[points], half_stretch)

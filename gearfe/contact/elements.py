@@ -165,7 +165,7 @@ def _felt(batch: Batch, state: State, turn: ComplexArray) -> tuple[dict[str, Arr
 
 
 def half_widths(pair: IntArray, place: ComplexArray, load: Array, count: int) -> Array:
-    r"""Half widths b (m) of `count` contacts from the second moments of their pressures; not-a-number without load.
+    r"""Return the half widths b of contacts from the second moments of their pressures.
 
     Contact points show the largest pressure badly: it oscillates by some per cent on every mesh, and under a sharp edge
     it has no bound. Force and second moment converge. Hertz's elliptic pressure has the variance :math:`b^2/4` about
@@ -176,6 +176,13 @@ def half_widths(pair: IntArray, place: ComplexArray, load: Array, count: int) ->
     pair, place, load : ndarray, shape (q,)
         Of each point the contact, the place (m), and pressure times area (N). The contact is nearly straight, so the
         largest principal variance is that along it.
+    count : int
+        Number of contacts.
+
+    Returns
+    -------
+    b : ndarray, shape (count,)
+        Half widths (m); NaN for contacts without load.
     """
     off = place - _means(pair, place, load, count)[pair]
     square = off * off  # its mean's size is the difference of the principal variances, the mean of |off|^2 their sum
@@ -265,8 +272,8 @@ class Equations:
         return np.maximum(pressure, 0.0)
 
 
-def equations_of(batch: Batch, b: int, rows: ProjectedPoints, bears: BoolArray) -> Equations:
-    """Those of position b on the points `rows`, some of which bear at first."""
+def _equations_of(batch: Batch, b: int, rows: ProjectedPoints, bears: BoolArray) -> Equations:
+    """Return the equations of position b on the points `rows`, some of which bear at first."""
     points, count = rows.points, len(rows.points)
     nodes, column = np.unique(rows.nodes, return_inverse=True)
     G = np.zeros((count, len(nodes)), dtype=complex)
@@ -287,9 +294,23 @@ def equations_of(batch: Batch, b: int, rows: ProjectedPoints, bears: BoolArray) 
 
 
 def solve(batch: Batch, start: State, turn: ComplexArray, equations: dict[int, Equations]) -> State:
-    """Solve all positions of a batch from a first state, with the windows turned by `turn`, shape (W,).
+    """Solve all positions of a batch from a first state.
 
-    `equations` are those of positions that were solved before near by, and are those of the last steps afterwards.
+    Parameters
+    ----------
+    batch : Batch
+        Positions side by side.
+    start : State
+        First state.
+    turn : ndarray of complex, shape (W,)
+        Unit numbers that turn the windows' tooth axes to global ones.
+    equations : dict
+        Position -> equations that were factorised near by; those of the last steps afterwards.
+
+    Returns
+    -------
+    state : State
+        `State.converged` says which positions converged.
     """
     pressure, place, forces = start.pressure.copy(), start.place.copy(), start.forces.copy()
     moved, iterations = np.zeros_like(forces), np.zeros(batch.size, dtype=np.int64)
@@ -323,7 +344,7 @@ def solve(batch: Batch, start: State, turn: ComplexArray, equations: dict[int, E
             known = equations[b].points if b in equations and (error[b] < CHORD or number == 0) else ()
             if not np.isin(rows.points[mine][asks[mine]], known).all():
                 may = mine[np.convolve(asks[mine], np.ones(2 * BESIDE + 1))[BESIDE:-BESIDE] > 0]
-                equations[b] = equations_of(batch, b, taken(rows, may), p[may] > 0)
+                equations[b] = _equations_of(batch, b, taken(rows, may), p[may] > 0)
             own = equations[b]
             on = mine[np.searchsorted(rows.points[mine], own.points)]
             new[on] = own.solve(off[on] + own.matrix @ p[on])

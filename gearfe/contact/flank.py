@@ -109,9 +109,20 @@ def edge_nodes(edges: IntArray) -> IntArray:
 def normal_stress_rows(
     mesh: SectorMesh, material: Material, plane: Plane, points_per_edge: int
 ) -> tuple[IntArray, Array]:
-    r"""Rows of :math:`\sigma_n = n\cdot\sigma(u)\,n` at the quadrature points of the contact surface.
+    r"""Return the rows of :math:`\sigma_n = n\cdot\sigma(u)\,n` at the quadrature points of the contact surface.
 
     With the gradients of the triangle behind the edge and the normal of the undeformed edge.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+        Mesh of one tooth sector.
+    material : Material
+        Elasticity of the gear.
+    plane : str
+        ``stress`` or ``strain``.
+    points_per_edge : int
+        Quadrature points q on each contact edge.
 
     Returns
     -------

@@ -256,17 +256,25 @@ def panel_influence(
     places: tuple[Array, Array],
     panels: tuple[Array, Array, Array],
 ) -> Array:
-    """Displacement of each face into its material at places on the first contact, by pressures on panels of the second,
-    without that of the half-plane by the contact itself, shape (q, 2, m, n) (m/Pa).
+    """Return the displacement of each face into its material at places on the first contact of each couple.
+
+    It is that by pressures on panels of the second contact, without that of the half-plane by the contact itself.
 
     Parameters
     ----------
-    influence
+    influence : pair of ndarray of complex, shape (q, 2)
         `local_influence`.
-    places
-        Arcs of the places and their distances from the corners, shape (p, 2, m) (m).
-    panels
-        The same of the panels' middles, shape (p, 2, n), and the panels' widths, shape (p, n) (m).
+    couples : Couplings
+        Couples (i, j) of contacts.
+    places : pair of ndarray, shape (p, 2, m)
+        Arcs of the places and their distances from the corners (m).
+    panels : (ndarray, ndarray, ndarray), shapes (p, 2, n), (p, 2, n), (p, n)
+        The same of the panels' middles, and the panels' widths (m).
+
+    Returns
+    -------
+    displacement : ndarray, shape (q, 2, m, n)
+        Per pressure (m/Pa).
     """
     i, j = couples.first, couples.second
     (arcs, y), (panel_arcs, panel_y, widths) = places, panels

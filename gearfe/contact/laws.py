@@ -296,7 +296,24 @@ DEFAULT_MODEL = PairModel()
 
 
 def check_torque(pair: GearPair, model: PairModel, torque: float, name: str = "torque") -> None:
-    """Raise `InputError` for a torque at the wheel (N m) that small strain is not meant for, called by `name`."""
+    """Raise an error for a torque under which small strain does not hold.
+
+    Parameters
+    ----------
+    pair : GearPair
+        The gears.
+    model : PairModel
+        Materials and plane state.
+    torque : float
+        At the wheel (N m).
+    name : str
+        Name of the torque in the message.
+
+    Raises
+    ------
+    InputError
+        If the teeth would deflect by more than `MOST_YIELD` modules.
+    """
     gears = pair.pinion, pair.wheel
     width = min(gear.face_width for gear in gears)
     moduli = [

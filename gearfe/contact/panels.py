@@ -202,6 +202,8 @@ def unilateral(
 
     Parameters
     ----------
+    couples : Couplings
+        Which contacts share a position.
     K : ndarray, shape (q, n, n)
         Approach of the panels' middles by pressures on the panels of the same tooth pair, by couple of
         `couples.beside` (m/Pa).
@@ -210,16 +212,16 @@ def unilateral(
     width, gap : ndarray, shape (p, n)
         Widths of the panels and g (m).
     bearing : ndarray of bool, shape (p, n)
-        First guess of the panels that bear.
-    held
-        Whether that is no guess but what bears.
+        First guess of the loaded panels.
+    held : bool
+        Whether that is no guess but the set of loaded panels.
 
     Returns
     -------
     pressure, approach : ndarray, shape (p, n)
         p (Pa), and what it brings the panels' middles nearer by (m).
     settled : ndarray of bool, shape (m,)
-        Whether the set of panels that bear was found.
+        Whether the set of loaded panels was found.
     """
     pairs, n = couples.beside, gap.shape[1]
     z, K, far_field = pairs.slots, pairs.matrices(K), couples.matrices(T[:, None, None])
