@@ -45,7 +45,7 @@ def draw_state(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0,
         axes.plot(shape.real, shape.imag, lw=2, color=colour, alpha=alpha)
         axes.plot(nodes.real, nodes.imag, "o", ms=3, color=colour, alpha=alpha)
     for plate, colour in zip(mechanism.plates.values(), _colours(mechanism), strict=False):
-        draw_plate(axes, plate, plate.exaggerated(q, magnification)[0], colour, alpha)
+        _draw_plate(axes, plate, plate.exaggerated(q, magnification)[0], colour, alpha)
     if names:
         draw_names(axes, mechanism, q)
 
@@ -89,7 +89,7 @@ def rigid_ends(mechanism: Mechanism) -> list[tuple[int, ComplexArray]]:
     return found
 
 
-def draw_plate(axes: Any, plate: PlateLink, places: np.ndarray, colour: str, alpha: float) -> None:
+def _draw_plate(axes: Any, plate: PlateLink, places: np.ndarray, colour: str, alpha: float) -> None:
     """A link of finite elements, filled, with its edge; `places` are those of its nodes as complex numbers."""
     from matplotlib.collections import LineCollection, PolyCollection
 

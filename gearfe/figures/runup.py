@@ -33,7 +33,7 @@ class RunUpPictures:
         """Draw into a folder; `bore` is the number of the attachment."""
         draw_waterfall(folder / "waterfall.png", run, multiples, bore, self.title)
         draw_campbell(folder / "campbell.png", run, critical, multiples, self.title)
-        draw_orders(folder / "orders.png", run, multiples, bore, self.title)
+        _draw_orders(folder / "orders.png", run, multiples, bore, self.title)
         save(forces_picture(run, self.title), folder / "meshes.png")
 
     def instability(self, path: Path, made: InstabilityMap) -> None:
@@ -50,7 +50,7 @@ class BranchCurve(NamedTuple):
     stable: Array
 
 
-def draw_orders(path: Path, run: RunUp, multiples: int, bore: int, title: str) -> None:
+def _draw_orders(path: Path, run: RunUp, multiples: int, bore: int, title: str) -> None:
     """Order cuts of a signal and its rms, on all branches."""
     signal, cut = signal_of(run, bore), orders(run, multiples)
     lines = [signal.lines(s) for s in run.states]

@@ -47,9 +47,9 @@ class TrainPictures:
     def curves(self, folder: Path, train: GearTrain, made: Followed, spectra: TrainSpectra, attachment: str) -> None:
         """``response.png``, ``spectrum.png``, and where there are such things the other two."""
         response = made.curves
-        draw_response(folder / "response.png", response, attachment, self.title, made.mean_force)
+        _draw_response(folder / "response.png", response, attachment, self.title, made.mean_force)
         if train.drive is not None and any(mesh.stiffness is not None for mesh in train.meshes):
-            draw_transmission(folder / "transmission_error.png", train, response, self.title)
+            _draw_transmission(folder / "transmission_error.png", train, response, self.title)
         draw_spectrum(folder / "spectrum.png", response, spectra, attachment, self.title, self.band)
         if spectra.power is not None:
             draw_power(folder / "radiated_power.png", response, spectra, spectra.power, self.title, self.band)
@@ -68,7 +68,7 @@ class TrainPictures:
         return draw_scene(path, frames(train, response, steps), self.title, self.most)
 
 
-def draw_response(path: Path, response: TrainResponse, attachment: str, title: str, mean: Array) -> None:
+def _draw_response(path: Path, response: TrainResponse, attachment: str, title: str, mean: Array) -> None:
     """Contact forces, speeds, angular accelerations, and the acceleration at an attachment over the drive's rotation.
 
     Shafts that turn against the drive are drawn with their sign reversed. `mean`: of each contact force (N).
@@ -129,7 +129,7 @@ def draw_response(path: Path, response: TrainResponse, attachment: str, title: s
     save_fixed(figure, path)
 
 
-def draw_transmission(path: Path, train: GearTrain, response: TrainResponse, title: str) -> None:
+def _draw_transmission(path: Path, train: GearTrain, response: TrainResponse, title: str) -> None:
     """Dynamic beside static transmission error over the drive's rotation, a panel for each mesh that yields."""
     sense = float(np.sign(response.drive_angle[-1])) or 1.0
     angle, static = np.degrees(response.drive_angle) * sense, static_errors(train, response.drive_angle)

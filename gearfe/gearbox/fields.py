@@ -105,7 +105,28 @@ def solids(train: GearTrain, response: TrainResponse, *, per_segment: int = 2) -
 
 
 def moved(solid: Solid, response: TrainResponse, frame: Array, step: int, exaggeration: float = 1.0) -> Array:
-    """(n, 3) points of a surface at an output step; displacement and tilt times `exaggeration`, the turning not."""
+    """Return the points of a surface at an output step.
+
+    Displacement and tilt are exaggerated, the turning is not.
+
+    Parameters
+    ----------
+    solid : Solid
+        The surface.
+    response : TrainResponse
+        The motion.
+    frame : ndarray, shape (3, 3)
+        Directions of the train, its axis last.
+    step : int
+        Number of the output step.
+    exaggeration : float
+        Factor on displacement and tilt.
+
+    Returns
+    -------
+    points : ndarray, shape (n, 3)
+        In m.
+    """
     pose, centre = response.gear_pose[step, solid.gear], response.gear_centres[solid.gear]
     angle = float(pose[3:] @ frame[2])
     tilt = exaggeration * (pose[3:] - angle * frame[2])
@@ -113,7 +134,7 @@ def moved(solid: Solid, response: TrainResponse, frame: Array, step: int, exagge
     return np.asarray(centre + exaggeration * pose[:3] + turned + np.cross(tilt, turned))
 
 
-def rolled(solid: Solid, train: GearTrain, response: TrainResponse, step: int) -> Array:
+def _rolled(solid: Solid, train: GearTrain, response: TrainResponse, step: int) -> Array:
     """(n, 3) points of a surface at an output step, had all shafts only rolled with the drive: no vibration."""
     ratio = float(train.kinematics.ratios[train.shaft_number(train.gears[solid.gear].shaft)])
     centre = response.gear_centres[solid.gear]
@@ -129,7 +150,21 @@ def _turned(arm: Array, axis: Array, angle: float) -> Array:
 
 
 def write_gears(path: Path, train: GearTrain, response: TrainResponse, steps: Sequence[int] | IntArray) -> None:
-    """VTKHDF series of the gears and shafts: places, displacement from the start and from rolling (m), number."""
+    """Write a VTKHDF series of the gears and shafts.
+
+    It has places, displacement from the start and from rolling (m), and the number of the gear.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    train : GearTrain
+        The train.
+    response : TrainResponse
+        Its motion.
+    steps : sequence of int
+        Numbers of the output steps.
+    """
     parts, frame = solids(train, response), train.frame
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
     cells = {
@@ -141,7 +176,7 @@ def write_gears(path: Path, train: GearTrain, response: TrainResponse, steps: Se
     with VtkHdfSeries(path) as series:
         for count, step in enumerate(steps):
             points = np.concatenate([moved(part, response, frame, int(step)) for part in parts])
-            smooth = np.concatenate([rolled(part, train, response, int(step)) for part in parts])
+            smooth = np.concatenate([_rolled(part, train, response, int(step)) for part in parts])
             moves = {"displacement_m": points - rest, "vibration_m": points - smooth}
             data = {"gear": number} | {name: values.astype(np.float32) for name, values in moves.items()}
             series.add(float(response.time[step]), points, None if count else cells, point_data=data)
@@ -153,7 +188,19 @@ def write_housing(
     response: TrainResponse,
     steps: Sequence[int] | IntArray,
 ) -> None:
-    """VTKHDF series of the housing: displacement (m), acceleration along the outward normal (m/s2)."""
+    """Write a VTKHDF series of the housing: displacement (m), acceleration along the outward normal (m/s2).
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    body : ModalBody
+        The reduced housing.
+    response : TrainResponse
+        The motion.
+    steps : sequence of int
+        Numbers of the output steps.
+    """
     position, acceleration = _coordinates(response)
     chosen = np.asarray(steps, dtype=np.int64)
     with VtkHdfSeries(path) as series:
@@ -176,10 +223,16 @@ def write_housing(
 def frames(
     train: GearTrain, response: TrainResponse, steps: Sequence[int] | IntArray, *, exaggeration: float | None = None
 ) -> dict[str, NDArray[np.generic]]:
-    """Arrays that `gearfe.figures.train_scene` draws: surfaces in all `steps`, in m, and their colours.
+    """Return the arrays that `gearfe.figures.train_scene` draws: surfaces in m, and their colours.
 
     Parameters
     ----------
+    train : GearTrain
+        The train.
+    response : TrainResponse
+        Its motion.
+    steps : sequence of int
+        Numbers of the output steps.
     exaggeration
         Factor on displacement and tilt; by default such that the housing's largest one is seen.
     """
@@ -205,7 +258,7 @@ def frames(
             "housing_values": np.einsum("snk,nk->sn", normal, body.normals[used]).astype(np.float32),
         }
     parts, frame = solids(train, response, per_segment=4), train.frame
-    smooth = [np.concatenate([rolled(part, train, response, int(s)) for part in parts]) for s in chosen]
+    smooth = [np.concatenate([_rolled(part, train, response, int(s)) for part in parts]) for s in chosen]
     true = [np.concatenate([moved(part, response, frame, int(s)) for part in parts]) for s in chosen]
     shown = [np.concatenate([moved(part, response, frame, int(s), factor) for part in parts]) for s in chosen]
     starts = np.cumsum([0, *(len(part.points) for part in parts)])

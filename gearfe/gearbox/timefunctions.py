@@ -110,7 +110,18 @@ def _of_expression(text: str, where: str, end: float) -> TimeFunction:
 
 
 def fitted(at: Callable[[Array], Array], end: float, where: str, text: str) -> TimeFunction:
-    """Pieces of polynomials that are a function from 0 to the end; see the module.
+    """Fit pieces of polynomials to a function from 0 to the end; see the module.
+
+    Parameters
+    ----------
+    at : callable
+        Function of an array of times (s).
+    end : float
+        End of the run (s).
+    where : str
+        Name of the key in messages.
+    text : str
+        Its value in messages.
 
     Raises
     ------

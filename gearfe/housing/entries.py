@@ -19,7 +19,22 @@ MOST_ROWS = 5000
 
 
 def add_entry(entries: Entries, row: Label, column: Label, value: float) -> None:
-    """Add an entry; ValueError where it has another value already."""
+    """Add an entry of a matrix.
+
+    Parameters
+    ----------
+    entries : dict
+        Entries by row and column; changed.
+    row, column : Label
+        Labels of the entry's row and column.
+    value : float
+        Its value.
+
+    Raises
+    ------
+    ValueError
+        If the entry has another value already.
+    """
     held = entries.setdefault((row, column), value)
     if held != value and not (np.isnan(held) and np.isnan(value)):
         raise ValueError(f"the entry of {shown(row)} and {shown(column)} was {held:.6g} before and is {value:.6g} here")

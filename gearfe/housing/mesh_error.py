@@ -51,18 +51,27 @@ _CHUNK = 300
 def energy_lost(
     nodes: Array, tets: IntArray, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]
 ) -> Array:
-    """Estimated energy that the mesh keeps fields from giving up, a quadratic form over them: (k, k), N m.
+    """Estimate the energy that the mesh keeps fields from giving up, a quadratic form over them.
 
     Parameters
     ----------
-    nodes, tets
-        The mesh (m).
-    fields : (3 n, k)
+    nodes : ndarray, shape (n, 3)
+        Nodes (m).
+    tets : ndarray of int, shape (m, 4 or 10)
+        Nodes of the tetrahedra.
+    material : Material
+        Elasticity and density.
+    fields : ndarray, shape (3 n, k)
         Nodal displacements, each in equilibrium with the inertia of its own frequency.
-    eigenvalues : (k,)
+    eigenvalues : ndarray, shape (k,)
         Squares of these circular frequencies (rad^2/s^2); 0 for a static field.
-    rigid
+    rigid : list of ndarray of int
         Sets of nodes that are held or move as a rigid thing: no function acts within one.
+
+    Returns
+    -------
+    energy : ndarray, shape (k, k)
+        In N m.
     """
     numbers, residual, stiffness = _unbalanced(nodes, tets, material, fields, eigenvalues, rigid)
     return FACTOR * energy_taken(residual, stiffness, numbers.acting)
@@ -71,7 +80,20 @@ def energy_lost(
 def energy_lost_by_element(
     nodes: Array, tets: IntArray, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]
 ) -> Array:
-    """(m, k) the same of each field alone, element by element: each function's in equal parts to those around it."""
+    """Estimate the energy of `energy_lost` for each field alone, element by element.
+
+    The part of each function is shared equally by the elements around it.
+
+    Parameters
+    ----------
+    nodes, tets, material, fields, eigenvalues, rigid
+        See `energy_lost`.
+
+    Returns
+    -------
+    energy : ndarray, shape (m, k)
+        In N m.
+    """
     numbers, residual, stiffness = _unbalanced(nodes, tets, material, fields, eigenvalues, rigid)
     chosen, taken = _taken(residual, stiffness, numbers.acting)
     energy = np.zeros((numbers.total, fields.shape[1]))

@@ -62,13 +62,25 @@ class Tetrahedra:
         return Surface(faces, normal_velocity(triangle_functions(faces.shape[1]), self.nodes, faces))
 
     def energy_lost(self, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]) -> Array:
-        """See `gearfe.housing.mesh_error.energy_lost`."""
+        """Estimate the energy that the mesh keeps fields from giving up.
+
+        Parameters
+        ----------
+        material, fields, eigenvalues, rigid
+            See `gearfe.housing.mesh_error.energy_lost`.
+        """
         return energy_lost(self.nodes, self.cells, material, fields, eigenvalues, rigid)
 
     def energy_lost_by_element(
         self, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]
     ) -> Array:
-        """See `gearfe.housing.mesh_error.energy_lost_by_element`."""
+        """Estimate that energy for each field alone, element by element.
+
+        Parameters
+        ----------
+        material, fields, eigenvalues, rigid
+            See `gearfe.housing.mesh_error.energy_lost_by_element`.
+        """
         return energy_lost_by_element(self.nodes, self.cells, material, fields, eigenvalues, rigid)
 
 
@@ -128,7 +140,13 @@ class Prisms:
         return Surface(np.concatenate(triangles), sparse.csr_array(sparse.vstack(velocities)))
 
     def energy_lost(self, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]) -> Array:
-        """See `gearfe.housing.prism_error.prism_energy_lost`."""
+        """Estimate the energy that the mesh keeps fields from giving up.
+
+        Parameters
+        ----------
+        material, fields, eigenvalues, rigid
+            See `gearfe.housing.prism_error.prism_energy_lost`.
+        """
         return prism_energy_lost(self.extrusion, self.used, material, fields, eigenvalues, rigid)
 
     @cached_property

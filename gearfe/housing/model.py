@@ -158,7 +158,28 @@ class Housing(Facts):
         attachments: Sequence[Attachment] = (),
         outer: Outer | None = None,
     ) -> Housing:
-        """Housing from a mesh that is in order; see `from_arrays`. `fixed` are numbers of nodes."""
+        """Return a housing from a mesh that is in order, see `from_arrays`.
+
+        Parameters
+        ----------
+        mesh : Tetrahedra or Prisms
+            The mesh (m).
+        bores : sequence
+            Bores, or what `Bore` takes.
+        fixed : ndarray of int
+            Numbers of the nodes that are held.
+        material : Material
+            Elasticity and density.
+        attachments : sequence of Attachment
+            Further interfaces.
+        outer : Outer, optional
+            Which part of the surface is outside and radiates.
+
+        Raises
+        ------
+        InputError
+            For a Poisson ratio beyond the elements' range, and attachments that do not fit the mesh.
+        """
         low, high = POISSON_RATIOS
         if not low <= material.poisson_ratio <= high:
             problem = f"must be {low:g} to {high:g}: beyond, elements lock, and the mesh's error estimate does not hold"

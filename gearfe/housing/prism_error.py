@@ -37,20 +37,27 @@ _GROUPS = ((slice(0, 5), slice(0, 5), np.array([0, 4, 1, 2, 3])), (slice(5, 15),
 def prism_energy_lost(
     mesh: Extrusion, used: IntArray, material: Material, fields: Array, eigenvalues: Array, rigid: list[IntArray]
 ) -> Array:
-    """Estimated energy that the mesh keeps fields from giving up, a quadratic form over them: (k, k), N m.
+    """Estimate the energy that the mesh keeps fields from giving up, a quadratic form over them.
 
     Parameters
     ----------
-    mesh
+    mesh : Extrusion
         The mesh (m).
     used : (n,)
         Number ``point * levels + level`` of each node.
+    material : Material
+        Elasticity and density.
     fields : (3 n, k)
         Nodal displacements, each in equilibrium with the inertia of its own frequency.
     eigenvalues : (k,)
         Squares of these circular frequencies (rad^2/s^2); 0 for a static field.
     rigid
         Sets of nodes that are held or move as a rigid thing: no function acts within one.
+
+    Returns
+    -------
+    energy : ndarray, shape (k, k)
+        In N m.
     """
     count, levels = fields.shape[1], len(mesh.levels)
     field, plane, line, numbers = fields.reshape(-1, 3, count), _plane(mesh), _line(), _number(mesh)

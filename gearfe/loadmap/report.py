@@ -93,7 +93,19 @@ def tables(made: LoadMap) -> dict[str, Mapping[str, Any]]:
 
 
 def summary(job: StiffnessJob, table: LoadMapTable, made: LoadMap, timings: Mapping[str, float]) -> dict[str, Any]:
-    """Content of loadmap.json."""
+    """Return the content of loadmap.json.
+
+    Parameters
+    ----------
+    job : StiffnessJob
+        The gears and the model.
+    table : LoadMapTable
+        The keys of the map.
+    made : LoadMap
+        The map.
+    timings : mapping
+        Name -> time that a part of the work took (s).
+    """
     return {
         "job": {**job.tables, table.NAME: asdict(table)},
         "versions": versions(),

@@ -64,7 +64,22 @@ class RootMesh:
     size: float
 
     def largest(self, loads: FlankLoads, position: IntArray, tooth: IntArray, teeth: int) -> tuple[Array, Array]:
-        """Largest tensions (Pa) along the fillets of c teeth at positions, both of shape (c,), and their radii (m)."""
+        """Return the largest tensions along the fillets of c teeth, and where they are.
+
+        Parameters
+        ----------
+        loads : FlankLoads
+            Loads on the gear's flanks.
+        position, tooth : ndarray of int, shape (c,)
+            Number of the position, and of the tooth.
+        teeth : int
+            Number of teeth of the gear.
+
+        Returns
+        -------
+        tension, radius : ndarray, shape (c,)
+            Largest tension (Pa) and its radius (m).
+        """
         stress = np.zeros((len(tooth), len(self.place)))
         of, load, step = loads.felt(position, tooth, teeth)
         for k in np.intersect1d(step, list(self.rows)):

@@ -53,12 +53,16 @@ def sweep_loads(
     elastic: MeshingPair | None = None,
     **changes: Any,
 ) -> LoadMap:
-    """Stiffness, transmission error, load share, peak pressure and root stress over pinion angle and torque.
+    """Compute stiffness, transmission error, load share, peak pressure and root stress over angle and torque.
 
     Parameters
     ----------
+    pair : GearPair
+        The gears.
     torques : array_like, shape (m,)
         Torques at the wheel's hub (N m), > 0.
+    model, kinematics, elastic, changes
+        See `gearfe.stiffness.sweep.sweep_stiffness`; teeth may differ (``deviations=(pinion, wheel)``).
     angles : array_like, shape (n,), optional
         Pinion angles (rad), instead of `positions`. Those after which all teeth meet again are solved once.
     positions, mesh_cycles
@@ -71,8 +75,6 @@ def sweep_loads(
         `gearfe.gear.deviation_job.deviations_of` and, for displaced teeth, `gearfe.gear.pitch_errors.back_turns` give
         them, to know the room behind the teeth: positions without
         have the status `gearfe.loadmap.load_map.BACK` and no numbers.
-    model, kinematics, elastic, changes
-        See `gearfe.stiffness.sweep.sweep_stiffness`; teeth may differ (``deviations=(pinion, wheel)``).
 
     Returns
     -------

@@ -94,16 +94,24 @@ def fit_law(
     base_radii: tuple[float, float],
     reach: float,
 ) -> MeshLaw:
-    """Law through the pair forces found, without backlash.
+    """Fit a law to pair forces, without backlash.
 
     Parameters
     ----------
-    touch
+    found : PairForces
+        Forces of tooth pairs in contact solutions.
+    touch : TouchCurve
         Rigid touch at whole mesh cycles of `cells` nodes each.
     couples
         C of pairs one, two, ... teeth apart.
+    cells : int
+        Cells of the phase in a mesh cycle.
     hertz
         B (m/N).
+    base_radii : (float, float)
+        Of pinion and wheel (m).
+    reach : float
+        Approach beyond the first touch (m) up to which the law is known.
     """
     y = np.log(found.force)
     parts = np.array(PARTS) * found.force.max() * 1.02

@@ -97,10 +97,10 @@ def law_jets(law: LawTables, at: Jets) -> int:
             work[PART, k] = -1.0
             for j in range(slots):
                 if j != k:
-                    work[ROWS + slots + k, j] = coupled(coupling, k, j, cell, z, 0)
+                    work[ROWS + slots + k, j] = _coupled(coupling, k, j, cell, z, 0)
         settled = False
         for _ in range(MOST):
-            compliances(forces, energies, cell, z, pairs[i], work)
+            _compliances(forces, energies, cell, z, pairs[i], work)
             for k in range(slots):
                 off = work[LAMBDA, k] - work[GAPS, k]
                 for j in range(slots):
@@ -130,8 +130,8 @@ def law_jets(law: LawTables, at: Jets) -> int:
             for k in range(RESULTS):
                 out[i, k] = math.nan
             continue
-        compliances(forces, energies, cell, z, pairs[i], work)
-        turning(forces, energies, cell, z, pairs[i], work)
+        _compliances(forces, energies, cell, z, pairs[i], work)
+        _turning(forces, energies, cell, z, pairs[i], work)
         force = 0.0
         moment = 0.0
         bend = 0.0
@@ -146,11 +146,11 @@ def law_jets(law: LawTables, at: Jets) -> int:
             energy += F * work[GAPS, k] - work[PHI, k]
             for j in range(slots):
                 if j != k:
-                    once = coupled(coupling, k, j, cell, z, 1) * pairs[i, j]
+                    once = _coupled(coupling, k, j, cell, z, 1) * pairs[i, j]
                     shift += once
                     moment -= 0.5 * once * F
                     energy -= 0.5 * work[ROWS + slots + k, j] * pairs[i, j] * F
-                    bend -= 0.5 * coupled(coupling, k, j, cell, z, 2) * pairs[i, j] * F
+                    bend -= 0.5 * _coupled(coupling, k, j, cell, z, 2) * pairs[i, j] * F
             work[BEFORE, k] = shift
             work[RIGHT1, k] = 1.0 if F > 0.0 else 0.0
             work[RIGHT2, k] = -shift if F > 0.0 else 0.0
@@ -173,7 +173,7 @@ def law_jets(law: LawTables, at: Jets) -> int:
     return 0
 
 
-def compliances(forces: Array, energies: Array, cell: int, z: float, pairs: Array, work: Array) -> None:
+def _compliances(forces: Array, energies: Array, cell: int, z: float, pairs: Array, work: Array) -> None:
     """Lambda and its derivative with the force, from the polynomials of the pairs' cells."""
     parts = forces.shape[0] - 1
     for k in range(pairs.shape[0]):
@@ -191,7 +191,7 @@ def compliances(forces: Array, energies: Array, cell: int, z: float, pairs: Arra
         work[GIVES, k] = e2 + f * (2.0 * e3 + 3.0 * f * e4)
 
 
-def turning(forces: Array, energies: Array, cell: int, z: float, pairs: Array, work: Array) -> None:
+def _turning(forces: Array, energies: Array, cell: int, z: float, pairs: Array, work: Array) -> None:
     """Phi, its first and second derivative with the angle, and Lambda's."""
     for k in range(pairs.shape[0]):
         part = int(work[PART, k])
@@ -212,7 +212,7 @@ def turning(forces: Array, energies: Array, cell: int, z: float, pairs: Array, w
         work[TURN2, k] = turn2
 
 
-def coupled(coupling: Array, k: int, j: int, cell: int, z: float, order: int) -> float:
+def _coupled(coupling: Array, k: int, j: int, cell: int, z: float, order: int) -> float:
     """C between two slots, its slope or its second derivative with the angle."""
     c = coupling[abs(k - j) - 1, min(k, j), cell]
     if order == 0:
@@ -251,7 +251,7 @@ def solved(slots: int, work: Array) -> None:
         work[RIGHT2, k] /= work[ROWS + k, k]
 
 
-FUNCTIONS = (law_jets, compliances, turning, coupled, matrix, solved)
+FUNCTIONS = (law_jets, _compliances, _turning, _coupled, matrix, solved)
 NAMES = {name: value for name, value in globals().items() if name == "math" or isinstance(value, int | float)}
 
 
@@ -267,7 +267,26 @@ def packed_tables(tables: LawTables) -> LawTables | Packed:
 def evaluate(
     tables: LawTables | Packed, phase: Array, approach: Array, shifts: Array, pairs: Array
 ) -> tuple[Array, Array]:
-    """Results and slopes of `law_jets`; `pairs` become the pair forces found."""
+    """Evaluate a law at n places, see `law_jets`.
+
+    Parameters
+    ----------
+    tables : LawTables
+        The law, as `packed_tables` gives it.
+    phase : ndarray, shape (n,)
+        Pinion angles (rad).
+    approach : ndarray, shape (n,)
+        Approaches (m).
+    shifts : ndarray, shape (n, s)
+        Further approach at which each pair touches (m).
+    pairs : ndarray, shape (n, s)
+        Pair forces from which the iteration starts, then those found (N).
+
+    Returns
+    -------
+    out : ndarray, shape (n, RESULTS)
+        Force, moment, tangent, cross, bend, energy, and whether beyond the law.
+    """
     count, slots = pairs.shape
     out, slopes, work = np.zeros((count, RESULTS)), np.zeros((2, count, slots)), np.zeros((ROWS + 2 * slots, slots))
     at = Jets(phase, approach, shifts, pairs, slopes, work, out)

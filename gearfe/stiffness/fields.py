@@ -49,14 +49,21 @@ _SHARES = np.diff(EDGES * np.sqrt(1 - EDGES**2) + np.arcsin(EDGES)) / np.pi
 
 
 def half_plane_stress(x: Array, z: Array, edges: Array, pressure: Array) -> Array:
-    """Stresses xx, zz, xz (Pa) at places x and depths z (m) of shape (n,), shape (3, n).
+    """Return the stresses xx, zz, xz (Pa) in a half-plane under constant pressures on panels.
 
     Parameters
     ----------
+    x, z : ndarray, shape (n,)
+        Places along the surface, and depths (m).
     edges : ndarray, shape (k + 1,)
         Rising edges of the panels (m).
     pressure : ndarray, shape (k,)
         On them (Pa).
+
+    Returns
+    -------
+    stress : ndarray, shape (3, n)
+        In Pa.
     """
     angle = np.arctan2(z[:, None], x[:, None] - edges)
     parts = 2 * np.diff(angle, axis=1), np.diff(np.sin(2 * angle), axis=1), np.diff(np.cos(2 * angle), axis=1)

@@ -67,6 +67,10 @@ def write_fields(
     ----------
     folder
         Where to write.
+    elastic : MeshingPair
+        The condensed gears.
+    curve : StiffnessCurve
+        Solved positions.
     angles_deg
         Pinion angles (deg) out of the curve's; None writes all.
     draw

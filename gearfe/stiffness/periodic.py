@@ -96,7 +96,7 @@ def curve_arrays(curves: Sequence[PeriodicInterpolant]) -> Curves:
 def periodic_interpolant(
     phase: ArrayLike, values: ArrayLike, period: float, *, method: str = "cubic", widest_gap: float = WIDEST_GAP
 ) -> PeriodicInterpolant:
-    """Interpolant through samples of a periodic function.
+    """Interpolate samples of a periodic function.
 
     Parameters
     ----------
@@ -105,6 +105,8 @@ def periodic_interpolant(
         are left out.
     period
         Length of one cycle, in the unit of the phase.
+    method : str
+        ``cubic``, with monotone slopes, or ``linear``.
     widest_gap
         Largest stretch without a sample, as a share of the period, that counts as covered.
 

@@ -93,7 +93,19 @@ def evaluate(task: Task, values: Sequence[Any], shared: Shared) -> tuple[dict[st
 
 
 def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -> Row:
-    """Row of a case; what goes wrong in it stands in the row."""
+    """Solve a case; an error in it becomes the status of its row.
+
+    Parameters
+    ----------
+    task : Task
+        Job and outputs of the study.
+    number : int
+        Number of the case.
+    values : sequence
+        Values of the parameters.
+    shared : Shared
+        Results that cases share.
+    """
     began = time.perf_counter()
     nothing = (float("nan"),) * len(task.outputs)
     try:

@@ -85,7 +85,23 @@ def solved_rows(
     workers: int | None,
     check: Callable[[], None] | None = None,
 ) -> Iterator[list[Row]]:
-    """Rows of the cases from where they are to run."""
+    """Yield the rows of the cases from where they are to run.
+
+    Parameters
+    ----------
+    task : Task
+        Job and outputs of the study.
+    cases : sequence of (int, tuple)
+        Numbers and values of the cases.
+    jobs : int or None
+        Processes; None: as many as there are processors.
+    executor : Executor or None
+        Where the cases run instead.
+    workers : int or None
+        Cases that the executor runs side by side; None: its own number, else 4.
+    check : callable, optional
+        Called now and then while cases run; raises if the executor stopped.
+    """
     if executor is not None:
         return side_by_side(task, cases, workers or getattr(executor, "_max_workers", None) or 4, executor, check)
     many = min(jobs or os.cpu_count() or 1, max(1, len(cases)))
@@ -143,6 +159,8 @@ def run_study(
 
     Parameters
     ----------
+    study : Study
+        The study.
     folder
         Of ``study.db`` and its export ``study.csv``: a study that was interrupted goes on.
     jobs

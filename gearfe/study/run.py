@@ -59,10 +59,14 @@ def side_by_side(
     executor: Executor | None = None,
     check: Callable[[], None] | None = None,
 ) -> Iterator[list[Row]]:
-    """Rows in the order in which they come.
+    """Yield rows in the order in which they are solved.
 
     Parameters
     ----------
+    task : Task
+        Job and outputs of the study.
+    cases : iterable of (int, tuple)
+        Numbers and values of the cases.
     workers
         How many processes there are.
     executor

@@ -147,7 +147,19 @@ class Analysis:
         attachment: str,
         draw: Callable[[Path, Analysed, TrainSpectra | None, str], None] | None,
     ) -> dict[str, Any]:
-        """Write tables and pictures into a folder; entries of the summary."""
+        """Write tables and pictures of the analyses into a folder; return entries of the summary.
+
+        Parameters
+        ----------
+        folder : Path
+            The folder.
+        spectra : TrainSpectra or None
+            Computed spectra, with which measured ones are compared.
+        attachment : str
+            Attachment in the pictures.
+        draw : callable or None
+            ``draw(folder, analysed, spectra, attachment)`` adds pictures.
+        """
         made = self.made()
         entries: dict[str, Any] = {}
         if made.falls:
@@ -204,7 +216,24 @@ def steady_start(job: TrainJob, train: GearTrain, every: int) -> float:
 
 
 def record_start(job: TrainJob, train: GearTrain, every: int, watch: Callable[[str], Any]) -> float:
-    """Begin of the spectrum's record (s): that of [spectrum], or where the motion is found to be steady."""
+    """Return the begin of the spectrum's record (s), given or where the motion is found to be steady.
+
+    Parameters
+    ----------
+    job : TrainJob
+        The train's job.
+    train : GearTrain
+        Its train.
+    every : int
+        Samples of the response in an output step.
+    watch : callable
+        ``watch(name)`` measures a stage.
+
+    Raises
+    ------
+    InputError
+        If no begin is given and the motion is not steady for its last quarter.
+    """
     if job.spectrum.start is not None:
         return job.spectrum.start
     with watch("steady part"):

@@ -70,13 +70,51 @@ class Pictures(Protocol):
     """Who draws a run: `gearfe.figures.train.TrainPictures`. Pictures stand above the results that they draw."""
 
     def curves(self, folder: Path, train: GearTrain, made: Followed, spectra: TrainSpectra, attachment: str) -> None:
-        """Draw curves and spectra into a folder."""
+        """Draw curves and spectra into a folder.
+
+        Parameters
+        ----------
+        folder : Path
+            Folder of the pictures.
+        train : GearTrain
+            The train.
+        made : Followed
+            The run with its curves.
+        spectra : TrainSpectra
+            Its spectra.
+        attachment : str
+            Attachment whose acceleration is drawn.
+        """
 
     def analysis(self, folder: Path, made: analysis.Analysed, spectra: TrainSpectra | None, attachment: str) -> None:
-        """Draw the analyses of [spectrum]."""
+        """Draw the analyses of [spectrum].
+
+        Parameters
+        ----------
+        folder : Path
+            Folder of the pictures.
+        made : Analysed
+            The analyses.
+        spectra : TrainSpectra or None
+            Computed spectra, with which measured ones are compared.
+        attachment : str
+            Attachment whose acceleration is drawn.
+        """
 
     def fields(self, path: Path, train: GearTrain, response: TrainResponse, steps: IntArray) -> str:
-        """Draw the fields at some output times; an empty text, or why nothing was drawn."""
+        """Draw the fields at some output times; return an empty text, or why nothing was drawn.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        train : GearTrain
+            The train.
+        response : TrainResponse
+            Its motion.
+        steps : ndarray of int
+            Numbers of the output steps.
+        """
 
 
 @dataclass(frozen=True)
@@ -127,6 +165,14 @@ def write_run(
 
     Parameters
     ----------
+    folder : Path
+        Folder of the files.
+    planned : TrainRun
+        The run.
+    choice : OutputChoice
+        What is written.
+    watch : Stopwatch
+        Measures the stages.
     draw
         Draws the pictures.
     beside

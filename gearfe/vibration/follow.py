@@ -118,6 +118,8 @@ def follow(
         Samples of the response, `every` of them in an output step.
     times : (n,)
         Output times (s) of the whole run.
+    every : int
+        Samples of the response in an output step.
     table
         File to write: ``response.csv``; None for none.
     bearings

@@ -64,7 +64,19 @@ def dominant(spectra: TrainSpectra, response: TrainResponse, name: str) -> list[
 def train_summary(
     followed: Followed, timings: Mapping[str, float], stability: Stability | None = None, **further: Any
 ) -> dict[str, Any]:
-    """Content of summary.json; `further` entries are put after the status."""
+    """Return the content of summary.json.
+
+    Parameters
+    ----------
+    followed : Followed
+        The run.
+    timings : mapping
+        Name -> time that a part of the work took (s).
+    stability : Stability, optional
+        Floquet multipliers with a note and warnings.
+    **further
+        Entries that are put after the status.
+    """
     response, made = followed.response, followed.spectra
     period, stability = response.common_period_s, stability or Stability()
     floquet = stability.multipliers

@@ -25,7 +25,19 @@ ROUGH = 1e-3
 
 
 def simulated(job: TrainJob, curves: Sequence[str], *, watch: Any, estimate: bool) -> TrainRun:
-    """The run of a job, its curves and housing each from the cache where it can be."""
+    """Return the run of a job; its curves and housing come from the cache if they are there.
+
+    Parameters
+    ----------
+    job : TrainJob
+        The train's job.
+    curves : sequence of str
+        CSV files of stiffness curves instead of computed ones, see `train_curves`.
+    watch : Stopwatch
+        Measures the stages.
+    estimate : bool
+        Whether errors are estimated.
+    """
     with watch.stage("curves"):
         stiffness = train_curves(job, curves, estimate=estimate)
     with watch.stage("housing"):

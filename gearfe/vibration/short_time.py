@@ -101,13 +101,18 @@ def averaged(fall: Waterfall, start: float) -> tuple[Array, int]:
 def order_tracks(
     time: Array, angle: Array, values: Array, orders: Array, turns: float, highest: float = math.inf
 ) -> OrderTracks:
-    """Amplitudes of `orders` over parts of so many turns.
+    """Return the amplitudes of orders over parts of so many turns.
 
     Parameters
     ----------
     time, angle : (n,)
         Of the samples (s, rad); the longest stretch in which the angle goes one way counts.
-    values : (n, s)
+    values : ndarray, shape (n, s)
+        Signals.
+    orders : ndarray, shape (k,)
+        Cycles in a turn of the shaft.
+    turns : float
+        Turns in a part.
     highest
         End of the samples' band (Hz).
 

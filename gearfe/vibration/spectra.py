@@ -181,7 +181,21 @@ def spectra(
     start: float = 0.0,
     length: float | None = None,
 ) -> TrainSpectra:
-    """Spectra of a response at hand, `every` samples of which make an output step; see `TrainRecord`."""
+    """Return the spectra of a response at hand, see `TrainRecord`.
+
+    Parameters
+    ----------
+    response : TrainResponse
+        The motion.
+    radiation : ndarray, shape (N, N), optional
+        Surface matrix of the housing.
+    every : int
+        Samples of the response in an output step.
+    window : str
+        See `gearfe.spectrum.WINDOWS`.
+    start, length : float
+        Begin and duration of the record (s); by default all of it.
+    """
     times = response.time[::every]
     made = TrainRecord(times, every, radiation, window=window, start=start, length=length)
     made.add(response)
