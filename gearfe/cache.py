@@ -71,7 +71,7 @@ def kept(
     write: Callable[[T, Path], None],
     folder: Path | None = None,
 ) -> T:
-    """What is kept under a key, else what `make` makes, which is kept from then on.
+    """Return what is kept under a key, or make and keep it.
 
     Parameters
     ----------
@@ -79,6 +79,8 @@ def kept(
         Of the entry, see `cache_key`.
     read
         Reads a file; None for one that is not to be trusted.
+    make : callable
+        Makes the data if no file can be trusted.
     write
         Writes one; a thing that is not to be kept is not written.
     folder
@@ -109,7 +111,19 @@ def kept(
 def cached_arrays(
     kind: str, recipe: object, make: Callable[[], dict[str, Any]], folder: Path | None = None
 ) -> dict[str, Any]:
-    """Name -> array that `recipe` describes, from disk when they are there, else made and kept; see `kept`."""
+    """Return the arrays that a recipe describes, from disk if they are there, or make and keep them.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of the entry, the first part of its file name.
+    recipe : object
+        Everything that decides the arrays, see `cache_key`.
+    make : callable
+        Makes the arrays by name.
+    folder : Path, optional
+        Folder of the cache; the user's by default.
+    """
     import numpy as np
 
     from .files import whole_file

@@ -146,7 +146,21 @@ def _run(arguments: list[str]) -> int:
 
 
 def run_command(module: Any, name: str, summary: str, example: str, arguments: list[str]) -> int:
-    """Run a command module (its contract is in `gearfe.commands`), called by `name`, with these arguments."""
+    """Run a command module with arguments; return the exit code.
+
+    Parameters
+    ----------
+    module : module
+        Command module, see `gearfe.commands`.
+    name : str
+        Words by which the command is called.
+    summary : str
+        One line of help.
+    example : str
+        An example call.
+    arguments : list of str
+        The command line after the name.
+    """
     import warnings
 
     from . import environment

@@ -64,10 +64,24 @@ def quantity(
     choices: tuple[str, ...] | None = None,
     gone: Mapping[str, str] | None = None,
 ) -> Any:
-    """Dataclass field of a table: ``low <= value <= high`` and ``above < value < below`` are checked on reading.
+    """Return the dataclass field of a key, with what is checked on reading.
 
-    `doc` is one sentence with the unit; it appears in error messages and in the generated job-file reference. A mutable
-    default (list, dict) is not accepted: use a tuple, ``None`` or a ``default_factory`` through a callable default.
+    A mutable default (list, dict) is not accepted: use a tuple, ``None`` or a callable default, which makes it.
+
+    Parameters
+    ----------
+    default : Any
+        Value without the key; without a default the key is required.
+    doc : str
+        One sentence with the unit, for error messages and the generated reference of keys.
+    low, high : float, optional
+        Least and largest allowed value.
+    above, below : float, optional
+        Bounds that the value may not reach.
+    choices : tuple of str, optional
+        Allowed values.
+    gone : mapping, optional
+        Former value -> what to write instead.
     """
     meta = {"doc": doc, "low": low, "high": high, "above": above, "below": below, "choices": choices, "gone": gone}
     if callable(default):
@@ -124,7 +138,24 @@ def _change(text: str) -> tuple[str, Any]:
 
 
 def set_key(tables: dict[str, Any], name: str, value: Any, field: str) -> None:
-    """Put a value under a dotted name into the tables of a job, as a TOML file would have it; see `InputError`."""
+    """Put a value under a dotted name into the tables of a job, as a TOML file would have it.
+
+    Parameters
+    ----------
+    tables : dict
+        Parsed job; changed.
+    name : str
+        Dotted name of the key; entries of lists by their number.
+    value : Any
+        Its value.
+    field : str
+        Name in messages.
+
+    Raises
+    ------
+    InputError
+        If the name leads through a value that is no table, or beyond a list.
+    """
     parts = name.split(".")
     place: Any = tables
     for i, part in enumerate(parts):
@@ -247,7 +278,24 @@ def load_job(path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...
 def job_tables(
     raw: dict[str, Any], path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()
 ) -> dict[str, Any]:
-    """The same of tables that are parsed; `path` is named in messages."""
+    """Return the asked tables of a parsed job, checked.
+
+    Parameters
+    ----------
+    raw : dict
+        The parsed job.
+    path : path
+        Its file, named in messages.
+    needed : tuple of str
+        Tables that must be there.
+    optional : tuple of str
+        Tables that are returned if they are there.
+
+    Raises
+    ------
+    InputError
+        For unknown or missing tables, and for every mistake in a known one.
+    """
     for name, table in raw.items():
         if name in REMOVED_TABLES:
             raise InputError(f"[{name}]", None, *REMOVED_TABLES[name])

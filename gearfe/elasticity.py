@@ -185,7 +185,7 @@ def physical_gradients(coordinates: Array, reference_gradients: Array) -> tuple[
 
 
 def element_stiffness(coordinates: Array, material: Material, plane: Plane, thickness: float) -> Array:
-    """Stiffness matrices of curved six-node triangles.
+    """Compute the stiffness matrices of curved six-node triangles.
 
     k_aibj = int w (lam N_a,i N_b,j + mu N_a,j N_b,i + mu delta_ij N_a,k N_b,k).
 
@@ -193,6 +193,10 @@ def element_stiffness(coordinates: Array, material: Material, plane: Plane, thic
     ----------
     coordinates : ndarray, shape (m, 6, 2)
         Node positions (m).
+    material : Material
+        Lame's constants lam and mu.
+    plane : str
+        ``stress`` or ``strain``.
     thickness
         w (m).
 
@@ -237,6 +241,10 @@ def finite_strain_rates(
         Curved six-node triangles.
     fields : ndarray, shape (n, 2, 2 c)
         u of c cases (m), then u' of the same (m per unit of what changes).
+    material : Material
+        Elasticity.
+    plane : str
+        ``stress`` or ``strain``.
     thickness
         w (m).
 

@@ -126,7 +126,20 @@ def read_csv(path: str | Path, field: str) -> dict[str, list[str]]:
 def read_numbers(
     path: Path, field: str, needed: Sequence[str], optional: Sequence[str] = (), *, others: bool = True
 ) -> dict[str, Any]:
-    """Columns of finite numbers of a CSV file as arrays, by name; `others`: whether further columns are allowed.
+    """Read columns of finite numbers of a CSV file as arrays, by name.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    field : str
+        Key that names it, for messages.
+    needed : sequence of str
+        Columns that must be there.
+    optional : sequence of str
+        Columns that are read if they are there.
+    others : bool
+        Whether further columns are allowed.
 
     Raises
     ------

@@ -172,6 +172,8 @@ def eliminate(matrix: BlockRows, ends: IntArray, order: IntArray, nodes: int, re
         One past the last own node of each front.
     order : ndarray
         Number of each node of `matrix` in the whole matrix of so many `nodes`; those left out are held at zero.
+    nodes : int
+        Number of nodes of the whole matrix.
     retained
         Number of nodes after the last front, which are not eliminated.
 

@@ -178,12 +178,25 @@ Pair = tuple[Functions, Functions]
 
 
 def element_matrices(nodes: Array, tets: IntArray, material: Material, stiff: Pair, heavy: Pair) -> ElementMatrices:
-    """Factors of the matrices of elements that are all straight or all curved, between pairs of functions.
+    """Compute the factors of element matrices between pairs of functions, of elements all straight or all curved.
 
     The second ones are the elements' own. With J the gradient of the inverse map, ``d phi_a/d x_i = J[m, i] d phi_a/d
     xi_m``, block (i, j) of the element stiffness is the sum over quadrature points of ``w det (lambda J[m,i] J[n,j] +
     mu J[m,j] J[n,i] + mu delta_ij J[m,k] J[n,k])`` times ``d phi_s/d xi_m d phi_a/d xi_n``. On straight elements all
     but the last factor is constant.
+
+    Parameters
+    ----------
+    nodes : ndarray, shape (n, 3)
+        Nodes (m).
+    tets : ndarray of int, shape (m, 10)
+        Nodes of the tetrahedra.
+    material : Material
+        Elasticity and density.
+    stiff : pair of Functions
+        Test functions, and the elements' own, of the stiffness.
+    heavy : pair of Functions
+        The same of the mass.
     """
     curved = bool(curved_elements(nodes, tets[:1])[0])
 

@@ -259,7 +259,26 @@ def nearest_line(frequency: float, lines: Iterable[OrderLine], within: float) ->
 def waterfall(
     values: ArrayLike, step: float, length: int, *, hop: int | None = None, window: str = "hann"
 ) -> Waterfall:
-    """Spectra of pieces of `length` samples, `hop` samples apart (default: half of it)."""
+    """Compute the spectra of pieces of a signal.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        The signal.
+    step : float
+        Time between samples (s).
+    length : int
+        Samples of a piece.
+    hop : int, optional
+        Samples from one piece to the next; half a piece by default.
+    window : str
+        See `WINDOWS`.
+
+    Raises
+    ------
+    InputError
+        For more than one signal, and a hop below one sample.
+    """
     x = np.asarray(values, dtype=float)
     advance = max(1, length // 2) if hop is None else hop
     if x.ndim != 1 or advance < 1:

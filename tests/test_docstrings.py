@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[1] / "gearfe"
-#: Parts of the package that are checked.
-CHECKED = (
-    "train", "mechanisms", "runup", "multibody/core", "multibody/planar", "multibody/integrators", "multibody/compiled",
-)  # fmt: skip
+#: Parts of the package that are not checked yet.
+LEFT = ("multibody/series", "gear/pair.py", "gear/spur_gear.py")
 #: Functions with fewer parameters may describe them in a sentence.
 MANY = 4
-FILES = sorted(file for part in CHECKED for file in (PACKAGE / part).rglob("*.py"))
+FILES = [
+    file for file in sorted(PACKAGE.rglob("*.py")) if not any(file.is_relative_to(PACKAGE / part) for part in LEFT)
+]
 
 
 def public_functions(body: list[ast.stmt], owner: str = "") -> Iterator[tuple[str, ast.FunctionDef]]:
@@ -63,9 +63,8 @@ def test_sections_name_every_parameter(file: Path) -> None:
     assert missing(file) == {}
 
 
-@pytest.mark.parametrize("part", CHECKED)
-def test_the_parts_are_found(part: str) -> None:
-    assert any(file.is_relative_to(PACKAGE / part) for file in FILES)
+def test_the_package_is_found() -> None:
+    assert len({file.relative_to(PACKAGE).parts[0] for file in FILES}) > 20
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,24 @@ def _counts(action: argparse.Action) -> tuple[int, float]:
 
 
 def check_option(option: str, value: Any, table: type, key: str) -> None:
-    """Raise `InputError` for a value that the `key` of a table does not allow."""
+    """Check the value of an option against a key of a table.
+
+    Parameters
+    ----------
+    option : str
+        Option, for messages.
+    value : Any
+        Its value.
+    table : type
+        Class of the table.
+    key : str
+        Key of the table.
+
+    Raises
+    ------
+    InputError
+        If the key does not allow the value.
+    """
     known = fields_of(table)[key].metadata
     if isinstance(value, (int, float)):
         check_range(value, option, known)
@@ -210,7 +227,19 @@ def command_module(name: str) -> Any:
 
 
 def parser_of(module: Any, name: str, summary: str, example: str) -> CommandParser:
-    """Parser of a command module, called by `name`, with the options that all commands have."""
+    """Return the parser of a command module, with the options that all commands have.
+
+    Parameters
+    ----------
+    module : module
+        Command module, see `gearfe.commands`.
+    name : str
+        Words by which the command is called.
+    summary : str
+        One line of help.
+    example : str
+        An example call.
+    """
     parser = CommandParser(prog=name, description=summary, example=example)
     module.add_arguments(parser)
     group = parser.add_mutually_exclusive_group()
@@ -249,7 +278,24 @@ def _formats(text: str) -> tuple[str, ...]:
 
 
 def with_keys(args: argparse.Namespace, table: Table, *keys: str, **renamed: str) -> Table:
-    """The table with the options of `add_keys` that were given in place of its values, each checked like these."""
+    """Return a table with the values of the options that were given, each checked.
+
+    Parameters
+    ----------
+    args : Namespace
+        Parsed command line.
+    table : dataclass
+        The table.
+    *keys : str
+        Keys whose options have the same name.
+    **renamed : str
+        Name of an option = its key.
+
+    Raises
+    ------
+    InputError
+        For a value that a key does not allow.
+    """
     changes: dict[str, Any] = {}
     for name, key in ({k: k for k in keys} | renamed).items():
         value = getattr(args, name)
@@ -291,7 +337,21 @@ def number(option: str, text: str) -> float:
 def print_results(
     lines: Iterable[str], folder: Path, names: Iterable[str], seconds: Mapping[str, float], warnings: Iterable[str]
 ) -> None:
-    """Print what a command found, the names of its files, the seconds of its stages; warnings to standard error."""
+    """Print results, names of files and seconds of stages, and warnings to standard error.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        What the command found.
+    folder : Path
+        Folder of the files.
+    names : iterable of str
+        Their names.
+    seconds : mapping
+        Stage -> seconds.
+    warnings : iterable of str
+        Sentences.
+    """
     for line in lines:
         print(line)
     print(f"written to {folder}: " + ", ".join(names))

@@ -53,7 +53,21 @@ def signal_of(run: RunUp, bore: int) -> Signal:
 
 
 def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str) -> None:
-    """Spectra over the speed of a slow run-up: coloured tracks, the meshes' orders named."""
+    """Draw spectra over the speed of a slow run-up: coloured tracks, the meshes' orders named.
+
+    Parameters
+    ----------
+    path : Path
+        The picture.
+    run : RunUp
+        The run-up.
+    multiples : int
+        Highest multiple of the mesh frequencies whose order is named.
+    bore : int
+        Number of the attachment whose acceleration is drawn.
+    title : str
+        Second line of the heading.
+    """
     from matplotlib.collections import LineCollection
 
     swept = sorted(run.sweep(), key=lambda s: s.speed)
@@ -93,7 +107,21 @@ def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str
 
 
 def draw_campbell(path: Path, run: RunUp, critical: CriticalSpeeds, multiples: int, title: str) -> None:
-    """Natural frequencies over the speed with the meshes' orders; modes with much strain in meshes are drawn strong."""
+    """Draw natural frequencies over the speed with the meshes' orders; modes strained in meshes are strong.
+
+    Parameters
+    ----------
+    path : Path
+        The picture.
+    run : RunUp
+        The run-up.
+    critical : CriticalSpeeds
+        Modes and the speeds at which orders meet them.
+    multiples : int
+        Highest multiple of the mesh frequencies that is drawn.
+    title : str
+        Second line of the heading.
+    """
     modes, met = critical.modes, critical.met
     share = modes.strain[:, : len(run.train.model.meshes)].sum(axis=1)
     rising, highest = np.argsort(modes.speeds), 1e-3 * run.band_hz

@@ -48,7 +48,21 @@ def draw_figures(folder: Path, mechanism: Mechanism, results: Results) -> None:
 
 
 def draw_modes(folder: Path, mechanism: Mechanism, q: np.ndarray, modes: Modes) -> None:
-    """modes.png: the first six shapes, 15 % of the mechanism's length at the largest, over the state of rest."""
+    """Draw modes.png: the first six shapes over the state of rest.
+
+    Shapes are drawn with 15 % of the mechanism's length at the largest.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the picture.
+    mechanism : Mechanism
+        The mechanism.
+    q : ndarray, shape (size,)
+        Coordinates at rest.
+    modes : Modes
+        Vibrations about it.
+    """
     count = min(6, len(modes.rates))
     columns = min(3, count)
     figure = new_figure(4 * columns, 3.4 * -(-count // columns))

@@ -32,9 +32,22 @@ class Shape(NamedTuple):
 
 
 def draw_field(axes: Any, mechanism: Mechanism, trajectory: Trajectory, time: float, *, names: bool) -> None:
-    """Bodies at a time (s) in the colours that ``figure.colour`` asks for, with their bar.
+    """Draw the bodies at a time in the colours that ``figure.colour`` asks for, with their bar.
 
     Displacements stand above the pale start, velocities have arrows at points.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to draw.
+    mechanism : Mechanism
+        The mechanism.
+    trajectory : Trajectory
+        Its motion.
+    time : float
+        The time (s).
+    names : bool
+        Whether bodies and points are named.
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable

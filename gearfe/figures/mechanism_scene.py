@@ -29,7 +29,21 @@ Point = tuple[float, float]
 
 
 def draw_state(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0, names: bool = False) -> None:
-    """Bodies as outlines of their points at one state, q of shape (1, k); with `names` those of bodies and points."""
+    """Draw the bodies as outlines of their points at one state.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to draw.
+    mechanism : Mechanism
+        The mechanism.
+    q : ndarray, shape (1, size)
+        Coordinates.
+    alpha : float
+        Opacity, 0 to 1.
+    names : bool
+        Whether bodies and points are named.
+    """
     draw_backdrop(axes, mechanism, q, alpha=alpha)
     magnification = mechanism.file.figure.magnification
     for (body, points), colour in zip(rigid_ends(mechanism), _colours(mechanism), strict=False):
@@ -51,7 +65,19 @@ def draw_state(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0,
 
 
 def draw_backdrop(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0) -> None:
-    """What is no body: springs, rods, guides, points at rest, and the factor of deflections."""
+    """Draw springs, rods, guides, points at rest, and the factor of deflections.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to draw.
+    mechanism : Mechanism
+        The mechanism.
+    q : ndarray, shape (1, size)
+        Coordinates.
+    alpha : float
+        Opacity, 0 to 1.
+    """
     _couplings(axes, mechanism, q, _size(mechanism, q), alpha)
     magnification = mechanism.file.figure.magnification
     if mechanism.elastic and magnification != 1.0:
@@ -180,7 +206,24 @@ def frame(axes: Any, mechanism: Mechanism, q: Array) -> None:
 
 
 def link_places(link: FlexibleLink, at: Array, q: Array, factor: float) -> ComplexArray:
-    """Places of a flexible link, deflections times a factor, as complex numbers (n, k)."""
+    """Return places of a flexible link with exaggerated deflections, as complex numbers.
+
+    Parameters
+    ----------
+    link : FlexibleLink
+        The link.
+    at : ndarray, shape (k,)
+        Stations along the link (m).
+    q : ndarray, shape (n, size)
+        Coordinates.
+    factor : float
+        Factor on the deflections.
+
+    Returns
+    -------
+    places : ndarray of complex, shape (n, k)
+        x + i y (m).
+    """
     shape = link.exaggerated(q, at, factor)
     return np.asarray(shape[:, :, 0] + 1j * shape[:, :, 1])
 

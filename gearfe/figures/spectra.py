@@ -57,7 +57,23 @@ _DASHES = ((0, (6, 3)), (0, (2, 2)), (0, (6, 2, 2, 2)))
 def draw_spectrum(
     path: Path, response: TrainResponse, made: TrainSpectra, attachment: str, title: str, band: Band = None
 ) -> None:
-    """Amplitude spectrum of the acceleration at an attachment as lines, its largest lines named."""
+    """Draw the amplitude spectrum of the acceleration at an attachment, its largest lines named.
+
+    Parameters
+    ----------
+    path : Path
+        The picture.
+    response : TrainResponse
+        The motion, whose frequencies name lines.
+    made : TrainSpectra
+        Its spectra.
+    attachment : str
+        The attachment.
+    title : str
+        Second line of the heading.
+    band : (float, float), optional
+        Lowest and highest frequency drawn (Hz).
+    """
     name, spectrum = f"attachment_{attachment}_acceleration_m_per_s2", made.spectrum
     amplitude = _inside(spectrum.frequency, made.amplitude(name), band)
     lines = lines_of(response, float(spectrum.frequency[-1]))
@@ -88,7 +104,23 @@ def draw_spectrum(
 def draw_power(
     path: Path, response: TrainResponse, made: TrainSpectra, power: RadiatedPower, title: str, band: Band = None
 ) -> None:
-    """Level of the equivalent radiated power of each line; the housing is elastic."""
+    """Draw the level of the equivalent radiated power of each line; the housing is elastic.
+
+    Parameters
+    ----------
+    path : Path
+        The picture.
+    response : TrainResponse
+        The motion, whose frequencies name lines.
+    made : TrainSpectra
+        Its spectra.
+    power : RadiatedPower
+        Power of the lines.
+    title : str
+        Second line of the heading.
+    band : (float, float), optional
+        Lowest and highest frequency drawn (Hz).
+    """
     found = peaks(power.frequency, _inside(power.frequency, power.power, band), 3)
     lowest, highest = _ends(response, made, [1e-3 * p.frequency for p in found], band)
     frequency, loud = largest_lines(1e-3 * power.frequency, power.level, highest)
@@ -191,7 +223,21 @@ def _ends(response: TrainResponse, made: TrainSpectra, lines: list[float], band:
 
 
 def draw_spectrogram(path: Path, made: Analysed, attachment: str, title: str, band: Band = None) -> None:
-    """Acceleration at an attachment over time and frequency, and its average beside."""
+    """Draw the acceleration at an attachment over time and frequency, and its average next to it.
+
+    Parameters
+    ----------
+    path : Path
+        The picture.
+    made : Analysed
+        The analyses.
+    attachment : str
+        The attachment.
+    title : str
+        Second line of the heading.
+    band : (float, float), optional
+        Lowest and highest frequency drawn (Hz).
+    """
     name = f"attachment_{attachment}_acceleration_m_per_s2"
     fall, average = made.falls[made.names.index(name)], made.average[:, made.names.index(name)]
     loud = level(fall.amplitude)
@@ -219,7 +265,21 @@ def draw_spectrogram(path: Path, made: Analysed, attachment: str, title: str, ba
 
 
 def draw_tracks(path: Path, made: Analysed, tracks: OrderTracks, attachment: str, title: str) -> None:
-    """Amplitudes of the orders at an attachment, over the speed where it goes one way, else over the time."""
+    """Draw the amplitudes of orders at an attachment over speed, or over time if the speed turns.
+
+    Parameters
+    ----------
+    path : Path
+        The picture.
+    made : Analysed
+        The analyses.
+    tracks : OrderTracks
+        Amplitudes of the orders.
+    attachment : str
+        The attachment.
+    title : str
+        Second line of the heading.
+    """
     values = np.abs(tracks.amplitude[:, :, made.names.index(f"attachment_{attachment}_acceleration_m_per_s2")])
     change = np.diff(tracks.speed)
     over_speed = len(change) > 0 and bool((change > 0.0).all() or (change < 0.0).all())
@@ -239,7 +299,21 @@ def draw_tracks(path: Path, made: Analysed, tracks: OrderTracks, attachment: str
 
 
 def draw_measured(path: Path, made: Analysed, spectra: TrainSpectra | None, title: str, band: Band = None) -> None:
-    """Measured spectra over the computed one, a panel for each attachment."""
+    """Draw measured spectra over the computed one, a panel for each attachment.
+
+    Parameters
+    ----------
+    path : Path
+        The picture.
+    made : Analysed
+        The analyses, with the measured spectra.
+    spectra : TrainSpectra or None
+        Computed spectra.
+    title : str
+        Second line of the heading.
+    band : (float, float), optional
+        Lowest and highest frequency drawn (Hz).
+    """
     places = list(dict.fromkeys(one.attachment for one in made.measured))
     figure = new_figure(10.5, 1.4 + 3.2 * len(places))
     panels: Any = figure.subplots(len(places), 1, squeeze=False)[:, 0]
@@ -289,16 +363,18 @@ class _Box(NamedTuple):
 
 
 def label_lines(axes: Any, labels: Sequence[tuple[float, float, str]], x: Array, y: Array, **look: Any) -> None:
-    """Label some of the vertical lines from 0 to (x, y), each at the nearest free place; without one, not at all.
+    """Label some of the vertical lines from 0 to (x, y), each at the nearest free place, or not at all.
 
     Parameters
     ----------
-    axes
+    axes : Axes
         With their final limits.
-    labels
+    labels : sequence of (float, float, str)
         (x, y, text), the most important first.
-    x, y : (n,)
+    x, y : ndarray, shape (n,)
         Tips of all lines, which no label covers.
+    **look
+        Look of the labels, as of `Axes.text`.
     """
     renderer = axes.figure.canvas.get_renderer()
     scale = axes.figure.dpi / 72.0

@@ -26,8 +26,20 @@ MOST_LINES = 12
 
 
 def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, Any]) -> None:
-    """Stiffness along the line of action and load sharing over the pinion angle, two mesh cycles from angle 0, beside
-    levels of the summary `found`.
+    """Draw stiffness along the line of action and load sharing over two mesh cycles of the pinion angle.
+
+    Levels of the summary are drawn with them.
+
+    Parameters
+    ----------
+    path : path
+        The picture.
+    job : StiffnessJob
+        The gears and the table.
+    curve : StiffnessCurve
+        The curve.
+    found : mapping
+        The summary.
     """
     table, pair, cycle = job.table, job.pair, curve.mesh_cycle
     wrapped, source = distinct_phases(curve.pinion_angle, cycle)

@@ -47,7 +47,21 @@ def _cut_out(field: GearField, zoom: tuple[float, float, float]) -> Part:
 def stress_figure(
     folder: Path, pair: GearPair, position: Positions, fields: Sequence[GearField], most: float | None = None
 ) -> None:
-    """``stress_<angle>deg.png``: von Mises stress in the meshing zone, deformed; colours up to `most` (MPa)."""
+    """Draw ``stress_<angle>deg.png``: von Mises stress in the meshing zone, deformed.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the picture.
+    pair : GearPair
+        The gears.
+    position : Positions
+        The position.
+    fields : sequence of GearField
+        Fields of pinion and wheel.
+    most : float, optional
+        End of the colours (MPa).
+    """
     from matplotlib.ticker import MaxNLocator
 
     zoom = zone(pair, modules=1.5)
@@ -125,10 +139,21 @@ def frames_of(elastic: MeshingPair, curve: StiffnessCurve, count: int) -> list[F
 
 
 def stress_animation(path: str | Path, elastic: MeshingPair, curve: StiffnessCurve, count: int) -> None:
-    """Write the von Mises stress in the meshing zone over one mesh cycle as an endless GIF of `count` frames.
+    """Write the von Mises stress in the meshing zone over one mesh cycle as an endless GIF.
 
     The twists are the curve's own where it has them, interpolated between its positions otherwise. The file appears
     whole or not at all, and not without a solution.
+
+    Parameters
+    ----------
+    path : path
+        The film.
+    elastic : MeshingPair
+        The condensed gears.
+    curve : StiffnessCurve
+        Solved positions.
+    count : int
+        Number of frames.
 
     Raises
     ------

@@ -17,14 +17,18 @@ MOST, DRAWN = 6, 4000
 
 
 def study_figures(folder: Path, result: StudyResult, summary: Mapping[str, Any], title: str) -> None:
-    """All pictures that a study has.
+    """Draw all pictures that a study has.
 
     Parameters
     ----------
+    folder : Path
+        Folder of the pictures.
     result
         The study.
     summary
         What its `summary` says.
+    title : str
+        Heading.
     """
     table, numbers, outputs = result.table, result.numbers(), _outputs(result)
     if not outputs:

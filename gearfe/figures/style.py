@@ -45,7 +45,21 @@ def save(figure: Any, path: str | Path, *, dpi: int = DPI) -> None:
 
 
 def write_film(path: str | Path, pictures: Sequence[NDArray[np.uint8]], palette: Any, *, ms: int, dither: bool) -> None:
-    """Write pictures (h, w, 3) as an endless GIF in the colours of a palette (Pillow image), `ms` milliseconds each."""
+    """Write pictures as an endless GIF in the colours of a palette.
+
+    Parameters
+    ----------
+    path : path
+        The film.
+    pictures : sequence of ndarray of uint8, shape (h, w, 3)
+        The pictures.
+    palette : Image
+        Pillow image with the palette.
+    ms : int
+        Time of each picture (ms).
+    dither : bool
+        Whether colours are dithered.
+    """
     from PIL import Image
 
     how = Image.Dither.FLOYDSTEINBERG if dither else Image.Dither.NONE
@@ -95,7 +109,19 @@ def save_fixed(figure: Any, path: str | Path) -> None:
 
 
 def panel(axes: Any, ylabel: str, letter: str, title: str) -> Any:
-    """The axes with a light grid, a label and a lettered title, both left out where empty."""
+    """Give axes a light grid, a label and a lettered title; return them.
+
+    Parameters
+    ----------
+    axes : Axes
+        The axes; changed.
+    ylabel : str
+        Label of the ordinate; none if empty.
+    letter : str
+        Letter of the panel.
+    title : str
+        Title; none if empty.
+    """
     tidy(axes)
     if ylabel:
         axes.set_ylabel(ylabel)

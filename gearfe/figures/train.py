@@ -45,7 +45,21 @@ class TrainPictures:
     most: float | None = None
 
     def curves(self, folder: Path, train: GearTrain, made: Followed, spectra: TrainSpectra, attachment: str) -> None:
-        """``response.png``, ``spectrum.png``, and where there are such things the other two."""
+        """Draw ``response.png``, ``spectrum.png``, and, where they apply, transmission errors and radiated power.
+
+        Parameters
+        ----------
+        folder : Path
+            Folder of the pictures.
+        train : GearTrain
+            The train.
+        made : Followed
+            The run with its curves.
+        spectra : TrainSpectra
+            Its spectra.
+        attachment : str
+            Attachment whose acceleration is drawn.
+        """
         response = made.curves
         _draw_response(folder / "response.png", response, attachment, self.title, made.mean_force)
         if train.drive is not None and any(mesh.stiffness is not None for mesh in train.meshes):
@@ -55,7 +69,19 @@ class TrainPictures:
             draw_power(folder / "radiated_power.png", response, spectra, spectra.power, self.title, self.band)
 
     def analysis(self, folder: Path, made: Analysed, spectra: TrainSpectra | None, attachment: str) -> None:
-        """``spectrogram.png``, ``order_tracks.png``, ``measured.png``, those that there is something for."""
+        """Draw ``spectrogram.png``, ``order_tracks.png`` and ``measured.png``, those that have data.
+
+        Parameters
+        ----------
+        folder : Path
+            Folder of the pictures.
+        made : Analysed
+            The analyses.
+        spectra : TrainSpectra or None
+            Computed spectra, with which measured ones are compared.
+        attachment : str
+            Attachment whose acceleration is drawn.
+        """
         if made.falls:
             draw_spectrogram(folder / "spectrogram.png", made, attachment, self.title, self.band)
         if made.tracks is not None:
@@ -64,7 +90,19 @@ class TrainPictures:
             draw_measured(folder / "measured.png", made, spectra, self.title, self.band)
 
     def fields(self, path: Path, train: GearTrain, response: TrainResponse, steps: IntArray) -> str:
-        """Fields at some output times; returns an empty text, or why nothing was drawn."""
+        """Draw the fields at some output times; return an empty text, or why nothing was drawn.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        train : GearTrain
+            The train.
+        response : TrainResponse
+            Its motion.
+        steps : ndarray of int
+            Numbers of the output steps.
+        """
         return draw_scene(path, frames(train, response, steps), self.title, self.most)
 
 

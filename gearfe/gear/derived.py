@@ -97,7 +97,24 @@ def _of_gear(gear: Gear, working_radius: float, span: int | None) -> dict[str, A
 
 
 def gear_outline(gear: Gear, angle: float, centre: tuple[float, float], *, per_segment: int = 24) -> Array:
-    """Closed outline of a whole gear (mm); `angle` (rad) turns the frame of tooth 0, `centre` is in m."""
+    """Return the closed outline of a whole gear.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    angle : float
+        Angle of the frame of tooth 0 (rad).
+    centre : (float, float)
+        Centre of the gear (m).
+    per_segment : int
+        Points on each piece of a tooth.
+
+    Returns
+    -------
+    outline : ndarray, shape (n, 2)
+        Points (mm), the first one again at the end.
+    """
     half = gear.profile.polyline(per_segment)
     left = half[:, 0] + 1j * half[:, 1]
     tooth = np.concatenate([np.conj(left), left[::-1][1:]])  # counter-clockwise: right flank, tip, left flank
@@ -186,10 +203,12 @@ def dynamic_factor(
     pair: MeshGeometry, speeds: ArrayLike, *, stiffness: float, mass: float, force: float, relief: float = 0.0,
     deviations: tuple[float, float] = (0.0, 0.0),
 ) -> Array:  # fmt: skip
-    """K_v of a spur pair at speeds of its pinion.
+    """Compute K_v of a spur pair at speeds of its pinion.
 
     Parameters
     ----------
+    pair : MeshGeometry
+        The gears.
     speeds : array_like, shape (n,)
         rad/s.
     stiffness

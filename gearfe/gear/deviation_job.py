@@ -31,12 +31,18 @@ def deviations_of(
     flank: str | None = None,
     gears: Sequence[str] = GEARS,
 ) -> tuple[ToothDeviations, ToothDeviations]:
-    """Deviations of the driving flanks of a pair's driver and driven gear; files are looked for in `folder`.
+    """Return the deviations of the driving flanks of a pair's driver and driven gear.
 
     Where the right flanks drive, those of the pair seen from the other side, whose left ones they are.
 
     Parameters
     ----------
+    table : MicrogeometryTable
+        The table.
+    pair : GearPair
+        The gears.
+    folder : path
+        Where files of the table are looked for.
     flank
         ``left`` or ``right``; None: what the table says.
     gears
@@ -134,8 +140,23 @@ def flank_deviations(one: FlankOf) -> ToothDeviations:
 def pitch_errors_of(
     table: MicrogeometryTable, gear: Gear, name: str, folder: str | Path = "."
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """How much earlier left and right flanks of each tooth touch along the line of action (m), teeth counted from 0
-    counter-clockwise; empty for flanks without pitch errors. `name` is ``pinion`` or ``wheel``.
+    """Return how much earlier the flanks of each tooth touch by their pitch errors.
+
+    Parameters
+    ----------
+    table : MicrogeometryTable
+        The table.
+    gear : Gear
+        The gear.
+    name : str
+        ``pinion`` or ``wheel``.
+    folder : path
+        Where files of the table are looked for.
+
+    Returns
+    -------
+    left, right : tuple of float
+        Along the line of action (m), teeth counted from 0 counter-clockwise; empty for flanks without pitch errors.
 
     Raises
     ------

@@ -244,11 +244,27 @@ def first_contact_curve(
     number: int = 0,
     deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL,
 ) -> Array:
-    """Twist of the wheel (rad) at which a tooth pair's rigid flanks touch at pinion angles (rad), shape (n,).
+    """Return the twists of the wheel at which a tooth pair's rigid flanks touch.
 
     The tooth pair `number` is pinion tooth k and wheel tooth -1 - k. It counts from where a wheel space faces the
     pinion tooth (`MeshGeometry.contact_twist` is where unmodified flanks touch) and is infinite where they cannot
     touch. Without deviations all pairs have one curve, shifted by mesh cycles.
+
+    Parameters
+    ----------
+    pair : MeshGeometry
+        The gears.
+    angles : ndarray, shape (n,)
+        Pinion angles (rad).
+    number : int
+        Number of the tooth pair.
+    deviations : pair of ToothDeviations
+        Of pinion and wheel.
+
+    Returns
+    -------
+    twist : ndarray, shape (n,)
+        In rad; infinite if the flanks cannot touch.
     """
     place = np.asarray(angles, dtype=float)
     numbers = np.full(len(place), number, dtype=np.int64)

@@ -258,18 +258,27 @@ def _check_interference(pair: MeshGeometry, name: str, mate_name: str) -> None:
 
 
 def tip_penetration(gear: Gear, mate: Gear, centre_distance: float, twist: float) -> float:
-    """Largest depth (m) by which tips of `mate` enter `gear` while the pair rolls with its left flanks in contact.
+    """Return the largest depth by which tips of a mate enter a gear while the pair rolls.
 
-    The mate's outline from the middle of its addendum outwards is followed through the space of the gear. In the
-    gear's frame the outline of its tooth is a single-valued polar angle over the radius, which separates inside from
-    outside; the depth of a point inside is its distance to that outline.
+    The left flanks are in contact. The mate's outline from the middle of its addendum outwards is followed through the
+    space of the gear. In the gear's frame the outline of its tooth is a single-valued polar angle over the radius,
+    which separates inside from outside; the depth of a point inside is its distance to that outline.
 
     Parameters
     ----------
+    gear : Gear
+        The gear.
+    mate : Gear
+        The gear whose tips are followed.
     centre_distance
         Distance (m) between the axes; the gear is at the origin, the mate on +x.
     twist
         Turn (rad) of the mate that closes the backlash on the left flanks.
+
+    Returns
+    -------
+    depth : float
+        In m.
     """
     outline, tip = _outline(gear), _tip_outline(mate)
     reach = (centre_distance**2 + mate.tip_radius**2 - gear.tip_radius**2) / (2.0 * centre_distance * mate.tip_radius)

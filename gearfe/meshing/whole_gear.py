@@ -104,7 +104,19 @@ def in_mesh(pair: GearPair) -> tuple[float, float]:
 
 
 def teeth_near(gear: Gear, turned: float, towards: float, count: int) -> set[int]:
-    """Numbers of the `count` teeth nearest to the direction `towards` (rad) when tooth 0 stands at `turned` (rad)."""
+    """Return the numbers of the teeth nearest to a direction.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    turned : float
+        Angle of tooth 0 (rad).
+    towards : float
+        The direction (rad).
+    count : int
+        Number of teeth.
+    """
     step = 2.0 * math.pi / gear.teeth
     off = {k: abs(math.remainder(turned + k * step - towards, 2.0 * math.pi)) for k in range(gear.teeth)}
     return set(sorted(off, key=lambda k: (round(off[k], 9), k))[:count])

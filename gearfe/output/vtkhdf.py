@@ -212,6 +212,18 @@ def write_vtkhdf(
     *,
     point_data: Fields | None = None,
 ) -> None:
-    """Write one grid without times; see `VtkHdfSeries.add`."""
+    """Write one grid without times.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    points : ndarray, shape (n, 3)
+        Points (m).
+    cells : mapping
+        Type of cells -> their points, see `VtkHdfSeries.add`.
+    point_data : mapping, optional
+        Name -> values at the points.
+    """
     with VtkHdfSeries(path, series=False) as file:
         file.add(0.0, points, cells, point_data=point_data)

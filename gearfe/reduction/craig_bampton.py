@@ -77,7 +77,17 @@ class Partition:
 
 
 def partition(stiffness: Any, mass: Any, interface: Any, internal: IntArray) -> Partition:
-    """Split a sparse model, so that the whole matrices (n, n) need be kept no longer; see `Partition`."""
+    """Split a sparse model into interfaces and internal unknowns, so that the whole matrices can be dropped.
+
+    Parameters
+    ----------
+    stiffness, mass : sparse matrix, shape (n, n)
+        The whole matrices.
+    interface : sparse matrix or ndarray, shape (n, m)
+        Displacement of every row for unit interface coordinates.
+    internal : ndarray of int, shape (k,)
+        Rows that are free and in no interface.
+    """
     boundary = np.asarray(interface.toarray() if sparse.issparse(interface) else interface, dtype=float)
     found = []
     for matrix in (stiffness, mass):
