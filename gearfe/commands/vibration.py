@@ -44,7 +44,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_train(parser: argparse.ArgumentParser, help_: str, table: type, *keys: str) -> None:
-    """Options of a train's job: file, folder, variant, curves, keys of its table, attachment in the pictures."""
+    """Add the options of a train's job: file, folder, variant, curves, keys of its table, attachment.
+
+    Parameters
+    ----------
+    parser : ArgumentParser
+        Parser of the command; changed.
+    help_ : str
+        Help of the job file.
+    table : type
+        Class of the table whose keys are options.
+    *keys : str
+        These keys.
+    """
     add_job(parser, "job", help_)
     add_folder(parser)
     parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
@@ -139,7 +151,19 @@ def title(table: TrainTable, *, driven: bool = True) -> str:
 
 
 def report_lines(response: TrainResponse, train: GearTrain, written: Written, choice: OutputChoice) -> list[str]:
-    """Lines for the terminal."""
+    """Return the lines that a run prints.
+
+    Parameters
+    ----------
+    response : TrainResponse
+        The motion at the end.
+    train : GearTrain
+        The train.
+    written : Written
+        Summary and files of the run.
+    choice : OutputChoice
+        What was asked for.
+    """
     from ..gearbox.inherited import inherited_lines
 
     summary = written.summary

@@ -86,9 +86,10 @@ def hertz(setting: Setting, state: State, force: Array) -> tuple[Array, Array]:
     return contact_model.compliance * (0.5 - np.log(0.5 * b)) - (along * np.log(2 * y)).sum(axis=1), b
 
 
-def shared(couples: Couplings, T: Array, own: Array, overlap: Array, on: BoolArray, *, held: bool = False) -> Array:
-    """Forces per width (N/m) that take up overlaps (m), both of shape (p,), where contacts yield by `own` (m2/N) as
-    well as by T; `on` and `held` as in `unilateral`.
+def _shared(couples: Couplings, T: Array, own: Array, overlap: Array, on: BoolArray, *, held: bool = False) -> Array:
+    """Return the forces per width (N/m) that take up overlaps (m), both of shape (p,).
+
+    Contacts yield by `own` (m2/N) as well as by T; `on` and `held` as in `unilateral`.
     """
     width = np.ones((len(own), 1))
     return unilateral(couples, own[:, None, None], T, width, -overlap[:, None], on[:, None], held=held)[0][:, 0]
@@ -102,7 +103,7 @@ def first_state(contact_model: HalfPlanePair, twists: Array, found: FirstContact
     force = np.maximum(overlap, 0.0) / reference_approach(contact_model)
     for _ in range(FORCE_ROUNDS):
         own, b = hertz(setting, state, force)
-        force = np.maximum(shared(setting.couples, T, own, overlap, overlap > 0), 0.0)
+        force = np.maximum(_shared(setting.couples, T, own, overlap, overlap > 0), 0.0)
     return setting, replace(state, force=force, variance=0.25 * b**2)
 
 
@@ -128,8 +129,8 @@ def expected_twists(contact_model: HalfPlanePair, torques: Array, first_contact:
     for _ in range(TWIST_STEPS):
         own, _ = hertz(setting, state, force)
         overlap = arm * (twist[position] - found.twist)
-        force = shared(couples, T, own, overlap, overlap > 0)
-        rate = shared(couples, T, own, arm, force > 0, held=True)
+        force = _shared(couples, T, own, overlap, overlap > 0)
+        rate = _shared(couples, T, own, arm, force > 0, held=True)
         torque, slope = (couples.total(one * arm) * contact_model.width for one in (force, rate))
         twist = np.maximum(twist + (goal - torque) / np.maximum(slope, 1e-300), touch + 0.1 * (twist - touch))
     made = np.full(len(torques), np.inf)

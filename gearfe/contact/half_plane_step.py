@@ -196,11 +196,24 @@ def cross(a: ComplexArray, b: ComplexArray) -> Array:
 def far_field_influence(
     contact_model: HalfPlanePair, couples: Couplings, normal: ComplexArray, arc: Array, variance: Array
 ) -> FarField:
-    r"""H at the arcs (m) and along the normals (tooth axes) of all contacts, both of shape (p, 2).
+    r"""Return the far-field influence H between all contacts of a position, with its slope.
 
     The bumps average over their widths, the contacts have widths of their own: with the variances v of the pressures
-    (m2), shape (p,), and a^2/4 of the bumps, H on one tooth is more by
+    and a^2/4 of the bumps, H on one tooth is more by
     :math:`\tfrac12(v_i-\tfrac14a_i^2)\,\partial_{ss}H+\tfrac12(v_j-\tfrac14a_j^2)\,\partial_{tt}H` along the normals.
+
+    Parameters
+    ----------
+    contact_model : HalfPlanePair
+        The pair.
+    couples : Couplings
+        Which contacts share a position.
+    normal : ndarray of complex, shape (p, 2)
+        n in the teeth's axes.
+    arc : ndarray, shape (p, 2)
+        Arcs of the contacts on both flanks (m).
+    variance : ndarray, shape (p,)
+        Variances of the pressures (m2).
     """
     shapes = contact_model.shapes.at(arc)
     values = shapes[:, :, 0]
@@ -215,15 +228,25 @@ def far_field_influence(
 
 
 def answers(contact_model: HalfPlanePair, values: Array, normal: ComplexArray, couples: Couplings) -> ComplexArray:
-    """Far-field displacements at the stations of the first tooth of each couple by a unit force per width along the
-    normal of the second contact, shape (c, 2, k, 1), tooth axes (m2/N).
+    """Return the far-field displacements at the stations of the first tooth of each couple.
+
+    They answer a unit force per width along the normal of the second contact.
 
     Parameters
     ----------
+    contact_model : HalfPlanePair
+        The pair.
     values : ndarray, shape (p, 2, k)
         Shape functions of the stations at the contacts.
     normal : ndarray of complex, shape (p, 2)
         n in the teeth's axes.
+    couples : Couplings
+        Couples (i, j) of contacts.
+
+    Returns
+    -------
+    displacement : ndarray of complex, shape (c, 2, k, 1)
+        In tooth axes (m2/N).
     """
     count, k = len(normal), values.shape[2]
     load = (values[..., None] * normal.view(float).reshape(count, 2, 1, 2)).reshape(count, 2, 2 * k)
@@ -244,10 +267,14 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
 
     Parameters
     ----------
-    search
+    setting : Setting
+        Teeth and contacts, which no step changes.
+    state : State
+        Forces, places and windows from which the step starts.
+    search : bool
         Whether windows are searched for; else they stay.
-    held
-        Whether the bearing panels stay, so that the step is a smooth function of its state.
+    held : bool
+        Whether the loaded panels stay, so that the step is a smooth function of its state.
     """
     contact_model, couples, tables, corner = setting.contact_model, setting.couples, setting.tables, setting.corner
     normal, force = state.normal[:, None] / setting.turn, state.force
@@ -331,7 +358,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
         bearing=p > 0,
         reach=state.reach,
     )
-    changed, settled = change(setting, state, following, place)[couples.position], settled[couples.position]
+    changed, settled = _change(setting, state, following, place)[couples.position], settled[couples.position]
     wider = outgrown & (changed <= WIDENED_BELOW)
     following = replace(following, reach=np.where(wider, WIDER * state.reach, state.reach))
     return Step(following, p, settled, low, high, outgrown, x, width, arcs, place, energy, changed)
@@ -348,9 +375,11 @@ def unseen_force(contact_model: HalfPlanePair) -> float:
     return ANGLE_ROUNDING * contact_model.pair.wheel.base_radius / reference_approach(contact_model)
 
 
-def change(setting: Setting, state: State, new: State, place: Array) -> Array:
-    """What a step changed beyond what rounding does, shape (m,): the forces in units of their sum, and weighted by them
-    the places and widths of the contacts, in units of these.
+def _change(setting: Setting, state: State, new: State, place: Array) -> Array:
+    """Return the change of a step beyond rounding, shape (m,).
+
+    Changes of forces count in units of their sum; those of the contacts' places and widths, in units of these, are
+    weighted by the forces.
     """
     couples = setting.couples
     safe = np.where(new.variance > 0, new.variance, 1.0)

@@ -30,10 +30,16 @@ _STILL, _FILM = (2000, 1440), (720, 520)
 
 
 def draw_scene(path: str | Path, arrays: Mapping[str, Array], title: str, most: float | None = None) -> str:
-    """Draw what `gearfe.gearbox.fields.frames` gives: one step into a ``.png``, several into an animated ``.gif``.
+    """Draw one step into a ``.png``, or several into an animated ``.gif``.
 
     Parameters
     ----------
+    path : path
+        The picture or film.
+    arrays : mapping
+        Surfaces and colours, of `gearfe.vibration.fields.frames`.
+    title : str
+        Heading.
     most
         End of the housing's colours (m/s2); by default what 97 % of its values are below.
 

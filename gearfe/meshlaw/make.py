@@ -72,7 +72,7 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
         met, first = _first_contacts(pair, angles)
         twists = first[:, None] + reach * np.array(depths) / radius
         solved = solve_half_plane(pair, np.repeat(angles, len(depths)), twists.ravel())
-        known.append(pair_forces(pair, solved, met, C))
+        known.append(_pair_forces(pair, solved, met, C))
         return solved
 
     begin, width, error = nodes[:-1], np.diff(nodes), 0.0
@@ -145,7 +145,7 @@ def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) 
     return np.where(np.isfinite(force), missed, 0.0)  # some contacts are not solved, as of flanks with short waves
 
 
-def pair_forces(pair: HalfPlanePair, solved: Positions, met: FirstContacts, coupling: Sequence[Couple]) -> PairForces:
+def _pair_forces(pair: HalfPlanePair, solved: Positions, met: FirstContacts, coupling: Sequence[Couple]) -> PairForces:
     """Forces and approaches of the loaded pairs in contact solutions; forces are the wheel's torques over r_b2."""
     radius = pair.pair.wheel.base_radius
     c = solved.contacts

@@ -59,7 +59,7 @@ NEARLY = 1e-4
 NOT_REACHED = "torque_not_reached"
 
 
-def newton_twist(twist: Array, first_contact: Array, torque: Array, tangent: Array, goal: Array) -> Array:
+def _newton_twist(twist: Array, first_contact: Array, torque: Array, tangent: Array, goal: Array) -> Array:
     """Newton's step above, shape (n,) (rad); not-a-number without a torque."""
     with np.errstate(all="ignore"):
         delta = twist - first_contact
@@ -69,7 +69,7 @@ def newton_twist(twist: Array, first_contact: Array, torque: Array, tangent: Arr
 def twists_for_torque(
     solve: Callable[[IntArray, Array], Positions], found: Positions, goal: Array, *, first_contact: Array, most: float
 ) -> Positions:
-    """Bring positions nearly (`NEARLY`) to the torques `goal`, shape (n,), > 0 (N m); iterations are those of all.
+    """Bring positions nearly (`NEARLY`) to given torques; iterations are those of all solutions.
 
     Parameters
     ----------
@@ -77,6 +77,8 @@ def twists_for_torque(
         ``solve(numbers, twists)`` gives the positions of these numbers.
     found
         Solutions at first guesses of the twist.
+    goal : ndarray, shape (n,)
+        Torques at the wheel (N m), > 0.
     first_contact : ndarray, shape (n,)
         Twists (rad) at which the rigid flanks touch.
     most
@@ -90,7 +92,7 @@ def twists_for_torque(
         if len(open_) == 0 or solutions == MAX_SOLUTIONS:
             break
         low, high = np.where(miss < 0, twist, low), np.where(miss > 0, twist, high)
-        step = newton_twist(twist, first_contact, torque, found.tangent, goal)
+        step = _newton_twist(twist, first_contact, torque, found.tangent, goal)
         between = np.where(np.isfinite(high), 0.5 * (low + high), np.clip(2 * twist - first_contact, twist, most))
         step = np.where((low < step) & (step < high), np.minimum(step, most), between)
         made = solve(open_, step[open_])
@@ -178,7 +180,17 @@ def position_solver(elastic: MeshingPair) -> PositionSolver:
 
 
 def at_twists(solver: PositionSolver, angles: Array, twists: Array, *, finite: bool = False) -> Positions:
-    """Positions at pinion angles and twists, both of shape (n,) (rad); with or without finite strain."""
+    """Solve positions at given twists.
+
+    Parameters
+    ----------
+    solver : PositionSolver
+        The gears.
+    angles, twists : ndarray, shape (n,)
+        Pinion angles, and twists from the centred position (rad).
+    finite : bool
+        Whether the torque has the effect of finite strain.
+    """
     found = solver.solve(angles, twists, np.arange(len(angles)) if finite else NONE)
     return found.raised(finite_strain_shares(solver.elastic, found)) if finite else found
 
@@ -191,7 +203,7 @@ def at_torques(
     kept: IntArray = NONE,
     finite: bool = False,
 ) -> Positions:
-    """Positions at pinion angles (rad) that carry torques (N m), both of shape (n,); with or without finite strain.
+    """Solve positions that carry given torques.
 
     The twist is expected by the half-plane law (laws on elements start from its solution, so that they are asked for
     loads near the goal) and searched for until the torque is off by no more than `NEARLY`; the last step is Newton's,
@@ -201,8 +213,16 @@ def at_torques(
 
     Parameters
     ----------
+    solver : PositionSolver
+        The gears.
+    angles : ndarray, shape (n,)
+        Pinion angles (rad).
+    torques : ndarray, shape (n,)
+        At the wheel (N m), > 0.
     kept
         Numbers of the positions with loads; all have them where finite strain counts.
+    finite : bool
+        Whether the torque has the effect of finite strain.
     """
     kept = np.arange(len(angles)) if finite else kept
     first_contact, most = solver.contact_model.first_contact_twists(angles), math.pi / solver.pair.wheel.teeth
@@ -233,7 +253,7 @@ def closed(found: Positions, goal: Array, first_contact: Array) -> Positions:
     factor = np.where(good, goal / np.where(good, found.torque_wheel, 1.0), 1.0)
     moments = {name: getattr(found, name) * factor for name in TORQUES if name != "tangent"}
     moments["torque_wheel"] = np.where(good, goal, found.torque_wheel)
-    twist = newton_twist(found.twist, first_contact, found.torque_wheel, found.tangent, goal)
+    twist = _newton_twist(found.twist, first_contact, found.torque_wheel, found.tangent, goal)
     twist = np.where(good, twist, found.twist)
     by = twist - found.twist
     energy = found.energy + 0.5 * (found.torque_wheel + moments["torque_wheel"]) * by
@@ -274,8 +294,23 @@ COVERAGE = 2.0
 
 
 def curve_error(solver: PositionSolver, coarse: MeshingPair, solved: Positions, *, finite: bool) -> Array:
-    """Estimated relative error of n solved positions from the coarser gears `coarse`, shape (n,); not-a-number where
-    none converged.
+    """Estimate the relative error of solved positions by coarser gears, see the module's docstring.
+
+    Parameters
+    ----------
+    solver : PositionSolver
+        The gears.
+    coarse : MeshingPair
+        Coarser gears.
+    solved : Positions
+        n solved positions.
+    finite : bool
+        Whether the torque has the effect of finite strain.
+
+    Returns
+    -------
+    error : ndarray, shape (n,)
+        NaN for positions that did not converge.
     """
     numbers, made = np.flatnonzero(solved.status == "converged"), np.full(len(solved), np.nan)
     if len(numbers) == 0:

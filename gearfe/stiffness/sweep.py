@@ -76,6 +76,8 @@ def elastic_pair(
 
     Parameters
     ----------
+    pair : GearPair
+        The gears.
     model
         Materials, contact law, element sizes.
     watch
@@ -118,10 +120,12 @@ def sweep_stiffness(
     elastic: MeshingPair | None = None,
     **changes: Any,
 ) -> StiffnessCurve:
-    """Mesh stiffness over the rotation of the pinion, at a given twist or a given torque.
+    """Compute the mesh stiffness over the rotation of the pinion, at a given twist or a given torque.
 
     Parameters
     ----------
+    pair : GearPair
+        The gears.
     model, changes
         Model of the pair, and fields of it to change, such as ``law="nitsche"``; see `elastic_pair`.
     twist
@@ -179,7 +183,24 @@ def sweep_stiffness(
 
 
 def requested_angles(pair: GearPair, angles: ArrayLike | None, count: int, kinematics: str) -> tuple[Array, bool]:
-    """Pinion angles (rad), by default `count` over one mesh cycle, and whether finite strain counts."""
+    """Return the pinion angles of a sweep (rad), and whether finite strain counts.
+
+    Parameters
+    ----------
+    pair : GearPair
+        The gears.
+    angles : array_like, shape (n,), or None
+        Asked angles (rad).
+    count : int
+        Number of angles over one mesh cycle if none are asked for.
+    kinematics : str
+        ``small`` or ``finite``.
+
+    Raises
+    ------
+    InputError
+        For other kinematics, and angles that are not a list of finite numbers.
+    """
     if kinematics not in ("small", "finite"):
         raise InputError("kinematics", kinematics, "must be small or finite")
     requested = (
@@ -213,12 +234,18 @@ def _checked_load(pair: GearPair, twist: float | None, torque: float | None, twi
 def assembled_curve(
     solver: PositionSolver, requested: Array, source: IntArray, solved: Positions, *, searched: bool
 ) -> tuple[StiffnessCurve, PairLoads]:
-    """The curve at all asked angles, and the loaded pairs there.
+    """Return the curve at all asked angles, and the loaded pairs there.
 
     Parameters
     ----------
-    source
+    solver : PositionSolver
+        The gears.
+    requested : ndarray, shape (n,)
+        Asked pinion angles (rad).
+    source : ndarray of int, shape (n,)
         Number of the position among those solved for each of the angles.
+    solved : Positions
+        Solved positions.
     searched
         Whether the twist is a result, not given.
     """
@@ -341,8 +368,21 @@ def _rolls(contact_model: HalfPlanePair, flank: IntArray, arc: Array) -> Array:
 
 
 def marks_met(contact_model: HalfPlanePair, flank: IntArray, low: Array, high: Array) -> BoolArray:
-    """Which of `HalfPlanePair.marks` lie between the arcs low and high (m), shape (m, 2, 1), of contacts on the flanks
-    `flank`, shape (m, 2): shape (m, k).
+    """Return which of `HalfPlanePair.marks` lie between two arcs of contacts.
+
+    Parameters
+    ----------
+    contact_model : HalfPlanePair
+        The pair.
+    flank : ndarray of int, shape (m, 2)
+        Flanks of the contacts.
+    low, high : ndarray, shape (m, 2, 1)
+        Arcs (m).
+
+    Returns
+    -------
+    met : ndarray of bool, shape (m, k)
+        For each contact and mark.
     """
     _, of, (first, last) = contact_model.marks
     return np.asarray(((flank[:, :, None] == of) & (low <= last) & (high >= first)).any(axis=1))

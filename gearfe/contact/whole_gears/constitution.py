@@ -105,7 +105,19 @@ class SaintVenantKirchhoff:
         return total
 
     def surface_stress(self, h: Array, n: Array, n0: Array, lam: Array, mu: Array) -> tuple[Array, Array]:
-        """sigma_n = -n . F S n0; with b = F^T n, delta sigma_n = -n . grad v S n0 - b . (C : sym(F^T grad v)) n0."""
+        """Return the normal stress on the surface and its rate, as P with delta sigma_n = P : grad v.
+
+        sigma_n = -n . F S n0; with b = F^T n, delta sigma_n = -n . grad v S n0 - b . (C : sym(F^T grad v)) n0.
+
+        Parameters
+        ----------
+        h : ndarray, shape (2, 2, q, 1)
+            grad u.
+        n, n0 : ndarray, shape (2, q, 1)
+            Present normal of the mate, and outward normal of the undeformed surface.
+        lam, mu : ndarray, shape (q, 1)
+            Lame constants (Pa).
+        """
         f, s = deformation(h, lam, mu)
         b = mul(transpose(f), n)
         rate = prod(n, mul(s, n0)) + lam * dot(b, n0) * f + mu * (prod(mul(f, b), n0) + prod(mul(f, n0), b))

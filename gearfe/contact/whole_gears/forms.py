@@ -32,7 +32,19 @@ from skfem.helpers import ddot, dot, grad, mul
 
 
 def trial_pressure(g: Any, sigma_n: Any, gamma: Any, s: float) -> Any:
-    """-gamma g - s sigma_n; the pressure is its positive part."""
+    """Return -gamma g - s sigma_n, whose positive part is the pressure.
+
+    Parameters
+    ----------
+    g : field
+        Gap (m).
+    sigma_n : field
+        Normal stress of the surface (Pa).
+    gamma : field
+        The law's stiffness (Pa/m).
+    s : float
+        Factor of the normal stress: 1 for Nitsche's law, 0 for the penalty.
+    """
     return -gamma * g - s * sigma_n
 
 
@@ -67,7 +79,17 @@ def pressure_rate(v_s: Any, v_m: Any, w: Any) -> Any:
 
 
 def turning(u_s: Any, u_m: Any, v_s: Any, v_m: Any, w: Any) -> Any:
-    """Delta(n . [v])."""
+    """Return Delta(n . [v]), the change of the normal jump with the displacements.
+
+    Parameters
+    ----------
+    u_s, u_m : field
+        Change of the displacements of both bodies.
+    v_s, v_m : field
+        Test functions of both bodies.
+    w : FormExtraParams
+        Data of the pairs of points, see the module's docstring.
+    """
     tilt_u, tilt_v = tilt(u_m, w), tilt(v_m, w)
     slide_u, slide_v = slide(u_s, u_m, w), slide(v_s, v_m, w)
     bend = w.g / dot(w.a, w.a)
@@ -83,6 +105,16 @@ def pressure_work(v_s: Any, v_m: Any, w: Any) -> Any:
 
 @BilinearForm
 def contact_tangent(u_s: Any, u_m: Any, v_s: Any, v_m: Any, w: Any) -> Any:
-    """Derivative of the work of the pressure."""
+    """Return the derivative of the work of the pressure.
+
+    Parameters
+    ----------
+    u_s, u_m : field
+        Change of the displacements of both bodies.
+    v_s, v_m : field
+        Test functions of both bodies.
+    w : FormExtraParams
+        Data of the pairs of points, see the module's docstring.
+    """
     rate = w.share * pressure_rate(u_s, u_m, w) + w.share_rate * slide(u_s, u_m, w) * w.p
     return rate * normal_jump(v_s, v_m, w) + w.share * w.p * turning(u_s, u_m, v_s, v_m, w)
