@@ -67,7 +67,7 @@ def test_stress_rows_are_the_stress_of_a_field(plane: Plane) -> None:
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_finite_strain_rates_are_the_rate_of_the_energy(plane: Plane) -> None:
-    """int sigma(eps) : eta with eta = grad u^T grad u / 2 is cubic in u: two central differences give its exact rate."""
+    """int sigma(eps) : eta with eta = grad u^T grad u / 2 is cubic in u: two differences give its exact rate."""
     sector, basis, unknowns = plane_basis(THREE)
     generator = np.random.default_rng(1)
     u, rate = generator.standard_normal((2, unknowns.size))
