@@ -7,10 +7,26 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.multibody import Body, Hinge, Linkage, Moment, Prescribed, Slot, System, Trajectory, integrate, polynomial
+from gearfe.multibody import (
+    Body,
+    CoordinateSpring,
+    Distance,
+    Hinge,
+    Linkage,
+    Moment,
+    PointForce,
+    Prescribed,
+    Slot,
+    System,
+    Trajectory,
+    integrate,
+    polynomial,
+)
 from gearfe.multibody.core.inverse import prescribed_motion
 from gearfe.multibody.core.start import consistent_start
 from gearfe.multibody.core.steps import ENDLESS, Pace, Status
+from gearfe.multibody.planar.couplings import GearRatio
+from gearfe.multibody.planar.forms import label_of
 
 CRANK, COUPLER, ROCKER, BASE = 2.5, 1.5, 2.5, 3.0
 
@@ -108,3 +124,34 @@ def test_a_run_with_too_many_steps_names_what_makes_them_short() -> None:
     run = integrate(system, [0.0, 10.0], method="taylor", most_steps=100, raise_on_failure=False)
     assert run.status is Status.MOST_STEPS
     assert "rotor turns at 1e+04 rad/s" in run.message
+
+
+def test_a_rod_that_is_driven_itself_is_named_among_the_links_in_line() -> None:
+    """Crank 1.5 m and rod 1 m, whose end is drawn along the x axis from 2 m at 1 m/s: in line at 2.5 m."""
+    cosine = (1.5**2 + 2.0**2 - 1.0) / (2.0 * 1.5 * 2.0)
+    A = 1.5 * cosine, 1.5 * math.sqrt(1.0 - cosine**2)
+    bodies = (link("crank", 1.5, (0.0, 0.0), A), link("rod", 1.0, A, (2.0, 0.0)))
+    joints = (
+        Hinge("crank", "ground", name="O"),
+        Hinge("rod", "crank", point_b=(1.5, 0.0), name="A"),
+        Slot("rod", "ground", (1.0, 0.0), (0.0, 0.0), (1.0, 0.0), name="guide"),
+        Prescribed("rod", "x", polynomial([2.0, 1.0]), point=(1.0, 0.0), name="drive"),
+    )
+    run = integrate(System([Linkage(bodies, joints)]), np.linspace(0.0, 1.0, 50), raise_on_failure=False)
+    assert "the mechanism locks with crank and rod in line (prescribed drive" in run.message
+    assert run.reached == pytest.approx(0.5, abs=1e-4)
+
+
+def test_a_rod_without_mass_is_named_among_the_links_in_line() -> None:
+    """A boom of 1 m on the origin, and a cylinder from (0.5, -0.5) m to its end: longest at 1 + sqrt(0.5) m."""
+    boom = link("boom", 1.0, (0.0, 0.0), (1.0, 0.0))
+    cylinder = Distance("boom", "ground", (1.0, 0.0), (0.5, -0.5), polynomial([math.sqrt(0.5), 0.5]), name="cylinder")
+    system = System([Linkage((boom,), (Hinge("boom", "ground", name="O"), cylinder))])
+    run = integrate(system, np.linspace(0.0, 3.0, 50), raise_on_failure=False)
+    assert "the mechanism locks with boom and distance cylinder in line (distance cylinder asks" in run.message
+    assert run.reached == pytest.approx(2.0, abs=1e-4)
+
+
+def test_messages_call_joints_and_forces_as_job_files_do() -> None:
+    parts = (GearRatio("a", "b", -2.0, name="g"), CoordinateSpring("a", "angle", 1.0), PointForce("a", x=1.0, name="f"))
+    assert [label_of(part, 7) for part in parts] == ["gear g", "coordinate spring 7", "force f"]

@@ -52,8 +52,9 @@ local
     derivative of a row jumps (knots of a cam's profile). Steps of the implicit method end there. Absent: smooth.
 17. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
 18. Names and places for messages and tables: ``coordinate_names``, ``row_names``, ``row_joint`` (number of the joint
-    of each row), ``turns`` (own coordinates that are angles), ``planar_bodies`` (names of bodies with the coordinates
-    x, y, angle, in order), ``gap_text``. Absent: numbers.
+    of each row), ``joint_places`` (of each joint: body -> point at which its force acts), ``turns`` (own coordinates
+    that are angles), ``planar_bodies`` (names of bodies with the coordinates x, y, angle, in order), ``gap_text``.
+    Absent: numbers.
 19. ``load_problem``, ``load_pole``, ``pole_between``: which force has no value, or grows beyond all bounds, at given
     states. Integrators ask after a step has failed. Absent: empty strings.
 
@@ -90,6 +91,7 @@ class Element:
     planar_bodies: tuple[str, ...] = ()
     row_names: tuple[str, ...] = ()
     row_joint: tuple[int, ...] = ()
+    joint_places: tuple[dict[str, tuple[float, float]], ...] = ()
 
     def mass(self) -> Array:
         """Mass matrix of the own coordinates."""

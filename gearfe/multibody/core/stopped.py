@@ -58,15 +58,15 @@ def locked(system: System, time: float, q: Array, active: BoolArray) -> str:
     carried[active] = np.where(np.abs(force) > PART * largest, force, 0.0) / system.row_units[active]
     driving = carried * system.rate(time, q) != 0.0
     drive = next(name for name, drives in zip(system.row_names(), driving, strict=True) if drives)
-    links = _links_in_line(system, time, q, carried, driving)
+    links = _links_in_line(system, time, q, carried)
     where = f" with {' and '.join(links)} in line" if len(links) > 1 else ""
     return f"the mechanism locks{where} ({drive.partition(' (')[0]} asks for a motion beyond this position)"
 
 
-def _links_in_line(system: System, time: float, q: Array, carried: Array, driving: BoolArray) -> list[str]:
-    """Names of links that row forces load at two joints only, along one common direction: the largest such set.
+def _links_in_line(system: System, time: float, q: Array, carried: Array) -> list[str]:
+    """Names of links, rods among them, that row forces load at two points only, along one direction: the largest set.
 
-    Driven links are left out: a drive may act at the same point as the other force.
+    Forces of joints at one point of a link count as one, that of a drive too; a drive's moment has no point.
     """
     found: list[tuple[str, Array]] = []
     at_rows = 0
@@ -74,16 +74,22 @@ def _links_in_line(system: System, time: float, q: Array, carried: Array, drivin
     for element, index in system.joints:
         rows = slice(at_rows, at_rows + element.rows)
         at_rows += element.rows
-        joints = np.array(element.row_joint)
         for number, body in enumerate(element.planar_bodies):
             own = index[3 * number : 3 * number + 3]
             pull = carried[rows, None] * gradients[rows][:, own] * system.units[own]
-            ends = np.array([pull[joints == joint].sum(axis=0) for joint in np.unique(joints)])
+            places = [element.joint_places[joint].get(body, joint) for joint in element.row_joint]
+            ends = np.array([pull[[place == end for place in places]].sum(axis=0) for end in dict.fromkeys(places)])
             sizes = np.linalg.norm(ends[:, :2], axis=1)
             loaded = np.abs(ends).max(axis=1) > PART * np.abs(pull).max(initial=0.0)
-            driven = (driving[rows] & (pull != 0.0).any(axis=1)).any()
-            if not driven and loaded.sum() == 2 and (sizes[loaded] > PART * sizes.max()).all():
+            if loaded.sum() == 2 and (sizes[loaded] > PART * sizes.max()).all():
                 found.append((body, ends[loaded][0, :2] / sizes[loaded][0]))
+        for row, name in enumerate(element.row_names):
+            pull = carried[rows][row] * gradients[rows][row, index].reshape(-1)
+            if name.startswith("distance ") and pull.any():  # a rod without mass
+                first = next(k for k in range(0, len(pull), 3) if pull[k : k + 2].any())
+                found.append(
+                    (name.partition(" (")[0], pull[first : first + 2] / np.linalg.norm(pull[first : first + 2]))
+                )
     groups = [[name for name, (x, y) in found if abs(x * along[1] - y * along[0]) < IN_LINE] for _, along in found]
     return max(groups, key=len, default=[])
 

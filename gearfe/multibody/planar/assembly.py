@@ -16,7 +16,7 @@ from ..series.ordering import elimination_order
 from ..series.timefunctions import TimeFunction
 from .bodies import Body
 from .forces import Along, Force, SpanFunction, StateFunction, Tension, Weight
-from .forms import Form, Frames
+from .forms import Form, Frames, label_of
 from .joints import Joint, Profile
 
 
@@ -62,7 +62,7 @@ def assemble(joints: tuple[Joint, ...], forces: tuple[Force, ...], frames: Frame
     n = len(frames.bodies)
     rows: list[Held] = []
     for number, joint in enumerate(joints):
-        label = f"{type(joint).__name__.lower()} {joint.name or number}"
+        label = label_of(joint, number)
         for what, form, motion, profile in joint.rows(frames):
             held = None if profile is None else (frames.number[profile[0]], profile[1])
             rows.append(Held(number, f"{label} ({what})", form, motion, held))

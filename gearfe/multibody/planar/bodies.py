@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from ...errors import InputError, shown, unknown_name
 from ..series.timefunctions import TimeFunction, constant
 from .forces import Force, StateFunction
-from .forms import GROUND, Point
+from .forms import GROUND, Point, label_of
 from .joints import Joint
 
 #: Masses and inertias below this, or above its inverse, overflow in products.
@@ -74,7 +74,7 @@ def body_numbers(bodies: tuple[Body, ...], joints: tuple[Joint, ...], forces: tu
             raise InputError("body name", body.name, "is used twice", "give every body a name of its own")
         index[body.name] = i
     for k, part in enumerate((*joints, *forces)):
-        label = f"{type(part).__name__.lower()} {getattr(part, 'name', '') or k}"
+        label = label_of(part, k)
         keys = ("a", "b", "body", "line", "relative_to", "reaction", "carrier")
         named = [(key, getattr(part, key)) for key in keys if hasattr(part, key)]
         used = [value for key, value in named if key != "carrier" or value is not None]

@@ -12,6 +12,7 @@ along.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -197,3 +198,14 @@ class Frames:
 
 def _turn(angle: float) -> Point:
     return math.cos(angle), math.sin(angle)
+
+
+#: Classes whose names are not those of mechanism files.
+_KINDS = {"GearRatio": "gear", "PointForce": "force"}
+
+
+def label_of(part: object, number: int) -> str:
+    """Return kind and name of a joint or force for messages, or its number where it has no name."""
+    kind = type(part).__name__
+    words = _KINDS.get(kind) or re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind).lower()
+    return f"{words} {getattr(part, 'name', '') or number}"

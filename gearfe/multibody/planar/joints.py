@@ -229,3 +229,15 @@ class Prescribed(Joint):
         if self.coordinate == "rate":
             motion = motion.integral(frames.start_angle(self.body) - frames.start_angle(self.relative_to))
         return [Row("angle", frames.angle(self.body) - frames.angle(self.relative_to), motion)]
+
+
+def places(joint: Joint) -> dict[str, Point]:
+    """Points of bodies, by their names, at which the force of a joint acts; none for moments, and points that move."""
+    if getattr(joint, "coordinate", "") in ("angle", "rate"):
+        return {}
+    keys = (("a", "point_a"), ("b", "point_b"), ("body", "point"), ("relative_to", "origin"))
+    return {
+        getattr(joint, body): getattr(joint, point)
+        for body, point in keys
+        if hasattr(joint, body) and hasattr(joint, point)
+    }

@@ -22,7 +22,7 @@ from .bodies import Body, body_numbers
 from .couplings import with_carriers
 from .forces import Along, Force, SpanFunction, StateFunction, Tension
 from .forms import Form, Frames, Vector
-from .joints import Joint
+from .joints import Joint, places
 
 #: A load beyond this value (N, N m) where a run ends has a pole there.
 POLE = 1e7
@@ -214,6 +214,7 @@ class Linkage(Written):
         self.driven = any(row.motion is not None for row in self.assembly.rows)
         self.planar_bodies = tuple(body.name for body in bodies)
         self.row_joint = self.assembly.row_joint
+        self.joint_places = tuple(places(joint) for joint in joints)
         self.coordinate_names = tuple(f"{b}_{c}" for b in self.planar_bodies for c in ("x_m", "y_m", "angle_rad"))
         self.turns = tuple(range(2, self.size, 3))
         profiles = any(row.profile is not None for row in self.assembly.rows)
