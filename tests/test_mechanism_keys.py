@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.config import build
+from gearfe.config import build, read_toml
 from gearfe.errors import InputError
 from gearfe.mechanisms.model import make_mechanism
 from gearfe.mechanisms.results import reactions
 from gearfe.mechanisms.solve import solve
+from gearfe.mechanisms.unused import unused
 from gearfe.tables.beam import BeamTable
 from gearfe.tables.kinds import FORCES, JOINTS
 from gearfe.tables.mechanism import BodyTable, FunctionTable, MechanismFile, ValueTableTable
@@ -330,3 +331,35 @@ def test_required_keys_are_required() -> None:
     """Fields without a default are those that the reader asks for."""
     for table in (BodyTable, FunctionTable):
         assert all(f.default is not MISSING or f.default_factory is not MISSING for f in fields(table))
+
+
+@pytest.mark.parametrize(
+    ("where", "key", "value", "remark"),
+    [
+        ("run", "modes", 4, "run.modes = 4 has no effect"),
+        ("run", "picture_s", 9.0, "run.picture_s = 9 is after the end of the run"),
+        ("figure", "every", 5, "figure.every has no effect"),
+        ("figure", "magnification", 20.0, "figure.magnification has no effect"),
+        ("tables", "spare", {"file": "lift.csv", "x": "angle", "y": "lift"}, "tables.spare has no effect"),
+    ],
+)
+def test_keys_without_effect_get_a_remark(where: str, key: str, value: Any, remark: str) -> None:
+    raw = tables(forces={"tried": {"type": "force", "body": "link", "x_N": "lift(time) + higher(time)"}})
+    assert unused(build(MechanismFile, copy.deepcopy(raw), "")) == []
+    raw.setdefault(where, {})[key] = value
+    assert [text[: len(remark)] for text in unused(build(MechanismFile, raw, ""))] == [remark]
+
+
+@pytest.mark.parametrize("analysis", ["equilibrium", "modes", "inverse"])
+def test_keys_of_a_run_over_time_get_a_remark_without_one(analysis: str) -> None:
+    raw = tables(forces={"tried": {"type": "force", "body": "link", "x_N": "lift(time) + higher(time)"}})
+    raw["run"] |= {"analysis": analysis, "method": "taylor", "tolerance": 1e-7}
+    remarks = unused(build(MechanismFile, raw, ""))
+    assert remarks == [f"run.{key} has no effect: analysis is {analysis}" for key in ("method", "tolerance")]
+
+
+@pytest.mark.parametrize("job", sorted((Path(__file__).parents[1] / "geometry").glob("*.toml")), ids=lambda p: p.stem)
+def test_shipped_mechanisms_have_no_keys_without_effect(job: Path) -> None:
+    raw = read_toml(job)
+    if "bodies" in raw:
+        assert unused(build(MechanismFile, raw, "")) == []

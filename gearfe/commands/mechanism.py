@@ -51,9 +51,10 @@ def run(args: argparse.Namespace) -> int:
     from ..mechanisms.job import run_mechanism
     from ..mechanisms.links import doubts
     from ..mechanisms.model import make_mechanism
+    from ..mechanisms.unused import unused
     from ..progress import announce
 
-    for doubt in doubts(file):  # the run may not begin, or not end
+    for doubt in (*doubts(file), *unused(file)):  # the run may not begin, or not end
         announce(f"warning: {doubt}")
     mechanism = make_mechanism(file, Path(args.file))
     run: Callable[..., Outcome]

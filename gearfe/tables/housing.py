@@ -239,10 +239,17 @@ class HousingReductionTable:
     REMOVED: ClassVar[dict[str, tuple[str, str]]] = {"solver": ("is gone: there is one solver", "leave it out")}
 
     modes: int | None = quantity(
-        None, low=0, high=2000, doc="number of modes with the bores held; left out: by frequency"
+        None,
+        low=0,
+        high=2000,
+        doc="number of modes with the bores held, whatever modes_below_Hz and least_modes say; left out: by these",
     )
-    modes_below_Hz: float = quantity(10000.0, above=0.0, doc="highest frequency of the modes kept (Hz)")
-    least_modes: int = quantity(40, low=0, high=2000, doc="modes kept at least when they are chosen by frequency")
+    modes_below_Hz: float = quantity(
+        10000.0, above=0.0, doc="highest frequency of the modes kept (Hz), where modes is left out"
+    )
+    least_modes: int = quantity(
+        40, low=0, high=2000, doc="modes kept at least when they are chosen by frequency, where modes is left out"
+    )
     quasi_static_levels: int = quantity(1, low=0, high=6, doc="levels of quasi-static corrections; 0 for none")
     band_Hz: float = quantity(5000.0, above=0.0, doc="highest frequency of interest, for the error estimate (Hz)")
 
