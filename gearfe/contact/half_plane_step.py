@@ -358,7 +358,7 @@ def step(setting: Setting, state: State, *, search: bool = True, held: bool = Fa
         bearing=p > 0,
         reach=state.reach,
     )
-    changed, settled = _change(setting, state, following, place)[couples.position], settled[couples.position]
+    changed, settled = change(setting, state, following, place)[couples.position], settled[couples.position]
     wider = outgrown & (changed <= WIDENED_BELOW)
     following = replace(following, reach=np.where(wider, WIDER * state.reach, state.reach))
     return Step(following, p, settled, low, high, outgrown, x, width, arcs, place, energy, changed)
@@ -375,11 +375,27 @@ def unseen_force(contact_model: HalfPlanePair) -> float:
     return ANGLE_ROUNDING * contact_model.pair.wheel.base_radius / reference_approach(contact_model)
 
 
-def _change(setting: Setting, state: State, new: State, place: Array) -> Array:
-    """Return the change of a step beyond rounding, shape (m,).
+def change(setting: Setting, state: State, new: State, place: Array) -> Array:
+    """Return the change of a step beyond rounding, for each position.
 
     Changes of forces count in units of their sum; those of the contacts' places and widths, in units of these, are
     weighted by the forces.
+
+    Parameters
+    ----------
+    setting : Setting
+        Teeth and contacts.
+    state : State
+        State before the step.
+    new : State
+        State after it.
+    place : ndarray, shape (p,)
+        Mean places of the pressures from the contacts' centres, by which these move (m).
+
+    Returns
+    -------
+    change : ndarray, shape (m,)
+        Of the forces, and of places and widths times the forces, over the sum of the forces.
     """
     couples = setting.couples
     safe = np.where(new.variance > 0, new.variance, 1.0)
