@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..meshlaw.law import Laws
-from ..multibody.series.kernel_rows import time_series
+from ..multibody.series.recurrences import time_series
 from ..multibody.series.timefunctions import Times
 from ..stiffness.periodic import Curves
 from ..typing import Array, IntArray

@@ -6,7 +6,7 @@ be anything in the elimination, though, as long as the force is the same: with a
 
     (M + D) a + G^T lambda = f + D a
 
-and D a is found exactly (`System.acceleration`, `kernel_series`). The mass that a link carries is the least kinetic
+and D a is found exactly (`System.acceleration`, `recurrences`). The mass that a link carries is the least kinetic
 energy of all motions in which it moves with speed 1 (twice that): the mass which one feels who pushes it. An excess up
 to that changes no energy of the mechanism by more than a few times, so nothing is lost in finding D a; a pendulum that
 is truly light keeps its mass.

@@ -5,6 +5,6 @@ Read in this order:
 - `tape`: registers, rows and forces; `timefunctions`: functions of time.
 - `ordering`, `row_tables`: the order of elimination, and constant tables of the rows.
 - `work_space`: arrays that one run changes.
-- `kernel_tape`, `kernel_rows`, `kernel_series`: the compiled loops over registers, rows and orders. They call each
-  other in every order of every step.
+- `recurrences`: the compiled loops over registers, rows and orders of the motion. They call each other in every order
+  of every step.
 """

@@ -22,7 +22,7 @@ import numpy as np
 from ...typing import Array, BoolArray, IntArray
 from .timefunctions import TimeFunction, Times, time_arrays
 
-#: Operations: f a + g b + c; of the variables, of their rates; of time; products and so on, see `kernel_tape`.
+#: Operations: f a + g b + c; of the variables, of their rates; of time; products and so on, see `recurrences`.
 SUM, LINEAR, RATE, FUNCTION, MUL, DIV, POWER, EXP, LOG, SIN, COS, TANH, ANGLE, SIDE, SHIFT, ENTRY = range(16)
 #: Factors of variables by their numbers.
 Terms = Mapping[int, float]

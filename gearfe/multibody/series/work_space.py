@@ -37,7 +37,7 @@ class Border(NamedTuple):
 
 
 class Carry(NamedTuple):
-    """Answers of the masses N to k light coordinates, see kernel_series."""
+    """Answers of the masses N to k light coordinates, see `recurrences`."""
 
     X: Array  # (k, n) coordinates
     Y: Array  # (k, m) multipliers

@@ -1,7 +1,7 @@
 """What a step of collocation asks of a system that is written on a tape: forces of all stages, tangents of one.
 
-Forces of registers and their derivatives are orders 0 and 1 of the registers' series (`kernel_tape`), those of beams
-and of bodies in floating frames are in closed form, as in `beam.Beam` and `floating.Floating`.
+Forces of registers and their derivatives are orders 0 and 1 of the registers' series (`series.recurrences`), those of
+beams and of bodies in floating frames are in closed form, as in `beam.Beam` and `floating.Floating`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,16 @@ import numpy as np
 
 from ....typing import Array, IntArray
 from ...compiled.simd import Lanes
-from ...series.kernel_rows import fill, time_series
-from ...series.kernel_tape import cauchy, curve_forces, curve_orders, piece_at, set_pieces, tape_order
+from ...series.recurrences import (
+    cauchy,
+    curve_forces,
+    curve_orders,
+    fill,
+    piece_at,
+    set_pieces,
+    tape_order,
+    time_series,
+)
 from .kernel_elastic import add_bar_tangents, add_bars, add_float_tangents, add_floats
 
 if TYPE_CHECKING:

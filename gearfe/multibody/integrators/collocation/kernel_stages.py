@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...series.kernel_rows import fill, time_series
+from ...series.recurrences import fill, time_series
 from .kernel_elastic import bar_changes, float_changes
 from .kernel_equations import all_variables, gradients, lane_times, row_orders, stages, variables
 from .kernel_matrices import across, factorise_mass, solve_mass, solve_systems

@@ -24,7 +24,7 @@ from ...core.elimination import in_modes, is_linear, modal_coordinates
 from ...core.start import Start
 from ...core.steps import Status, StepControl, StepLaw, Watch, first_step
 from ...core.system import System
-from ...series import kernel_rows, kernel_tape
+from ...series import recurrences
 from ...series.ordering import narrow_order
 from ...series.tape import Program
 from ..discontinuities import TRUSTED, Corners, collocated_path, quiet_speeds
@@ -35,9 +35,7 @@ from .numpy_equations import SystemEquations
 from .scheme import RADAU, Collocated, Scheme, path_matrix, powers_of_path, scheme
 
 FUNCTIONS = (
-    kernel_rows.fill,
-    kernel_rows.time_series,
-    *kernel_tape.FUNCTIONS,
+    *recurrences.REGISTERS,
     *kernel_elastic.FUNCTIONS,
     *kernel_equations.FUNCTIONS,
     *kernel_matrices.FUNCTIONS,
@@ -48,8 +46,7 @@ HOT = ("fill", "cauchy", "weighted", "bar_strains", "coordinate", "turned")
 KERNELS = Kernels(
     FUNCTIONS,
     {
-        **kernel_rows.GLOBALS,
-        **kernel_tape.NAMES,
+        **recurrences.NAMES,
         **kernel_matrices.NAMES,
         **kernel_collocation.NAMES,
         **simd.NAMES,

@@ -10,8 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ....typing import Array
-from ...series.kernel_rows import add_transposed, copy, fill, inner, residuals, time_series, times_gradients
-from ...series.kernel_series import small_solve
+from ...series.recurrences import (
+    add_transposed,
+    copy,
+    fill,
+    inner,
+    residuals,
+    small_solve,
+    time_series,
+    times_gradients,
+)
 from .kernel_singular import TOGETHER, border_change, combination, evaluate, regular_parts, row_square, singular_frame
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@ than jump them, and where a switch leaves its piece.
 
 Terms count in units of the coordinates (`kernel_steps`). A series started at the distance d from a singular position
 amplifies round-off by (h/d)^N beyond it, so a step never crosses one: it ends there, and the next one is expanded there
-with the bordered equations of `kernel_series`. Forces within the step are checked against their series.
+with the bordered equations of `series.recurrences`. Forces within the step are checked against their series.
 """
 
 from __future__ import annotations
@@ -14,18 +14,27 @@ import numpy as np
 
 from ....typing import Array, IntArray
 from ...core.steps import Status
-from ...series.kernel_rows import accelerations, copy, fill, rates, time_series, times_gradients, variables
-from ...series.kernel_series import add_carried, carry_responses, constrained, expand
-from ...series.kernel_tape import (
+from ...series.recurrences import (
     OUTSIDE,
+    accelerations,
+    add_carried,
+    carry_responses,
+    constrained,
+    copy,
     curve_forces,
+    expand,
+    fill,
     horner,
     is_pole,
     largest,
     leaves,
     margin,
     next_piece,
+    rates,
     tape_order,
+    time_series,
+    times_gradients,
+    variables,
 )
 from .kernel_locate import exchange, locate
 from .kernel_singular import evaluate, factor_at, next_singular, project

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ....typing import Array
-from ...series.kernel_rows import (
+from ...series.recurrences import (
     accelerations,
     add_transposed,
+    border_solve,
     factorise,
     fill,
     gradient_rates,
@@ -25,7 +26,6 @@ from ...series.kernel_rows import (
     time_series,
     times_gradients,
 )
-from ...series.kernel_series import border_solve
 
 if TYPE_CHECKING:
     from ...series.row_tables import Equations

@@ -18,17 +18,17 @@ from ...core.dense import Polynomials
 from ...core.start import Start
 from ...core.steps import Status, Watch, run_in_pieces
 from ...core.system import System
-from ...series import kernel_rows, kernel_series, kernel_tape
+from ...series import recurrences
 from ...series.row_tables import Equations, row_tables
 from ...series.work_space import Run, Work, work_space
 from ..discontinuities import load_problem_ahead
 from . import kernel_locate, kernel_run, kernel_singular, kernel_steps
 
 FUNCTIONS = (
-    *kernel_rows.FUNCTIONS, *kernel_tape.FUNCTIONS, *kernel_series.FUNCTIONS, *kernel_singular.FUNCTIONS,
-    *kernel_locate.FUNCTIONS, *kernel_steps.FUNCTIONS, *kernel_run.FUNCTIONS,
+    *recurrences.FUNCTIONS, *kernel_singular.FUNCTIONS, *kernel_locate.FUNCTIONS, *kernel_steps.FUNCTIONS,
+    *kernel_run.FUNCTIONS,
 )  # fmt: skip
-NAMES = {**kernel_rows.GLOBALS, **kernel_tape.NAMES, **kernel_singular.NAMES, **kernel_locate.NAMES, **kernel_run.NAMES}
+NAMES = {**recurrences.NAMES, **kernel_singular.NAMES, **kernel_locate.NAMES, **kernel_run.NAMES}
 HOT = (
     "fill", "copy", "cauchy", "weighted", "horner", "largest", "margin", "lower_knot", "own_piece", "curve_orders",
     "curve_forces", "variables", "rates", "gradients", "residuals", "times_gradients", "add_transposed",
