@@ -124,8 +124,8 @@ def housings() -> Answers:
 def gears() -> Answers:
     """Rigid touch of a relieved pair and one with an undercut, ISO's stiffness, area and inertia."""
     from gearfe.gear.derived import mesh_stiffness
+    from gearfe.gear.gear_data import TipRelief
     from gearfe.gear.pair import Gear, GearPair
-    from gearfe.gear.spur_gear import TipRelief
     from gearfe.train.elements import outline_moments
 
     form: dict[str, Any] = {"module": 2.5e-3, "pressure_angle": np.radians(20.0), "face_width": 10e-3}
@@ -187,7 +187,7 @@ ROOMS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
     "solid": (housings, ()),
     "prisms": (housings, ()),
     "meshing.housing_mesh": (housings, ()),
-    "gear": (gears, ("pitch_", "modif", "deviation", "face", "first_contact", "derived", "validity", "LARGEST")),
+    "gear": (gears, ("pitch_", "modif", "deviation", "face", "first_contact", "derived", "validity", "spur_gear")),
     "gear.face": (curves, ()),
     "gear.first_contact": (curves, ()),
     "stiffness": (curves, ("SIDE_BY_SIDE", "report")),

@@ -16,7 +16,7 @@ from gearfe import Material, sweep_stiffness
 from gearfe.contact.elements import half_widths
 from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
 from gearfe.contact.position import Positions
-from gearfe.gear.spur_gear import TipRelief
+from gearfe.gear.gear_data import TipRelief
 from gearfe.stiffness.sweep import elastic_pair
 
 from .condensed_bodies import condensed_body, pressed, pressed_pair

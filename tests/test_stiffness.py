@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearfe import InputError, Material, sweep_stiffness
-from gearfe.gear.spur_gear import TipRelief
+from gearfe.gear.gear_data import TipRelief
 from gearfe.loadmap.sweep import sweep_loads
 from gearfe.stiffness.positions import PositionSolver
 from gearfe.stiffness.sweep import elastic_pair

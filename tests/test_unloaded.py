@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gearfe.gear.first_contact import ToothFlanks
+from gearfe.gear.gear_data import TipRelief
 from gearfe.gear.pair import Gear, GearPair
-from gearfe.gear.spur_gear import TipRelief
 
 from .gears import pair
 from .unloaded import unloaded_twist

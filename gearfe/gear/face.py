@@ -255,7 +255,9 @@ class Face:
 def face_of(gear: Gear, deviation: Deviation | None = None) -> Face:
     """Working flank of a gear, with a deviation of micrometres."""
     profile = gear.profile
-    root, (flank, round_) = profile.root, deviated(gear, deviation) if deviation else (profile.flank, profile.round_)
+    flank, round_, root = profile.flank, profile.round_, profile.root
+    if deviation:
+        flank, round_ = deviated(gear, flank, deviation)
     # going up a convex flank its normal turns clockwise
     edge = profile.undercut and root is not None and np.angle(root.normal(np.array(1.0)) / flank.normal(np.array(0.0)))
     return Face(flank, round_, root, bool(edge and edge > 0.0))

@@ -13,7 +13,6 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,28 +20,26 @@ from ..errors import InputError
 from ..typing import Array
 from .curves import Arc, Involute, Segment, Trochoid, bisect, inverse_inv
 from .deviation import Deviation
-
-if TYPE_CHECKING:
-    from .spur_gear import Gear
+from .gear_data import GearData
 
 #: Arcs of a smaller polar angle (rad) are taken for none: below 1e-9 mm on a gear of 1 m radius.
 NIL_ANGLE = 1e-12
 
 
-def largest_rack_tip_radius(gear: Gear) -> float:
+def largest_rack_tip_radius(gear: GearData) -> float:
     """Rack tip radius (times module) at which the land of the rack's tip vanishes; beyond it no such rack exists."""
     alpha = gear.pressure_angle
     land = math.pi / 4 + 0.5 * gear.tooth_thinning / gear.module - gear.dedendum * math.tan(alpha)
     return land * math.cos(alpha) / (1.0 - math.sin(alpha))
 
 
-def least_shift(gear: Gear) -> float:
+def least_shift(gear: GearData) -> float:
     """Profile shift coefficient from which on the rack does not undercut: h_F/m - z sin^2(alpha)/2 (-)."""
     sine = math.sin(gear.pressure_angle)
     return gear.dedendum - gear.rack_tip_radius * (1.0 - sine) - 0.5 * gear.teeth * sine**2
 
 
-def tooth_root(gear: Gear) -> tuple[Trochoid, float, bool]:
+def tooth_root(gear: GearData) -> tuple[Trochoid, float, bool]:
     """Trochoid up to the involute, roll length (m) of the form point, and whether it is undercut."""
     m, alpha = gear.module, gear.pressure_angle
     r, rho = gear.reference_radius, gear.rack_tip_radius * m
@@ -72,7 +69,7 @@ def tooth_root(gear: Gear) -> tuple[Trochoid, float, bool]:
     return cut, form_roll, True
 
 
-def _crossing(gear: Gear, root: Trochoid) -> tuple[float, float]:
+def _crossing(gear: GearData, root: Trochoid) -> tuple[float, float]:
     """Normal angle (rad) and roll length (m) where an undercutting trochoid leaves the tooth through the involute."""
     base, base_angle = gear.base_radius, gear.base_angle
 
@@ -159,7 +156,7 @@ class ToothProfile:
 
 
 @lru_cache(maxsize=256)
-def tooth_profile(gear: Gear) -> ToothProfile:
+def tooth_profile(gear: GearData) -> ToothProfile:
     """Exact left half profile of a tooth.
 
     Raises
@@ -198,7 +195,7 @@ def tooth_profile(gear: Gear) -> ToothProfile:
     return ToothProfile(_joined(pieces), flank, fillet, round_, tip_roll, undercut, tip_half_angle)
 
 
-def _flank(gear: Gear, form_roll: float) -> tuple[Involute, float]:
+def _flank(gear: GearData, form_roll: float) -> tuple[Involute, float]:
     """Flank from the form point, end still open, and the roll length (m) of the tip circle."""
     base, base_angle, tip_roll = gear.base_radius, gear.base_angle, gear.roll_length(gear.tip_radius)
     if tip_roll <= form_roll:
@@ -221,12 +218,12 @@ def _flank(gear: Gear, form_roll: float) -> tuple[Involute, float]:
     return flank, tip_roll
 
 
-def _round_centre(gear: Gear, flank: Involute, s: float) -> complex:
+def _round_centre(gear: GearData, flank: Involute, s: float) -> complex:
     at = np.array(s)
     return complex(flank.at(at) - gear.tip_round * flank.normal_at(at))
 
 
-def _round_start(gear: Gear, flank: Involute, tip_roll: float, end_roll: float) -> float:
+def _round_start(gear: GearData, flank: Involute, tip_roll: float, end_roll: float) -> float:
     """Roll length (m) where the tip round, tangent to flank and tip circle, begins; the flank's end without one."""
     rho, tip = gear.tip_round, gear.tip_radius
     if rho == 0.0:
@@ -250,7 +247,7 @@ def _round_start(gear: Gear, flank: Involute, tip_roll: float, end_roll: float) 
     return start
 
 
-def _largest_round(gear: Gear, flank: Involute) -> float:
+def _largest_round(gear: GearData, flank: Involute) -> float:
     """Largest tip round (m) that begins above the form point and leaves a tip land; relief not counted."""
     tip, base = gear.tip_radius, flank.base_radius
 
@@ -262,12 +259,12 @@ def _largest_round(gear: Gear, flank: Involute) -> float:
     return bisect(too_large, 0.0, tip - base)
 
 
-def deviated(gear: Gear, deviation: Deviation) -> tuple[Involute, Arc | None]:
-    """Flank of a gear with a deviation of micrometres, and its tip round fitted anew.
+def deviated(gear: GearData, nominal: Involute, deviation: Deviation) -> tuple[Involute, Arc | None]:
+    """Flank of a gear with a deviation of micrometres from the nominal one, and the tip round that fits it.
 
     The flank starts at the same radius and ends on the same tip circle; its round is tangent to both as before.
     """
-    nominal, tip, rho = gear.profile.flank, gear.tip_radius, gear.tip_round
+    tip, rho = gear.tip_radius, gear.tip_round
     flank, reach = replace(nominal, deviation=deviation), 2 * (deviation.most + nominal.amount) + 1e-12
     if flank.start > reach:  # twice as far as any point moves
         flank = replace(flank, start=float(flank.roll_at(abs(nominal.at(np.array(nominal.start))))))
@@ -282,12 +279,12 @@ def deviated(gear: Gear, deviation: Deviation) -> tuple[Involute, Arc | None]:
     return flank, _tip_arc(gear, flank)
 
 
-def _addendum_to(gear: Gear, radius: float) -> float:
+def _addendum_to(gear: GearData, radius: float) -> float:
     """Addendum coefficient with which the tip circle has the given radius (m)."""
     return radius / gear.module - gear.teeth / 2 - gear.profile_shift + gear.tip_shortening
 
 
-def _tip_arc(gear: Gear, flank: Involute) -> Arc:
+def _tip_arc(gear: GearData, flank: Involute) -> Arc:
     """Tip round from the end of the flank to the tip land, whose half angle is that of its end."""
     centre = _round_centre(gear, flank, flank.end)
     start = cmath.phase(flank.normal_at(np.array(flank.end)))

@@ -1,11 +1,4 @@
-"""Gear pairs: how two spur gears mesh in the transverse plane (ISO 21771 names), and the pair of a job file.
-
-Convention of a pair: pinion centre at the origin, wheel centre at (a, 0). At pinion angle 0 a pinion tooth (tooth 0) is
-centred on the line of centres and a wheel space faces it. Angles are positive counter-clockwise; the wheel turns by
--pinion angle * z1/z2 + twist. A positive twist presses the driving flanks together: the left (counter-clockwise) flanks
-of the pinion's teeth and the left flanks, in the wheel's own frame, of the wheel's teeth. Their line of action touches
-the pinion's base circle at polar angle -alpha_w; with s1 and s2 the roll lengths on pinion and wheel, s1 + s2 =
-a sin(alpha_w) along it, and a pinion flank passes s1 at the pinion angle s1/r_b1 - alpha_w - psi1 - inv(alpha).
+"""Gear pairs that run together, and the pair of a job file; `gearfe.gear.mesh_geometry` says how they stand and turn.
 
 SI units and radians. Whether two gears can run together is checked by `gearfe.gear.validity`.
 """
@@ -15,202 +8,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from numbers import Real
 from typing import Any
 
 from ..errors import InputError, given
 from ..shown import Shown
 from ..tables.pair import INSTEAD, GearTable, PairTable
-from .curves import inv, inverse_inv
-from .spur_gear import Gear, TipRelief, nominal_span
+from .gear_data import TipRelief, nominal_span
+from .mesh_geometry import MeshGeometry, PathPoint
+from .spur_gear import Gear
 from .validity import check_pair, pair_warnings
 
 __all__ = ["Gear", "GearPair", "MeshGeometry", "PathPoint", "TipRelief"]
-
-
-@dataclass(frozen=True)
-class PathPoint:
-    """A point of the path of contact: roll lengths (m) on both gears and the pinion angle (rad) for tooth 0."""
-
-    name: str
-    pinion_roll: float
-    wheel_roll: float
-    pinion_angle: float
-
-
-@dataclass(frozen=True)
-class MeshGeometry:
-    """Two external spur gears in mesh, not yet checked; `GearPair` is the checked one.
-
-    Parameters
-    ----------
-    pinion, wheel
-        The gears; the pinion drives.
-    centre_distance
-        Centre distance a (m); None: without backlash for the unthinned teeth, from the profile shifts.
-    """
-
-    pinion: Gear
-    wheel: Gear
-    centre_distance: float | None = None
-
-    @cached_property
-    def gear_ratio(self) -> float:
-        """Gear ratio z2/z1 (-)."""
-        return self.wheel.teeth / self.pinion.teeth
-
-    @cached_property
-    def reference_centre_distance(self) -> float:
-        """Reference centre distance a_0 = (r_1 + r_2) (m)."""
-        return self.pinion.reference_radius + self.wheel.reference_radius
-
-    @cached_property
-    def working_pressure_angle(self) -> float:
-        """Working pressure angle alpha_w (rad): a_0 cos(alpha)/a = cos(alpha_w), or from the profile shifts,
-        inv(alpha_w) = inv(alpha) + 2 (x_1 + x_2) tan(alpha)/(z_1 + z_2)."""
-        alpha = self.pinion.pressure_angle
-        if self.centre_distance is not None:
-            return math.acos(self.reference_centre_distance * math.cos(alpha) / self.centre_distance)
-        shift = self.pinion.profile_shift + self.wheel.profile_shift
-        if shift == 0.0:
-            return alpha
-        return inverse_inv(inv(alpha) + 2.0 * shift * math.tan(alpha) / (self.pinion.teeth + self.wheel.teeth))
-
-    @cached_property
-    def working_centre_distance(self) -> float:
-        """Centre distance a = a_0 cos(alpha)/cos(alpha_w) (m)."""
-        if self.centre_distance is not None:
-            return self.centre_distance
-        if self.working_pressure_angle == self.pinion.pressure_angle:
-            return self.reference_centre_distance
-        ratio = math.cos(self.pinion.pressure_angle) / math.cos(self.working_pressure_angle)
-        return self.reference_centre_distance * ratio
-
-    @cached_property
-    def pinion_working_radius(self) -> float:
-        """Radius of the pinion's working pitch circle a/(1 + z2/z1) (m)."""
-        return self.working_centre_distance / (1.0 + self.gear_ratio)
-
-    @cached_property
-    def wheel_working_radius(self) -> float:
-        """Radius of the wheel's working pitch circle (m)."""
-        return self.working_centre_distance - self.pinion_working_radius
-
-    @cached_property
-    def base_pitch(self) -> float:
-        """Base pitch p_b (m)."""
-        return self.pinion.base_pitch
-
-    @cached_property
-    def normal_backlash(self) -> float:
-        """Backlash j_bn along the line of action (m): r_b1, r_b2 times the angles that the two teeth leave free."""
-        half = inv(self.working_pressure_angle)
-        pinion, wheel = self.pinion, self.wheel
-        tooth1 = 2.0 * pinion.base_radius * (pinion.base_angle - half)
-        tooth2 = 2.0 * wheel.base_radius * (wheel.base_angle - half)
-        gap = self.base_pitch - tooth1 - tooth2
-        return 0.0 if abs(gap) < 1e-12 else gap
-
-    @cached_property
-    def backlash(self) -> float:
-        """Circumferential backlash j_wt = j_bn/cos(alpha_w) at the working pitch circles (m)."""
-        return self.normal_backlash / math.cos(self.working_pressure_angle)
-
-    @cached_property
-    def contact_twist(self) -> float:
-        """Twist of the wheel (rad) at which rigid driving flanks just touch: half the backlash, j_bn/(2 r_b2)."""
-        return 0.5 * self.normal_backlash / self.wheel.base_radius
-
-    @cached_property
-    def mesh_cycle(self) -> float:
-        """Pinion angle from one tooth to the next, 2 pi/z1 (rad)."""
-        return 2.0 * math.pi / self.pinion.teeth
-
-    @cached_property
-    def tangent_length(self) -> float:
-        """Length a sin(alpha_w) of the line of action between the base circles (m): s1 + s2 on it."""
-        return self.working_centre_distance * math.sin(self.working_pressure_angle)
-
-    def pinion_angle_at(self, pinion_roll: float) -> float:
-        """Pinion angle (rad) at which the driving flank of tooth 0 passes the roll length `pinion_roll` (m)."""
-        pinion = self.pinion
-        return pinion_roll / pinion.base_radius - self.working_pressure_angle - pinion.base_angle
-
-    def pinion_roll_at(self, pinion_angle: float) -> float:
-        """Roll length (m) on the driving flank of tooth 0 on the line of action at a pinion angle (rad)."""
-        pinion = self.pinion
-        return pinion.base_radius * (pinion_angle + self.working_pressure_angle + pinion.base_angle)
-
-    def wheel_angle_at(self, pinion_angle: Any, twist: Any = 0.0) -> Any:
-        """Wheel angle (rad; a number or an array) from its meshing position, -pinion angle/ratio + twist."""
-        return twist - pinion_angle / self.gear_ratio
-
-    @cached_property
-    def wheel_phase(self) -> float:
-        """Angle pi + pi/z2 (rad) of the wheel's tooth frame at pinion angle 0: a space faces the pinion."""
-        return math.pi + math.pi / self.wheel.teeth
-
-    def tooth_angle(self, gear: int, tooth: Any, pinion_angle: Any, twist: Any) -> Any:
-        """Angle (rad) of the frame of a tooth of the pinion (gear 0) or wheel (gear 1); numbers or arrays."""
-        if gear == 0:
-            return pinion_angle + tooth * self.mesh_cycle
-        wheel = self.wheel_phase + 2.0 * math.pi * tooth / self.wheel.teeth
-        return wheel + self.wheel_angle_at(pinion_angle, twist)
-
-    def path_limits(self, *, rounded: bool = True, relieved: bool = False) -> tuple[float, float]:
-        """Pinion roll lengths (m) at which contact starts (wheel's tip) and ends (pinion's tip).
-
-        Tips end at the tip circle, with `rounded` where the tip round starts, with `relieved` where the relief starts
-        (if that is lower). No flank reaches below its form point.
-        """
-
-        def tip(gear: Gear) -> float:
-            profile = gear.profile
-            end = min(profile.round_roll, profile.tip_roll) if rounded else profile.tip_roll
-            return min(end, profile.relief_roll) if relieved else end
-
-        start = max(self.tangent_length - tip(self.wheel), self.pinion.form_roll)
-        end = min(tip(self.pinion), self.tangent_length - self.wheel.form_roll)
-        return start, end
-
-    @cached_property
-    def contact_ratio(self) -> float:
-        """Nominal transverse contact ratio eps_alpha (-): path between the tip circles (or form points, when they
-        cut it short) over the base pitch; tip rounds and relief do not count."""
-        start, end = self.path_limits(rounded=False)
-        return (end - start) / self.base_pitch
-
-    @cached_property
-    def contact_ratio_active(self) -> float:
-        """Contact ratio (-) of the path between the starts of the tip rounds; relief does not count."""
-        start, end = self.path_limits()
-        return (end - start) / self.base_pitch
-
-    @cached_property
-    def contact_ratio_effective(self) -> float:
-        """Contact ratio (-) of the full involute only: the path ends where a tip round or a tip relief starts. This is
-        what an unloaded pair has; under load, contact grows into the relieved part up to `contact_ratio_active`."""
-        start, end = self.path_limits(relieved=True)
-        return max(0.0, end - start) / self.base_pitch
-
-    @cached_property
-    def path_length(self) -> float:
-        """Length g_alpha of the nominal path of contact (m)."""
-        return self.contact_ratio * self.base_pitch
-
-    @cached_property
-    def path(self) -> dict[str, PathPoint]:
-        """Points A, B, C, D, E of the active path (tip rounds respected, relief not).
-
-        A: start of contact, at the wheel's tip; B = E - p_b: the tooth pair ahead leaves contact; C: pitch point;
-        D = A + p_b: the next pair comes into contact; E: end, at the pinion's tip. Between B and D one pair carries
-        when 1 <= contact ratio <= 2.
-        """
-        start, end = self.path_limits()
-        pitch_point = self.pinion.base_radius * math.tan(self.working_pressure_angle)
-        rolls = {"A": start, "B": end - self.base_pitch, "C": pitch_point, "D": start + self.base_pitch, "E": end}
-        return {n: PathPoint(n, s, self.tangent_length - s, self.pinion_angle_at(s)) for n, s in rolls.items()}
 
 
 @dataclass(frozen=True, repr=False)

@@ -1,7 +1,5 @@
-"""What gears and pairs are meant for: what lies beyond is refused, loads beyond it are flagged. The one check of it.
+"""What pairs are meant for: what lies beyond is refused, loads beyond it are flagged. `spur_gear` checks single gears.
 
-- *Teeth*: 8 and more. Fewer are undercut so far that their flanks end within the path of contact.
-- *Rim*: a quarter of a module between bore and root circle, and a bore that holds the gear.
 - *Pair*: gears that run together, with a contact ratio of 1 and more; whether tips enter the material of the mate is
   answered by rolling the pair.
 - *Overlap* r_b times twist, by which rigid flanks would overlap along the line of action: up to 0.12 modules. That is
@@ -15,8 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,21 +22,9 @@ from ..errors import InputError
 from ..typing import Array, IntArray
 from .curves import inv, inverse_inv
 from .involute import least_shift
+from .mesh_geometry import MeshGeometry
+from .spur_gear import LEAST_ROUND, Gear
 
-if TYPE_CHECKING:
-    from .pair import MeshGeometry
-    from .spur_gear import Gear
-
-#: Numbers of teeth.
-LEAST_TEETH, MOST_TEETH = 8, 1000
-#: Modules and face widths beyond it (m) are mistakes, and large ones overflow.
-LARGEST = 1e4
-#: Least tip round that is not a sharp corner, times module: meshers need seconds for less, and elements degenerate.
-LEAST_ROUND = 1e-6
-#: Least rim between bore and root circle, times module.
-LEAST_RIM = 0.25
-#: Least bore, times module: plane elasticity gives a point no stiffness, and a bore of a hundredth tears loose.
-LEAST_BORE = 0.05
 #: Largest overlap, times module.
 MOST_OVERLAP = 0.12
 #: Largest yield of a tooth pair (modules) by the standard's stiffness under a given torque.
@@ -48,83 +33,6 @@ MOST_YIELD = 0.25
 TOLERANCE = 1e-4
 #: Rotations through the engagement of one tooth at which tips are looked at.
 POSITIONS = 241
-
-
-def check_gear(gear: Gear) -> None:
-    """Raise `InputError` for data that no gear here has; the profile, which is made of them, has checks of its own."""
-    teeth: Any = gear.teeth
-    if isinstance(teeth, bool) or not isinstance(teeth, Integral) or not LEAST_TEETH <= int(teeth) <= MOST_TEETH:
-        problem = f"must be a whole number >= {LEAST_TEETH} and <= {MOST_TEETH}"
-        raise InputError("teeth", teeth, problem, "use another number of teeth")
-    ranges = {
-        "module": (0.0, LARGEST, False),
-        "pressure_angle": (math.radians(5.0), math.radians(45.0), True),
-        "face_width": (0.0, LARGEST, False),
-        "bore_diameter": (0.0, math.inf, False),
-        # -teeth/2 moves the reference line to the axis, and teeth are pointed long before teeth/2
-        "profile_shift": (-0.5 * gear.teeth, 0.5 * gear.teeth, True),
-        "addendum": (0.0, math.inf, False),
-        "dedendum": (0.0, math.inf, False),
-        "rack_tip_radius": (0.0, math.inf, True),
-        "tip_round": (0.0, math.inf, True),
-        "tip_shortening": (0.0, math.inf, True),
-        "tooth_thinning": (0.0, math.inf, True),
-    }
-    for name, (low, high, closed) in ranges.items():
-        _check(name, getattr(gear, name), low, high, closed)
-    if gear.tip_relief is not None:
-        _check("tip_relief.amount", gear.tip_relief.amount, 0.0, math.inf, True)
-        _check("tip_relief.length", gear.tip_relief.length, 0.0, math.inf, False)
-        _check("tip_relief.exponent", gear.tip_relief.exponent, 1.0, math.inf, True)
-    if gear.half_thickness_angle <= 0.0:
-        what, slope = "leaves no tooth thickness at the reference circle", 2.0 * math.tan(gear.pressure_angle)
-        most = gear.module * (0.5 * math.pi + slope * gear.profile_shift)  # thickness without thinning
-        if most > 0.0:
-            cure = "use less thinning, a larger module or more profile shift"
-            raise InputError("tooth_thinning", gear.tooth_thinning, what, cure, ("<", 1e6 * most, "um"))
-        least = (gear.tooth_thinning / gear.module - 0.5 * math.pi) / slope
-        problem = f"{what}: must be > {least:.6g}"
-        raise InputError("profile_shift", gear.profile_shift, problem, "use more profile shift")
-    _check_rim(gear)
-    if 0.0 < gear.tip_round < LEAST_ROUND * gear.module:
-        problem = f"must be 0 or >= {1e3 * LEAST_ROUND * gear.module:.6g} mm, {LEAST_ROUND:g} module"
-        raise InputError("tip_round", gear.tip_round, problem, "write 0 for a sharp corner")
-    if gear.tip_round > gear.module:
-        problem = f"must be <= {1e3 * gear.module:.6g} mm, one module"
-        raise InputError("tip_round", gear.tip_round, problem, "use a smaller tip round")
-
-
-def _check(name: str, value: float, low: float, high: float, closed: bool) -> None:
-    number = not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
-    if number and (low <= value <= high if closed else low < value < high):
-        return
-    if number and not closed and value <= low:  # a bound that a drawing value states in its own quantity
-        raise InputError(name, value, "is too small", "correct it", (">", low, ""))
-    signs = (">=", "<=") if closed else (">", "<")
-    limits = [f"{sign} {limit:g}" for sign, limit in zip(signs, (low, high), strict=True) if math.isfinite(limit)]
-    raise InputError(name, value, "must be a finite number" + "".join(f", {limit}" for limit in limits), "correct it")
-
-
-def _check_rim(gear: Gear) -> None:
-    """Raise `InputError` unless the gear has a bore that holds it and a rim around it."""
-    if gear.root_radius <= LEAST_RIM * gear.module:
-        most = gear.teeth / 2 + gear.profile_shift - LEAST_RIM
-        problem, cure = (
-            "leaves no material inside the root circle",
-            "use less dedendum, more teeth or more profile shift",
-        )
-        raise InputError("dedendum", gear.dedendum, problem, cure, ("<", most, ""))
-    if not gear.bore_diameter >= LEAST_BORE * gear.module:
-        problem = f"must be >= {1e3 * LEAST_BORE * gear.module:.6g} mm, {LEAST_BORE:g} module"
-        cure = "use a larger bore: the gear is held there, and a point holds nothing"
-        raise InputError("bore_diameter", gear.bore_diameter, problem, cure)
-    limit = 2.0 * (gear.root_radius - LEAST_RIM * gear.module)
-    if not gear.bore_diameter <= limit:
-        problem = (
-            f"must be <= {1e3 * limit:.6g} mm, so that a rim of {LEAST_RIM:g} module is left inside the root "
-            f"circle of {2e3 * gear.root_radius:.6g} mm"
-        )
-        raise InputError("bore_diameter", gear.bore_diameter, problem, "use a smaller bore")
 
 
 def check_pair(pair: MeshGeometry) -> None:
