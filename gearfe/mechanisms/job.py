@@ -7,7 +7,7 @@ import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +19,7 @@ from ..multibody.core.mass_regularisation import free_motions
 from ..progress import stage
 from .error_estimate import TrajectoryError, trajectory_error
 from .model import Mechanism
-from .results import Results, evaluate, in_blocks, reactions, reference_table
-
-if TYPE_CHECKING:
-    from .sensitivity import Sensitivities
+from .results import Results, Sensitivities, evaluate, in_blocks, reactions, reference_table
 
 #: Bodies that a line of the report names.
 MOST_NAMES = 8

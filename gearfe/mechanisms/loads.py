@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..errors import InputError, given
 from ..multibody import SpanFunction, StateFunction, polynomial
-from ..multibody.planar.linkage import Affine, BodyVariables
+from ..multibody.planar.variables import Affine, BodyVariables
 from ..multibody.series.tape import Tape
 from ..typing import Array
 from .expressions import OF_POINT, PLAIN, Node, compute, quantities, value_of, without_value
 from .tables import ValueTable
-
-if TYPE_CHECKING:
-    from .model import Mechanism
 
 #: What a load may depend on.
 ALLOWED = ("time", "angle", "rate", "x", "y", "vx", "vy")
@@ -25,6 +22,19 @@ ALLOWED = ("time", "angle", "rate", "x", "y", "vx", "vy")
 OF_SPAN = ("time", "length", "length_rate")
 #: The register of a quantity (name, argument).
 Leaf = Callable[[tuple[str, str | None]], int]
+
+
+class Quantities(Protocol):
+    """What a load asks of the mechanism that it acts in (`mechanisms.model.Mechanism`)."""
+
+    def angle_of(self, what: str, label: str) -> list[tuple[int, float]]:
+        """Moving bodies, with signs, whose angles add up to a named one."""
+
+    def point(self, where: str, label: str) -> tuple[int, tuple[float, float]]:
+        """Body number of a named point, and its coordinates relative to the mass centre (m)."""
+
+    def values(self, needed: set[tuple[str, str | None]], q: Array, v: Array) -> Mapping[tuple[str, str | None], Any]:
+        """Values of named quantities in states (n, size)."""
 
 
 class Formula:
@@ -93,7 +103,7 @@ class ExpressionLoad(Formula, StateFunction):
     def __init__(self, text: str, label: str, node: Node) -> None:
         super().__init__(text, label, node, ALLOWED, "a load")
 
-    def bind(self, mechanism: Mechanism) -> None:
+    def bind(self, mechanism: Quantities) -> None:
         """Look up bodies, with signs, and points."""
         self.mechanism, label = mechanism, self.label
         self.where: dict[tuple[str, str | None], list[tuple[int, float, float, float]]] = {}

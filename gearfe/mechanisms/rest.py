@@ -6,7 +6,7 @@ import time as clock
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,10 +20,7 @@ from ..shown import percent
 from ..typing import Array
 from .job import MAY_WRITE, Outcome, write_elastic
 from .model import Mechanism
-from .results import Results, evaluate, reactions
-
-if TYPE_CHECKING:
-    from .sensitivity import Sensitivities
+from .results import Results, Sensitivities, evaluate, reactions
 
 
 def run_rest(

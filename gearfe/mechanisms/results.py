@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +47,44 @@ class Results:
     outputs: dict[str, Array] = field(repr=False)
     energy: dict[str, Array] = field(repr=False)
     sections: dict[str, Array] = field(default_factory=dict, repr=False)
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Slopes of outputs by parameters.
+
+    Attributes
+    ----------
+    values : dict
+        Dotted name of a key -> its value, in its own unit.
+    at : dict
+        Output -> times (s), or numbers of modes; 0 for a state of rest.
+    outputs : dict
+        Output -> its values.
+    slopes, errors : dict
+        (key, output) -> slope by the key's own unit at every time; estimate of the largest error of these.
+    """
+
+    values: Mapping[str, float]
+    at: Mapping[str, Array] = field(repr=False)
+    outputs: Mapping[str, Array] = field(repr=False)
+    slopes: Mapping[tuple[str, str], Array] = field(repr=False)
+    errors: Mapping[tuple[str, str], float] = field(repr=False)
+
+    def table(self) -> dict[str, Any]:
+        """Columns of sensitivities.csv: a row for every parameter, output and time."""
+        columns: dict[str, list[Any]] = {
+            name: [] for name in ("parameter", "output", "time_s_or_mode", "value", "slope", "error")
+        }
+        for (name, output), slope in self.slopes.items():
+            count = len(slope)
+            columns["parameter"] += [name] * count
+            columns["output"] += [output] * count
+            columns["time_s_or_mode"] += self.at[output].tolist()
+            columns["value"] += self.outputs[output].tolist()
+            columns["slope"] += slope.tolist()
+            columns["error"] += [self.errors[name, output]] * count
+        return dict(columns)
 
 
 @stage("outputs")

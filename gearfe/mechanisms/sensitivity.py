@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,50 +30,13 @@ from ..tables.mechanism import RunTable
 from ..typing import Array
 from .error_estimate import LEAST_TOLERANCE, SHARPER
 from .model import load_mechanism
+from .results import Sensitivities
 from .solve import Case, sweep
 
 #: Largest step as a share of the value, and how many steps there are, each half of the one before.
 LARGEST, STEPS = 1e-2, 5
 #: Factor of the differences in the estimate, for what they share.
 SAFETY = 2.0
-
-
-@dataclass(frozen=True)
-class Sensitivities:
-    """Slopes of outputs by parameters.
-
-    Attributes
-    ----------
-    values : dict
-        Dotted name of a key -> its value, in its own unit.
-    at : dict
-        Output -> times (s), or numbers of modes; 0 for a state of rest.
-    outputs : dict
-        Output -> its values.
-    slopes, errors : dict
-        (key, output) -> slope by the key's own unit at every time; estimate of the largest error of these.
-    """
-
-    values: Mapping[str, float]
-    at: Mapping[str, Array] = field(repr=False)
-    outputs: Mapping[str, Array] = field(repr=False)
-    slopes: Mapping[tuple[str, str], Array] = field(repr=False)
-    errors: Mapping[tuple[str, str], float] = field(repr=False)
-
-    def table(self) -> dict[str, Any]:
-        """Columns of sensitivities.csv: a row for every parameter, output and time."""
-        columns: dict[str, list[Any]] = {
-            name: [] for name in ("parameter", "output", "time_s_or_mode", "value", "slope", "error")
-        }
-        for (name, output), slope in self.slopes.items():
-            count = len(slope)
-            columns["parameter"] += [name] * count
-            columns["output"] += [output] * count
-            columns["time_s_or_mode"] += self.at[output].tolist()
-            columns["value"] += self.outputs[output].tolist()
-            columns["slope"] += slope.tolist()
-            columns["error"] += [self.errors[name, output]] * count
-        return dict(columns)
 
 
 @stage("sensitivities")
@@ -96,7 +59,7 @@ def sensitivities(
     executor
         Runs the cases, twelve for each parameter.
     run
-        In place of the file's [run].
+        Instead of the file's [run].
 
     Raises
     ------
@@ -115,7 +78,7 @@ def sensitivities(
     for case in (*made, *finer):
         if case.problem:
             name, at = next(iter(case.values.items()), ("mechanism file", None))
-            raise InputError(name, at, f"has no answer: {case.problem}", "mend that, or give a smaller step")
+            raise InputError(name, at, f"has no answer: {case.problem}", "fix that, or give a smaller step")
     at, outputs = _columns(made[0])
     slopes, errors = {}, {}
     for k, (name, h) in enumerate(steps.items()):

@@ -9,15 +9,16 @@ forces that are left open those of least squares are taken.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
+from ..multibody import System
+from ..reduction.modal_body import ModalBody
 from ..typing import Array, ComplexArray
 from .elements import bore_rows
-
-if TYPE_CHECKING:
-    from .model import TrainModel
+from .gear_train import GearTrain
+from .mesh_element import Shafts
 
 #: What a moment counts beside a force (1/m) where shares are open: so much that it is taken only where it must be.
 MOMENT = 1e6
@@ -53,9 +54,20 @@ class BearingLoads:
         return found.reshape(len(found), -1, 6)
 
 
-def bearing_loads(model: TrainModel) -> BearingLoads:
-    """Loads on the bores that carry shafts, in the order of the model's `bores`."""
-    system, train = model.system, model.train
+def bearing_loads(
+    train: GearTrain, system: System, shafts: Shafts, bores: tuple[str, ...], *, shared: bool
+) -> BearingLoads:
+    """Loads on the bores that carry shafts.
+
+    Parameters
+    ----------
+    train, system, shafts
+        The train, its system, and the shafts in this.
+    bores
+        Names of the bores, in the order of the results.
+    shared
+        Whether statics leave open how the hinges of a shaft share its load.
+    """
     e1, e2, axis = train.frame
     to_global = np.zeros((5, 6))
     to_global[:3, :3], to_global[3, 3:], to_global[4, 3:] = np.array([e1, axis, e2]), e1, e2
@@ -63,20 +75,20 @@ def bearing_loads(model: TrainModel) -> BearingLoads:
     ends = np.cumsum([0, *(element.rows for element, _ in system.joints)])
     first = {element.name: int(row) for (element, _), row in zip(system.joints, ends, strict=False)}
     counts = np.ones(len(G))
-    if len(model.start.freedoms.redundant):
+    if shared:
         for name, row in first.items():
             if name.startswith("hinge "):
                 counts[row + 3 : row + 5] = MOMENT
     multipliers = np.linalg.pinv(G / counts[:, None]) / counts
     springs = {bearing.bore: bearing for bearing in train.bearings}
-    parts = [np.zeros((system.size, 6 * len(model.bores))) for _ in range(3)]
-    for number, bore in enumerate(model.bores):
+    parts = [np.zeros((system.size, 6 * len(bores))) for _ in range(3)]
+    for number, bore in enumerate(bores):
         at = slice(6 * number, 6 * number + 6)
         if bore not in springs:
             row = first[f"hinge {bore}"]
             parts[0][:, at] = multipliers[:, row : row + 5] @ to_global
             continue
-        rows = _moved(model, bore)
+        rows = _moved(train, shafts, bore)
         stiffness, damping = (np.array(x, dtype=float) for x in (springs[bore].stiffness, springs[bore].damping))
         parts[1][:, at] = rows.T @ (stiffness[:, None] * to_global)
         parts[2][:, at] = rows.T @ ((damping + train.damping.beta * stiffness)[:, None] * to_global)
@@ -86,23 +98,22 @@ def bearing_loads(model: TrainModel) -> BearingLoads:
     )
 
 
-def _moved(model: TrainModel, bore: str) -> Array:
+def _moved(train: GearTrain, shafts: Shafts, bore: str) -> Array:
     """Motion of a shaft against its bore for unit coordinates of the system, (5, size); see `bore_rows`."""
-    train, size = model.train, model.system.size
     number = next(i for i, shaft in enumerate(train.shafts) if bore in shaft.bores)
     selector = None if train.housing is None else np.eye(train.housing.size)[:, train.housing.attachment(bore)]
-    local = bore_rows(model.shafts[number], train.bore_points[bore], train.frame, selector)
-    rows, first = np.zeros((5, size)), int(model.first[number])
+    local = bore_rows(shafts.bodies[number], train.bore_points[bore], train.frame, selector)
+    rows, first = np.zeros((5, shafts.size)), int(shafts.first[number])
     rows[:, first : first + 6] = local[:, :6]
     rows[:, : local.shape[1] - 6] += local[:, 6:]
     return rows
 
 
-def bore_motion(model: TrainModel) -> Array:
+def bore_motion(housing: ModalBody | None, bores: tuple[str, ...], size: int) -> Array:
     """Displacement and rotation of each bore along x, y, z for unit coordinates, (6 bores, size); 0 if rigid."""
-    rows, housing = np.zeros((6 * len(model.bores), model.system.size)), model.train.housing
+    rows = np.zeros((6 * len(bores), size))
     if housing is not None:
-        for number, bore in enumerate(model.bores):
+        for number, bore in enumerate(bores):
             selector = np.eye(housing.size)[housing.attachment(bore)]
             rows[6 * number : 6 * number + 6, : housing.size] = selector
     return rows

@@ -129,12 +129,14 @@ class TrainModel(Facts):
     @cached_property
     def bearings(self) -> BearingLoads:
         """Loads on the bores that carry shafts."""
-        return bearing_loads(self)
+        shafts = Shafts(self.shafts, self.first, tuple(self.ratios), self.system.size)
+        shared = len(self.start.freedoms.redundant) > 0
+        return bearing_loads(self.train, self.system, shafts, self.bores, shared=shared)
 
     @cached_property
     def bore_motion(self) -> Array:
         """Displacement and rotation of each bore along x, y, z for unit coordinates, (6 bores, system size)."""
-        return bore_motion(self)
+        return bore_motion(self.train.housing, self.bores, self.system.size)
 
     @cached_property
     def multipliers_of_forces(self) -> Array:

@@ -14,16 +14,11 @@ is truly light keeps its mass.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...errors import InputError
 from ...typing import Array
 from .system import System
-
-if TYPE_CHECKING:
-    from .start import Start
 
 #: Carried mass over own mass from which on a link counts as light: less costs no more than 4 of the 16 digits.
 LIGHT = 1e4
@@ -82,7 +77,7 @@ def mass_excess(system: System, time: float, q: Array, v: Array, active: np.ndar
     return excess
 
 
-def loose_link(system: System, times: Array, q: Array, v: Array, start: Start) -> str | None:
+def loose_link(system: System, times: Array, q: Array, v: Array, active: np.ndarray, excess: Array) -> str | None:
     """Return the name of the light link that carries next to nothing in the last finite state.
 
     Parameters
@@ -93,8 +88,10 @@ def loose_link(system: System, times: Array, q: Array, v: Array, start: Start) -
         Times of the states (s).
     q, v : ndarray, shape (n, size)
         Coordinates and velocities.
-    start : Start
-        Start of the run, with the excess of light links.
+    active : ndarray of bool, shape (rows,)
+        Rows that are not redundant.
+    excess : ndarray, shape (size,) or (0,)
+        Masses by which the elimination raises light links, from `mass_excess`.
 
     Returns
     -------
@@ -102,12 +99,12 @@ def loose_link(system: System, times: Array, q: Array, v: Array, start: Start) -
         None if no state is finite, no link is light, or all of them carry mass.
     """
     finite = np.flatnonzero(np.isfinite(q).all(axis=1) & np.isfinite(v).all(axis=1))
-    if not start.excess.any() or not len(finite):
+    if not excess.any() or not len(finite):
         return None
     at = finite[-1]
     bodies, _ = _own_masses(system)
-    share = _carried(system, _gradients_ahead(system, times[at], q[at], v[at], start.active))[:, None]
-    raised = (start.excess * system.units**2)[bodies]
+    share = _carried(system, _gradients_ahead(system, times[at], q[at], v[at], active))[:, None]
+    raised = (excess * system.units**2)[bodies]
     found = np.where(raised > 0.0, share / np.where(raised > 0.0, raised, 1.0), np.inf).min(axis=1)
     names = [name for element in system.elements for name in element.planar_bodies]
     return names[int(found.argmin())] if found.min() < LOOSE else None
