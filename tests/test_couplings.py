@@ -24,8 +24,8 @@ from gearfe.multibody import (
     constant,
     integrate,
 )
+from gearfe.multibody.planar.bodies import Frames
 from gearfe.multibody.planar.couplings import Belt, GearRatio, Rack
-from gearfe.multibody.planar.forms import Frames
 from gearfe.multibody.planar.joints import Joint, Rolling, Row
 
 TIMES = np.linspace(0.0, 0.8, 5)

@@ -7,17 +7,22 @@ All arms are relative to the mass centre.
 from __future__ import annotations
 
 import math
+import re
 from typing import NamedTuple
 
 import numpy as np
 
+from ...errors import InputError, shown, unknown_name
 from ...typing import Array, BoolArray
 from ..series.ordering import elimination_order
-from ..series.timefunctions import TimeFunction
-from .bodies import Body
+from ..series.timefunctions import TimeFunction, constant
+from .bodies import Body, Frames
 from .forces import Along, Force, SpanFunction, StateFunction, Tension, Weight
-from .forms import Form, Frames, label_of
+from .forms import GROUND, Form
 from .joints import Joint, Profile
+
+#: Classes whose names are not those of mechanism files.
+_KINDS = {"GearRatio": "gear", "PointForce": "force"}
 
 
 class Held(NamedTuple):
@@ -55,6 +60,57 @@ class Assembly(NamedTuple):
     def tension_laws(self) -> list[tuple[int, SpanFunction]]:
         """Numbers among the springs of those with laws."""
         return [(k, t.law) for k, (_, t) in enumerate(self.springs) if t.law is not None]
+
+
+def label_of(part: object, number: int) -> str:
+    """Return kind and name of a joint or force for messages, or its number where it has no name."""
+    kind = type(part).__name__
+    words = _KINDS.get(kind) or re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind).lower()
+    return f"{words} {getattr(part, 'name', '') or number}"
+
+
+def body_numbers(bodies: tuple[Body, ...], joints: tuple[Joint, ...], forces: tuple[Force, ...]) -> dict[str, int]:
+    """Number of each body, the ground last.
+
+    Raises
+    ------
+    InputError
+        For names of bodies that are used twice or not there, and arguments that are not finite.
+    """
+    index: dict[str, int] = {GROUND: len(bodies)}
+    for i, body in enumerate(bodies):
+        if body.name in index:
+            raise InputError("body name", body.name, "is used twice", "give every body a name of its own")
+        index[body.name] = i
+    for k, part in enumerate((*joints, *forces)):
+        label = label_of(part, k)
+        keys = ("a", "b", "body", "line", "relative_to", "reaction", "carrier")
+        named = [(key, getattr(part, key)) for key in keys if hasattr(part, key)]
+        used = [value for key, value in named if key != "carrier" or value is not None]
+        for name in used:
+            if not isinstance(name, str):
+                order = ", ".join(vars(part))
+                raise InputError(label, None, f"{shown(name)} is no name of a body", f"its arguments are {order}")
+            if name not in index:
+                raise unknown_name(label, name, index)
+        for key, value in vars(part).items():
+            values = value if isinstance(value, tuple) else (value,)
+            if any(isinstance(x, float) and not math.isfinite(x) for x in values):
+                raise InputError(f"{label} {key}", value, "must be finite", "give a number")
+            if key in ("function", "x", "y") and not isinstance(value, TimeFunction | StateFunction):
+                if not isinstance(value, int | float):
+                    cure = "use constant, polynomial, sine, smoothed_step, or a StateFunction"
+                    raise InputError(f"{label} {key}", None, "must be a function of time", cure)
+                object.__setattr__(part, key, constant(float(value)))
+        if getattr(part, "direction", None) == (0, 0):
+            raise InputError(f"{label} direction", (0, 0), "must not be zero", "give the direction of the line")
+        if len(used) >= 2 and used[0] == used[1]:
+            cure = "name two different bodies (or the ground)"
+            raise InputError(label, used[0], "joins a body to itself", cure)
+        if len(used) == 3 and used[2] in used[:2]:
+            cure = "name the body on which both turn"
+            raise InputError(f"{label} carrier", used[2], "is one of the two that are coupled", cure)
+    return index
 
 
 def assemble(joints: tuple[Joint, ...], forces: tuple[Force, ...], frames: Frames) -> Assembly:

@@ -1,4 +1,4 @@
-"""Planar bodies as plain data, and what joints and forces may name of them.
+"""Planar bodies as plain data, and their frames, of which joints and forces make forms.
 
 A body carries a frame: points, the mass centre and joint directions are written in that frame (m); the start pose is
 the position of the frame's origin and its angle. The ground is the body named ``"ground"`` with its frame at rest.
@@ -7,13 +7,11 @@ the position of the frame's origin and its angle. The ground is the body named `
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...errors import InputError, shown, unknown_name
-from ..series.timefunctions import TimeFunction, constant
-from .forces import Force, StateFunction
-from .forms import GROUND, Point, label_of
-from .joints import Joint
+from ...errors import InputError
+from .forms import Form, Point, Vector
 
 #: Masses and inertias below this, or above its inverse, overflow in products.
 LEAST_MASS = 1e-100
@@ -60,45 +58,66 @@ class Body:
                 raise InputError(f"body {self.name!r} {key}", value, "must be finite and >= 0", cure)
 
 
-def body_numbers(bodies: tuple[Body, ...], joints: tuple[Joint, ...], forces: tuple[Force, ...]) -> dict[str, int]:
-    """Number of each body, the ground last.
+@dataclass(frozen=True)
+class Frames:
+    """The bodies' frames: what joints and forces make their forms of.
 
-    Raises
-    ------
-    InputError
-        For names of bodies that are used twice or not there, and arguments that are not finite.
+    Parameters
+    ----------
+    bodies : tuple of Body
+        The moving ones.
+    number : dict
+        Name -> number; the ground's is the number of moving bodies.
     """
-    index: dict[str, int] = {GROUND: len(bodies)}
-    for i, body in enumerate(bodies):
-        if body.name in index:
-            raise InputError("body name", body.name, "is used twice", "give every body a name of its own")
-        index[body.name] = i
-    for k, part in enumerate((*joints, *forces)):
-        label = label_of(part, k)
-        keys = ("a", "b", "body", "line", "relative_to", "reaction", "carrier")
-        named = [(key, getattr(part, key)) for key in keys if hasattr(part, key)]
-        used = [value for key, value in named if key != "carrier" or value is not None]
-        for name in used:
-            if not isinstance(name, str):
-                order = ", ".join(vars(part))
-                raise InputError(label, None, f"{shown(name)} is no name of a body", f"its arguments are {order}")
-            if name not in index:
-                raise unknown_name(label, name, index)
-        for key, value in vars(part).items():
-            values = value if isinstance(value, tuple) else (value,)
-            if any(isinstance(x, float) and not math.isfinite(x) for x in values):
-                raise InputError(f"{label} {key}", value, "must be finite", "give a number")
-            if key in ("function", "x", "y") and not isinstance(value, TimeFunction | StateFunction):
-                if not isinstance(value, int | float):
-                    cure = "use constant, polynomial, sine, smoothed_step, or a StateFunction"
-                    raise InputError(f"{label} {key}", None, "must be a function of time", cure)
-                object.__setattr__(part, key, constant(float(value)))
-        if getattr(part, "direction", None) == (0, 0):
-            raise InputError(f"{label} direction", (0, 0), "must not be zero", "give the direction of the line")
-        if len(used) >= 2 and used[0] == used[1]:
-            cure = "name two different bodies (or the ground)"
-            raise InputError(label, used[0], "joins a body to itself", cure)
-        if len(used) == 3 and used[2] in used[:2]:
-            cure = "name the body on which both turn"
-            raise InputError(f"{label} carrier", used[2], "is one of the two that are coupled", cure)
-    return index
+
+    bodies: tuple[Body, ...]
+    number: Mapping[str, int]
+
+    def arm(self, body: str, at: Point) -> Point:
+        """A point of the body's frame as seen from the mass centre."""
+        i = self.number[body]
+        x, y = (0.0, 0.0) if i == len(self.bodies) else self.bodies[i].centre
+        return at[0] - x, at[1] - y
+
+    def point(self, body: str, at: Point) -> Vector:
+        """Place of a point of the body's frame."""
+        return Vector({self.number[body]: (1.0, *self.arm(body, at))}, len(self.bodies))
+
+    def centre(self, body: str) -> Vector:
+        """Place of the mass centre; of the origin for the ground."""
+        return Vector({self.number[body]: (1.0, 0.0, 0.0)}, len(self.bodies))
+
+    def direction(self, body: str, along: Point) -> Vector:
+        """Unit vector that turns with the body, from its components in the body's frame (of any length)."""
+        length = math.hypot(*along)
+        return Vector({self.number[body]: (0.0, along[0] / length, along[1] / length)}, len(self.bodies))
+
+    def angle(self, body: str) -> Form:
+        """Angle of the body (rad)."""
+        return Form({self.number[body]: (0.0, 0.0, 1.0, 0.0, 0.0)})
+
+    def start_angle(self, body: str) -> float:
+        """Angle at the start pose (rad)."""
+        i = self.number[body]
+        return 0.0 if i == len(self.bodies) else self.bodies[i].angle
+
+    def start_place(self, body: str, at: Point) -> Point:
+        """Place of a point of the body's frame at the start pose (m)."""
+        i = self.number[body]
+        if i == len(self.bodies):
+            return at
+        place, (c, s) = self.bodies[i].position, _turn(self.bodies[i].angle)
+        return place[0] + c * at[0] - s * at[1], place[1] + s * at[0] + c * at[1]
+
+    def start_seen_from(self, body: str, place: Point) -> Point:
+        """Where a place of the ground lies in the body's frame at the start pose (m)."""
+        i = self.number[body]
+        if i == len(self.bodies):
+            return place
+        origin, (c, s) = self.bodies[i].position, _turn(self.bodies[i].angle)
+        x, y = place[0] - origin[0], place[1] - origin[1]
+        return c * x + s * y, -s * x + c * y
+
+
+def _turn(angle: float) -> Point:
+    return math.cos(angle), math.sin(angle)

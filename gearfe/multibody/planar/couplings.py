@@ -14,7 +14,8 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 
 from ...errors import InputError
-from .forms import GROUND, Form, Frames, Point
+from .bodies import Frames
+from .forms import GROUND, Form, Point
 from .joints import Fixed, Hinge, Joint, Prismatic, Profile, Row, Slot
 
 #: Points of a body nearer than this share of its largest coordinate are one axis.

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, NamedTuple
 from ...errors import InputError
 from ...typing import Array
 from ..series.timefunctions import TimeFunction, constant
-from .forms import GROUND, Form, Frames, Point, Vector
+from .bodies import Frames
+from .forms import GROUND, Form, Point, Vector
 
 if TYPE_CHECKING:
     from ..series.tape import Tape
-    from .linkage import BodyVariables
+    from .variables import BodyVariables
 
 
 class StateFunction(ABC):

@@ -11,14 +11,8 @@ along.
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .bodies import Body
 
 #: Factors of x, y, theta, cos theta, sin theta of a body.
 Terms = tuple[float, ...]
@@ -133,79 +127,3 @@ def _sum(one: tuple[float, ...], two: tuple[float, ...]) -> tuple[float, ...]:
 
 def _times(factor: float, row: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(factor * a for a in row)
-
-
-@dataclass(frozen=True)
-class Frames:
-    """The bodies' frames: what joints and forces make their forms of.
-
-    Parameters
-    ----------
-    bodies : tuple of Body
-        The moving ones.
-    number : dict
-        Name -> number; the ground's is the number of moving bodies.
-    """
-
-    bodies: tuple[Body, ...]
-    number: Mapping[str, int]
-
-    def arm(self, body: str, at: Point) -> Point:
-        """A point of the body's frame as seen from the mass centre."""
-        i = self.number[body]
-        x, y = (0.0, 0.0) if i == len(self.bodies) else self.bodies[i].centre
-        return at[0] - x, at[1] - y
-
-    def point(self, body: str, at: Point) -> Vector:
-        """Place of a point of the body's frame."""
-        return Vector({self.number[body]: (1.0, *self.arm(body, at))}, len(self.bodies))
-
-    def centre(self, body: str) -> Vector:
-        """Place of the mass centre; of the origin for the ground."""
-        return Vector({self.number[body]: (1.0, 0.0, 0.0)}, len(self.bodies))
-
-    def direction(self, body: str, along: Point) -> Vector:
-        """Unit vector that turns with the body, from its components in the body's frame (of any length)."""
-        length = math.hypot(*along)
-        return Vector({self.number[body]: (0.0, along[0] / length, along[1] / length)}, len(self.bodies))
-
-    def angle(self, body: str) -> Form:
-        """Angle of the body (rad)."""
-        return Form({self.number[body]: (0.0, 0.0, 1.0, 0.0, 0.0)})
-
-    def start_angle(self, body: str) -> float:
-        """Angle at the start pose (rad)."""
-        i = self.number[body]
-        return 0.0 if i == len(self.bodies) else self.bodies[i].angle
-
-    def start_place(self, body: str, at: Point) -> Point:
-        """Place of a point of the body's frame at the start pose (m)."""
-        i = self.number[body]
-        if i == len(self.bodies):
-            return at
-        place, (c, s) = self.bodies[i].position, _turn(self.bodies[i].angle)
-        return place[0] + c * at[0] - s * at[1], place[1] + s * at[0] + c * at[1]
-
-    def start_seen_from(self, body: str, place: Point) -> Point:
-        """Where a place of the ground lies in the body's frame at the start pose (m)."""
-        i = self.number[body]
-        if i == len(self.bodies):
-            return place
-        origin, (c, s) = self.bodies[i].position, _turn(self.bodies[i].angle)
-        x, y = place[0] - origin[0], place[1] - origin[1]
-        return c * x + s * y, -s * x + c * y
-
-
-def _turn(angle: float) -> Point:
-    return math.cos(angle), math.sin(angle)
-
-
-#: Classes whose names are not those of mechanism files.
-_KINDS = {"GearRatio": "gear", "PointForce": "force"}
-
-
-def label_of(part: object, number: int) -> str:
-    """Return kind and name of a joint or force for messages, or its number where it has no name."""
-    kind = type(part).__name__
-    words = _KINDS.get(kind) or re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind).lower()
-    return f"{words} {getattr(part, 'name', '') or number}"

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from ...errors import InputError
 from ..series.timefunctions import TimeFunction
-from .forms import GROUND, Form, Frames, Point
+from .bodies import Frames
+from .forms import GROUND, Form, Point
 
 if TYPE_CHECKING:
     from ..series.tape import Tape

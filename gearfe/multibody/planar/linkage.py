@@ -6,7 +6,6 @@ quadratic and vectors have affine components; the tension T along a span D pulls
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -17,139 +16,71 @@ from ...typing import Array, IntArray
 from ..core.tape_evaluation import TapeValues, Written
 from ..series.tape import Tape
 from ..series.timefunctions import TimeFunction
-from .assembly import Assembly, Held, assemble
-from .bodies import Body, body_numbers
+from .assembly import Assembly, Held, assemble, body_numbers
+from .bodies import Body, Frames
 from .couplings import with_carriers
 from .forces import Along, Force, SpanFunction, StateFunction, Tension
-from .forms import Form, Frames, Vector
 from .joints import Joint, places
+from .variables import Affine, BodyVariables
 
 #: A load beyond this value (N, N m) where a run ends has a pole there.
 POLE = 1e7
 
 
-class Affine(NamedTuple):
-    """A form of the variables of a tape."""
+def write_row(bodies: BodyVariables, row: Held, unit: float) -> None:
+    """Write a constraint."""
+    (terms, constant), products = bodies.form(row.form), []
+    for pair in row.form.products:
+        for u, v in zip(*map(bodies.vector, pair), strict=True):
+            products += [(i, j, f * g) for i, f in u.terms.items() for j, g in v.terms.items()]
+            for a, b in ((u, v), (v, u)):
+                for i, f in a.terms.items():
+                    terms[i] = terms.get(i, 0.0) + f * b.constant
+            constant += u.constant * v.constant
+    if row.profile is not None:
+        body, profile = row.profile
+        terms[profile.write(bodies.tape, bodies.places[3 * body + 2])] = -1.0
+    bodies.tape.row(terms, products, constant, row.motion, unit)
 
-    terms: dict[int, float]
-    constant: float
+
+def write_tension(bodies: BodyVariables, spring: Tension) -> tuple[tuple[Affine, Affine], int]:
+    """Write a tension along a vector; return the vector's components, and the register of its law, -1 for none."""
+    tape, law = bodies.tape, -1
+    stiffness, damping, free = spring.stiffness, spring.damping, spring.free_length
+    x, y = bodies.vector(spring.vector)
+    span = [tape.linear(*x), tape.linear(*y)]
+    pull = tape.number(stiffness)  # tension over length
+    if free != 0.0 or damping != 0.0 or spring.law is not None:
+        square = tape.sum(tape.mul(span[0], span[0]), tape.mul(span[1], span[1]))
+        inverse = tape.power(square, -0.5)
+        if free != 0.0:
+            pull = tape.sum(inverse, f=-stiffness * free, c=stiffness)
+        if damping != 0.0 or spring.law is not None:
+            speed = [tape.rate(x.terms), tape.rate(y.terms)]
+            flow = tape.sum(tape.mul(span[0], speed[0]), tape.mul(span[1], speed[1]))
+            pull = tape.sum(pull, tape.div(flow, square), g=damping)
+        if spring.law is not None:
+            law = register(spring.law, spring.law.write(tape, tape.mul(square, inverse), tape.mul(flow, inverse)))
+            pull = tape.sum(pull, tape.mul(law, inverse))
+    for part, along in zip(span, (x, y), strict=True):
+        opposite = {i: -f for i, f in along.terms.items()}
+        tape.push(tape.mul(pull, part), opposite, told=spring.law is None)
+    return (x, y), law
 
 
-class BodyVariables:
-    """Variables x, y, theta, cos theta, sin theta of the bodies of a linkage; the ground's are constants.
-
-    Parameters
-    ----------
-    tape : Tape
-        On which they are.
-    places : ndarray of int, shape (3n,)
-        Numbers of the coordinates.
-    """
-
-    def __init__(self, tape: Tape, places: IntArray) -> None:
-        self.tape, self.places = tape, [int(p) for p in places]
-
-    def affine(self, body: int, factors: Sequence[float], into: Affine | None = None) -> Affine:
-        """kx x + ky y + kt theta + kc cos theta + ks sin theta, added to another one."""
-        terms, constant = (dict(into.terms), into.constant) if into is not None else ({}, 0.0)
-        if 3 * body >= len(self.places):
-            return Affine(terms, constant + float(factors[3]))
-        own = self.places[3 * body : 3 * body + 3]
-        turning = self.tape.turn(own[2]) if factors[3] or factors[4] else ()
-        for variable, factor in zip((*own, *turning), factors, strict=False):
-            if factor:
-                terms[variable] = terms.get(variable, 0.0) + float(factor)
-        return Affine(terms, constant)
-
-    def point(
-        self, body: int, weight: float, x: float, y: float, into: tuple[Affine, Affine] | None = None
-    ) -> tuple[Affine, Affine]:
-        """Return the components of ``weight (x_b, y_b) + R(theta) (x, y)``, added to others.
-
-        (x_b, y_b) is the body's mass centre and theta its angle.
-
-        Parameters
-        ----------
-        body : int
-            Number of the body; the number of bodies stands for the ground.
-        weight : float
-            Factor of the mass centre: 1 for a point of the body, 0 for a direction.
-        x, y : float
-            Vector in the frame of the body (m).
-        into : pair of Affine, optional
-            Components to which these are added.
-        """
-        one, two = into if into is not None else (None, None)
-        across = self.affine(body, (weight, 0.0, 0.0, x, -y), one)
-        return across, self.affine(body, (0.0, weight, 0.0, y, x), two)
-
-    def form(self, form: Form) -> Affine:
-        """A form but for its products."""
-        made = Affine({}, form.constant)
-        for body, factors in form.terms.items():
-            made = self.affine(body, factors, made)
-        return made
-
-    def vector(self, vector: Vector) -> tuple[Affine, Affine]:
-        """Components of a vector."""
-        made = Affine({}, 0.0), Affine({}, 0.0)
-        for body, end in vector.ends.items():
-            weight, x, y = end
-            made = self.point(body, weight, x, y, made)
-        return made
-
-    def row(self, row: Held, unit: float) -> None:
-        """A constraint."""
-        (terms, constant), products = self.form(row.form), []
-        for pair in row.form.products:
-            for u, v in zip(*map(self.vector, pair), strict=True):
-                products += [(i, j, f * g) for i, f in u.terms.items() for j, g in v.terms.items()]
-                for a, b in ((u, v), (v, u)):
-                    for i, f in a.terms.items():
-                        terms[i] = terms.get(i, 0.0) + f * b.constant
-                constant += u.constant * v.constant
-        if row.profile is not None:
-            body, profile = row.profile
-            terms[profile.write(self.tape, self.places[3 * body + 2])] = -1.0
-        self.tape.row(terms, products, constant, row.motion, unit)
-
-    def tension(self, spring: Tension) -> tuple[tuple[Affine, Affine], int]:
-        """A tension along a vector; the vector's components, and the register of its law, -1 for none."""
-        tape, law = self.tape, -1
-        stiffness, damping, free = spring.stiffness, spring.damping, spring.free_length
-        x, y = self.vector(spring.vector)
-        span = [tape.linear(*x), tape.linear(*y)]
-        pull = tape.number(stiffness)  # tension over length
-        if free != 0.0 or damping != 0.0 or spring.law is not None:
-            square = tape.sum(tape.mul(span[0], span[0]), tape.mul(span[1], span[1]))
-            inverse = tape.power(square, -0.5)
-            if free != 0.0:
-                pull = tape.sum(inverse, f=-stiffness * free, c=stiffness)
-            if damping != 0.0 or spring.law is not None:
-                speed = [tape.rate(x.terms), tape.rate(y.terms)]
-                flow = tape.sum(tape.mul(span[0], speed[0]), tape.mul(span[1], speed[1]))
-                pull = tape.sum(pull, tape.div(flow, square), g=damping)
-            if spring.law is not None:
-                law = register(spring.law, spring.law.write(tape, tape.mul(square, inverse), tape.mul(flow, inverse)))
-                pull = tape.sum(pull, tape.mul(law, inverse))
-        for part, along in zip(span, (x, y), strict=True):
-            opposite = {i: -f for i, f in along.terms.items()}
-            tape.push(tape.mul(pull, part), opposite, told=spring.law is None)
-        return (x, y), law
-
-    def along(self, force: Along) -> tuple[Affine, int]:
-        """A force along a form; the form, and the register of the load, -1 for none."""
-        tape, form, load = self.tape, self.form(force.form), -1
-        if force.stiffness != 0.0 or force.damping != 0.0:
-            pull = tape.sum(tape.linear(*form), tape.rate(form.terms), f=-force.stiffness, g=-force.damping)
-            tape.push(pull, form.terms, told=True)
-        if isinstance(force.load, StateFunction):
-            load = register(force.load, force.load.write(self))
-            tape.push(load, form.terms)
-        elif force.load is not None:
-            load = tape.function(force.load)
-            tape.push(load, form.terms, told=True)
-        return form, load
+def write_along(bodies: BodyVariables, force: Along) -> tuple[Affine, int]:
+    """Write a force along a form; return the form, and the register of the load, -1 for none."""
+    tape, form, load = bodies.tape, bodies.form(force.form), -1
+    if force.stiffness != 0.0 or force.damping != 0.0:
+        pull = tape.sum(tape.linear(*form), tape.rate(form.terms), f=-force.stiffness, g=-force.damping)
+        tape.push(pull, form.terms, told=True)
+    if isinstance(force.load, StateFunction):
+        load = register(force.load, force.load.write(bodies))
+        tape.push(load, form.terms)
+    elif force.load is not None:
+        load = tape.function(force.load)
+        tape.push(load, form.terms, told=True)
+    return form, load
 
 
 def register(load: StateFunction | SpanFunction, number: object) -> int:
@@ -251,10 +182,10 @@ class Linkage(Written):
     def _write(self, bodies: BodyVariables) -> tuple[list[tuple[tuple[Affine, Affine], int]], list[tuple[Affine, int]]]:
         """Spans of the springs and forms of the other forces, with the registers of laws and loads."""
         for row, unit in zip(self.assembly.rows, self.units()[1], strict=True):
-            bodies.row(row, float(unit))
+            write_row(bodies, row, float(unit))
         tape, (springs, along) = bodies.tape, (self.assembly.springs, self.assembly.along)
         tape.constant[bodies.places] += self.assembly.weight
-        return [bodies.tension(spring) for _, spring in springs], [bodies.along(force) for force in along]
+        return [write_tension(bodies, spring) for _, spring in springs], [write_along(bodies, force) for force in along]
 
     @property
     def values(self) -> TapeValues:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...typing import Array
+from .bodies import Frames
 from .forces import Along, Force, StateFunction, Tension, Weight
-from .forms import Frames
 
 if TYPE_CHECKING:
-    from .linkage import BodyVariables, Linkage
+    from .linkage import Linkage
+    from .variables import BodyVariables
 
 
 @dataclass(frozen=True)
