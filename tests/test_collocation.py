@@ -23,7 +23,7 @@ from gearfe.multibody import (
     consistent_start,
     smoothed_step,
 )
-from gearfe.multibody.compiled.simd import as_lanes, lanes
+from gearfe.multibody.compiled.simd import simd_copy, simd_zeros
 from gearfe.multibody.core.start import Start
 from gearfe.multibody.core.steps import Status, StepControl, StepLaw
 from gearfe.multibody.integrators.collocation.numpy_equations import saddle_solver
@@ -93,10 +93,10 @@ def test_saddle_matrices_side_by_side(seed: int) -> None:
     without = rng.permutation(size)[:6]
     A[:, without[:, None], without] = 0.0
     b = rng.standard_normal((4, size)) + 1j * rng.standard_normal((4, size))
-    B = as_lanes(np.stack([A.real, A.imag]).transpose(3, 2, 0, 1))
-    x = as_lanes(np.stack([b.real, b.imag]).transpose(2, 0, 1))
+    B = simd_copy(np.stack([A.real, A.imag]).transpose(3, 2, 0, 1))
+    x = simd_copy(np.stack([b.real, b.imag]).transpose(2, 0, 1))
     places = np.arange(size)
-    over, right = lanes(size, 2, 4), np.minimum(places + width, size - 1)
+    over, right = simd_zeros(size, 2, 4), np.minimum(places + width, size - 1)
     pivot, low, top = np.zeros((3, size), dtype=np.int64)
     names = KERNELS.python
     assert names.factorise_band(B, over, right.copy(), pivot, low, top, right.copy())

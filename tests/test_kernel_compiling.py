@@ -13,7 +13,7 @@ import pytest
 
 from gearfe.multibody.compiled import kernels as compiled
 from gearfe.multibody.compiled.packed import Packed
-from gearfe.multibody.compiled.simd import NAMES, Lanes, as_lanes, flat, halves, highest, lanes, total
+from gearfe.multibody.compiled.simd import NAMES, SimdArray, flat, halves, highest, simd_copy, simd_zeros, total
 from gearfe.typing import Array, IntArray
 
 from .rigid_cases import by_scipy, pendulum
@@ -107,14 +107,14 @@ def hits() -> tuple[int, int]:
 
 
 class Sides(NamedTuple):
-    angles: Lanes  # (n, 4)
-    out: Lanes  # (4, n, 4)
-    wave: Lanes  # (2, 2, 4)
+    angles: SimdArray  # (n, 4)
+    out: SimdArray  # (4, n, 4)
+    wave: SimdArray  # (2, 2, 4)
     single: Array  # (3,)
 
 
 def square_order(a, i, k):  # type: ignore[no-untyped-def]
-    """Order k of a square: a sum that begins as a number and goes on with all lanes."""
+    """Order k of a square: a sum that begins as a number and goes on as a SIMD vector."""
     value = 0.0
     for p in range(k + 1):
         value += a[i, p] * a[i, k - p]
@@ -122,7 +122,7 @@ def square_order(a, i, k):  # type: ignore[no-untyped-def]
 
 
 def use_sides(sides):  # type: ignore[no-untyped-def]
-    """Everything that kernels do with lanes."""
+    """Everything that kernels do with SIMD vectors."""
     angles, out, single = sides.angles, sides.out, sides.single
     for i in range(angles.shape[0]):
         x = angles[i]
@@ -138,7 +138,7 @@ def use_sides(sides):  # type: ignore[no-untyped-def]
     return angles.shape[0]
 
 
-def test_lanes_compute_as_arrays_do(tmp_path, monkeypatch):
+def test_simd_vectors_compute_as_arrays_do(tmp_path, monkeypatch):
     """Compiled against NumPy; sines and cosines within two roundings of 1 of the library's, far from zero, too."""
     monkeypatch.setenv("GEARFE_CACHE", str(tmp_path))
     rng = np.random.default_rng(8)
@@ -148,7 +148,7 @@ def test_lanes_compute_as_arrays_do(tmp_path, monkeypatch):
     wave = rng.normal(size=(2, 2, 4))
     made = []
     for jit in (False, True):
-        sides = Sides(as_lanes(angles), lanes(4, 60, 4), as_lanes(wave), np.zeros(3))
+        sides = Sides(simd_copy(angles), simd_zeros(4, 60, 4), simd_copy(wave), np.zeros(3))
         names = compiled.bind((square_order, use_sides), {**NAMES, "np": np}, entries=("use_sides",) if jit else ())
         assert names.use_sides(Packed(sides) if jit else sides) == 60
         made.append(sides)

@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from .simd import Lanes
+from .simd import SimdArray
 
-#: Each member: type and number of axes of an array ("d", 2), of one of lanes without theirs ("v8", 1), a number
+#: Each member: type and number of axes of an array ("d", 2), of one of SIMD vectors without theirs ("v8", 1), a number
 #: ("d", -1), or the members of a named tuple.
 Members = tuple[tuple[str, Any], ...]
 #: Types of elements: float64, int64, uint64, complex128.
 ELEMENTS = "dlLD"
-#: Before the number of lanes in the type of an element of `Lanes`.
-LANES = "v"
+#: Before the width in the type of an element of a `SimdArray`.
+SIMD = "v"
 
 
 class Layout(tuple[tuple[str, Any], ...]):
@@ -63,8 +63,8 @@ def _lay_out(named: Any, words: list[int]) -> Members:
                 raise TypeError(f"{name}: {value.dtype} array, C-contiguous: {value.flags.c_contiguous}")
             words.append(_address(value))
             shape = value.shape
-            if isinstance(value, Lanes):
-                kind, shape = f"{LANES}{shape[-1]}", shape[:-1]
+            if isinstance(value, SimdArray):
+                kind, shape = f"{SIMD}{shape[-1]}", shape[:-1]
             words.extend(shape)
             members.append((name, (kind, len(shape))))
         elif isinstance(value, tuple):

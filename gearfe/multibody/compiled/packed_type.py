@@ -14,8 +14,8 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
 from numba.np import arrayobj
 
-from .packed import LANES, Members
-from .simd_type import LaneType
+from .packed import SIMD, Members
+from .simd_type import SimdType
 
 NUMBERS = {"d": types.float64, "l": types.int64, "L": types.uint64, "D": types.complex128}
 
@@ -51,7 +51,7 @@ class _Model(models.PrimitiveModel):
 def kind_of(inner: Any) -> Any:
     if not isinstance(inner[0], str):
         return PackedType(inner)
-    number = LaneType(int(inner[0][1:])) if inner[0].startswith(LANES) else NUMBERS[inner[0]]
+    number = SimdType(int(inner[0][1:])) if inner[0].startswith(SIMD) else NUMBERS[inner[0]]
     return number if inner[1] < 0 else types.Array(number, inner[1], "C")
 
 

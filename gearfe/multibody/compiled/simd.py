@@ -1,8 +1,9 @@
 """Numbers side by side: one of each of several stages, or systems of equations, which kernels take at once.
 
-The last axis of a `Lanes` array are its lanes. In NumPy it is an array like others; in compiled kernels an element of
-it is all lanes of a row, one vector of the processor, with +, -, *, /, abs, `np.maximum`, `np.sin` and `np.cos` of its
-own (`lanes_type`). Loops over stages or systems are none then, and what leads to a row is read once for all of them.
+The last axis of a `SimdArray` are the SIMD lanes of the processor. In NumPy it is an array like others; in compiled
+kernels an element of it is a whole row, one vector of the processor, with +, -, *, /, abs, `np.maximum`, `np.sin` and
+`np.cos` of its own (`simd_type`). So kernels need no loops over stages or systems, and indices of a row are read once
+for all of them.
 """
 
 from __future__ import annotations
@@ -18,21 +19,21 @@ from ...typing import Array
 ALIGNED = 64
 
 
-class Lanes(np.ndarray):
-    """An array of float64 whose last axis are lanes."""
+class SimdArray(np.ndarray):
+    """An array of float64 whose last axis is one SIMD vector."""
 
 
-def lanes(*shape: int) -> Lanes:
-    """Zeros of a shape, whose last axis are lanes."""
+def simd_zeros(*shape: int) -> SimdArray:
+    """Zeros of a shape, whose last axis is one SIMD vector."""
     raw = np.zeros(math.prod(shape) + ALIGNED // 8)
     first = -raw.ctypes.data % ALIGNED // 8
-    made: Lanes = raw[first : first + math.prod(shape)].reshape(shape).view(Lanes)
+    made: SimdArray = raw[first : first + math.prod(shape)].reshape(shape).view(SimdArray)
     return made
 
 
-def as_lanes(values: Array) -> Lanes:
-    """A copy of an array whose last axis are lanes."""
-    made = lanes(*values.shape)
+def simd_copy(values: Array) -> SimdArray:
+    """A copy of an array whose last axis is one SIMD vector."""
+    made = simd_zeros(*values.shape)
     made[...] = values
     return made
 
@@ -43,17 +44,17 @@ def flat(x: Any) -> Any:
 
 
 def halves(x: Any) -> Any:
-    """The same numbers with half as many lanes; the axis before them is the half."""
+    """The same numbers in vectors of half the width; the axis before is the half."""
     return x.reshape(*x.shape[:-1], 2, x.shape[-1] // 2)
 
 
 def total(x: Any) -> float:
-    """Sum over the lanes."""
+    """Sum over a vector."""
     return float(x.sum())
 
 
 def highest(x: Any) -> float:
-    """Largest lane, not-a-number where one is."""
+    """Largest entry; NaN where one is NaN."""
     return float(x.max())
 
 

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-call,no-untyped-def,misc"
-"""Numba's type of a row of `gearfe.multibody.compiled.simd.Lanes`: a vector of the processor.
+"""Numba's type of a row of `gearfe.multibody.compiled.simd.SimdArray`: a vector of the processor.
 
 Sine and cosine by their series about the nearest multiple of pi, whose terms beyond degree 22 are below 1e-17; the
 multiple is taken off in two parts, the first exactly by fused multiplication (Muller et al., Handbook of Floating-Point
@@ -29,10 +29,10 @@ PI, PI_REST = math.pi, 1.2246467991473532e-16
 TERMS = 12
 
 
-class LaneType(types.Type):
+class SimdType(types.Type):
     def __init__(self, width: int) -> None:
         self.width = width
-        super().__init__(name=f"Lanes({width})")
+        super().__init__(name=f"Simd({width})")
 
     def unify(self, context: Any, other: Any) -> Any:  # noqa: ARG002
         return self if isinstance(other, types.Number) else None
@@ -41,14 +41,14 @@ class LaneType(types.Type):
         return Conversion.safe if isinstance(other, types.Number) else None
 
 
-@register_model(LaneType)
+@register_model(SimdType)
 class _Model(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, ir.VectorType(DOUBLE, kind.width))
 
 
 def _spread(builder: Any, value: Any, width: int) -> Any:
-    """A number in all lanes."""
+    """A number in all entries."""
     vector = ir.VectorType(DOUBLE, width)
     one = builder.insert_element(ir.Constant(vector, ir.Undefined), value, INDEX(0))
     return builder.shuffle_vector(one, ir.Constant(vector, ir.Undefined), _mask([0] * width))
@@ -70,7 +70,7 @@ def _call(builder: Any, name: str, *args: Any) -> Any:
     return builder.call(function, args)
 
 
-@lower_cast(types.Number, LaneType)
+@lower_cast(types.Number, SimdType)
 def _cast(context: Any, builder: Any, source: Any, target: Any, value: Any) -> Any:
     return _spread(builder, context.cast(builder, value, source, types.float64), target.width)
 
@@ -93,7 +93,7 @@ def _series(builder: Any, x: Any, odd: bool) -> Any:
 
 
 def _reduced(builder: Any, x: Any, join: Any) -> Any:
-    """One number of all lanes, by halves."""
+    """One number of all entries, by halves."""
     while x.type.count > 1:
         half = x.type.count // 2
         none = ir.Constant(x.type, ir.Undefined)
@@ -112,8 +112,8 @@ def _operation(key: Any, count: int, result: Any, make: Any) -> None:
 
     class Template(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
-            kinds = [a for a in args if isinstance(a, LaneType)]
-            if kws or len(args) != count or not kinds or not all(isinstance(a, LaneType | types.Number) for a in args):
+            kinds = [a for a in args if isinstance(a, SimdType)]
+            if kws or len(args) != count or not kinds or not all(isinstance(a, SimdType | types.Number) for a in args):
                 return None
             return signature(result(kinds[0]), *[kinds[0]] * count)
 
@@ -121,7 +121,7 @@ def _operation(key: Any, count: int, result: Any, make: Any) -> None:
         return make(builder, *args)
 
     _teach(key, Template)
-    lower_builtin(key, *[LaneType] * count)(lower)
+    lower_builtin(key, *[SimdType] * count)(lower)
 
 
 def _same(kind: Any) -> Any:
@@ -167,11 +167,11 @@ def _seen_as(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 
 def _view(key: Any, kind_of: Any) -> None:
-    """Teach numba a function that sees the memory of lanes otherwise."""
+    """Teach numba a function that sees the memory of SIMD vectors otherwise."""
 
     class Template(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
-            if kws or not isinstance(args[0], types.Array) or not isinstance(args[0].dtype, LaneType):
+            if kws or not isinstance(args[0], types.Array) or not isinstance(args[0].dtype, SimdType):
                 return None
             return signature(types.Array(kind_of(args[0].dtype), args[0].ndim + 1, "C"), args[0])
 
@@ -180,4 +180,4 @@ def _view(key: Any, kind_of: Any) -> None:
 
 
 _view(flat, _number_type)
-_view(halves, lambda kind: LaneType(kind.width // 2))
+_view(halves, lambda kind: SimdType(kind.width // 2))

@@ -1,6 +1,9 @@
 """Integration by collocation at Radau and Gauss points.
 
-`run` chooses the steps, `scheme` holds the coefficients. `kernel_collocation` is one step: `kernel_equations` evaluates
-the stages, `kernel_elastic` flexible links, `kernel_matrices` solves, `kernel_stages` updates. `numpy_equations` does
-the same for elements that are not written on a tape.
+Read in this order:
+
+- `scheme`: coefficients of the stages.
+- `kernels`: one step, compiled; `numpy_equations`: the same for elements that are not written on a tape.
+- `work_space`: state, tables and scratch arrays of a step.
+- `run`: chooses the steps and keeps what they pass through.
 """

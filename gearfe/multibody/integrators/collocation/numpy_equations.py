@@ -1,10 +1,10 @@
-"""What a step of collocation asks of any system of elements, by NumPy; as `kernel_equations`, which is compiled."""
+"""What a step of collocation asks of any system of elements, by NumPy; as `kernels`, which are compiled."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +12,9 @@ from ....typing import Array
 from ...compiled import simd
 from ...core.start import Start, on_constraints
 from ...core.system import System
-from . import kernel_stages
-
-if TYPE_CHECKING:
-    from .kernel_collocation import Stages
-    from .scheme import Scheme
+from .kernels import end_state, keep_path
+from .scheme import Scheme
+from .work_space import Stages
 
 
 class SystemEquations:
@@ -38,7 +36,7 @@ class SystemEquations:
 
 
 def begin(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
-    """See `kernel_stages.begin`."""
+    """See `kernels.begin`."""
     h = w.now[1]
     w.Z[:] = w.speeds.T @ w.guess
     w.Q[:] = w.q[:, None] + h * tab.side.c * w.v[:, None] + w.Z
@@ -51,7 +49,7 @@ def begin(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
 
 
 def stages(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
-    """See `kernel_equations.stages`; all stages in one call of each element where it takes many states."""
+    """See `kernels.stages`; all stages in one call of each element where it takes many states."""
     system, s = eq.system, len(tab.c)
     t, q, v = w.now[0] + tab.side.c * w.now[1], w.Q.view(np.ndarray).T.copy(), w.V.view(np.ndarray).T.copy()
     force = system.force(t, q, v, stressed=False)
@@ -120,7 +118,7 @@ def factorise(eq: SystemEquations, w: Stages, tab: Scheme) -> bool:
 
 
 def solve(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
-    """See `kernel_matrices.solve`."""
+    """See `kernels.solve`."""
     s = len(tab.c)
     r, g = tab.back @ w.rest[:, :s].T, tab.back @ w.gap[:, :s].T
     r[0], g[0] = eq.solves[0](-r[0], -g[0] / tab.values[0, 0] ** tab.level)
@@ -132,7 +130,7 @@ def solve(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
 
 
 def change(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
-    """See `kernel_stages.change`."""
+    """See `kernels.change`."""
     s, h = len(tab.c), w.now[1]
     rates = w.dZ[:, :-1] @ tab.side.inverse / h
     w.Z[:] += w.dZ
@@ -147,7 +145,7 @@ def change(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
 
 
 def defect(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
-    """See `kernel_stages.defect`."""
+    """See `kernels.defect`."""
     system, M, h = eq.system, eq.system.mass, w.now[1]
     first, second = w.v - w.V[:, :-1] @ tab.defect, -w.rest[:, -1] - M @ (w.A[:, :-1] @ tab.defect)
     none = np.zeros(len(w.gap))
@@ -230,7 +228,7 @@ def saddle_solver(
 
 
 FUNCTIONS = (
-    begin, stages, linearise, factorise, solve, change, defect, kernel_stages.end_state, kernel_stages.keep_path,
+    begin, stages, linearise, factorise, solve, change, defect, end_state, keep_path,
     gap_between, project,
 )  # fmt: skip
 NAMES = {**simd.NAMES, "np": np, "math": math, "saddle_solver": saddle_solver,

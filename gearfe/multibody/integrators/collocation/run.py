@@ -1,6 +1,6 @@
 """Implicit integration by collocation: Radau IIA for stiff and flexible systems, Gauss where energy counts.
 
-Steps of `kernel_collocation`, compiled where the system can be written on a tape, with NumPy for elements of any other
+Steps of `kernels`, compiled where the system can be written on a tape, with NumPy for elements of any other
 kind; this module chooses their lengths and keeps what they pass through. The order goes with the tolerance.
 """
 
@@ -16,7 +16,6 @@ import numpy as np
 
 from ....progress import announce
 from ....typing import Array
-from ...compiled import simd
 from ...compiled.kernels import Kernels, bind, packed
 from ...core.contract import LocalForce
 from ...core.dense import Polynomials
@@ -24,36 +23,15 @@ from ...core.elimination import in_modes, is_linear, modal_coordinates
 from ...core.start import Start
 from ...core.steps import Status, StepControl, StepLaw, Watch, first_step
 from ...core.system import System
-from ...series import recurrences
-from ...series.ordering import narrow_order
 from ...series.tape import Program
 from ..discontinuities import TRUSTED, Corners, collocated_path, quiet_speeds
-from . import kernel_collocation, kernel_elastic, kernel_equations, kernel_matrices, kernel_stages, numpy_equations
-from .kernel_collocation import SOLVED, Stages
-from .kernel_equations import Band, Equations, Scratch, Wide
+from . import kernels, numpy_equations
+from .kernels import SOLVED
 from .numpy_equations import SystemEquations
 from .scheme import RADAU, Collocated, Scheme, path_matrix, powers_of_path, scheme
+from .work_space import equations, narrow_band, work
 
-FUNCTIONS = (
-    *recurrences.REGISTERS,
-    *kernel_elastic.FUNCTIONS,
-    *kernel_equations.FUNCTIONS,
-    *kernel_matrices.FUNCTIONS,
-    *kernel_stages.FUNCTIONS,
-    kernel_collocation.collocation_step,
-)
-HOT = ("fill", "cauchy", "weighted", "bar_strains", "coordinate", "turned")
-KERNELS = Kernels(
-    FUNCTIONS,
-    {
-        **recurrences.NAMES,
-        **kernel_matrices.NAMES,
-        **kernel_collocation.NAMES,
-        **simd.NAMES,
-    },
-    ("collocation_step",),
-    HOT,
-)
+KERNELS = Kernels(kernels.FUNCTIONS, kernels.NAMES, ("collocation_step",), kernels.HOT)
 #: Stages of a step (measured: five and nine take as long for the same error).
 STAGES = 7
 #: Steps whose polynomials are made at once; bytes of a run's steps from which on they are told.
@@ -76,8 +54,8 @@ MODES_SHARE = 0.01
 
 @lru_cache(maxsize=1)
 def _numpy_step() -> Any:
-    functions = (*numpy_equations.FUNCTIONS, kernel_collocation.collocation_step)
-    return bind(functions, {**numpy_equations.NAMES, **kernel_collocation.NAMES}).collocation_step
+    functions = (*numpy_equations.FUNCTIONS, kernels.collocation_step)
+    return bind(functions, {**numpy_equations.NAMES, **kernels.NEWTON}).collocation_step
 
 
 def run_implicit(
@@ -155,7 +133,7 @@ class Stepper:
         self.tab = tab
         elements = SystemEquations(system, start)
         s, n, m = len(tab.c), system.size, int(start.active.sum())
-        self.w = _work(s, n, m, elements.stresses, tab.inner + 4)
+        self.w = work(s, n, m, elements.stresses, tab.inner + 4)
         self.w.now[2] = SOLVED
         self.compiled, self.compile_seconds = program is not None, 0.0
         if program is None:
@@ -203,7 +181,7 @@ class Stepper:
         w.multipliers[:] = w.L[:, -2]
 
     def __call__(self, t: float, h: float, q: Array, v: Array, limit: Array) -> int:
-        """See `kernel_collocation.collocation_step`."""
+        """See `kernels.collocation_step`."""
         w = self.w
         w.now[:2], w.q[:], w.v[:], w.limit[:] = (t, h), q, v, limit
         w.guess[1:] = self._guess * h ** (self._powers[1:, None] + 1.0)
@@ -404,94 +382,3 @@ def _line_of_accelerations(count: int, h: float, begin: Array, a: Array | list[A
     coefficients[0] = begin[0] + 0.5 * begin[1] + h * h * (a[0] / 8.0 + h * slope / 48.0)
     coefficients[1:4] = v, 0.5 * middle, slope / 6.0
     return coefficients
-
-
-def _work(s: int, n: int, m: int, k: int, known: int) -> Stages:
-    """Return the arrays of a step: s stages, n coordinates, m rows, k stresses."""
-    plain = [(3,), (4,), (n,), (n,), (m,), (s + 1, n), (n,)]
-    W = s + 1
-    wide = [(s + 1, W), *[(n, W)] * 4, (m, W), (k, W), *[(n, W), (m, W)] * 3]
-    arrays: list[Array] = [np.zeros(shape) for shape in plain]
-    arrays += [simd.lanes(*shape) for shape in wide]
-    return Stages._make([*arrays, np.zeros((known, n)), np.zeros(n), np.zeros(n)])
-
-
-def equations(program: Program, band: Band, s: int, stresses: int) -> Equations:
-    """Return a program with the order of its unknowns and work arrays.
-
-    Parameters
-    ----------
-    program : Program
-        The system on a tape.
-    band : Band
-        Order of the unknowns and entries of the matrices.
-    s : int
-        Number of stages.
-    stresses : int
-        Number of stresses that are unknowns.
-    """
-    n, m, z = len(program.mass), len(program.rows.constant), len(program.mass) + len(program.curves.sign)
-    N, R = n + m, (s + 1) // 2
-    place = program.floats.place
-    widest = int(max([4, *place[:, 1], *place[:, 2]]))
-    width = int(max([4, *(2 * place[:, 1] + 4)]))
-
-    def whole(*shape: int) -> Any:
-        return np.zeros(shape, dtype=np.int64)
-
-    own = Scratch(
-        q=np.zeros(n), v=np.zeros(n), s=np.zeros(stresses), L=np.zeros(m), gap=np.zeros(m), at=np.full(1, np.nan),
-        P=np.zeros((z, 3)), R=np.zeros((len(program.code.op), 3)), TF=np.zeros((len(program.times.first) - 1, 4)),
-        pieces=whole(len(program.switches.register)), H=np.zeros((z, 1)), F=np.zeros(n), D=np.zeros((m, z)),
-        G=np.zeros((m, n)), K=np.zeros((n, n)), C=np.zeros((n, n)), B=simd.lanes(2, N, N, 2, R),
-        over=simd.lanes(2, N, 2, R), scale=simd.lanes(2, R), pivot=whole(2, N), low=whole(2, N), top=whole(2, N),
-        right=whole(N), x=simd.lanes(N, 2, R), law=np.zeros((stresses, width)), slope=np.zeros((3, 4)),
-        by=np.zeros((2, 4, 4)), shapes=np.zeros((4, widest)),
-        pairs=np.zeros((widest, widest)), drift=np.zeros(width), blocks=np.zeros((widest, width)),
-    )  # fmt: skip
-    W = s + 1
-    wide = Wide(
-        P=simd.lanes(z, 2, W), TF=simd.lanes(len(own.TF), 2, W), H=simd.lanes(z, 1, W), F=simd.lanes(n, W),
-        shapes=simd.lanes(2, widest, W), blocks=simd.lanes(widest, width, W),
-    )  # fmt: skip
-    return Equations(program, band, own, wide)
-
-
-def narrow_band(program: Program) -> Band:
-    """Which entries of the matrices may not vanish, and an order of the unknowns in which they lie in a narrow band."""
-    n, m, held = len(program.mass), len(program.rows.constant), np.argwhere(program.mass != 0.0)
-
-    of = np.append(np.arange(n), program.curves.place[:, 0])  # coordinate of each variable
-    rows, code = program.rows, program.code
-    filled = np.zeros((n, n), dtype=bool)
-    filled[tuple(held.T)] = True
-    filled[tuple(program.block.T)] = True
-    filled[of[n:], of[n:]] = True
-    pairs = of[rows.pair[:, 1:]]
-    filled[pairs[:, 0], pairs[:, 1]] = filled[pairs[:, 1], pairs[:, 0]] = True
-    for nodes in program.bars.place:
-        own = (nodes[:, None] + np.arange(3)).ravel()
-        filled[np.ix_(own, own)] = True
-    for first, modes in program.floats.place[:, :2]:
-        own = first + np.arange(2 * modes + 4)
-        filled[np.ix_(own, own)] = True
-    acting = np.unique(of[code.variable])
-    pushed = np.unique(of[code.push[:, 1]])
-    filled[np.ix_(pushed, acting)] = True
-    graph = np.zeros((n + m, n + m), dtype=bool)
-    graph[:n, :n] = filled | filled.T
-    for row, at in ((rows.place[:, 0], of[rows.place[:, 1]]), *((rows.pair[:, 0], p) for p in pairs.T)):
-        graph[n + row, at] = graph[at, n + row] = True
-    place = np.empty(n + m, dtype=np.int64)
-    place[narrow_order(graph)] = np.arange(n + m)
-    entries = np.ascontiguousarray(np.argwhere(filled).astype(np.int64))
-    graph |= np.eye(n + m, dtype=bool)
-    placed = np.zeros_like(graph)
-    placed[np.ix_(place, place)] = graph
-    last = n + m - 1 - placed[:, ::-1].argmax(axis=1)
-    reach = np.maximum.accumulate(last)  # pivots exchange rows up to it
-    first = np.searchsorted(np.maximum.accumulate(reach[reach]), np.arange(n + m))
-    return Band(
-        place, entries, program.mass[tuple(entries.T)], np.ascontiguousarray(held.astype(np.int64)),
-        program.mass[tuple(held.T)], acting, first.astype(np.int64), reach.astype(np.int64), last.astype(np.int64),
-    )  # fmt: skip

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....typing import Array
-from ...compiled.simd import Lanes, as_lanes
+from ...compiled.simd import SimdArray, simd_copy
 from ...core.dense import Polynomials
 
 RADAU, GAUSS = "Radau IIA", "Gauss"
@@ -25,21 +25,21 @@ AHEAD = 4
 
 
 class SideBySide(NamedTuple):
-    """The same coefficients for all stages at once, which lie in lanes, W = s + 1: the last one is the step's begin.
+    """The same coefficients for all stages at once, side by side, W = s + 1: the last one is the step's begin.
 
-    Of the r + 1 systems the lanes hold the real parts, then the imaginary ones.
+    Of the r + 1 systems the SIMD vectors hold the real parts, then the imaginary ones.
     """
 
     c: Array  # (W,)
     middles: Array  # (W,)
-    inverse: Lanes  # (s, W) to all stages from each
-    back: Lanes  # (s, W) to the systems from each stage
-    basis: Lanes  # (W, W) to the stages from each part
-    between: Lanes  # (k, W)
-    defect: Lanes  # (1, W)
-    ends: Lanes  # (2, W)
-    values: Lanes  # (2, r + 1)
-    over: Lanes  # (2, r + 1) of the rows where the stages hold their rates: 1 / values, else 1
+    inverse: SimdArray  # (s, W) to all stages from each
+    back: SimdArray  # (s, W) to the systems from each stage
+    basis: SimdArray  # (W, W) to the stages from each part
+    between: SimdArray  # (k, W)
+    defect: SimdArray  # (1, W)
+    ends: SimdArray  # (2, W)
+    values: SimdArray  # (2, r + 1)
+    over: SimdArray  # (2, r + 1) of the rows where the stages hold their rates: 1 / values, else 1
 
 
 class Scheme(NamedTuple):
@@ -96,22 +96,22 @@ def scheme(family: str, stages: int) -> Scheme:
     mu = np.array([values[k] for k in kept])
     level = int(family == GAUSS)
     parts = [0, *range(1, stages, 2), *range(2, stages, 2)]  # real parts, then imaginary ones but for the first
-    lane = [*range(len(kept)), *range(len(kept) + 1, stages + 1)]
+    entry = [*range(len(kept)), *range(len(kept) + 1, stages + 1)]
 
-    def wide(rows: Array) -> Lanes:
-        return as_lanes(np.pad(rows, ((0, 0), (0, stages + 1 - rows.shape[1]))))
+    def wide(rows: Array) -> SimdArray:
+        return simd_copy(np.pad(rows, ((0, 0), (0, stages + 1 - rows.shape[1]))))
 
     systems, stage = np.zeros((stages, stages + 1)), np.zeros((stages + 1, stages))
     back = np.linalg.inv(basis)
-    systems[:, lane], stage[lane] = back[parts].T, basis[:, parts].T
+    systems[:, entry], stage[entry] = back[parts].T, basis[:, parts].T
     begin = np.zeros((inner + 4, 1))
     begin[0] = 1.0
     ends = np.stack([b @ inverse, b @ inverse @ inverse])
     over = 1.0 / mu if level else np.ones(len(mu), dtype=complex)
     side = SideBySide(
-        np.append(c, 0.0), np.append(middles, 0.0), wide(inverse.T), as_lanes(systems), wide(stage),
-        as_lanes(np.hstack([between.T, begin])), wide(force[:1]), wide(ends), as_lanes(np.stack([mu.real, mu.imag])),
-        as_lanes(np.stack([over.real, over.imag])),
+        np.append(c, 0.0), np.append(middles, 0.0), wide(inverse.T), simd_copy(systems), wide(stage),
+        simd_copy(np.hstack([between.T, begin])), wide(force[:1]), wide(ends), simd_copy(np.stack([mu.real, mu.imag])),
+        simd_copy(np.stack([over.real, over.imag])),
     )  # fmt: skip
     return Scheme(
         c=c, inverse=inverse, twice=inverse @ inverse, ends=ends,

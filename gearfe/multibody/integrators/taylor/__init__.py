@@ -1,6 +1,8 @@
 """Integration by Taylor series.
 
-`run` prepares and runs systems on a tape. `kernel_run` is its loop, `kernel_steps` the length of a step;
-`kernel_singular` and `kernel_locate` pass singular positions. `modal` and `kernel_modal` integrate gear trains in modal
-coordinates.
+Read in this order:
+
+- `kernels`: the compiled loop of systems on a tape: steps, singular positions, the state on the constraints.
+- `run`: prepares and runs them.
+- `modal`, `kernel_modal`: gear trains in modal coordinates, and their compiled loop.
 """

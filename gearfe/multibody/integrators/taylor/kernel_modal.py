@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....typing import Array, IntArray
-from .kernel_steps import next_goal
+from .kernels import next_goal
 
 #: Orders that are computed in any case: a force that sets in as a polynomial of degree 5 shows up to order 7.
 LEAST = 8

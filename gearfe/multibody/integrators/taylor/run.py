@@ -1,6 +1,6 @@
 """Taylor integration of systems that can be written on a tape: orders, work space, runs.
 
-The loops are in the kernel modules.
+The loops are in `kernels` and `series.recurrences`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....typing import Array, IntArray
-from ...compiled import kernels as compiled
-from ...compiled.kernels import packed
+from ...compiled.kernels import Kernels, packed
 from ...core.dense import Polynomials
 from ...core.start import Start
 from ...core.steps import Status, Watch, run_in_pieces
@@ -22,13 +21,8 @@ from ...series import recurrences
 from ...series.row_tables import Equations, row_tables
 from ...series.work_space import Run, Work, work_space
 from ..discontinuities import load_problem_ahead
-from . import kernel_locate, kernel_run, kernel_singular, kernel_steps
+from . import kernels
 
-FUNCTIONS = (
-    *recurrences.FUNCTIONS, *kernel_singular.FUNCTIONS, *kernel_locate.FUNCTIONS, *kernel_steps.FUNCTIONS,
-    *kernel_run.FUNCTIONS,
-)  # fmt: skip
-NAMES = {**recurrences.NAMES, **kernel_singular.NAMES, **kernel_locate.NAMES, **kernel_run.NAMES}
 HOT = (
     "fill", "copy", "cauchy", "weighted", "horner", "largest", "margin", "lower_knot", "own_piece", "curve_orders",
     "curve_forces", "variables", "rates", "gradients", "residuals", "times_gradients", "add_transposed",
@@ -37,7 +31,10 @@ HOT = (
 )  # fmt: skip
 
 
-KERNELS = compiled.Kernels((*FUNCTIONS, *kernel_run.STARTERS), NAMES, ("integrate_series", "sample"), HOT)
+KERNELS = Kernels(
+    (*recurrences.FUNCTIONS, *kernels.FUNCTIONS, *kernels.STARTERS), {**recurrences.NAMES, **kernels.NAMES},
+    ("integrate_series", "sample"), HOT,
+)  # fmt: skip
 #: Steps of the first piece, and most coefficients in a piece.
 FIRST_STEPS, MOST_NUMBERS = 64, 2_000_000
 #: Distance from a pole, as a share of the way to it, at which loads are asked for their side of it.
@@ -94,10 +91,10 @@ def load_kernels(prepared: TaylorRun, run: Run) -> float:
     width = prepared.work.q.size
     times, coefficients = np.zeros(2), np.zeros((1, run.order + 1, width))
     state = first_state(run.end)
-    state[kernel_run.BEGUN] = 1.0
+    state[kernels.BEGUN] = 1.0
 
     def nothing() -> None:
-        out = kernel_run.Output(state, times, coefficients, *np.zeros((2, 1), dtype=np.int64))
+        out = kernels.Output(state, times, coefficients, *np.zeros((2, 1), dtype=np.int64))
         KERNELS.compiled.integrate_series(*prepared.handed, packed(run), packed(out))
         _sampler(times, coefficients, 1.0, np.zeros(1), 0, np.zeros((1, width)))
 
@@ -105,7 +102,7 @@ def load_kernels(prepared: TaylorRun, run: Run) -> float:
 
 
 def first_state(begin: float) -> Array:
-    """State of a run that has not begun, see `kernel_run`."""
+    """State of a run that has not begun, see `kernels`."""
     return np.array([begin, 0.0, math.inf, 0.0, 0.0, -1.0])
 
 
@@ -162,7 +159,7 @@ def run_taylor(
     def fill(room: int) -> tuple[int, float, int]:
         times, coefficients = np.empty(room + 1), np.empty((room, order + 1, width))
         singular = np.zeros(room, dtype=np.int64)
-        out = kernel_run.Output(state, times, coefficients, singular, made)
+        out = kernels.Output(state, times, coefficients, singular, made)
         status = advance(*handed, packed(out)) if covered else Status.NOT_FINITE
         if status == Status.SINGULAR_START:
             rows, shift, ahead, row, status = KERNELS.python.begin(tables, w, run, t0)
@@ -170,13 +167,13 @@ def run_taylor(
             if status == Status.DONE:
                 return fill(room)
             made[0] = 0
-        times[0] = state[kernel_run.TIME] if made[0] == 0 else times[0]
+        times[0] = state[kernels.TIME] if made[0] == 0 else times[0]
         count = int(made[0])
         parts.append((times[: count + 1], coefficients[:count], singular[:count]))
-        return status, float(state[kernel_run.TIME]), count
+        return status, float(state[kernels.TIME]), count
 
     def look(t: float, steps: int, moving: Callable[[], tuple[Array, Array]]) -> bool:
-        regular = state[kernel_run.SINGULAR] == 0.0
+        regular = state[kernels.SINGULAR] == 0.0
         return watch is None or (steps > 0 and not regular) or watch(t, steps, moving)
 
     with np.errstate(all="ignore"):
@@ -186,7 +183,7 @@ def run_taylor(
         )  # fmt: skip
     problem = ""
     if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE):
-        problem = _load_problem(shared, run, float(state[kernel_run.TIME]), status)
+        problem = _load_problem(shared, run, float(state[kernels.TIME]), status)
         status = Status.NOT_FINITE if problem else status
     shared.spare.append((w, both[1]))
     ends = np.concatenate([parts[0][0], *(p[0][1:] for p in parts[1:])])
@@ -224,4 +221,4 @@ def _load_problem(shared: TaylorRun, run: Run, t: float, status: Status) -> str:
 
 def _sampler(times: Array, coefficients: Array, sign: float, t: Array, derivative: int, out: Array) -> None:
     """Evaluate the polynomials of a run by compiled code, see `Polynomials`."""
-    KERNELS.compiled.sample(packed(kernel_steps.Samples(times, coefficients, sign, t, derivative, out)))
+    KERNELS.compiled.sample(packed(kernels.Samples(times, coefficients, sign, t, derivative, out)))
