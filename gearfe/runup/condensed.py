@@ -116,7 +116,7 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     )  # fmt: skip
     sense = drive_sense(model.train.driven.speed) or 1.0
     steady = model.kinematics.steady_forces
-    ends = np.cumsum([0, *map(len, model.sides)]).tolist()
+    ends = np.cumsum([0, *(len(line.flanks) for line in model.meshes)]).tolist()
     of_mesh = tuple(tuple(range(a, b)) for a, b in itertools.pairwise(ends))
     mesh_of = {number: mesh for mesh, numbers in enumerate(of_mesh) for number in numbers}
     rubbing = [_rubbing(model, flank, mesh_of[i], float(steady[mesh_of[i]])) for i, flank in enumerate(flanks)]
@@ -140,13 +140,12 @@ def _rubbing(model: TrainModel, flank: Flank, mesh: int, force: float) -> Rubbin
     """Friction of a flank of a mesh, whose coefficient may follow from the speed."""
     if flank.sliding is None:
         return None
-    train, given = model.train, model.train.meshes[mesh].friction
+    line = model.meshes[mesh]
+    oil = line.given.friction
     coefficient = None
-    if isinstance(given, Lubrication):
-        one, two = (train.gear(name).gear for name in (train.meshes[mesh].driver, train.meshes[mesh].driven))
-        pair = MeshGeometry(one, two, train.meshes[mesh].centre_distance)
-        coefficient = partial(_of_drive, given, pair, force, flank.ratio)
-    return Rubbing(flank.sliding, fastest(train.driven.speed), coefficient)
+    if isinstance(oil, Lubrication):
+        coefficient = partial(_of_drive, oil, line.pair, force, flank.ratio)
+    return Rubbing(flank.sliding, fastest(model.train.driven.speed), coefficient)
 
 
 def _of_drive(oil: Lubrication, pair: MeshGeometry, force: float, ratio: float, speed: float) -> float:

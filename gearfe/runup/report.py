@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..gear.derived import dynamic_factor
-from ..gear.pair import MeshGeometry
 from ..gearbox.radiation import power_level
 from ..train.response import XYZ
 from ..typing import Array, IntArray
@@ -122,16 +121,17 @@ def iso_dynamic_factors(run: RunUp, mesh: int) -> Array:
     with the mesh's own mean stiffness, and all that turns with its gears.
     """
     model = run.train.model
-    line, given = model.meshes[mesh], model.train.meshes[mesh]
-    one, two = (model.train.gear(name) for name in (given.driver, given.driven))
+    line = model.meshes[mesh]
+    one, two = (model.train.gear(name) for name in (line.given.driver, line.given.driven))
     inertia = [model.shafts[model.train.shaft_number(gear.shaft)].rotor.polar for gear in (one, two)]
     mass = 1.0 / sum(gear.gear.base_radius**2 / polar for gear, polar in zip((one, two), inertia, strict=True))
     relief = min(0.0 if g.gear.tip_relief is None else g.gear.tip_relief.amount for g in (one, two))
     force = abs(float(run.train.steady[mesh]))
     if not force > 0.0:
         return np.full(len(run.speeds), np.nan)
-    pair, speeds = MeshGeometry(one.gear, two.gear, given.centre_distance), line.ratio * run.speeds
-    return dynamic_factor(pair, speeds, stiffness=line.mean, mass=mass, force=force, relief=relief)
+    return dynamic_factor(
+        line.pair, line.ratio * run.speeds, stiffness=line.mean, mass=mass, force=force, relief=relief
+    )
 
 
 def power_in_band(state: SteadyState, band_hz: float) -> float:

@@ -29,6 +29,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,7 @@ from .elements import LinearForce, RigidShaft
 from .forces import CurveFlank, Flank, LawFlank
 from .friction import CREEP, NEAR, Lubrication, Sliding
 from .gear_train import GearMesh, GearTrain
+from .kinematics import fastest
 
 #: Least force F0 of a mesh's damping, in parts of the largest that its law is known for.
 LEAST_REFERENCE = 0.01
@@ -50,87 +52,108 @@ PHASES = 72
 
 @dataclass(frozen=True, eq=False)
 class MeshLine:
-    """Where and how a mesh acts.
+    """A gear mesh in its train: where it acts, and the flanks that act there.
+
+    The compiled series (`gearfe.train.series`) has the numbers of the flanks as the columns of its tables.
 
     Attributes
     ----------
-    name
-        ``driver-driven``.
-    row, back : (system size,)
-        Approach of the driving and of the back flanks for unit coordinates of the system.
-    turn : (system size,)
-        Rotation of the driver that the phase follows.
-    direction, point : (3,)
-        n and P (m).
-    curve
-        Stiffness over the driver's rotation; None for a rigid mesh, and for one with a law.
-    law
-        Mesh law, or None.
-    backlash
-        j (m); None: without back flanks, a curve then acts both ways.
-    mean, damping
-        Mean of k (N/m), infinite for a rigid mesh; d (N s/m), the Rayleigh part included.
-    rayleigh
-        The Rayleigh part (N s/m). Of a damper that acts in contact only it stands in the constant part, which then is
-        damped alike in all modes, and the forces of the flanks take it off again.
-    in_contact
-        Whether the damper acts in contact only, the Rayleigh part included.
-    reference
-        F0 (N) of a law.
+    given
+        The mesh as described.
+    pair
+        Its gears, the driver as pinion.
     driver
         Number of the driver's shaft.
-    ratio, sense, phase
-        Ratio of the driver's shaft to the drive, its driving sense (+1 or -1), start of the curve (rad).
-    module
-        m.
-    slides : (3, system size)
-        Displacement of the driver against the driven gear at P across both lines of action, a x n and a x n_b, and the
-        driver's turn against the driven gear's.
-    shifts : (two arrays)
-        How much later the pairs of the driving and of the back flanks touch (m), see `gearfe.train.phases.pair_shifts`.
-    sliding
-        Friction, the numbers of its directions still to be filled in; None without.
+    direction, point : ndarray, shape (3,)
+        n and P (m).
+    row : ndarray, shape (system size,)
+        Approach of the driving flanks for unit coordinates of the system.
+    columns : tuple of ndarray, shape (system size,)
+        Directions that its flanks count: approaches, then of a law the driver's turn, then those of friction.
+    flanks
+        Driving flanks, and the back flanks behind a backlash; none of a rigid mesh.
+    rayleigh
+        Rayleigh part of its damping (N s/m). Of a damper that acts in contact only it stands in the constant part,
+        which then is damped alike in all modes, and the forces of the flanks take it off again.
+    reference
+        F0 (N) of a law.
     """
 
-    name: str
-    row: Array
-    back: Array
-    turn: Array
+    given: GearMesh
+    pair: GearPair
+    driver: int
     direction: Array
     point: Array
-    curve: PeriodicInterpolant | None
-    law: MeshLaw | None
-    backlash: float | None
-    mean: float
-    damping: float
+    row: Array
+    columns: tuple[Array, ...]
+    flanks: tuple[Flank, ...]
     rayleigh: float
-    in_contact: bool
     reference: float
-    driver: int
-    ratio: float
-    sense: float
-    phase: float
-    module: float
-    slides: Array
-    sliding: Sliding | None
-    shifts: tuple[Array, Array]
 
     @property
-    def columns(self) -> list[Array]:
-        """Directions of its flanks: approaches, then of a law the driver's turn, then those of friction."""
-        if self.rigid:
-            return []
-        made = [self.row] + ([] if self.backlash is None else [self.back])
-        if self.law is not None:
-            made.append(self.turn)
-        if self.sliding is not None:
-            made += [self.slides[0], self.slides[2]] + ([] if self.backlash is None else [self.slides[1]])
-        return made
+    def name(self) -> str:
+        """``driver-driven``."""
+        return self.given.name
+
+    @property
+    def module(self) -> float:
+        """Of the gears (m)."""
+        return self.pair.pinion.module
 
     @property
     def rigid(self) -> bool:
         """Whether the mesh is a constraint."""
-        return self.curve is None and self.law is None
+        return not self.flanks
+
+    @property
+    def curve(self) -> PeriodicInterpolant | None:
+        """Stiffness over the driver's rotation; None for a rigid mesh, and for one with a law."""
+        return next((flank.curve for flank in self.flanks if isinstance(flank, CurveFlank)), None)
+
+    @property
+    def law(self) -> MeshLaw | None:
+        """Mesh law of the driving flanks, or None."""
+        return next((flank.law for flank in self.flanks if isinstance(flank, LawFlank)), None)
+
+    @property
+    def backlash(self) -> float | None:
+        """Normal backlash j (m); None: without back flanks, a curve then acts both ways."""
+        return self.flanks[1].gap if len(self.flanks) > 1 else None
+
+    @property
+    def mean(self) -> float:
+        """Mean of k (N/m), infinite for a rigid mesh."""
+        return self.flanks[0].mean if self.flanks else math.inf
+
+    @property
+    def damping(self) -> float:
+        """d (N s/m), the Rayleigh part included."""
+        return self.given.damping + self.rayleigh
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether the damper acts in contact only, the Rayleigh part included."""
+        return self.given.damps_in_contact
+
+    @property
+    def ratio(self) -> float:
+        """Ratio of the driver's shaft to the drive, of a mesh that is not rigid."""
+        return self.flanks[0].ratio
+
+    @property
+    def sense(self) -> float:
+        """Driving sense (+1 or -1) of the driver, of a mesh that is not rigid."""
+        return self.flanks[0].sense
+
+    @property
+    def phase(self) -> float:
+        """Phase at the start (rad) of a mesh that is not rigid."""
+        return self.flanks[0].phase
+
+    @property
+    def sliding(self) -> Sliding | None:
+        """Friction of the driving flanks; None without."""
+        return self.flanks[0].sliding if self.flanks else None
 
     @property
     def pulls(self) -> bool:
@@ -161,25 +184,6 @@ class MeshLine:
         damping = self.rayleigh if self.in_contact else self.damping
         return LinearForce(tuple(bodies), damping * square, self.mean * square, f"mesh {self.name}")
 
-    def flanks(self, first: int) -> tuple[Flank, ...]:
-        """Driving and back flanks, `first` the number of their first direction, see `columns`."""
-        ends = [(1.0, self.mean, 0.0)] + ([] if self.backlash is None else [(-1.0, 0.0, self.backlash)])
-        turn = first + len(ends) if self.law is not None else 3 * self.driver + 2
-        made: list[Flank] = []
-        for number, (side, mean, gap) in enumerate(ends):
-            place = (first + number, turn, self.ratio, side * self.sense, side * self.phase, mean, gap)
-            damping = self.damping if self.in_contact else 0.0
-            mean_damping = self.rayleigh if self.in_contact and number == 0 else 0.0
-            if self.law is not None:
-                sliding = self.sliding
-                if sliding is not None:
-                    sliding = replace(sliding, across=turn + 1 + 2 * number, spin=turn + 2)
-                law, chi = self.law.sides[number], damping / self.reference
-                made.append(LawFlank(*place, law, chi, sliding, self.shifts[number], mean_damping))
-            elif self.curve is not None:
-                made.append(CurveFlank(*place, self.curve, not self.pulls, damping, mean_damping))
-        return tuple(made)
-
 
 @dataclass(frozen=True)
 class Shafts:
@@ -203,44 +207,86 @@ class Shafts:
     size: int
 
 
-@dataclass(frozen=True)
-class OperatingPoint:
-    """Of a mesh: driving sense of its driver, phase of its teeth (rad), force in steady running (N), largest speed of
-    the drive (rad/s), and the shifts of its tooth pairs.
-    """
+class _Directions(NamedTuple):
+    """Directions of a mesh in the coordinates of the system (system size,), and its line of action."""
 
-    sense: float
-    phase: float
-    force: float
-    speed: float
-    shifts: tuple[Array, Array]
+    direction: Array  # n (3,)
+    point: Array  # P (m), (3,)
+    row: Array  # approach of the driving flanks
+    back: Array  # approach of the back flanks
+    turn: Array  # the driver's rotation relative to the line of centres
+    across: tuple[Array, Array]  # displacement of driver against driven gear at P along a x n and a x n_b
+    spin: Array  # the driver's turn against the driven gear's
 
 
-def mesh_line(train: GearTrain, mesh: GearMesh, shafts: Shafts, running: OperatingPoint) -> MeshLine:
-    """Return the line of action of a mesh in a train, with its constant stiffness and damping.
-
-    Parameters
-    ----------
-    train : GearTrain
-        The train.
-    mesh : GearMesh
-        One of its meshes.
-    shafts : Shafts
-        Bodies, and the numbers of their coordinates.
-    running : OperatingPoint
-        Driving sense, phase, force, speed and pitch errors of the mesh.
+def mesh_lines(train: GearTrain, shafts: Shafts) -> tuple[MeshLine, ...]:
+    """Records of all meshes of a train, whose directions follow three of each shaft.
 
     Raises
     ------
     InputError
         If friction follows from the lubrication and the gears stand still.
     """
-    first, size, ratios, sense, force = shafts.first, shafts.size, shafts.ratios, running.sense, running.force
+    lines: list[MeshLine] = []
+    first = 3 * len(shafts.bodies)
+    for number in range(len(train.meshes)):
+        lines.append(_mesh_line(train, number, shafts, first))
+        first += len(lines[-1].columns)
+    return tuple(lines)
+
+
+def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> MeshLine:
+    """The record of one mesh, `first` the number of its first direction."""
+    mesh, rolled = train.meshes[number], train.kinematics
+    force, sense, shifts = float(rolled.steady_forces[number]), rolled.senses[number], rolled.shifts[number]
     driver, driven = train.gear(mesh.driver), train.gear(mesh.driven)
     i, j = train.shaft_number(driver.shaft), train.shaft_number(driven.shaft)
-    a = train.frame[2]
-    pair = gear_pair(driver.gear, driven.gear, mesh.centre_distance)
-    alpha = pair.working_pressure_angle
+    ratio, pair = shafts.ratios[i], gear_pair(driver.gear, driven.gear, mesh.centre_distance)
+    along = _directions(train, mesh, pair, sense, shafts)
+    law, backlash, mean, reference = _stiffness(mesh, force)
+    rayleigh = 0.0 if mesh.stiffness is None else train.damping.beta * mean
+    in_contact = (mesh.damping + rayleigh, rayleigh) if mesh.damps_in_contact else (0.0, 0.0)
+    sliding = _sliding(mesh, pair, force, (ratio, shafts.ratios[j]), fastest(train.driven.speed))
+    ends = [(1.0, mean, 0.0, in_contact[1])] + ([] if backlash is None else [(-1.0, 0.0, backlash, 0.0)])
+    columns, flanks = [along.row, along.back][: len(ends)], list[Flank]()
+    turn = 3 * i + 2
+    if law is not None:
+        turn = first + len(columns)
+        columns.append(along.turn)
+        if sliding is not None:
+            columns += [along.across[0], along.spin, along.across[1]][: 1 + len(ends)]
+    for side, (sign, stiffness, gap, mean_damping) in enumerate(ends):
+        place = (first + side, turn, ratio, sign * sense, sign * rolled.phases[number], stiffness, gap)
+        if law is not None:
+            rubs = None if sliding is None else replace(sliding, across=turn + 1 + 2 * side, spin=turn + 2)
+            chi = in_contact[0] / reference
+            flanks.append(LawFlank(*place, law.sides[side], chi, rubs, shifts[side], mean_damping))
+        elif mesh.stiffness is not None:
+            flanks.append(CurveFlank(*place, mesh.interpolant(), backlash is not None, in_contact[0], mean_damping))
+    return MeshLine(
+        mesh, pair, i, along.direction, along.point, along.row, tuple(columns) if flanks else (), tuple(flanks),
+        rayleigh, reference,
+    )  # fmt: skip
+
+
+def _stiffness(mesh: GearMesh, force: float) -> tuple[MeshLaw | None, float | None, float, float]:
+    """Law and backlash (m) of a mesh, or None; its mean stiffness (N/m); F0 (N) under a steady force (N)."""
+    law = mesh.stiffness
+    if law is None:
+        return None, mesh.backlash, math.inf, 1.0
+    if not isinstance(law, MeshLaw):
+        return None, mesh.backlash, mesh.interpolant().mean, 1.0
+    reference = min(max(abs(force), LEAST_REFERENCE * law.largest_force), law.largest_force)
+    backlash = law.backlash if mesh.backlash is None and law.backlash > 0.0 else mesh.backlash
+    return law, backlash, mean_tangent(law, reference), reference
+
+
+def _directions(train: GearTrain, mesh: GearMesh, pair: GearPair, sense: float, shafts: Shafts) -> _Directions:
+    """Directions of a mesh whose driver pushes in a sense (+1 or -1)."""
+    first, size = shafts.first, shafts.size
+    driver, driven = train.gear(mesh.driver), train.gear(mesh.driven)
+    i, j = train.shaft_number(driver.shaft), train.shaft_number(driven.shaft)
+    a, alpha = train.frame[2], pair.working_pressure_angle
     base = np.array(train.shaft(driver.shaft).point)
     arm = np.array(train.shaft(driven.shaft).point) - base
     arm = arm - (arm @ a) * a
@@ -260,48 +306,13 @@ def mesh_line(train: GearTrain, mesh: GearMesh, shafts: Shafts, running: Operati
 
     line = math.cos(alpha) * sense * along + math.sin(alpha) * across
     back = -math.cos(alpha) * sense * along + math.sin(alpha) * across
-    turn = np.zeros(size)
-    curve, law, backlash, mean, rayleigh, reference = None, None, mesh.backlash, math.inf, 0.0, 1.0
-    if isinstance(mesh.stiffness, MeshLaw):
-        law = mesh.stiffness
-        turn = relative(along / distance, centre, centre + arm)
-        reference = min(max(abs(force), LEAST_REFERENCE * law.largest_force), law.largest_force)
-        mean = mean_tangent(law, reference)
-        if backlash is None and law.backlash > 0.0:
-            backlash = law.backlash
-    elif mesh.stiffness is not None:
-        curve = mesh.interpolant()
-        mean = curve.mean
+    turn = relative(along / distance, centre, centre + arm)
     turn[first[i] + 5] += 1.0
-    if mesh.stiffness is not None:
-        rayleigh = train.damping.beta * mean
     spin = np.zeros(size)
     spin[first[i] + 5], spin[first[j] + 5] = 1.0, -1.0
-    slides = np.array([*(relative(np.cross(a, n), point, point) for n in (line, back)), spin])
-    return MeshLine(
-        name=mesh.name,
-        row=relative(line, point, point),
-        back=relative(back, point, point),
-        turn=turn,
-        direction=line,
-        point=point,
-        curve=curve,
-        law=law,
-        backlash=backlash,
-        mean=mean,
-        damping=mesh.damping + rayleigh,
-        rayleigh=rayleigh,
-        in_contact=mesh.damps_in_contact,
-        reference=reference,
-        driver=i,
-        ratio=ratios[i],
-        sense=sense,
-        phase=running.phase,
-        module=driver.gear.module,
-        slides=slides,
-        sliding=_sliding(mesh, pair, force, (ratios[i], ratios[j]), running.speed),
-        shifts=running.shifts,
-    )
+    slides = relative(np.cross(a, line), point, point), relative(np.cross(a, back), point, point)
+    rows = relative(line, point, point), relative(back, point, point)
+    return _Directions(line, point, *rows, turn, slides, spin)
 
 
 def _sliding(mesh: GearMesh, pair: GearPair, force: float, ratios: tuple[float, float], speed: float) -> Sliding | None:

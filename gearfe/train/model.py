@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import islice
 
 import numpy as np
 
@@ -24,10 +23,10 @@ from ..typing import Array, IntArray
 from .bearings import BearingLoads, bearing_loads, bore_motion
 from .checks import check_train
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge, rotor
-from .forces import Flank, Gyro, TrainForces, derivative
+from .forces import Gyro, TrainForces, derivative
 from .gear_train import Drive, GearTrain
-from .kinematics import Kinematics, fastest, load_end
-from .mesh_element import MeshLine, OperatingPoint, Shafts, mesh_line
+from .kinematics import Kinematics, load_end
+from .mesh_element import MeshLine, Shafts, mesh_lines
 from .program import train_series
 
 
@@ -46,7 +45,7 @@ class TrainModel(Facts):
     shafts, housing
         Bodies.
     meshes
-        Lines of action.
+        The record of each mesh.
     torques
         Pairs (direction in the system, torque over time): loads, and the shafts' inertia under a changing drive.
     forces, directions
@@ -120,13 +119,6 @@ class TrainModel(Facts):
         return np.sqrt(np.maximum(self.modal.eigenvalues, 0.0)) / (2.0 * math.pi)
 
     @cached_property
-    def sides(self) -> tuple[tuple[Flank, ...], ...]:
-        """Flanks of each mesh: none of a rigid one, else the driving ones, and the back ones behind a backlash."""
-        left = iter(self.forces.flanks)
-        counts = (0 if line.rigid else 1 if line.backlash is None else 2 for line in self.meshes)
-        return tuple(tuple(islice(left, count)) for count in counts)
-
-    @cached_property
     def bearings(self) -> BearingLoads:
         """Loads on the bores that carry shafts."""
         shafts = Shafts(self.shafts, self.first, tuple(self.ratios), self.system.size)
@@ -179,7 +171,7 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
     first = np.array([0 if housing is None else housing.size] + [6] * (len(shafts) - 1)).cumsum()
     size = sum(b.size for b in bodies)
     placed = Shafts(shafts, first, tuple(ratios), size)
-    lines = lines or _mesh_lines(train, placed)
+    lines = lines or mesh_lines(train, placed)
     torques = _torques(train, placed, angle)
     forces, directions = _forces(train, lines, torques, angle, placed)
     series = train_series(forces)
@@ -206,17 +198,6 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
         axial=_axial(train, size),
         bores=_used_bores(train),
     )
-
-
-def _mesh_lines(train: GearTrain, placed: Shafts) -> tuple[MeshLine, ...]:
-    rolled, speed = train.kinematics, fastest(train.driven.speed)
-    points = (
-        OperatingPoint(sense, phase, float(force), speed, shifts)
-        for sense, phase, force, shifts in zip(
-            rolled.senses, rolled.phases, rolled.steady_forces, rolled.shifts, strict=True
-        )
-    )
-    return tuple(mesh_line(train, mesh, placed, point) for mesh, point in zip(train.meshes, points, strict=True))
 
 
 def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tuple[Array, TimeFunction], ...]:
@@ -249,14 +230,12 @@ def _forces(
         gyros = tuple(
             Gyro(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(shafts.ratios, shafts.bodies, strict=True))
         )
-    flanks: list[Flank] = []
-    for line in lines:
-        flanks += line.flanks(len(columns))
-        columns += line.columns
+    columns += [column for line in lines for column in line.columns]
+    flanks = tuple(flank for line in lines for flank in line.flanks)
     at = len(columns)
     columns += [direction for direction, _ in torques]
     numbered = tuple((at + i, function) for i, (_, function) in enumerate(torques))
-    made = TrainForces(len(columns), angle, gyros, tuple(flanks), numbered)
+    made = TrainForces(len(columns), angle, gyros, flanks, numbered)
     return made, np.array(columns).T
 
 

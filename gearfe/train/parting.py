@@ -59,9 +59,10 @@ def apart_in_steps(model: TrainModel, trajectory: Trajectory, until: float) -> t
     middle = 0.5 * (u[:-1] + u[1:]) + 0.125 * h * (du[:-1] - du[1:])
     angle = model.angle(0.5 * (ends[:-1] + ends[1:]))
     apart = np.zeros((len(angle), len(model.meshes)), dtype=bool)
-    for i, sides in enumerate(model.sides):
-        if sides:
-            apart[:, i] = ~np.any([flank.bears(*flank.phase_and_approach(angle, middle)) for flank in sides], axis=0)
+    for i, line in enumerate(model.meshes):
+        if not line.rigid:
+            touching = [flank.bears(*flank.phase_and_approach(angle, middle)) for flank in line.flanks]
+            apart[:, i] = ~np.any(touching, axis=0)
     return ends, apart
 
 
@@ -83,8 +84,8 @@ def beyond_law(model: TrainModel, moved: TrainStates) -> tuple[int, str] | None:
     """The first sample at which a mesh goes beyond the range of its law, and the cure."""
     first: tuple[int, str] | None = None
     u = moved.q @ model.directions
-    for i, (line, sides) in enumerate(zip(model.meshes, model.sides, strict=True)):
-        for flank in sides:
+    for i, line in enumerate(model.meshes):
+        for flank in line.flanks:
             if not isinstance(flank, LawFlank):
                 continue
             phase, approach = flank.phase_and_approach(model.angle(moved.time), u)

@@ -97,7 +97,7 @@ def _contact_forces(
             out[:, i] = multipliers[f"mesh {line.name}"]
             continue
         apart[:, i] = not line.pulls
-        for side in (1.0,) if line.backlash is None else (1.0, -1.0):
+        for side in (1.0, -1.0)[: len(line.flanks)]:
             forces = next(flank_forces)
             out[:, i] += side * forces.force
             apart[:, i] &= forces.force == 0.0
