@@ -25,7 +25,7 @@ from ..errors import InputError
 from ..files import write_csv
 from ..gear.face import NOMINAL
 from ..gear.pair import GearPair
-from ..progress import count, one_thread, stage
+from ..progress import one_thread, stage
 from ..shown import Facts
 from ..typing import Array, BoolArray, IntArray
 from .curve import SOLVED, StiffnessCurve, as_text
@@ -244,14 +244,12 @@ def check_positions(
     with stage("whole gears"), one_thread():
         whole = whole_pair(pair, model.changed(law=law), kinematics)
         unknowns = int(whole.bodies.unknowns.size)
-        for done, (angle, own_twist) in enumerate(zip(curve.pinion_angle[at], twist, strict=True)):
-            count(done, len(at), "positions")
-            if math.isnan(own_twist):
+        for k, (angle, deflection) in enumerate(zip(curve.pinion_angle[at], twist, strict=True)):
+            if math.isnan(deflection):
                 positions.append(WholePosition(NO_TWIST))
                 continue
-            solved = solve_position(whole, law, float(angle), float(own_twist + curve.lost_motion))
-            positions.append(solved)
-        count(len(at), len(at), "positions")
+            with stage(f"position {k + 1} of {len(at)}"):
+                positions.append(solve_position(whole, law, float(angle), float(deflection + curve.lost_motion)))
     status = np.array([position.status for position in positions])
     torque = np.array([position.torque_wheel for position in positions])
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
+from ...progress import count
 from ...typing import Array, IntArray
 from .contact_state import ContactState, contact_at
 from .problem import ContactProblem
@@ -80,6 +81,7 @@ def solve_contact(
     free = np.setdiff1d(np.arange(problem.unknowns.size), problem.fixed)
     residuals, newton = [np.inf], None
     for iteration in range(MAX_ITERATIONS):
+        count(iteration, None, "Newton iterations")
         if newton is None:
             newton = _Linearised(problem, state, free)
         step = newton.step(problem, state, internal)
