@@ -146,5 +146,19 @@ class GearData:
 
 
 def nominal_span(z: int, x: float, angle: float, k: int) -> float:
-    """Span size W_k/m = cos(alpha) [(k - 1/2) pi + z inv(alpha)] + 2 x sin(alpha) without thinning (times module)."""
+    """Return the span size over module without thinning.
+
+    W_k/m = cos(alpha) [(k - 1/2) pi + z inv(alpha)] + 2 x sin(alpha).
+
+    Parameters
+    ----------
+    z : int
+        Number of teeth.
+    x : float
+        Profile shift coefficient.
+    angle : float
+        Pressure angle alpha (rad).
+    k : int
+        Number of teeth spanned.
+    """
     return math.cos(angle) * ((k - 0.5) * math.pi + z * inv(angle)) + 2.0 * x * math.sin(angle)

@@ -144,7 +144,19 @@ class MeshGeometry:
         return math.pi + math.pi / self.wheel.teeth
 
     def tooth_angle(self, gear: int, tooth: Any, pinion_angle: Any, twist: Any) -> Any:
-        """Angle (rad) of the frame of a tooth of the pinion (gear 0) or wheel (gear 1); numbers or arrays."""
+        """Return the angle of the frame of a tooth (rad).
+
+        Parameters
+        ----------
+        gear : int
+            0 for the pinion, 1 for the wheel.
+        tooth : int or ndarray
+            Number of the tooth.
+        pinion_angle : float or ndarray
+            Pinion angle (rad).
+        twist : float or ndarray
+            Twist of the wheel from the centred position (rad).
+        """
         if gear == 0:
             return pinion_angle + tooth * self.mesh_cycle
         wheel = self.wheel_phase + 2.0 * math.pi * tooth / self.wheel.teeth

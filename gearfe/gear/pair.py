@@ -145,7 +145,19 @@ def gear_of_form(teeth: int, form: Mapping[str, Any]) -> Gear:
 
 
 def in_keys(error: InputError, where: str, *, key: str = "", unit: float = 0.0) -> InputError:
-    """The error of an argument of `Gear` as that of its key in a table, in the key's unit."""
+    """Return the error of an argument of `Gear` as that of its key in a table, in the key's unit.
+
+    Parameters
+    ----------
+    error : InputError
+        The error.
+    where : str
+        Table of the key, for the message.
+    key : str
+        Key, if it is not the usual one.
+    unit : float
+        Unit of the key in SI; 0 for the usual one.
+    """
     named, own = KEYS.get(error.field, (error.field, 1.0))
     value = float(f"{error.value / (unit or own):.12g}") if isinstance(error.value, float) else error.value
     return InputError(f"{where}.{key or named}", value, error.problem, error.cure)

@@ -71,7 +71,17 @@ OUTSIDE = 1e-6
 
 
 def cauchy(a: Array, i: int, b: Array, j: int, k: int) -> float:
-    """Order k of the product of the series i of a and j of b."""
+    """Return order k of the product of two series, sum_p a_p b_(k-p).
+
+    Parameters
+    ----------
+    a, b : ndarray or SIMD, shape (rows, orders[, W])
+        Series.
+    i, j : int
+        Rows of the factors in a and b.
+    k : int
+        Order.
+    """
     value = 0.0
     for p in range(k + 1):
         value += a[i, p] * b[j, k - p]
@@ -79,7 +89,19 @@ def cauchy(a: Array, i: int, b: Array, j: int, k: int) -> float:
 
 
 def weighted(a: Array, i: int, b: Array, j: int, k: int, last: int) -> float:
-    """sum_p p a_p b_{k-p} for p = 1 .. last."""
+    """Return the sum of p a_p b_(k-p) over p = 1 .. last.
+
+    Parameters
+    ----------
+    a, b : ndarray or SIMD, shape (rows, orders[, W])
+        Series.
+    i, j : int
+        Rows of the factors in a and b.
+    k : int
+        Order.
+    last : int
+        Last term of the sum.
+    """
     value = 0.0
     for p in range(1, last + 1):
         value += p * a[i, p] * b[j, k - p]
@@ -87,7 +109,27 @@ def weighted(a: Array, i: int, b: Array, j: int, k: int, last: int) -> float:
 
 
 def tape_order(tb: Program, Z: Array, R: Array, TF: Array, pieces: IntArray, k: int) -> None:
-    """Order k of all registers; Z holds the variables up to order k + 1."""
+    """Write order k of the series of all registers.
+
+    Parameters
+    ----------
+    tb : Program
+        The system on a tape.
+    Z : ndarray, shape (variables, orders)
+        Series of the variables, known up to order k + 1.
+    R : ndarray, shape (registers, orders)
+        Series of the registers; order k is written.
+    TF : ndarray, shape (functions, orders)
+        Series of the functions of time.
+    pieces : ndarray of int, shape (switches,)
+        Pieces that the switches are on.
+    k : int
+        Order.
+
+    References
+    ----------
+    E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, Sec. I.8.
+    """
     code: Code = tb.code
     switches: Switches = tb.switches
     for r in range(code.op.shape[0]):
@@ -166,7 +208,19 @@ def tape_order(tb: Program, Z: Array, R: Array, TF: Array, pieces: IntArray, k: 
 
 
 def curve_orders(tb: Program, Z: Array, pieces: IntArray, k: int) -> None:
-    """Order k of all variables that are functions of one coordinate, as far as orders of that are known."""
+    """Write order k of the variables that are functions of one coordinate, as far as it is known.
+
+    Parameters
+    ----------
+    tb : Program
+        The system on a tape.
+    Z : ndarray or SIMD, shape (variables, orders[, W])
+        Series of the variables; those of functions change.
+    pieces : ndarray of int, shape (switches,)
+        Pieces that the switches are on.
+    k : int
+        Order.
+    """
     place, sign, switches = tb.curves.place, tb.curves.sign, tb.switches
     n = tb.mass.shape[0]
     for f in range(place.shape[0]):
@@ -190,7 +244,21 @@ def curve_orders(tb: Program, Z: Array, pieces: IntArray, k: int) -> None:
 
 
 def curve_forces(tb: Program, Z: Array, H: Array, k: int, out: Array) -> None:
-    """out += order k of the forces on coordinates of the forces with the series H along the variables."""
+    """Add order k of the forces on coordinates that act along functions of them.
+
+    Parameters
+    ----------
+    tb : Program
+        The system on a tape.
+    Z : ndarray or SIMD, shape (variables, orders[, W])
+        Series of the variables.
+    H : ndarray or SIMD, shape (variables, orders[, W])
+        Series of the forces along the variables.
+    k : int
+        Order.
+    out : ndarray or SIMD, shape (n[, W])
+        Order k of the forces on the coordinates; changed.
+    """
     curves = tb.curves
     n = tb.mass.shape[0]
     for f in range(curves.place.shape[0]):
@@ -229,8 +297,26 @@ def piece_at(switches: Switches, s: int, x: float) -> int:
 
 
 def set_pieces(tb: Program, Z: Array, R: Array, TF: Array, pieces: IntArray) -> bool:
-    """Pieces of all switches where the variables are Z[:, 0], of tables beyond their ends the nearest; whether none is
-    beyond."""
+    """Set the pieces of all switches from the variables Z[:, 0]; beyond the ends of a table, the nearest.
+
+    Parameters
+    ----------
+    tb : Program
+        The system on a tape.
+    Z : ndarray, shape (variables, orders)
+        Series of the variables, known up to order 1.
+    R : ndarray, shape (registers, orders)
+        Series of the registers; order 0 is written.
+    TF : ndarray, shape (functions, orders)
+        Series of the functions of time.
+    pieces : ndarray of int, shape (switches,)
+        Pieces; written.
+
+    Returns
+    -------
+    covered : bool
+        Whether no value is beyond the ends of its table.
+    """
     switches: Switches = tb.switches
     covered = True
     for s in range(pieces.shape[0]):
@@ -246,7 +332,24 @@ def set_pieces(tb: Program, Z: Array, R: Array, TF: Array, pieces: IntArray) -> 
 
 
 def margin(switches: Switches, s: int, piece: int, x: float) -> float:
-    """How far inside of its piece a value lies, negative outside."""
+    """Return how far inside of its piece a value lies.
+
+    Parameters
+    ----------
+    switches : Switches
+        Switches of the tape.
+    s : int
+        Number of the switch.
+    piece : int
+        Its piece.
+    x : float
+        Value of its register.
+
+    Returns
+    -------
+    distance : float
+        To the nearer end of the piece, in the unit of the register; negative outside.
+    """
     if switches.first[s + 1] == switches.first[s]:
         return piece * x
     low = x - lower_knot(switches, s, piece)
@@ -258,7 +361,19 @@ def margin(switches: Switches, s: int, piece: int, x: float) -> float:
 
 
 def horner(R: Array, r: int, last: int, h: float) -> float:
-    """Value of a series."""
+    """Return the value of a series.
+
+    Parameters
+    ----------
+    R : ndarray, shape (registers, orders)
+        Series.
+    r : int
+        Row.
+    last : int
+        Highest order that counts.
+    h : float
+        Time from the expansion (s).
+    """
     value = 0.0
     for k in range(last, -1, -1):
         value = value * h + R[r, k]
@@ -266,7 +381,19 @@ def horner(R: Array, r: int, last: int, h: float) -> float:
 
 
 def largest(R: Array, r: int, last: int, h: float) -> float:
-    """Sum of the sizes of all terms of a series."""
+    """Return the sum of the sizes of all terms of a series.
+
+    Parameters
+    ----------
+    R : ndarray, shape (registers, orders)
+        Series.
+    r : int
+        Row.
+    last : int
+        Highest order that counts.
+    h : float
+        Time from the expansion (s).
+    """
     value = 0.0
     for k in range(last, -1, -1):
         value = value * abs(h) + abs(R[r, k])
@@ -274,9 +401,27 @@ def largest(R: Array, r: int, last: int, h: float) -> float:
 
 
 def leaves(tb: Program, R: Array, pieces: IntArray, last: int, h: float) -> tuple[float, int]:
-    """First time up to h at which a register leaves its piece, and its switch; (h, -1) where none does.
+    """Find the first time up to h at which a register leaves its piece.
 
-    A time of 0 is one that has left at once.
+    Parameters
+    ----------
+    tb : Program
+        The system on a tape.
+    R : ndarray, shape (registers, orders)
+        Series of the registers.
+    pieces : ndarray of int, shape (switches,)
+        Pieces that the switches are on.
+    last : int
+        Highest order that counts.
+    h : float
+        Largest time from the expansion (s), negative backwards.
+
+    Returns
+    -------
+    time : float
+        From the expansion (s); 0 for a register that leaves at once, h if none leaves.
+    switch : int
+        Number of its switch, -1 if none leaves.
     """
     switches: Switches = tb.switches
     found = -1
@@ -311,7 +456,24 @@ def leaves(tb: Program, R: Array, pieces: IntArray, last: int, h: float) -> tupl
 
 
 def next_piece(switches: Switches, s: int, piece: int, x: float) -> int:
-    """Piece beyond the nearer end of this one; itself where a table has none."""
+    """Return the piece beyond the nearer end of a piece.
+
+    Parameters
+    ----------
+    switches : Switches
+        Switches of the tape.
+    s : int
+        Number of the switch.
+    piece : int
+        Its piece.
+    x : float
+        Value of its register.
+
+    Returns
+    -------
+    piece : int
+        The same piece if the table ends there.
+    """
     if switches.first[s + 1] == switches.first[s]:
         return -piece
     count = switches.first[s + 1] - switches.first[s] - 1
@@ -323,9 +485,22 @@ def next_piece(switches: Switches, s: int, piece: int, x: float) -> int:
 
 
 def is_pole(switches: Switches, R: Array, s: int, last: int, h: float, size: float) -> bool:
-    """Whether the switch is a denominator at whose zero, the time h ahead, what is above it is none of its own.
+    """Return whether a switch is a denominator at whose zero the numerator does not vanish.
 
-    Zero beside its terms over the step `size`.
+    Parameters
+    ----------
+    switches : Switches
+        Switches of the tape.
+    R : ndarray, shape (registers, orders)
+        Series of the registers.
+    s : int
+        Number of the switch.
+    last : int
+        Highest order that counts.
+    h : float
+        Time of the zero from the expansion (s).
+    size : float
+        Step (s); the numerator is compared with its terms over this step.
     """
     above = switches.above[s]
     return above >= 0 and abs(horner(R, above, last, h)) > OUTSIDE * largest(R, above, last, size)
@@ -423,7 +598,19 @@ def residuals(tb: Equations, w: Work, g: Array) -> None:
 
 
 def times_gradients(tb: Equations, G: Array, u: Array, out: Array) -> None:
-    """out = G u, one number per row."""
+    """Write G u, one number per row.
+
+    Parameters
+    ----------
+    tb : Equations
+        Tables of the system.
+    G : ndarray, shape (entries,)
+        Gradients of the rows, or their rates.
+    u : ndarray, shape (n,)
+        Motion of the coordinates.
+    out : ndarray, shape (m,)
+        The product; written.
+    """
     gradient = tb.gradient
     fill(out, 0.0)
     for e in range(G.shape[0]):
@@ -431,7 +618,21 @@ def times_gradients(tb: Equations, G: Array, u: Array, out: Array) -> None:
 
 
 def add_transposed(tb: Equations, G: Array, mu: Array, factor: float, out: Array) -> None:
-    """out += factor G^T mu."""
+    """Add factor G^T mu.
+
+    Parameters
+    ----------
+    tb : Equations
+        Tables of the system.
+    G : ndarray, shape (entries,)
+        Gradients of the rows, or their rates.
+    mu : ndarray, shape (m,)
+        One number per row.
+    factor : float
+        Factor.
+    out : ndarray, shape (n,)
+        Sum along the coordinates; changed.
+    """
     gradient = tb.gradient
     for e in range(G.shape[0]):
         out[gradient.column[e]] += factor * G[e] * mu[gradient.row[e]]
@@ -463,10 +664,25 @@ def inner(tb: Equations, a: Array, b: Array) -> float:
 
 
 def factorise(tb: Equations, w: Work, skip: IntArray, bound: float) -> tuple[float, int]:
-    """L D L^T of S in w.val (m reciprocals of D, then the entries of L); rows with skip != 0 become unit rows.
+    """Factorise S = G M^-1 G^T = L D L^T with rows left out.
 
-    Rows whose pivot falls below `bound` of their diagonal become unit rows, too, and get skip = 2.
-    Returns the smallest pivot relative to its diagonal of S, and its row (-1 when there is none).
+    Parameters
+    ----------
+    tb : Equations
+        Tables of the system.
+    w : Work
+        Gradients in ``w.G``; ``w.val`` becomes m reciprocals of D, then the entries of L, ``w.diag`` the diagonal of S.
+    skip : ndarray of int, shape (m,)
+        Rows that are not 0 become unit rows; those that `bound` drops get 2.
+    bound : float
+        Rows whose pivot falls below this part of their diagonal become unit rows, too; 0 for none.
+
+    Returns
+    -------
+    least : float
+        Least pivot relative to its diagonal of S.
+    where : int
+        Its row, -1 if there is none.
     """
     plan, product, inverse, G, val, diag = tb.factor, tb.product, tb.mass.inverse, w.G, w.val, w.diag
     m = diag.shape[0]
@@ -532,8 +748,21 @@ def solve(tb: Equations, val: Array, x: Array) -> None:
 
 
 def time_series(times: Times, t: float, forward: bool, orders: int, out: Array) -> None:
-    """Taylor coefficients of every time function at t, on the piece ahead in the direction of travel;
-    (functions, orders)."""
+    """Write the Taylor coefficients of every function of time, on the piece ahead in the direction of travel.
+
+    Parameters
+    ----------
+    times : Times
+        The functions.
+    t : float
+        Time (s).
+    forward : bool
+        Whether time runs forwards.
+    orders : int
+        Number of coefficients.
+    out : ndarray, shape (functions, orders)
+        Coefficients of powers of the time from t; written.
+    """
     width = times.factor.shape[1]
     for k in range(times.first.shape[0] - 1):
         p = times.first[k]
@@ -569,7 +798,19 @@ def square_orders(tb: Equations, w: Work, j: int) -> None:
 
 
 def row_orders(tb: Equations, w: Work, j: int, out: Array) -> None:
-    """Order j >= 2 of every row without the part of q_j."""
+    """Write order j >= 2 of every row without the part of q_j.
+
+    Parameters
+    ----------
+    tb : Equations
+        Tables of the system.
+    w : Work
+        Series of the variables below order j.
+    j : int
+        Order.
+    out : ndarray, shape (m,)
+        Order j of the rows; written.
+    """
     rows, gradient, square, Z = tb.program.rows, tb.gradient, tb.square, w.Z
     curve_orders(tb.program, Z, w.pieces, j)
     square_orders(tb, w, j)
@@ -589,8 +830,11 @@ def row_orders(tb: Equations, w: Work, j: int, out: Array) -> None:
         out[square.row[s]] += square.factor[s] * value
 
 
-def push_orders(tb: Equations, w: Work, k: int, at: int, F: Array) -> None:
-    """F := order k of all forces but those of the multipliers of that order; those along variables in w.H[:, at]."""
+def _push_orders(tb: Equations, w: Work, k: int, at: int, F: Array) -> None:
+    """Write order k of all forces except those of the multipliers of that order.
+
+    Those along variables are in w.H[:, at].
+    """
     program, square, Z, H, L = tb.program, tb.square, w.Z, w.H, w.L
     code = program.code
     n = F.shape[0]
@@ -604,7 +848,7 @@ def push_orders(tb: Equations, w: Work, k: int, at: int, F: Array) -> None:
         value = 0.0
         for e in range(1, at + 1):
             value += form[e] * held[at - e]
-        add_square(tb, H, s, at, value)
+        _add_square(tb, H, s, at, value)
     for i in range(n):
         F[i] = H[i, at]
         if k == 0:
@@ -615,30 +859,30 @@ def push_orders(tb: Equations, w: Work, k: int, at: int, F: Array) -> None:
     curve_forces(program, Z, H, at, F)
 
 
-def add_square(tb: Equations, H: Array, s: int, at: int, value: float) -> None:
-    """Order `at` of the force of a square, `value` that of its form times the multiplier."""
+def _add_square(tb: Equations, H: Array, s: int, at: int, value: float) -> None:
+    """Add order `at` of the force of a square; `value` is that of its form times the multiplier."""
     square = tb.square
     value *= 2.0 * square.factor[s]
     for e in range(square.first[s], square.first[s + 1]):
         H[square.variable[e], at] -= square.weight[e] * value
 
 
-def add_multipliers(tb: Equations, w: Work, at: int, values: Array) -> None:
-    """Multipliers `values` (one per row) join order `at`: what turns with a body goes into w.H."""
+def _add_multipliers(tb: Equations, w: Work, at: int, values: Array) -> None:
+    """Add multipliers `values` (one per row) to order `at`; what turns with a body goes into w.H."""
     gradient, L, H = tb.gradient, w.L, w.H
     for r in range(values.shape[0]):
         L[r, at] += values[r]
     for e in range(gradient.turning.shape[0]):
         H[gradient.turning[e, 2], at] -= gradient.factor[e] * values[gradient.turning[e, 0]]
-    add_square_multipliers(tb, w, at, 0, values)
+    _add_square_multipliers(tb, w, at, 0, values)
 
 
-def add_square_multipliers(tb: Equations, w: Work, at: int, i: int, values: Array) -> None:
-    """Order `at` of the force of every square gains order i of its form times its multiplier."""
+def _add_square_multipliers(tb: Equations, w: Work, at: int, i: int, values: Array) -> None:
+    """Add order i of the form of every square times its multiplier to order `at` of its force."""
     square = tb.square
     z = w.slope.shape[0]
     for s in range(square.row.shape[0]):
-        add_square(tb, w.H, s, at, w.Z[z + s, i] * values[square.row[s]])
+        _add_square(tb, w.H, s, at, w.Z[z + s, i] * values[square.row[s]])
 
 
 def finish_order(tb: Equations, w: Work, j: int) -> None:
@@ -653,9 +897,20 @@ def finish_order(tb: Equations, w: Work, j: int) -> None:
 
 
 def expand(tb: Equations, w: Work, run: Run, t: float, singular: int) -> None:
-    """Series w.Z of the variables from w.q, w.v; w.G, w.val hold gradients and factor there, w.border singular rows.
+    """Write the series w.Z of the variables from the state w.q, w.v.
 
-    `singular` is their number: 0 at a regular position.
+    Parameters
+    ----------
+    tb : Equations
+        Tables of the system.
+    w : Work
+        State, gradients ``w.G``, factor ``w.val`` and singular rows ``w.border`` there; the series are written.
+    run : Run
+        What holds for the whole run.
+    t : float
+        Time of the state (s).
+    singular : int
+        Number of singular rows, 0 in a regular position.
     """
     border, skip = w.border, w.skip
     mu, rhs, F, u = w.mu, w.rhs, w.F, w.u
@@ -670,13 +925,13 @@ def expand(tb: Equations, w: Work, run: Run, t: float, singular: int) -> None:
         alpha = float(j * (j - 1))
         share = 1.0 / alpha
         tape_order(tb.program, w.Z, w.R, w.TF, w.pieces, k)
-        push_orders(tb, w, k, at, F)
+        _push_orders(tb, w, k, at, F)
         row_orders(tb, w, j, rhs)
         accelerations(tb, F, u)
         for i in range(u.shape[0]):
             u[i] *= share
         if singular > 0:
-            border_rows(tb, w, j, singular)
+            _border_rows(tb, w, j, singular)
         times_gradients(tb, w.G, u, mu)
         for r in range(mu.shape[0]):
             mu[r] = mu[r] + rhs[r] if skip[r] == 0 else 0.0
@@ -685,22 +940,37 @@ def expand(tb: Equations, w: Work, run: Run, t: float, singular: int) -> None:
             add_carried(tb, singular, w, mu, w.a)
         for r in range(mu.shape[0]):
             mu[r] *= alpha
-        add_multipliers(tb, w, at, mu)
+        _add_multipliers(tb, w, at, mu)
         if singular > 0:  # the multipliers Z nu belong one order below the regular ones
             for r in range(mu.shape[0]):
                 mu[r] = 0.0
                 for p in range(singular):
                     mu[r] += alpha * border.Z[p, r] * border.nu[p]
-            add_multipliers(tb, w, at - 1, mu)
-            add_square_multipliers(tb, w, at, 1, mu)
+            _add_multipliers(tb, w, at - 1, mu)
+            _add_square_multipliers(tb, w, at, 1, mu)
         finish_order(tb, w, j)
     if w.pieces.shape[0] > 0 or tb.program.code.checked.shape[0] > 0:
         tape_order(tb.program, w.Z, w.R, w.TF, w.pieces, run.order - 1)
 
 
 def constrained(tb: Equations, singular: int, w: Work, mu: Array, u: Array, q: Array) -> None:
-    """q := the motion that a free motion u becomes under the constraints; mu (and border.nu): gaps in, multipliers
-    out."""
+    """Write the motion that a free motion becomes under the constraints, and the multipliers.
+
+    Parameters
+    ----------
+    tb : Equations
+        Tables of the system.
+    singular : int
+        Number of singular rows.
+    w : Work
+        Gradients, factor and singular rows; ``w.border.nu`` holds gaps, then multipliers of the singular rows.
+    mu : ndarray, shape (m,)
+        Gaps of the regular rows, then their multipliers.
+    u : ndarray, shape (n,)
+        Free motion of the coordinates.
+    q : ndarray, shape (n,)
+        Constrained motion; written.
+    """
     border, F = w.border, w.F
     if singular > 0:
         border_solve(tb, w.val, border, mu, singular)
@@ -749,7 +1019,21 @@ def carry_responses(tb: Equations, singular: int, w: Work) -> None:
 
 
 def add_carried(tb: Equations, singular: int, w: Work, mu: Array, q: Array) -> None:
-    """Motion q and multipliers mu (and border.nu) of the masses N become those of the masses M."""
+    """Turn motion and multipliers of the raised masses N into those of the masses M.
+
+    Parameters
+    ----------
+    tb : Equations
+        Tables of the system.
+    singular : int
+        Number of singular rows.
+    w : Work
+        Responses to the light coordinates in ``w.carry``; ``w.border.nu`` changes.
+    mu : ndarray, shape (m,)
+        Multipliers; changed.
+    q : ndarray, shape (n,)
+        Motion of the coordinates; changed.
+    """
     carry, light = w.carry, tb.mass.light
     lu, own = carry.lu, carry.own
     k = light.shape[0]
@@ -786,8 +1070,11 @@ def start_series(tb: Equations, w: Work) -> None:
     finish_order(tb, w, 1)
 
 
-def border_rows(tb: Equations, w: Work, j: int, singular: int) -> None:
-    """Order j + 1 of Z^T g with q_j and q_{j+1} left out: border.nu; the part of q_j is B q_j."""
+def _border_rows(tb: Equations, w: Work, j: int, singular: int) -> None:
+    """Write order j + 1 of Z^T g without q_j and q_(j+1) to border.nu.
+
+    The part of q_j is B q_j.
+    """
     border, work, u = w.border, w.mu, w.u
     row_orders(tb, w, j + 1, work)
     for p in range(singular):
@@ -800,8 +1087,21 @@ def border_rows(tb: Equations, w: Work, j: int, singular: int) -> None:
 
 
 def border_solve(tb: Equations, val: Array, border: Border, mu: Array, singular: int) -> None:
-    """Bordered solve: in come the regular right-hand side in mu and the one of the rows B in nu; out the
-    multipliers."""
+    """Solve the bordered system of regular and singular rows.
+
+    Parameters
+    ----------
+    tb : Equations
+        Tables of the system.
+    val : ndarray, shape (m + entries,)
+        Factor of the regular rows.
+    border : Border
+        Singular rows; ``border.nu`` holds the right-hand side of the rows B, then their multipliers.
+    mu : ndarray, shape (m,)
+        Right-hand side of the regular rows, then their multipliers.
+    singular : int
+        Number of singular rows.
+    """
     for p in range(singular):
         for r in range(mu.shape[0]):
             border.nu[p] -= border.Y[p, r] * mu[r]
@@ -813,7 +1113,19 @@ def border_solve(tb: Equations, val: Array, border: Border, mu: Array, singular:
 
 
 def small_solve(matrix: Array, size: int, x: Array, work: Array) -> None:
-    """x := matrix^-1 x by Gaussian elimination with row pivots (a few unknowns)."""
+    """Solve a system of a few unknowns by Gaussian elimination with row pivots.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (k, k)
+        The matrix, k >= size.
+    size : int
+        Number of unknowns.
+    x : ndarray, shape (k,)
+        Right-hand side, then solution.
+    work : ndarray, shape (k, k)
+        Scratch.
+    """
     for i in range(size):
         for j in range(size):
             work[i, j] = matrix[i, j]
@@ -851,8 +1163,8 @@ FUNCTIONS = (
     *REGISTERS,
     copy, variables, rates, gradients, gradient_rates, residuals, times_gradients, add_transposed,
     accelerations, inner, factorise, solve,
-    square_orders, row_orders, push_orders, add_square, add_multipliers, add_square_multipliers, finish_order, expand,
-    constrained, carry_responses, add_carried, start_series, border_rows, border_solve, small_solve,
+    square_orders, row_orders, _push_orders, _add_square, _add_multipliers, _add_square_multipliers, finish_order,
+    expand, constrained, carry_responses, add_carried, start_series, _border_rows, border_solve, small_solve,
 )  # fmt: skip
 NAMES = {
     "math": math, "np": np,

@@ -119,7 +119,21 @@ class Equations(NamedTuple):
 
 
 def work(s: int, n: int, m: int, k: int, known: int) -> Stages:
-    """Return the arrays of a step: s stages, n coordinates, m rows, k stresses."""
+    """Return the arrays of a step.
+
+    Parameters
+    ----------
+    s : int
+        Number of stages.
+    n : int
+        Number of coordinates.
+    m : int
+        Number of rows.
+    k : int
+        Number of stresses.
+    known : int
+        Rows of ``Stages.known``, as `Scheme.path` has them.
+    """
     plain = [(3,), (4,), (n,), (n,), (m,), (s + 1, n), (n,)]
     W = s + 1
     wide = [(s + 1, W), *[(n, W)] * 4, (m, W), (k, W), *[(n, W), (m, W)] * 3]

@@ -26,8 +26,8 @@ from . import kernels
 HOT = (
     "fill", "copy", "cauchy", "weighted", "horner", "largest", "margin", "lower_knot", "own_piece", "curve_orders",
     "curve_forces", "variables", "rates", "gradients", "residuals", "times_gradients", "add_transposed",
-    "accelerations", "inner", "solve", "least_change", "square_orders", "row_orders", "push_orders", "add_square",
-    "add_multipliers", "add_square_multipliers", "finish_order", "constrained",
+    "accelerations", "inner", "solve", "least_change", "square_orders", "row_orders", "_push_orders", "_add_square",
+    "_add_multipliers", "_add_square_multipliers", "finish_order", "constrained",
 )  # fmt: skip
 
 
