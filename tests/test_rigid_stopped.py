@@ -25,8 +25,8 @@ from gearfe.multibody import (
 from gearfe.multibody.core.inverse import prescribed_motion
 from gearfe.multibody.core.start import consistent_start
 from gearfe.multibody.core.steps import ENDLESS, Pace, Status
+from gearfe.multibody.planar.assembly import label_of
 from gearfe.multibody.planar.couplings import GearRatio
-from gearfe.multibody.planar.forms import label_of
 
 CRANK, COUPLER, ROCKER, BASE = 2.5, 1.5, 2.5, 3.0
 
