@@ -42,6 +42,8 @@ _CLOSER = np.linspace(-1.0, 1.0, CLOSER)
 #: Change of the least twist (rad) from one look to the next that ends the search: points are twenty times closer in the
 #: next one, so that what is left is rounding.
 SETTLED = 4e-14
+#: Steps to the place of the pinion's flank that meets a mark of the wheel's: what is left is rounding.
+MARK_STEPS = 6
 
 
 @dataclass(frozen=True)
@@ -164,8 +166,9 @@ class ToothFlanks:
         return every.take(np.isfinite(least))
 
 
-def _met_at(pinion: Face, wheel: Face, a: float, frames: Array, u: Array) -> Array:
-    """D (rad) at parameters u of the pinion's flank, shape (n, m), infinite where the wheel's flank has no such radius.
+def _met_at(pinion: Face, wheel: Face, a: float, frames: Array, u: Array) -> tuple[Array, Array]:
+    """D (rad) at parameters u of the pinion's flank, infinite where the wheel's flank has no such radius, and the radii
+    there about the wheel's centre (m), both of shape (n, m).
 
     Parameters
     ----------
@@ -178,7 +181,7 @@ def _met_at(pinion: Face, wheel: Face, a: float, frames: Array, u: Array) -> Arr
     seen = pinion.points(u) * turn[:, :1] - a
     radius, (low, *_, high) = np.abs(seen), wheel.radii
     mate = wheel.points(wheel.at_radius(radius)) * turn[:, 1:]
-    return np.where((radius >= low) & (radius <= high * (1 + 1e-15)), np.angle(seen / mate), np.inf)
+    return np.where((radius >= low) & (radius <= high * (1 + 1e-15)), np.angle(seen / mate), np.inf), radius
 
 
 def _least(pinion: Face, wheel: Face, a: float, frames: Array) -> tuple[Array, Array]:
@@ -187,22 +190,94 @@ def _least(pinion: Face, wheel: Face, a: float, frames: Array) -> tuple[Array, A
     """
     pieces = [len(face.flank.deviation.pieces) for face in (pinion, wheel) if face.flank.deviation is not None]
     coarse, low, high = COARSE + PER_PIECE * max(pieces, default=0), pinion.start, pinion.end
-    best, least = np.zeros(len(frames)), np.full(len(frames), np.inf)
-    u = np.broadcast_to(np.linspace(low, high, coarse), (len(frames), coarse))
-    open_, step = np.arange(len(frames)), (high - low) / (coarse - 1)
-    for _ in range(REFINEMENTS):
-        place, value, known = _lowest(u, _met_at(pinion, wheel, a, frames[open_], u), step)
-        with np.errstate(invalid="ignore"):
-            goes_on = np.isfinite(value) & ~(known & (np.abs(value - least[open_]) <= SETTLED))
-        lower = np.isfinite(value)
-        best[open_[lower]], least[open_[lower]] = place[lower], value[lower]
-        open_, place, reach = open_[goes_on], place[goes_on], 1.5 * step
+    grid, step = np.broadcast_to(np.linspace(low, high, coarse), (len(frames), coarse)), (high - low) / (coarse - 1)
+    values, radii = _met_at(pinion, wheel, a, frames, grid)
+    best, least, _ = _lowest(grid, values, step)
+    mark_row, mark_place, mark_least = _marks_below(pinion, wheel, a, frames, grid, values, radii, least)
+    row = np.append(np.arange(len(frames)), mark_row)
+    best, least = np.append(best, mark_place), np.append(least, mark_least)
+    open_, change = np.flatnonzero(np.isfinite(least)), np.zeros(len(least))
+    for _ in range(1, REFINEMENTS):
         if len(open_) == 0:
             break
-        middle = np.minimum(np.maximum(place, low + reach), high - reach)[:, None]
+        reach = 1.5 * step
+        middle = np.minimum(np.maximum(best[open_], low + reach), high - reach)[:, None]
         u = np.minimum(np.maximum(middle + reach * _CLOSER, low), high)
         step = 2.0 * reach / (CLOSER - 1)
-    return np.where(np.abs(best) < AT_AN_END, 0.0, best), least
+        place, value, known = _lowest(u, _met_at(pinion, wheel, a, frames[row[open_]], u)[0], step)
+        seen = np.isfinite(value)
+        open_, place, value, known = open_[seen], place[seen], value[seen], known[seen]
+        change[open_] = np.abs(value - least[open_])
+        best[open_], least[open_] = place, value
+        lowest = np.full(len(frames), np.inf)
+        np.minimum.at(lowest, row, least + change)
+        # a further look changes less: it ends where rounding is left, or where another valley of the row is deeper
+        open_ = open_[~(known & (change[open_] <= SETTLED)) & (value - change[open_] <= lowest[row[open_]])]
+    order = np.lexsort((-least, row))  # of several valleys of a row, the deepest is assigned last
+    places, twists = np.zeros(len(frames)), np.full(len(frames), np.inf)
+    places[row[order]], twists[row[order]] = best[order], least[order]
+    return np.where(np.abs(places) < AT_AN_END, 0.0, places), twists
+
+
+def _marks_below(
+    pinion: Face, wheel: Face, a: float, frames: Array, grid: Array, values: Array, radii: Array, least: Array
+) -> tuple[IntArray, Array, Array]:
+    """Further places to look closer at: marks of either flank where D may have a valley between the points of a grid.
+
+    An edge, as of an undercut, and the begin of a round or a relief make valleys that are narrower than its steps.
+
+    Parameters
+    ----------
+    grid, values, radii : ndarray, shape (n, m)
+        Rising parameters of the pinion's flank, D there (rad), and radii about the wheel's centre (m).
+    least : ndarray, shape (n,)
+        Lowest D known (rad).
+
+    Returns
+    -------
+    row, place, value : ndarray, shape (c,)
+        Numbers of the tooth pairs, parameters of the marks and D there (rad).
+    """
+    goals = np.array(pinion.marks), np.abs(wheel.points(np.array([*wheel.marks, wheel.end])))
+    beyond = [x[:, None] > goal[:, None] for x, goal in zip((grid, radii), goals, strict=True)]
+    row, mark, k = np.nonzero(np.concatenate([x[:, :, :-1] != x[:, :, 1:] for x in beyond], axis=1))
+    low, bend = _going_on(values, row, k)
+    deep = low - bend < least[row]
+    row, mark, k, bend = row[deep], mark[deep], k[deep], bend[deep]
+    place, met = np.concatenate(goals)[mark], mark >= len(goals[0])
+    at, inner, outer = row[met], k[met], k[met] + 1
+    ends = [(grid[at, n], radii[at, n]) for n in (inner, outer)]
+    place[met] = _at_radius(pinion, a, frames[at], place[met], *ends)
+    value = _met_at(pinion, wheel, a, frames[row], place[:, None])[0][:, 0]
+    low = value - bend < least[row]
+    return row[low], place[low], value[low]
+
+
+def _going_on(values: Array, row: IntArray, k: IntArray) -> tuple[Array, Array]:
+    """Lowest that D can be between the points k and k + 1 of a row, when it goes on from both sides as it comes, and
+    the larger second difference of both sides, by which it may be lower yet (rad); infinite values do not count.
+    """
+    near = values[row[:, None], np.clip(k[:, None] + np.arange(-2, 4), 0, values.shape[1] - 1)]
+    a, b, c, d, e, f = np.where(np.isfinite(near), near, np.nan).T
+    low = np.fmin(np.fmin(c, 2.0 * c - b), np.fmin(d, 2.0 * d - e))
+    return low, np.nan_to_num(np.fmax(np.abs(a - 2.0 * b + c), np.abs(f - 2.0 * e + d)))
+
+
+def _at_radius(
+    pinion: Face, a: float, frames: Array, goal: Array, inner: tuple[Array, Array], outer: tuple[Array, Array]
+) -> Array:  # fmt: skip
+    """Parameters of the pinion's flank with the radii `goal` about the wheel's centre (m), shape (n,), just within the
+    smaller radii; `inner` and `outer` are parameters on either side with the radii there.
+    """
+    turn, side = np.exp(1j * frames[:, 0]), np.where(inner[1] < outer[1], -AT_AN_END, AT_AN_END)
+    (u, off), (u_outer, off_outer) = (inner[0], inner[1] - goal), (outer[0], outer[1] - goal)
+    for _ in range(MARK_STEPS if len(goal) else 0):  # regula falsi, by Illinois
+        middle = u - off * (u_outer - u) / (off_outer - off)
+        off_middle = np.abs(pinion.points(middle) * turn - a) - goal
+        same = (off_middle > 0.0) == (off_outer > 0.0)
+        u, off = np.where(same, u, u_outer), np.where(same, 0.5 * off, off_outer)
+        u_outer, off_outer = middle, off_middle
+    return np.clip(u_outer + side, pinion.start, pinion.end)
 
 
 def _lowest(u: Array, values: Array, step: float) -> tuple[Array, Array, BoolArray]:
