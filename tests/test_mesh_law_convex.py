@@ -10,10 +10,11 @@ import pytest
 
 from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.errors import InputError
-from gearfe.gear.touching import ToothFlanks
+from gearfe.gear.first_contact import ToothFlanks
 from gearfe.meshlaw.fit import Couple, PairForces, TouchCurve, fit_law
 from gearfe.meshlaw.law import MeshLaw
-from gearfe.meshlaw.make import coupling_curve, pair_forces
+from gearfe.meshlaw.make import _pair_forces as pair_forces
+from gearfe.meshlaw.make import coupling_curve
 from gearfe.meshlaw.store import load_law, save_law
 from gearfe.stiffness.job import read_stiffness_job
 
@@ -50,7 +51,7 @@ def test_an_edge_of_an_undercut_is_seen_between_the_points_of_the_search(undercu
     pinion, wheel = teeth.faces[0], teeth.faces[-1]
     angles = undercut.gears.mesh_cycle * np.linspace(1.12, 1.16, 81)
     zero = np.zeros(len(angles), dtype=np.int64)
-    found = teeth.first_touch(np.arange(len(angles)), angles, zero)
+    found = teeth.first_contacts_of(np.arange(len(angles)), angles, zero)
     frames = teeth.frames(angles, zero, 0.0)
     mate = wheel.points(np.linspace(wheel.start, wheel.end, 200_001))
     order = np.argsort(np.abs(mate))
@@ -69,7 +70,7 @@ def test_the_force_of_a_pair_is_that_of_all_stretches_of_its_flanks(undercut):
     pair = half_plane_pair(undercut)
     radius, cycle = pair.pair.wheel.base_radius, pair.pair.mesh_cycle
     angles = cycle * np.array([1.1800, 1.1836, 1.1907])
-    met = pair.teeth.touching(angles)
+    met = pair.teeth.first_contacts(angles)
     first = np.full(len(angles), np.inf)
     np.minimum.at(first, met.position, met.twist)
     depth = np.array([1.5e-6, 1.5e-6, 0.83e-6])

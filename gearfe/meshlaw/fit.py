@@ -18,7 +18,7 @@ from scipy.interpolate import BSpline, PchipInterpolator
 from scipy.sparse.linalg import spsolve
 
 from ..typing import Array
-from .law import NO_CONTACT, MeshLaw
+from .law import NO_CONTACT, MeshLaw, indefinite
 
 #: Weights of the second derivative of b over the phase (in mesh cycles), and of the second and first over ln F (nm/N).
 #: Squares are integrated, so that they mean the same on any nodes: they decide where no pair force was found.
@@ -27,8 +27,9 @@ SMOOTH_PHASE, SMOOTH_FORCE, LEVEL_FORCE = 1e-4, 0.25, 0.1
 SHARE = 0.5
 #: What the approach of a contact solution is off by (m) where flanks have kinks: smaller approaches count less.
 NOISE = 1e-9
-#: Least dLambda/dF, in parts of the least Lambda/F of contact solutions: b may be anything where none are near.
-LEAST_COMPLIANCE = 0.7
+#: Least dLambda/dF, in parts of the least Lambda/F of contact solutions: b may be anything where none are near; and in
+#: parts of what makes J = diag(dLambda/dF) + C positive definite.
+LEAST_COMPLIANCE, DEFINITE = 0.7, 1.05
 #: Cells of the pair force end at these parts of the largest: Lambda's cubics err by 1e-4 of it in a cell of ratio 2.2,
 #: and by 1e-3 in those of small forces.
 PARTS = (0.0, 0.002, 0.01, 0.05, 0.2, 0.45, 1.0)
@@ -145,14 +146,19 @@ def fit_law(
     line = level - hertz * (at - middle)
     approach = (b @ (2 * values + slopes) + line) * parts[1:]
     slope = b @ (2 * values + 3 * slopes + bends) + line - hertz
+    coupling = _couplings(touch.angle, couples, cells)
     least = LEAST_COMPLIANCE * float((found.approach / found.force)[exact > 0.5].min(initial=level))
+    least = max(least, DEFINITE * indefinite(coupling, np.diff(touch.angle[: cells + 1])))
     approach, slope = _rising(parts, approach, slope, least)
+    # beyond the largest force Lambda is linear, so that it rises for all forces
+    approach = np.column_stack([approach, approach[:, -1] + slope[:, -1] * parts[-1]])
+    slope, parts = np.column_stack([slope, slope[:, -1]]), np.append(parts, 2.0 * parts[-1])
     return MeshLaw(
         nodes=touch.angle[: cells + 1],
         forces=parts,
         touch=_by_slots(touch_cubics(touch), cells),
         energies=_by_slots(_energies(phase, parts, approach, slope), cells),
-        coupling=_couplings(touch.angle, couples, cells),
+        coupling=coupling,
         base_radii=base_radii,
         backlash=0.0,
         reach=reach,

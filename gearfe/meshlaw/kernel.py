@@ -1,5 +1,9 @@
 r"""A mesh law with the derivatives that Newton's method needs, sample by sample, compiled.
 
+The pair forces minimise the convex energy :math:`E = \sum_k[\Phi - F_k(\delta - t)] + \sum_{k<l} CF_kF_l` over
+:math:`F_k \ge 0`. Projected Newton steps, halved until E falls, converge from any initial forces (D. P. Bertsekas,
+Projected Newton methods for optimization problems with simple constraints, SIAM J. Control Optim. 20, 1982).
+
 With :math:`g_k = t'(\psi_k) + \Lambda_\psi(\psi_k, F_k) + \sum_l C'_{kl}F_l` and J as in `gearfe.meshlaw.law`,
 
 .. math::
@@ -21,14 +25,18 @@ from ..multibody.compiled.packed import Packed
 from ..typing import Array
 
 #: Newton steps for the pair forces, their relative change in the last one: what is left is of the order of its square.
-MOST, SETTLED = 60, 1e-7
+MOST, SETTLED = 100, 1e-7
+#: Halvings of a step; least part of the expected fall of the energy (Armijo), and what rounding leaves of the energy.
+HALVINGS, FALL, ROUNDING = 40, 1e-4, 1e-14
 #: Columns of the results: F, M, dF/d approach, dF/d phase = dM/d approach, dM/d phase, W, 1 where beyond the reach.
 FORCE, MOMENT, TANGENT, CROSS, BEND, ENERGY, BEYOND, RESULTS = range(8)
 #: Rows of the work space, before those of the matrix and of C: gap, t', t'', Lambda and its derivative with the force,
-#: Phi, two of its derivatives and one of Lambda with the angle, whether a pair bears, two right sides that become
-#: solutions, g, cell of the force with Lambda's polynomial there.
-GAPS, TOUCH1, TOUCH2, LAMBDA, GIVES, PHI, TURN, TURN2, SHIFT, BEARS, RIGHT1, RIGHT2, BEFORE, PART = range(14)
-ROWS = PART + 5
+#: Phi, two of its derivatives and one of Lambda with the angle, whether a pair is loaded, two right sides that become
+#: solutions, g, slope of the energy, pair forces on trial, cell of the force with the energy's polynomial there.
+GAPS, TOUCH1, TOUCH2, LAMBDA, GIVES, PHI, TURN, TURN2, SHIFT, BEARS, RIGHT1, RIGHT2, BEFORE, OFF, TRIAL, PART = range(
+    16
+)
+ROWS = PART + 6
 
 
 class LawTables(NamedTuple):
@@ -65,7 +73,8 @@ def law_jets(law: LawTables, at: Jets) -> int:
     cycle = nodes[cells] - nodes[0]
     for i in range(phase.shape[0]):
         x = phase[i]
-        if math.isfinite(x):
+        settled = math.isfinite(x) and math.isfinite(approach[i])
+        if settled:
             x -= math.floor((x - nodes[0]) / cycle) * cycle
         cell = 0
         top = cells
@@ -85,7 +94,7 @@ def law_jets(law: LawTables, at: Jets) -> int:
             work[TOUCH1, k] = c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
             work[TOUCH2, k] = 2.0 * c[2] + 6.0 * z * c[3]
         out[i, BEYOND] = 1.0 if approach[i] - least > law.reach else 0.0
-        if approach[i] <= least:  # all pairs are apart
+        if settled and approach[i] <= least:  # all pairs are apart
             for k in range(slots):
                 pairs[i, k] = 0.0
                 slopes[0, i, k] = 0.0
@@ -98,15 +107,17 @@ def law_jets(law: LawTables, at: Jets) -> int:
             for j in range(slots):
                 if j != k:
                     work[ROWS + slots + k, j] = _coupled(coupling, k, j, cell, z, 0)
+        _compliances(forces, energies, cell, z, pairs[i], work)
+        energy = _slopes_of_energy(slots, pairs[i], work)
+        largest = 0.0
+        for k in range(slots):
+            largest = max(largest, pairs[i, k])
+        most = MOST if settled else 0
         settled = False
-        for _ in range(MOST):
-            _compliances(forces, energies, cell, z, pairs[i], work)
+        for _ in range(most):
             for k in range(slots):
-                off = work[LAMBDA, k] - work[GAPS, k]
-                for j in range(slots):
-                    if j != k:
-                        off += work[ROWS + slots + k, j] * pairs[i, j]
-                work[BEARS, k] = 1.0 if pairs[i, k] > 0.0 or off < 0.0 else 0.0
+                off = work[OFF, k]
+                work[BEARS, k] = 1.0 if pairs[i, k] > SETTLED * largest or off < 0.0 else 0.0
                 work[RIGHT1, k] = -off
             matrix(slots, work)
             for k in range(slots):
@@ -114,28 +125,41 @@ def law_jets(law: LawTables, at: Jets) -> int:
                     work[RIGHT1, k] = -pairs[i, k]
                 work[RIGHT2, k] = 0.0
             solved(slots, work)
-            change = 0.0
-            largest = 0.0
             for k in range(slots):
-                new = max(pairs[i, k] + work[RIGHT1, k], 0.0)
-                change = max(change, abs(new - pairs[i, k]))
-                largest = max(largest, new)
-                pairs[i, k] = new
-            if change <= SETTLED * largest:  # none bears on the way to others
+                work[RIGHT2, k] = work[OFF, k]  # where the step begins
+            share = 1.0
+            for _ in range(HALVINGS):
+                change = 0.0
+                largest = 0.0
+                fall = 0.0
+                for k in range(slots):
+                    new = max(pairs[i, k] + share * work[RIGHT1, k], 0.0)
+                    move = new - pairs[i, k]
+                    change = max(change, abs(move))
+                    largest = max(largest, new)
+                    fall += work[RIGHT2, k] * move
+                    work[TRIAL, k] = new
+                _compliances(forces, energies, cell, z, work[TRIAL], work)
+                lower = _slopes_of_energy(slots, work[TRIAL], work)
+                if lower <= energy + FALL * fall + ROUNDING * (abs(energy) + abs(lower)):
+                    break
+                share *= 0.5
+            energy = lower
+            for k in range(slots):
+                pairs[i, k] = work[TRIAL, k]
+            if share == 1.0 and change <= SETTLED * largest:
                 settled = True
                 break
-        if not settled:
+        if not settled:  # phase or approach are not finite, or the law is not convex
             for k in range(slots):
                 pairs[i, k] = 0.0
             for k in range(RESULTS):
                 out[i, k] = math.nan
             continue
-        _compliances(forces, energies, cell, z, pairs[i], work)
         _turning(forces, energies, cell, z, pairs[i], work)
         force = 0.0
         moment = 0.0
         bend = 0.0
-        energy = 0.0
         for k in range(slots):
             F = pairs[i, k]
             work[BEARS, k] = 1.0 if F > 0.0 else 0.0
@@ -143,13 +167,11 @@ def law_jets(law: LawTables, at: Jets) -> int:
             shift = work[TOUCH1, k] + work[SHIFT, k]
             moment -= F * work[TOUCH1, k] + work[TURN, k]
             bend -= F * work[TOUCH2, k] + work[TURN2, k]
-            energy += F * work[GAPS, k] - work[PHI, k]
             for j in range(slots):
                 if j != k:
                     once = _coupled(coupling, k, j, cell, z, 1) * pairs[i, j]
                     shift += once
                     moment -= 0.5 * once * F
-                    energy -= 0.5 * work[ROWS + slots + k, j] * pairs[i, j] * F
                     bend -= 0.5 * _coupled(coupling, k, j, cell, z, 2) * pairs[i, j] * F
             work[BEFORE, k] = shift
             work[RIGHT1, k] = 1.0 if F > 0.0 else 0.0
@@ -169,12 +191,25 @@ def law_jets(law: LawTables, at: Jets) -> int:
         out[i, TANGENT] = tangent
         out[i, CROSS] = cross
         out[i, BEND] = bend
-        out[i, ENERGY] = energy
+        out[i, ENERGY] = -energy
     return 0
 
 
+def _slopes_of_energy(slots: int, pairs: Array, work: Array) -> float:
+    """E = sum(Phi - F gap) + sum(C F F)/2, whose least value over all F >= 0 is -W; its slopes become row `OFF`."""
+    energy = 0.0
+    for k in range(slots):
+        others = 0.0
+        for j in range(slots):
+            if j != k:
+                others += work[ROWS + slots + k, j] * pairs[j]
+        work[OFF, k] = work[LAMBDA, k] + others - work[GAPS, k]
+        energy += work[PHI, k] + pairs[k] * (0.5 * others - work[GAPS, k])
+    return energy
+
+
 def _compliances(forces: Array, energies: Array, cell: int, z: float, pairs: Array, work: Array) -> None:
-    """Lambda and its derivative with the force, from the polynomials of the pairs' cells."""
+    """Phi, Lambda and its derivative with the force, from the polynomials of the pairs' cells."""
     parts = forces.shape[0] - 1
     for k in range(pairs.shape[0]):
         part = 0
@@ -182,31 +217,31 @@ def _compliances(forces: Array, energies: Array, cell: int, z: float, pairs: Arr
             part += 1
         if work[PART, k] != part:
             work[PART, k] = part
-            for b in range(1, 5):
+            for b in range(5):
                 c = energies[k, cell, part, b]
-                work[PART + b, k] = b * (c[0] + z * (c[1] + z * (c[2] + z * c[3])))
+                work[PART + 1 + b, k] = c[0] + z * (c[1] + z * (c[2] + z * c[3]))
         f = pairs[k] - forces[part]
-        e1, e2, e3, e4 = work[PART + 1, k], work[PART + 2, k], work[PART + 3, k], work[PART + 4, k]
-        work[LAMBDA, k] = e1 + f * (e2 + f * (e3 + f * e4))
-        work[GIVES, k] = e2 + f * (2.0 * e3 + 3.0 * f * e4)
+        e0, e1, e2, e3, e4 = (
+            work[PART + 1, k], work[PART + 2, k], work[PART + 3, k], work[PART + 4, k], work[PART + 5, k],
+        )  # fmt: skip
+        work[PHI, k] = e0 + f * (e1 + f * (e2 + f * (e3 + f * e4)))
+        work[LAMBDA, k] = e1 + f * (2.0 * e2 + f * (3.0 * e3 + f * 4.0 * e4))
+        work[GIVES, k] = 2.0 * e2 + f * (6.0 * e3 + f * 12.0 * e4)
 
 
 def _turning(forces: Array, energies: Array, cell: int, z: float, pairs: Array, work: Array) -> None:
-    """Phi, its first and second derivative with the angle, and Lambda's."""
+    """First and second derivative of Phi with the angle, and Lambda's."""
     for k in range(pairs.shape[0]):
         part = int(work[PART, k])
         f = pairs[k] - forces[part]
-        value = 0.0
         turn = 0.0
         turn2 = 0.0
         shift = 0.0
         for b in range(4, -1, -1):
             c = energies[k, cell, part, b]
             shift = shift * f + turn
-            value = value * f + c[0] + z * (c[1] + z * (c[2] + z * c[3]))
             turn = turn * f + c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
             turn2 = turn2 * f + 2.0 * c[2] + 6.0 * z * c[3]
-        work[PHI, k] = value
         work[TURN, k] = turn
         work[SHIFT, k] = shift
         work[TURN2, k] = turn2
@@ -251,7 +286,7 @@ def solved(slots: int, work: Array) -> None:
         work[RIGHT2, k] /= work[ROWS + k, k]
 
 
-FUNCTIONS = (law_jets, _compliances, _turning, _coupled, matrix, solved)
+FUNCTIONS = (law_jets, _slopes_of_energy, _compliances, _turning, _coupled, matrix, solved)
 NAMES = {name: value for name, value in globals().items() if name == "math" or isinstance(value, int | float)}
 
 
@@ -267,26 +302,7 @@ def packed_tables(tables: LawTables) -> LawTables | Packed:
 def evaluate(
     tables: LawTables | Packed, phase: Array, approach: Array, shifts: Array, pairs: Array
 ) -> tuple[Array, Array]:
-    """Evaluate a law at n places, see `law_jets`.
-
-    Parameters
-    ----------
-    tables : LawTables
-        The law, as `packed_tables` gives it.
-    phase : ndarray, shape (n,)
-        Pinion angles (rad).
-    approach : ndarray, shape (n,)
-        Approaches (m).
-    shifts : ndarray, shape (n, s)
-        Further approach at which each pair touches (m).
-    pairs : ndarray, shape (n, s)
-        Pair forces from which the iteration starts, then those found (N).
-
-    Returns
-    -------
-    out : ndarray, shape (n, RESULTS)
-        Force, moment, tangent, cross, bend, energy, and whether beyond the law.
-    """
+    """Results and slopes of `law_jets`; `pairs` become the pair forces found."""
     count, slots = pairs.shape
     out, slopes, work = np.zeros((count, RESULTS)), np.zeros((2, count, slots)), np.zeros((ROWS + 2 * slots, slots))
     at = Jets(phase, approach, shifts, pairs, slopes, work, out)

@@ -49,6 +49,8 @@ from . import kernel
 NO_CONTACT = 1.0
 #: Newton steps for the approach at a force.
 STEPS = 60
+#: Places in each cell, in parts of its width, at which matrices are looked at.
+SAMPLES = np.linspace(0.0, 1.0, 5)
 
 
 class MeshForces(NamedTuple):
@@ -57,7 +59,7 @@ class MeshForces(NamedTuple):
     Attributes
     ----------
     force : ndarray, shape (n,)
-        F (N), along the line of action; not-a-number where pair forces with a beginning do not settle.
+        F (N), along the line of action; NaN where angle or approach are not finite.
     moment : ndarray, shape (n,)
         M (N m), derivative of the energy with the pinion angle.
     tangent : ndarray, shape (n,)
@@ -162,6 +164,15 @@ class MeshLaw:
         """Mesh force (N) up to which the law is known at pinion angles (n,); `shifts` as in `__call__`."""
         return self(angles, self.first_contact(angles, shifts) + self.reach, shifts).force
 
+    @cached_property
+    def convex(self) -> bool:
+        """Whether J is positive definite at all forces of the law, so that pair forces are unique."""
+        z = SAMPLES[:, None] * np.diff(self.nodes)
+        f = SAMPLES[:, None] * np.diff(self.forces)
+        rises = np.stack([0 * f, 0 * f, 2.0 + 0 * f, 6.0 * f, 12.0 * f**2])
+        slope = np.einsum("snmab,azn,bfm->snmzf", self.energies, z ** np.arange(4)[:, None, None], rises)
+        return bool(slope.min() > indefinite(self.coupling, np.diff(self.nodes)))
+
     def locate(self, angles: Array) -> tuple[IntArray, IntArray, Array]:
         """Mesh cycle, cell and angle beyond its first node (rad)."""
         turn = np.floor((angles - self.nodes[0]) / self.cycle)
@@ -200,7 +211,7 @@ class MeshLaw:
         shifts : array_like, shape (n, slots)
             Further approach (m) at which each pair touches, such as its pitch error.
         begin : ndarray, shape (n, slots)
-            Pair forces (N) to begin with, in which those that are found are left.
+            Initial pair forces (N), replaced by those that are found.
         """
         places = np.empty((2, max(np.size(angles), np.size(approaches))))
         places[0], places[1] = angles, approaches
@@ -209,8 +220,6 @@ class MeshLaw:
         pairs = np.zeros_like(later) if begin is None else begin
         out, slopes = kernel.evaluate(_tables(self), places[0], places[1], later, pairs)
         force, moment, tangent, cross, bend, energy, beyond = out.T
-        if begin is None and np.isnan(force).any():
-            raise ArithmeticError("the pair forces of the mesh law do not settle")
         return MeshForces(force, moment, tangent, cross, bend, energy, beyond > 0.0, pairs, slopes)
 
     def approach(self, angles: ArrayLike, forces: ArrayLike, shifts: ArrayLike = 0.0) -> Array:
@@ -241,6 +250,27 @@ class MeshLaw:
                 break
             delta = new
         return np.where(force > 0.0, delta, first)
+
+
+def indefinite(coupling: Array, widths: Array) -> float:
+    """Largest -lambda (m/N), lambda the least eigenvalue of the matrices C, whose diagonal is zero, at all phases.
+
+    Where every dLambda/dF is larger, J = diag(dLambda/dF) + C is positive definite.
+
+    Parameters
+    ----------
+    coupling : ndarray, shape (s - 1, s - 1, n, 4)
+        As in `MeshLaw`.
+    widths : ndarray, shape (n,)
+        Of the cells of the phase (rad).
+    """
+    slots, z = coupling.shape[1] + 1, SAMPLES[:, None] * widths
+    values = np.einsum("klna,azn->znkl", coupling, z ** np.arange(4)[:, None, None])
+    C = np.zeros((*z.shape, slots, slots))
+    for apart in range(1, slots):
+        for low in range(slots - apart):
+            C[..., low, low + apart] = C[..., low + apart, low] = values[..., apart - 1, low]
+    return -float(np.linalg.eigvalsh(C)[..., 0].min())
 
 
 @lru_cache(maxsize=64)

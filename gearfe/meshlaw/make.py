@@ -103,9 +103,6 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
             break
         begin, width = np.append(begin[coarse], begin[coarse] + 0.5 * width[coarse]), np.tile(0.5 * width[coarse], 2)
         nodes = np.union1d(nodes, begin)
-    if not math.isfinite(error):
-        problem = f"has contact solutions from which no mesh law for forces up to {force:.6g} N can be made"
-        raise InputError("force", force, problem, "ask for a law up to larger forces, or change the reliefs")
     return replace(law, backlash=geometry.normal_backlash, error=error)
 
 
@@ -131,37 +128,36 @@ def _changes(law: MeshLaw) -> Array:
 
 
 def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) -> Array:
-    """Error of force, or of the driver's torque, in parts of contact solutions, or of a least force (N).
-
-    Infinite where the law's pair forces do not settle.
-    """
+    """Error of force, or of the driver's torque, in parts of contact solutions, or of a least force (N)."""
     r1, r2 = law.base_radii
-    begin = np.zeros((len(solved), law.slots))
-    found = law(solved.pinion_angle, r2 * (solved.twist - pair.pair.contact_twist), begin=begin)
+    found = law(solved.pinion_angle, r2 * (solved.twist - pair.pair.contact_twist))
     force = solved.torque_wheel / r2
     moment = solved.torque_pinion - r1 * force
     off = np.maximum(np.abs(found.force - force), np.abs(found.moment - moment) / r1)
-    missed = np.where(np.isfinite(found.force), off / np.maximum(force, least), math.inf)
-    return np.where(np.isfinite(force), missed, 0.0)  # some contacts are not solved, as of flanks with short waves
+    # some contacts are not solved, as of flanks with short waves
+    return np.where(np.isfinite(force), off / np.maximum(force, least), 0.0)
 
 
 def _pair_forces(pair: HalfPlanePair, solved: Positions, met: FirstContacts, coupling: Sequence[Couple]) -> PairForces:
     """Forces and approaches of the loaded pairs in contact solutions; forces are the wheel's torques over r_b2."""
     radius = pair.pair.wheel.base_radius
-    c = solved.contacts
-    force = c.torque_wheel / radius
-    k = c.pair - c.pair.min()
-    table = np.zeros((len(solved), int(k.max()) + 1))
-    table[c.position, k] = force
-    own = solved.pinion_angle[c.position] + c.pair * pair.pair.mesh_cycle
+    contacts = solved.contacts
+    # a pair may be loaded on several stretches of its flanks, each of which is a contact
+    (position, number), inverse = np.unique([contacts.position, contacts.pair], axis=1, return_inverse=True)
+    force = np.bincount(inverse.ravel(), contacts.torque_wheel, minlength=len(position)) / radius
+    k = number - number.min(initial=0)
+    table = np.zeros((len(solved), int(k.max(initial=0)) + 1))
+    table[position, k] = force
+    angle = solved.pinion_angle[position]
+    own = angle + number * pair.pair.mesh_cycle
     others = np.zeros(len(force))
     for apart, couple in enumerate(coupling, start=1):
         for other, lower in ((k - apart, own - apart * pair.pair.mesh_cycle), (k + apart, own)):
             inside = (other >= 0) & (other < table.shape[1])
-            others[inside] += couple(lower[inside]) * table[c.position[inside], other[inside]]
-    touch = _of_pairs(met, solved.pinion_angle[c.position], c.pair)
-    approach = radius * (solved.twist[c.position] - touch) - others
-    return PairForces(own, force, force / table.sum(axis=1)[c.position], approach)
+            others[inside] += couple(lower[inside]) * table[position[inside], other[inside]]
+    touch = _of_pairs(met, angle, number)
+    approach = radius * (solved.twist[position] - touch) - others
+    return PairForces(own, force, force / table.sum(axis=1)[position], approach)
 
 
 def touch_curve(pair: HalfPlanePair, phases: Array) -> TouchCurve:

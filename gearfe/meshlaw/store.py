@@ -5,6 +5,7 @@ What solves contacts loads only for a law that was not made before.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -55,14 +56,20 @@ def load_law(path: str | Path) -> MeshLaw:
     Raises
     ------
     InputError
-        For a file that is not there, or holds no mesh law.
+        For a file that is not there, or holds no mesh law, or one whose pair forces are not unique.
     """
     found = load_arrays(path)
     missing = [name for name, axes in ARRAYS.items() if name not in found or found[name].ndim != axes]
     if missing or "numbers" not in found or found["numbers"].shape != (5,):
         problem = "holds no mesh law" + (f": no array {missing[0]!r} of {ARRAYS[missing[0]]} axes" if missing else "")
         raise InputError("mesh law", str(path), problem, "write it with gearfe.meshlaw.store.save_law")
-    return law_of_arrays(found)
+    law = law_of_arrays(found)
+    if not all(side.convex for side in law.sides):
+        problem = (
+            "holds a mesh law whose pair forces are not unique: compliances of pairs rise too little with the force"
+        )
+        raise InputError("mesh law", str(path), problem, "make it again with gearfe.meshlaw.make.mesh_law")
+    return law
 
 
 def write_law_csv(law: MeshLaw, path: str | Path) -> None:
@@ -72,7 +79,7 @@ def write_law_csv(law: MeshLaw, path: str | Path) -> None:
         "pair_angle_deg": np.degrees(angle).ravel(),
         "touch_um": np.where(touch < NO_CONTACT, 1e6 * touch, math.nan),
     }
-    for part, (low, high) in enumerate(zip(law.forces[:-1], law.forces[1:], strict=True)):
+    for part, (low, high) in enumerate(itertools.pairwise(law.forces[:-1])):
         c = law.energies[:, :, part, 0].reshape(-1, 5)
         columns[f"yield_um_at_{high:.6g}_N"] = 1e6 * (c[:, 1:] * np.arange(1, 5)) @ (high - low) ** np.arange(4)
     write_csv(path, columns)
