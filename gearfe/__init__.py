@@ -5,6 +5,9 @@ Public names load on first use (PEP 562), so ``import gearfe`` costs millisecond
 
 from importlib import import_module
 
+from . import drawing
+from .version import VERSION as __version__
+
 TYPE_CHECKING = False  # `typing` itself would be a third of the import
 if TYPE_CHECKING:  # what type checkers and the API reference see; below, the same names load on first use
     from typing import Any
@@ -25,8 +28,6 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .study.search import Search
     from .train import GearTrain, TrainModel, TrainResponse, build_train
     from .train.simulate import simulate
-
-__version__ = "0.1.0"
 
 #: Public name -> module that defines it.
 _PUBLIC: dict[str, str] = {
@@ -82,6 +83,16 @@ __all__ = [
     "sweep_loads",
     "sweep_stiffness",
 ]
+
+
+def _draw(result: "Any") -> "Any":
+    """The picture of a result, whose libraries load when one is drawn."""
+    from .figures.results import picture
+
+    return picture(result)
+
+
+drawing.draw = _draw
 
 
 def __getattr__(name: str) -> "Any":

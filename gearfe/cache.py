@@ -23,8 +23,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar
 
-from . import __version__
 from .environment import limit, named_folder, user_folder
+from .files import whole_file
+from .version import VERSION
 
 T = TypeVar("T")
 
@@ -126,8 +127,6 @@ def cached_arrays(
     """
     import numpy as np
 
-    from .files import whole_file
-
     key = cache_key(kind, recipe)
 
     def read(path: Path) -> dict[str, Any] | None:
@@ -162,7 +161,7 @@ def cache_key(kind: str, recipe: object) -> str:
 
 def versions(packages: tuple[str, ...] = PACKAGES) -> dict[str, str]:
     """Versions of this program, of Python and of packages, by default those that decide the numbers."""
-    found = {"gearfe": __version__, "python": platform.python_version()}
+    found = {"gearfe": VERSION, "python": platform.python_version()}
     return found | {name: _version(name) for name in packages}
 
 

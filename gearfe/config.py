@@ -1,16 +1,13 @@
 """Job files: TOML tables read into frozen dataclasses, with every mistake named.
 
-A table is a frozen dataclass whose fields are made with `quantity`; the reader checks types, ranges and names. A job
-file may hold the tables of several jobs: a command reads those it needs by `load_job`. Of the others, keys, types
-and ranges are checked (``gearfe.tables`` says which tables exist), so a misspelt key is an error wherever it stands;
-the rules that join several keys are not.
+A table is a frozen dataclass whose fields are made with `quantity`; the reader checks types, ranges and names.
+`gearfe.tables.jobs` says which tables there are.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib
 import math
 import tomllib
 import types
@@ -31,26 +28,6 @@ Removed = tuple[str, str | Callable[[Any], str]]
 
 #: No number in everyday units is larger: the fourth powers of such numbers overflow; whole ones have 64 bits in arrays.
 LARGEST, LARGEST_WHOLE = 1e75, 2**63 - 1
-
-#: Table name in a job file -> "module:class" of the dataclass that describes it. Each module is light (no numpy).
-TABLES: dict[str, str] = {
-    "pair": "gearfe.tables.pair:PairTable",
-    "stiffness": "gearfe.tables.pair:StiffnessTable",
-    "loadmap": "gearfe.tables.loadmap:LoadMapTable",
-    "microgeometry": "gearfe.tables.microgeometry:MicrogeometryTable",
-    "housing": "gearfe.tables.housing:HousingTable",
-    "train": "gearfe.tables.train:TrainTable",
-    "runup": "gearfe.tables.runup:RunUpTable",
-    "spectrum": "gearfe.tables.spectrum:SpectrumTable",
-    "study": "gearfe.tables.study:StudyTable",
-}
-#: Tables that were: what became of them, and what to write instead.
-REMOVED_TABLES = {
-    "relief": (
-        "is gone: the best relief is a search of gearfe study",
-        'take the table out; [study] with design = "search" varies [microgeometry] (gearfe new relief.toml)',
-    ),
-}
 
 
 def quantity(
@@ -190,13 +167,13 @@ def fields_of(table: type) -> dict[str, dataclasses.Field[Any]]:
     return {field.name: field for field in dataclasses.fields(typing.cast(Any, table))}
 
 
-def build(cls: type[T], table: Any, where: str) -> T:
+def build(cls: type[T], table: Any, where: str, *, rules: bool = True) -> T:
     """Frozen dataclass `cls` from a parsed TOML table; `where` is the table's name for messages.
 
     Understands ``int``, ``float``, ``bool``, ``str``, ``X | None``, ``tuple[X, ...]``, fixed tuples, ``dict[str, X]``,
-    and nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields, and
-    ``REMOVED``: removed key -> what became of it, and what to write instead (see `Removed`); and ``SHORT``: the key
-    that a text instead of the table stands for.
+    and nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields (left out
+    without `rules`), and ``REMOVED``: removed key -> what became of it, and what to write instead (see `Removed`); and
+    ``SHORT``: the key that a text instead of the table stands for.
 
     Raises
     ------
@@ -204,7 +181,8 @@ def build(cls: type[T], table: Any, where: str) -> T:
         Unknown key (with the nearest known one), missing key, wrong type, value out of range, a rule broken.
     """
     made = _built(cls, table, where)
-    _check_rules(made, where)
+    if rules:
+        _check_rules(made, where)
     return made
 
 
@@ -262,64 +240,6 @@ def _written(hint: Any, label: str) -> str:
 
 def _joined(where: str, name: str) -> str:
     return f"{where}.{name}" if where else name
-
-
-def load_job(path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Read the `needed` (and, where present, `optional`) tables of a job file; check keys and ranges of all others.
-
-    Returns
-    -------
-    dict
-        Table name -> dataclass instance.
-    """
-    return job_tables(read_toml(path), path, needed, optional)
-
-
-def job_tables(
-    raw: dict[str, Any], path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()
-) -> dict[str, Any]:
-    """Return the asked tables of a parsed job, checked.
-
-    Parameters
-    ----------
-    raw : dict
-        The parsed job.
-    path : path
-        Its file, named in messages.
-    needed : tuple of str
-        Tables that must be there.
-    optional : tuple of str
-        Tables that are returned if they are there.
-
-    Raises
-    ------
-    InputError
-        For unknown or missing tables, and for every mistake in a known one.
-    """
-    for name, table in raw.items():
-        if name in REMOVED_TABLES:
-            raise InputError(f"[{name}]", None, *REMOVED_TABLES[name])
-        if name not in TABLES:
-            if {"run", "bodies"} <= raw.keys():
-                raise InputError("job file", str(path), "describes a mechanism", "run it: gearfe mechanism FILE")
-            raise unknown_key("", name, table, TABLES, field=f"job file {Path(path).name}")
-    for name in needed:
-        if name not in raw:
-            cure = f"add a table [{name}] (see gearfe new)"
-            raise InputError(f"[{name}]", None, f"is missing in {Path(path).name}", cure)
-    made: dict[str, Any] = {}
-    for name, table in raw.items():
-        if name in needed or name in optional:
-            made[name] = build(table_class(name), table, name)
-        else:
-            _built(table_class(name), table, name)
-    return made
-
-
-def table_class(name: str) -> type:
-    """Dataclass that describes the table `name` of a job file."""
-    module, _, cls = TABLES[name].partition(":")
-    return typing.cast(type, getattr(importlib.import_module(module), cls))
 
 
 def _convert(hint: Any, value: Any, label: str, meta: Any) -> Any:

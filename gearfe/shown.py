@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from . import drawing
 from .errors import MissingLibraryError
 
 if TYPE_CHECKING:
@@ -55,8 +56,7 @@ class Shown(Facts):
 
     def plot(self) -> Figure:
         """A picture of the result, which a notebook shows; ``.savefig("name.png")`` keeps it."""
-        # pictures stand above all results, so they are looked up when one is drawn
-        figure: Figure = importlib.import_module(".figures.results", __package__).picture(self)
+        figure: Figure = drawing.draw(self)
         return figure
 
 

@@ -9,7 +9,8 @@ import typing
 from pathlib import Path
 from typing import Any
 
-from gearfe.config import TABLES, table_class, type_hints
+from gearfe.config import type_hints
+from gearfe.tables.jobs import TABLES, table_class
 from gearfe.tables.mechanism import MechanismFile
 from gearfe.tables.text import inner_table, toml_value
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import pytest
 
-from gearfe.config import build, load_job, quantity, read_toml
+from gearfe.config import build, quantity, read_toml
 from gearfe.errors import InputError
 from gearfe.files import read_csv, read_numbers
+from gearfe.tables.jobs import load_job
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.config import build, load_job, table_class
+from gearfe.config import build
 from gearfe.errors import InputError
 from gearfe.gear.pair import GearPair, TipRelief
+from gearfe.tables.jobs import load_job, table_class
 
 SHIPPED = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
 

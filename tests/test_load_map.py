@@ -11,13 +11,13 @@ import pytest
 
 from gearfe import LoadMap, sweep_loads, sweep_stiffness
 from gearfe.cli import main
-from gearfe.config import load_job
 from gearfe.errors import InputError
 from gearfe.gearbox.job import read_train_job
 from gearfe.gearbox.mesh_stiffness import train_curves
 from gearfe.loadmap.load_map import RootMap
 from gearfe.stiffness.job import read_stiffness_job
 from gearfe.stiffness.sweep import elastic_pair
+from gearfe.tables.jobs import load_job
 
 from .gears import pair
 from .test_train_job import BORES, SMALL

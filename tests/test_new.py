@@ -8,12 +8,13 @@ from pathlib import Path
 import pytest
 
 from gearfe.cli import main
-from gearfe.config import TABLES, build, load_job, quantity, table_class
+from gearfe.config import build, quantity
 from gearfe.tables.examples import JOBS, job_file
+from gearfe.tables.jobs import TABLES, load_job, read_train_tables, table_class
 from gearfe.tables.mechanism import BodyTable, MechanismFile, RunTable, read_mechanism_file
 from gearfe.tables.microgeometry import GearMicrogeometryTable
 from gearfe.tables.text import table_text
-from gearfe.tables.train import TrainShaftTable, read_train_tables
+from gearfe.tables.train import TrainShaftTable
 
 ROOT = Path(__file__).parents[1]
 SHIPPED = sorted((Path(__file__).parents[1] / "geometry").glob("*.toml"))

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from gearfe.cli import main
-from gearfe.config import load_job
 from gearfe.study.job import read_study
+from gearfe.tables.jobs import load_job
 
 from .studies import BASE, JOBS, rows_of
 

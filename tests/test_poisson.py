@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from skfem.quadrature import get_quadrature_tri
 
-from gearfe.config import load_job
 from gearfe.contact import compliance
 from gearfe.contact.laws import MOST_POISSON, PairModel, law_named
 from gearfe.elasticity import Material, Plane, triangle_shapes
@@ -16,6 +15,7 @@ from gearfe.errors import InputError
 from gearfe.gear.pair import Gear, GearPair
 from gearfe.stiffness.job import stiffness_job
 from gearfe.stiffness.sweep import sweep_stiffness
+from gearfe.tables.jobs import load_job
 from gearfe.typing import Array
 
 

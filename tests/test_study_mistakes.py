@@ -21,12 +21,13 @@ import pytest
 
 from gearfe.cache import versions
 from gearfe.cli import main
-from gearfe.config import TABLES, _convert, fields_of, job_tables, read_toml, table_class, type_hints
+from gearfe.config import _convert, fields_of, read_toml, type_hints
 from gearfe.errors import InputError
 from gearfe.files import output_folder
 from gearfe.study.job import read_study, run_study
 from gearfe.study.journal import Journal
 from gearfe.study.run import serially
+from gearfe.tables.jobs import TABLES, job_tables, table_class
 from gearfe.tables.mechanism import MechanismFile
 
 from .studies import rows_of, stored_rows, written

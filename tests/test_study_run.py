@@ -181,10 +181,10 @@ def test_outputs_that_the_job_does_not_give_are_told_before_any_case(tmp_path):
 
 def test_gears_and_their_microgeometry(tmp_path):
     """A stiffness study gives what the sweep gives; cases that share gears have the digits of cases that do not."""
-    from gearfe.config import job_tables
     from gearfe.gear.pair import GearPair
     from gearfe.stiffness.job import StiffnessJob
     from gearfe.stiffness.sweep import sweep_stiffness
+    from gearfe.tables.jobs import job_tables
 
     job = "[pair]\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"
     job += "[pair.pinion]\nteeth = 22\npitch_diameter_mm = 44.0\nbore_diameter_mm = 10.0\n"

@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the geometry, write gear_pair.png and gear_pair.json."""
-    from ..config import load_job
+    from ..tables.jobs import load_job
     from ..tables.pair import StiffnessTable
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load

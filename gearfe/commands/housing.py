@@ -41,8 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..config import load_job
     from ..errors import InputError
+    from ..tables.jobs import load_job
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load
     table = load_job(args.job, ("housing",))["housing"]

@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compute the map and write the files; 1 when a cell failed."""
     started = time.perf_counter()
-    from ..config import load_job
+    from ..tables.jobs import load_job
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = load_job(args.job, ("pair",), ("stiffness", "loadmap", "microgeometry"))

@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the file and name its groups."""
-    from ..config import load_job
+    from ..tables.jobs import load_job
 
     out = Path(args.out) if args.out else Path("out") / Path(args.job).stem / "mesh"
     args.out = str(out if out.suffix else out / ("gears.inp" if args.deck else "gears.msh"))
@@ -149,10 +149,10 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, MeshPa
     """Solve the position here, and write the deck of the same twist; its parts, torque and twist."""
     import numpy as np
 
-    from .. import __version__
     from ..errors import InputError
     from ..meshing.deck import Deck, write_deck
     from ..stiffness.sweep import sweep_stiffness
+    from ..version import VERSION
 
     sweep = {**job.sweep, "angles": np.array([math.radians(args.angle_deg)])}
     curve = sweep_stiffness(job.pair, job.model, **sweep)
@@ -168,7 +168,7 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, MeshPa
     pair = job.pair
     width = min(pair.pinion.face_width, pair.wheel.face_width)
     heading = (
-        f"gearfe {__version__}, {job.table.law}: torque {torque:.9g} N m at the wheel's hub, twist {twist:.9g} rad",
+        f"gearfe {VERSION}, {job.table.law}: torque {torque:.9g} N m at the wheel's hub, twist {twist:.9g} rad",
         f"centre of the wheel x = {1e3 * pair.working_centre_distance:.9g} mm, pinion angle {args.angle_deg:g} deg",
         "contact acts between the driving flanks of the fine teeth",
     )

@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     """Compute and write; 1 when the range was not covered."""
     started = time.perf_counter()
     from ..errors import unknown_name
-    from ..tables.train import read_train_tables
+    from ..tables.jobs import read_train_tables
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = read_train_tables(args.job, args.variant)
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _own_table(job: str) -> RunUpTable:
-    from ..config import load_job
+    from ..tables.jobs import load_job
 
     found: RunUpTable = load_job(job, ("runup",))["runup"]
     return found

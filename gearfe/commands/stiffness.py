@@ -70,14 +70,15 @@ def run(args: argparse.Namespace) -> int:
     if args.range is not None:
         check_range(args.range, "--range", {"above": 0.0, "doc": "end of the colours (MPa)"})
     started = time.perf_counter()
-    from ..config import job_tables, read_toml
+    from ..config import read_toml
     from ..errors import InputError
+    from ..tables.jobs import job_tables
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load
     raw = read_toml(args.job)
     tables = job_tables(raw, args.job, ("pair",), ("stiffness", "microgeometry"))
     if args.variant is not None:
-        from ..tables.train import variant_stiffness
+        from ..tables.jobs import variant_stiffness
 
         tables["stiffness"] = variant_stiffness(raw, args.variant)
     tables["stiffness"] = overridden(tables.get("stiffness", StiffnessTable()), args)

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     started = time.perf_counter()
     from ..config import check_range
     from ..errors import InputError
-    from ..tables.train import read_train_tables
+    from ..tables.jobs import read_train_tables
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load
     tables = read_train_tables(args.job, args.variant)

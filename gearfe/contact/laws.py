@@ -27,6 +27,7 @@ that is integrated, which nothing cuts.
 
 from __future__ import annotations
 
+import importlib
 import math
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, Protocol, get_args, runtime_checkable
@@ -40,7 +41,7 @@ from ..gear.derived import mesh_stiffness
 from ..gear.face import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
 from ..gear.validity import MOST_YIELD
-from ..tables.pair import check_flank_coarsen, law_class
+from ..tables.pair import GROUP, LAWS, check_flank_coarsen, check_law, known_laws
 from ..typing import Array, BoolArray
 
 Sides = Literal["both", "pinion", "wheel", "tip"]
@@ -169,6 +170,18 @@ class HalfPlane:
     """No overlap, no tension, on the panels of `gearfe.contact.half_plane`: half-planes instead of contact elements."""
 
     name: ClassVar[str] = "half_plane"
+
+
+def law_class(name: str) -> Any:
+    """Class of the law called `name`."""
+    check_law("law", name)
+    reference = LAWS.get(name) or known_laws()[name]
+    module, _, attribute = reference.partition(":")
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        problem = f"cannot be loaded from {reference} ({error})"
+        raise InputError("law", name, problem, f"correct the package that names it in the group {GROUP}") from None
 
 
 def law_named(name: str, **parameters: Any) -> ContactLaw:

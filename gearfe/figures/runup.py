@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..runup.columns import dynamic_factors
 from ..runup.critical import CriticalSpeeds
 from ..runup.instability import InstabilityMap
 from ..runup.orders import orders
-from ..runup.report import dynamic_factors, iso_dynamic_factors
+from ..runup.report import iso_dynamic_factors
 from ..runup.run_up import RunUp
 from ..typing import Array, IntArray
 from .campbell import draw_campbell, draw_instability, draw_waterfall, signal_of
@@ -79,7 +80,7 @@ def forces_picture(run: RunUp, title: str = "") -> Any:
         error[f"mesh {i + 1} ({line.name})"] = _branch_curve(
             run, [1e6 * np.ptp(s.transmission_error[:, i]) for s in states]
         )
-        factor[f"mesh {i + 1}"] = _branch_curve(run, dynamic_factors(run, i))
+        factor[f"mesh {i + 1}"] = _branch_curve(run, dynamic_factors(run.train, run.states, i))
         open_[f"mesh {i + 1}"] = _branch_curve(run, [100.0 * s.apart[i] for s in states])
     panels = [
         ("dynamic transmission error,\npeak to peak  (µm)", error),

@@ -19,15 +19,18 @@ import numpy as np
 from ..errors import InputError, given
 from ..gear.deviation_job import pitch_errors_of
 from ..gear.pair import Gear, GearPair, gear_of_form, gear_pair, in_keys
+from ..housing.body import bore_points, reduced_housing
 from ..meshlaw.law import MeshLaw
 from ..multibody import TimeFunction, smoothed_step
 from ..stiffness.curve import StiffnessCurve
 from ..tables.housing import HousingTable
+from ..tables.jobs import read_train_tables
 from ..tables.microgeometry import MicrogeometryTable
 from ..tables.pair import REQUIRED, PairTable, StiffnessTable, tooth_form
 from ..tables.spectrum import SpectrumTable
 from ..tables.timefunction import TrainFunctionTable
-from ..tables.train import POTENTIAL, TrainGearTable, TrainMeshTable, TrainTable, read_train_tables
+from ..tables.train import POTENTIAL, TrainGearTable, TrainMeshTable, TrainTable
+from ..train.checks import check_flanks, check_layout
 from ..train.friction import Lubrication
 from ..train.gear_train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from ..typing import Array
@@ -120,8 +123,6 @@ def train_body(job: TrainJob) -> ModalBody | None:
     """Reduced housing of the job, from the cache when it was made before; None for a rigid one."""
     if job.table.housing == "rigid":
         return None
-    from ..housing.body import reduced_housing
-
     return reduced_housing(given(job.housing, "housing"), job.path.parent)
 
 
@@ -184,8 +185,6 @@ def _rigid_train(job: TrainJob) -> GearTrain:
 
 
 def _check_rigid(job: TrainJob, train: GearTrain) -> None:
-    from ..train.checks import check_flanks, check_layout
-
     meshes = tuple(replace(mesh, backlash=None, damping=0.0, damping_acts=None) for mesh in train.meshes)
     check_layout(replace(train, meshes=meshes))
     check_flanks(train, np.array([not back_flanks(job, train, i) for i in range(len(meshes))], dtype=bool))
@@ -293,8 +292,6 @@ def bore_places(table: HousingTable, folder: Path = Path()) -> dict[str, tuple[f
     Files that the table names are looked for in `folder`.
     """
     if table.reduced or table.mesh.file is not None:
-        from ..housing.body import bore_points
-
         return bore_points(table, folder)
     ranges = [(shaft, *ends) for shaft in table.shafts for ends in table.bore_ranges(shaft)]
     return {

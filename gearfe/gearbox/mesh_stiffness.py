@@ -10,13 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..contact.laws import HalfPlane, check_alike, check_deviations
 from ..errors import InputError, given
 from ..gear.deviation_job import deviations_of
 from ..gear.face import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair, gear_pair
 from ..meshlaw.law import MeshLaw
+from ..meshlaw.store import cached_law
 from ..progress import stage
 from ..stiffness.curve import NO_CYCLE, StiffnessCurve
+from ..stiffness.job import StiffnessJob, cached_curve, material_of
 from ..tables.train import MEAN, POTENTIAL
 from ..train.gear_train import GearMesh, GearTrain
 from .job import Stiffness, TrainJob, back_flanks, job_train
@@ -90,8 +93,6 @@ def _carried_torque(train: GearTrain, number: int) -> float:
 
 def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> StiffnessCurve:
     """Curve of a mesh with the driver as pinion, by [stiffness] or at the torque that the mesh carries."""
-    from ..stiffness.job import StiffnessJob, cached_curve
-
     mesh = train.meshes[number]
     one, two = train.gear(mesh.driver).gear, train.gear(mesh.driven).gear
     pair = gear_pair(one, two, mesh.centre_distance)
@@ -120,9 +121,6 @@ def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool
 
 def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> MeshLaw:
     """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
-    from ..contact.laws import HalfPlane
-    from ..meshlaw.store import cached_law
-    from ..stiffness.job import StiffnessJob, cached_curve
 
     def gears(mesh: GearMesh) -> tuple[Any, ...]:
         materials = None if job.pair is None else _materials(job, mesh)
@@ -186,8 +184,6 @@ def _deviations(
     mapped = job.table.model_of(job.table.meshes[number]) == POTENTIAL
     if mapped:  # pitch errors are the train's own
         driving, back = ((replace(a, turn=(0.0,)), replace(b, turn=(0.0,))) for a, b in (driving, back))
-    from ..contact.laws import check_alike, check_deviations
-
     if not back_flanks(job, train, number):
         back = driving
     for one in (driving, back):
@@ -201,8 +197,6 @@ def _deviations(
 
 
 def _materials(job: TrainJob, mesh: GearMesh) -> Any:
-    from ..stiffness.job import material_of
-
     pair = given(job.pair, "pair")
     sides = {g.name: g.gear for g in job.table.gears}
     names = (sides[mesh.driver], sides[mesh.driven])

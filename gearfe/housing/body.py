@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import __version__
 from ..cache import cache_key, kept
 from ..errors import InputError
 from ..meshing.housing_recipe import RECIPE
 from ..reduction.modal_body import FORMAT, ModalBody
 from ..tables.housing import HousingDampingTable, HousingTable
+from ..version import VERSION
 
 
 def reduced_housing(table: HousingTable, folder: str | Path = ".") -> ModalBody:
@@ -28,7 +28,7 @@ def reduced_housing(table: HousingTable, folder: str | Path = ".") -> ModalBody:
         from .superelement import superelement
 
         return damped(superelement(table.superelement, folder), table)
-    recipe: list[object] = [dataclasses.replace(table, damping=HousingDampingTable()), RECIPE, FORMAT, __version__]
+    recipe: list[object] = [dataclasses.replace(table, damping=HousingDampingTable()), RECIPE, FORMAT, VERSION]
     if table.mesh.file is not None:
         from ..meshing.mesh_file import source_fingerprint
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..config import load_job
 from ..elasticity import Material
 from ..errors import InputError
 from ..meshing.housing_mesh import housing_mesh
 from ..progress import stage
 from ..reduction.modal_body import ModalBody
 from ..tables.housing import HousingReductionTable, HousingTable
+from ..tables.jobs import load_job
 from .attachments import PLACE_TOLERANCE, Bore
 from .meshes import Prisms
 from .model import Housing

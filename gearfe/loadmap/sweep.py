@@ -26,6 +26,7 @@ from ..stiffness.sweep import assembled_curve, elastic_pair, requested_angles
 from ..tables.loadmap import LoadMapTable
 from ..typing import Array, IntArray
 from .load_map import BACK, LoadMap
+from .root_stress import pair_roots, root_map
 
 if TYPE_CHECKING:
     from .root_stress import PairRoots, ToothRoots
@@ -102,8 +103,6 @@ def sweep_loads(
         solver.contact_model.first_contacts(solved_angles)
     roots = None
     if root_stress:
-        from .root_stress import pair_roots
-
         with watch.stage("root meshes"), one_thread():
             roots = pair_roots(elastic)
     with watch.stage("cells"), one_thread():
@@ -118,8 +117,6 @@ def sweep_loads(
     made = [assembled_curve(solver, requested, source, level, searched=True) for level in levels]
     root = None
     if at_roots is not None:
-        from .root_stress import root_map
-
         good = found.status[at_roots.position] != BACK
         root = root_map(taken(at_roots, good), (len(goals), n), source)
     curves, loads = (tuple(parts) for parts in zip(*made, strict=True))

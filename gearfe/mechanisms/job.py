@@ -18,6 +18,7 @@ from ..multibody.core.inverse import prescribed_motion
 from ..multibody.core.mass_regularisation import free_motions
 from ..progress import stage
 from .error_estimate import TrajectoryError, trajectory_error
+from .link_files import write_links, write_plates
 from .model import Mechanism
 from .results import Results, Sensitivities, evaluate, in_blocks, reactions, reference_table
 
@@ -301,8 +302,6 @@ def _of_elements(mechanism: Mechanism, results: Results, name: str) -> dict[str,
 def write_elastic(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -> None:
     """Files of flexible links, where there are some."""
     if mechanism.elastic:
-        from .link_files import write_links, write_plates
-
         if mechanism.links:
             write_links(folder, mechanism, trajectory)
         if mechanism.plates:

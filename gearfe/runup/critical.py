@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..typing import Array
+from .columns import largest_force
 from .modes import CoupledModes, coupled_modes, modes_below
 from .orders import OrderCut, multiples_of, orders
 from .results import SteadyState
@@ -140,11 +141,6 @@ def peaks_of(run: RunUp, critical: CriticalSpeeds) -> list[dict[str, Any]]:
             made = {"speed_rad_per_s": state.speed, "mesh": line.name, "dynamic_factor": float(values[at])}
             found.append({**made, **_cause(critical, mesh, state, (swept[low], swept[high]))})
     return sorted(found, key=lambda x: -float(x["dynamic_factor"]))
-
-
-def largest_force(state: SteadyState, mesh: int) -> float:
-    """Largest size of a mesh's force (N)."""
-    return float(np.abs(state.force[:, mesh]).max())
 
 
 def _cause(

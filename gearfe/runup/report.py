@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ..gear.derived import dynamic_factor
-from ..gearbox.radiation import power_level
-from ..train.response import XYZ
 from ..typing import Array, IntArray
 from . import torus
-from .critical import CriticalSpeeds, largest_force, peaks_of
+from .columns import RPM, dynamic_factors
+from .critical import CriticalSpeeds, peaks_of
 from .instability import InstabilityMap
 from .modes import CoupledModes
 from .orders import order_columns
 from .results import SteadyState
 from .run_up import RunUp
-
-RPM = 30.0 / math.pi
 
 
 def tables(
@@ -40,80 +36,13 @@ def tables(
         Map of parametric instability.
     """
     columns = {
-        "runup": runup_columns(run),
+        "runup": run.columns(),
         "orders": order_columns(run, multiples),
         "waterfall": waterfall_columns(run),
         "modes": mode_columns(critical.modes),
         "critical_speeds": critical_columns(critical),
     }
     return columns if unstable is None else {**columns, "instability": instability_columns(unstable)}
-
-
-def runup_columns(run: RunUp) -> dict[str, Any]:
-    """Columns of runup.csv: a row for each steady state, along the curve."""
-    states, model = run.states, run.train.model
-    made: dict[str, Any] = {
-        "speed_rad_per_s": np.array([s.speed for s in states]),
-        "speed_rpm": RPM * np.array([s.speed for s in states]),
-        "branch": np.array([s.branch for s in states], dtype=int),
-        **stability_columns(run),
-        "error_estimate": np.array([s.error for s in states]),
-        "beyond_mesh_law": np.array([s.beyond for s in states], dtype=int),
-    }
-    for i in range(len(model.meshes)):
-        force = [s.force[:, i] for s in states]
-        error = np.array([np.ptp(s.transmission_error[:, i]) for s in states])
-        made |= {
-            f"mean_force_{i + 1}_N": np.array([f.mean() for f in force]),
-            f"peak_to_peak_force_{i + 1}_N": np.array([np.ptp(f) for f in force]),
-            f"least_force_{i + 1}_N": np.array([f.min() for f in force]),
-            f"dynamic_factor_{i + 1}": dynamic_factors(run, i),
-            f"share_without_contact_{i + 1}": np.array([s.apart[i] for s in states]),
-            f"peak_to_peak_transmission_error_{i + 1}_um": 1e6 * error,
-        }
-    rms = np.array([s.rms(run.band_hz) for s in states]).reshape(len(states), -1)
-    for j, name in enumerate(model.bores):
-        made[f"acceleration_rms_{name}_m_per_s2"] = rms[:, j]
-    made |= bearing_means(run)
-    if all(s.power is not None for s in states):
-        made["radiated_power_level_dB"] = np.array([power_level(power_in_band(s, run.band_hz)) for s in states])
-    return made
-
-
-def bearing_means(run: RunUp) -> dict[str, Array]:
-    """Mean force of the shaft on each bore, and the rms of what swings about it up to the band."""
-    made: dict[str, Array] = {}
-    states = run.states
-    for j, name in enumerate(run.train.model.bores):
-        for k, x in enumerate(XYZ):
-            lines = [s.bearing[:, j, k] for s in states]
-            inside = [(s.frequency > 0.0) & (s.frequency <= run.band_hz) for s in states]
-            made[f"mean_bearing_force_{name}_{x}_N"] = np.array([one[0].real for one in lines])
-            made[f"bearing_force_rms_{name}_{x}_N"] = np.array(
-                [math.sqrt(0.5 * float((np.abs(one[i]) ** 2).sum())) for one, i in zip(lines, inside, strict=True)]
-            )
-    return made
-
-
-def stability_columns(run: RunUp) -> dict[str, Array]:
-    """Columns of the largest multiplier; none without multipliers, not-a-number where stability is undecided."""
-    if any(s.multipliers is None for s in run.states):
-        return {}
-    largest = np.array([s.multipliers[0] for s in run.states if s.multipliers is not None])
-    return {
-        "stable": [math.nan if s.stable is None else int(s.stable) for s in run.states],
-        "growth_per_s": np.array([s.growth for s in run.states]),
-        "largest_multiplier": np.abs(largest),
-        "largest_multiplier_angle_deg": np.degrees(np.abs(np.angle(largest))),
-        "multiplier_over_s": np.array([s.span for s in run.states]),
-    }
-
-
-def dynamic_factors(run: RunUp, mesh: int) -> Array:
-    """Largest size of a mesh's force over the steady one, of all states."""
-    steady = abs(float(run.train.steady[mesh]))
-    largest = np.array([largest_force(s, mesh) for s in run.states])
-    return np.asarray(largest / steady) if steady > 0.0 else np.full(len(largest), np.nan)
 
 
 def iso_dynamic_factors(run: RunUp, mesh: int) -> Array:
@@ -132,12 +61,6 @@ def iso_dynamic_factors(run: RunUp, mesh: int) -> Array:
     return dynamic_factor(
         line.pair, line.ratio * run.speeds, stiffness=line.mean, mass=mass, force=force, relief=relief
     )
-
-
-def power_in_band(state: SteadyState, band_hz: float) -> float:
-    """Equivalent radiated power up to a frequency (W)."""
-    assert state.power is not None
-    return float(state.power[(state.frequency > 0.0) & (state.frequency <= band_hz)].sum())
 
 
 def waterfall(run: RunUp, states: Sequence[SteadyState] | None = None) -> dict[str, Array]:
@@ -239,7 +162,7 @@ def summary(run: RunUp, critical: CriticalSpeeds) -> dict[str, Any]:
     modes = critical.modes
     states, model = run.states, run.train.model
     reached = {s.speed for s in states} & set(run.speeds.tolist())
-    factors = [dynamic_factors(run, i) for i in range(len(model.meshes))]
+    factors = [dynamic_factors(run.train, run.states, i) for i in range(len(model.meshes))]
     open_ = [np.array([s.apart[i] for s in states]) for i in range(len(model.meshes))]
 
     def most(values: Array) -> dict[str, float] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import itertools
 import math
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ from ..train.kinematics import drive_sense
 from ..train.model import TrainModel
 from ..typing import Array, ComplexArray
 from .balance import Orbit, settled, size_of, solve
+from .columns import runup_columns
 from .condensed import CondensedTrain, condense, unmatched
 from .first import first_motion
 from .follow import Curve, Turn, follow
@@ -74,9 +74,7 @@ class RunUp(ShownTable):
 
     def columns(self) -> dict[str, Any]:
         """The table runup.csv: a row for each steady state, along the curve."""
-        # tables stand above the run-up: imported when needed
-        made: dict[str, Any] = importlib.import_module(".report", __package__).runup_columns(self)
-        return made
+        return runup_columns(self.train, self.states, self.band_hz)
 
     def sweep(self, *, up: bool = True) -> tuple[SteadyState, ...]:
         """One state at each speed that was reached: what a slow run-up, or a slow run-down, meets there.

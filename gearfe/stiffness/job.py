@@ -20,12 +20,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..cache import cache_key, cached_arrays, source_hash, versions
-from ..config import load_job
 from ..contact.laws import ContactLaw, PairModel, check_alike, check_poisson, check_torque, law_named
 from ..elasticity import Material
 from ..errors import InputError
+from ..gear.deviation_job import deviations_of
 from ..gear.face import NOMINAL, ToothDeviations
 from ..gear.pair import GearPair
+from ..tables.jobs import load_job
 from ..tables.pair import MaterialTable, PairTable, StiffnessTable
 from .curve import StiffnessCurve
 
@@ -91,8 +92,6 @@ class StiffnessJob:
     def _flanks(self, *, back: bool = False) -> tuple[ToothDeviations, ToothDeviations] | None:
         if self.microgeometry is None:
             return None
-        from ..gear.deviation_job import deviations_of
-
         other = {"left": "right", "right": "left"}[self.microgeometry.flank]
         return deviations_of(self.microgeometry, self.pair, self.folder, flank=other if back else None)
 

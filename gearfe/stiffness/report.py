@@ -14,6 +14,8 @@ from ..cache import versions
 from ..contact.laws import COARSENING
 from ..errors import InputError
 from ..gear.derived import derived_geometry, iso_values
+from ..gear.deviation_job import GEARS
+from ..gear.modifications import CHECKED, ends_of
 from ..gear.validity import overlap_warnings
 from ..shown import percent
 from ..tables.pair import DEFAULT_LAW
@@ -102,9 +104,6 @@ def deviation_lines(job: StiffnessJob) -> list[str]:
     """A line about the deviations of the flanks, where there are any."""
     if job.microgeometry is None:
         return []
-    from ..gear.deviation_job import GEARS
-    from ..gear.modifications import CHECKED, ends_of
-
     most = []
     for gear, own in zip((job.pair.pinion, job.pair.wheel), job.model.deviations, strict=True):
         roll = np.linspace(*ends_of(gear), CHECKED)

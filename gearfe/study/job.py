@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ..cache import versions
 from ..config import build, read_toml
 from ..errors import InputError
 from ..files import output_folder
@@ -180,8 +181,6 @@ def run_study(
         Outputs that the job does not give, a folder with another study or that another program writes, a study whose
         first cases all have no answer, or whose cases are not known beforehand.
     """
-    from ..cache import versions
-
     if study.table.design == "search":
         raise InputError("study.design", "search", "has no cases beforehand", "gearfe study runs it; or gearfe.Search")
     base = check_outputs(study)

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..config import build, job_tables
+from ..config import build
 from ..files import read_csv
 from ..gear.face import NOMINAL
 from ..progress import Stopwatch
+from ..tables.jobs import job_tables
 from ..tables.loadmap import loads_of
 from .expressions import Answer
 
@@ -91,7 +92,7 @@ def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
 
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     from ..gearbox.job import train_job
-    from ..tables.train import train_tables
+    from ..tables.jobs import train_tables
     from ..vibration.analysis import Analysis, record_start
     from ..vibration.files import OutputChoice, write_run
     from ..vibration.run import simulated
@@ -115,7 +116,7 @@ def _runup(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
     from ..runup import report
     from ..runup.critical import critical_speeds
     from ..runup.job import described, solved
-    from ..tables.train import train_tables
+    from ..tables.jobs import train_tables
 
     table, job = job_tables(raw, path, ("runup",))["runup"], train_job(path, train_tables(raw, path))
     run, unstable = solved(job, table, watch=Stopwatch())

@@ -12,8 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ..config import TABLES, build, check_size, table_class, type_hints
+from ..config import build, check_size, type_hints
 from ..errors import InputError, given, unknown_name
+from ..gear.pair import GearPair
+from ..gear.pitch_errors import tolerances
+from ..tables.jobs import TABLES, table_class
+from ..tables.mechanism import MechanismFile
+from ..tables.pair import PairTable
 from ..tables.study import DistributionTable
 from ..typing import Array
 
@@ -168,9 +173,6 @@ def _check_sizes(value: Any, label: str) -> None:
 
 def _of_class(found: DistributionTable, class_: int, name: str, base: Mapping[str, Any]) -> DistributionTable:
     """Normal, three deviations to the tolerance f_HaT of the profile slope, and cut off there."""
-    from ..gear.pair import GearPair
-    from ..gear.pitch_errors import tolerances
-    from ..tables.pair import PairTable
 
     parts = name.split(".")
     if parts[-1] != "slope_um" or parts[1] not in ("pinion", "wheel"):
@@ -220,8 +222,6 @@ def key_hint(kind: str, name: str, base: Mapping[str, Any]) -> Any:
     where, rest = WHERE, parts
     hint: Any
     if kind == "mechanism":
-        from ..tables.mechanism import MechanismFile
-
         hint = MechanismFile
     else:
         if parts[0] in TABLES and parts[0] not in READ[kind]:

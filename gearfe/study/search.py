@@ -20,6 +20,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..cache import versions
 from ..errors import InputError
 from ..files import output_folder
 from ..progress import count
@@ -109,8 +110,6 @@ class Search(Facts):
 
     def _known(self, folder: Path, restart: bool) -> Journal:
         """The points that stand in the folder, from now on with those of this search."""
-        from ..cache import versions
-
         names, outputs = self.study.task.names, tuple(self.study.table.outputs)
         journal = Journal(folder, {**self.study.head, "search": True}, versions(), names, outputs, restart=restart)
         columns = journal.cells()

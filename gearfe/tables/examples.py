@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
-from ..config import table_class
+from .jobs import table_class
 from .mechanism import MechanismFile
 from .text import table_text
 

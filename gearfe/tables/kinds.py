@@ -1,9 +1,15 @@
-"""Types of joints and forces of a mechanism file: the class of each, and which keys are which of its fields."""
+"""Types of joints and forces of a mechanism file: the class of each, and which keys are which of its fields.
+
+And integrators that jobs of mechanisms and of trains may not name any more.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import NamedTuple
+
+#: What to write for integrators that exist no more.
+GONE_METHODS = {"explicit": 'explicit was removed: leave the method out, or write "implicit"'}
 
 
 class Kind(NamedTuple):

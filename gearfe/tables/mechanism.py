@@ -7,16 +7,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from ..config import TABLES, build, quantity, read_toml
+from ..config import build, quantity, read_toml
 from ..errors import InputError, unknown_name
 from .beam import BeamTable, check_on_axis
-from .kinds import FORCES, JOINTS, Kind
+from .jobs import TABLES
+from .kinds import FORCES, GONE_METHODS, JOINTS, Kind
 from .plate import PlateTable
 
 Pair = tuple[float, float]
-
-#: What to write for integrators that exist no more.
-GONE_METHODS = {"explicit": 'explicit was removed: leave the method out, or write "implicit"'}
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ name; its numbers are the table ``law_parameters``, the option ``--law-parameter
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -192,18 +191,6 @@ def check_law(label: str, name: str) -> None:
     if name not in known:
         problem = "must be one of " + ", ".join([*LAWS, *sorted(known.keys() - LAWS)])
         raise InputError(label, name, problem, nearest(name, known))
-
-
-def law_class(name: str) -> Any:
-    """Class of the law called `name`."""
-    check_law("law", name)
-    reference = LAWS.get(name) or known_laws()[name]
-    module, _, attribute = reference.partition(":")
-    try:
-        return getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
-        problem = f"cannot be loaded from {reference} ({error})"
-        raise InputError("law", name, problem, f"mend the package that names it in the group {GROUP}") from None
 
 
 #: More positions than this are a slip of the keyboard.

@@ -5,15 +5,13 @@ All shafts run along y, in the frame of the housing. Lengths in millimetres; spe
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from ..config import Removed, build, job_tables, quantity, read_toml
+from ..config import Removed, quantity
 from ..errors import InputError, unknown_name
-from .mechanism import GONE_METHODS
-from .pair import LOADS, StiffnessTable, ToothFormTable
+from .kinds import GONE_METHODS
+from .pair import StiffnessTable, ToothFormTable
 from .timefunction import TrainFunctionTable
 
 Five = tuple[float, float, float, float, float]
@@ -389,52 +387,6 @@ class TrainTable:
         """The table with the curves and damping of a variant; an empty name leaves it as it stands."""
         if not name:
             return self
-        check_variant(name, self.variants)
+        if name not in self.variants:
+            raise unknown_name("variant", name, self.variants)
         return replace(self, curves=self.variants[name].curves, damping=self.variants[name].damping, variant=name)
-
-
-def read_train_tables(path: str | Path, variant: str | None = None) -> dict[str, Any]:
-    """Tables of a train job by name: ``train`` with the chosen variant (None: that which the file names), and others.
-
-    Raises
-    ------
-    InputError
-        For every mistake in the tables, and an unknown variant.
-    """
-    return train_tables(read_toml(path), path, variant)
-
-
-def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = None) -> dict[str, Any]:
-    """The same of tables that are parsed; `path` is named in messages."""
-    tables = job_tables(raw, path, ("train",), ("pair", "stiffness", "microgeometry", "housing", "spectrum"))
-    table: TrainTable = tables["train"]
-    table = table.chosen(table.variant if variant is None else variant)
-    table.check_models()
-    if table.variant:
-        tables["stiffness"] = variant_stiffness(raw, table.variant)
-    if table.housing == "elastic" and "housing" not in tables:
-        raise InputError("train.housing", "elastic", "needs a table [housing]", 'add it, or write housing = "rigid"')
-    return {**tables, "train": table}
-
-
-def check_variant(name: str, variants: Mapping[str, Any]) -> None:
-    """Raise `InputError` for a variant that the job file does not describe."""
-    if name not in variants:
-        raise unknown_name("variant", name, variants)
-
-
-def variant_stiffness(raw: Mapping[str, Any], name: str) -> StiffnessTable:
-    """Return [stiffness] of the parsed tables with the keys that variant `name` of [train] has instead.
-
-    Raises
-    ------
-    InputError
-        For a variant that the file does not describe, and mistakes in its keys.
-    """
-    variants = raw.get("train", {}).get("variants", {})
-    check_variant(name, variants)
-    shared, own = raw.get("stiffness", {}), variants[name].get("stiffness", {})
-    if not own.keys().isdisjoint(LOADS):
-        shared = {key: value for key, value in shared.items() if key not in LOADS}
-    where = f"train.variants.{name}.stiffness" if own else "stiffness"
-    return build(StiffnessTable, {**shared, **own}, where)

@@ -16,6 +16,7 @@ from ..multibody import IntegrationError, Start, Status, Trajectory, integrate
 from ..multibody.integrators.integrate import chosen_method
 from ..progress import count, stage
 from ..record_spectrum import FASTEST, OVERSAMPLING
+from ..reduction.error import reduction_error
 from ..typing import Array
 from .model import TrainModel
 from .parting import Parting, apart_in_steps, beyond_law, parted
@@ -261,8 +262,6 @@ def _whole(
     if finer is not None:
         estimates["integration"] = finer.error
         if model.train.housing is not None:
-            from ..reduction.error import reduction_error
-
             estimates["reduction"] = reduction_error(model.train.housing, options.band_hz).response
     return replace(response, estimates=estimates, warnings=tuple(warnings))
 

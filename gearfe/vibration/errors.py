@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from ..meshlaw.law import MeshLaw
+from ..reduction.error import reduction_error
 from ..reduction.modal_body import ModalBody
 from ..stiffness.curve import StiffnessCurve
 from ..train import build_train
@@ -172,8 +173,6 @@ def _largest(run: Run, base: dict[str, Array]) -> dict[str, Array]:
 
 def _reduction(run: Run, body: ModalBody, base: dict[str, Array], band_hz: float) -> dict[str, Array]:
     """Share of the reduction: its bound up to the band's end, for a line beyond it up to that line."""
-    from ..reduction.error import reduction_error
-
     bound = float(run.summary["error_estimates"].get("reduction", math.nan))
     swing = 0.5 * (base[FORCES[2]] - base[FORCES[1]])
     found = dict.fromkeys(FORCES, bound * swing) | {FORCES[0]: np.zeros_like(swing), PEAKS: bound * base[PEAKS]}

@@ -10,10 +10,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import InputError, given
+from ..errors import InputError, given, unknown_name
 from ..files import whole_set, write_csv, write_json
+from ..gearbox.fields import write_gears, write_housing
 from ..gearbox.report import attachment_to_draw
 from ..progress import Stopwatch
+from ..spectrum import window_values
 from ..train.gear_train import GearTrain
 from ..train.model import TrainModel
 from ..train.response import TrainResponse
@@ -137,9 +139,6 @@ def check_choice(choice: OutputChoice, times: np.ndarray, attachments: tuple[str
     InputError
         Unknown window or attachment, a record or a picture's time outside of the run.
     """
-    from ..errors import unknown_name
-    from ..spectrum import window_values
-
     record(times, choice.spectrum_start, choice.spectrum_length)
     window_values(choice.window, 2)
     if choice.attachment is not None and choice.attachment not in attachments:
@@ -321,8 +320,6 @@ def _fields(
     draw: Pictures | None,
 ) -> list[str]:
     """Write and draw the fields of the response at the output times of `field_steps`."""
-    from ..gearbox.fields import write_gears, write_housing
-
     steps = field_steps(times, choice)
     series, still, film = (np.searchsorted(steps, some) for some in _shown(times, choice))
     write_gears(target / "gears.vtkhdf", train, kept, series)

@@ -66,7 +66,7 @@ def off_changes(pair: GearPair, angles: np.ndarray, margin: float) -> np.ndarray
 @lru_cache(maxsize=1)
 def shipped_housing() -> HousingTable:
     """Table ``[housing]`` of the shipped job."""
-    from gearfe.config import load_job
+    from gearfe.tables.jobs import load_job
 
     table: HousingTable = load_job(given_file(GEOMETRY / "gear_train.toml"), ("housing",))["housing"]
     return table

@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.config import load_job
 from gearfe.tables.housing import HousingMeshTable
+from gearfe.tables.jobs import load_job
 from gearfe.tables.pair import LAWS
 
 from .campaign import Campaign, Case, Columns

@@ -15,15 +15,17 @@ from ...typing import Array
 from ..core.dense import Dense
 from ..core.elimination import is_linear, modal_coordinates
 from ..core.mass_regularisation import loose_link
+from ..core.modes import fastest_rate
 from ..core.start import Start, consistent_start
 from ..core.steps import Status, Watch
 from ..core.stopped import locked, short_steps
 from ..core.system import System
 from ..core.trajectory import IntegrationError, Trajectory
+from .collocation.run import run_implicit
 from .collocation.scheme import GAUSS, RADAU
 from .discontinuities import load_problem_ahead
 from .taylor import run as taylor
-from .taylor.modal import series_force
+from .taylor.modal import run_modal_taylor, series_force
 
 Run = tuple[Dense, Status, dict[str, Any]]
 #: Points of collocation by method.
@@ -175,8 +177,6 @@ def _modal(system: System) -> bool:
 @lru_cache(maxsize=4)
 def _rates(system: System, start: Start) -> tuple[float, float]:
     """Fastest decay and vibration (1/s) at a start; an error estimate asks again for the same."""
-    from ..core.modes import fastest_rate
-
     return fastest_rate(system, start)
 
 
@@ -185,14 +185,10 @@ def _run(
 ) -> Run:
     """Integrate by one method."""
     if method in COLLOCATION:
-        from .collocation.run import run_implicit
-
         program = None if system.program is None else system.program.without_redundant(start.active)
         more = options | {"family": COLLOCATION[method], "program": program}
         return run_implicit(system, start, times, most=most, watch=watch, **more)
     if _modal(system):
-        from .taylor.modal import run_modal_taylor
-
         if series_force(system) is None:
             problem = "needs a linkage, or linear constraints and one force whose law has a series"
             raise InputError("method", "taylor", problem, "use method='implicit'")
