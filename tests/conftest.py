@@ -1,6 +1,27 @@
-"""Meshes that tests make are kept in an ignored folder of the repository."""
+"""Keep meshes that tests make in an ignored folder of the repository; print failing tests as they fail."""
 
 import os
 from pathlib import Path
 
+import pytest
+
 os.environ.setdefault("GEARFE_CACHE", str(Path(__file__).parents[1] / ".test_cache"))
+
+
+class FailuresAsTheyHappen:
+    """Print the name of each failing test when it fails: a run of minutes then need not end to be of use."""
+
+    def __init__(self, terminal: pytest.TerminalReporter) -> None:
+        self.terminal = terminal
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            self.terminal.ensure_newline()
+            self.terminal.write_line(f"FAILED ({report.when}) {report.nodeid}", red=True)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    terminal = config.pluginmanager.get_plugin("terminalreporter")
+    if terminal is not None and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(FailuresAsTheyHappen(terminal))
