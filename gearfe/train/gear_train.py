@@ -22,7 +22,7 @@ from ..stiffness.periodic import PeriodicInterpolant
 from ..typing import Array
 from .friction import Lubrication
 from .kinematics import Kinematics, kinematics
-from .layout import Layout, Link, PitchErrors, Wheel
+from .layout import LayoutGear, LayoutMesh, PitchErrors, TrainLayout
 
 Vector = tuple[float, float, float]
 #: When the damper of a mesh acts.
@@ -291,23 +291,24 @@ class GearTrain(Facts):
         return self.drive
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> TrainLayout:
         """What the kinematics follow from, as values."""
-        gears = {
-            g.name: Wheel(g.name, self.shaft_number(g.shaft), g.gear.teeth, g.gear.base_radius, _tuples(g.pitch_errors))
-            for g in self.gears
-        }
+        gears = {gear.name: self._layout_gear(gear) for gear in self.gears}
         loads = tuple((self.shaft_number(load.shaft), load.torque) for load in self.loads)
-        meshes = tuple(self._link(mesh, gears[mesh.driver], gears[mesh.driven]) for mesh in self.meshes)
+        meshes = tuple(self._layout_mesh(mesh, gears[mesh.driver], gears[mesh.driven]) for mesh in self.meshes)
         names, driven = tuple(shaft.name for shaft in self.shafts), self.shaft_number(self.driven.shaft)
-        return Layout(names, driven, self.driven.speed, tuple(gears.values()), meshes, loads)
+        return TrainLayout(names, driven, self.driven.speed, tuple(gears.values()), meshes, loads)
 
-    def _link(self, mesh: GearMesh, driver: Wheel, driven: Wheel) -> Link:
+    def _layout_gear(self, item: ShaftGear) -> LayoutGear:
+        gear, errors = item.gear, _tuples(item.pitch_errors)
+        return LayoutGear(item.name, self.shaft_number(item.shaft), gear.teeth, gear.base_radius, errors)
+
+    def _layout_mesh(self, mesh: GearMesh, driver: LayoutGear, driven: LayoutGear) -> LayoutMesh:
         one, two = self.gear(mesh.driver), self.gear(mesh.driven)
         arm = self.frame[:2] @ (np.array(self.shaft(two.shaft).point) - np.array(self.shaft(one.shaft).point))
         twist = MeshGeometry(one.gear, two.gear, mesh.centre_distance).contact_twist
         towards, distance = math.atan2(arm[1], arm[0]), float(np.linalg.norm(arm))
-        return Link(mesh.name, driver, driven, towards, distance, twist, mesh.phase)
+        return LayoutMesh(mesh.name, driver, driven, towards, distance, twist, mesh.phase)
 
     @cached_property
     def kinematics(self) -> Kinematics:

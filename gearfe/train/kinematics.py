@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import InputError
 from ..multibody.series.timefunctions import TimeFunction
 from ..typing import Array
-from .layout import Layout
+from .layout import TrainLayout
 from .phases import pair_shifts, tooth_places
 
 #: A common period of more cycles of the fastest mesh than this is of no practical use.
@@ -69,7 +69,7 @@ class Kinematics:
 
 
 @lru_cache(maxsize=32)
-def kinematics(layout: Layout) -> Kinematics:
+def kinematics(layout: TrainLayout) -> Kinematics:
     """Kinematics of a layout; `gearfe.train.GearTrain.kinematics` are those of a train.
 
     Raises
@@ -89,7 +89,7 @@ def kinematics(layout: Layout) -> Kinematics:
     return Kinematics(ratios, cycles, common, note, senses, forces, places.angles, places.phases, shifts)
 
 
-def rolling(layout: Layout) -> tuple[Fraction, ...]:
+def rolling(layout: TrainLayout) -> tuple[Fraction, ...]:
     """Speed of each shaft for unit speed of the drive.
 
     Raises
@@ -161,7 +161,7 @@ def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
     return turns, ""
 
 
-def _senses_and_forces(layout: Layout, ratios: Sequence[Fraction]) -> tuple[tuple[float, ...], Array]:
+def _senses_and_forces(layout: TrainLayout, ratios: Sequence[Fraction]) -> tuple[tuple[float, ...], Array]:
     """Driving senses, and steady forces (N), see `Kinematics`."""
     rolled = tuple(math.copysign(1.0, ratios[mesh.driver.shaft]) for mesh in layout.meshes)
     forces = balanced_forces(layout, rolled, load_torques(layout, [load_end(layout)]))[:, 0]
@@ -171,12 +171,12 @@ def _senses_and_forces(layout: Layout, ratios: Sequence[Fraction]) -> tuple[tupl
     return tuple(sense * s for s in rolled), sense * forces
 
 
-def load_end(layout: Layout) -> float:
+def load_end(layout: TrainLayout) -> float:
     """Time at which all load ramps have ended (s)."""
     return max((b for _, torque in layout.loads for b in torque.breaks), default=0.0)
 
 
-def load_torques(layout: Layout, times: Sequence[float] | Array) -> Array:
+def load_torques(layout: TrainLayout, times: Sequence[float] | Array) -> Array:
     """Torque of the loads on each shaft without its oscillating part (N m), shape (shafts, times)."""
     torques = np.zeros((len(layout.shafts), len(times)))
     for shaft, torque in layout.loads:
@@ -184,7 +184,7 @@ def load_torques(layout: Layout, times: Sequence[float] | Array) -> Array:
     return torques
 
 
-def balanced_forces(layout: Layout, senses: Sequence[float], torques: Array) -> Array:
+def balanced_forces(layout: TrainLayout, senses: Sequence[float], torques: Array) -> Array:
     """Mesh forces (N), shape (meshes, n), that balance the torques (N m) on the shafts, shape (shafts, n)."""
     arms = np.zeros((len(layout.shafts), len(layout.meshes)))
     for column, (mesh, sense) in enumerate(zip(layout.meshes, senses, strict=True)):

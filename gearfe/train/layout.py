@@ -14,7 +14,7 @@ PitchErrors = tuple[tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
-class Wheel:
+class LayoutGear:
     """A gear as kinematics see it.
 
     Attributes
@@ -39,7 +39,7 @@ class Wheel:
 
 
 @dataclass(frozen=True)
-class Link:
+class LayoutMesh:
     """A gear mesh as kinematics see it.
 
     Attributes
@@ -59,8 +59,8 @@ class Link:
     """
 
     name: str
-    driver: Wheel
-    driven: Wheel
+    driver: LayoutGear
+    driven: LayoutGear
     towards: float
     distance: float
     contact_twist: float
@@ -68,7 +68,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Layout:
+class TrainLayout:
     """Shafts, gears and meshes of a train with its drive and its loads.
 
     Attributes
@@ -88,6 +88,6 @@ class Layout:
     shafts: tuple[str, ...]
     driven: int
     speed: TimeFunction
-    gears: tuple[Wheel, ...]
-    meshes: tuple[Link, ...]
+    gears: tuple[LayoutGear, ...]
+    meshes: tuple[LayoutMesh, ...]
     loads: tuple[tuple[int, TimeFunction], ...]

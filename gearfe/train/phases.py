@@ -22,7 +22,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..typing import Array
-from .layout import Layout, Link
+from .layout import LayoutMesh, TrainLayout
 
 #: Agreement of the shafts' places that is checked, relative to the centre distance.
 SAME = 1e-6
@@ -50,7 +50,7 @@ class ToothPlaces:
 class _Join:
     """A mesh as a relation of two teeth: ``z1 (t1 - towards) + z2 (t2 - towards - pi) = remainder``, modulo 2 pi."""
 
-    mesh: Link
+    mesh: LayoutMesh
     sense: float
 
     @property
@@ -90,7 +90,7 @@ class _Join:
         return math.remainder(sides - self.remainder, 2.0 * math.pi) / z1
 
 
-def tooth_places(layout: Layout, senses: Sequence[float]) -> ToothPlaces:
+def tooth_places(layout: TrainLayout, senses: Sequence[float]) -> ToothPlaces:
     """Places of all teeth and phases of all meshes.
 
     The first mesh of a connected group of gears has the phase 0, unless one of them is given a phase.
@@ -155,7 +155,7 @@ def _check(join: _Join, angles: dict[str, float], room: float) -> None:
         raise InputError(f"mesh {mesh.name!r} phase_deg", math.degrees(mesh.phase), problem, cure)
 
 
-def pair_shifts(mesh: Link, sense: float, places: ToothPlaces) -> tuple[Array, Array]:
+def pair_shifts(mesh: LayoutMesh, sense: float, places: ToothPlaces) -> tuple[Array, Array]:
     r"""Return how much later the tooth pairs of a mesh touch because of the gears' pitch errors.
 
     Pair k is the k-th tooth of the driver behind the one whose place is the phase. It meets the driver's tooth
