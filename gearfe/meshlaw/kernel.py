@@ -302,7 +302,26 @@ def packed_tables(tables: LawTables) -> LawTables | Packed:
 def evaluate(
     tables: LawTables | Packed, phase: Array, approach: Array, shifts: Array, pairs: Array
 ) -> tuple[Array, Array]:
-    """Results and slopes of `law_jets`; `pairs` become the pair forces found."""
+    """Evaluate a law at n places, see `law_jets`.
+
+    Parameters
+    ----------
+    tables : LawTables
+        The law, as `packed_tables` gives it.
+    phase : ndarray, shape (n,)
+        Pinion angles (rad).
+    approach : ndarray, shape (n,)
+        Approaches (m).
+    shifts : ndarray, shape (n, s)
+        Further approach at which each pair touches (m).
+    pairs : ndarray, shape (n, s)
+        Pair forces (N); those found are written.
+
+    Returns
+    -------
+    out, slopes : ndarray, shapes (n, RESULTS), (2, n, s)
+        Results of the law, and derivatives of the pair forces.
+    """
     count, slots = pairs.shape
     out, slopes, work = np.zeros((count, RESULTS)), np.zeros((2, count, slots)), np.zeros((ROWS + 2 * slots, slots))
     at = Jets(phase, approach, shifts, pairs, slopes, work, out)
