@@ -148,6 +148,50 @@ def test_another_surface_algorithm_is_taken_and_named(
     assert all(f"{ALGORITHMS[number]}: overlapping facets" in note for number in broken)
 
 
+def sliver(occ: Any) -> None:
+    """A cylinder with a bore that leaves 0.01 mm of wall: facets of both faces cross with every algorithm."""
+    whole, bore = occ.addCylinder(0, 0, 0, 0, 0, 30, 20), occ.addCylinder(0, 9.99, -1, 0, 0, 32, 10)
+    occ.cut([(3, whole)], [(3, bore)])
+
+
+@pytest.mark.parametrize("working", [5, 1])
+def test_another_algorithm_meshes_after_facets_that_really_crossed(
+    working: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After such an error gmsh meshes no volume in that session: the next algorithm must have one of its own."""
+    written(box_with_bores, tmp_path / "solid.step")
+    meshed_by = cad._meshed_by
+    broken = list(ALGORITHMS)[: list(ALGORITHMS).index(working)]
+
+    def cross(gmsh: Any, algorithm: int) -> str | None:
+        if algorithm not in broken:
+            return meshed_by(gmsh, algorithm)
+        gmsh.model.add("sliver")
+        sliver(gmsh.model.occ)
+        gmsh.model.occ.synchronize()
+        problem = meshed_by(gmsh, algorithm)
+        assert problem is not None
+        assert "intersect" in problem
+        gmsh.model.remove()
+        gmsh.model.setCurrent("housing")
+        return problem
+
+    monkeypatch.setattr(cad, "_meshed_by", cross)
+    mesh = mesh_cad_file(tmp_path / "solid.step", "housing.mesh", 40.0)
+    assert len(mesh.tets) > 0
+    assert "intersect" in mesh.notes[0]
+
+
+def test_each_algorithm_is_tried_on_facets_that_cross(tmp_path: Path) -> None:
+    with gmsh_session("solid") as gmsh:
+        sliver(gmsh.model.occ)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "solid.step"))
+    with pytest.raises(InputError) as caught:
+        mesh_cad_file(tmp_path / "solid.step", "housing.mesh", 8.0)
+    assert caught.value.problem.count("intersect") == len(ALGORITHMS)
+
+
 def test_a_solid_that_no_algorithm_meshes_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written(box_with_bores, tmp_path / "solid.step")
     monkeypatch.setattr(cad, "_meshed_by", lambda _, algorithm: f"facets of {algorithm} overlap")

@@ -65,26 +65,20 @@ def mesh_cad_file(path: Path, field: str, size: float) -> CadMesh:
     InputError
         When it cannot be read, has no solid, or no algorithm meshes it.
     """
-    with gmsh_session("housing") as gmsh:
-        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
-        try:
-            gmsh.model.occ.importShapes(str(path))
-            gmsh.model.occ.synchronize()
-        except Exception as error:
-            raise InputError(field, path.name, f"cannot be read ({error})", "export it again as STEP") from None
-        if not gmsh.model.getEntities(3):
-            raise InputError(field, path.name, "has no solid, only surfaces or curves", "export the solid body")
-        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", ROUND)
-        problems: list[str] = []
-        for number, name in ALGORITHMS.items():
+    problems: list[str] = []
+    for number, name in ALGORITHMS.items():
+        # a session each: after facets that cross, gmsh meshes no volume any more, whatever the model
+        with gmsh_session("housing") as gmsh:
+            _import(gmsh, path, field)
+            gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+            gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", ROUND)
             with stage(f"meshing {path.name} (surfaces by {name})"):
                 problem = _meshed_by(gmsh, number)
             if problem is None:
                 notes = () if not problems else (_fallback_note(name, problems),)
                 return CadMesh(*_read_back(gmsh.model), notes)
-            problems.append(f"{name}: {problem}")
-        shortest = min(float(gmsh.model.occ.getMass(1, tag)) for _, tag in gmsh.model.getEntities(1))
+            shortest = min(float(gmsh.model.occ.getMass(1, tag)) for _, tag in gmsh.model.getEntities(1))
+        problems.append(f"{name}: {problem}")
     finer = ", ".join(f"{part * size:.3g}" for part in (0.7, 0.5, 0.35))
     cure = (
         f"another size_mm ({finer}) often meshes; if none does, look at the named surfaces in the CAD program: faces "
@@ -92,6 +86,18 @@ def mesh_cad_file(path: Path, field: str, size: float) -> CadMesh:
     )
     problem = f"cannot be meshed with size_mm = {size:g} by any of gmsh's surface algorithms ({'; '.join(problems)})"
     raise InputError(field, path.name, problem, cure)
+
+
+def _import(gmsh: Any, path: Path, field: str) -> None:
+    """Read the solid into the model of a session."""
+    gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
+    try:
+        gmsh.model.occ.importShapes(str(path))
+        gmsh.model.occ.synchronize()
+    except Exception as error:
+        raise InputError(field, path.name, f"cannot be read ({error})", "export it again as STEP") from None
+    if not gmsh.model.getEntities(3):
+        raise InputError(field, path.name, "has no solid, only surfaces or curves", "export the solid body")
 
 
 def _meshed_by(gmsh: Any, algorithm: int) -> str | None:
