@@ -18,7 +18,7 @@ from gearfe.train.series import train_order
 
 from .mesh_laws import hertzian_law
 from .test_train_contact import R1, R2, pair
-from .test_train_corners import began
+from .test_train_discontinuities import began
 from .trains import gear
 
 GEOMETRY = MeshGeometry(gear(20), gear(30))

@@ -12,8 +12,8 @@ from ..multibody import SeriesLaw
 from ..multibody.series.timefunctions import time_arrays
 from ..stiffness.periodic import PeriodicInterpolant, curve_arrays
 from ..typing import Array, IntArray
-from . import corners, friction, series
-from .corners import SAME
+from . import discontinuities, friction, series
+from .discontinuities import SAME
 from .forces import CurveFlank, Flank, LawFlank, TrainForces
 from .friction import UNKNOWN, Sliding
 from .series import Flanks, Gyros, Places, Program, Slides
@@ -123,8 +123,8 @@ def train_series(forces: TrainForces) -> SeriesLaw:
             memory[row + series.BEFORE, :slots] = force
 
     constants: dict[str, float] = {}
-    for module in (series, corners, friction):
+    for module in (series, discontinuities, friction):
         found = {name: value for name, value in vars(module).items() if name.isupper()}
         constants |= {name: value for name, value in found.items() if isinstance(value, int | float)}
-    helpers = (*series.FUNCTIONS, *corners.FUNCTIONS)
-    return SeriesLaw(begin, series.train_order, corners.train_corner, helpers, program, rows, pieces, constants)
+    helpers = (*series.FUNCTIONS, *discontinuities.FUNCTIONS)
+    return SeriesLaw(begin, series.train_order, discontinuities.train_corner, helpers, program, rows, pieces, constants)

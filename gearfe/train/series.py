@@ -4,7 +4,7 @@ Over x, time :math:`t + s x`, all forces follow order by order from Cauchy's rul
 series: first the functions of time, then those of the gyroscopic moments and of the flanks. The forces of tooth pairs
 (mesh laws) are solved for from :math:`t + \Lambda(z, f) + \sum C F = \delta`, in which their highest order is linear.
 Whole numbers tell on which cells of their laws the flanks are; a step ends where one leaves its cell
-(`gearfe.train.corners`). The functions see each other and the constants by name, in plain Python and compiled.
+(`gearfe.train.discontinuities`). The functions see each other and the constants by name, in plain Python and compiled.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ eliminated at
 local
     coordinates; False where they cannot be written. Rows are quadratic in coordinates, cosines and sines. The Taylor
     method then runs any system compiled. Not needed by what has neither rows nor ``force``. A
-    `gearfe.multibody.core.tape_evaluation.Written` has the rows of 3. from it.
+    `gearfe.multibody.core.tape_evaluation.TapeElement` has the rows of 3. from it.
 15. ``pieced = True`` and ``pieces(t, q, v)``: whole numbers, shape (..., s) at times (...), that change where its force
     has a corner, a jump or a pole; -1 where it has no value. Steps of the implicit method end there.
     Absent: smooth.

@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...typing import Array, IntArray
 from ..series.tape import Program, Tape
 from .contract import Element
-from .tape_evaluation import Written
+from .tape_evaluation import TapeElement
 
 T = TypeVar("T")
 _MAKING = RLock()
@@ -362,7 +362,7 @@ def in_states(element: Element, function: Any, t: float | Array, *states: Array)
     *states : ndarray, shape (size,) or (n, size)
         Coordinates, or coordinates and velocities.
     """
-    if np.ndim(t) == 0 or isinstance(element, Written):
+    if np.ndim(t) == 0 or isinstance(element, TapeElement):
         return np.asarray(function(t, *states), dtype=float)
     return np.array([function(*state) for state in zip(np.asarray(t), *states, strict=True)])
 

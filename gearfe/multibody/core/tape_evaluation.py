@@ -336,7 +336,7 @@ def _groups(op: IntArray, factor: Array, switched: IntArray) -> list[_Group]:
     return groups
 
 
-class Written(Element):
+class TapeElement(Element):
     """An element whose rows follow from what it writes on a tape."""
 
     def write(self, tape: Tape, places: IntArray) -> bool:

@@ -25,7 +25,7 @@ POLE, POLE_AT = 20.0, (1e-3, 1e-6, 1e-9)
 POLE_SHARE, POLE_NEARER = 1e-3, 0.7
 #: How far beyond the end of a run that stopped loads without a value are sought, as shares of the run's length.
 AHEAD = (1e-9, 1e-6, 1e-5)
-#: Steps with larger errors (over the tolerance) do not tell where corners are.
+#: Steps with larger errors (over the tolerance) do not show where discontinuities are.
 TRUSTED = 1e3
 #: A knot of a profile in this share of a step at either end does not cut it: an error of the cube of the share. A cut
 #: is found to 2**-KNOT_HALVINGS of the step.
@@ -36,13 +36,13 @@ ROUNDING = 1e-14
 Path = Callable[[float | Array], tuple[Array, Array]]
 
 
-class Corners:
-    """Cuts the steps of one run at the corners of its forces.
+class Discontinuities:
+    """Cut the steps of a run at the discontinuities of its forces.
 
     Parameters
     ----------
     system, control
-        What runs, and its steps; no system has no corners.
+        What runs, and its steps; no system has no discontinuities.
     tolerance
         Of the run.
     """

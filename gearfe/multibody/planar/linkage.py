@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...typing import Array, IntArray
-from ..core.tape_evaluation import TapeValues, Written
+from ..core.tape_evaluation import TapeElement, TapeValues
 from ..series.tape import Tape
 from ..series.timefunctions import TimeFunction
 from .assembly import Assembly, Held, assemble, body_numbers
@@ -64,7 +64,7 @@ def write_tension(bodies: BodyVariables, spring: Tension) -> tuple[tuple[Affine,
             pull = tape.sum(pull, tape.mul(law, inverse))
     for part, along in zip(span, (x, y), strict=True):
         opposite = {i: -f for i, f in along.terms.items()}
-        tape.push(tape.mul(pull, part), opposite, told=spring.law is None)
+        tape.push(tape.mul(pull, part), opposite, estimated=spring.law is None)
     return (x, y), law
 
 
@@ -73,13 +73,13 @@ def write_along(bodies: BodyVariables, force: Along) -> tuple[Affine, int]:
     tape, form, load = bodies.tape, bodies.form(force.form), -1
     if force.stiffness != 0.0 or force.damping != 0.0:
         pull = tape.sum(tape.linear(*form), tape.rate(form.terms), f=-force.stiffness, g=-force.damping)
-        tape.push(pull, form.terms, told=True)
+        tape.push(pull, form.terms, estimated=True)
     if isinstance(force.load, StateFunction):
         load = register(force.load, force.load.write(bodies))
         tape.push(load, form.terms)
     elif force.load is not None:
         load = tape.function(force.load)
-        tape.push(load, form.terms, told=True)
+        tape.push(load, form.terms, estimated=True)
     return form, load
 
 
@@ -102,7 +102,7 @@ class Observed(NamedTuple):
     load: IntArray  # (f,)
 
 
-class Linkage(Written):
+class Linkage(TapeElement):
     """Planar bodies with their joints and forces; the coordinates are (x, y, theta) of every mass centre.
 
     Parameters

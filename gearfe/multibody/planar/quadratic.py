@@ -9,13 +9,13 @@ import numpy as np
 
 from ...typing import Array, IntArray
 from ..core.contract import Element
-from ..core.tape_evaluation import Written
+from ..core.tape_evaluation import TapeElement
 from ..series.tape import Tape
 from ..series.timefunctions import TimeFunction
 
 
 @dataclass(frozen=True, eq=False)
-class QuadraticJoint(Written):
+class QuadraticJoint(TapeElement):
     """Rows g = c + L z + sum B z_i z_j - motion(t), z = (q, then cosine and sine of the coordinates `angles`).
 
     Frames of elastic bodies in vectors (|a|^2 = 1, a . b = 0), joints between such bodies, and planar ones are of this

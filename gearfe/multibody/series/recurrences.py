@@ -918,7 +918,7 @@ def expand(tb: Equations, w: Work, run: Run, t: float, singular: int) -> None:
     time_series(tb.program.times, t, run.sign > 0.0, run.order + 2, w.TF)
     start_series(tb, w)
     if tb.mass.light.shape[0] > 0:
-        carry_responses(tb, singular, w)
+        regularisation_responses(tb, singular, w)
     for k in range(run.order - 1):
         j = k + 2
         at = k + shift
@@ -937,7 +937,7 @@ def expand(tb: Equations, w: Work, run: Run, t: float, singular: int) -> None:
             mu[r] = mu[r] + rhs[r] if skip[r] == 0 else 0.0
         constrained(tb, singular, w, mu, u, w.a)
         if tb.mass.light.shape[0] > 0:
-            add_carried(tb, singular, w, mu, w.a)
+            add_regularisation(tb, singular, w, mu, w.a)
         for r in range(mu.shape[0]):
             mu[r] *= alpha
         _add_multipliers(tb, w, at, mu)
@@ -986,39 +986,41 @@ def constrained(tb: Equations, singular: int, w: Work, mu: Array, u: Array, q: A
         q[i] = u[i] - w.work[i]
 
 
-def carry_responses(tb: Equations, singular: int, w: Work) -> None:
-    """w.carry: what a unit of every light coordinate adds to coordinates (X) and multipliers (Y, W); 1 - X = L U.
+def regularisation_responses(tb: Equations, singular: int, w: Work) -> None:
+    """Set w.regularisation: what a unit of every light coordinate adds to coordinates (X) and multipliers (Y, W).
+
+    And the factors of 1 - X = L U.
 
     D (1 - X) is symmetric and positive definite, so it needs no pivots.
     """
-    carry, light, border, u = w.carry, tb.mass.light, w.border, w.u
+    responses, light, border, u = w.regularisation, tb.mass.light, w.border, w.u
     k = light.shape[0]
     for c in range(k):
         fill(w.F, 0.0)
         w.F[light[c]] = tb.mass.excess[c]
         accelerations(tb, w.F, u)
-        times_gradients(tb, w.G, u, carry.Y[c])
-        for r in range(carry.Y.shape[1]):
+        times_gradients(tb, w.G, u, responses.Y[c])
+        for r in range(responses.Y.shape[1]):
             if w.skip[r] != 0:
-                carry.Y[c, r] = 0.0
+                responses.Y[c, r] = 0.0
         for p in range(singular):
             border.nu[p] = 0.0
             for i in range(u.shape[0]):
                 border.nu[p] += border.B[p, i] * u[i]
-        constrained(tb, singular, w, carry.Y[c], u, carry.X[c])
+        constrained(tb, singular, w, responses.Y[c], u, responses.X[c])
         for p in range(singular):
-            carry.W[c, p] = border.nu[p]
-    lu = carry.lu
+            responses.W[c, p] = border.nu[p]
+    lu = responses.lu
     for e in range(k):
         for c in range(k):
-            lu[e, c] = (1.0 if e == c else 0.0) - carry.X[c, light[e]]
+            lu[e, c] = (1.0 if e == c else 0.0) - responses.X[c, light[e]]
             for i in range(min(e, c)):
                 lu[e, c] -= lu[e, i] * lu[i, c]
             if c < e:
                 lu[e, c] /= lu[c, c]
 
 
-def add_carried(tb: Equations, singular: int, w: Work, mu: Array, q: Array) -> None:
+def add_regularisation(tb: Equations, singular: int, w: Work, mu: Array, q: Array) -> None:
     """Turn motion and multipliers of the raised masses N into those of the masses M.
 
     Parameters
@@ -1028,14 +1030,14 @@ def add_carried(tb: Equations, singular: int, w: Work, mu: Array, q: Array) -> N
     singular : int
         Number of singular rows.
     w : Work
-        Responses to the light coordinates in ``w.carry``; ``w.border.nu`` changes.
+        Responses to the light coordinates in ``w.regularisation``; ``w.border.nu`` changes.
     mu : ndarray, shape (m,)
         Multipliers; changed.
     q : ndarray, shape (n,)
         Motion of the coordinates; changed.
     """
-    carry, light = w.carry, tb.mass.light
-    lu, own = carry.lu, carry.own
+    responses, light = w.regularisation, tb.mass.light
+    lu, own = responses.lu, responses.own
     k = light.shape[0]
     for e in range(k):
         own[e] = q[light[e]]
@@ -1048,11 +1050,11 @@ def add_carried(tb: Equations, singular: int, w: Work, mu: Array, q: Array) -> N
     for c in range(k):
         value = own[c]
         for i in range(q.shape[0]):
-            q[i] += carry.X[c, i] * value
+            q[i] += responses.X[c, i] * value
         for r in range(mu.shape[0]):
-            mu[r] += carry.Y[c, r] * value
+            mu[r] += responses.Y[c, r] * value
         for p in range(singular):
-            w.border.nu[p] += carry.W[c, p] * value
+            w.border.nu[p] += responses.W[c, p] * value
 
 
 def start_series(tb: Equations, w: Work) -> None:
@@ -1164,7 +1166,8 @@ FUNCTIONS = (
     copy, variables, rates, gradients, gradient_rates, residuals, times_gradients, add_transposed,
     accelerations, inner, factorise, solve,
     square_orders, row_orders, _push_orders, _add_square, _add_multipliers, _add_square_multipliers, finish_order,
-    expand, constrained, carry_responses, add_carried, start_series, _border_rows, border_solve, small_solve,
+    expand, constrained, regularisation_responses, add_regularisation, start_series, _border_rows, border_solve,
+    small_solve,
 )  # fmt: skip
 NAMES = {
     "math": math, "np": np,

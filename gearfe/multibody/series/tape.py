@@ -241,10 +241,12 @@ class Tape:
         """
         self._rows.append((terms, products, constant, -1 if motion is None else self._numbered(motion), unit))
 
-    def push(self, register: int, terms: Terms, *, told: bool = False) -> None:
-        """The force of a register along a form of the variables; `told` where the terms of its series tell how far it
-        reaches."""
-        if not told:
+    def push(self, register: int, terms: Terms, *, estimated: bool = False) -> None:
+        """Add the force of a register along a form of the variables.
+
+        With `estimated`, the last terms of its series give its error; other forces are checked within each step.
+        """
+        if not estimated:
             self._checked += range(len(self._pushes), len(self._pushes) + len(terms))
         self._pushes += [(register, variable, factor) for variable, factor in terms.items()]
 

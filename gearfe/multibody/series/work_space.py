@@ -36,7 +36,7 @@ class Border(NamedTuple):
     drop: IntArray  # (m,) rows left out
 
 
-class Carry(NamedTuple):
+class Regularisation(NamedTuple):
     """Answers of the masses N to k light coordinates, see `recurrences`."""
 
     X: Array  # (k, n) coordinates
@@ -79,7 +79,7 @@ class Work(NamedTuple):
     base: IntArray  # (m,) redundant rows: which ones are left out changes along the motion
     pieces: IntArray  # of the switches
     border: Border
-    carry: Carry
+    regularisation: Regularisation
 
 
 def work_space(tb: Equations, order: int) -> Work:
@@ -96,9 +96,9 @@ def work_space(tb: Equations, order: int) -> Work:
         return np.zeros(size, dtype=np.int64)
 
     border = Border._make([*zeros(*[(m, m)] * 3, *[(m, n)] * 2, *[(m, m)] * 2, m), whole(m)])
-    carry = Carry._make(zeros((k, n), (k, m), (k, m), (k, k), k))
+    regularisation = Regularisation._make(zeros((k, n), (k, m), (k, m), (k, k), k))
     series = zeros((forms, K), (z, K), (m, K), (registers, K), (functions, K), (forms, 2), (registers, 1), (z, 1), z, z)
     rows = zeros(entries, entries, m + len(tb.factor.row), m, m, m)
     numbers = [whole(m), whole(m), whole(len(program.switches.register))]
-    arrays: list[Any] = [*series, *rows, *zeros(*[n] * 10), *numbers, border, carry]
+    arrays: list[Any] = [*series, *rows, *zeros(*[n] * 10), *numbers, border, regularisation]
     return Work._make(arrays)

@@ -24,7 +24,7 @@ from ...core.start import Start
 from ...core.steps import Status, StepControl, StepLaw, Watch, first_step
 from ...core.system import System
 from ...series.tape import Program
-from ..discontinuities import TRUSTED, Corners, collocated_path, quiet_speeds
+from ..discontinuities import TRUSTED, Discontinuities, collocated_path, quiet_speeds
 from . import kernels, numpy_equations
 from .kernels import SOLVED
 from .numpy_equations import SystemEquations
@@ -34,8 +34,8 @@ from .work_space import equations, narrow_band, work
 KERNELS = Kernels(kernels.FUNCTIONS, kernels.NAMES, ("collocation_step",), kernels.HOT)
 #: Stages of a step (measured: five and nine take as long for the same error).
 STAGES = 7
-#: Steps whose polynomials are made at once; bytes of a run's steps from which on they are told.
-BLOCK, TOLD_BYTES = 1024, 1e9
+#: Steps whose polynomials are made at once; bytes of a run's steps from which on they are reported.
+BLOCK, REPORTED_BYTES = 1024, 1e9
 #: Share of a step about which its polynomials are written.
 MIDDLE = 0.5
 #: Relative to the largest coordinate: a step whose path is straight within this is too short for differences of its
@@ -238,10 +238,10 @@ class Stepper:
             w.now[2] = 0.0  # to rounding: what Newton's method leaves is a force at random, which the energy follows
             first = self._steady_step(first, tolerance, (t, float(times[1]) - t, q, v), limit, options["longest"])
             size = 16.0 * abs(end - t) / first * (w.known.size + w.L.size + w.S.size)  # as it goes, and as it is kept
-            if size > TOLD_BYTES:
+            if size > REPORTED_BYTES:
                 announce(f"about {abs(end - t) / first:.2g} steps will take {size / 1e9:.2g} GB of memory")
         control = StepControl(law, (t, end), first, breaks=system.breaks, watch=watch, **options)
-        corners = Corners(system, control, tolerance)
+        discontinuities = Discontinuities(system, control, tolerance)
         ends, known, forces, accelerations, newton = [t], [], [], [a], 0
 
         def state() -> tuple[Array, Array]:
@@ -254,10 +254,10 @@ class Stepper:
                 control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
                 continue
             error = self.error(tolerance)
-            if corners.cutting and error <= TRUSTED:
+            if discontinuities.cutting and error <= TRUSTED:
                 quiet = quiet_speeds(tab.c, w.v, w.V[:, :-1].T, w.vn, units * float((reach / units).max()) / abs(h))
                 speeds = (tab.speed @ np.vstack([w.v, quiet])) / h ** self._powers[:, None]
-                if corners.cut(t, h, collocated_path(h, powers_of_path(tab.path, w.known, tab.inner), speeds)):
+                if discontinuities.cut(t, h, collocated_path(h, powers_of_path(tab.path, w.known, tab.inner), speeds)):
                     continue
             if not error <= 1.0:
                 control.reject(error)
@@ -266,14 +266,14 @@ class Stepper:
                 control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
                 continue
             t = control.accept(error)
-            if not (law.steady or corners.passing(h)):
+            if not (law.steady or discontinuities.passing(h)):
                 control.trial = min(control.trial, abs(h) * EASY / max(float(w.measures[2]), 1e-3))
             known.append(w.known.copy())
             forces.append(np.concatenate((w.L, w.S)))
             ends.append(t)
             self.keep(h)
             q, v = w.qn.copy(), w.vn.copy()
-            if corners.passing(h) or control.trial > MOST_AHEAD * abs(h):
+            if discontinuities.passing(h) or control.trial > MOST_AHEAD * abs(h):
                 accelerations.append(self.restart(system, start, t, q, v))
             elif not system.stressed:
                 accelerations.append(system.acceleration(t, q, v, start.active, start.excess)[0])
@@ -285,8 +285,8 @@ class Stepper:
         }
         if self.compiled:
             counts["compile_seconds"] = self.compile_seconds
-        if corners.load_problem and control.status is not Status.DONE:
-            counts["load_problem"] = corners.load_problem
+        if discontinuities.load_problem and control.status is not Status.DONE:
+            counts["load_problem"] = discontinuities.load_problem
         return dense, control.status, {
             **counts, "steps": control.accepted, "newton_iterations": newton, "rejected": control.rejected,
         }  # fmt: skip

@@ -27,10 +27,9 @@ from ...core.steps import Status
 from ...series.recurrences import (
     OUTSIDE,
     accelerations,
-    add_carried,
+    add_regularisation,
     add_transposed,
     border_solve,
-    carry_responses,
     constrained,
     copy,
     curve_forces,
@@ -47,6 +46,7 @@ from ...series.recurrences import (
     margin,
     next_piece,
     rates,
+    regularisation_responses,
     residuals,
     small_solve,
     solve,
@@ -868,7 +868,7 @@ def _defect(tb: Equations, w: Work, run: Run, t: float, h: float, singular: int)
     P, F, code, switches = w.P, w.F, program.code, program.switches
     n = w.q.shape[0]
     if tb.mass.light.shape[0] > 0:
-        carry_responses(tb, singular, w)
+        regularisation_responses(tb, singular, w)
     most = 0.0
     for look in range(LOOKS_WITHIN):
         place = h * (look + 1) / LOOKS_WITHIN
@@ -902,7 +902,7 @@ def _defect(tb: Equations, w: Work, run: Run, t: float, h: float, singular: int)
                 w.border.nu[p] += w.border.B[p, i] * w.u[i]
         constrained(tb, singular, w, w.mu, w.u, w.a)
         if tb.mass.light.shape[0] > 0:
-            add_carried(tb, singular, w, w.mu, w.a)
+            add_regularisation(tb, singular, w, w.mu, w.a)
         for i in range(n):
             off = abs(w.a[i]) * h * h / program.unit[i]
             most = max(most, off) if np.isfinite(off) else np.inf

@@ -10,7 +10,7 @@ from gearfe.multibody.compiled import kernels as compiled
 from gearfe.multibody.integrators.taylor import kernel_modal
 from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import build_train, simulate
-from gearfe.train.corners import leaves, train_corner
+from gearfe.train.discontinuities import leaves, train_corner
 from gearfe.train.forces import CurveFlank, Gyro, LawFlank, TrainForces
 from gearfe.train.program import train_series
 from gearfe.train.series import train_order
