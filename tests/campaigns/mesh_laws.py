@@ -29,7 +29,7 @@ TRUTHS, PLACES = 80, 2000
 #: Torques at the driven gear, as shares of what the material bears.
 TORQUES = (1e-4, 1.0)
 #: Largest error (of the force, or of a tenth of the largest one that the law is asked for) over the stated one.
-FAR_OFF = 3.0
+FAR_OFF = 1.3
 #: Loads (N/mm) that part the rows of the table, and its quantiles.
 LOADS, QUANTILES = (0.0, 1.0, 10.0, math.inf), (0.5, 0.9, 1.0)
 
