@@ -227,6 +227,7 @@ def run_in_pieces(
     largest: int,
     most: int,
     watch: Watch | None,
+    stiff: Callable[[float, float, Array, Array], bool] | None = None,
 ) -> tuple[Status, int]:
     """A compiled loop by pieces of its output; (why it ended, number of steps).
 
@@ -242,8 +243,10 @@ def run_in_pieces(
         Steps in all.
     watch
         See `Watch`; it looks between two pieces.
+    stiff
+        Whether to end the run with `Status.STIFF`, by the time (s), the mean step of the last piece (s), q and v.
     """
-    done, pace = 0, Pace(*span, most)
+    done, pace, before = 0, Pace(*span, most), span[0]
     if watch is not None:
         watch(span[0], 0, state)
     while done < most:
@@ -251,6 +254,9 @@ def run_in_pieces(
         done += count
         if status != Status.MOST_STEPS:
             return Status(status), done
+        if stiff is not None and stiff(t, abs(t - before) / count, *state()):
+            return Status.STIFF, done
+        before = t
         if pace.hopeless(t, done):
             return Status.ENDLESS, done
         if done < most and watch is not None and not watch(t, done, state):
@@ -297,6 +303,7 @@ class Status(IntEnum):
     SINGULAR_START = 6
     REDUNDANT_NOT_MET = 7
     ENDLESS = 8
+    STIFF = 9
 
     @property
     def message(self) -> str:
@@ -317,5 +324,6 @@ _MESSAGES = {
     Status.NOT_SOLVED: "the equations could not be solved in a step",
     Status.SINGULAR_START: "the start is beside a singular position",
     Status.ENDLESS: "the steps became so short that the rest would take more than can be made",
+    Status.STIFF: "a force damps the motion so fast that it limits the steps",
     Status.REDUNDANT_NOT_MET: "constraints that were taken for redundant at the start are not met by the motion",
 }

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -15,7 +17,7 @@ from ...typing import Array
 from ..core.dense import Dense
 from ..core.elimination import is_linear, modal_coordinates
 from ..core.mass_regularisation import loose_link
-from ..core.modes import fastest_rate
+from ..core.modes import fastest_rate, rates
 from ..core.start import Start, consistent_start
 from ..core.steps import Status, Watch
 from ..core.stopped import locked, short_steps
@@ -42,6 +44,9 @@ LOCAL_SHARE = 5e-4
 OVERDAMPED, DECAYED, DECAYED_MODAL = 3.0, 3e3, 1e6
 #: Fastest rate times the duration from which on steps of series are below the rounding of the run's time.
 HOPELESS = 1e12
+#: Steps of series are limited by a decay where the decay times the step is between these numbers (their stability ends
+#: at about a third of their order), and that is worth a look where so many such steps are left.
+LIMITED, MANY_LEFT = (0.1, 100.0), 1e3
 #: What to write for methods that exist no more.
 GONE_METHODS = {"explicit": 'explicit was removed: leave the method out, or write "implicit"'}
 
@@ -104,10 +109,14 @@ def integrate(
     chosen = chosen_method(system, start, duration) if method == "auto" else method
     options = {"tolerance": tolerance, "longest": longest}
     counted = partial(_counted, start.time, output_times[-1])
+    stiff = partial(_stiff, system, start, float(output_times[-1])) if method == "auto" and not _modal(system) else None
     with np.errstate(all="ignore"):  # a state that is not finite has a status of its own
-        dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps, counted)
-        if method == "auto" and chosen == "taylor" and status is Status.STEP_TOO_SMALL and not system.algebraic:
-            chosen = "implicit"  # a load has no series at a state on the way
+        dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps, counted, stiff)
+        # a decay limits the steps, or a load has no series at a state on the way
+        if status is Status.STIFF or (
+            method == "auto" and chosen == "taylor" and status is Status.STEP_TOO_SMALL and not system.algebraic
+        ):
+            chosen = "implicit"
             dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps, counted)
     sign = 1.0 if output_times[-1] >= output_times[0] else -1.0
     reached = sign * dense.times[-1] + 1e-12 * abs(dense.times[-1])
@@ -152,16 +161,28 @@ def _dropped_rows_hold(system: System, start: Start, dense: Dense, tolerance: fl
 
 
 def chosen_method(system: System, start: Start, duration: float) -> str:
-    """Return the method that ``auto`` takes for a run of that duration (s), by the rule in docs/integrators.md.
+    """Return the method that ``auto`` begins with for a run of that duration (s), by the rule in docs/integrators.md.
 
-    It depends on the system and its start alone, so the same file has the same digits on every machine.
+    It depends on the system and its start alone, and what follows on counted steps (`_stiff`), so the same file has the
+    same digits on every machine. The decay at the start decides only where it stays: nonlinear loads change it.
     """
     if not _has_series(system) or any(element.stiff for element in system.elements):
         return "implicit"
     decay, vibration = _rates(system, start)
     long = DECAYED_MODAL if _modal(system) else DECAYED
-    overdamped = decay > OVERDAMPED * vibration and decay * duration > long
+    lasting = _modal(system) or len(system.series.code.checked) == 0  # type: ignore[union-attr]
+    overdamped = lasting and decay > OVERDAMPED * vibration and decay * duration > long
     return "implicit" if overdamped or max(decay, vibration) * duration > HOPELESS else "taylor"
+
+
+def _stiff(system: System, start: Start, end: float, t: float, step: float, q: Array, v: Array) -> bool:
+    """Whether a decay limits the mean step (s) of series at a state, and the rest of the run is long for it."""
+    left = abs(end - t)
+    if not left > MANY_LEFT * step:
+        return False
+    _, decay, vibration = rates(system, replace(start, time=t, q=q.copy(), v=v.copy()))
+    limited = LIMITED[0] < decay * step < LIMITED[1]
+    return limited and decay > OVERDAMPED * vibration and decay * left > DECAYED
 
 
 def _has_series(system: System) -> bool:
@@ -181,9 +202,10 @@ def _rates(system: System, start: Start) -> tuple[float, float]:
 
 
 def _run(
-    system: System, method: str, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None
-) -> Run:
-    """Integrate by one method."""
+    system: System, method: str, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None,
+    stiff: Callable[[float, float, Array, Array], bool] | None = None,
+) -> Run:  # fmt: skip
+    """Integrate by one method; `stiff` may end Taylor series of a linkage, see `run_in_pieces`."""
     if method in COLLOCATION:
         program = None if system.program is None else system.program.without_redundant(start.active)
         more = options | {"family": COLLOCATION[method], "program": program}
@@ -199,7 +221,9 @@ def _run(
     local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
     prepared = taylor.prepare(system, start, taylor.order_for(local))
     end, longest = float(times[-1]), options["longest"]
-    return taylor.run_taylor(prepared, start, end, tolerance=local, longest=longest, most=most, watch=watch)
+    return taylor.run_taylor(
+        prepared, start, end, tolerance=local, longest=longest, most=most, watch=watch, stiff=stiff
+    )
 
 
 def _default_start(system: System, time: float) -> Start:

@@ -129,6 +129,11 @@ def solve(eq: SystemEquations, w: Stages, tab: Scheme) -> None:
     w.dZ[:, :s], w.dL[:, :s] = (tab.basis @ r).T, (tab.basis @ g).T
 
 
+def left_over(eq: SystemEquations, w: Stages, tab: Scheme) -> float:  # noqa: ARG001
+    """See `kernels.left_over`; elements do not say whether their forces are linear, and count as such."""
+    return 0.0
+
+
 def change(eq: SystemEquations, w: Stages, tab: Scheme) -> float:
     """See `kernels.change`."""
     s, h = len(tab.c), w.now[1]
@@ -228,7 +233,7 @@ def saddle_solver(
 
 
 FUNCTIONS = (
-    begin, stages, linearise, factorise, solve, change, defect, end_state, keep_path,
+    begin, stages, left_over, linearise, factorise, solve, change, defect, end_state, keep_path,
     gap_between, project,
 )  # fmt: skip
 NAMES = {**simd.NAMES, "np": np, "math": math, "saddle_solver": saddle_solver,

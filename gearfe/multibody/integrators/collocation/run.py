@@ -112,7 +112,10 @@ def run_implicit(
         coefficients = within.coefficients @ modal.T.T
         coefficients[:, 0] += modal.origin
         return replace(within, coefficients=coefficients), status, {**statistics, "free_coordinates": inner.size}
-    step = Stepper(system, start, scheme(family, STAGES), program)
+    if program is not None and system.stressed:  # speeds of waves along stiff links are not to be followed
+        program = program._replace(code=program.code._replace(checked=program.code.checked[:0]))
+    nonlinear = program is not None and len(program.code.checked) > 0
+    step = Stepper(system, start, scheme(family, STAGES, rates=nonlinear), program)
     return step.run(system, start, times, tolerance, watch, options)
 
 
@@ -219,9 +222,8 @@ class Stepper:
         w, tab, units = self.w, self.tab, system.units
         q, v, t, end = start.q.copy(), start.v.copy(), start.time, float(times[-1])
         a = self.restart(system, start, t, q, v)
-        law = StepLaw(
-            exponent=1.0 / (len(tab.c) + 1), growth=5.0, least_error=1e-8, predictive=True, steady=tab.level == 1
-        )
+        steady = tab.inner == len(tab.c)  # Gauss's points
+        law = StepLaw(exponent=1.0 / (len(tab.c) + 1), growth=5.0, least_error=1e-8, predictive=True, steady=steady)
         reach = np.maximum(np.abs(q), 1e-300)
 
         def least() -> Array:
@@ -247,7 +249,11 @@ class Stepper:
         def state() -> tuple[Array, Array]:
             return q, v
 
+        speeds_count, fastest = tab.level == 1 and not steady, 1e-300
         while (h := control.next_step(state)) is not None:
+            if speeds_count:
+                fastest = max(fastest, float(np.abs(v / units).max()))
+                w.now[3] = min(float((reach / units).max()) / fastest, control.span)
             count = self(t, h, q, v, limit(h))
             newton += abs(count)
             if count <= 0:

@@ -66,8 +66,8 @@ class Scheme(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def scheme(family: str, stages: int) -> Scheme:
-    """Coefficients of a family with an odd number of stages."""
+def scheme(family: str, stages: int, rates: bool = False) -> Scheme:
+    """Coefficients of a family with an odd number of stages; with `rates` Radau's, too, hold those of constraints."""
     series = np.zeros(stages + 1)
     series[stages], series[stages - 1] = 1.0, -1.0 if family == RADAU else 0.0
     c = 0.5 + 0.5 * np.sort(np.real(np.polynomial.legendre.legroots(series)))
@@ -94,7 +94,7 @@ def scheme(family: str, stages: int) -> Scheme:
     before = np.vander(np.append(0.0, c) - 1.0, increasing=True)
     next_to = np.linalg.pinv(before[:, : min(AHEAD, stages - 1) + 1])
     mu = np.array([values[k] for k in kept])
-    level = int(family == GAUSS)
+    level = int(family == GAUSS or rates)
     parts = [0, *range(1, stages, 2), *range(2, stages, 2)]  # real parts, then imaginary ones but for the first
     entry = [*range(len(kept)), *range(len(kept) + 1, stages + 1)]
 

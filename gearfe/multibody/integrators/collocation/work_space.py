@@ -19,7 +19,9 @@ from ...series.tape import Program
 class Stages(NamedTuple):
     """State and unknowns of a step: n coordinates, m rows, k stresses; W = s + 1 stages, last the begin."""
 
-    now: Array  # (3,) time at the begin and step (s), change over the limit at which Newton's method ends
+    #: (4,) time at the begin and step (s), change over the limit at which Newton's method ends, time for which an error
+    #: of the speed lasts (s), 0 where it does not count
+    now: Array
     #: (4,) error over the tolerance, gap of the rows between the stages, mean rate of Newton's changes, stages that are
     #: beyond the end of a table
     measures: Array
@@ -134,7 +136,7 @@ def work(s: int, n: int, m: int, k: int, known: int) -> Stages:
     known : int
         Rows of ``Stages.known``, as `Scheme.path` has them.
     """
-    plain = [(3,), (4,), (n,), (n,), (m,), (s + 1, n), (n,)]
+    plain = [(4,), (4,), (n,), (n,), (m,), (s + 1, n), (n,)]
     W = s + 1
     wide = [(s + 1, W), *[(n, W)] * 4, (m, W), (k, W), *[(n, W), (m, W)] * 3]
     arrays: list[Array] = [np.zeros(shape) for shape in plain]

@@ -869,6 +869,10 @@ def _defect(tb: Equations, w: Work, run: Run, t: float, h: float, singular: int)
     n = w.q.shape[0]
     if tb.mass.light.shape[0] > 0:
         regularisation_responses(tb, singular, w)
+    speed = 1e-300
+    for i in range(n):
+        speed = max(speed, abs(w.v[i]) / program.unit[i])
+    lasting = max(abs(h), min(1.0 / speed, abs(run.end - run.begin)))  # time in which an error of the speed displaces
     most = 0.0
     for look in range(LOOKS_WITHIN):
         place = h * (look + 1) / LOOKS_WITHIN
@@ -904,7 +908,7 @@ def _defect(tb: Equations, w: Work, run: Run, t: float, h: float, singular: int)
         if tb.mass.light.shape[0] > 0:
             add_regularisation(tb, singular, w, w.mu, w.a)
         for i in range(n):
-            off = abs(w.a[i]) * h * h / program.unit[i]
+            off = abs(w.a[i] * h) * lasting / program.unit[i]
             most = max(most, off) if np.isfinite(off) else np.inf
     return most
 

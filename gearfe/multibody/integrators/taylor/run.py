@@ -113,7 +113,7 @@ def order_for(tolerance: float) -> int:
 
 def run_taylor(
     shared: TaylorRun, start: Start, end: float, *, tolerance: float, longest: float = math.inf, most: int = 1_000_000,
-    watch: Watch | None = None,
+    watch: Watch | None = None, stiff: Callable[[float, float, Array, Array], bool] | None = None,
 ) -> tuple[Polynomials, Status, dict[str, Any]]:  # fmt: skip
     """Integrate from the consistent start to the time `end` by Taylor series.
 
@@ -179,7 +179,7 @@ def run_taylor(
     with np.errstate(all="ignore"):
         status, done = run_in_pieces(
             fill, (t0, end), lambda: (w.q, w.v), room=FIRST_STEPS,
-            largest=max(FIRST_STEPS, MOST_NUMBERS // ((order + 1) * width)), most=most, watch=look,
+            largest=max(FIRST_STEPS, MOST_NUMBERS // ((order + 1) * width)), most=most, watch=look, stiff=stiff,
         )  # fmt: skip
     problem = ""
     if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE):

@@ -1,0 +1,132 @@
+"""Dry friction smoothed over a narrow width of speed, against Coulomb's law in closed form: slip, stick, reversal."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from gearfe.multibody import Body, Gravity, Hinge, Linkage, Moment, Status, System, Trajectory, integrate, polynomial
+from gearfe.multibody.planar.linkage import BodyVariables, StateFunction
+from gearfe.typing import Array
+
+MASS, LENGTH, G = 2.0, 1.0, 9.81
+INERTIA = MASS * LENGTH**2 / 3  # of a bar about its end
+TIGHT = 1e-9
+
+
+class Friction(StateFunction):
+    """``drive sin(3 t) - moment tanh(rate / width)`` of a body, or of a body against the one before."""
+
+    def __init__(self, moment: float, width: float, body: int = 0, drive: float = 0.0) -> None:
+        self.moment, self.width, self.drive = moment, width, drive
+        self.terms = {3 * body + 2: 1.0} | ({3 * body - 1: -1.0} if body else {})
+
+    def value(self, t: float, q: Array, v: Array) -> float:
+        """Moment (N m)."""
+        rate = sum(sign * v[i] for i, sign in self.terms.items())
+        return float(self.drive * math.sin(3 * t) - self.moment * math.tanh(rate / self.width))
+
+    def write(self, bodies: BodyVariables) -> int:
+        """Its register."""
+        tape = bodies.tape
+        brake = tape.tanh(tape.sum(tape.rate(self.terms), f=1.0 / self.width))
+        push = tape.sincos(tape.sum(tape.function(polynomial((0.0, 1.0))), f=3.0))[0]
+        return tape.sum(push, brake, f=self.drive, g=-self.moment)
+
+
+def bar(friction: Friction, *, gravity: bool = False, angle: float = 0.5, rate: float = 0.0) -> System:
+    """A uniform bar hinged at its end."""
+    body = Body("rod", MASS, MASS * LENGTH**2 / 12, (LENGTH / 2, 0.0), (0.0, 0.0), angle, (0.0, 0.0), rate)
+    forces: tuple[Any, ...] = (Moment("rod", friction), *([Gravity((0.0, -G))] if gravity else []))
+    return System([Linkage((body,), (Hinge("rod", "ground"),), forces)])
+
+
+def run(system: System, method: str, end: float = 6.0) -> Trajectory:
+    """Run at a tight tolerance; a few thousand steps must do."""
+    return integrate(system, np.linspace(0.0, end, 601), method=method, tolerance=TIGHT, most_steps=5000)
+
+
+@pytest.mark.parametrize("width", [1e-4, 1e-7, 1e-9])
+def test_a_bar_slips_and_then_sticks(width: float) -> None:
+    """The angle until it sticks is I w^2 / 2 M; it then creeps by nothing, as no load drives it."""
+    moved = run(bar(Friction(0.5, width), rate=2.0), "auto")
+    assert moved.q[-1, 2] - 0.5 == pytest.approx(INERTIA * 2.0**2 / (2 * 0.5), abs=1e2 * TIGHT + width**2)
+    assert abs(moved.v[-1, 2]) < 1e-3 * width
+
+
+@pytest.mark.parametrize("method", ["auto", "implicit"])
+@pytest.mark.parametrize("width", [1e-7, 1e-9])
+def test_a_load_drives_through_stiction(width: float, method: str) -> None:
+    """Under A sin(3 t) it sticks until that is M, slides until its speed is none, and sticks until -A sin(3 t) is M."""
+    drive, moment = 1.0, 0.6
+    begin = math.asin(moment / drive) / 3.0
+
+    def speed(t: float) -> float:
+        return (drive / 3.0 * (math.cos(3 * begin) - math.cos(3 * t)) - moment * (t - begin)) / INERTIA
+
+    end = brentq(speed, 2.0 * begin, math.pi / 3.0 + begin, xtol=1e-14)
+    assert abs(drive * math.sin(3 * end)) < moment
+    dt = end - begin
+    cosines = math.cos(3 * begin) * dt - (math.sin(3 * end) - math.sin(3 * begin)) / 3.0
+    slid = (drive / 3.0 * cosines - moment * dt**2 / 2.0) / INERTIA
+    again = math.pi / 3.0 + begin
+    moved = run(bar(Friction(moment, width, drive=drive)), method, 0.5 * (end + again))
+    assert moved.q[-1, 2] - 0.5 == pytest.approx(slid, abs=1e2 * TIGHT + 5.0 * width)  # and creeps by some widths
+
+
+def turning_angles(angle: float, moment: float, count: int) -> list[float]:
+    """Where a pendulum turns: weight and friction do no work between two of these angles."""
+    weight, found = MASS * G * LENGTH / 2, [angle]
+    bottom = -math.pi / 2
+    for _ in range(count):
+        first, sense = found[-1], math.copysign(1.0, bottom - found[-1])
+
+        def lost(other: float, first: float = first, sense: float = sense) -> float:
+            return weight * (math.sin(first) - math.sin(other)) - moment * sense * (other - first)
+
+        found.append(brentq(lost, bottom + 1e-3 * sense, bottom + abs(first - bottom) * sense, xtol=1e-14))
+    return found
+
+
+@pytest.mark.parametrize("method", ["taylor", "implicit", "auto"])
+@pytest.mark.parametrize("width", [1e-4, 1e-7, 1e-9])
+def test_friction_reverses_with_a_pendulum(width: float, method: str) -> None:
+    """Every reversal takes place within the width: its turning angles follow from the energy alone."""
+    moved = run(bar(Friction(0.6, width), gravity=True), method)
+    times, rates = moved.time, moved.v[:, 2]
+    turns = [k for k in range(1, len(times) - 1) if rates[k] * rates[k + 1] < 0.0]
+    expected = turning_angles(0.5, 0.6, len(turns))[1:]
+    assert len(turns) > 2
+
+    def rate(t: float) -> float:
+        return float(moved.dense(np.array([t]), 1)[0, 2])
+
+    found = [float(moved.dense(np.array([brentq(rate, times[k], times[k + 1], xtol=1e-13)]))[0, 2]) for k in turns]
+    assert found == pytest.approx(expected, abs=1e2 * TIGHT + 1e-2 * width)
+
+
+def test_two_frictional_joints() -> None:
+    """The joint between two bars sticks, the other slips; the energy lost is M times the angles travelled."""
+    width, moment, first, second = 1e-7, 3.0, -0.5, -1.0
+    tip = (math.cos(first), math.sin(first))
+    bodies = (
+        Body("one", MASS, MASS / 12, (0.5, 0.0), (0.0, 0.0), first),
+        Body("two", MASS, MASS / 12, (0.5, 0.0), tip, second),
+    )
+    joints = (Hinge("one", "ground"), Hinge("one", "two", (1.0, 0.0), (0.0, 0.0)))
+    loads = (Moment("one", Friction(moment, width)), Moment("two", Friction(moment, width, 1), "one"))
+    system = System([Linkage(bodies, joints, (Gravity((0.0, -G)), *loads))])
+    moved = run(system, "auto")
+    assert moved.status is Status.DONE
+    step = 3e-3  # a turn between two of these times is missed by up to 10 rad/s2 step^2/4: 1e-5 of the energy in all
+    times = np.linspace(0.0, 6.0, round(6.0 / step) + 1)
+    q = moved.dense(times)
+    height, rates = q[:, 1] + q[:, 4], moved.v[-1]
+    travelled = np.abs(np.diff(q[:, 2])).sum() + np.abs(np.diff(q[:, 5] - q[:, 2])).sum()
+    kinetic = MASS / 2 * (rates[[0, 1, 3, 4]] ** 2).sum() + MASS / 24 * (rates[[2, 5]] ** 2).sum()
+    assert MASS * G * (height[0] - height[-1]) - kinetic == pytest.approx(moment * travelled, rel=1e-5)
+    assert abs(rates[5] - rates[2]) < 10.0 * width < abs(rates[2])
