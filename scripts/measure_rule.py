@@ -336,7 +336,7 @@ rule with both methods.
 `scripts/measure_rule.py` writes the table: processor seconds at the same tolerance, kernels loaded before, the least
 of three runs where these are short. "> x" means: ended after x seconds, or earlier without reaching the end. Flexible
 links have one method only (a dash). On {count} scenes with two methods the rule takes at most {worst:.2f} times the
-better one. The numbers of the rule were not chosen on the scenes called "held out".
+better one, whole calls included. The numbers of the rule were not chosen on the scenes called "held out".
 
 At the bound the methods cost the same only on the average: a damped bar takes 4 ms by series and 13 ms by collocation,
 a linkage of 81 bodies 0.3 s and 0.13 s.

@@ -133,6 +133,8 @@ def run_taylor(
         Largest number of steps.
     watch : Watch, optional
         Called between pieces of the run; may end it.
+    stiff : callable, optional
+        Whether a decay limits the steps, see `run_in_pieces`.
 
     Returns
     -------
