@@ -155,3 +155,12 @@ def test_a_rod_without_mass_is_named_among_the_links_in_line() -> None:
 def test_messages_call_joints_and_forces_as_job_files_do() -> None:
     parts = (GearRatio("a", "b", -2.0, name="g"), CoordinateSpring("a", "angle", 1.0), PointForce("a", x=1.0, name="f"))
     assert [label_of(part, 7) for part in parts] == ["gear g", "coordinate spring 7", "force f"]
+
+
+@pytest.mark.parametrize(("needed", "stops"), [(5.0, True), (1.5, False)])
+def test_a_steady_pace_beyond_the_steps_allowed_stops_early(needed: float, stops: bool) -> None:
+    """Equal steps tell after some looks that the run needs more than is allowed; one that may pass goes on."""
+    pace = Pace(0.0, 1.0, 1_000_000)
+    seen = [n for n in range(64, 500_000, 64) if pace.hopeless(n / (needed * 1e6), n)]
+    assert bool(seen) is stops
+    assert not stops or seen[0] < 20_000

@@ -36,6 +36,8 @@ ROUNDING, NO_SIZE = 1e-14, 1e-12
 STRETCH = 1e-6
 #: Steps between two looks at the pace; how many times the steps allowed a run may need by its pace before it stops.
 PACE, ENDLESS = 4096, 100.0
+#: How many times the steps allowed a run may need where so many looks in a row agree within this factor.
+STEADY_ENDLESS, AGREEING, ALIKE = 3.0, 4, 1.1
 #: Steps before the first doubling of their number that counts; doublings in a row, each in at most this many times the
 #: time of the last, after which the number of steps counts as growing exponentially.
 FIRST_DOUBLING, DOUBLINGS, SLOWER = 512, 3, 1.05
@@ -69,8 +71,9 @@ class StepLaw:
 class Pace:
     """The number of steps that a run needs, extrapolated from the steps so far.
 
-    Two rules: the pace of the last steps stays, or the number of steps doubles in equal times, as where a force feeds
-    the motion. (Where steps grow shorter by a power of the time, up to the fourteenth, every doubling takes longer.)
+    Two rules: the pace of the last steps stays (which is trusted sooner where it is steady), or the number of steps
+    doubles in equal times, as where a force feeds the motion. (Where steps grow shorter by a power of the time, up to
+    the fourteenth, every doubling takes longer.)
 
     Parameters
     ----------
@@ -86,6 +89,7 @@ class Pace:
         self._doubled = begin, FIRST_DOUBLING
         self._times: list[float] = []  # that doublings took (s)
         self._announced = False
+        self._needed: list[float] = []  # steps that the run needs, by the last looks
 
     def hopeless(self, t: float, steps: int) -> bool:
         """Whether the rest of the run needs `ENDLESS` times the steps allowed, at time t (s) after so many steps."""
@@ -103,9 +107,11 @@ class Pace:
             needed = steps * 2.0 ** min(left / max(recent[-1], 1e-300), 1000.0)
         if steps >= self._last[1] + PACE:
             passed = abs(t - self._last[0])
-            needed = max(needed, steps + left * (steps - self._last[1]) / max(passed, 1e-300))
-            self._last = t, steps
-        hopeless = needed > ENDLESS * self.most
+            by_pace = steps + left * (steps - self._last[1]) / max(passed, 1e-300)
+            needed = max(needed, by_pace)
+            self._last, self._needed = (t, steps), [*self._needed[1 - AGREEING :], by_pace]
+        alike = len(self._needed) == AGREEING and max(self._needed) <= ALIKE * min(self._needed)
+        hopeless = needed > ENDLESS * self.most or (alike and min(self._needed) > STEADY_ENDLESS * self.most)
         if needed > self.most and not (hopeless or self._announced):
             self._announced = True
             announce(f"at this pace the run would need {needed:.1g} steps; it stops after {self.most:.1g}")
