@@ -102,8 +102,8 @@ def _check_ratio(pair: MeshGeometry) -> None:
         tangent = pair.tangent_length - (1.0 - nominal) * pair.base_pitch
         if pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch and tangent > 0.0:
             most = math.hypot(tangent, pair.pinion.base_radius + pair.wheel.base_radius)
-            limit = ("<=", 1e3 * most, "mm")
-            raise InputError("centre_distance", pair.centre_distance, problem, "use a smaller centre distance", limit)
+            cure = "use a smaller centre distance"
+            raise InputError("centre_distance", pair.centre_distance, problem, cure, ("<=", 1e3 * most, "mm"))
         name = min(("pinion", "wheel"), key=lambda name: getattr(pair, name).addendum)
         gear = getattr(pair, name)
         roll = gear.profile.tip_roll + (1.0 - nominal) * pair.base_pitch

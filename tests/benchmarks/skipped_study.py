@@ -22,7 +22,7 @@ from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .record import Record
 from .subject import GEOMETRY, ROOT, housing_of, shipped_housing, shipped_pair
-from .sweep_study import whole_pair
+from .sweep_study import assembled_pair
 from .timing import measured
 
 TWIST = math.radians(0.05)
@@ -55,7 +55,7 @@ def one_sector(quick: bool) -> tuple[float, float, str]:
     short = _cpu(lambda: elastic_pair(pair, coarsen=coarsen))
 
     def whole() -> None:
-        gears = whole_pair(pair, coarsen)
+        gears = assembled_pair(pair, coarsen)
         stiffness = gears.bodies.stiffness.tocsr()
         bores = [n[np.unique(g.boundaries["bore"])] for n, g in zip(gears.bodies.node_of, gears.gears, strict=True)]
         free = np.setdiff1d(np.arange(stiffness.shape[0]), gears.bodies.unknowns[np.concatenate(bores)].ravel())

@@ -156,7 +156,8 @@ class ContactProblem:
         carriers = []
         for couple, pair in enumerate(self.facing):
             sides = carrying(self.law, self._to_ends(*pair)[None])[0]
-            carriers += [(pair[k], pair[1 - k], 2 * couple + 1 - k, 1 / sides.sum()) for k in np.flatnonzero(sides)]
+            share = 1.0 / float(sides.sum())
+            carriers += [(pair[k], pair[1 - k], 2 * couple + 1 - k, share) for k in (0, 1) if sides[k]]
         return carriers
 
     def _to_ends(self, first: Surface, second: Surface) -> Array:
