@@ -178,7 +178,7 @@ def coarse_gears(law: Any) -> Any:
 
 #: Room -> its job, and modules or names that are left out.
 ROOMS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
-    "rigid": (mechanisms, ("packed", "LARGEST", "MOST_STEPS", "FIRST_")),
+    "multibody": (mechanisms, ("packed", "LARGEST", "MOST_STEPS", "FIRST_")),
     "train": (trains, ("program",)),
     "meshlaw": (laws, ("NANO", "NO_CONTACT", "kernel.FORCE")),
     "runup": (run_ups, ("swinging", "report")),

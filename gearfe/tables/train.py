@@ -269,7 +269,7 @@ class TrainCurvesTable:
         POTENTIAL,
         choices=MESH_MODELS,
         gone=GONE_MODELS,
-        doc="of meshes that are computed: potential, variable_stiffness or mean_stiffness, see [[train.meshes]]",
+        doc="of computed meshes",
     )
     load: str | None = quantity(
         None,
