@@ -1,10 +1,13 @@
 """Keep meshes that tests make in an ignored folder of the repository; print failing tests as they fail."""
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
 
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell without job control starts what runs behind it so
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # commands under test inherit it and would ignore Ctrl-C
 os.environ.setdefault("GEARFE_CACHE", str(Path(__file__).parents[1] / ".test_cache"))
 
 

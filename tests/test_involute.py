@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gearfe.gear.curves import coordinates, inv, inverse_inv
+from gearfe.gear.gear_data import GearData
 from gearfe.gear.involute import tooth_profile
 from gearfe.gear.pair import Gear, TipRelief
 
@@ -228,25 +229,24 @@ def test_the_undercut_junction_lies_on_both_curves():
     np.testing.assert_allclose(trochoid.curve.point(joint), flank.curve.point(1.0 - joint), atol=1e-15)
 
 
+def small_gear(teeth: int, profile_shift: float) -> GearData:
+    """A gear by a sharp rack at 14.5 deg, unchecked: gears have 8 teeth at least, profiles need not."""
+    return GearData(
+        teeth=teeth, module=1e-3, pressure_angle=math.radians(14.5), face_width=1e-2, bore_diameter=1e-3,
+        profile_shift=profile_shift, addendum=1.0, dedendum=1.25, rack_tip_radius=0.0,
+    )  # fmt: skip
+
+
 def test_waist_of_a_severely_undercut_tooth():
     """6 teeth at 14.5 deg with a sharp rack are cut through at x = -0.5; 7 teeth at x = -0.6 just hold together.
 
     The half angle 0.00196 of that waist was found by sweeping the rack tip in another program.
     """
-    form = {"module": 1e-3, "pressure_angle": math.radians(14.5), "addendum": 1.0, "dedendum": 1.25}
-    form |= dict.fromkeys(("rack_tip_radius", "tip_round", "tip_shortening", "tooth_thinning"), 0.0)
-    form["tip_relief"] = None
-
-    def unchecked(**values) -> Gear:  # gears have 8 teeth at least, profiles have not
-        made = object.__new__(Gear)
-        vars(made).update(values)
-        return made
-
-    whole = tooth_profile(unchecked(teeth=7, profile_shift=-0.6, **form))
+    whole = tooth_profile(small_gear(teeth=7, profile_shift=-0.6))
     points = whole.segment("trochoid").points(np.linspace(0.0, 1.0, 4001))
     assert np.arctan2(points[:, 1], points[:, 0]).min() == pytest.approx(0.00196, abs=5e-6)
     with pytest.raises(ValueError, match="cuts the tooth through"):
-        tooth_profile(unchecked(teeth=6, profile_shift=-0.5, **form))
+        tooth_profile(small_gear(teeth=6, profile_shift=-0.5))
 
 
 def test_zero_length_segments_are_left_out():

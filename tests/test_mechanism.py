@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -343,7 +344,7 @@ def test_the_core_knows_no_mechanism():
         for word in used:
             if isinstance(word, str):
                 assert "andrews" not in word.lower(), path
-                assert "slider" not in word.lower(), path
+                assert not re.search(r"slider.?crank", word.lower()), path  # "slider" alone is a joint's name elsewhere
 
 
 @pytest.mark.parametrize(

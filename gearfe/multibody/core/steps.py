@@ -36,7 +36,8 @@ ROUNDING, NO_SIZE = 1e-14, 1e-12
 STRETCH = 1e-6
 #: Steps between two looks at the pace; how many times the steps allowed a run may need by its pace before it stops.
 PACE, ENDLESS = 4096, 100.0
-#: How many times the steps allowed a run may need where so many looks in a row agree within this factor.
+#: How many times the steps allowed a run may need by each of so many looks in a row, none below the one before by more
+#: than this factor.
 STEADY_ENDLESS, AGREEING, ALIKE = 3.0, 4, 1.1
 #: Steps before the first doubling of their number that counts; doublings in a row, each in at most this many times the
 #: time of the last, after which the number of steps counts as growing exponentially.
@@ -71,7 +72,7 @@ class StepLaw:
 class Pace:
     """The number of steps that a run needs, extrapolated from the steps so far.
 
-    Two rules: the pace of the last steps stays (which is trusted sooner where it is steady), or the number of steps
+    Two rules: the pace of the last steps stays (trusted sooner where it does not improve), or the number of steps
     doubles in equal times, as where a force feeds the motion. (Where steps grow shorter by a power of the time, up to
     the fourteenth, every doubling takes longer.)
 
@@ -110,8 +111,8 @@ class Pace:
             by_pace = steps + left * (steps - self._last[1]) / max(passed, 1e-300)
             needed = max(needed, by_pace)
             self._last, self._needed = (t, steps), [*self._needed[1 - AGREEING :], by_pace]
-        alike = len(self._needed) == AGREEING and max(self._needed) <= ALIKE * min(self._needed)
-        hopeless = needed > ENDLESS * self.most or (alike and min(self._needed) > STEADY_ENDLESS * self.most)
+        stays = len(self._needed) == AGREEING and all(a <= ALIKE * b for a, b in itertools.pairwise(self._needed))
+        hopeless = needed > ENDLESS * self.most or (stays and min(self._needed) > STEADY_ENDLESS * self.most)
         if needed > self.most and not (hopeless or self._announced):
             self._announced = True
             announce(f"at this pace the run would need {needed:.1g} steps; it stops after {self.most:.1g}")
