@@ -59,7 +59,7 @@ def by_scipy(
     n = system.size
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
-        return np.concatenate([y[n:], system.acceleration(t, y[:n], y[n:], begin.active, begin.excess)[0]])
+        return np.concatenate([y[n:], system.acceleration(t, y[:n], y[n:], begin.active, begin.added_mass)[0]])
 
     y0 = np.concatenate([begin.q, begin.v])
     options = {"rtol": 1e-12, "atol": 1e-12, **options}

@@ -96,7 +96,7 @@ def peaucellier(phi: float, rate: float) -> tuple[System, Start]:
 
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-12])
 def test_peaucellier_straight_line(tolerance):
-    """P draws a straight line; both loops of the rhombus fold at once where A and B, or P and Q, fall together."""
+    """P draws a line; both loops of the rhombus have a change point where A and B, or P and Q, fall together."""
     system, start = peaucellier(0.3, 3.0)
     made = integrate(system, np.linspace(0.0, 5.0, 5001), tolerance=tolerance, start=start)
     assert made.message == "done"
@@ -109,7 +109,7 @@ def test_peaucellier_straight_line(tolerance):
 
 
 def two_linkages(apart: float) -> System:
-    """Two uncoupled folding linkages in one linkage, the second one `apart` (rad) ahead."""
+    """Two uncoupled linkages with change points in one linkage, the second one `apart` (rad) ahead."""
     one, other = (folding_links(angle, 3.0).elements[0] for angle in (1.0, 1.0 + apart))
     name = {"crank": "crank2", "rod": "rod2"}
     bodies = one.bodies + tuple(replace(b, name=name[b.name]) for b in other.bodies)

@@ -66,7 +66,7 @@ def test_a_coupler_without_mass_is_a_distance():
 
 
 def test_a_rod_that_passes_the_line_of_its_crank():
-    """Crank of 1 m, a rod of 1 m without mass, a bob on its end held to the x axis at x = 2 cos phi: the loop folds.
+    """Crank of 1 m, a rod of 1 m without mass, a bob on its end held to the x axis at x = 2 cos phi: a change point.
 
     (1/3 + 4 sin^2 phi) phi'' + 4 sin phi cos phi phi'^2 + g/2 cos phi = 0, by Runge-Kutta of order 8 (scipy).
     """

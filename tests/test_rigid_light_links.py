@@ -141,7 +141,7 @@ def test_auto_takes_the_series_with_a_light_coupler():
 
 
 def with_rod(mass: float, inertia: float, theta: float, omega: float) -> System:
-    """Folding links whose rod has another mass."""
+    """Links with a change point whose rod has another mass."""
     linkage = folding_links(theta, omega).elements[0]
     bodies = (linkage.bodies[0], replace(linkage.bodies[1], mass=mass, inertia=inertia / 12))
     return System([Linkage(bodies, linkage.joints, linkage.forces)])

@@ -29,7 +29,7 @@ from .rigid_cases import G, folding_angle, folding_links, total_energy
 
 
 def random_starts(count: int, seed: int = 11) -> list[tuple[float, float]]:
-    """Starts that pass the fold with at least 0.5 rad/s."""
+    """Starts that pass the change point with at least 0.5 rad/s."""
     random = np.random.default_rng(seed)
     found: list[tuple[float, float]] = []
     while len(found) < count:
@@ -68,7 +68,7 @@ def test_starts_on_and_beside_the_fold(distance, side):
 
 
 def test_near_miss_is_no_fold():
-    """A rod 0.1 % longer than the crank: no fold, the rod swings through; energy holds and the loop stays closed."""
+    """A rod 0.1 % longer than the crank: no change point, the rod swings through; energy and loop hold."""
     times = np.linspace(0.0, 1.5, 31)
     made = integrate(folding_links(pi / 4, 3.0, rod=1.001), times, tolerance=1e-10)
     assert made.status == 0
@@ -111,7 +111,7 @@ def test_passing_singularity_at_the_start_is_not_called_redundant():
 
 
 def test_two_folds_at_the_same_moment():
-    """Two uncoupled linkages in one linkage that fold together."""
+    """Two uncoupled linkages in one linkage that pass change points together."""
     one = folding_links(1.0, 3.0).elements[0]
     rename = {"crank": "crank2", "rod": "rod2"}
     from dataclasses import replace

@@ -159,7 +159,7 @@ def test_what_cannot_close_says_by_how_much_and_where(length):
 
 @pytest.mark.parametrize("time", [1e-9, 1.0, 1e9])
 def test_a_row_that_is_dependent_until_the_motion_begins_is_no_redundant_one(time):
-    """Two links of equal length, folded; the slot at the end is dependent until the prescribed crank turns."""
+    """Two links of equal length, one on the other; the slot is dependent until the crank turns."""
     linkage = folding_links(0.0, 0.0).elements[0]
     rise = Prescribed("crank", "angle", smoothed_step(5.0 * time, 2.0 * time, 0.5))
     start = consistent_start(System([Linkage(linkage.bodies, (*linkage.joints, rise))]))

@@ -1,4 +1,4 @@
-"""The series of a train's forces: the same law at many times, order by order, and the corners between its cells."""
+"""The series of a train's forces: the same law at many times, order by order, and the kinks between its cells."""
 
 import math
 
@@ -10,7 +10,7 @@ from gearfe.multibody.compiled import kernels as compiled
 from gearfe.multibody.integrators.taylor import kernel_modal
 from gearfe.stiffness.periodic import periodic_interpolant
 from gearfe.train import build_train, simulate
-from gearfe.train.discontinuities import leaves, train_corner
+from gearfe.train.discontinuities import leaves, train_discontinuity
 from gearfe.train.forces import CurveFlank, Gyro, LawFlank, TrainForces
 from gearfe.train.program import train_series
 from gearfe.train.series import train_order
@@ -82,7 +82,7 @@ def test_the_series_sums_up_to_the_law(kind, s):
         (1.0009, 0.0, 1.0, 1.0, 0.6 - 0.54),  # many turns later: 600.54 rad, to the end of the period
     ],
 )
-def test_the_way_to_the_next_corner(t, spin, sense, sign, way):
+def test_the_way_to_the_next_discontinuity(t, spin, sense, sign, way):
     forces = TrainForces(2, constant(SPEED).integral(0.0, 0.0), (), (flank(sense),), ())
     s = sign * 0.3 / SPEED
     u, out = np.zeros((2, 11)), np.zeros(2)
@@ -91,11 +91,11 @@ def test_the_way_to_the_next_corner(t, spin, sense, sign, way):
     for j in range(10):
         train_order(j, t, s, u, parameters, memory, pieces, out)
     before = pieces.copy()
-    told = 0.3 * train_corner(1, 1.0, parameters, memory, pieces, True)
+    told = 0.3 * train_discontinuity(1, 1.0, parameters, memory, pieces, True)
     assert way * (1 + 1e-9) < told < way + 1e-3
-    assert train_corner(9, 0.9 * way / 0.3, parameters, memory, pieces, False) == 2.0
+    assert train_discontinuity(9, 0.9 * way / 0.3, parameters, memory, pieces, False) == 2.0
     assert (pieces == before).all()
-    assert train_corner(9, 1.0, parameters, memory, pieces, False) * 0.3 == pytest.approx(way, rel=1e-9)
+    assert train_discontinuity(9, 1.0, parameters, memory, pieces, False) * 0.3 == pytest.approx(way, rel=1e-9)
     assert 5 * (pieces[0] - before[0]) + pieces[1] - before[1] == sense * sign
 
 
@@ -108,17 +108,17 @@ def test_a_flank_parts_where_its_approach_ends(ends):
     parameters, memory, pieces = began(forces, 0.05, 1.0, u, s)
     for j in range(10):
         train_order(j, 0.05, s, u, parameters, memory, pieces, out)
-    assert train_corner(9, 1.0, parameters, memory, pieces, False) == pytest.approx(ends[0], rel=1e-9)
+    assert train_discontinuity(9, 1.0, parameters, memory, pieces, False) == pytest.approx(ends[0], rel=1e-9)
     assert pieces[2] == -1
     for j in range(10):  # open: no force but the mean stiffness's
         train_order(j, 0.05, s, u, parameters, memory, pieces, out)
         assert out[0] == pytest.approx(1e8 * u[0, j], rel=1e-12)
 
 
-def test_a_constant_stiffness_has_no_corner():
+def test_a_constant_stiffness_has_no_discontinuity():
     forces = TrainForces(1, constant(SPEED), (), (), ())
     parameters, memory, pieces = began(forces, 0.0, 1.0, np.zeros((1, 11)), 1.0)
-    assert train_corner(9, 1.0, parameters, memory, pieces, False) == 2.0
+    assert train_discontinuity(9, 1.0, parameters, memory, pieces, False) == 2.0
 
 
 def oscillators(tolerance):
@@ -127,12 +127,12 @@ def oscillators(tolerance):
     def order(j, t, s, u, parameters, memory, pieces, out):
         out[0] = 0.0
 
-    def corner(last, limit, parameters, memory, pieces, ahead):
+    def discontinuity(last, limit, parameters, memory, pieces, ahead):
         return 2.0
 
     names = {"np": np, "math": math, "LEAST": kernel_modal.LEAST}
-    alias = {"order": "law_order", "corner": "law_corner"}
-    kernels = compiled.bind((*kernel_modal.FUNCTIONS, order, corner), names, alias=alias)
+    alias = {"order": "law_order", "discontinuity": "law_discontinuity"}
+    kernels = compiled.bind((*kernel_modal.FUNCTIONS, order, discontinuity), names, alias=alias)
     eigenvalues, diagonal = np.array([0.0, 4.0, 900.0]), np.array([0.0, 0.0, 1.2])
     state, asked = np.array([0.1, 1.0, 1e-3, 0.5, 0.0, 1.0]), np.linspace(0.25, 4.0, 16)
     equations = kernel_modal.Equations(
@@ -161,7 +161,7 @@ def test_free_response_of_modal_coordinates_in_closed_form(tolerance):
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["linear", "cubic"])
 def test_compiled_series_against_scipy(method):
-    """Another formulation: steps of order 8 that know no corners, short enough for them."""
+    """Another formulation: steps of order 8 that know no kinks, short enough for them."""
     gear_train = train(SHIPPED, stiffness=lambda z: curve(z, swing=0.2, method=method, count=12))
     model, times = build_train(gear_train), np.linspace(0.0, 4e-3, 41)
     made = simulate(model, times, tolerance=1e-8)

@@ -86,7 +86,7 @@ def _followed(nodes: Array, tets: IntArray, folded: BoolArray, surface: BoolArra
     straight = _straight(nodes, tets)[used]
     moves = free[used]
     rows, others = ((3 * np.flatnonzero(mask)[:, None] + np.arange(3)).ravel() for mask in (moves, ~moves))
-    stiffness = assemble(straight, patch.reshape(-1, tets.shape[1]), Material(1.0)).stiffness.tocsr()[rows]
+    stiffness = assemble(straight, patch.reshape(-1, tets.shape[1]), Material()).stiffness.tocsr()[rows]
     given = (nodes[used] - straight)[~moves].ravel()
     inside = -factorize(stiffness[:, rows]).solve((stiffness[:, others] @ given)[:, None])
     found = nodes.copy()

@@ -10,7 +10,7 @@ from ..typing import Array, IntArray
 from .friction import UNKNOWN
 from .series import BEFORE, GAP, PAIR, PER_FLANK, PHASE, SLIDE, TOUCH, F, Program
 
-#: Part of a cell's width by which a corner is passed in its prediction, so that the step contains it.
+#: Part of a cell's width by which a discontinuity is passed in its prediction, so that the step contains it.
 PAST = 2e-3
 #: Part of a cell's width that counts as none, and approach (m) whose part `SAME` counts as none.
 SAME, SMALL = 1e-9, 1e-7
@@ -18,7 +18,7 @@ SAME, SMALL = 1e-9, 1e-7
 SAMPLES = 6
 
 
-def train_corner(last: int, limit: float, p: Program, memory: Array, pieces: IntArray, ahead: bool) -> float:
+def train_discontinuity(last: int, limit: float, p: Program, memory: Array, pieces: IntArray, ahead: bool) -> float:
     """Find the first x at which a watched series leaves its cell.
 
     Without `ahead`, what is off its cell at that x goes on to the next cell: memory and pieces change.
@@ -96,8 +96,8 @@ def _bounds(w: int, p: Program, pieces: IntArray) -> tuple[float, float, float]:
     return (0.0, 1e300, slack) if pieces[at + 2] >= 0 else (-1e300, 0.0, slack)
 
 
-def _go_on(w: int, last: int, x: float, corner: bool, p: Program, memory: Array, pieces: IntArray) -> None:
-    """Keep the pair forces at x for the next step; at a corner, go on to the next cell."""
+def _go_on(w: int, last: int, x: float, reached: bool, p: Program, memory: Array, pieces: IntArray) -> None:
+    """Keep the pair forces at x for the next step; at a discontinuity, go on to the next cell."""
     kind = p.watches[w, 0]
     k = p.watches[w, 1]
     at = p.places.piece[k]
@@ -105,8 +105,8 @@ def _go_on(w: int, last: int, x: float, corner: bool, p: Program, memory: Array,
     slot = p.watches[w, 3]
     low, high, slack = _bounds(w, p, pieces)
     value, slope = _polynomial(memory, _watched(w, p, pieces), last, x)
-    up = corner and slope > 0.0 and value >= high - slack
-    down = corner and slope < 0.0 and value <= low + slack
+    up = reached and slope > 0.0 and value >= high - slack
+    down = reached and slope < 0.0 and value <= low + slack
     if kind == PAIR:
         part = pieces[at + PER_FLANK + slot]
         law = p.places.law[k]

@@ -127,4 +127,6 @@ def train_series(forces: TrainForces) -> SeriesLaw:
         found = {name: value for name, value in vars(module).items() if name.isupper()}
         constants |= {name: value for name, value in found.items() if isinstance(value, int | float)}
     helpers = (*series.FUNCTIONS, *discontinuities.FUNCTIONS)
-    return SeriesLaw(begin, series.train_order, discontinuities.train_corner, helpers, program, rows, pieces, constants)
+    return SeriesLaw(
+        begin, series.train_order, discontinuities.train_discontinuity, helpers, program, rows, pieces, constants
+    )

@@ -46,7 +46,7 @@ local
     method then runs any system compiled. Not needed by what has neither rows nor ``force``. A
     `gearfe.multibody.core.tape_evaluation.TapeElement` has the rows of 3. from it.
 15. ``pieced = True`` and ``pieces(t, q, v)``: whole numbers, shape (..., s) at times (...), that change where its force
-    has a corner, a jump or a pole; -1 where it has no value. Steps of the implicit method end there.
+    has a kink, a jump or a pole; -1 where it has no value. Steps of the implicit method end there.
     Absent: smooth.
 16. ``has_knots = True`` and ``knots(q)``: whole numbers, shape (..., s) in states (..., k), that change where the third
     derivative of a row jumps (knots of a cam's profile). Steps of the implicit method end there. Absent: smooth.
@@ -225,10 +225,10 @@ class SeriesLaw:
     order
         ``order(j, t, s, u, parameters, memory, pieces, out)``: order j of the forces into ``out[k]``, from orders up to
         j of u and up to j + 1 for u'.
-    corner
-        ``corner(last, limit, parameters, memory, pieces, ahead)``: where x, up to `limit`, leaves a smooth piece, 2
-        when it does not; the pieces then go on to the next. With `ahead` from orders 0 and 1 a little past that
-        place, for the length of the step; pieces stay.
+    discontinuity
+        ``discontinuity(last, limit, parameters, memory, pieces, ahead)``: where x, up to `limit`, leaves a
+        smooth piece, 2 when it does not; the pieces then go on to the next. With `ahead` from orders 0 and 1 a little
+        past that place, for the length of the step; pieces stay.
     helpers
         Functions that they call by name.
     parameters
@@ -241,7 +241,7 @@ class SeriesLaw:
 
     begin: Callable[..., None]
     order: Callable[..., None]
-    corner: Callable[..., float]
+    discontinuity: Callable[..., float]
     helpers: tuple[Callable[..., object], ...]
     parameters: Any
     rows: int
@@ -267,7 +267,7 @@ class LocalForce(Element):
     breaks
         Times (s) at which the law is not smooth.
     piece_numbers
-        ``(t, u, du)`` -> whole numbers, shape (..., s) at times (...), that change where the law has a corner or a
+        ``(t, u, du)`` -> whole numbers, shape (..., s) at times (...), that change where the law has a kink or a
         jump; None: it is smooth.
     """
 
@@ -281,7 +281,7 @@ class LocalForce(Element):
 
     @property
     def pieced(self) -> bool:
-        """Whether its law has corners or jumps."""
+        """Whether its law has kinks or jumps."""
         return self.piece_numbers is not None
 
     def pieces(self, t: float | Array, q: Array, v: Array) -> IntArray:

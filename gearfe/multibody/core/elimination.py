@@ -108,7 +108,7 @@ def in_modes(modal: ModalCoordinates, start: Start) -> tuple[System, Start]:
         elements.append(LocalForce((body,), directions, law, breaks=force.breaks, piece_numbers=pieces))
     elements.append(LocalForce((body,), modal.constant[:, None], lambda *_: np.ones(1)))
     q, v = modal.reduce(start.q, start.v)
-    return System(elements), replace(start, q=q, v=v, active=np.zeros(0, dtype=bool), excess=np.zeros(0))
+    return System(elements), replace(start, q=q, v=v, active=np.zeros(0, dtype=bool), added_mass=np.zeros(0))
 
 
 def _shifted(law: Callable[..., Any], offset: Array) -> Callable[..., Any]:

@@ -2,14 +2,14 @@
 
 All solvers of the core eliminate accelerations with the inverse masses: S = G M^-1 G^T. A coupler of next to no mass
 fills S with numbers that cancel in the pivots which carry the heavy links, and nothing of these is left. Its mass may
-be anything in the elimination, though, as long as the force is the same: with an excess D on a few coordinates
+be anything in the elimination, though, as long as the force is the same: with an added mass D on a few coordinates
 
     (M + D) a + G^T lambda = f + D a
 
-and D a is found exactly (`System.acceleration`, `recurrences`). The mass that a link carries is the least kinetic
-energy of all motions in which it moves with speed 1 (twice that): the mass which one feels who pushes it. An excess up
-to that changes no energy of the mechanism by more than a few times, so nothing is lost in finding D a; a pendulum that
-is truly light keeps its mass.
+and D a is found exactly (`System.acceleration`, `recurrences`). The effective mass of a link is twice the
+least kinetic energy of all motions in which it moves with speed 1: the mass that resists a push on the link. An added
+mass up to that changes no energy of the mechanism by more than a few times, so nothing is lost in finding D a; a
+pendulum that is truly light keeps its mass.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from ...errors import InputError
 from ...typing import Array
 from .system import System
 
-#: Carried mass over own mass from which on a link counts as light: less costs no more than 4 of the 16 digits.
+#: Effective mass over own mass from which on a link counts as light: less costs no more than 4 of the 16 digits.
 LIGHT = 1e4
-#: Share of the largest mass below which carried mass is rounding (square of that of the singular values).
+#: Share of the largest mass below which an effective mass is rounding (square of that of the singular values).
 LEAST = 1e-24
-#: Share of the mass carried at the start from which on a link carries next to nothing.
+#: Share of the effective mass at the start from which on a link carries next to nothing.
 LOOSE = 1e-6
 #: Singular values of constraint gradients below this share of the largest count as zero.
 RANK = 1e-11
@@ -40,7 +40,7 @@ def free_motions(G: Array) -> Array:
     return right[int((sizes > RANK * sizes.max(initial=0.0)).sum()) :].T
 
 
-def mass_excess(system: System, time: float, q: Array, v: Array, active: np.ndarray) -> Array:
+def added_masses(system: System, time: float, q: Array, v: Array, active: np.ndarray) -> Array:
     """Return the mass by which the elimination raises the coordinates of light links.
 
     Parameters
@@ -56,7 +56,7 @@ def mass_excess(system: System, time: float, q: Array, v: Array, active: np.ndar
 
     Returns
     -------
-    excess : ndarray, shape (size,)
+    added_mass : ndarray, shape (size,)
         Mass (kg) or moment of inertia (kg m2); 0 for links that are not light.
 
     Raises
@@ -64,20 +64,20 @@ def mass_excess(system: System, time: float, q: Array, v: Array, active: np.ndar
     InputError
         For a link without mass that nothing with mass holds: its acceleration is undetermined.
     """
-    excess = np.zeros(system.size)
+    added_mass = np.zeros(system.size)
     bodies, own = _own_masses(system)
     if own.size == 0 or 0.0 < own.max() <= LIGHT * own.min():
-        return excess
+        return added_mass
     G = _gradients_ahead(system, time, q, v, active)
     if own.min() == 0.0:
         _check_determined(system, G)
-    carried = _carried(system, G)
-    light = carried[:, None] > LIGHT * own
-    excess[bodies] = np.where(light, carried[:, None] - own, 0.0) / system.units[bodies] ** 2
-    return excess
+    effective = _effective_mass(system, G)
+    light = effective[:, None] > LIGHT * own
+    added_mass[bodies] = np.where(light, effective[:, None] - own, 0.0) / system.units[bodies] ** 2
+    return added_mass
 
 
-def loose_link(system: System, times: Array, q: Array, v: Array, active: np.ndarray, excess: Array) -> str | None:
+def loose_link(system: System, times: Array, q: Array, v: Array, active: np.ndarray, added_mass: Array) -> str | None:
     """Return the name of the light link that carries next to nothing in the last finite state.
 
     Parameters
@@ -90,8 +90,8 @@ def loose_link(system: System, times: Array, q: Array, v: Array, active: np.ndar
         Coordinates and velocities.
     active : ndarray of bool, shape (rows,)
         Rows that are not redundant.
-    excess : ndarray, shape (size,) or (0,)
-        Masses by which the elimination raises light links, from `mass_excess`.
+    added_mass : ndarray, shape (size,) or (0,)
+        Masses by which the elimination raises light links, from `added_masses`.
 
     Returns
     -------
@@ -99,12 +99,12 @@ def loose_link(system: System, times: Array, q: Array, v: Array, active: np.ndar
         None if no state is finite, no link is light, or all of them carry mass.
     """
     finite = np.flatnonzero(np.isfinite(q).all(axis=1) & np.isfinite(v).all(axis=1))
-    if not excess.any() or not len(finite):
+    if not added_mass.any() or not len(finite):
         return None
     at = finite[-1]
     bodies, _ = _own_masses(system)
-    share = _carried(system, _gradients_ahead(system, times[at], q[at], v[at], active))[:, None]
-    raised = (excess * system.units**2)[bodies]
+    share = _effective_mass(system, _gradients_ahead(system, times[at], q[at], v[at], active))[:, None]
+    raised = (added_mass * system.units**2)[bodies]
     found = np.where(raised > 0.0, share / np.where(raised > 0.0, raised, 1.0), np.inf).min(axis=1)
     names = [name for element in system.elements for name in element.planar_bodies]
     return names[int(found.argmin())] if found.min() < LOOSE else None
@@ -117,17 +117,17 @@ def _own_masses(system: System) -> tuple[np.ndarray, Array]:
     return bodies, (np.diagonal(system.mass) * system.units**2)[bodies]
 
 
-def _carried(system: System, G: Array) -> Array:
+def _effective_mass(system: System, G: Array) -> Array:
     """Mass that every planar body carries (units that compare), at most the largest own one; 0 where it is rounding."""
     bodies, own = _own_masses(system)
     free = free_motions(G)
-    carried = np.full(len(bodies), own.max() or 1.0)
+    effective = np.full(len(bodies), own.max() or 1.0)
     if free.shape[1]:
         triangle = np.linalg.qr(system.mass_root * system.units @ free)[1]
         answers = np.linalg.lstsq(triangle.T, free[bodies.ravel()].T, rcond=0.0)[0].T.reshape(len(bodies), 3, -1)
         with np.errstate(divide="ignore"):
-            carried = np.minimum(carried, 1.0 / np.linalg.norm(answers, 2, axis=(1, 2)) ** 2)
-    return np.where(carried < LEAST * own.max(), 0.0, carried)
+            effective = np.minimum(effective, 1.0 / np.linalg.norm(answers, 2, axis=(1, 2)) ** 2)
+    return np.where(effective < LEAST * own.max(), 0.0, effective)
 
 
 def _gradients_ahead(system: System, time: float, q: Array, v: Array, active: np.ndarray) -> Array:

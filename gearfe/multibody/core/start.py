@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...typing import Array
-from .mass_regularisation import RANK, free_motions, mass_excess
+from .mass_regularisation import RANK, added_masses, free_motions
 from .second_order import SINGULAR, hidden_freedoms, motions_of_second_order
 from .system import System
 
@@ -59,7 +59,7 @@ class Freedoms:
 class Start:
     """A consistent state: time, coordinates, velocities, freedoms; `active` marks the rows that are not redundant.
 
-    `excess`, shape (size,) or (0,), is the mass by which the elimination raises light links
+    `added_mass`, shape (size,) or (0,), is the mass by which the elimination raises light links
     (`multibody.core.mass_regularisation`).
     """
 
@@ -68,7 +68,7 @@ class Start:
     v: Array
     freedoms: Freedoms
     active: np.ndarray = field(repr=False)
-    excess: Array = field(default_factory=lambda: np.zeros(0), repr=False)
+    added_mass: Array = field(default_factory=lambda: np.zeros(0), repr=False)
 
 
 def consistent_start(
@@ -116,7 +116,7 @@ def consistent_start(
         raise InputError(names, None, problem, "leave that direction free: a slot instead of a hinge, or a joint less")
     active = np.ones(system.rows, dtype=bool)
     active[list(freedoms.redundant)] = False
-    return Start(float(time), q, v, freedoms, active, mass_excess(system, time, q, v, active))
+    return Start(float(time), q, v, freedoms, active, added_masses(system, time, q, v, active))
 
 
 def count_freedoms(system: System, time: float, q: Array) -> Freedoms:

@@ -108,9 +108,9 @@ class System:
         """M^-1, shape (size, size); infinite for links without mass."""
         return self.inverse_of(np.zeros(0))
 
-    def inverse_of(self, excess: Array) -> Array:
-        """(M + D)^-1 with D = diag(excess); no entries mean no excess."""
-        mass = self.mass + np.diag(excess) if excess.any() else self.mass
+    def inverse_of(self, added_mass: Array) -> Array:
+        """(M + D)^-1 with D = diag(added_mass); no entries mean none."""
+        mass = self.mass + np.diag(added_mass) if added_mass.any() else self.mass
         if not self.diagonal_mass:
             return np.asarray(np.linalg.inv(mass), dtype=float)
         with np.errstate(divide="ignore"):
@@ -200,7 +200,7 @@ class System:
 
     @cached_property
     def pieced(self) -> bool:
-        """Whether forces may have corners."""
+        """Whether forces may have kinks."""
         return any(getattr(element, "pieced", False) for element in self.elements)
 
     def pieces(self, t: float | Array, q: Array, v: Array) -> IntArray:
@@ -290,7 +290,7 @@ class System:
         return [name for e, _ in self.joints for name in e.row_names or e.numbered("{} ({})", e.rows)]
 
     def acceleration(
-        self, t: float, q: Array, v: Array, active: np.ndarray | None = None, excess: Array | None = None
+        self, t: float, q: Array, v: Array, active: np.ndarray | None = None, added_mass: Array | None = None
     ) -> tuple[Array, Array]:
         """Return accelerations and multipliers at a consistent state.
 
@@ -304,7 +304,7 @@ class System:
             Coordinates and velocities that meet the constraints.
         active : ndarray of bool, shape (rows,), optional
             Constraints that are not redundant, all by default; the others have no multipliers.
-        excess : ndarray, shape (size,), optional
+        added_mass : ndarray, shape (size,), optional
             Mass by which the elimination raises light links, that of the start (`multibody.core.mass_regularisation`).
 
         Returns
@@ -315,7 +315,7 @@ class System:
             Constraint forces lambda; 0 for rows that are not active.
         """
         f = self.force(t, q, v)
-        extra = np.zeros(self.size) if excess is None or not excess.any() else excess
+        extra = np.zeros(self.size) if added_mass is None or not added_mass.any() else added_mass
         inverse = self.inverse_of(extra) if extra.any() else self.inverse_mass
         if self.rows == 0:
             return inverse @ f, np.zeros(0)
@@ -368,7 +368,7 @@ def in_states(element: Element, function: Any, t: float | Array, *states: Array)
 
 
 def own_motion(answers: Array, light: np.ndarray) -> tuple[Array, Array]:
-    """Motion with the own masses, and the shares of the answers in it, from answers of masses with an excess.
+    """Motion with the own masses, and the shares of the answers in it, from answers with added masses.
 
     `answers`, shape (size, 1 + k), hold the motion that the forces give, and those for a unit of each `light`
     coordinate.

@@ -239,7 +239,7 @@ class TapeValues:
     def slopes(self, q: Array, v: Array, R: Array) -> Array:
         """Derivatives of the registers R of one state by (q, v), shape (k + 1, 2 n).
 
-        Without a value they are 0, and in corners such as that of a root at 0.
+        Without a value they are 0, and at kinks such as that of a root at 0.
         """
         z, speed = self.variables(q), v[self.coordinate]
         D = np.zeros((len(R), 2 * self.size))
@@ -274,7 +274,7 @@ class TapeValues:
     # pieces ---------------------------------------------------------------------------------------------------
     @cached_property
     def switches(self) -> list[int]:
-        """Numbers of those at which forces have corners, jumps or poles: all but profiles'."""
+        """Numbers of those at which forces have kinks, jumps or poles: all but profiles'."""
         held = set(self.program.curves.place[:, 2].tolist())
         return [s for s in range(len(self.program.switches.register)) if s not in held]
 

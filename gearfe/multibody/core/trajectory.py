@@ -186,15 +186,15 @@ class Trajectory(Shown):
 
     def _multipliers(self, times: Array) -> Array:
         """The same of so many times as matrices may be held of at once."""
-        excess, keep = self.start.excess, self.start.active
-        inverse, light = self.system.inverse_of(excess), np.flatnonzero(excess)
+        added_mass, keep = self.start.added_mass, self.start.active
+        inverse, light = self.system.inverse_of(added_mass), np.flatnonzero(added_mass)
         q, v, a = (self.dense(times, k) for k in range(3))
         out = np.zeros((len(times), self.system.rows))
         if not keep.any():
             return out
         G = self.system.jacobian(times, q)[:, keep]
         force = self.system.force(times, q, v)
-        force[:, light] += excess[light] * a[:, light]
+        force[:, light] += added_mass[light] * a[:, light]
         right = G @ (force @ inverse.T - a)[..., None]
         S = G @ inverse @ G.transpose(0, 2, 1)
         if regular(S, REGULAR):

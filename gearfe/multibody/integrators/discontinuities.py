@@ -1,7 +1,7 @@
 """Where forces leave their smooth pieces within a step of collocation.
 
-A step that crosses a corner has an error that no estimate sees as it is. Such a step is made again, up to just before
-the corner; from there a short one goes over it, and the method begins anew behind it. Jumps are passed like this, too;
+A step that crosses a kink has an error that no estimate sees as it is. Such a step is made again, up to just before
+the kink; from there a short one goes over it, and the method begins anew behind it. Jumps are passed like this, too;
 poles and ends of tables are not.
 """
 
@@ -17,7 +17,7 @@ from ...typing import Array
 from ..core.steps import Status, StepControl
 from ..core.system import System
 
-#: Looks within a step; bisections; length of the step over a corner, of the run's and of the tolerance.
+#: Looks within a step; bisections; length of the step over a kink, of the run's and of the tolerance.
 LOOKS, HALVINGS, PASSING = 8, 45, 1e-3
 #: A force that grows so many times from each of these distances (shares of the step) to the next has a pole.
 POLE, POLE_AT = 20.0, (1e-3, 1e-6, 1e-9)
@@ -61,16 +61,16 @@ class Discontinuities:
         return self.system is not None or self.profiled is not None
 
     def passing(self, h: float) -> bool:
-        """Whether a step is one over a corner, after which the method begins anew."""
+        """Whether a step is one over a kink, after which the method begins anew."""
         return self.system is not None and abs(h) <= 4.0 * self.near
 
     def cut(self, t: float, h: float, path: Path) -> bool:
-        """Whether the step h from t is not to stand: the control then knows that the next ends before a corner."""
+        """Whether the step h from t is not to stand: the control then knows that the next ends before a kink."""
         system = self.system
         if self.profiled is not None and not self.passing(h) and (share := _knot(self.profiled, path)) < 1.0:
             self.control.end_at(t + share * h)
             return True
-        if system is None or self.passing(h) or (found := _corner(system, t, h, path)) is None:
+        if system is None or self.passing(h) or (found := _kink(system, t, h, path)) is None:
             return False
         low, high, ends = found
         distance = low * abs(h)
@@ -93,8 +93,8 @@ class Discontinuities:
         return True
 
 
-def _corner(system: System, t: float, h: float, path: Path) -> tuple[float, float, bool] | None:
-    """Shares of the step just before and behind the first corner, and whether loads have no value behind it."""
+def _kink(system: System, t: float, h: float, path: Path) -> tuple[float, float, bool] | None:
+    """Shares of the step just before and behind the first kink, and whether loads have no value behind it."""
     looks = np.arange(LOOKS + 1) / LOOKS
     found = system.pieces(t + looks * h, *path(looks))
     if (found[0] < 0).any():
@@ -172,7 +172,7 @@ def load_problem_ahead(system: System, t: float, state: tuple[Array, Array, Arra
             later = (t + reach, *path(1.0))
             if problem := system.load_problem(*later) or system.load_pole(*later):
                 return problem
-            if (found := _corner(system, t, reach, path)) and (grows := _pole(system, t, reach, path, found[0])):
+            if (found := _kink(system, t, reach, path)) and (grows := _pole(system, t, reach, path, found[0])):
                 return system.load_pole(*grows)
     return ""
 

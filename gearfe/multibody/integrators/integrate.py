@@ -129,7 +129,7 @@ def integrate(
         ahead = float(output_times[-1]) - start.time
         if problem := statistics.get("load_problem") or load_problem_ahead(system, end, (q, v, a), ahead):
             statistics = {**statistics, "load_problem": problem}
-        elif link := loose_link(system, last, dense(last, 0), dense(last, 1), start.active, start.excess):
+        elif link := loose_link(system, last, dense(last, 0), dense(last, 1), start.active, start.added_mass):
             statistics = {**statistics, "loose_link": link}
         elif why := locked(system, end, q, start.active):
             statistics = {**statistics, "locked": why}

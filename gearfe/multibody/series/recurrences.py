@@ -22,7 +22,7 @@ fixes q_{k+2} along B, and the multipliers have a simple pole: lambda = (Z nu_0)
 give the bordered system with the rows B; multipliers and forces are then stored one order up ("shift").
 
 Light links: where the joints make a link carry far more than its own mass, M^-1 of the link hides the heavy ones in S.
-The elimination then uses N = M + D with the excess D on these few coordinates c, and
+The elimination then uses N = M + D with the added mass D on these few coordinates c, and
 
     N q + G^T lambda = f + D q,    q = q_N + sum_c X_c q_c,    X_c = D_c times the answer of N to a unit force on c
 
@@ -639,7 +639,7 @@ def add_transposed(tb: Equations, G: Array, mu: Array, factor: float, out: Array
 
 
 def accelerations(tb: Equations, force: Array, out: Array) -> None:
-    """out = M^-1 force, the masses raised by their excess."""
+    """out = M^-1 force, M with the added masses."""
     mass = tb.mass
     if mass.inverse.shape[0] == out.shape[0]:  # diagonal
         for i in range(out.shape[0]):
@@ -997,7 +997,7 @@ def regularisation_responses(tb: Equations, singular: int, w: Work) -> None:
     k = light.shape[0]
     for c in range(k):
         fill(w.F, 0.0)
-        w.F[light[c]] = tb.mass.excess[c]
+        w.F[light[c]] = tb.mass.added_mass[c]
         accelerations(tb, w.F, u)
         times_gradients(tb, w.G, u, responses.Y[c])
         for r in range(responses.Y.shape[1]):

@@ -24,12 +24,12 @@ ROUNDING = 1e-14
 
 
 class Masses(NamedTuple):
-    """Inverse of the mass matrix, raised by the excess of light coordinates (`multibody.core.mass_regularisation`)."""
+    """Inverse of the mass matrix with the added masses of light links (`multibody.core.mass_regularisation`)."""
 
     place: Numbers  # (e, 2) its entries
     inverse: Array  # (e,)
     light: IntArray  # (k,) coordinates
-    excess: Array  # (k,)
+    added_mass: Array  # (k,)
 
 
 class Gradients(NamedTuple):
@@ -65,7 +65,7 @@ class Equations(NamedTuple):
     factor: Factor
 
 
-def row_tables(program: Program, inverse: Array, excess: Array) -> Equations:
+def row_tables(program: Program, inverse: Array, added_mass: Array) -> Equations:
     """Tables of a program.
 
     Parameters
@@ -73,8 +73,8 @@ def row_tables(program: Program, inverse: Array, excess: Array) -> Equations:
     program
         On whose rows they are.
     inverse : ndarray, shape (n, n)
-        Inverse of the mass matrix with the excess.
-    excess : ndarray, shape (n,)
+        Inverse of the mass matrix with the added masses.
+    added_mass : ndarray, shape (n,)
         Of the light coordinates, else 0.
     """
     rows, n = program.rows, len(program.mass)
@@ -109,8 +109,8 @@ def row_tables(program: Program, inverse: Array, excess: Array) -> Equations:
         np.array([e for _, _, e in terms], dtype=np.uint64),
     )
     place = np.argwhere(inverse != 0.0)
-    light = np.flatnonzero(excess)
-    masses = Masses(np.ascontiguousarray(place, dtype=np.uint64), inverse[tuple(place.T)], light, excess[light])
+    light = np.flatnonzero(added_mass)
+    masses = Masses(np.ascontiguousarray(place, dtype=np.uint64), inverse[tuple(place.T)], light, added_mass[light])
     holders: dict[int, list[tuple[int, int]]] = defaultdict(list)  # column -> rows and their entries
     for r in range(m):
         for e in range(int(first[r]), int(first[r + 1])):

@@ -159,7 +159,7 @@ class Stepper:
         system : System
             The system.
         start : Start
-            Start of the run, with the active rows and the excess of light links.
+            Start of the run, with the active rows and the added masses of light links.
         t : float
             Time (s).
         q, v : ndarray, shape (size,)
@@ -170,7 +170,7 @@ class Stepper:
         a : ndarray, shape (size,)
             The acceleration.
         """
-        a, multipliers = system.acceleration(t, q, v, start.active, start.excess)
+        a, multipliers = system.acceleration(t, q, v, start.active, start.added_mass)
         self.w.multipliers[:] = multipliers[start.active]
         self.w.speeds[:] = 0.0
         self.w.speeds[1] = a
@@ -268,7 +268,7 @@ class Stepper:
             if not error <= 1.0:
                 control.reject(error)
                 continue
-            if w.measures[3] > 0.0:  # and the corner there was not found
+            if w.measures[3] > 0.0:  # and the kink there was not found
                 control.fail(Status.NOT_SOLVED, NOT_SOLVED_SHARE)
                 continue
             t = control.accept(error)
@@ -282,7 +282,7 @@ class Stepper:
             if discontinuities.passing(h) or control.trial > MOST_AHEAD * abs(h):
                 accelerations.append(self.restart(system, start, t, q, v))
             elif not system.stressed:
-                accelerations.append(system.acceleration(t, q, v, start.active, start.excess)[0])
+                accelerations.append(system.acceleration(t, q, v, start.active, start.added_mass)[0])
             reach = np.maximum(reach, np.abs(q))
             floor = least()
         dense = self._dense(system, start, np.array(ends), known, forces, accelerations)

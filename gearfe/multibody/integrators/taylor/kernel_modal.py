@@ -6,9 +6,9 @@ With y = sum_j y_j x^j, x = (t - t0) / s running from 0 to 1 over the trial step
 
 (Hairer, Norsett & Wanner I, Sec. I.8). phi_j comes from the law's own recurrences
 (`multibody.core.contract.SeriesLaw`),
-which stand in for `law_order`, `law_corner`. One order costs two small products with W, half a stage of
-a Runge-Kutta method of order 8, and takes the fastest mode further. A step ends where its law has a corner; the number
-of orders follows from the terms.
+which stand in for `law_order`, `law_discontinuity`. One order costs two small products with W, half a stage of
+a Runge-Kutta method of order 8, and takes the fastest mode further. A step ends where its law has a discontinuity; the
+number of orders follows from the terms.
 """
 
 from __future__ import annotations
@@ -73,9 +73,9 @@ def _unbound(*_: Any) -> Any:
     raise NotImplementedError
 
 
-#: Stand for the law's own `order` and `corner`, see `gearfe.multibody.core.contract.SeriesLaw`, until they are bound.
+#: Placeholders until the `order` and `discontinuity` of a `gearfe.multibody.core.contract.SeriesLaw` are bound.
 law_order: Callable[[int, float, float, Array, Any, Array, IntArray, Array], None] = _unbound
-law_corner: Callable[[int, float, Any, Array, IntArray, bool], float] = _unbound
+law_discontinuity: Callable[[int, float, Any, Array, IntArray, bool], float] = _unbound
 
 
 def _project(W: Array, y: Array, j: int, out: Array) -> None:
@@ -259,7 +259,7 @@ def modal_steps(run: Equations, w: Work, out: Output) -> int:
             law_order(j, t, s, u, law, memory, pieces, force)
             _next_order(run, force, s, y, j)
             if j == 1:
-                end = min(1.0, law_corner(1, 1.0, law, memory, pieces, True))
+                end = min(1.0, law_discontinuity(1, 1.0, law, memory, pieces, True))
                 power = end * end
             power *= end
             size = _velocity_term(y, j + 2, power, weight)
@@ -286,12 +286,12 @@ def modal_steps(run: Equations, w: Work, out: Output) -> int:
             size = _last_size(y, last, end, weight)
         if size > 1.0:  # too long: as far as the last term allows
             x = end * size ** (-1.0 / last)
-        if still < 20:  # corners that the law does not get past are no reason to stand still
-            corner = law_corner(last - 2, x, law, memory, pieces, False)
-            x = min(x, corner)
+        if still < 20:  # discontinuities that the law does not get past are no reason to stand still
+            discontinuity = law_discontinuity(last - 2, x, law, memory, pieces, False)
+            x = min(x, discontinuity)
         if x * step <= 1e-15 * max(abs(t), abs(t1 - begin)):
             still += 1
-            if still > 40:  # it is not the corners
+            if still > 40:  # it is not the discontinuities
                 status = 1
                 break
             continue

@@ -92,10 +92,10 @@ def series_force(system: System) -> tuple[LocalForce, np.ndarray, SeriesLaw] | N
 
 
 @lru_cache(maxsize=8)
-def _kernels(order: Any, corner: Any, helpers: tuple[Any, ...], constants: tuple[Any, ...]) -> Kernels:
-    functions = (*kernel_modal.FUNCTIONS, *helpers, order, corner)
+def _kernels(order: Any, discontinuity: Any, helpers: tuple[Any, ...], constants: tuple[Any, ...]) -> Kernels:
+    functions = (*kernel_modal.FUNCTIONS, *helpers, order, discontinuity)
     names = {"np": np, "math": math, "LEAST": kernel_modal.LEAST, **dict(constants)}
-    alias = {order.__name__: "law_order", corner.__name__: "law_corner"}
+    alias = {order.__name__: "law_order", discontinuity.__name__: "law_discontinuity"}
     return Kernels(functions, names, ("modal_steps",), alias=alias)
 
 
@@ -113,7 +113,7 @@ class SeriesRun:
     @property
     def _bound(self) -> Kernels:
         series = self.series
-        return _kernels(series.order, series.corner, series.helpers, tuple(sorted(series.names.items())))
+        return _kernels(series.order, series.discontinuity, series.helpers, tuple(sorted(series.names.items())))
 
     def expand(self, t: float, y: Array, derivative: int) -> Array:
         """Coordinates, velocities or accelerations of the system in the state y at the time t."""

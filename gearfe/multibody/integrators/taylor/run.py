@@ -60,13 +60,13 @@ def prepare(system: System, start: Start, order: int) -> TaylorRun:
     """Tables of a system, made once, and a work space that no other run uses."""
     program = system.series
     assert program is not None  # the caller asks before
-    light = np.flatnonzero(start.excess)
+    light = np.flatnonzero(start.added_mass)
 
     def made() -> tuple[Equations, Any]:
-        tables = row_tables(program, system.inverse_of(start.excess), start.excess)
+        tables = row_tables(program, system.inverse_of(start.added_mass), start.added_mass)
         return tables, packed(tables)
 
-    key = light.tobytes(), start.excess[light].tobytes()
+    key = light.tobytes(), start.added_mass[light].tobytes()
     tables, handed = system.once(("row tables", *key), made)
     spare: list[tuple[Work, Any]] = system.once(("spare work", order, *key), list)
     try:
