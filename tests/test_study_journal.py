@@ -7,6 +7,7 @@ nothing.
 from __future__ import annotations
 
 import csv
+import errno
 import os
 import random
 import signal
@@ -15,6 +16,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from contextlib import closing
 from pathlib import Path
 
@@ -434,6 +436,26 @@ def killed_at_start(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
         return pool
 
     monkeypatch.setattr(run, "processes", deadly)
+
+
+def test_a_pool_whose_queue_is_closed_already_is_a_broken_one(monkeypatch):
+    """A process that dies as another is started: the pool is not marked as broken yet, but its queue is closed."""
+
+    def submit(self, *call, **options):
+        raise errors.pop(0)
+
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", submit)
+    pool = run.IsolatedPool(1)
+    errors = [
+        OSError("handle is closed"),
+        ValueError("bad value(s) in fds_to_keep"),
+        OSError(errno.EAGAIN, "no more processes"),
+    ]
+    for _ in range(2):
+        with pytest.raises(BrokenExecutor):
+            pool.submit(os.getpid)
+    with pytest.raises(OSError, match="no more processes"):
+        pool.submit(os.getpid)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")

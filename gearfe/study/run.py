@@ -157,9 +157,21 @@ class IsolatedPool(ProcessPoolExecutor):
             super().__init__(workers, get_context("spawn"), _begin, (folder,))
 
     def submit(self, *call: Any, **options: Any) -> Future[Any]:
-        """Start a process where one is missing, and hand a call to one."""
-        with away():
-            return super().submit(*call, **options)
+        """Start a process where one is missing, and hand a call to one.
+
+        Raises
+        ------
+        BrokenExecutor
+            Also where a process died so recently that only the queue is closed yet: the library then starts a process
+            with the closed queue, whose error has no number of the operating system.
+        """
+        try:
+            with away():
+                return super().submit(*call, **options)
+        except (OSError, ValueError) as error:
+            if isinstance(error, OSError) and error.errno is not None:
+                raise
+            raise BrokenExecutor("a process of the pool ended abruptly") from error
 
 
 def _refuse(workers: int, codes: Sequence[int], starts: int) -> None:
@@ -189,9 +201,15 @@ def processes(workers: int) -> Executor:
 
 
 def _begun(workers: int) -> tuple[Executor, Future[int] | None]:
-    """Fresh processes, and a future that shows whether they begin."""
+    """Fresh processes, and a finished future that shows whether they begin.
+
+    No other process starts before: the library hands one that starts as another dies a closed queue, so that it ends
+    with an error of its own and not with the signal that ends the others.
+    """
     pool = processes(workers)
-    return pool, pool.submit(os.getpid)
+    begun = pool.submit(os.getpid)
+    wait([begun])
+    return pool, begun
 
 
 def _begin(folder: str) -> None:
