@@ -134,8 +134,9 @@ def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) 
     force = solved.torque_wheel / r2
     moment = solved.torque_pinion - r1 * force
     off = np.maximum(np.abs(found.force - force), np.abs(found.moment - moment) / r1)
-    # some contacts are not solved, as of flanks with short waves
-    return np.where(np.isfinite(force), off / np.maximum(force, least), 0.0)
+    # a force that was not found is an infinite error: NaN would pass every comparison
+    missed = np.where(np.isnan(found.force), math.inf, off / np.maximum(force, least))
+    return np.where(np.isfinite(force), missed, 0.0)  # some contacts are not solved, as of flanks with short waves
 
 
 def _pair_forces(pair: HalfPlanePair, solved: Positions, met: FirstContacts, coupling: Sequence[Couple]) -> PairForces:

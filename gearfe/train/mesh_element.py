@@ -73,7 +73,7 @@ class MeshLine:
     flanks
         Driving flanks, and the back flanks behind a backlash; none of a rigid mesh.
     rayleigh
-        Rayleigh part of its damping (N s/m). Of a damper that acts in contact only it stands in the constant part,
+        Rayleigh part of its damping (N s/m). For a damper that acts in contact only it is in the constant part,
         which then is damped alike in all modes, and the forces of the flanks take it off again.
     reference
         F0 (N) of a law.

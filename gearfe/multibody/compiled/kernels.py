@@ -4,10 +4,9 @@ The kernel modules hold plain functions that call one another by name. `bind` pu
 those that Python calls. With `NUMBA_DISABLE_JIT=1` in the environment, numba's own switch for debugging, they stay
 Python functions: a debugger steps through them, some hundred times slower.
 
-Compiled code (`multibody.compiled.object_code`) is kept in the cache folder (`gearfe.cache`) below a hash of all that
-it was made
-from and for: no stale code after an upgrade, one form for all installations of the same sources, nothing written to the
-installed package.
+Compiled code (`multibody.compiled.object_code`) is kept in the cache folder (`gearfe.cache`) below a hash of its
+sources, of the compiler and of the processor: no stale code after an upgrade, one form for all installations of the
+same sources, nothing written to the installed package.
 """
 
 from __future__ import annotations
@@ -58,7 +57,7 @@ def packed(named: Any) -> Any:
 def cache_folder(functions: Iterable[Callable[..., Any]]) -> Path | None:
     """Writable folder for the compiled forms of `functions`; ``None`` without one.
 
-    Where the user names no folder and has none that can be written, a temporary one of this user serves.
+    Falls back to a temporary folder of the user if no cache folder is named or writable.
     """
     for folder in _folders(functions):
         try:

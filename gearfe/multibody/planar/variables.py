@@ -66,11 +66,11 @@ class BodyVariables:
         return across, self.affine(body, (0.0, weight, 0.0, y, x), two)
 
     def form(self, form: Form) -> Affine:
-        """A form but for its products."""
-        made = Affine({}, form.constant)
+        """The linear part of a form: all of it except its products."""
+        linear = Affine({}, form.constant)
         for body, factors in form.terms.items():
-            made = self.affine(body, factors, made)
-        return made
+            linear = self.affine(body, factors, linear)
+        return linear
 
     def vector(self, vector: Vector) -> tuple[Affine, Affine]:
         """Components of a vector."""

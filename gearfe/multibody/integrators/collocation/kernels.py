@@ -24,7 +24,7 @@ beams (`beam.Beam`) and floating frames (`floating.Floating`)), `linearise` and 
 `solve`, `change`, `defect`, `project`. `numpy_equations` has functions of the same names for any `System`.
 
 Forces of registers and their derivatives are orders 0 and 1 of the registers' series (`series.recurrences`), those of
-beams and of bodies in floating frames are in closed form. Stresses S of all these stand in one row of unknowns; ``law``
+beams and of bodies in floating frames are in closed form. Stresses S of all these form one row of unknowns; ``law``
 holds the derivatives of each by what its strain is made of. A stage's force is that of S and, through `law`, of what S
 lacks; S then becomes the stress of the strains.
 

@@ -52,7 +52,7 @@ class Band(NamedTuple):
     """Order of the unknowns and entries of the matrices."""
 
     place: IntArray  # (N,) of coordinates, then rows, in the matrices; N = n + m
-    entry: IntArray  # (e, 2) of the matrices that may be none, but for the rows'
+    entry: IntArray  # (e, 2) of the matrices that may be none, except the rows'
     mass: Array  # (e,) of them
     held: IntArray  # (p, 2) of the mass matrix
     masses: Array  # (p,)

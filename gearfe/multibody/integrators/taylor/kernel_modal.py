@@ -5,10 +5,9 @@ With y = sum_j y_j x^j, x = (t - t0) / s running from 0 to 1 over the trial step
     (j + 2)(j + 1) y_{j+2} = s^2 (c_j - w^2 y_j + W^T phi_j) - s (j + 1) D y_{j+1}
 
 (Hairer, Norsett & Wanner I, Sec. I.8). phi_j comes from the law's own recurrences
-(`multibody.core.contract.SeriesLaw`),
-which stand in for `law_order`, `law_discontinuity`. One order costs two small products with W, half a stage of
-a Runge-Kutta method of order 8, and takes the fastest mode further. A step ends where its law has a discontinuity; the
-number of orders follows from the terms.
+(`multibody.core.contract.SeriesLaw`), bound as `law_order` and `law_discontinuity`. One order costs two small products
+with W, half a stage of a Runge-Kutta method of order 8, and takes the fastest mode further. A step ends where its law
+has a discontinuity; the number of orders follows from the terms.
 """
 
 from __future__ import annotations
