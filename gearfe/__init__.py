@@ -5,55 +5,55 @@ Public names load on first use (PEP 562), so ``import gearfe`` costs millisecond
 
 from importlib import import_module
 
-from . import drawing
+from .base import drawing
 from .version import VERSION as __version__
 
 TYPE_CHECKING = False  # `typing` itself would be a third of the import
 if TYPE_CHECKING:  # what type checkers and the API reference see; below, the same names load on first use
     from typing import Any
 
-    from .elasticity import Material
-    from .errors import InputError
-    from .gear import Gear, GearPair
-    from .housing.build import housing_from_job
-    from .housing.model import Housing
-    from .loadmap.load_map import LoadMap
-    from .loadmap.sweep import sweep_loads
-    from .reduction.modal_body import ModalBody
-    from .runup.run_up import run_up, steady_state
-    from .stiffness.check import StiffnessCheck, check_positions
-    from .stiffness.curve import StiffnessCurve
-    from .stiffness.sweep import sweep_stiffness
+    from .base.errors import InputError
+    from .drivetrain.housing.build import housing_from_job
+    from .drivetrain.housing.model import Housing
+    from .drivetrain.runup.run_up import run_up, steady_state
+    from .drivetrain.train import GearTrain, TrainModel, TrainResponse, build_train
+    from .drivetrain.train.simulate import simulate
+    from .fem.plane import Material
+    from .fem.reduction.modal_body import ModalBody
+    from .gears.geometry import Gear, GearPair
+    from .gears.loadmap.load_map import LoadMap
+    from .gears.loadmap.sweep import sweep_loads
+    from .gears.stiffness.check import StiffnessCheck, check_positions
+    from .gears.stiffness.curve import StiffnessCurve
+    from .gears.stiffness.sweep import sweep_stiffness
     from .study.job import read_study, run_study
     from .study.search import Search
-    from .train import GearTrain, TrainModel, TrainResponse, build_train
-    from .train.simulate import simulate
 
 #: Public name -> module that defines it.
 _PUBLIC: dict[str, str] = {
-    "Gear": "gear",
-    "GearPair": "gear",
-    "Housing": "housing.model",
-    "InputError": "errors",
-    "LoadMap": "loadmap.load_map",
-    "Material": "elasticity",
-    "ModalBody": "reduction.modal_body",
+    "Gear": "gears.geometry",
+    "GearPair": "gears.geometry",
+    "Housing": "drivetrain.housing.model",
+    "InputError": "base.errors",
+    "LoadMap": "gears.loadmap.load_map",
+    "Material": "fem.plane",
+    "ModalBody": "fem.reduction.modal_body",
     "Search": "study.search",
-    "StiffnessCheck": "stiffness.check",
-    "StiffnessCurve": "stiffness.curve",
-    "TrainModel": "train",
-    "TrainResponse": "train",
-    "GearTrain": "train",
-    "build_train": "train",
-    "check_positions": "stiffness.check",
-    "housing_from_job": "housing.build",
+    "StiffnessCheck": "gears.stiffness.check",
+    "StiffnessCurve": "gears.stiffness.curve",
+    "TrainModel": "drivetrain.train",
+    "TrainResponse": "drivetrain.train",
+    "GearTrain": "drivetrain.train",
+    "build_train": "drivetrain.train",
+    "check_positions": "gears.stiffness.check",
+    "housing_from_job": "drivetrain.housing.build",
     "read_study": "study.job",
     "run_study": "study.job",
-    "run_up": "runup.run_up",
-    "simulate": "train",
-    "steady_state": "runup.run_up",
-    "sweep_loads": "loadmap.sweep",
-    "sweep_stiffness": "stiffness.sweep",
+    "run_up": "drivetrain.runup.run_up",
+    "simulate": "drivetrain.train",
+    "steady_state": "drivetrain.runup.run_up",
+    "sweep_loads": "gears.loadmap.sweep",
+    "sweep_stiffness": "gears.stiffness.sweep",
 }
 
 # written out for type checkers; a test holds it against the names above

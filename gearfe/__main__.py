@@ -2,11 +2,11 @@
 
 import sys
 
-from .isolation import leave_working_folder
+from .base.isolation import leave_working_folder
 
 if __name__ == "__main__":
     leave_working_folder(module=True)  # before anything else is imported
 
-    from .cli import main
+    from .cli.main import main
 
     sys.exit(main())

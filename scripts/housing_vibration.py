@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import sys
 
-from gearfe.files import output_folder, write_csv
-from gearfe.gearbox.job import job_train, read_train_job, train_body
-from gearfe.gearbox.mesh_stiffness import train_curves
-from gearfe.record_spectrum import finer
-from gearfe.train import build_train, simulate
-from gearfe.vibration.follow import RunningMean
-from gearfe.vibration.spectra import response_columns, spectra
+from gearfe.base.files import output_folder, write_csv
+from gearfe.base.record_spectrum import finer
+from gearfe.drivetrain.gearbox.job import job_train, read_train_job, train_body
+from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
+from gearfe.drivetrain.train import build_train, simulate
+from gearfe.drivetrain.vibration.follow import RunningMean
+from gearfe.drivetrain.vibration.spectra import response_columns, spectra
 
 
 def main(job_file: str = "geometry/gear_train.toml", out: str = "out/vibration", variant: str | None = None) -> int:

@@ -11,7 +11,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from gearfe.meshing.session import gmsh_session
+from gearfe.fem.meshing.session import gmsh_session
 
 #: Outer box, its walls and its base, pads under its corners.
 LOW, HIGH, WALL, BASE = (-38.0, -35.0, -52.0), (113.0, 35.0, 42.0), 8.0, 10.0

@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from gearfe import GearPair, sweep_stiffness
-from gearfe.contact.laws import DEFAULT_MODEL
-from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
-from gearfe.stiffness.job import read_stiffness_job
-from gearfe.tables.pair import LAWS
+from gearfe.base.tables.pair import LAWS
+from gearfe.gears.contact.laws import DEFAULT_MODEL
+from gearfe.gears.stiffness.job import read_stiffness_job
+from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 
 ROOT = Path(__file__).resolve().parents[1]
 SIZES = (2.0, 1.5, 1.0, 0.7)

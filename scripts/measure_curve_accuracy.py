@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearfe import Gear, GearPair, StiffnessCurve, sweep_stiffness
-from gearfe.contact.laws import Nitsche
-from gearfe.elasticity import Material, Plane
-from gearfe.errors import InputError
-from gearfe.gear.pair import TipRelief
-from gearfe.stiffness.sweep import elastic_pair
+from gearfe.base.errors import InputError
+from gearfe.fem.plane import Material, Plane
+from gearfe.gears.contact.laws import Nitsche
+from gearfe.gears.geometry.pair import TipRelief
+from gearfe.gears.stiffness.sweep import elastic_pair
 
 Case = tuple[GearPair, tuple[Material, Material], Plane]
 

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.study import run
 from gearfe.study.case import Task
 from gearfe.study.job import read_study

@@ -54,9 +54,9 @@ def mechanisms() -> Answers:
 
 def trains() -> Answers:
     """A train of two stages in a frame, with damping: forces and accelerations by two methods, multipliers."""
-    from gearfe.runup.train_stability import train_stability
-    from gearfe.train import build_train, simulate
-    from gearfe.train.gear_train import Damping
+    from gearfe.drivetrain.runup.train_stability import train_stability
+    from gearfe.drivetrain.train import build_train, simulate
+    from gearfe.drivetrain.train.gear_train import Damping
     from tests.trains import SHIPPED, curve, elastic, train
 
     one = elastic(train(SHIPPED, stiffness=curve, damping=Damping(ratio=0.02)), uneven=0.2, skew=0.3)
@@ -72,9 +72,9 @@ def trains() -> Answers:
 
 def laws() -> Answers:
     """The mesh law of a coarse pair: force, torque and tangent over phase and approach."""
-    from gearfe.contact.half_plane import half_plane_pair
-    from gearfe.contact.laws import HalfPlane
-    from gearfe.meshlaw.make import mesh_law
+    from gearfe.gears.contact.half_plane import half_plane_pair
+    from gearfe.gears.contact.laws import HalfPlane
+    from gearfe.gears.meshlaw.make import mesh_law
 
     law = mesh_law(half_plane_pair(coarse_gears(HalfPlane())), 2000.0)
     angle, depth = np.tile(law.cycle * np.linspace(0.0, 1.0, 40), 3), np.repeat([0.7e-6, 5e-6, 20e-6], 40)
@@ -88,8 +88,8 @@ def laws() -> Answers:
 
 def run_ups() -> Answers:
     """Steady states of one stage with a mesh law, teeth in contact and apart."""
-    from gearfe.runup.run_up import run_up
-    from gearfe.train import build_train
+    from gearfe.drivetrain.runup.run_up import run_up
+    from gearfe.drivetrain.train import build_train
     from tests.mesh_laws import hertzian_law
     from tests.test_runup_train import loaded
 
@@ -103,11 +103,11 @@ def run_ups() -> Answers:
 
 def housings() -> Answers:
     """A coarse housing, extruded, and a box of tetrahedra: frequencies and their estimates."""
-    from gearfe.config import build
-    from gearfe.housing.build import housing_from_table
-    from gearfe.housing.model import Housing
-    from gearfe.reduction.error import mesh_error, reduction_error
-    from gearfe.tables.housing import HousingTable
+    from gearfe.base.config import build
+    from gearfe.base.tables.housing import HousingTable
+    from gearfe.drivetrain.housing.build import housing_from_table
+    from gearfe.drivetrain.housing.model import Housing
+    from gearfe.fem.reduction.error import mesh_error, reduction_error
     from tests.housing_meshes import box
 
     table = build(HousingTable, {"mesh": {"size_mm": 16.0}}, "housing")
@@ -123,10 +123,10 @@ def housings() -> Answers:
 
 def gears() -> Answers:
     """Rigid touch of a relieved pair and one with an undercut, ISO's stiffness, area and inertia."""
-    from gearfe.gear.derived import mesh_stiffness
-    from gearfe.gear.gear_data import TipRelief
-    from gearfe.gear.pair import Gear, GearPair
-    from gearfe.train.elements import outline_moments
+    from gearfe.drivetrain.train.elements import outline_moments
+    from gearfe.gears.geometry.derived import mesh_stiffness
+    from gearfe.gears.geometry.gear_data import TipRelief
+    from gearfe.gears.geometry.pair import Gear, GearPair
 
     form: dict[str, Any] = {"module": 2.5e-3, "pressure_angle": np.radians(20.0), "face_width": 10e-3}
     form |= {"tip_round": 1e-4, "tip_relief": TipRelief(2e-5, 2e-3)}
@@ -144,9 +144,9 @@ def gears() -> Answers:
 
 def curves() -> Answers:
     """Curve and load map of a coarse pair with their estimates."""
-    from gearfe.contact.laws import HalfPlane
-    from gearfe.loadmap.sweep import sweep_loads
-    from gearfe.stiffness.sweep import sweep_stiffness
+    from gearfe.gears.contact.laws import HalfPlane
+    from gearfe.gears.loadmap.sweep import sweep_loads
+    from gearfe.gears.stiffness.sweep import sweep_stiffness
 
     pair, law = coarse_pair(), HalfPlane()
     curve = sweep_stiffness(pair, torque=80.0, law=law, coarsen=3.0, estimate_error=True)
@@ -171,7 +171,7 @@ def coarse_pair() -> Any:
 
 def coarse_gears(law: Any) -> Any:
     """Both condensed."""
-    from gearfe.stiffness.sweep import elastic_pair
+    from gearfe.gears.stiffness.sweep import elastic_pair
 
     return elastic_pair(coarse_pair(), law=law, coarsen=3.0)
 

@@ -23,7 +23,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearfe.gearbox.job import job_train, read_train_job
+from gearfe.drivetrain.gearbox.job import job_train, read_train_job
+from gearfe.drivetrain.train import Bearing, Damping, build_train
+from gearfe.gears.stiffness.periodic import periodic_interpolant
 from gearfe.mechanisms import load_mechanism
 from gearfe.multibody import Body, CoordinateSpring, Gravity, Hinge, Linkage, Moment, Slot, Spring, System, constant
 from gearfe.multibody.core.modes import fastest_rate
@@ -31,8 +33,6 @@ from gearfe.multibody.core.start import Start, consistent_start
 from gearfe.multibody.integrators.integrate import DECAYED, DECAYED_MODAL, OVERDAMPED, _run, integrate
 from gearfe.multibody.planar.beam import Beam
 from gearfe.multibody.planar.beam_link import BeamLink, Section
-from gearfe.stiffness.periodic import periodic_interpolant
-from gearfe.train import Bearing, Damping, build_train
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "development" / "integrators.md"

@@ -9,15 +9,15 @@ import typing
 from pathlib import Path
 from typing import Any
 
-from gearfe.config import type_hints
-from gearfe.tables.jobs import TABLES, table_class
-from gearfe.tables.mechanism import MechanismFile
-from gearfe.tables.text import inner_table, toml_value
+from gearfe.base.config import type_hints
+from gearfe.base.tables.jobs import TABLES, table_class
+from gearfe.base.tables.mechanism import MechanismFile
+from gearfe.base.tables.text import inner_table, toml_value
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "keys.md"
 HEAD = """# Keys of the job files
 
-Made from the descriptions in `gearfe/tables/` by `python scripts/write_keys.py`; the messages, `gearfe new` and
+Made from the descriptions in `gearfe/base/tables/` by `python scripts/write_keys.py`; the messages, `gearfe new` and
 the options of the commands say the same. A key whose default is *required* must be given; where it is -, it may be
 left out.
 """

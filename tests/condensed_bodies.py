@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from gearfe.contact.compliance import GearBody, MeshingPair, turn
-from gearfe.contact.elements import solve_elements
-from gearfe.contact.flank import flank_of, normal_stress_rows
-from gearfe.contact.laws import ContactLaw, PairModel
-from gearfe.contact.position import FlankLoads, Positions
-from gearfe.contact.whole_gears.bodies import Bodies, ElasticBody
+from gearfe.gears.contact.compliance import GearBody, MeshingPair, turn
+from gearfe.gears.contact.elements import solve_elements
+from gearfe.gears.contact.flank import flank_of, normal_stress_rows
+from gearfe.gears.contact.laws import ContactLaw, PairModel
+from gearfe.gears.contact.position import FlankLoads, Positions
+from gearfe.gears.contact.whole_gears.bodies import Bodies, ElasticBody
 
 from .contact_problems import chain
 from .solving import given_positions

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from functools import cache
 
-from gearfe.contact.compliance import GearBody, MeshingPair, gear_body
-from gearfe.contact.laws import ContactLaw, PairModel
-from gearfe.contact.whole_gears.pair import ElasticGear, WholePair
-from gearfe.elasticity import Material, Plane
-from gearfe.gear.pair import Gear, GearPair, TipRelief
-from gearfe.meshing.tooth_sector import SectorMesh, sector_mesh, sector_recipes
+from gearfe.fem.plane import Material, Plane
+from gearfe.gears.contact.compliance import GearBody, MeshingPair, gear_body
+from gearfe.gears.contact.laws import ContactLaw, PairModel
+from gearfe.gears.contact.whole_gears.pair import ElasticGear, WholePair
+from gearfe.gears.geometry.pair import Gear, GearPair, TipRelief
+from gearfe.gears.teeth.tooth_sector import SectorMesh, sector_mesh, sector_recipes
 
 WIDTH = 10e-3
 STEEL = Material(200e9, 0.30)

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.contact.flank import edge_shapes, gauss_rule
-from gearfe.contact.laws import ElementLaw
-from gearfe.contact.whole_gears.bodies import Bodies, ElasticBody
-from gearfe.contact.whole_gears.contact_state import contact_at
-from gearfe.contact.whole_gears.newton import ContactSolution, solve_contact
-from gearfe.contact.whole_gears.problem import ContactProblem, Surface
-from gearfe.typing import Array, IntArray
+from gearfe.base.typing import Array, IntArray
+from gearfe.gears.contact.flank import edge_shapes, gauss_rule
+from gearfe.gears.contact.laws import ElementLaw
+from gearfe.gears.contact.whole_gears.bodies import Bodies, ElasticBody
+from gearfe.gears.contact.whole_gears.contact_state import contact_at
+from gearfe.gears.contact.whole_gears.newton import ContactSolution, solve_contact
+from gearfe.gears.contact.whole_gears.problem import ContactProblem, Surface
 
 #: A prescribed displacement (m) or traction (Pa): a number, or a function of places, shape (n, 2), with values (n,).
 Value = float | Callable[[Array], Array]

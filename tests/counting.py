@@ -4,7 +4,7 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gearfe import progress
+from gearfe.base import progress
 
 
 class _Counts(progress.Display):

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gearfe.meshing.session import gmsh_session
+from gearfe.fem.meshing.session import gmsh_session
 from gearfe.study.case import Task
 from gearfe.study.job import read_study
 from gearfe.study.run import side_by_side

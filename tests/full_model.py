@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from gearfe.errors import InputError
-from gearfe.housing.model import Housing
-from gearfe.progress import one_thread
-from gearfe.reduction.craig_bampton import rigid_shift
-from gearfe.reduction.lanczos import lowest_modes
-from gearfe.reduction.sparse_solver import factorize
-from gearfe.typing import Array
+from gearfe.base.errors import InputError
+from gearfe.base.progress import one_thread
+from gearfe.base.typing import Array
+from gearfe.drivetrain.housing.model import Housing
+from gearfe.fem.reduction.craig_bampton import rigid_shift
+from gearfe.fem.reduction.lanczos import lowest_modes
+from gearfe.fem.reduction.sparse_solver import factorize
 
 
 @dataclass(frozen=True, eq=False)

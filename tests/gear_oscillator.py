@@ -2,7 +2,7 @@
 
     m x'' = F(t) - k(phase) g(x) - damper,     g(x) = x, 0 or x + j on the driving flanks, between, on the back flanks
 
-The driver turns as prescribed, the driven gear on stiff axes. Nothing here comes from `gearfe.train` but the curve.
+The driver turns as prescribed, the driven gear on stiff axes. Nothing here comes from `drivetrain.train` but the curve.
 """
 
 from __future__ import annotations

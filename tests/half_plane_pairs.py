@@ -7,10 +7,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair
-from gearfe.contact.position import Contacts
-from gearfe.gear.pair import GearPair, TipRelief
-from gearfe.stiffness.sweep import elastic_pair, marks_met
+from gearfe.gears.contact.half_plane import HalfPlanePair, half_plane_pair
+from gearfe.gears.contact.position import Contacts
+from gearfe.gears.geometry.pair import GearPair, TipRelief
+from gearfe.gears.stiffness.sweep import elastic_pair, marks_met
 
 from .gears import pair as gear_pair
 

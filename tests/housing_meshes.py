@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from gearfe.elasticity import Material
-from gearfe.housing.meshes import Tetrahedra
-from gearfe.housing.model import Housing
-from gearfe.housing.surface import triangle_functions
-from gearfe.solid import EDGES, SolidMatrices, maps, shape_functions
+from gearfe.drivetrain.housing.meshes import Tetrahedra
+from gearfe.drivetrain.housing.model import Housing
+from gearfe.drivetrain.housing.surface import triangle_functions
+from gearfe.fem.plane import Material
+from gearfe.fem.solid import EDGES, SolidMatrices, maps, shape_functions
 
 DATA = Path(__file__).parent / "data"
 

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gearfe.meshlaw.fit import Couple, PairForces, TouchCurve, fit_law
-from gearfe.meshlaw.law import MeshLaw
+from gearfe.gears.meshlaw.fit import Couple, PairForces, TouchCurve, fit_law
+from gearfe.gears.meshlaw.law import MeshLaw
 
 CYCLE = 2 * math.pi / 20
 

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from gearfe.progress import one_thread
-from gearfe.reduction.sparse_solver import factorize
-from gearfe.typing import Array
+from gearfe.base.progress import one_thread
+from gearfe.base.typing import Array
+from gearfe.fem.reduction.sparse_solver import factorize
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """Oscillators of one degree of freedom, and periodic motions by shooting: an integration of its own, events located.
 
-Nothing here comes from `gearfe.runup`'s solution; its oscillators are made for it.
+Nothing here comes from `gearfe.drivetrain.runup`'s solution; its oscillators are made for it.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from gearfe.runup.balance import Oscillator, Pushes
-from gearfe.runup.linear import Linear
+from gearfe.drivetrain.runup.balance import Oscillator, Pushes
+from gearfe.drivetrain.runup.linear import Linear
 
 
 def synthesis(amplitudes: np.ndarray, samples: int) -> np.ndarray:

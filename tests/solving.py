@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearfe.contact.compliance import MeshingPair
-from gearfe.contact.elements import solve_elements
-from gearfe.contact.laws import HalfPlane
-from gearfe.contact.position import NO_LOADS, STATUS, TORQUES, Contacts, FlankLoads, Positions
-from gearfe.stiffness.positions import position_solver
+from gearfe.gears.contact.compliance import MeshingPair
+from gearfe.gears.contact.elements import solve_elements
+from gearfe.gears.contact.laws import HalfPlane
+from gearfe.gears.contact.position import NO_LOADS, STATUS, TORQUES, Contacts, FlankLoads, Positions
+from gearfe.gears.stiffness.positions import position_solver
 
 
 def solve_positions(elastic: MeshingPair, angles, twists) -> Positions:

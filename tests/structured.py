@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gearfe.contact.whole_gears.bodies import ElasticBody
-from gearfe.elasticity import Material
+from gearfe.fem.plane import Material
+from gearfe.gears.contact.whole_gears.bodies import ElasticBody
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
 
-from gearfe.cache import versions
+from gearfe.base.cache import versions
 from gearfe.study.job import Study
 from gearfe.study.journal import Journal
 from gearfe.study.run import serially

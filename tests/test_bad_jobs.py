@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from gearfe import Housing
-from gearfe.cli import main
-from gearfe.reduction.error import reduction_error
-from gearfe.tables.examples import job_file
+from gearfe.base.tables.examples import job_file
+from gearfe.cli.main import main
+from gearfe.fem.reduction.error import reduction_error
 
 from .housing_meshes import box
 

@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
+from gearfe.drivetrain.runup.run_up import steady_state
+from gearfe.drivetrain.train import Bearing, Damping, build_train, simulate
 from gearfe.multibody import constant
-from gearfe.runup.run_up import steady_state
-from gearfe.train import Bearing, Damping, build_train, simulate
 
 from .trains import ALPHA, SPEED, base_radius, changed, curve, elastic, train
 
@@ -100,8 +100,8 @@ def test_each_shaft_is_in_balance(kind):
 
 def motions(model, response):
     """Rates and second rates of the coordinates, from a run of the same model (they are not in the response)."""
+    from gearfe.drivetrain.train.states import train_states
     from gearfe.multibody import integrate
-    from gearfe.train.states import train_states
 
     run = integrate(model.system, response.time, tolerance=1e-8, method=METHOD, start=model.start)
     states = train_states(model, run)

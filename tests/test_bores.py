@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.housing.attachments import Bore, bore_attachment
-from gearfe.housing.model import Housing
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.housing.attachments import Bore, bore_attachment
+from gearfe.drivetrain.housing.model import Housing
 from tests.housing_meshes import box
 
 RADIUS, LENGTH = 0.02, 0.03

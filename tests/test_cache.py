@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cache import LOOK, cache_folder, cache_key, cached_arrays, entries, kept, trim
-from gearfe.cli import main
-from gearfe.errors import MissingLibraryError
-from gearfe.meshing import session
+from gearfe.base.cache import LOOK, cache_folder, cache_key, cached_arrays, entries, kept, trim
+from gearfe.base.errors import MissingLibraryError
+from gearfe.cli.main import main
+from gearfe.fem.meshing import session
 
 
 @dataclasses.dataclass(frozen=True)
@@ -188,5 +188,5 @@ def test_missing_system_library_names_the_packages(monkeypatch: pytest.MonkeyPat
 
 
 def test_cache_module_imports_no_mesher() -> None:
-    code = "import sys, gearfe.cache; assert not {'gmsh', 'meshio', 'skfem'} & set(sys.modules)"
+    code = "import sys, gearfe.base.cache; assert not {'gmsh', 'meshio', 'skfem'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.housing.mesh_checks import checked_mesh
-from gearfe.meshing import cad
-from gearfe.meshing.cad import ALGORITHMS, mesh_cad_file
-from gearfe.meshing.session import gmsh_session
-from gearfe.solid import jacobian_determinants, maps, shape_functions
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.housing.mesh_checks import checked_mesh
+from gearfe.fem.meshing import cad
+from gearfe.fem.meshing.cad import ALGORITHMS, mesh_cad_file
+from gearfe.fem.meshing.session import gmsh_session
+from gearfe.fem.solid import jacobian_determinants, maps, shape_functions
 
 SIZES = (40.0, 25.0, 15.0, 10.0, 7.0)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.results import reactions
 from gearfe.multibody import integrate

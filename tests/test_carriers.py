@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.config import build
-from gearfe.errors import InputError
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.mechanism import MechanismFile
 from gearfe.mechanisms.model import Mechanism, make_mechanism
 from gearfe.mechanisms.results import reactions
 from gearfe.mechanisms.solve import solve
 from gearfe.multibody import Trajectory
-from gearfe.tables.mechanism import MechanismFile
 
 ARM = 0.1125
 SUN, PLANET, RING = 18, 12, 42

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from gearfe import Gear, GearPair, check_positions, sweep_stiffness
-from gearfe.cli import main
-from gearfe.contact.laws import Penalty
-from gearfe.contact.whole_gears import newton
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
+from gearfe.gears.contact.laws import Penalty
+from gearfe.gears.contact.whole_gears import newton
 
 JOB = """
 [pair]
@@ -169,6 +169,6 @@ def test_whole_gears_load_nothing_that_they_check() -> None:
     """Whatever they import, directly or not: neither condensed gears nor the solvers on them."""
     contact = ["compliance", "elements", "element_batch", "half_plane", "half_plane_pair", "half_plane_step"]
     contact += ["panels", "position", "zones", "flank_compliance"]
-    names = ["gearfe.multifrontal", "gearfe.stiffness", *(f"gearfe.contact.{name}" for name in contact)]
-    code = f"import gearfe.contact.whole_gears.position, sys; print([n for n in {names} if n in sys.modules])"
+    names = ["gearfe.fem.multifrontal", "gearfe.gears.stiffness", *(f"gearfe.gears.contact.{name}" for name in contact)]
+    code = f"import gearfe.gears.contact.whole_gears.position, sys; print([n for n in {names} if n in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import CLOSED, main
-from gearfe.commands.arguments import CommandParser
-from gearfe.commands.housing import cure_of_error
-from gearfe.errors import InputError, NotFiniteWarning, shown
-from gearfe.files import csv_table, write_csv
-from gearfe.tables.examples import job_file
-from gearfe.tables.housing import HousingMeshTable
+from gearfe.base.errors import InputError, NotFiniteWarning, shown
+from gearfe.base.files import csv_table, write_csv
+from gearfe.base.tables.examples import job_file
+from gearfe.base.tables.housing import HousingMeshTable
+from gearfe.cli.arguments import CommandParser
+from gearfe.cli.housing import cure_of_error
+from gearfe.cli.main import CLOSED, main
 
 JOB = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
 #: Every command that reads a job file, with what it needs besides.
@@ -49,7 +49,7 @@ def test_a_bad_file_is_answered_before_the_libraries_load(tmp_path):
     for name, (text, _) in WRONG.items():
         (tmp_path / f"{name}.toml").write_text(text)
     code = (
-        "import sys\nfrom gearfe.cli import main\n"
+        "import sys\nfrom gearfe.cli.main import main\n"
         f"for command, options in {READERS!r}.items():\n"
         f"    for name in {list(WRONG)!r}:\n"
         "        assert main([command, f'{sys.argv[1]}/{name}.toml', *options]) == 2, (command, name)\n"
@@ -63,7 +63,7 @@ def test_gears_that_cannot_run_together_are_told_before_scipy_loads(tmp_path):
     text = job_file("stiffness").replace("# centre_distance_mm (not set):", "centre_distance_mm = 68.0 #")
     (tmp_path / "job.toml").write_text(text)
     code = (
-        "import sys\nfrom gearfe.cli import main\n"
+        "import sys\nfrom gearfe.cli.main import main\n"
         "for line in (['stiffness'], ['loadmap', '--torques-Nm', '5'], ['gear'], ['mesh', '--out', 'x.msh']):\n"
         "    assert main([*line, sys.argv[1] + '/job.toml']) == 2, line\n"
         "heavy = {'scipy', 'skfem', 'gmsh', 'numba', 'matplotlib', 'h5py'} & set(sys.modules)\n"
@@ -89,11 +89,11 @@ dataclasses._create_fn = interrupted
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("when", [FOUND.format("commands.arguments"), FOUND.format("config"), EXECUTED])
+@pytest.mark.parametrize("when", [FOUND.format("cli.arguments"), FOUND.format("base.config"), EXECUTED])
 def test_an_interruption_while_the_program_loads_is_told_as_later(when: str) -> None:
     # a shell's job in the background ignores interruptions, and so would what it starts
     listening = "import os, signal, sys\nsignal.signal(signal.SIGINT, signal.default_int_handler)"
-    code = f"{listening}\n{when}\nfrom gearfe.cli import main\nsys.exit(main(['stiffness', 'job.toml']))"
+    code = f"{listening}\n{when}\nfrom gearfe.cli.main import main\nsys.exit(main(['stiffness', 'job.toml']))"
     made = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=120)
     assert (made.returncode, made.stderr) == (130, "gearfe: interrupted\n")
 
@@ -111,7 +111,7 @@ def test_every_table_with_infinite_numbers_is_told(tmp_path, capsys, monkeypatch
 
     with pytest.warns(NotFiniteWarning, match="2 of 6 .* the first in row 2"):
         written_in_pieces()
-    monkeypatch.setattr("gearfe.commands.gear.run", lambda _: len(write_csv(tmp_path / "t.csv", values)) - 1)
+    monkeypatch.setattr("gearfe.cli.gear.run", lambda _: len(write_csv(tmp_path / "t.csv", values)) - 1)
     for _ in range(2):  # Python tells a warning once
         assert main(["gear", str(JOB)]) == 1
         assert capsys.readouterr().err.startswith(

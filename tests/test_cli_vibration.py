@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
+from gearfe.cli.main import main
 
 from .train_responses import COLUMNS, table
 
@@ -126,7 +126,7 @@ def test_a_rigid_train(job, tmp_path, capsys):
 def test_a_rigid_train_loads_no_finite_elements(job, tmp_path):
     code = f"""
 import sys
-from gearfe.cli import main
+from gearfe.cli.main import main
 assert main(["vibration", {str(job)!r}, "--out", {str(tmp_path / "out")!r}, "--no-pictures"]) == 0
 loaded = {{name.partition(".")[0] for name in sys.modules}}
 assert not loaded & {{"gmsh", "meshio", "skfem", "pyvista", "vtk", "matplotlib"}}, loaded

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.config import build
+from gearfe.base.config import build
+from gearfe.base.tables.mechanism import MechanismFile
 from gearfe.mechanisms.model import make_mechanism
 from gearfe.mechanisms.tables import ValueTable
 from gearfe.multibody import (
@@ -35,7 +36,6 @@ from gearfe.multibody.planar.couplings import Cam
 from gearfe.multibody.planar.floating import Floating, FloatingBody, frame_joint
 from gearfe.multibody.planar.turning import TurningFrame
 from gearfe.multibody.series.ordering import narrow_order
-from gearfe.tables.mechanism import MechanismFile
 
 
 @pytest.mark.parametrize(("family", "order"), [(RADAU, 9), (GAUSS, 10)])

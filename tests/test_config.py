@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import pytest
 
-from gearfe.config import build, quantity, read_toml
-from gearfe.errors import InputError
-from gearfe.files import read_csv, read_numbers
-from gearfe.tables.jobs import load_job
+from gearfe.base.config import build, quantity, read_toml
+from gearfe.base.errors import InputError
+from gearfe.base.files import read_csv, read_numbers
+from gearfe.base.tables.jobs import load_job
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def test_errors_survive_another_process():
 
 def test_gears_load_no_finite_element_or_plotting_library():
     code = (
-        "import sys, gearfe.gear.pair, gearfe.gear.derived, gearfe.tables.pair\n"
+        "import sys, gearfe.gears.geometry.pair, gearfe.gears.geometry.derived, gearfe.base.tables.pair\n"
         "bad = {'scipy', 'skfem', 'gmsh', 'meshio', 'matplotlib', 'pyvista', 'h5py'} & set(sys.modules)\n"
         "assert not bad, bad\n"
     )

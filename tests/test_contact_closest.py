@@ -7,8 +7,8 @@ parameter keep it one: there are no kinks between edges, and blended and own nor
 import numpy as np
 import pytest
 
-from gearfe.contact.flank import OFF_END, Projection, edge_nodes, edge_shapes, project
-from gearfe.contact.whole_gears.problem import nearest_places
+from gearfe.gears.contact.flank import OFF_END, Projection, edge_nodes, edge_shapes, project
+from gearfe.gears.contact.whole_gears.problem import nearest_places
 
 EDGES = 4
 STEP = 1e-5

@@ -5,12 +5,12 @@ import pytest
 from scipy.sparse import coo_matrix, csc_matrix
 from scipy.sparse.linalg import splu, spsolve
 
-from gearfe.contact.compliance import GearBody
-from gearfe.contact.flank import flank_of, normal_stress_rows
-from gearfe.elasticity import element_stiffness
-from gearfe.meshing.whole_gear import whole_gear
-from gearfe.multifrontal import condense
-from gearfe.reduction.sparse_solver import factorize
+from gearfe.fem.multifrontal import condense
+from gearfe.fem.plane import element_stiffness
+from gearfe.fem.reduction.sparse_solver import factorize
+from gearfe.gears.contact.compliance import GearBody
+from gearfe.gears.contact.flank import flank_of, normal_stress_rows
+from gearfe.gears.teeth.whole_gear import whole_gear
 
 from .contact_cases import IRON, STEEL, WIDTH, bodies, meshes
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearfe.contact.laws import ElementLaw, Nitsche, Penalty
-from gearfe.contact.whole_gears import forms
-from gearfe.contact.whole_gears.bodies import Bodies
-from gearfe.contact.whole_gears.contact_state import contact_at
-from gearfe.contact.whole_gears.problem import ContactProblem
-from gearfe.elasticity import Material
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.fem.plane import Material
+from gearfe.gears.contact.laws import ElementLaw, Nitsche, Penalty
+from gearfe.gears.contact.whole_gears import forms
+from gearfe.gears.contact.whole_gears.bodies import Bodies
+from gearfe.gears.contact.whole_gears.contact_state import contact_at
+from gearfe.gears.contact.whole_gears.problem import ContactProblem
 
 from .contact_problems import contact_problem
 from .structured import block

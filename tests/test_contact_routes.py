@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.sparse import coo_matrix
 
-from gearfe.contact.laws import ContactLaw, Nitsche, Penalty
-from gearfe.contact.whole_gears.position import solve_position as solve_whole
-from gearfe.elasticity import element_stiffness
-from gearfe.meshing.whole_gear import whole_gear
+from gearfe.fem.plane import element_stiffness
+from gearfe.gears.contact.laws import ContactLaw, Nitsche, Penalty
+from gearfe.gears.contact.whole_gears.position import solve_position as solve_whole
+from gearfe.gears.teeth.whole_gear import whole_gear
 
 from .contact_cases import STEEL, WIDTH, condensed, meshes, whole
 from .solving import peak_pressure, solve_position

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.mechanisms import load_mechanism
 from gearfe.mechanisms.results import reactions
 from gearfe.multibody import (

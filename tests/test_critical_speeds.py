@@ -6,13 +6,13 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.commands.runup import _report_lines
+from gearfe.cli.runup import _report_lines
+from gearfe.drivetrain.runup import critical
+from gearfe.drivetrain.runup.report import summary
+from gearfe.drivetrain.runup.run_up import run_up
+from gearfe.drivetrain.train import Damping, build_train
+from gearfe.gears.stiffness.periodic import periodic_interpolant
 from gearfe.multibody import constant
-from gearfe.runup import critical
-from gearfe.runup.report import summary
-from gearfe.runup.run_up import run_up
-from gearfe.stiffness.periodic import periodic_interpolant
-from gearfe.train import Damping, build_train
 
 from .trains import train
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from gearfe import sweep_stiffness
-from gearfe.contact.laws import Nitsche, Penalty
-from gearfe.elasticity import Material
-from gearfe.gear.face import face_of
-from gearfe.stiffness.positions import at_torques, position_solver, unseen_twists
-from gearfe.stiffness.sweep import elastic_pair
+from gearfe.fem.plane import Material
+from gearfe.gears.contact.laws import Nitsche, Penalty
+from gearfe.gears.geometry.face import face_of
+from gearfe.gears.stiffness.positions import at_torques, position_solver, unseen_twists
+from gearfe.gears.stiffness.sweep import elastic_pair
 
 from . import gears
 from .solving import solve_positions

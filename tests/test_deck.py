@@ -12,11 +12,11 @@ import meshio
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.meshing.deck import deck_torque
-from gearfe.meshing.tooth_sector import sector_recipes
-from gearfe.meshing.whole_gear import mixed_gear, teeth_near
-from gearfe.tables.examples import job_file
+from gearfe.base.tables.examples import job_file
+from gearfe.cli.main import main
+from gearfe.fem.meshing.deck import deck_torque
+from gearfe.gears.teeth.tooth_sector import sector_recipes
+from gearfe.gears.teeth.whole_gear import mixed_gear, teeth_near
 
 from .gears import pair
 

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from gearfe import InputError
-from gearfe.cli import main
-from gearfe.config import build
-from gearfe.gear.deviation_job import active_rolls, deviations_of
-from gearfe.tables.microgeometry import GearMicrogeometryTable, MicrogeometryTable, WavinessTable
+from gearfe.base.config import build
+from gearfe.base.tables.microgeometry import GearMicrogeometryTable, MicrogeometryTable, WavinessTable
+from gearfe.cli.main import main
+from gearfe.gears.geometry.deviation_job import active_rolls, deviations_of
 
 from .gears import pair as gear_pair
 

@@ -6,11 +6,11 @@ import math
 
 import pytest
 
-from gearfe.config import build
-from gearfe.errors import InputError
-from gearfe.gear.derived import derived_geometry
-from gearfe.gear.pair import Gear, GearPair
-from gearfe.tables.pair import PairTable
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.pair import PairTable
+from gearfe.gears.geometry.derived import derived_geometry
+from gearfe.gears.geometry.pair import Gear, GearPair
 
 PAIR = {
     "module_mm": 3.0,

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from gearfe.base.typing import Array
 from gearfe.multibody import Body, Gravity, Hinge, Linkage, Moment, Status, System, Trajectory, integrate, polynomial
 from gearfe.multibody.planar.linkage import BodyVariables, StateFunction
-from gearfe.typing import Array
 
 MASS, LENGTH, G = 2.0, 1.0, 9.81
 INERTIA = MASS * LENGTH**2 / 3  # of a bar about its end

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.config import build
+from gearfe.base.config import build
+from gearfe.base.tables.mechanism import MechanismFile
 from gearfe.mechanisms import evaluate
 from gearfe.mechanisms.model import make_mechanism
 from gearfe.multibody import integrate
-from gearfe.tables.mechanism import MechanismFile
 from tests.benchmarks.peers.exudyn_flexible import tables
 from tests.benchmarks.subject import DATA
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import coo_matrix, csc_matrix
 from scipy.sparse.linalg import spsolve
 
-from gearfe.elasticity import Material, Plane, element_stiffness, physical_gradients, stress_rows, triangle_shapes
+from gearfe.fem.plane import Material, Plane, element_stiffness, physical_gradients, stress_rows, triangle_shapes
 
 MATERIAL = Material(200e9, 0.30)
 WIDTH = 10e-3

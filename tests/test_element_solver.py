@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.contact.compliance import MeshingPair
-from gearfe.gear.pair import TipRelief
-from gearfe.loadmap.sweep import sweep_loads
-from gearfe.meshing.tooth_sector import sector_recipes
-from gearfe.stiffness.positions import position_solver
-from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.cli.main import main
+from gearfe.gears.contact.compliance import MeshingPair
+from gearfe.gears.geometry.pair import TipRelief
+from gearfe.gears.loadmap.sweep import sweep_loads
+from gearfe.gears.stiffness.positions import position_solver
+from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.teeth.tooth_sector import sector_recipes
 
 from .gears import pair as gear_pair
 from .solving import solve_positions

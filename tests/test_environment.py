@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.cache import cache_folder
-from gearfe.cli import main
-from gearfe.environment import LIMIT, interpreted, limit
+from gearfe.base.cache import cache_folder
+from gearfe.base.environment import LIMIT, interpreted, limit
+from gearfe.cli.main import main
 
 JOB = str(Path(__file__).parents[1] / "geometry" / "gear_train.toml")
 

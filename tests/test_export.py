@@ -6,11 +6,11 @@ import meshio
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.meshing.export import MeshPart, export_mesh
-from gearfe.meshing.session import gmsh_session
-from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
-from gearfe.meshing.whole_gear import whole_gear
+from gearfe.base.errors import InputError
+from gearfe.fem.meshing.export import MeshPart, export_mesh
+from gearfe.fem.meshing.session import gmsh_session
+from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
+from gearfe.gears.teeth.whole_gear import whole_gear
 
 from .gears import pair
 

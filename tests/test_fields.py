@@ -9,17 +9,17 @@ import pytest
 from scipy.sparse.linalg import splu
 
 from gearfe import StiffnessCurve
-from gearfe.contact.compliance import turn
-from gearfe.contact.laws import Penalty
-from gearfe.elasticity import element_stiffness
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.fem.plane import element_stiffness
 from gearfe.figures import stress
 from gearfe.figures.stress import color_limit
-from gearfe.gear.derived import path_place
-from gearfe.meshing.whole_gear import whole_gear
-from gearfe.stiffness.fields import GearRecovery, field_recovery, flank_pressures, straight_triangles
-from gearfe.stiffness.fields_output import chosen_positions, fields_size, size_note, write_fields
-from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.contact.compliance import turn
+from gearfe.gears.contact.laws import Penalty
+from gearfe.gears.geometry.derived import path_place
+from gearfe.gears.stiffness.fields import GearRecovery, field_recovery, flank_pressures, straight_triangles
+from gearfe.gears.stiffness.fields_output import chosen_positions, fields_size, size_note, write_fields
+from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.teeth.whole_gear import whole_gear
 
 from .gears import pair
 from .solving import nodal, peak_pressure, solve_position
@@ -141,7 +141,7 @@ def test_stress_below_a_line_contact(elastic, position, fields):
 
 def test_principal_stresses_are_the_eigenvalues(fields):
     """Of the full tensor with its component along the axis, by LAPACK."""
-    from gearfe.elasticity import principal_stresses
+    from gearfe.fem.plane import principal_stresses
 
     xx, yy, zz, xy = fields[0].stress[::501].T
     full = np.zeros((len(xx), 3, 3))

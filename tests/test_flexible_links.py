@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
 from gearfe.mechanisms import evaluate, load_mechanism, solve
 from gearfe.mechanisms.results import reactions
 from gearfe.multibody import integrate

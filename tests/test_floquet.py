@@ -11,11 +11,11 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
+from gearfe.drivetrain.runup.monodromy import flow, kick_times, monodromy
+from gearfe.drivetrain.runup.run_up import steady_state
+from gearfe.drivetrain.runup.train_stability import train_stability
+from gearfe.drivetrain.train import Damping, Drive, Load, TrainModel, build_train
 from gearfe.multibody import constant, integrate
-from gearfe.runup.monodromy import flow, kick_times, monodromy
-from gearfe.runup.run_up import steady_state
-from gearfe.runup.train_stability import train_stability
-from gearfe.train import Damping, Drive, Load, TrainModel, build_train
 
 from .test_runup_shooting import start_of
 from .trains import SHIPPED, changed, curve, elastic, train

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.config import build
-from gearfe.errors import InputError
-from gearfe.housing.modal_test import read_modes
-from gearfe.housing.superelement import read_matrix, rigid_shapes, superelement, write_matrix
-from gearfe.reduction.modal_body import ModalBody
-from gearfe.tables.housing import SuperelementTable
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.housing import SuperelementTable
+from gearfe.drivetrain.housing.modal_test import read_modes
+from gearfe.drivetrain.housing.superelement import read_matrix, rigid_shapes, superelement, write_matrix
+from gearfe.fem.reduction.modal_body import ModalBody
 
 from .nastran import Output2, output4_binary, output4_text
 from .test_foreign_meshes import damaged

@@ -10,9 +10,9 @@ import meshio
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.meshing.mesh_file import MeshFile, read_mesh_file, source_fingerprint
-from gearfe.meshing.session import gmsh_session
+from gearfe.base.errors import InputError
+from gearfe.fem.meshing.mesh_file import MeshFile, read_mesh_file, source_fingerprint
+from gearfe.fem.meshing.session import gmsh_session
 
 from .housing_meshes import box
 

@@ -10,10 +10,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.gear import derived
-from gearfe.gear.curves import inv
-from gearfe.gear.pair import Gear, GearPair, TipRelief
+from gearfe.base.errors import InputError
+from gearfe.gears.geometry import derived
+from gearfe.gears.geometry.curves import inv
+from gearfe.gears.geometry.pair import Gear, GearPair, TipRelief
 
 
 def gear(teeth, module=2.5e-3, degrees=25.0, **form):

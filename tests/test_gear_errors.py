@@ -7,8 +7,8 @@ import re
 
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.gear.pair import Gear, GearPair, TipRelief
+from gearfe.base.errors import InputError
+from gearfe.gears.geometry.pair import Gear, GearPair, TipRelief
 
 #: Waist of the tooth below zero: see the test of the waist in test_involute.py.
 SEVERED = {

@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.gear.curves import coordinates
-from gearfe.gear.deviation import Deviation
-from gearfe.gear.face import ToothDeviations
-from gearfe.gear.outline import tooth_outline, whole_outline
-from gearfe.gear.pair import Gear
-from gearfe.meshing.gear_solid import write_solid
-from gearfe.meshing.session import gmsh_session
+from gearfe.base.tables.examples import job_file
+from gearfe.cli.main import main
+from gearfe.fem.meshing.session import gmsh_session
+from gearfe.gears.geometry.curves import coordinates
+from gearfe.gears.geometry.deviation import Deviation
+from gearfe.gears.geometry.face import ToothDeviations
+from gearfe.gears.geometry.outline import tooth_outline, whole_outline
+from gearfe.gears.geometry.pair import Gear
+from gearfe.gears.teeth.gear_solid import write_solid
 from gearfe.output.formats import read_csv
-from gearfe.tables.examples import job_file
 
 from .gears import gear, pair
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.gear.curves import coordinates
-from gearfe.gear.pair import Gear, GearPair, MeshGeometry, TipRelief
-from gearfe.gear.validity import tip_penetration
+from gearfe.base.errors import InputError
+from gearfe.gears.geometry.curves import coordinates
+from gearfe.gears.geometry.pair import Gear, GearPair, MeshGeometry, TipRelief
+from gearfe.gears.geometry.validity import tip_penetration
 
 NM = 1e-12  # 1e-9 mm (m)
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.config import build
-from gearfe.errors import InputError
-from gearfe.gear.pair import GearPair, TipRelief
-from gearfe.tables.jobs import load_job, table_class
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.jobs import load_job, table_class
+from gearfe.gears.geometry.pair import GearPair, TipRelief
 
 SHIPPED = Path(__file__).parents[1] / "geometry" / "gear_train.toml"
 

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
-from gearfe.gear.deviation import Deviation
-from gearfe.gear.face import ToothDeviations, face_of
-from gearfe.gear.first_contact import Faces
-from gearfe.gear.pair import TipRelief
-from gearfe.stiffness.sweep import elastic_pair
+from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
+from gearfe.gears.geometry.deviation import Deviation
+from gearfe.gears.geometry.face import ToothDeviations, face_of
+from gearfe.gears.geometry.first_contact import Faces
+from gearfe.gears.geometry.pair import TipRelief
+from gearfe.gears.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair
 from .half_plane_pairs import PAIRS, angles_of, law_of

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
-from gearfe.contact.flank_compliance import cubic_spline
-from gearfe.contact.panels import (
+from gearfe.gears.contact.flank_compliance import cubic_spline
+from gearfe.gears.contact.panels import (
     ELLIPSE_W,
     ELLIPSE_X,
     MIDDLES,
@@ -22,7 +22,7 @@ from gearfe.contact.panels import (
     unilateral,
     wedge_tensor,
 )
-from gearfe.gear.face import face_of
+from gearfe.gears.geometry.face import face_of
 
 from .half_plane_pairs import PAIRS
 

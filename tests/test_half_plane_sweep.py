@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from gearfe import InputError
-from gearfe.cli import main
-from gearfe.contact.compliance import MeshingPair, finite_strain_shares
-from gearfe.contact.laws import HalfPlane, on_elements
-from gearfe.elasticity import Material
-from gearfe.loadmap.sweep import sweep_loads
-from gearfe.stiffness.curve import StiffnessCurve
-from gearfe.stiffness.positions import position_solver
-from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.cli.main import main
+from gearfe.fem.plane import Material
+from gearfe.gears.contact.compliance import MeshingPair, finite_strain_shares
+from gearfe.gears.contact.laws import HalfPlane, on_elements
+from gearfe.gears.loadmap.sweep import sweep_loads
+from gearfe.gears.stiffness.curve import StiffnessCurve
+from gearfe.gears.stiffness.positions import position_solver
+from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .gears import pair as gear_pair
 from .solving import solve_positions
@@ -139,7 +139,7 @@ def test_load_map() -> None:
 
 
 def test_no_other_solver_takes_it() -> None:
-    with pytest.raises(InputError, match=r"gearfe.contact.half_plane solves it"):
+    with pytest.raises(InputError, match=r"gearfe.gears.contact.half_plane solves it"):
         on_elements(HalfPlane())
     assert not position_solver(elastic_of("half_plane")).on_elements
     assert isinstance(elastic_of("half_plane").law, HalfPlane)

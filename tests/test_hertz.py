@@ -23,10 +23,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gearfe.contact.laws import ElementLaw, Nitsche, Penalty
-from gearfe.contact.whole_gears.bodies import Bodies, ElasticBody
-from gearfe.contact.whole_gears.problem import ContactProblem
-from gearfe.elasticity import Material
+from gearfe.fem.plane import Material
+from gearfe.gears.contact.laws import ElementLaw, Nitsche, Penalty
+from gearfe.gears.contact.whole_gears.bodies import Bodies, ElasticBody
+from gearfe.gears.contact.whole_gears.problem import ContactProblem
 
 from .contact_problems import contact_problem, solved
 from .structured import mapped_grid

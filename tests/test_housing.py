@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.config import build
-from gearfe.errors import InputError
-from gearfe.housing.body import reduced_housing
-from gearfe.housing.build import bores, housing_from_table, inside_faces
-from gearfe.housing.meshes import Prisms
-from gearfe.prisms import volume_ratios
-from gearfe.tables.housing import HousingTable
-from gearfe.tables.jobs import load_job
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.housing import HousingTable
+from gearfe.base.tables.jobs import load_job
+from gearfe.drivetrain.housing.body import reduced_housing
+from gearfe.drivetrain.housing.build import bores, housing_from_table, inside_faces
+from gearfe.drivetrain.housing.meshes import Prisms
+from gearfe.fem.prisms import volume_ratios
 
 from .full_model import full_model
 from .housing_meshes import surface_area

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.elasticity import Material
-from gearfe.errors import InputError
-from gearfe.housing.attachments import Attachment, Bore, Plane, interface_matrix
-from gearfe.housing.mesh_checks import boundary_faces
-from gearfe.housing.model import Housing
-from gearfe.meshing.session import gmsh_session
-from gearfe.solid import curved_elements, jacobian_determinants
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.housing.attachments import Attachment, Bore, Plane, interface_matrix
+from gearfe.drivetrain.housing.mesh_checks import boundary_faces
+from gearfe.drivetrain.housing.model import Housing
+from gearfe.fem.meshing.session import gmsh_session
+from gearfe.fem.plane import Material
+from gearfe.fem.solid import curved_elements, jacobian_determinants
 from tests.housing_meshes import box, second_order
 
 

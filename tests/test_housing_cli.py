@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
+from gearfe.cli.main import main
+from gearfe.fem.reduction.modal_body import ModalBody
 from gearfe.figures.housing import draw_bodies, picture_of_bodies
-from gearfe.reduction.modal_body import ModalBody
 
 JOB = """
 [housing]
@@ -68,7 +68,7 @@ def test_command_writes_its_files(job: Path, tmp_path: Path, capsys: pytest.Capt
     # a second run needs no mesher
     code = (
         "import sys\n"
-        "from gearfe.cli import main\n"
+        "from gearfe.cli.main import main\n"
         "assert main(sys.argv[1:]) == 0\n"
         "assert not {'gmsh', 'meshio'} & set(sys.modules)\n"
     )

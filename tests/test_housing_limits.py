@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.config import build
-from gearfe.elasticity import Material
-from gearfe.errors import InputError
-from gearfe.housing.model import Housing
-from gearfe.reduction.lanczos import lowest_modes
-from gearfe.tables.housing import HousingTable
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.housing import HousingTable
+from gearfe.drivetrain.housing.model import Housing
+from gearfe.fem.plane import Material
+from gearfe.fem.reduction.lanczos import lowest_modes
 from tests.housing_meshes import box
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.housing.model import Housing
+from gearfe.drivetrain.housing.model import Housing
 
 from .full_model import full_model
 from .housing_meshes import reference_housing

@@ -12,19 +12,14 @@ from skfem import Basis, BilinearForm, ElementTetP1, ElementTetP2, ElementVector
 from skfem.assembly import Dofs
 from skfem.helpers import ddot, div, sym_grad
 
-from gearfe.elasticity import Material
-from gearfe.errors import InputError
-from gearfe.housing.mesh_checks import boundary_faces
-from gearfe.housing.meshes import Tetrahedra
-from gearfe.housing.surface import nodal_normals, triangle_functions
-from gearfe.reduction.lanczos import lowest_modes
-from gearfe.reduction.sparse_solver import factorize
-from gearfe.solid import (
-    CURVED_DEGREE,
-    assemble,
-    curved_elements,
-    jacobian_determinants,
-)
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.housing.mesh_checks import boundary_faces
+from gearfe.drivetrain.housing.meshes import Tetrahedra
+from gearfe.drivetrain.housing.surface import nodal_normals, triangle_functions
+from gearfe.fem.plane import Material
+from gearfe.fem.reduction.lanczos import lowest_modes
+from gearfe.fem.reduction.sparse_solver import factorize
+from gearfe.fem.solid import CURVED_DEGREE, assemble, curved_elements, jacobian_determinants
 from tests.housing_meshes import box, surface_area
 
 STEEL = Material()

@@ -20,7 +20,7 @@ def loaded_after(code):
 
 SWEEP = """
 from gearfe import sweep_stiffness
-from gearfe.stiffness.job import read_stiffness_job
+from gearfe.gears.stiffness.job import read_stiffness_job
 job = read_stiffness_job("geometry/gear_train.toml")
 curve = sweep_stiffness(job.pair, twist=1e-3, angles=[0.05], coarsen=4.0)
 assert not curve.failed.any()
@@ -34,7 +34,7 @@ def test_import_loads_nothing_heavy():
 
 
 def test_help_loads_no_numerics():
-    assert not loaded_after("from gearfe.cli import main; main(['--help'])") & {*HEAVY, "numpy", "scipy"}
+    assert not loaded_after("from gearfe.cli.main import main; main(['--help'])") & {*HEAVY, "numpy", "scipy"}
 
 
 def test_a_sweep_on_cached_meshes_loads_no_mesher_and_no_plots():

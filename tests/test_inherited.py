@@ -2,9 +2,9 @@
 
 import pytest
 
-from gearfe.gearbox.inherited import inherited, inherited_lines
-from gearfe.gearbox.job import job_train, read_train_job
-from gearfe.train import build_train
+from gearfe.drivetrain.gearbox.inherited import inherited, inherited_lines
+from gearfe.drivetrain.gearbox.job import job_train, read_train_job
+from gearfe.drivetrain.train import build_train
 
 JOB = """
 [pair]

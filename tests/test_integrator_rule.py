@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
 from gearfe.multibody import (
     Body,
     CoordinateSpring,

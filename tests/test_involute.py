@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.gear.curves import coordinates, inv, inverse_inv
-from gearfe.gear.gear_data import GearData
-from gearfe.gear.involute import tooth_profile
-from gearfe.gear.pair import Gear, TipRelief
+from gearfe.gears.geometry.curves import coordinates, inv, inverse_inv
+from gearfe.gears.geometry.gear_data import GearData
+from gearfe.gears.geometry.involute import tooth_profile
+from gearfe.gears.geometry.pair import Gear, TipRelief
 
 NM = 1e-12  # 1e-9 mm, the accuracy that profile points must have (m)
 

@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from gearfe.base.typing import Array
 from gearfe.multibody.compiled import kernels as compiled
 from gearfe.multibody.compiled.object_code import Entry
 from gearfe.multibody.compiled.packed import Layout, Packed
-from gearfe.typing import Array
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNELS = """

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from gearfe.base.typing import Array, IntArray
 from gearfe.multibody.compiled import kernels as compiled
 from gearfe.multibody.compiled.packed import Packed
 from gearfe.multibody.compiled.simd import NAMES, SimdArray, flat, halves, highest, simd_copy, simd_zeros, total
-from gearfe.typing import Array, IntArray
 
 from .rigid_cases import by_scipy, pendulum
 

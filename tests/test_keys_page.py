@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.tables.jobs import TABLES, table_class
+from gearfe.base.tables.jobs import TABLES, table_class
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "keys.md"

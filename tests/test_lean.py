@@ -15,7 +15,7 @@ PROGRAM = """
 import sys
 for name in {left_out!r}:
     sys.modules[name] = None
-from gearfe.cli import main
+from gearfe.cli.main import main
 from gearfe.figures.offscreen import draw_apart
 job, crank, out = sys.argv[1:]
 coarse = ["--coarsen", "4", "--angles", "0", "9", "9", "--no-estimate", "--no-pictures"]

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from gearfe import LoadMap, sweep_loads, sweep_stiffness
-from gearfe.cli import main
-from gearfe.errors import InputError
-from gearfe.gearbox.job import read_train_job
-from gearfe.gearbox.mesh_stiffness import train_curves
-from gearfe.loadmap.load_map import RootMap
-from gearfe.stiffness.job import read_stiffness_job
-from gearfe.stiffness.sweep import elastic_pair
-from gearfe.tables.jobs import load_job
+from gearfe.base.errors import InputError
+from gearfe.base.tables.jobs import load_job
+from gearfe.cli.main import main
+from gearfe.drivetrain.gearbox.job import read_train_job
+from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
+from gearfe.gears.loadmap.load_map import RootMap
+from gearfe.gears.stiffness.job import read_stiffness_job
+from gearfe.gears.stiffness.sweep import elastic_pair
 
 from .gears import pair
 from .test_train_job import BORES, SMALL

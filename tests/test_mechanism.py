@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.expressions import compute, parse, quantities
 from gearfe.mechanisms.results import reactions, wrapped
@@ -318,7 +318,7 @@ def test_a_planar_run_loads_no_heavy_library(tmp_path):
         "0.002",
     ]
     code = (
-        "import sys; from gearfe.cli import main; "
+        "import sys; from gearfe.cli.main import main; "
         f"main({arguments!r}); "
         "heavy = {'skfem', 'gmsh', 'meshio', 'pyvista', 'matplotlib', 'vtk', 'h5py'} & set(sys.modules); "
         "print('HEAVY', heavy)"

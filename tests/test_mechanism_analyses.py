@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
 from gearfe.mechanisms import load_mechanism
 from gearfe.mechanisms.rest import run_rest
 from gearfe.multibody import (

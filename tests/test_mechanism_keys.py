@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.config import build, read_toml
-from gearfe.errors import InputError
+from gearfe.base.config import build, read_toml
+from gearfe.base.errors import InputError
+from gearfe.base.tables.beam import BeamTable
+from gearfe.base.tables.kinds import FORCES, JOINTS
+from gearfe.base.tables.mechanism import BodyTable, FunctionTable, MechanismFile, ValueTableTable
+from gearfe.base.tables.plate import InterfaceTable, PlateTable
 from gearfe.mechanisms.model import make_mechanism
 from gearfe.mechanisms.results import reactions
 from gearfe.mechanisms.solve import solve
 from gearfe.mechanisms.unused import unused
-from gearfe.tables.beam import BeamTable
-from gearfe.tables.kinds import FORCES, JOINTS
-from gearfe.tables.mechanism import BodyTable, FunctionTable, MechanismFile, ValueTableTable
-from gearfe.tables.plate import InterfaceTable, PlateTable
 
 
 def body(x: float, y: float, turn: float, rate: float = 0.0, speed: float = 0.0) -> dict[str, Any]:

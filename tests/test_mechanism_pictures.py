@@ -12,8 +12,9 @@ import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.quiver import Quiver
 
-from gearfe.config import build
-from gearfe.errors import InputError
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.mechanism import MechanismFile
 from gearfe.figures.mechanism import draw_animation, draw_figures
 from gearfe.figures.mechanism_field import draw_field
 from gearfe.figures.mechanism_scene import draw_paths, drawn_states, frame
@@ -21,7 +22,6 @@ from gearfe.figures.style import new_figure
 from gearfe.mechanisms.model import Mechanism, make_mechanism
 from gearfe.mechanisms.results import Results, reference_table
 from gearfe.mechanisms.solve import solve
-from gearfe.tables.mechanism import MechanismFile
 
 GEOMETRY = Path(__file__).resolve().parents[1] / "geometry"
 ANGLE, RATE = 0.3, 2.0

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.base.tables.mechanism import RunTable
+from gearfe.cli.main import main
 from gearfe.mechanisms import sensitivities, sweep
 from gearfe.mechanisms.sensitivity import extrapolated
 from gearfe.study.expressions import Answer
 from gearfe.study.kinds import Shared, solve
-from gearfe.tables.mechanism import RunTable
 
 MASS, STIFFNESS, GRAVITY = 2.0, 50.0, 9.81
 #: A mass on a vertical spring, let go where the spring is free.
@@ -181,7 +181,7 @@ def test_the_command_writes_slopes(file: Path, tmp_path: Path, analysis: str) ->
     ("analysis", "main_table"), [("transient", "trajectory"), ("equilibrium", "equilibrium"), ("modes", "modes")]
 )
 def test_studies_know_the_analyses(file: Path, analysis: str, main_table: str) -> None:
-    from gearfe.config import read_toml
+    from gearfe.base.config import read_toml
 
     answer: Answer = solve("mechanism", read_toml(with_analysis(file, analysis)), file, Shared())
     assert next(iter(answer.tables)) == main_table

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from gearfe import InputError
+from gearfe.drivetrain.runup.run_up import steady_state
+from gearfe.drivetrain.train import GearMesh, build_train, simulate
 from gearfe.multibody import constant
-from gearfe.runup.run_up import steady_state
-from gearfe.train import GearMesh, build_train, simulate
 
 from .gear_oscillator import GearOscillator
 from .mesh_laws import hertzian_law

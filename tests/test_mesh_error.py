@@ -8,16 +8,16 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.elasticity import Material
-from gearfe.housing.attachments import Attachment
-from gearfe.housing.build import housing_from_table
-from gearfe.housing.mesh_error import energy_lost
-from gearfe.housing.model import Housing, rigid_motions
-from gearfe.reduction.error import accelerances, mesh_error
-from gearfe.reduction.lanczos import lowest_modes
-from gearfe.reduction.sparse_solver import factorize
-from gearfe.solid import assemble
-from gearfe.tables.housing import FeetTable, HousingMeshTable, HousingTable, ShaftAxisTable
+from gearfe.base.tables.housing import FeetTable, HousingMeshTable, HousingTable, ShaftAxisTable
+from gearfe.drivetrain.housing.attachments import Attachment
+from gearfe.drivetrain.housing.build import housing_from_table
+from gearfe.drivetrain.housing.mesh_error import energy_lost
+from gearfe.drivetrain.housing.model import Housing, rigid_motions
+from gearfe.fem.plane import Material
+from gearfe.fem.reduction.error import accelerances, mesh_error
+from gearfe.fem.reduction.lanczos import lowest_modes
+from gearfe.fem.reduction.sparse_solver import factorize
+from gearfe.fem.solid import assemble
 from tests.housing_meshes import box, reference_housing
 from tests.test_housing_reference import REFERENCE
 

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
-from gearfe.errors import InputError
-from gearfe.gear.first_contact import ToothFlanks
-from gearfe.meshlaw.fit import Couple, PairForces, TouchCurve, fit_law
-from gearfe.meshlaw.law import MeshLaw
-from gearfe.meshlaw.make import _pair_forces as pair_forces
-from gearfe.meshlaw.make import coupling_curve
-from gearfe.meshlaw.store import load_law, save_law
-from gearfe.stiffness.job import read_stiffness_job
+from gearfe.base.errors import InputError
+from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
+from gearfe.gears.geometry.first_contact import ToothFlanks
+from gearfe.gears.meshlaw.fit import Couple, PairForces, TouchCurve, fit_law
+from gearfe.gears.meshlaw.law import MeshLaw
+from gearfe.gears.meshlaw.make import _pair_forces as pair_forces
+from gearfe.gears.meshlaw.make import coupling_curve
+from gearfe.gears.meshlaw.store import load_law, save_law
+from gearfe.gears.stiffness.job import read_stiffness_job
 
 from .mesh_laws import couplings, hertzian_law, pair_energies, powers, times
 

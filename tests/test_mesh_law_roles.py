@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from gearfe import GearPair
-from gearfe.contact.half_plane import half_plane_pair
-from gearfe.contact.laws import law_named
-from gearfe.meshlaw.law import MeshLaw
-from gearfe.meshlaw.make import mesh_law
+from gearfe.drivetrain.train import Damping, GearMesh, Load, build_train, simulate
+from gearfe.drivetrain.train.states import train_states
+from gearfe.gears.contact.half_plane import half_plane_pair
+from gearfe.gears.contact.laws import law_named
+from gearfe.gears.meshlaw.law import MeshLaw
+from gearfe.gears.meshlaw.make import mesh_law
+from gearfe.gears.stiffness.sweep import elastic_pair
 from gearfe.multibody import TimeFunction, constant, integrate, smoothed_step
-from gearfe.stiffness.sweep import elastic_pair
-from gearfe.train import Damping, GearMesh, Load, build_train, simulate
-from gearfe.train.states import train_states
 
 from .mesh_laws import CYCLE, hertzian_law
 from .test_mesh_law import DESIGN, PAIR, STEEL

@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.train import build_train
-from gearfe.train.forces import LawFlank
-from gearfe.train.model import TrainModel
-from gearfe.train.program import train_program
+from gearfe.drivetrain.train import build_train
+from gearfe.drivetrain.train.forces import LawFlank
+from gearfe.drivetrain.train.model import TrainModel
+from gearfe.drivetrain.train.program import train_program
 
 from .mesh_laws import hertzian_law
 from .trains import ALPHA, changed, train

@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 
 from gearfe import InputError
-from gearfe.config import build
-from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
-from gearfe.contact.laws import Nitsche
-from gearfe.contact.whole_gears.pair import ElasticGear, WholePair
-from gearfe.contact.whole_gears.position import solve_position
-from gearfe.elasticity import Material
-from gearfe.gear import pitch_errors
-from gearfe.gear.deviation_job import deviations_of, pitch_errors_of
-from gearfe.gear.face import NOMINAL, ToothDeviations
-from gearfe.gear.modifications import FlankModification, Relief, Waviness, tooth_deviations
-from gearfe.gear.pair import GearPair, TipRelief
-from gearfe.loadmap.load_map import BACK, LoadMap
-from gearfe.loadmap.sweep import sweep_loads
-from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
-from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
-from gearfe.tables.microgeometry import MicrogeometryTable
+from gearfe.base.config import build
+from gearfe.base.tables.microgeometry import MicrogeometryTable
+from gearfe.fem.plane import Material
+from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
+from gearfe.gears.contact.laws import Nitsche
+from gearfe.gears.contact.whole_gears.pair import ElasticGear, WholePair
+from gearfe.gears.contact.whole_gears.position import solve_position
+from gearfe.gears.geometry import pitch_errors
+from gearfe.gears.geometry.deviation_job import deviations_of, pitch_errors_of
+from gearfe.gears.geometry.face import NOMINAL, ToothDeviations
+from gearfe.gears.geometry.modifications import FlankModification, Relief, Waviness, tooth_deviations
+from gearfe.gears.geometry.pair import GearPair, TipRelief
+from gearfe.gears.loadmap.load_map import BACK, LoadMap
+from gearfe.gears.loadmap.sweep import sweep_loads
+from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 
 from .gears import pair as gear_pair
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from gearfe import ModalBody, housing_from_job
-from gearfe.cli import main
-from gearfe.errors import InputError
-from gearfe.housing.modal_points import point_columns, point_lines
-from gearfe.housing.modal_test import COLUMNS, TestModes, compare, mac_table, read_modes
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
+from gearfe.drivetrain.housing.modal_points import point_columns, point_lines
+from gearfe.drivetrain.housing.modal_test import COLUMNS, TestModes, compare, mac_table, read_modes
 
 MESHES = Path(__file__).parents[1] / "meshes"
 

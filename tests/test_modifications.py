@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from gearfe import InputError
-from gearfe.gear import pitch_errors
-from gearfe.gear.deviation import Deviation
-from gearfe.gear.modifications import FlankModification, Relief, Waviness, tooth_deviations
-from gearfe.gear.pair import Gear
+from gearfe.gears.geometry import pitch_errors
+from gearfe.gears.geometry.deviation import Deviation
+from gearfe.gears.geometry.modifications import FlankModification, Relief, Waviness, tooth_deviations
+from gearfe.gears.geometry.pair import Gear
 
 from .gears import pair as gear_pair
 

@@ -13,36 +13,39 @@ import pytest
 ROOT = Path(__file__).parents[1]
 COMMANDS = (ROOT / "gearfe" / "commands").glob("*.py")
 #: Modules that load what a job needs only when it runs: the package itself, the commands, the kinds of a study.
-LAZY = ("gearfe", "gearfe.cli", "gearfe.study.kinds", *(f"gearfe.commands.{path.stem}" for path in COMMANDS))
+LAZY = ("gearfe", "gearfe.cli.main", "gearfe.study.kinds", *(f"gearfe.cli.{path.stem}" for path in COMMANDS))
 #: Other imports of the package within functions: what is heavy behind them.
 HEAVY = {
-    ("gearfe.housing.body", "gearfe.housing.build"): "sparse matrices; a reduced body is read from the cache",
-    ("gearfe.housing.body", "gearfe.housing.superelement"): "sparse matrices",
-    ("gearfe.housing.body", "gearfe.meshing.mesh_file"): "readers of meshes",
-    ("gearfe.mechanisms.plates", "gearfe.elasticity"): "finite elements",
+    (
+        "gearfe.drivetrain.housing.body",
+        "gearfe.drivetrain.housing.build",
+    ): "sparse matrices; a reduced body is read from the cache",
+    ("gearfe.drivetrain.housing.body", "gearfe.drivetrain.housing.superelement"): "sparse matrices",
+    ("gearfe.drivetrain.housing.body", "gearfe.fem.meshing.mesh_file"): "readers of meshes",
+    ("gearfe.mechanisms.plates", "gearfe.fem.plane"): "finite elements",
     ("gearfe.mechanisms.plates", "gearfe.mechanisms.plate_reduction"): "finite elements",
-    ("gearfe.mechanisms.plates", "gearfe.meshing.plate_mesh"): "the mesher",
-    ("gearfe.meshlaw.store", "gearfe.contact.half_plane"): "scipy; a law is read from the cache",
-    ("gearfe.meshlaw.store", "gearfe.meshlaw.make"): "scipy; a law is read from the cache",
-    ("gearfe.meshlaw.store", "gearfe.stiffness.sweep"): "scipy; a law is read from the cache",
+    ("gearfe.mechanisms.plates", "gearfe.fem.meshing.plate_mesh"): "the mesher",
+    ("gearfe.gears.meshlaw.store", "gearfe.gears.contact.half_plane"): "scipy; a law is read from the cache",
+    ("gearfe.gears.meshlaw.store", "gearfe.gears.meshlaw.make"): "scipy; a law is read from the cache",
+    ("gearfe.gears.meshlaw.store", "gearfe.gears.stiffness.sweep"): "scipy; a law is read from the cache",
     ("gearfe.multibody.compiled.kernels", "gearfe.multibody.compiled.packed_type"): "numba",
-    ("gearfe.stiffness.check", "gearfe.contact.whole_gears.pair"): "finite elements of whole gears",
-    ("gearfe.stiffness.check", "gearfe.contact.whole_gears.position"): "finite elements of whole gears",
-    ("gearfe.stiffness.job", "gearfe.stiffness.sweep"): "scipy; a curve is read from the cache",
-    ("gearfe.gearbox.fields", "gearfe.housing.mesh_checks"): "sparse matrices",
-    ("gearfe.gearbox.timefunctions", "gearfe.mechanisms.expressions"): "all of planar mechanisms",
+    ("gearfe.gears.stiffness.check", "gearfe.gears.contact.whole_gears.pair"): "finite elements of whole gears",
+    ("gearfe.gears.stiffness.check", "gearfe.gears.contact.whole_gears.position"): "finite elements of whole gears",
+    ("gearfe.gears.stiffness.job", "gearfe.gears.stiffness.sweep"): "scipy; a curve is read from the cache",
+    ("gearfe.drivetrain.gearbox.fields", "gearfe.drivetrain.housing.mesh_checks"): "sparse matrices",
+    ("gearfe.drivetrain.gearbox.timefunctions", "gearfe.mechanisms.expressions"): "all of planar mechanisms",
 }
 #: Modules that import by name, and what they name: parts of their own package, of packages below, of other programs.
 BY_NAME = {
     "gearfe": "public names, which load at their first use",
-    "gearfe.commands.arguments": "the modules of the commands, beside it",
-    "gearfe.contact.laws": "contact laws: its own, and those of other programs",
+    "gearfe.cli.arguments": "the modules of the commands, beside it",
+    "gearfe.gears.contact.laws": "contact laws: its own, and those of other programs",
     "gearfe.figures.results": "pictures, beside it",
-    "gearfe.isolation": "libraries that read settings from the working folder",
+    "gearfe.base.isolation": "libraries that read settings from the working folder",
     "gearfe.mechanisms.parts": "joints and forces of gearfe.multibody",
-    "gearfe.shown": "pandas and xarray",
+    "gearfe.base.shown": "pandas and xarray",
     "gearfe.study.journal": "msvcrt, of Windows",
-    "gearfe.tables.jobs": "tables, beside it",
+    "gearfe.base.tables.jobs": "tables, beside it",
 }
 
 
@@ -106,7 +109,7 @@ def test_no_module_comes_back_to_itself() -> None:
 
 def test_nothing_but_the_commands_imports_the_whole_package() -> None:
     users = {module for module, found in GRAPH.items() for one in found if one.name == "gearfe"}
-    assert users <= {"gearfe.cli"}
+    assert users <= {"gearfe.cli.main"}
 
 
 def test_functions_import_only_what_is_heavy() -> None:
@@ -114,7 +117,7 @@ def test_functions_import_only_what_is_heavy() -> None:
         (module, one.name)
         for module, found in GRAPH.items()
         for one in found
-        if one.in_function and module not in LAZY and not module.startswith("gearfe.commands.")
+        if one.in_function and module not in LAZY and not module.startswith("gearfe.cli.")
     }
     assert lazy == set(HEAVY)
 
@@ -131,7 +134,7 @@ def test_modules_that_import_by_name_are_known() -> None:
 
 
 def test_names_of_joints_and_forces_are_those_of_a_package_below() -> None:
-    from gearfe.tables.kinds import FORCES, JOINTS
+    from gearfe.base.tables.kinds import FORCES, JOINTS
 
     for kind in (*JOINTS.values(), *FORCES.values()):
         assert kind.reference.startswith("gearfe.multibody.planar.")

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfe.contact.compliance import NEIGHBOURS, MeshingPair, finite_strain_shares, gear_body
-from gearfe.contact.laws import Nitsche, PairModel
-from gearfe.contact.whole_gears.pair import ElasticGear, WholePair
-from gearfe.contact.whole_gears.position import solve_position
-from gearfe.elasticity import Material
-from gearfe.gear.pair import Gear, GearPair
-from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
+from gearfe.fem.plane import Material
+from gearfe.gears.contact.compliance import NEIGHBOURS, MeshingPair, finite_strain_shares, gear_body
+from gearfe.gears.contact.laws import Nitsche, PairModel
+from gearfe.gears.contact.whole_gears.pair import ElasticGear, WholePair
+from gearfe.gears.contact.whole_gears.position import solve_position
+from gearfe.gears.geometry.pair import Gear, GearPair
+from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 
 from .contact_cases import whole
 from .solving import solve_positions

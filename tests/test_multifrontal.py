@@ -9,9 +9,9 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from gearfe.multifrontal import Factor
-from gearfe.reduction import sparse_solver
-from gearfe.reduction.sparse_solver import elimination_order, multifrontal, node_graph
+from gearfe.fem.multifrontal import Factor
+from gearfe.fem.reduction import sparse_solver
+from gearfe.fem.reduction.sparse_solver import elimination_order, multifrontal, node_graph
 
 
 def blocks(matrix: Any, width: int = 1) -> sparse.bsr_array:

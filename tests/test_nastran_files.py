@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.housing.nastran_files import output2, output4, read_nastran
-from gearfe.housing.superelement import read_matrix
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.housing.nastran_files import output2, output4, read_nastran
+from gearfe.drivetrain.housing.superelement import read_matrix
 
 from .nastran import Output2, output4_binary, output4_text
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.cli import main
-from gearfe.config import build, quantity
-from gearfe.tables.examples import JOBS, job_file
-from gearfe.tables.jobs import TABLES, load_job, read_train_tables, table_class
-from gearfe.tables.mechanism import BodyTable, MechanismFile, RunTable, read_mechanism_file
-from gearfe.tables.microgeometry import GearMicrogeometryTable
-from gearfe.tables.text import table_text
-from gearfe.tables.train import TrainShaftTable
+from gearfe.base.config import build, quantity
+from gearfe.base.tables.examples import JOBS, job_file
+from gearfe.base.tables.jobs import TABLES, load_job, read_train_tables, table_class
+from gearfe.base.tables.mechanism import BodyTable, MechanismFile, RunTable, read_mechanism_file
+from gearfe.base.tables.microgeometry import GearMicrogeometryTable
+from gearfe.base.tables.text import table_text
+from gearfe.base.tables.train import TrainShaftTable
+from gearfe.cli.main import main
 
 ROOT = Path(__file__).parents[1]
 SHIPPED = sorted((Path(__file__).parents[1] / "geometry").glob("*.toml"))

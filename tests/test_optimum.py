@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
+from gearfe.base.tables.jobs import load_job
+from gearfe.cli.main import main
 from gearfe.study.job import read_study
-from gearfe.tables.jobs import load_job
 
 from .studies import BASE, JOBS, rows_of
 
@@ -183,7 +183,7 @@ def test_a_search_stops_where_its_tolerances_say_so(tmp_path, share) -> None:
 def test_ctrl_c_prints_the_best_point_and_the_same_command_goes_on(tmp_path) -> None:
     path, out = study_file(tmp_path), tmp_path / "out"
     program = (
-        "import os, signal, sys; from gearfe.cli import main; from gearfe.study.search import Search\n"
+        "import os, signal, sys; from gearfe.cli.main import main; from gearfe.study.search import Search\n"
         "solve = Search.solve\n"
         "def stopped(self, points):\n"
         "    found = solve(self, points)\n"

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.cli import main
-from gearfe.config import read_toml, type_hints
-from gearfe.elasticity import Material
-from gearfe.errors import LONGEST_MESSAGE, OUT_OF_SCOPE, SYMBOLS, InputError, UnitWarning
-from gearfe.gear.curves import inverse_inv
-from gearfe.suspects import suspects
-from gearfe.tables.jobs import TABLES, table_class
+from gearfe.base.config import read_toml, type_hints
+from gearfe.base.errors import LONGEST_MESSAGE, OUT_OF_SCOPE, SYMBOLS, InputError, UnitWarning
+from gearfe.base.suspects import suspects
+from gearfe.base.tables.jobs import TABLES, table_class
+from gearfe.cli.main import main
+from gearfe.fem.plane import Material
+from gearfe.gears.geometry.curves import inverse_inv
 
 JOB = str(Path(__file__).parents[1] / "geometry" / "gear_train.toml")
 LONG = "q" * 10_000

@@ -13,20 +13,20 @@ import meshio
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.config import build
-from gearfe.errors import InputError
-from gearfe.gearbox.job import bore_places, job_train, read_train_job, train_body
-from gearfe.gearbox.mesh_stiffness import train_curves
-from gearfe.housing.attachments import Bore
-from gearfe.housing.body import reduced_housing
-from gearfe.housing.build import housing_from_job, housing_from_table
-from gearfe.housing.model import Housing
-from gearfe.housing.own_mesh import fitted_cylinder
-from gearfe.meshing.mesh_file import read_mesh_file
-from gearfe.meshing.session import gmsh_session
-from gearfe.tables.housing import HousingTable
-from gearfe.train import build_train
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.housing import HousingTable
+from gearfe.cli.main import main
+from gearfe.drivetrain.gearbox.job import bore_places, job_train, read_train_job, train_body
+from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
+from gearfe.drivetrain.housing.attachments import Bore
+from gearfe.drivetrain.housing.body import reduced_housing
+from gearfe.drivetrain.housing.build import housing_from_job, housing_from_table
+from gearfe.drivetrain.housing.model import Housing
+from gearfe.drivetrain.housing.own_mesh import fitted_cylinder
+from gearfe.drivetrain.train import build_train
+from gearfe.fem.meshing.mesh_file import read_mesh_file
+from gearfe.fem.meshing.session import gmsh_session
 
 MESHES = Path(__file__).parent.parent / "meshes"
 BORES = [{"group": f"bore_{i}"} for i in (1, 2, 3, 4)]

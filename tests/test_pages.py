@@ -15,9 +15,9 @@ import pytest
 
 import gearfe
 from gearfe import Material, build_train
-from gearfe.commands import COMMANDS
-from gearfe.commands.arguments import command_module, parser_of
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.cli import COMMANDS
+from gearfe.cli.arguments import command_module, parser_of
 
 from . import gears, trains
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from gearfe.contact.laws import HalfPlane, Nitsche, PairModel
-from gearfe.elasticity import Material
-from gearfe.errors import InputError
-from gearfe.gear.face import NOMINAL, ToothDeviations
+from gearfe.base.errors import InputError
+from gearfe.fem.plane import Material
+from gearfe.gears.contact.laws import HalfPlane, Nitsche, PairModel
+from gearfe.gears.geometry.face import NOMINAL, ToothDeviations
 
 BRONZE = Material(110e9, 0.34)
 

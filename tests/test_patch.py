@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gearfe.contact.laws import ElementLaw, Nitsche, Penalty
-from gearfe.contact.whole_gears.bodies import Bodies
-from gearfe.contact.whole_gears.newton import ContactSolution
-from gearfe.contact.whole_gears.problem import ContactProblem
-from gearfe.elasticity import Material
+from gearfe.fem.plane import Material
+from gearfe.gears.contact.laws import ElementLaw, Nitsche, Penalty
+from gearfe.gears.contact.whole_gears.bodies import Bodies
+from gearfe.gears.contact.whole_gears.newton import ContactSolution
+from gearfe.gears.contact.whole_gears.problem import ContactProblem
 
 from .contact_problems import contact_problem, solved
 from .structured import block, quarter_ring

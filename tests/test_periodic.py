@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from gearfe.errors import InputError
-from gearfe.stiffness.periodic import METHODS, periodic_interpolant
+from gearfe.base.errors import InputError
+from gearfe.gears.stiffness.periodic import METHODS, periodic_interpolant
 
 PERIOD = 0.31
 

@@ -11,20 +11,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gearfe.base.progress import Stopwatch
+from gearfe.base.record_spectrum import finer
+from gearfe.drivetrain.train import Damping, Load, build_train, simulate
+from gearfe.drivetrain.train.response import SAMPLED, joined
+from gearfe.drivetrain.train.simulate import simulate_in_pieces
+from gearfe.drivetrain.vibration.files import OutputChoice, write_run
+from gearfe.drivetrain.vibration.follow import Envelope, RunningMean, TrainRun
 from gearfe.figures.spectra import largest_lines
 from gearfe.multibody import smoothed_step
-from gearfe.progress import Stopwatch
-from gearfe.record_spectrum import finer
-from gearfe.train import Damping, Load, build_train, simulate
-from gearfe.train.response import SAMPLED, joined
-from gearfe.train.simulate import simulate_in_pieces
-from gearfe.vibration.files import OutputChoice, write_run
-from gearfe.vibration.follow import Envelope, RunningMean, TrainRun
 
 from .train_responses import made_up, table
 from .trains import TORQUE, curve, train
 
-simulation = importlib.import_module("gearfe.train.simulate")
+simulation = importlib.import_module("gearfe.drivetrain.train.simulate")
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Plane elasticity against scikit-fem: the batched arrays of `gearfe.elasticity` are the weak forms written here."""
+"""Plane elasticity against scikit-fem: the batched arrays of `gearfe.fem.plane` are the weak forms written here."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import pytest
 from skfem import CellBasis, ElementTriP2, ElementVector, Functional, MeshTri2
 from skfem.helpers import ddot, eye, grad, mul, sym_grad, trace, transpose
 
-from gearfe.contact.whole_gears.bodies import stiffness_form
-from gearfe.elasticity import (
+from gearfe.fem.plane import (
     Material,
     Plane,
     element_stiffness,
@@ -20,6 +19,7 @@ from gearfe.elasticity import (
     triangle_rule,
     triangle_shapes,
 )
+from gearfe.gears.contact.whole_gears.bodies import stiffness_form
 
 from .contact_cases import STEEL, WIDTH, meshes
 

@@ -16,12 +16,12 @@ import skfem
 from scipy.sparse.linalg import eigsh
 from skfem.helpers import ddot, dot, eye, sym_grad, trace
 
-from gearfe.cli import main
-from gearfe.elasticity import Material
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
+from gearfe.fem.meshing.plate_mesh import mesh_outline
+from gearfe.fem.plane import Material
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.plate_reduction import Interface, Plate, reduce_plate
-from gearfe.meshing.plate_mesh import mesh_outline
 from gearfe.multibody import (
     Body,
     Fixed,

@@ -118,7 +118,7 @@ for module, names in ((os, ("getuid", "fork", "sched_getaffinity")), (signal, ("
     for name in names:
         if hasattr(module, name):
             delattr(module, name)
-from gearfe.cli import main
+from gearfe.cli.main import main
 job, crank, study = sys.argv[1:]
 assert main(["new", "stiffness", job]) == 0
 assert main(["stiffness", job, "--coarsen", "4", "--angles", "0", "9", "9", "--no-estimate", "--report"]) == 0

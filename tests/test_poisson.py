@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from skfem.quadrature import get_quadrature_tri
 
-from gearfe.contact import compliance
-from gearfe.contact.laws import MOST_POISSON, PairModel, law_named
-from gearfe.elasticity import Material, Plane, triangle_shapes
-from gearfe.errors import InputError
-from gearfe.gear.pair import Gear, GearPair
-from gearfe.stiffness.job import stiffness_job
-from gearfe.stiffness.sweep import sweep_stiffness
-from gearfe.tables.jobs import load_job
-from gearfe.typing import Array
+from gearfe.base.errors import InputError
+from gearfe.base.tables.jobs import load_job
+from gearfe.base.typing import Array
+from gearfe.fem.plane import Material, Plane, triangle_shapes
+from gearfe.gears.contact import compliance
+from gearfe.gears.contact.laws import MOST_POISSON, PairModel, law_named
+from gearfe.gears.geometry.pair import Gear, GearPair
+from gearfe.gears.stiffness.job import stiffness_job
+from gearfe.gears.stiffness.sweep import sweep_stiffness
 
 
 def mixed_stiffness(coordinates: Array, material: Material, plane: Plane, thickness: float) -> Array:

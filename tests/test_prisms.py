@@ -8,18 +8,18 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.elasticity import Material
-from gearfe.housing.build import housing_from_table, inside_faces
-from gearfe.housing.mesh_checks import boundary_faces
-from gearfe.housing.meshes import Prisms
-from gearfe.housing.model import rigid_motions
-from gearfe.housing.surface import nodal_normals
-from gearfe.meshing.housing_mesh import Extrusion, housing_mesh
-from gearfe.prisms import LATTICE, ORDER
-from gearfe.reduction.error import mesh_error
-from gearfe.reduction.lanczos import lowest_modes
-from gearfe.reduction.sparse_solver import factorize
-from gearfe.tables.housing import FeetTable, HousingMeshTable, HousingReductionTable, HousingTable, ShaftAxisTable
+from gearfe.base.tables.housing import FeetTable, HousingMeshTable, HousingReductionTable, HousingTable, ShaftAxisTable
+from gearfe.drivetrain.housing.build import housing_from_table, inside_faces
+from gearfe.drivetrain.housing.mesh_checks import boundary_faces
+from gearfe.drivetrain.housing.meshes import Prisms
+from gearfe.drivetrain.housing.model import rigid_motions
+from gearfe.drivetrain.housing.surface import nodal_normals
+from gearfe.fem.meshing.housing_mesh import Extrusion, housing_mesh
+from gearfe.fem.plane import Material
+from gearfe.fem.prisms import LATTICE, ORDER
+from gearfe.fem.reduction.error import mesh_error
+from gearfe.fem.reduction.lanczos import lowest_modes
+from gearfe.fem.reduction.sparse_solver import factorize
 
 from .housing_meshes import surface_area
 

@@ -8,14 +8,14 @@ import time
 
 import pytest
 
-from gearfe import progress
-from gearfe.cli import main
+from gearfe.base import progress
+from gearfe.base.progress import Display, Stopwatch, _Stage, count, shown, stage
+from gearfe.base.tables.examples import job_file
+from gearfe.cli.main import main
 from gearfe.multibody import integrate
 from gearfe.multibody.compiled.kernels import COMPILING, Kernels
 from gearfe.multibody.integrators.collocation.run import KERNELS as COLLOCATION
 from gearfe.multibody.integrators.taylor.run import KERNELS as TAYLOR
-from gearfe.progress import Display, Stopwatch, _Stage, count, shown, stage
-from gearfe.tables.examples import job_file
 
 from .rigid_cases import pendulum
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.gearbox.radiation import RadiatedPower, instantaneous_power, power_level
-from gearfe.housing.meshes import Tetrahedra
-from gearfe.vibration.spectra import spectra
+from gearfe.drivetrain.gearbox.radiation import RadiatedPower, instantaneous_power, power_level
+from gearfe.drivetrain.housing.meshes import Tetrahedra
+from gearfe.drivetrain.vibration.spectra import spectra
 
 from .housing_meshes import box
 from .train_responses import COUNT, STEP, made_up, tone

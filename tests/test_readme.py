@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.commands import stiffness
-from gearfe.stiffness.curve import COLUMNS
+from gearfe.cli import stiffness
+from gearfe.gears.stiffness.curve import COLUMNS
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

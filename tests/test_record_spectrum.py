@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gearfe.errors import InputError
-from gearfe.record_spectrum import IN_MEMORY, ColumnStore, RecordSpectrum, finer, low_pass, samples_per_step
-from gearfe.train import build_train, simulate
-from gearfe.vibration.spectra import TrainRecord, spectra
+from gearfe.base.errors import InputError
+from gearfe.base.record_spectrum import IN_MEMORY, ColumnStore, RecordSpectrum, finer, low_pass, samples_per_step
+from gearfe.drivetrain.train import build_train, simulate
+from gearfe.drivetrain.vibration.spectra import TrainRecord, spectra
 
 from .train_responses import STEP, made_up
 from .trains import curve, train

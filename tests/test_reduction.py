@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from gearfe.elasticity import Material
-from gearfe.errors import InputError
-from gearfe.housing.attachments import Attachment, Plane
-from gearfe.housing.model import Housing
-from gearfe.reduction.craig_bampton import reduce_model
-from gearfe.reduction.error import reduction_error
-from gearfe.reduction.modal_body import ModalBody
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.housing.attachments import Attachment, Plane
+from gearfe.drivetrain.housing.model import Housing
+from gearfe.fem.plane import Material
+from gearfe.fem.reduction.craig_bampton import reduce_model
+from gearfe.fem.reduction.error import reduction_error
+from gearfe.fem.reduction.modal_body import ModalBody
 from tests.housing_meshes import box
 
 from .full_model import full_model
@@ -267,7 +267,7 @@ def test_loading_is_light(tmp_path: Path) -> None:
     beam(cells=(20, 5, 5)).reduce(40).save(tmp_path / "body.npz")
     code = (
         "import sys, numpy\n"
-        "from gearfe.reduction.modal_body import ModalBody\n"
+        "from gearfe.fem.reduction.modal_body import ModalBody\n"
         "body = ModalBody.load(sys.argv[1])\n"
         "heavy = {'gmsh', 'skfem', 'meshio', 'pyvista', 'matplotlib', 'h5py'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"

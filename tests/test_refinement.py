@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.config import build
-from gearfe.elasticity import Material
-from gearfe.errors import InputError
-from gearfe.housing.bisection import bisected
-from gearfe.housing.build import housing_from_table
-from gearfe.housing.mesh_checks import boundary_faces, checked_mesh
-from gearfe.housing.model import Housing
-from gearfe.housing.refinement import refined
-from gearfe.reduction.error import mesh_error
-from gearfe.solid import EDGES, FACES, assemble
-from gearfe.tables.housing import HousingTable
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.housing import HousingTable
+from gearfe.drivetrain.housing.bisection import bisected
+from gearfe.drivetrain.housing.build import housing_from_table
+from gearfe.drivetrain.housing.mesh_checks import boundary_faces, checked_mesh
+from gearfe.drivetrain.housing.model import Housing
+from gearfe.drivetrain.housing.refinement import refined
+from gearfe.fem.plane import Material
+from gearfe.fem.reduction.error import mesh_error
+from gearfe.fem.solid import EDGES, FACES, assemble
 from tests.housing_meshes import box, second_order, surface_area
 
 MESHES = Path(__file__).parent.parent / "meshes"

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from gearfe.cli import main
-from gearfe.commands import COMMANDS
-from gearfe.files import write_csv
+from gearfe.base.files import write_csv
+from gearfe.cli import COMMANDS
+from gearfe.cli.main import main
 from gearfe.output.formats import read_csv, write_tables
 
 JOB = str(Path(__file__).parents[1] / "geometry" / "gear_train.toml")

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.multibody import (
     Body,
     CoordinateSpring,

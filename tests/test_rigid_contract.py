@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.multibody import (
     GROUND,
     Body,

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.mechanisms import load_mechanism
 from gearfe.mechanisms.results import reactions
 from gearfe.multibody import Body, Distance, Gravity, Hinge, Linkage, Slot, System, consistent_start, integrate

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.multibody import (
     Body,
     CoordinateSpring,

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.multibody import Body, Gravity, Hinge, Linkage, Prescribed, Prismatic, System, constant, integrate
 
 from .rigid_cases import G, folding_links, total_energy

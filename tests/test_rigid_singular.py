@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.multibody import (
     Body,
     Forced,

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.multibody import (
     Body,
     Gravity,

@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.contact.compliance import gear_body
-from gearfe.contact.flank import flank_of
-from gearfe.contact.position import FlankLoads
-from gearfe.elasticity import element_stiffness
-from gearfe.loadmap.root_stress import fillet_radius, pair_roots, peaks, root_mesh, root_recipe, spread_of
-from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
-from gearfe.meshing.whole_gear import whole_gear
-from gearfe.stiffness.fields import GearRecovery
-from gearfe.stiffness.sweep import elastic_pair
+from gearfe.fem.plane import element_stiffness
+from gearfe.gears.contact.compliance import gear_body
+from gearfe.gears.contact.flank import flank_of
+from gearfe.gears.contact.position import FlankLoads
+from gearfe.gears.loadmap.root_stress import fillet_radius, pair_roots, peaks, root_mesh, root_recipe, spread_of
+from gearfe.gears.stiffness.fields import GearRecovery
+from gearfe.gears.stiffness.sweep import elastic_pair
+from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
+from gearfe.gears.teeth.whole_gear import whole_gear
 
 from .gears import gear, pair
 from .solving import solve_positions

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
+from gearfe.cli.main import main
 
 from .studies import JOBS
 from .test_pages import command_lines

@@ -8,11 +8,11 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.runup.balance import Oscillator, error_of, settled, solve
-from gearfe.runup.first import first_motion
-from gearfe.runup.follow import follow
-from gearfe.runup.linear import Linear
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.runup.balance import Oscillator, error_of, settled, solve
+from gearfe.drivetrain.runup.first import first_motion
+from gearfe.drivetrain.runup.follow import follow
+from gearfe.drivetrain.runup.linear import Linear
 
 from .oscillators import around, duffing, meshing, rates, shooting, synthesis, turning_speed
 

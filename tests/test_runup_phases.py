@@ -12,20 +12,20 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gearfe.cli import main
-from gearfe.errors import InputError
-from gearfe.runup import torus
-from gearfe.runup.balance import Orbit, Oscillator, Pushes, settled, solve
-from gearfe.runup.condensed import CondensedTrain, condense
-from gearfe.runup.instability import instability_map
-from gearfe.runup.linear import Linear
-from gearfe.runup.orders import order_columns, orders
-from gearfe.runup.report import phases, warnings, waterfall
-from gearfe.runup.results import SteadyState, steady_result
-from gearfe.runup.run_up import run_up, steady_state
-from gearfe.runup.stability import multipliers, window
-from gearfe.train import TrainModel, build_train, simulate
-from gearfe.train.kinematics import mesh_phases
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
+from gearfe.drivetrain.runup import torus
+from gearfe.drivetrain.runup.balance import Orbit, Oscillator, Pushes, settled, solve
+from gearfe.drivetrain.runup.condensed import CondensedTrain, condense
+from gearfe.drivetrain.runup.instability import instability_map
+from gearfe.drivetrain.runup.linear import Linear
+from gearfe.drivetrain.runup.orders import order_columns, orders
+from gearfe.drivetrain.runup.report import phases, warnings, waterfall
+from gearfe.drivetrain.runup.results import SteadyState, steady_result
+from gearfe.drivetrain.runup.run_up import run_up, steady_state
+from gearfe.drivetrain.runup.stability import multipliers, window
+from gearfe.drivetrain.train import TrainModel, build_train, simulate
+from gearfe.drivetrain.train.kinematics import mesh_phases
 
 from .mesh_laws import hertzian_law
 from .test_runup_train import loaded, smooth

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gearfe.drivetrain.runup.balance import size_of, widened
+from gearfe.drivetrain.runup.condensed import condense
+from gearfe.drivetrain.runup.report import warnings
+from gearfe.drivetrain.runup.results import SteadyState
+from gearfe.drivetrain.runup.run_up import run_up, steady_state
+from gearfe.drivetrain.train import TrainModel, build_train
+from gearfe.drivetrain.train.states import train_states
 from gearfe.multibody import constant, integrate
-from gearfe.runup.balance import size_of, widened
-from gearfe.runup.condensed import condense
-from gearfe.runup.report import warnings
-from gearfe.runup.results import SteadyState
-from gearfe.runup.run_up import run_up, steady_state
-from gearfe.train import TrainModel, build_train
-from gearfe.train.states import train_states
 
 from .mesh_laws import hertzian_law
 from .test_runup_train import loaded, smooth
@@ -143,7 +143,7 @@ def test_the_estimate_covers_the_error_of_random_trains() -> None:
 
 def test_too_few_harmonics_for_the_asked_error_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """The state says its error, and the run a warning."""
-    monkeypatch.setattr("gearfe.runup.balance.MOST_HARMONICS", 32)
+    monkeypatch.setattr("gearfe.drivetrain.runup.balance.MOST_HARMONICS", 32)
     law = hertzian_law(relief=6e-6)
     model = build_train(loaded([(20, 30)], lambda teeth: law, torque=15.0, flexible=False))
     run = run_up(model, np.array([300.0, 310.0]), tolerance=1e-6, stability=False)

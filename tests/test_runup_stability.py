@@ -10,15 +10,15 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
-from gearfe.errors import InputError
-from gearfe.runup.balance import Oscillator, Pushes, settled, solve
-from gearfe.runup.condensed import condense
-from gearfe.runup.instability import instability_map
-from gearfe.runup.linear import Linear
-from gearfe.runup.run_up import run_up, steady_state
-from gearfe.runup.stability import STABLE, kind_of, multipliers
-from gearfe.runup.train_stability import train_stability
-from gearfe.train import build_train
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.runup.balance import Oscillator, Pushes, settled, solve
+from gearfe.drivetrain.runup.condensed import condense
+from gearfe.drivetrain.runup.instability import instability_map
+from gearfe.drivetrain.runup.linear import Linear
+from gearfe.drivetrain.runup.run_up import run_up, steady_state
+from gearfe.drivetrain.runup.stability import STABLE, kind_of, multipliers
+from gearfe.drivetrain.runup.train_stability import train_stability
+from gearfe.drivetrain.train import build_train
 
 from .oscillators import duffing, meshing, monodromy
 from .test_runup_balance import curve, found, start_of

@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.runup.run_up import run_up, steady_state
+from gearfe.drivetrain.train import build_train
 from gearfe.multibody import TimeFunction, constant, sine
-from gearfe.runup.run_up import run_up, steady_state
-from gearfe.train import build_train
 
 from .gear_oscillator import GearOscillator
 from .test_mesh_damper import pair

@@ -11,19 +11,19 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
+from gearfe.drivetrain.runup.condensed import condense
+from gearfe.drivetrain.runup.critical import crossings
+from gearfe.drivetrain.runup.modes import coupled_modes
+from gearfe.drivetrain.runup.orders import OrderCut
+from gearfe.drivetrain.runup.run_up import run_up, steady_state
+from gearfe.drivetrain.runup.stability import multipliers
+from gearfe.drivetrain.runup.swinging import mesh_modes, swinging, write_modes
+from gearfe.drivetrain.train import Damping, Load, build_train, simulate
+from gearfe.drivetrain.train.friction import Lubrication
 from gearfe.figures.campbell import signal_of
 from gearfe.multibody import constant
-from gearfe.runup.condensed import condense
-from gearfe.runup.critical import crossings
-from gearfe.runup.modes import coupled_modes
-from gearfe.runup.orders import OrderCut
-from gearfe.runup.run_up import run_up, steady_state
-from gearfe.runup.stability import multipliers
-from gearfe.runup.swinging import mesh_modes, swinging, write_modes
-from gearfe.train import Damping, Load, build_train, simulate
-from gearfe.train.friction import Lubrication
 
 from .mesh_laws import hertzian_law, numpy_law
 from .oscillators import analysis, rates, synthesis
@@ -249,7 +249,7 @@ def test_a_resonance_without_damping_is_told():
 
 def test_motions_that_turn_back_out_of_the_range_are_told_and_the_rest_is_found(monkeypatch):
     """As if the curve of the first motion left the range where it began; the way back of the next meets it there."""
-    from gearfe.runup import run_up as module
+    from gearfe.drivetrain.runup import run_up as module
 
     real, calls = module.follow, []
 
@@ -272,7 +272,7 @@ def test_motions_that_turn_back_out_of_the_range_are_told_and_the_rest_is_found(
 
 
 def test_speeds_without_a_first_motion_are_reached_from_the_next_one_or_told(monkeypatch):
-    from gearfe.runup import run_up as module
+    from gearfe.drivetrain.runup import run_up as module
 
     real, failing = module.first_motion, {400.0, 450.0}
     monkeypatch.setattr(

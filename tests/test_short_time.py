@@ -9,11 +9,11 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.errors import InputError
-from gearfe.train.response import TrainResponse
-from gearfe.vibration.measured import read_universal
-from gearfe.vibration.short_time import Tracked, averaged, order_tracks, short_time, steady_from
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
+from gearfe.drivetrain.train.response import TrainResponse
+from gearfe.drivetrain.vibration.measured import read_universal
+from gearfe.drivetrain.vibration.short_time import Tracked, averaged, order_tracks, short_time, steady_from
 
 from .test_cli_vibration import SMALL
 

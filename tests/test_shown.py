@@ -11,24 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe import (
-    Search,
-    build_train,
-    housing_from_job,
-    read_study,
-    run_study,
-    run_up,
-    simulate,
-    sweep_loads,
-)
-from gearfe.errors import MissingLibraryError
+from gearfe import Search, build_train, housing_from_job, read_study, run_study, run_up, simulate, sweep_loads
+from gearfe.base.errors import MissingLibraryError
+from gearfe.base.shown import Shown, as_numbers, percent
+from gearfe.base.spectrum import amplitude_spectrum
+from gearfe.drivetrain.train import Damping, Load
 from gearfe.figures.results import PICTURES
+from gearfe.gears.stiffness.sweep import elastic_pair
 from gearfe.mechanisms import load_mechanism
 from gearfe.multibody import constant, integrate
-from gearfe.shown import Shown, as_numbers, percent
-from gearfe.spectrum import amplitude_spectrum
-from gearfe.stiffness.sweep import elastic_pair
-from gearfe.train import Damping, Load
 
 from . import gears, trains
 from .studies import written

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from gearfe import sweep_stiffness
-from gearfe.cli import main
-from gearfe.housing.model import Housing
-from gearfe.stiffness.sweep import elastic_pair
-from gearfe.train import build_train, simulate
+from gearfe.cli.main import main
+from gearfe.drivetrain.housing.model import Housing
+from gearfe.drivetrain.train import build_train, simulate
+from gearfe.gears.stiffness.sweep import elastic_pair
 
 from .gears import pair
 from .housing_meshes import box
@@ -54,7 +54,7 @@ def loaded_after(code, **environment):
 def test_one_sector_instead_of_the_gears(gears, monkeypatch):
     """The whole gear is never built; that both routes agree is shown by tests/test_contact_routes.py."""
     # the modules that use it first: they must not meet the stand-in when they are imported
-    for room in ("stiffness.fields", "meshing.whole_gear"):
+    for room in ("gears.stiffness.fields", "gears.teeth.whole_gear"):
         monkeypatch.setattr(f"gearfe.{room}.whole_gear", touched)
     elastic = elastic_pair(gears, coarsen=COARSE)
     curve = sweep_stiffness(gears, twist=TWIST, angles=[0.0, 0.1], elastic=elastic)
@@ -77,9 +77,9 @@ def test_fields_only_where_asked(tmp_path):
     job = str(ROOT / "geometry" / "gear_train.toml")
     plain = ["stiffness", job, "--twist-deg", "0.1", "--angles", "2", "3", "5", "--coarsen", "4"]
     plain += ["--no-estimate", "--no-pictures"]
-    code = f"from gearfe.cli import main; assert main({[*plain, '--out', str(tmp_path / 'a')]!r}) == 0"
+    code = f"from gearfe.cli.main import main; assert main({[*plain, '--out', str(tmp_path / 'a')]!r}) == 0"
     loaded, _ = loaded_after(code)
-    room = {"gearfe.stiffness.fields", "gearfe.stiffness.fields_output", "gearfe.output.vtkhdf"}
+    room = {"gearfe.gears.stiffness.fields", "gearfe.gears.stiffness.fields_output", "gearfe.output.vtkhdf"}
     assert not loaded & {*room, "h5py", "pyvista", "matplotlib"}
     assert sorted(p.name for p in (tmp_path / "a").iterdir()) == ["stiffness.csv", "summary.json"]
     assert main([*plain, "--out", str(tmp_path / "b"), "--fields", "5"]) == 0
@@ -89,7 +89,7 @@ def test_fields_only_where_asked(tmp_path):
 
 RIGID = """
 from tests.benchmarks.subject import train_model, train_times
-from gearfe.train import simulate
+from gearfe.drivetrain.train import simulate
 made = simulate(train_model("tutorial", quick=True), train_times(True))
 print(made.contact_force[-1, 0])
 """
@@ -102,10 +102,10 @@ def test_a_rigid_housing_loads_no_finite_elements():
         "skfem",
         "gmsh",
         "meshio",
-        "gearfe.housing.model",
-        "gearfe.solid",
-        "gearfe.reduction.craig_bampton",
-        "gearfe.reduction.lanczos",
+        "gearfe.drivetrain.housing.model",
+        "gearfe.fem.solid",
+        "gearfe.fem.reduction.craig_bampton",
+        "gearfe.fem.reduction.lanczos",
     }
     assert not loaded & heavy
     # the same train in a frame that is a million times stiffer than it could be
@@ -135,8 +135,8 @@ def test_modes_above_the_band_are_not_sought(monkeypatch):
 def test_cached_meshes_start_no_mesher(tmp_path):
     """Nor do they load it; the second mesh is the first one."""
     sector = f"""
-from gearfe.meshing.tooth_sector import sector_recipes
-from gearfe.meshing.tooth_sector import sector_mesh
+from gearfe.gears.teeth.tooth_sector import sector_recipes
+from gearfe.gears.teeth.tooth_sector import sector_mesh
 from tests.benchmarks.subject import shipped_pair
 pair = shipped_pair()
 made = sector_mesh(pair.pinion, sector_recipes(pair, coarsen={COARSE})[0])
@@ -152,7 +152,7 @@ def test_a_cached_reduced_housing_loads_no_finite_elements(tmp_path):
     table = """
 from dataclasses import replace
 from tests.benchmarks.subject import shipped_housing
-from gearfe.housing.body import reduced_housing
+from gearfe.drivetrain.housing.body import reduced_housing
 table = shipped_housing()
 small = replace(table, mesh=replace(table.mesh, size_mm=40.0), reduction=replace(table.reduction, modes=5))
 print(repr(reduced_housing(small).coupled.frequencies_hz[:8].tolist()))
@@ -185,5 +185,5 @@ def test_a_mechanism_loads_no_finite_elements_and_no_compiler(tmp_path):
 
 
 def test_help_of_the_benchmark_loads_no_numerics():
-    loaded, _ = loaded_after("from gearfe.cli import main; main(['--help'])")
+    loaded, _ = loaded_after("from gearfe.cli.main import main; main(['--help'])")
     assert not loaded & {"numpy", "scipy", "matplotlib", "exudyn", "tests.benchmarks"}

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from gearfe.elasticity import Material
-from gearfe.errors import InputError
-from gearfe.reduction.lanczos import lowest_modes
-from gearfe.reduction.sparse_solver import elimination_order, factorize, multifrontal, node_graph
-from gearfe.solid import assemble
+from gearfe.base.errors import InputError
+from gearfe.fem.plane import Material
+from gearfe.fem.reduction.lanczos import lowest_modes
+from gearfe.fem.reduction.sparse_solver import elimination_order, factorize, multifrontal, node_graph
+from gearfe.fem.solid import assemble
 from tests.housing_meshes import box
 
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.spectrum import (
+from gearfe.base.errors import InputError
+from gearfe.base.spectrum import (
     WINDOWS,
     OrderLine,
     amplitude_spectrum,

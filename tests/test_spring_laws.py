@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import gamma
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.multibody import IntegrationError, integrate
 from gearfe.multibody.core.equilibrium import equilibrium

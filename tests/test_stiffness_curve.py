@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gearfe import StiffnessCurve
-from gearfe.errors import InputError
-from gearfe.stiffness.curve import as_text, numbers
+from gearfe.base.errors import InputError
+from gearfe.gears.stiffness.curve import as_text, numbers
 
 #: The first columns of the file, in the order that is promised to readers.
 PROMISED = (

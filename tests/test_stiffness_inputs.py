@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.config import build
-from gearfe.errors import InputError
-from gearfe.gear.derived import iso_values
-from gearfe.gear.pair import GearPair
-from gearfe.stiffness.job import StiffnessJob
-from gearfe.stiffness.positions import twists_for_torque
-from gearfe.stiffness.sweep import sweep_stiffness
-from gearfe.tables.pair import PairTable, StiffnessTable
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.pair import PairTable, StiffnessTable
+from gearfe.gears.geometry.derived import iso_values
+from gearfe.gears.geometry.pair import GearPair
+from gearfe.gears.stiffness.job import StiffnessJob
+from gearfe.gears.stiffness.positions import twists_for_torque
+from gearfe.gears.stiffness.sweep import sweep_stiffness
 
 from .solving import given_positions
 

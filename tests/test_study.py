@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from scipy.stats import norm, qmc, sobol_indices, truncnorm
 
-from gearfe.config import build, read_toml, set_key
-from gearfe.errors import InputError
-from gearfe.expressions import syntax
+from gearfe.base.config import build, read_toml, set_key
+from gearfe.base.errors import InputError
+from gearfe.base.expressions import syntax
+from gearfe.base.tables.study import StudyTable
+from gearfe.base.tables.text import toml_document
 from gearfe.study.design import saltelli, study_cases
 from gearfe.study.expressions import Answer, value_of
 from gearfe.study.job import read_study, run_study
 from gearfe.study.parameters import read_parameters
 from gearfe.study.statistics import pareto_set, proportion, spread
-from gearfe.tables.study import StudyTable
-from gearfe.tables.text import toml_document
 
 from .studies import JOBS, written
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.cli import main
+from gearfe.cli.main import main
 from gearfe.study.job import read_study, run_study
 
 from .studies import rows_of, written
@@ -131,7 +131,7 @@ def test_dask_that_is_missing_is_named(tmp_path, monkeypatch, capsys):
 
 
 def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch, capsys):
-    from gearfe.commands import study as command
+    from gearfe.cli import study as command
 
     monkeypatch.setattr(command, "TIMEOUT_S", 1)
     run = ["study", str(written(tmp_path)), "--out", str(tmp_path / "out"), "--dask"]

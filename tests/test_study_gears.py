@@ -10,15 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.cli import main
-from gearfe.config import read_toml
-from gearfe.gear.pair import GearPair
-from gearfe.stiffness import sweep
-from gearfe.stiffness.job import StiffnessJob
+from gearfe.base.config import read_toml
+from gearfe.base.tables.jobs import job_tables
+from gearfe.base.tables.text import toml_document
+from gearfe.cli.main import main
+from gearfe.gears.geometry.pair import GearPair
+from gearfe.gears.stiffness import sweep
+from gearfe.gears.stiffness.job import StiffnessJob
 from gearfe.study.design import study_cases
 from gearfe.study.job import read_study, run_study
-from gearfe.tables.jobs import job_tables
-from gearfe.tables.text import toml_document
 
 from .studies import JOBS, rows_of
 

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.study import journal as module
 from gearfe.study import run
 from gearfe.study.case import Row

@@ -19,16 +19,16 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.cache import versions
-from gearfe.cli import main
-from gearfe.config import _convert, fields_of, read_toml, type_hints
-from gearfe.errors import InputError
-from gearfe.files import output_folder
+from gearfe.base.cache import versions
+from gearfe.base.config import _convert, fields_of, read_toml, type_hints
+from gearfe.base.errors import InputError
+from gearfe.base.files import output_folder
+from gearfe.base.tables.jobs import TABLES, job_tables, table_class
+from gearfe.base.tables.mechanism import MechanismFile
+from gearfe.cli.main import main
 from gearfe.study.job import read_study, run_study
 from gearfe.study.journal import Journal
 from gearfe.study.run import serially
-from gearfe.tables.jobs import TABLES, job_tables, table_class
-from gearfe.tables.mechanism import MechanismFile
 
 from .studies import rows_of, stored_rows, written
 

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.config import read_toml
-from gearfe.errors import InputError, MissingLibraryError
-from gearfe.files import output_folder
+from gearfe.base.config import read_toml
+from gearfe.base.errors import InputError, MissingLibraryError
+from gearfe.base.files import output_folder
+from gearfe.base.tables.text import toml_document
+from gearfe.cli.main import main
 from gearfe.study.case import DIED, Row, Task, solve_case
 from gearfe.study.job import read_study, run_study
-from gearfe.tables.text import toml_document
 
 from .counting import counted
 from .studies import JOBS, rows_of, solved_before, stored_rows, written
@@ -181,10 +181,10 @@ def test_outputs_that_the_job_does_not_give_are_told_before_any_case(tmp_path):
 
 def test_gears_and_their_microgeometry(tmp_path):
     """A stiffness study gives what the sweep gives; cases that share gears have the digits of cases that do not."""
-    from gearfe.gear.pair import GearPair
-    from gearfe.stiffness.job import StiffnessJob
-    from gearfe.stiffness.sweep import sweep_stiffness
-    from gearfe.tables.jobs import job_tables
+    from gearfe.base.tables.jobs import job_tables
+    from gearfe.gears.geometry.pair import GearPair
+    from gearfe.gears.stiffness.job import StiffnessJob
+    from gearfe.gears.stiffness.sweep import sweep_stiffness
 
     job = "[pair]\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"
     job += "[pair.pinion]\nteeth = 22\npitch_diameter_mm = 44.0\nbore_diameter_mm = 10.0\n"
@@ -277,7 +277,8 @@ def test_a_full_disk_stops_and_keeps_all_rows(tmp_path):
     path = written(tmp_path, cases=300)
     solved_before(read_study(path), output_folder(tmp_path / "out"), range(20))
     program = (
-        "import resource, signal, sys; from gearfe.cli import main; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
+        "import resource, signal, sys; from gearfe.cli.main import main; "
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
         "resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192)); sys.exit(main(sys.argv[1:]))"
     )
     command = ["study", str(path), "--out", str(tmp_path / "out"), "--jobs", "1", "--no-pictures"]

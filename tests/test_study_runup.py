@@ -6,7 +6,7 @@ import csv
 import json
 import math
 
-from gearfe.cli import main
+from gearfe.cli.main import main
 from gearfe.study.job import read_study, run_study
 
 from .test_cli_vibration import SMALL

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.study.job import read_study
 from gearfe.study.search import Search
 

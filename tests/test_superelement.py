@@ -12,18 +12,18 @@ import pytest
 from scipy.io import mmwrite
 from scipy.sparse import coo_array
 
-from gearfe.cli import main
-from gearfe.config import build
-from gearfe.errors import InputError
-from gearfe.gearbox.job import bore_places, job_train, read_train_job, train_body
-from gearfe.gearbox.mesh_stiffness import train_curves
-from gearfe.housing.body import reduced_housing
-from gearfe.housing.build import housing_from_job
-from gearfe.housing.superelement import read_matrix, superelement, write_matrix
-from gearfe.reduction.error import accelerances
-from gearfe.reduction.modal_body import ModalBody
-from gearfe.tables.housing import HousingTable, SuperelementTable
-from gearfe.train import build_train
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.housing import HousingTable, SuperelementTable
+from gearfe.cli.main import main
+from gearfe.drivetrain.gearbox.job import bore_places, job_train, read_train_job, train_body
+from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
+from gearfe.drivetrain.housing.body import reduced_housing
+from gearfe.drivetrain.housing.build import housing_from_job
+from gearfe.drivetrain.housing.superelement import read_matrix, superelement, write_matrix
+from gearfe.drivetrain.train import build_train
+from gearfe.fem.reduction.error import accelerances
+from gearfe.fem.reduction.modal_body import ModalBody
 
 from .nastran import Output2, output4_binary, output4_text
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from gearfe import sweep_stiffness
-from gearfe.cli import main
-from gearfe.elasticity import least_jacobian
-from gearfe.errors import InputError
-from gearfe.loadmap.sweep import sweep_loads
-from gearfe.meshing import tooth_sector
-from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
+from gearfe.fem.plane import least_jacobian
+from gearfe.gears.loadmap.sweep import sweep_loads
+from gearfe.gears.teeth import tooth_sector
+from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 
 from .gears import pair
 

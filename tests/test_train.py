@@ -10,12 +10,12 @@ import sys
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.runup.train_stability import train_stability
+from gearfe.drivetrain.train import Bearing, Damping, Drive, GearMesh, Load, build_train, simulate
+from gearfe.drivetrain.train.elements import outline_moments
+from gearfe.drivetrain.train.states import train_states
 from gearfe.multibody import IntegrationError, constant, integrate, smoothed_step
-from gearfe.runup.train_stability import train_stability
-from gearfe.train import Bearing, Damping, Drive, GearMesh, Load, build_train, simulate
-from gearfe.train.elements import outline_moments
-from gearfe.train.states import train_states
 
 from .full_model import full_model
 from .trains import ALPHA, SHIPPED, SPEED, TORQUE, base_radius, braking, changed, curve, elastic, gear, train
@@ -282,7 +282,7 @@ def test_instability_ends_with_a_status() -> None:
 
 def test_a_rigid_housing_loads_no_finite_elements() -> None:
     code = (
-        "import sys; from tests.trains import *; from gearfe.train import build_train, simulate;"
+        "import sys; from tests.trains import *; from gearfe.drivetrain.train import build_train, simulate;"
         "simulate(build_train(train(SHIPPED)), np.linspace(0, 1e-4, 3));"
         "print([m for m in ('skfem', 'gmsh', 'meshio', 'pyvista', 'matplotlib', 'h5py') if m in sys.modules])"
     )

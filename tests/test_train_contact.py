@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.train import Damping, Drive, Load, build_train, simulate
+from gearfe.drivetrain.train.states import train_states
+from gearfe.drivetrain.train.statics import static_errors
 from gearfe.multibody import TimeFunction, constant, integrate, smoothed_step
-from gearfe.train import Damping, Drive, Load, build_train, simulate
-from gearfe.train.states import train_states
-from gearfe.train.statics import static_errors
 
 from .mesh_laws import hertzian_law
 from .trains import base_radius, curve, train

@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
+from gearfe.drivetrain.train import build_train, simulate
+from gearfe.drivetrain.train.discontinuities import leaves, train_discontinuity
+from gearfe.drivetrain.train.forces import CurveFlank, Gyro, LawFlank, TrainForces
+from gearfe.drivetrain.train.program import train_series
+from gearfe.drivetrain.train.series import train_order
+from gearfe.gears.stiffness.periodic import periodic_interpolant
 from gearfe.multibody import TimeFunction, constant, smoothed_step
 from gearfe.multibody.compiled import kernels as compiled
 from gearfe.multibody.integrators.taylor import kernel_modal
-from gearfe.stiffness.periodic import periodic_interpolant
-from gearfe.train import build_train, simulate
-from gearfe.train.discontinuities import leaves, train_discontinuity
-from gearfe.train.forces import CurveFlank, Gyro, LawFlank, TrainForces
-from gearfe.train.program import train_series
-from gearfe.train.series import train_order
 
 from .mesh_laws import hertzian_law
 from .rigid_cases import by_scipy

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, build_train, simulate
+from gearfe.gears.stiffness.curve import StiffnessCurve
+from gearfe.gears.stiffness.periodic import periodic_interpolant
 from gearfe.multibody import constant
-from gearfe.stiffness.curve import StiffnessCurve
-from gearfe.stiffness.periodic import periodic_interpolant
-from gearfe.train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, build_train, simulate
 
 from .trains import SHIPPED, changed, curve, elastic, gear, train
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from gearfe import steady_state
-from gearfe.errors import InputError
-from gearfe.gearbox.job import job_train, read_train_job
-from gearfe.gearbox.mesh_stiffness import train_curves
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.gearbox.job import job_train, read_train_job
+from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
+from gearfe.drivetrain.train import Drive, GearMesh, Load, build_train, simulate
 from gearfe.multibody import TimeFunction, constant, smoothed_step
-from gearfe.train import Drive, GearMesh, Load, build_train, simulate
 
 from .test_train_job import BORES, SMALL, written
 from .trains import SHIPPED, base_radius, braking, changed, train

@@ -8,13 +8,13 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.gear.pair import MeshGeometry
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.train import Bearing, Damping, Drive, Load, build_train, simulate
+from gearfe.drivetrain.train.forces import LawFlank, TrainForces
+from gearfe.drivetrain.train.friction import Lubrication, Sliding, smooth_sign
+from gearfe.drivetrain.train.series import train_order
+from gearfe.gears.geometry.pair import MeshGeometry
 from gearfe.multibody import TimeFunction, constant, smoothed_step
-from gearfe.train import Bearing, Damping, Drive, Load, build_train, simulate
-from gearfe.train.forces import LawFlank, TrainForces
-from gearfe.train.friction import Lubrication, Sliding, smooth_sign
-from gearfe.train.series import train_order
 
 from .mesh_laws import hertzian_law
 from .test_train_contact import R1, R2, pair

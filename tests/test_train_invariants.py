@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
+from gearfe.drivetrain.train import Drive, build_train
+from gearfe.drivetrain.train.forces import LawFlank
+from gearfe.drivetrain.train.states import train_states
 from gearfe.multibody import TimeFunction, constant, integrate
-from gearfe.train import Drive, build_train
-from gearfe.train.forces import LawFlank
-from gearfe.train.states import train_states
 
 from .mesh_laws import hertzian_law
 from .test_train_contact import R1, R2, pair

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.config import build
-from gearfe.errors import InputError
-from gearfe.gear.pair import GearPair
-from gearfe.gearbox.job import bore_places, job_train, read_train_job, train_gear
-from gearfe.gearbox.mesh_stiffness import train_curves
-from gearfe.stiffness.curve import StiffnessCurve
-from gearfe.tables.jobs import load_job
-from gearfe.tables.pair import PairTable, StiffnessTable
-from gearfe.tables.train import TrainCurvesTable, TrainGearTable
-from gearfe.train import build_train, simulate
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.jobs import load_job
+from gearfe.base.tables.pair import PairTable, StiffnessTable
+from gearfe.base.tables.train import TrainCurvesTable, TrainGearTable
+from gearfe.drivetrain.gearbox.job import bore_places, job_train, read_train_job, train_gear
+from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
+from gearfe.drivetrain.train import build_train, simulate
+from gearfe.gears.geometry.pair import GearPair
+from gearfe.gears.stiffness.curve import StiffnessCurve
 
 SHIPPED = Path(__file__).parent.parent / "geometry" / "gear_train.toml"
 

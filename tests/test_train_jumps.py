@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
+from gearfe.drivetrain.runup.run_up import run_up
+from gearfe.drivetrain.train import TrainModel, build_train, simulate
 from gearfe.multibody import TimeFunction, constant, smoothed_step
-from gearfe.runup.run_up import run_up
-from gearfe.train import TrainModel, build_train, simulate
 
 from .test_train_contact import pair
 from .trains import base_radius, curve

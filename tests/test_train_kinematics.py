@@ -11,15 +11,15 @@ from typing import Any
 
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.gear.involute import tooth_profile
-from gearfe.gear.pair import _shared_pair, gear_pair
-from gearfe.gearbox.job import TrainJob, read_train_job
-from gearfe.progress import Stopwatch
-from gearfe.runup.job import at_speed, solved
-from gearfe.tables.runup import RunUpTable
-from gearfe.train.kinematics import kinematics
-from gearfe.vibration.run import simulated
+from gearfe.base.errors import InputError
+from gearfe.base.progress import Stopwatch
+from gearfe.base.tables.runup import RunUpTable
+from gearfe.drivetrain.gearbox.job import TrainJob, read_train_job
+from gearfe.drivetrain.runup.job import at_speed, solved
+from gearfe.drivetrain.train.kinematics import kinematics
+from gearfe.drivetrain.vibration.run import simulated
+from gearfe.gears.geometry.involute import tooth_profile
+from gearfe.gears.geometry.pair import _shared_pair, gear_pair
 
 from .trains import changed, gear, train
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson, solve_ivp
 
+from gearfe.drivetrain.train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, build_train, simulate
+from gearfe.drivetrain.train.states import train_states
 from gearfe.multibody import constant, integrate
-from gearfe.train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, build_train, simulate
-from gearfe.train.states import train_states
 
 from .trains import ALPHA, SHIPPED, SPEED, base_radius, braking, changed, curve, elastic, gear, train
 
@@ -51,7 +51,7 @@ def test_energy_balance_of_the_undamped_train() -> None:
 
 def lone_rotor(**changes: object) -> GearTrain:
     """One driven shaft with a disc in the middle, both bores isotropic bearings."""
-    from gearfe.train import ShaftGear
+    from gearfe.drivetrain.train import ShaftGear
 
     shaft = Shaft("rotor", (0.0, 0.0, 0.0), 0.2, 0.01, ("a", "b"))
     gear_train = GearTrain(

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from matplotlib.path import Path as Outline
 
-from gearfe.errors import InputError
-from gearfe.gear.derived import gear_outline
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear, build_train, simulate
+from gearfe.gears.geometry.derived import gear_outline
 from gearfe.multibody import constant
-from gearfe.train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear, build_train, simulate
 
 from .trains import MODULE, changed, curve, gear
 

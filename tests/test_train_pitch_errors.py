@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.gear.curves import inv
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.train import Damping, GearTrain, build_train, simulate
+from gearfe.drivetrain.train.forces import LawFlank
+from gearfe.drivetrain.train.model import TrainModel
+from gearfe.drivetrain.train.statics import static_errors
+from gearfe.gears.geometry.curves import inv
 from gearfe.multibody import constant, smoothed_step
-from gearfe.train import Damping, GearTrain, build_train, simulate
-from gearfe.train.forces import LawFlank
-from gearfe.train.model import TrainModel
-from gearfe.train.statics import static_errors
 
 from .mesh_laws import hertzian_law
 from .test_train_contact import free_energy, free_pair, pair

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.config import build
-from gearfe.errors import InputError
-from gearfe.gearbox.timefunctions import PIECES, fitted, time_function
-from gearfe.tables.timefunction import TrainFunctionTable
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.timefunction import TrainFunctionTable
+from gearfe.cli.main import main
+from gearfe.drivetrain.gearbox.timefunctions import PIECES, fitted, time_function
 
 from .test_cli_vibration import SMALL
 

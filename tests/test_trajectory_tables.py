@@ -8,7 +8,7 @@ import types
 import numpy as np
 import pytest
 
-from gearfe.errors import MissingLibraryError
+from gearfe.base.errors import MissingLibraryError
 from gearfe.multibody import Body, Gravity, Hinge, Linkage, System, Trajectory, integrate
 
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from gearfe.config import build
+from gearfe.base.config import build
+from gearfe.base.tables.mechanism import MechanismFile
 from gearfe.mechanisms.job import Outcome, run_mechanism
 from gearfe.mechanisms.model import make_mechanism
-from gearfe.tables.mechanism import MechanismFile
 
 
 def four_bar() -> dict[str, Any]:

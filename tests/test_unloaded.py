@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from gearfe.gear.first_contact import ToothFlanks
-from gearfe.gear.gear_data import TipRelief
-from gearfe.gear.pair import Gear, GearPair
+from gearfe.gears.geometry.first_contact import ToothFlanks
+from gearfe.gears.geometry.gear_data import TipRelief
+from gearfe.gears.geometry.pair import Gear, GearPair
 
 from .gears import pair
 from .unloaded import unloaded_twist

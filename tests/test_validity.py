@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from gearfe import StiffnessCurve, sweep_stiffness
-from gearfe.cli import main
-from gearfe.gear.validity import MOST_OVERLAP
-from gearfe.loadmap.sweep import sweep_loads
+from gearfe.cli.main import main
+from gearfe.gears.geometry.validity import MOST_OVERLAP
+from gearfe.gears.loadmap.sweep import sweep_loads
 
 from .gears import pair as gear_pair
 

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe.cli import main
+from gearfe.base.record_spectrum import finer
+from gearfe.cli.main import main
+from gearfe.drivetrain.train import GearTrain, build_train, simulate
+from gearfe.drivetrain.train.model import TrainModel
+from gearfe.drivetrain.vibration.errors import FORCES, PEAKS, STARTS, Run, with_errors
+from gearfe.drivetrain.vibration.follow import follow
+from gearfe.drivetrain.vibration.report import train_summary
+from gearfe.drivetrain.vibration.spectra import TrainRecord
+from gearfe.gears.stiffness.curve import StiffnessCurve
 from gearfe.multibody import constant
-from gearfe.record_spectrum import finer
-from gearfe.stiffness.curve import StiffnessCurve
-from gearfe.train import GearTrain, build_train, simulate
-from gearfe.train.model import TrainModel
-from gearfe.vibration.errors import FORCES, PEAKS, STARTS, Run, with_errors
-from gearfe.vibration.follow import follow
-from gearfe.vibration.report import train_summary
-from gearfe.vibration.spectra import TrainRecord
 from tests.test_cli_vibration import SMALL
 from tests.trains import SHIPPED, curve, elastic, train
 

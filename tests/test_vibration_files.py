@@ -10,27 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError, NotFiniteWarning
+from gearfe.base.errors import InputError, NotFiniteWarning
+from gearfe.base.progress import Stopwatch
+from gearfe.drivetrain.gearbox.fields import frames, gear_surface, moved, solids, write_gears, write_housing
+from gearfe.drivetrain.gearbox.stability import Stability
+from gearfe.drivetrain.housing.attachments import Attachment
+from gearfe.drivetrain.housing.model import Housing
+from gearfe.drivetrain.train import Drive, GearMesh, GearTrain, Shaft, ShaftGear, build_train
+from gearfe.drivetrain.vibration.files import OutputChoice, write_run
+from gearfe.drivetrain.vibration.follow import RunningMean, TrainRun
+from gearfe.drivetrain.vibration.report import lines_of
+from gearfe.drivetrain.vibration.spectra import response_columns, spectra
 from gearfe.figures.train import TrainPictures
 from gearfe.figures.train_scene import draw_scene, sharp_edges
-from gearfe.gearbox.fields import (
-    frames,
-    gear_surface,
-    moved,
-    solids,
-    write_gears,
-    write_housing,
-)
-from gearfe.gearbox.stability import Stability
-from gearfe.housing.attachments import Attachment
-from gearfe.housing.model import Housing
 from gearfe.multibody import constant
-from gearfe.progress import Stopwatch
-from gearfe.train import Drive, GearMesh, GearTrain, Shaft, ShaftGear, build_train
-from gearfe.vibration.files import OutputChoice, write_run
-from gearfe.vibration.follow import RunningMean, TrainRun
-from gearfe.vibration.report import lines_of
-from gearfe.vibration.spectra import response_columns, spectra
 
 from .gears import pair
 from .housing_meshes import box

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 from gearfe.output.vtkhdf import VtkHdfSeries, write_vtkhdf
 from tests.housing_meshes import box
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.commands import COMMANDS
+from gearfe.cli import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 pytestmark = pytest.mark.slow

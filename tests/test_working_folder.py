@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.commands import COMMANDS
+from gearfe.cli import COMMANDS
 from gearfe.study.run import processes
 
 from .studies import JOBS, written
 
 #: What the installed program is: a script in a folder of its own.
-SCRIPT = "import sys\nfrom gearfe.cli import main\nif __name__ == '__main__':\n    sys.exit(main())\n"
+SCRIPT = "import sys\nfrom gearfe.cli.main import main\nif __name__ == '__main__':\n    sys.exit(main())\n"
 #: Reports that it was imported, wherever that happens.
 HOSTILE = "open({mark!r}, 'a').write(__name__ + '\\n')\n"
 #: Name of a library's file of settings -> settings that change pictures, end imports, or run a command in gmsh.

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.contact.compliance import flank_loads
-from gearfe.contact.elements import solve_elements
-from gearfe.contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
-from gearfe.contact.panels import MIDDLES, PANELS, WIDTHS, couplings, influence, log_integral, unilateral
-from gearfe.contact.position import Positions
-from gearfe.gear.face import ToothDeviations
-from gearfe.stiffness.job import read_stiffness_job
-from gearfe.stiffness.sweep import elastic_pair
+from gearfe.gears.contact.compliance import flank_loads
+from gearfe.gears.contact.elements import solve_elements
+from gearfe.gears.contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
+from gearfe.gears.contact.panels import MIDDLES, PANELS, WIDTHS, couplings, influence, log_integral, unilateral
+from gearfe.gears.contact.position import Positions
+from gearfe.gears.geometry.face import ToothDeviations
+from gearfe.gears.stiffness.job import read_stiffness_job
+from gearfe.gears.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair
 from .solving import solve_positions

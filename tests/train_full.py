@@ -15,8 +15,8 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import null_space
 
-from gearfe.reduction.sparse_solver import factorize
-from gearfe.train import TrainModel
+from gearfe.drivetrain.train import TrainModel
+from gearfe.fem.reduction.sparse_solver import factorize
 
 
 def coupled_transient(

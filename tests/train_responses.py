@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.train.response import TrainResponse
+from gearfe.drivetrain.train.response import TrainResponse
 
 #: Record of the shipped job: 0..7 ms in steps of 35 us.
 STEP, COUNT = 35e-6, 201

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.gear.pair import Gear
+from gearfe.drivetrain.train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+from gearfe.fem.reduction.modal_body import ModalBody
+from gearfe.gears.geometry.pair import Gear
+from gearfe.gears.stiffness.periodic import PeriodicInterpolant, periodic_interpolant
 from gearfe.multibody import TimeFunction, constant, smoothed_step
-from gearfe.reduction.modal_body import ModalBody
-from gearfe.stiffness.periodic import PeriodicInterpolant, periodic_interpolant
-from gearfe.train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 
 MODULE, ALPHA = 2.5e-3, math.radians(25.0)
 SPEED, TORQUE = 600.0, -100.0

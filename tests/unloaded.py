@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gearfe.gear.first_contact import ToothFlanks
-from gearfe.gear.pair import MeshGeometry
+from gearfe.gears.geometry.first_contact import ToothFlanks
+from gearfe.gears.geometry.pair import MeshGeometry
 
 Array = NDArray[np.float64]
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 def unloaded_twist(pair: MeshGeometry, pinion_angles: ArrayLike) -> Array:
     """Twist of the wheel (rad) at which the rigid driving flanks just touch; 0 faces a pinion tooth with a wheel space.
 
-    The least over all tooth pairs (`gearfe.gear.first_contact`).
+    The least over all tooth pairs (`gearfe.gears.geometry.first_contact`).
 
     Parameters
     ----------

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearfe.contact.compliance import MeshingPair
-from gearfe.gear.deviation import Deviation
-from gearfe.gear.face import ToothDeviations, face_of
-from gearfe.gear.pair import GearPair
-from gearfe.gear.spur_gear import Gear
+from gearfe.gears.contact.compliance import MeshingPair
+from gearfe.gears.geometry.deviation import Deviation
+from gearfe.gears.geometry.face import ToothDeviations, face_of
+from gearfe.gears.geometry.pair import GearPair
+from gearfe.gears.geometry.spur_gear import Gear
 
 
 def wave(gear: Gear, waves: float, amplitude: float, phase: float = 0.3) -> ToothDeviations:

@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..runup.critical import CriticalSpeeds
-from ..runup.instability import InstabilityMap
-from ..runup.modes import STRONG
-from ..runup.orders import orders
-from ..runup.report import waterfall
-from ..runup.results import SteadyState
-from ..runup.run_up import RunUp
-from ..shown import percent
-from ..typing import Array
+from ..base.shown import percent
+from ..base.typing import Array
+from ..drivetrain.runup.critical import CriticalSpeeds
+from ..drivetrain.runup.instability import InstabilityMap
+from ..drivetrain.runup.modes import STRONG
+from ..drivetrain.runup.orders import orders
+from ..drivetrain.runup.report import waterfall
+from ..drivetrain.runup.results import SteadyState
+from ..drivetrain.runup.run_up import RunUp
 from .style import BLUE, COLOURS, GREY, RANGE_DB, RED, REFERENCE, level, new_figure, on_white, save, single
 
 #: Width and height of an order's name, in parts of the axes.

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..gear import pitch_errors
-from ..gear.deviation_job import GEARS, FlankOf, flank_deviations
-from ..gear.pair import GearPair
-from ..tables.microgeometry import MicrogeometryTable
-from ..typing import Array
+from ..base.tables.microgeometry import MicrogeometryTable
+from ..base.typing import Array
+from ..gears.geometry import pitch_errors
+from ..gears.geometry.deviation_job import GEARS, FlankOf, flank_deviations
+from ..gears.geometry.pair import GearPair
 from .style import BLUE, GREY, ORANGE, headed, new_figure, some_of, tidy
 
 #: Lines of a panel; of more profiles, so many are drawn.

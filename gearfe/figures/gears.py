@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..gear.derived import gear_outline, path_place, zone
-from ..gear.pair import GearPair
-from ..typing import Array
+from ..base.typing import Array
+from ..gears.geometry.derived import gear_outline, path_place, zone
+from ..gears.geometry.pair import GearPair
 from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save
 
 if TYPE_CHECKING:
-    from ..meshing.export import MeshPart
+    from ..fem.meshing.export import MeshPart
 
 PINION_FILL, WHEEL_FILL = "#dbe7f3", "#f3e6d8"
 

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..files import whole_file
+from ..base.files import whole_file
+from ..base.typing import Array, IntArray
 from ..output.arrays import load_arrays
-from ..typing import Array, IntArray
 from .offscreen import corner_triangles, draw_all, draw_apart, vtk_cells
 from .style import new_figure, save
 
 if TYPE_CHECKING:
-    from ..housing.modal_test import Comparison
+    from ..drivetrain.housing.modal_test import Comparison
 
 #: Largest displacement in a picture of a mode, in parts of the body's size.
 EXAGGERATION = 0.06

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..gear.deviation_job import GEARS
-from ..loadmap.load_map import LoadMap
-from ..typing import Array
+from ..base.typing import Array
+from ..gears.geometry.deviation_job import GEARS
+from ..gears.loadmap.load_map import LoadMap
 from .style import BLUE, ORANGE, RED, headed, labelled, new_figure, shades, some_of
 
 #: Lines of a panel; of more torques, so many are drawn.

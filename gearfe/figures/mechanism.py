@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..files import whole_file
+from ..base.files import whole_file
+from ..base.progress import count, stage
 from ..mechanisms.model import Mechanism
 from ..mechanisms.results import Results, reference_table
 from ..multibody import Trajectory
 from ..multibody.core.modes import Modes
-from ..progress import count, stage
 from .mechanism_field import draw_field
 from .mechanism_scene import MOST_NAMES, draw_paths, draw_state, drawn_states, frame
 from .style import BLUE, COLOURS, ORANGE, fixed, new_figure, save_fixed, tidy

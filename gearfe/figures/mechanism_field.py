@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.typing import Array, ComplexArray, IntArray
 from ..mechanisms.model import Mechanism
 from ..multibody import Trajectory
-from ..typing import Array, ComplexArray, IntArray
 from .mechanism_scene import draw_backdrop, draw_names, draw_state, link_places, place_of, rigid_ends
 
 #: Pieces of an edge of a body, each of one colour.

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from ..base.typing import Array, ComplexArray
 from ..mechanisms.links import FlexibleLink
 from ..mechanisms.model import Mechanism
 from ..mechanisms.plates import PlateLink
 from ..multibody import GROUND, Prismatic, Slot, Spring, Trajectory
 from ..multibody.planar.joints import Distance
-from ..typing import Array, ComplexArray
 from .style import COLOURS, GREY
 
 #: Bodies beyond which names would hide the mechanism.

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..isolation import EMPTY
+from ..base.isolation import EMPTY
+from ..base.typing import Array, IntArray
 from ..output.arrays import save_arrays
-from ..typing import Array, IntArray
 
 #: Why nothing is drawn where the extra is not installed.
 MISSING = "pyvista is not installed: pip install 'gearfe[fields]'"

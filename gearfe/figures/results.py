@@ -1,4 +1,4 @@
-"""Pictures of results as Python has them, without the job: what `gearfe.shown.Shown.plot` gives."""
+"""Pictures of results as Python has them, without the job: what `gearfe.base.shown.Shown.plot` gives."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from .style import BLUE, CYCLE, GREY, ORANGE, RED, legend_beside, new_figure, tidy
 
 if TYPE_CHECKING:
+    from ..base.spectrum import Spectrum
+    from ..base.typing import Array
+    from ..drivetrain.train.response import TrainResponse
+    from ..fem.reduction.modal_body import ModalBody
+    from ..gears.stiffness.curve import StiffnessCurve
     from ..multibody.core.trajectory import Trajectory
-    from ..reduction.modal_body import ModalBody
-    from ..spectrum import Spectrum
-    from ..stiffness.curve import StiffnessCurve
-    from ..train.response import TrainResponse
-    from ..typing import Array
 
 #: Faces of a body that are drawn at most.
 MOST_FACES = 30_000

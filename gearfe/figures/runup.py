@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..runup.columns import dynamic_factors
-from ..runup.critical import CriticalSpeeds
-from ..runup.instability import InstabilityMap
-from ..runup.orders import orders
-from ..runup.report import iso_dynamic_factors
-from ..runup.run_up import RunUp
-from ..typing import Array, IntArray
+from ..base.typing import Array, IntArray
+from ..drivetrain.runup.columns import dynamic_factors
+from ..drivetrain.runup.critical import CriticalSpeeds
+from ..drivetrain.runup.instability import InstabilityMap
+from ..drivetrain.runup.orders import orders
+from ..drivetrain.runup.report import iso_dynamic_factors
+from ..drivetrain.runup.run_up import RunUp
 from .campbell import draw_campbell, draw_instability, draw_waterfall, signal_of
 from .style import CYCLE, GREY, headed, new_figure, save, tidy
 
@@ -26,7 +26,7 @@ FACTOR = "dynamic factor $K_v$"
 
 @dataclass(frozen=True)
 class RunUpPictures:
-    """All pictures of a run-up, as `gearfe.runup.files.write_runup` takes them; they have the same title."""
+    """All pictures of a run-up, as `gearfe.drivetrain.runup.files.write_runup` takes them; they have the same title."""
 
     title: str
 

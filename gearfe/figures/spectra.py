@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..gearbox.radiation import RadiatedPower
-from ..spectrum import nearest_line, peaks
-from ..train.response import TrainResponse
-from ..typing import Array
-from ..vibration.analysis import Analysed
-from ..vibration.report import lines_of, settled
-from ..vibration.short_time import OrderTracks
-from ..vibration.spectra import TrainSpectra
+from ..base.spectrum import nearest_line, peaks
+from ..base.typing import Array
+from ..drivetrain.gearbox.radiation import RadiatedPower
+from ..drivetrain.train.response import TrainResponse
+from ..drivetrain.vibration.analysis import Analysed
+from ..drivetrain.vibration.report import lines_of, settled
+from ..drivetrain.vibration.short_time import OrderTracks
+from ..drivetrain.vibration.spectra import TrainSpectra
 from .style import (
     BLUE,
     COLOURS,

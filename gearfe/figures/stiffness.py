@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..gear.derived import single_pair_stretches
-from ..gear.pair import GearPair
-from ..stiffness.curve import StiffnessCurve
-from ..stiffness.job import StiffnessJob
-from ..stiffness.periodic import distinct_phases
-from ..typing import Array, IntArray
+from ..base.errors import InputError
+from ..base.typing import Array, IntArray
+from ..gears.geometry.derived import single_pair_stretches
+from ..gears.geometry.pair import GearPair
+from ..gears.stiffness.curve import StiffnessCurve
+from ..gears.stiffness.job import StiffnessJob
+from ..gears.stiffness.periodic import distinct_phases
 from .style import BLUE, GREEN, GREY, ORANGE, RED, headed, new_figure, save, shades, some_of, tidy
 
 if TYPE_CHECKING:
-    from ..stiffness.fields import FlankPressure
+    from ..gears.stiffness.fields import FlankPressure
 
 #: Positions in the picture of the pressures at most.
 MOST_LINES = 12

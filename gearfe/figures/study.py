@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.typing import Array
 from ..study.statistics import StudyResult
-from ..typing import Array
 from .style import BLUE, GREY, ORANGE, RED, headed, new_figure, save, shades, single, tidy
 
 #: Parameters and outputs that a picture shows at most, and cases of which every one is drawn.

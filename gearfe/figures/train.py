@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from ..gearbox.fields import frames
-from ..train.gear_train import GearTrain
-from ..train.response import TrainResponse
-from ..train.statics import static_errors
-from ..typing import Array, IntArray
-from ..vibration.analysis import Analysed
-from ..vibration.follow import Followed
-from ..vibration.report import attachment_acceleration
-from ..vibration.spectra import TrainSpectra
+from ..base.typing import Array, IntArray
+from ..drivetrain.gearbox.fields import frames
+from ..drivetrain.train.gear_train import GearTrain
+from ..drivetrain.train.response import TrainResponse
+from ..drivetrain.train.statics import static_errors
+from ..drivetrain.vibration.analysis import Analysed
+from ..drivetrain.vibration.follow import Followed
+from ..drivetrain.vibration.report import attachment_acceleration
+from ..drivetrain.vibration.spectra import TrainSpectra
 from .spectra import draw_measured, draw_power, draw_spectrogram, draw_spectrum, draw_tracks
 from .style import BLUE, COLOURS, CYCLE, GREY, RED, fixed, panel, save_fixed
 from .train_scene import draw_scene
@@ -28,7 +28,7 @@ Spans = Sequence[tuple[float, float]]
 
 @dataclass(frozen=True)
 class TrainPictures:
-    """Pictures of a run, as `gearfe.vibration.files.write_run` takes them.
+    """Pictures of a run, as `gearfe.drivetrain.vibration.files.write_run` takes them.
 
     Attributes
     ----------

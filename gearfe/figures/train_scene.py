@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import whole_file
+from ..base.files import whole_file
+from ..base.typing import Array, IntArray
 from ..output.arrays import load_arrays
-from ..typing import Array, IntArray
 from .offscreen import corner_triangles, draw_all, draw_apart, vtk_cells
 from .style import write_film
 
@@ -37,7 +37,7 @@ def draw_scene(path: str | Path, arrays: Mapping[str, Array], title: str, most: 
     path : path
         The picture or film.
     arrays : mapping
-        Surfaces and colours, of `gearfe.vibration.fields.frames`.
+        Surfaces and colours, of `gearfe.drivetrain.vibration.fields.frames`.
     title : str
         Heading.
     most

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
+from ..base.progress import stage
+from ..base.typing import Array
 from ..multibody import Start, Status, Trajectory, integrate
-from ..progress import stage
-from ..typing import Array
 from .model import Mechanism
 from .results import Results, evaluate
 

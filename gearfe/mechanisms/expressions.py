@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, unknown_name
-from ..expressions import syntax
+from ..base.errors import InputError, unknown_name
+from ..base.expressions import syntax
 
 #: Functions of numbers.
 FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {

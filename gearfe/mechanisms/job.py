@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..files import output_folder, whole_set, write_csv, write_json
+from ..base.errors import InputError
+from ..base.files import output_folder, whole_set, write_csv, write_json
+from ..base.progress import stage
 from ..multibody import Start, Trajectory, integrate
 from ..multibody.core.inverse import prescribed_motion
 from ..multibody.core.mass_regularisation import free_motions
-from ..progress import stage
 from .error_estimate import TrajectoryError, trajectory_error
 from .link_files import write_links, write_plates
 from .model import Mechanism

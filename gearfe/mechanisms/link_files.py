@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..files import csv_table
+from ..base.files import csv_table
+from ..base.progress import stage
+from ..base.typing import Array
 from ..multibody import Trajectory
 from ..output.vtkhdf import VtkHdfSeries
-from ..progress import stage
-from ..typing import Array
 from .model import Mechanism
 from .plates import PlateLink
 

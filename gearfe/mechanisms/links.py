@@ -10,14 +10,14 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import InputError, given, unknown_name
+from ..base.errors import InputError, given, unknown_name
+from ..base.tables.beam import BeamTable
+from ..base.tables.mechanism import BodyTable, ForceTable, JointTable, MechanismFile
+from ..base.typing import Array
 from ..multibody.core.system import System
 from ..multibody.planar.beam import Beam
 from ..multibody.planar.beam_link import BeamLink, Section
 from ..multibody.planar.linkage import Linkage
-from ..tables.beam import BeamTable
-from ..tables.mechanism import BodyTable, ForceTable, JointTable, MechanismFile
-from ..typing import Array
 from .plates import PlateLink
 
 Point = tuple[float, float]

@@ -8,11 +8,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import InputError, given
+from ..base.errors import InputError, given
+from ..base.typing import Array
 from ..multibody import SpanFunction, StateFunction, polynomial
 from ..multibody.planar.variables import Affine, BodyVariables
 from ..multibody.series.tape import Tape
-from ..typing import Array
 from .expressions import OF_POINT, PLAIN, Node, compute, quantities, value_of, without_value
 from .tables import ValueTable
 

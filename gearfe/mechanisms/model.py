@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, given, unknown_name
+from ..base.errors import InputError, given, unknown_name
+from ..base.tables.kinds import FORCES, JOINTS
+from ..base.tables.mechanism import FigureTable, MechanismFile, read_mechanism_file
+from ..base.typing import Array
 from ..multibody import GROUND, Forced, Linkage, Start, System, consistent_start
 from ..multibody.core.mass_regularisation import free_motions
-from ..tables.kinds import FORCES, JOINTS
-from ..tables.mechanism import FigureTable, MechanismFile, read_mechanism_file
-from ..typing import Array
 from .expressions import (
     FUNCTIONS,
     NAMED,

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, given, unknown_name
+from ..base.errors import InputError, given, unknown_name
+from ..base.tables.kinds import Kind
+from ..base.tables.mechanism import BodyTable, ForceTable, FunctionTable, JointTable, MechanismFile
 from ..multibody import GROUND, Body, TimeFunction, constant, polynomial, sine, smoothed_step
 from ..multibody.planar.beam_link import BeamLink
-from ..tables.kinds import Kind
-from ..tables.mechanism import BodyTable, ForceTable, FunctionTable, JointTable, MechanismFile
 from .expressions import parse
 from .links import link_of
 from .loads import ALLOWED, OF_SPAN, ExpressionLoad, ExpressionTension

@@ -24,9 +24,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from ..elasticity import Material, physical_gradients, triangle_rule, triangle_shapes
+from ..base.typing import Array, IntArray
+from ..fem.plane import Material, physical_gradients, triangle_rule, triangle_shapes
 from ..multibody.planar.floating import FloatingBody
-from ..typing import Array, IntArray
 
 #: Share of its own energy below which a shape counts as made of others; of the largest derivative, for derivatives.
 DEPENDENT, SMALL = 1e-6, 3e-2

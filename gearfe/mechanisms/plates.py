@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, given, unknown_name
+from ..base.errors import InputError, given, unknown_name
+from ..base.progress import stage
+from ..base.tables.mechanism import BodyTable
+from ..base.tables.plate import InterfaceTable, PlateTable
+from ..base.typing import Array, IntArray
 from ..multibody.core.contract import Element
 from ..multibody.planar.bodies import Body
 from ..multibody.planar.floating import Floating, frame_joint
 from ..multibody.planar.linkage import Linkage
-from ..progress import stage
-from ..tables.mechanism import BodyTable
-from ..tables.plate import InterfaceTable, PlateTable
-from ..typing import Array, IntArray
 
 if TYPE_CHECKING:
     from .plate_reduction import Interface, Plate
@@ -203,7 +203,7 @@ class _Shape:
 
 @lru_cache(maxsize=16)
 def _reduced(shape: _Shape, written: int) -> Plate:  # noqa: ARG001 - a mesh file that is written anew is another
-    from ..elasticity import Material
+    from ..fem.plane import Material
     from .plate_reduction import reduce_plate
 
     table = shape.table
@@ -219,7 +219,7 @@ def _reduced(shape: _Shape, written: int) -> Plate:  # noqa: ARG001 - a mesh fil
 
 
 def _mesh(shape: _Shape) -> tuple[Array, IntArray]:
-    from ..meshing.plate_mesh import check_outline, mesh_outline, read_plate
+    from ..fem.meshing.plate_mesh import check_outline, mesh_outline, read_plate
 
     table, where = shape.table, shape.where
     if table.outline_m is None:

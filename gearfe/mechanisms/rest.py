@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from ..files import output_folder, whole_set, write_csv, write_json
+from ..base.files import output_folder, whole_set, write_csv, write_json
+from ..base.progress import stage
+from ..base.shown import percent
+from ..base.typing import Array
 from ..multibody import Start, Status, Trajectory
 from ..multibody.core.dense import Polynomials
 from ..multibody.core.equilibrium import Equilibrium, equilibrium
 from ..multibody.core.modes import Modes, modes
-from ..progress import stage
-from ..shown import percent
-from ..typing import Array
 from .job import MAY_WRITE, Outcome, write_elastic
 from .model import Mechanism
 from .results import Results, Sensitivities, evaluate, reactions

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..files import read_text
+from ..base.errors import InputError
+from ..base.files import read_text
+from ..base.progress import stage
+from ..base.typing import Array
 from ..multibody import Linkage, Trajectory
-from ..progress import stage
-from ..typing import Array
 from .expressions import PLAIN, compute, quantities
 from .model import Mechanism
 

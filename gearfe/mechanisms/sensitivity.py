@@ -23,11 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from ..config import read_toml
-from ..errors import InputError, unknown_name
-from ..progress import stage
-from ..tables.mechanism import RunTable
-from ..typing import Array
+from ..base.config import read_toml
+from ..base.errors import InputError, unknown_name
+from ..base.progress import stage
+from ..base.tables.mechanism import RunTable
+from ..base.typing import Array
 from .error_estimate import LEAST_TOLERANCE, SHARPER
 from .model import load_mechanism
 from .results import Sensitivities

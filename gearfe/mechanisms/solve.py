@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from ..config import build, read_toml, set_key
-from ..errors import InputError
+from ..base.config import build, read_toml, set_key
+from ..base.errors import InputError
+from ..base.progress import one_thread
+from ..base.tables.mechanism import MechanismFile, RunTable
+from ..base.typing import Array
 from ..multibody import Start, Trajectory, integrate
 from ..multibody.core.equilibrium import Equilibrium, equilibrium
 from ..multibody.core.inverse import prescribed_motion
 from ..multibody.core.modes import Modes, modes
-from ..progress import one_thread
-from ..tables.mechanism import MechanismFile, RunTable
-from ..typing import Array
 from .job import output_times
 from .model import Mechanism, make_mechanism
 from .rest import at_rest, mode_columns

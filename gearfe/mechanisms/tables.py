@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..files import read_text
+from ..base.errors import InputError
+from ..base.files import read_text
+from ..base.tables.mechanism import ValueTableTable
+from ..base.typing import Array
 from ..multibody import TimeFunction
 from ..multibody.series.tape import Tape
-from ..tables.mechanism import ValueTableTable
-from ..typing import Array
 
 
 @dataclass(frozen=True, eq=False)

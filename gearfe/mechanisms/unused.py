@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from ..config import fields_of
-from ..tables.mechanism import FigureTable, MechanismFile, RunTable
+from ..base.config import fields_of
+from ..base.tables.mechanism import FigureTable, MechanismFile, RunTable
 
 
 def unused(file: MechanismFile) -> list[str]:

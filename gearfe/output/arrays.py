@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.lib import format as npy
 
-from ..errors import InputError
-from ..files import whole_file
-from ..typing import Array
+from ..base.errors import InputError
+from ..base.files import whole_file
+from ..base.typing import Array
 
 #: Arrays of more bytes than this are mapped.
 LARGE = 1 << 20

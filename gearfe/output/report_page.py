@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..cache import versions
-from ..typing import Array
+from ..base.cache import versions
+from ..base.typing import Array
 
 #: Libraries whose versions the page lists.
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio", "numba", "h5py", "matplotlib", "pyvista")

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..config import set_key
-from ..errors import InputError
-from ..expressions import syntax
-from ..progress import one_thread
+from ..base.config import set_key
+from ..base.errors import InputError
+from ..base.expressions import syntax
+from ..base.progress import one_thread
 from .expressions import Answer, value_of
 from .kinds import Shared, solve
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..config import check_size
-from ..errors import InputError, given, shown
-from ..files import read_csv
-from ..tables.study import StudyTable
-from ..typing import Array
+from ..base.config import check_size
+from ..base.errors import InputError, given, shown
+from ..base.files import read_csv
+from ..base.tables.study import StudyTable
+from ..base.typing import Array
 from .parameters import Parameter, key_hint, read_parameters
 
 #: Cases of one study at most; levels of a grid of Morris's.

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, unknown_name
-from ..shown import as_numbers
+from ..base.errors import InputError, unknown_name
+from ..base.shown import as_numbers
 
 #: Functions of numbers and columns; gaps of a column (not-a-number) are left out.
 FUNCTIONS: dict[str, Callable[..., Any]] = {

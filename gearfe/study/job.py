@@ -10,12 +10,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ..cache import versions
-from ..config import build, read_toml
-from ..errors import InputError
-from ..files import output_folder
-from ..progress import count, one_thread
-from ..tables.study import StudyTable
+from ..base.cache import versions
+from ..base.config import build, read_toml
+from ..base.errors import InputError
+from ..base.files import output_folder
+from ..base.progress import count, one_thread
+from ..base.tables.study import StudyTable
 from .case import DIED, ERROR, HERE, INVALID, Row, Task, evaluate, files_named
 from .design import Cases, study_cases
 from .journal import Journal, only_writer

@@ -33,8 +33,8 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import LONGEST_TEXT, InputError
-from ..files import quoted, whole_file, write_json
+from ..base.errors import LONGEST_TEXT, InputError
+from ..base.files import quoted, whole_file, write_json
 from .case import Row
 
 try:

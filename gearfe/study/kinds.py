@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..config import build
-from ..files import read_csv
-from ..gear.face import NOMINAL
-from ..progress import Stopwatch
-from ..tables.jobs import job_tables
-from ..tables.loadmap import loads_of
+from ..base.config import build
+from ..base.files import read_csv
+from ..base.progress import Stopwatch
+from ..base.tables.jobs import job_tables
+from ..base.tables.loadmap import loads_of
+from ..gears.geometry.face import NOMINAL
 from .expressions import Answer
 
 if TYPE_CHECKING:
-    from ..stiffness.job import Keep
+    from ..gears.stiffness.job import Keep
 
 #: Tables of a job as parsed from TOML.
 Raw = dict[str, Any]
@@ -71,8 +71,8 @@ def solve(kind: str, raw: Raw, path: Path, shared: Shared, *, estimate: bool = F
 
 
 def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool) -> Answer:
-    from ..stiffness.report import summary
-    from ..stiffness.sweep import sweep_stiffness
+    from ..gears.stiffness.report import summary
+    from ..gears.stiffness.sweep import sweep_stiffness
 
     job = _pair_job(job_tables(raw, path, ("pair",), ("stiffness", "microgeometry")), path)
     sweep, elastic = job.sweep, job.elastic(_kept(job, shared))
@@ -81,8 +81,8 @@ def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool) -> Answer:
 
 
 def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
-    from ..loadmap.report import summary, tables
-    from ..loadmap.sweep import job_map
+    from ..gears.loadmap.report import summary, tables
+    from ..gears.loadmap.sweep import job_map
 
     read = job_tables(raw, path, ("pair",), ("stiffness", "microgeometry", "loadmap"))
     table, job = loads_of(read), _pair_job(read, path)
@@ -91,11 +91,11 @@ def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
 
 
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
-    from ..gearbox.job import train_job
-    from ..tables.jobs import train_tables
-    from ..vibration.analysis import Analysis, record_start
-    from ..vibration.files import OutputChoice, write_run
-    from ..vibration.run import simulated
+    from ..base.tables.jobs import train_tables
+    from ..drivetrain.gearbox.job import train_job
+    from ..drivetrain.vibration.analysis import Analysis, record_start
+    from ..drivetrain.vibration.files import OutputChoice, write_run
+    from ..drivetrain.vibration.run import simulated
 
     job, watch = train_job(path, train_tables(raw, path)), Stopwatch()
     planned = simulated(job, (), watch=watch, estimate=estimate)
@@ -112,11 +112,11 @@ def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
 
 
 def _runup(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
-    from ..gearbox.job import train_job
-    from ..runup import report
-    from ..runup.critical import critical_speeds
-    from ..runup.job import described, solved
-    from ..tables.jobs import train_tables
+    from ..base.tables.jobs import train_tables
+    from ..drivetrain.gearbox.job import train_job
+    from ..drivetrain.runup import report
+    from ..drivetrain.runup.critical import critical_speeds
+    from ..drivetrain.runup.job import described, solved
 
     table, job = job_tables(raw, path, ("runup",))["runup"], train_job(path, train_tables(raw, path))
     run, unstable = solved(job, table, watch=Stopwatch())
@@ -129,12 +129,12 @@ def _runup(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
 
 
 def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
+    from ..base.tables.mechanism import MechanismFile
     from ..mechanisms.error_estimate import trajectory_error
     from ..mechanisms.job import summarise
     from ..mechanisms.model import make_mechanism
     from ..mechanisms.rest import summarise_rest
     from ..mechanisms.solve import solve
-    from ..tables.mechanism import MechanismFile
 
     mechanism = make_mechanism(build(MechanismFile, raw, ""), path)
     made, tolerance = solve(mechanism), mechanism.tolerance
@@ -146,7 +146,7 @@ def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
 
 
 def _pair_job(tables: dict[str, Any], path: Path) -> Any:
-    from ..stiffness.job import stiffness_job
+    from ..gears.stiffness.job import stiffness_job
 
     return stiffness_job(tables, path.parent)
 

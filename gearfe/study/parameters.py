@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from ..config import build, check_size, type_hints
-from ..errors import InputError, given, unknown_name
-from ..gear.pair import GearPair
-from ..gear.pitch_errors import tolerances
-from ..tables.jobs import TABLES, table_class
-from ..tables.mechanism import MechanismFile
-from ..tables.pair import PairTable
-from ..tables.study import DistributionTable
-from ..typing import Array
+from ..base.config import build, check_size, type_hints
+from ..base.errors import InputError, given, unknown_name
+from ..base.tables.jobs import TABLES, table_class
+from ..base.tables.mechanism import MechanismFile
+from ..base.tables.pair import PairTable
+from ..base.tables.study import DistributionTable
+from ..base.typing import Array
+from ..gears.geometry.pair import GearPair
+from ..gears.geometry.pitch_errors import tolerances
 
 _KEYS = {field.name for field in dataclasses.fields(DistributionTable)}
 WHERE = "study.parameters"

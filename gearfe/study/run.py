@@ -20,9 +20,9 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from multiprocessing import connection, get_context, parent_process
 from typing import Any
 
-from ..errors import InputError
-from ..isolation import away
-from ..progress import one_thread
+from ..base.errors import InputError
+from ..base.isolation import away
+from ..base.progress import one_thread
 from .case import DIED, HERE, Row, Task, solve_case, solve_group
 
 #: Seconds of a group of cases, and groups that wait for each worker.

@@ -20,12 +20,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..cache import versions
-from ..errors import InputError
-from ..files import output_folder
-from ..progress import count
-from ..shown import Facts
-from ..typing import Array
+from ..base.cache import versions
+from ..base.errors import InputError
+from ..base.files import output_folder
+from ..base.progress import count
+from ..base.shown import Facts
+from ..base.typing import Array
 from .case import DIED, DONE, Row
 from .job import Study, check_outputs, solved_rows
 from .journal import Journal, cell_text, only_writer

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ..files import whole_file
-from ..shown import ShownTable, as_numbers, library, percent
-from ..tables.study import LimitTable, StudyTable
-from ..typing import Array, BoolArray, IntArray
+from ..base.files import whole_file
+from ..base.shown import ShownTable, as_numbers, library, percent
+from ..base.tables.study import LimitTable, StudyTable
+from ..base.typing import Array, BoolArray, IntArray
 from .case import DONE
 
 #: Quantiles of the summary, and the confidence of all intervals.

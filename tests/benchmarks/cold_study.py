@@ -39,7 +39,7 @@ class Case:
     def command(self) -> tuple[str, ...]:
         """Words after the interpreter."""
         out = () if self.arguments[0] in ("--help", "cache") else ("--out", "out")
-        return ("-m", "gearfe.cli", *self.arguments, *out)
+        return ("-m", "gearfe.cli.main", *self.arguments, *out)
 
 
 TRAIN, ANDREWS, SLIDER = (str(GEOMETRY / f"{name}.toml") for name in ("gear_train", "andrews", "slider_crank"))

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure and draw, or write the page; 1 when a row failed."""
-    from gearfe.errors import unknown_name
+    from gearfe.base.errors import unknown_name
 
     if args.job not in (*JOBS, "all"):
         raise unknown_name("benchmark job", args.job, (*JOBS, "all"))

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.config import build
+from gearfe.base.config import build
+from gearfe.base.tables.mechanism import MechanismFile
 from gearfe.mechanisms import evaluate
 from gearfe.mechanisms.model import Mechanism, make_mechanism
 from gearfe.multibody import integrate
-from gearfe.tables.mechanism import MechanismFile
 
 from .peers.exudyn_flexible import REFERENCES, tables
 from .peers.process import PeerError, missing, run_python

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.housing.model import Housing
+from gearfe.drivetrain.housing.model import Housing
 
 from ..full_model import full_model
 from ..housing_meshes import reference_housing
@@ -67,7 +67,7 @@ def reduced(housing: Housing, modes: int = 40, levels: int = 1) -> Any:
 
 def sizes(record: Record) -> None:
     """Mesh to reduced model (40 modes, one level): seconds against unknowns, frequencies and their estimated errors."""
-    from gearfe.reduction.error import mesh_error
+    from gearfe.fem.reduction.error import mesh_error
 
     table = record.table("housing_sizes", "size_mm")
 

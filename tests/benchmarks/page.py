@@ -8,8 +8,8 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from gearfe.errors import InputError
-from gearfe.files import whole_file
+from gearfe.base.errors import InputError
+from gearfe.base.files import whole_file
 
 from .pictures import PICTURES, draw_all, exponent
 from .record import Row, read_rows

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.files import whole_file
+from gearfe.base.files import whole_file
 
 from .record import Row, read_rows
 

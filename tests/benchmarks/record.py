@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfe import __version__
-from gearfe.files import output_folder, write_csv, write_json
+from gearfe.base.files import output_folder, write_csv, write_json
 
 #: Packages whose versions are recorded.
 PACKAGES = (

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearfe.gear.derived import mesh_stiffness, single_stiffness
+from gearfe.gears.geometry.derived import mesh_stiffness, single_stiffness
+from gearfe.gears.stiffness.sweep import sweep_stiffness
 from gearfe.multibody import integrate
-from gearfe.stiffness.sweep import sweep_stiffness
 
 from ..housing_meshes import reference_housing
 from .mechanism_study import subject
@@ -175,7 +175,7 @@ def iso(coarsen: float, which: str) -> Found:
 
 def patch(which: str) -> Found:
     """Elements with inner nodes anywhere: a linear displacement on the boundary is met inside, to rounding."""
-    from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
+    from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 
     pair = reference_pair()
     mesh = sector_mesh(pair.pinion, sector_recipes(pair, coarsen=4.0)[0])
@@ -186,8 +186,8 @@ def _patch(points: np.ndarray, triangles: np.ndarray, which: str) -> Found:
     from scipy.sparse.linalg import spsolve
     from skfem import CellBasis, ElementTriP2, ElementVector, MeshTri, MeshTri2
 
-    from gearfe.contact.whole_gears.bodies import stiffness_form
-    from gearfe.elasticity import Material
+    from gearfe.fem.plane import Material
+    from gearfe.gears.contact.whole_gears.bodies import stiffness_form
 
     if which == "strain":  # straight sides, distorted inside: second-order elements hold linear fields exactly there
         mesh: Any = MeshTri.init_tensor(np.linspace(0, 1, 5) ** 1.3, np.linspace(0, 1, 5) ** 0.8)

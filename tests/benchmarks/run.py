@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from gearfe.progress import one_thread
+from gearfe.base.progress import one_thread
 
 from .record import Record, open_record, told
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.runup.run_up import run_up, steady_state
-from gearfe.train import simulate
+from gearfe.drivetrain.runup.run_up import run_up, steady_state
+from gearfe.drivetrain.train import simulate
 
 from .peers.process import PeerError, missing, run_python
 from .record import Record

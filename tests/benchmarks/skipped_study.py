@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.stiffness.positions import position_solver
-from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.stiffness.positions import position_solver
+from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .record import Record
 from .subject import GEOMETRY, ROOT, housing_of, shipped_housing, shipped_pair
@@ -49,7 +49,7 @@ def _cpu(job: Callable[[], Any], runs: int = 2) -> float:
 
 def one_sector(quick: bool) -> tuple[float, float, str]:
     """Condensing one tooth sector of each gear; assembling and factorising the whole gears once."""
-    from gearfe.reduction.sparse_solver import factorize
+    from gearfe.fem.reduction.sparse_solver import factorize
 
     pair, coarsen = shipped_pair(), 5.0 if quick else 2.0
     short = _cpu(lambda: elastic_pair(pair, coarsen=coarsen))
@@ -92,7 +92,7 @@ def neighbours(quick: bool) -> tuple[float, float, str]:
 
 def fields(quick: bool) -> tuple[float, float, str]:
     """A sweep without fields; with displacement and stress of the whole gears at every position."""
-    from gearfe.stiffness.fields import field_recovery
+    from gearfe.gears.stiffness.fields import field_recovery
 
     pair = shipped_pair()
     elastic = elastic_pair(pair, coarsen=5.0 if quick else 1.0)
@@ -117,7 +117,7 @@ def _process(code: str, **extra: str) -> float:
 
 
 RIGID = """
-from gearfe.train import simulate
+from gearfe.drivetrain.train import simulate
 from tests.benchmarks.subject import train_model, train_times
 simulate(train_model("tutorial", quick=True), train_times(True))
 """
@@ -128,7 +128,7 @@ def rigid_housing(quick: bool) -> tuple[float, float, str]:
     short = _process(RIGID)
     housing = housing_of(24.0 if quick else 9.0, small=quick)
     more = _cpu(lambda: housing.reduce(10 if quick else 40), 1)
-    loaded = _process(RIGID + "\nimport skfem, gearfe.housing, gearfe.meshing.housing_mesh")
+    loaded = _process(RIGID + "\nimport skfem, gearfe.drivetrain.housing, gearfe.fem.meshing.housing_mesh")
     return short, loaded + more, f"housing of {housing.unknowns} unknowns, assembled and reduced"
 
 
@@ -141,7 +141,7 @@ def modes_above(quick: bool) -> tuple[float, float, str]:
 
 def cached_meshes(_quick: bool) -> tuple[float, float, str]:
     """Both tooth sectors from the cache, and from gmsh."""
-    from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
+    from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 
     pair = shipped_pair()
     each = list(zip((pair.pinion, pair.wheel), sector_recipes(pair), strict=True))
@@ -155,7 +155,7 @@ def cached_meshes(_quick: bool) -> tuple[float, float, str]:
 
 def cached_body(quick: bool) -> tuple[float, float, str]:
     """A reduced housing loaded, and made from its mesh."""
-    from gearfe.reduction.modal_body import ModalBody
+    from gearfe.fem.reduction.modal_body import ModalBody
 
     housing = housing_of(24.0, small=True) if quick else housing_of(shipped_housing().mesh.size_mm)
     made, cost = measured(lambda: housing.reduce(10 if quick else 60), runs=1)

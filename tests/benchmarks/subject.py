@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from gearfe.gear.pair import GearPair
-    from gearfe.housing.model import Housing
-    from gearfe.tables.housing import HousingTable
-    from gearfe.train import GearTrain
+    from gearfe.base.tables.housing import HousingTable
+    from gearfe.drivetrain.housing.model import Housing
+    from gearfe.drivetrain.train import GearTrain
+    from gearfe.gears.geometry.pair import GearPair
 
 ROOT = Path(__file__).resolve().parents[2]
 GEOMETRY = ROOT / "geometry"
@@ -32,7 +32,7 @@ def given_file(path: Path) -> Path:
         When it is not there: the benchmark runs in a copy of the repository.
     """
     if not path.exists():
-        from gearfe.errors import InputError
+        from gearfe.base.errors import InputError
 
         cure = "run the benchmark in a copy of the repository, which holds the shipped jobs and the reference data"
         raise InputError("benchmark", str(path), "is not there", cure)
@@ -41,14 +41,14 @@ def given_file(path: Path) -> Path:
 
 def shipped_pair() -> GearPair:
     """20/30 teeth with tip rounds of 0.1 mm, `geometry/gear_train.toml`."""
-    from gearfe.stiffness.job import read_stiffness_job
+    from gearfe.gears.stiffness.job import read_stiffness_job
 
     return read_stiffness_job(given_file(GEOMETRY / "gear_train.toml")).pair
 
 
 def reference_pair() -> GearPair:
     """The sharp-tipped pair of `tests/data/gear_pair_20_30.csv`, bores of 0.35 times the pitch diameter."""
-    from gearfe.gear.pair import Gear, GearPair
+    from gearfe.gears.geometry.pair import Gear, GearPair
 
     form: dict[str, Any] = {"module": 2.5e-3, "pressure_angle": math.radians(25.0), "face_width": 10e-3}
     pinion, wheel = (Gear(z, bore_diameter=0.35 * z * 2.5e-3, **form) for z in (20, 30))
@@ -66,7 +66,7 @@ def off_changes(pair: GearPair, angles: np.ndarray, margin: float) -> np.ndarray
 @lru_cache(maxsize=1)
 def shipped_housing() -> HousingTable:
     """Table ``[housing]`` of the shipped job."""
-    from gearfe.tables.jobs import load_job
+    from gearfe.base.tables.jobs import load_job
 
     table: HousingTable = load_job(given_file(GEOMETRY / "gear_train.toml"), ("housing",))["housing"]
     return table
@@ -74,7 +74,7 @@ def shipped_housing() -> HousingTable:
 
 def housing_of(size_mm: float, *, small: bool = False) -> Housing:
     """The shipped housing with elements `size_mm` thick at inner edges; small: about one of its shafts, and short."""
-    from gearfe.housing.build import housing_from_table
+    from gearfe.drivetrain.housing.build import housing_from_table
 
     table = shipped_housing()
     if small:
@@ -96,10 +96,10 @@ def train_model(variant: str, *, quick: bool = False, modes: int | None = None, 
     speed
         Of the drive (rad/s), in place of the variant's.
     """
-    from gearfe.gearbox.job import job_train, read_train_job, train_body
-    from gearfe.gearbox.mesh_stiffness import train_curves
+    from gearfe.drivetrain.gearbox.job import job_train, read_train_job, train_body
+    from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
+    from gearfe.drivetrain.train import build_train
     from gearfe.multibody import constant
-    from gearfe.train import build_train
 
     parting = variant == "parting"
     job = read_train_job(given_file(GEOMETRY / "gear_train.toml"), "operating" if parting else variant)

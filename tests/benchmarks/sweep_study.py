@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.contact.laws import DEFAULT_MODEL
-from gearfe.gear.pair import GearPair
-from gearfe.meshing.tooth_sector import sector_mesh, sector_recipes
-from gearfe.stiffness.curve import StiffnessCurve
-from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
-from gearfe.tables.pair import DEFAULT_LAW, LAWS
+from gearfe.base.tables.pair import DEFAULT_LAW, LAWS
+from gearfe.gears.contact.laws import DEFAULT_MODEL
+from gearfe.gears.geometry.pair import GearPair
+from gearfe.gears.stiffness.curve import StiffnessCurve
+from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 
 from .record import Record
 from .subject import off_changes, shipped_pair
@@ -126,8 +126,8 @@ def verification(record: Record) -> None:
         return {"error": found["error"], "setup_cpu_s": setup.cpu_s, "position_cpu_s": cost.cpu_s / len(at)}
 
     def whole(coarsen: float) -> Mapping[str, Any]:
-        from gearfe.contact.laws import Nitsche
-        from gearfe.contact.whole_gears.position import solve_position
+        from gearfe.gears.contact.laws import Nitsche
+        from gearfe.gears.contact.whole_gears.position import solve_position
 
         gears, setup = measured(lambda: assembled_pair(pair, coarsen), runs=1)
         solved, cost = measured(lambda: [solve_position(gears, Nitsche(), a, TWIST) for a in at], runs=1)
@@ -146,8 +146,8 @@ def verification(record: Record) -> None:
 
 def assembled_pair(pair: GearPair, coarsen: float) -> Any:
     """Both whole gears, assembled (plane strain, steel)."""
-    from gearfe.contact.laws import Nitsche, PairModel
-    from gearfe.contact.whole_gears.pair import whole_pair
+    from gearfe.gears.contact.laws import Nitsche, PairModel
+    from gearfe.gears.contact.whole_gears.pair import whole_pair
 
     gears = whole_pair(pair, PairModel(law=Nitsche(), coarsen=coarsen))
     _ = gears.bodies.stiffness  # assembled on first use, shared by all positions

@@ -150,7 +150,7 @@ SECTIONS: tuple[Section, ...] = (
         "sweep_verification",
         "Mesh stiffness: whole gears",
         "One position at small strain on gears condensed to their flanks, and on whole gears with all unknowns at "
-        "once (`gearfe.contact.whole_gears`), the same elements.",
+        "once (`gearfe.gears.contact.whole_gears`), the same elements.",
         {
             "model": ("model", PLAIN),
             "coarsen": ("`coarsen`", digits),

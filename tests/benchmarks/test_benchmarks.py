@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.tables.pair import LAWS
+from gearfe.base.tables.pair import LAWS
 
 from ..script import answered
 from . import command
@@ -69,7 +69,7 @@ def test_interrupted_while_writing_the_old_table_stays(tmp_path, monkeypatch):
     def interrupted(value):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gearfe.files._cell", interrupted)
+    monkeypatch.setattr("gearfe.base.files._cell", interrupted)
     with pytest.raises(KeyboardInterrupt):
         record.row(table, {"value": 2}, lambda: {"x": 2.0})
     assert (tmp_path / "numbers.csv").read_text() == before
@@ -155,7 +155,7 @@ def test_equations_for_other_programs_are_those_of_the_mechanisms():
 def test_compiled_equations_of_the_train_for_other_programs_are_the_plain_ones():
     import dataclasses
 
-    from gearfe.train import build_train
+    from gearfe.drivetrain.train import build_train
 
     from ..test_runup_train import loaded, smooth
     from .peers.train_transient import compiled_rhs, plain_rhs

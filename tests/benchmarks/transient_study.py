@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.train import simulate
-from gearfe.train.states import train_states
+from gearfe.drivetrain.train import simulate
+from gearfe.drivetrain.train.states import train_states
 
 from .peers.process import PeerError, missing, run_python
 from .record import Record

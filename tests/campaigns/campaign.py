@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.errors import unknown_name
+from gearfe.base.errors import unknown_name
 
 from .outcome import Finding, Outcome
 

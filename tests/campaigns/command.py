@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from gearfe.progress import stage
+from gearfe.base.progress import stage
 
 HELP = "random campaigns that look for crashes, hangs and wrong results"
 
@@ -28,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run; 1 when a case crashed, hung, ended with a traceback or gave a wrong result."""
-    from gearfe.errors import InputError
-    from gearfe.files import output_folder
+    from gearfe.base.errors import InputError
+    from gearfe.base.files import output_folder
 
     from .campaign import CAMPAIGNS, campaign_named
     from .outcome import CLASSES
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _alone(names: list[str], seed: int, number: int) -> int:
     """One case in this process."""
-    from gearfe.errors import InputError
+    from gearfe.base.errors import InputError
 
     from .campaign import campaign_named
     from .worker import run_case

@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.tables.housing import HousingMeshTable
-from gearfe.tables.jobs import load_job
-from gearfe.tables.pair import LAWS
+from gearfe.base.tables.housing import HousingMeshTable
+from gearfe.base.tables.jobs import load_job
+from gearfe.base.tables.pair import LAWS
 
 from .campaign import Campaign, Case, Columns
 from .linkages import linkage
@@ -89,8 +89,8 @@ def _draw_curve(random: np.random.Generator, number: int, kind: str) -> Case:
 
 def _run_curve(case: Case, job_path: Path) -> Found:
     """Worst relative error over six positions."""
-    from gearfe.stiffness.job import read_stiffness_job
-    from gearfe.stiffness.sweep import sweep_stiffness
+    from gearfe.gears.stiffness.job import read_stiffness_job
+    from gearfe.gears.stiffness.sweep import sweep_stiffness
 
     job = read_stiffness_job(job_path)
     del case
@@ -152,9 +152,9 @@ def _draw_response(random: np.random.Generator, number: int, kind: str) -> Case:
 
 def _run_response(case: Case, job_path: Path) -> Found:
     """Worst error of a contact force over the run, relative to its largest value."""
-    from gearfe.gearbox.job import job_train, read_train_job
-    from gearfe.gearbox.mesh_stiffness import train_curves
-    from gearfe.train import build_train, simulate
+    from gearfe.drivetrain.gearbox.job import job_train, read_train_job
+    from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
+    from gearfe.drivetrain.train import build_train, simulate
 
     del case
     job = read_train_job(job_path)
@@ -176,8 +176,8 @@ def _draw_body(random: np.random.Generator, number: int, kind: str) -> Case:
 
 def _run_frequencies(case: Case, job_path: Path) -> Found:
     """Of the first ten natural frequencies that whose error is largest against its estimate."""
-    from gearfe.housing.body import reduced_housing
-    from gearfe.reduction.error import mesh_error, reduction_error
+    from gearfe.drivetrain.housing.body import reduced_housing
+    from gearfe.fem.reduction.error import mesh_error, reduction_error
 
     del case
     table = load_job(job_path, ("housing",))["housing"]
@@ -192,8 +192,8 @@ def _run_frequencies(case: Case, job_path: Path) -> Found:
 
 def _run_reduction(case: Case, job_path: Path) -> Found:
     """Accelerances of the bores up to the band's end, rms, against a body with many more modes."""
-    from gearfe.housing.build import housing_from_table, reduced
-    from gearfe.reduction.error import accelerances, reduction_error
+    from gearfe.drivetrain.housing.build import housing_from_table, reduced
+    from gearfe.fem.reduction.error import accelerances, reduction_error
 
     del case
     table = load_job(job_path, ("housing",))["housing"]

@@ -189,8 +189,8 @@ def closed_run(case: Case, folder: Path) -> Finding:
     (folder / "file").write_text("no folder\n", encoding="utf-8")
     place = places[int(case.data["choice"]) % len(places)]
     if "\x00" in place:  # no process can be given that: the library is asked
-        from gearfe.errors import InputError
-        from gearfe.files import output_folder
+        from gearfe.base.errors import InputError
+        from gearfe.base.files import output_folder
 
         try:
             output_folder(place)

@@ -15,8 +15,8 @@ import math
 
 import numpy as np
 
-from gearfe.reduction.modal_body import ModalBody
-from gearfe.typing import Array
+from gearfe.base.typing import Array
+from gearfe.fem.reduction.modal_body import ModalBody
 
 from .pairs import log_uniform
 

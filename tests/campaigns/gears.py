@@ -21,15 +21,15 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.contact.compliance import MeshingPair
-from gearfe.contact.laws import HalfPlane
-from gearfe.contact.position import Positions
-from gearfe.gear.pair import GearPair
-from gearfe.stiffness.curve import SOLVED
-from gearfe.stiffness.job import read_stiffness_job
-from gearfe.stiffness.positions import ANGLE_ROUNDING, PositionSolver, position_solver
-from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
-from gearfe.tables.pair import DEFAULT_LAW, LAWS
+from gearfe.base.tables.pair import DEFAULT_LAW, LAWS
+from gearfe.gears.contact.compliance import MeshingPair
+from gearfe.gears.contact.laws import HalfPlane
+from gearfe.gears.contact.position import Positions
+from gearfe.gears.geometry.pair import GearPair
+from gearfe.gears.stiffness.curve import SOLVED
+from gearfe.gears.stiffness.job import read_stiffness_job
+from gearfe.gears.stiffness.positions import ANGLE_ROUNDING, PositionSolver, position_solver
+from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .campaign import Campaign, Case
 from .outcome import Check, Finding

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gearfe.cache import cache_folder
+from gearfe.base.cache import cache_folder
 
 from .campaign import Case
 from .outcome import Check, Finding
@@ -79,7 +79,7 @@ def mutated_run(case: Case, folder: Path) -> Finding:
     if not _INSTALLED:
         sys.addaudithook(_WATCH)
         _INSTALLED.append(True)
-    main = importlib.import_module("gearfe.cli").main  # the program as a user meets it
+    main = importlib.import_module("gearfe.cli.main").main  # the program as a user meets it
     job = case.write(folder)
     given = [str(a) for a in case.data["arguments"]]
     out = folder / "out"

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.contact.compliance import MeshingPair
-from gearfe.contact.laws import HalfPlane, Nitsche
-from gearfe.stiffness.job import StiffnessJob, read_stiffness_job
-from gearfe.stiffness.sweep import elastic_pair
+from gearfe.gears.contact.compliance import MeshingPair
+from gearfe.gears.contact.laws import HalfPlane, Nitsche
+from gearfe.gears.stiffness.job import StiffnessJob, read_stiffness_job
+from gearfe.gears.stiffness.sweep import elastic_pair
 
 from ..solving import solve_positions
 from .campaign import Campaign, Case, Columns

@@ -14,7 +14,7 @@ Table = dict[str, Any]
 Made = tuple[Table, dict[str, Any]]
 
 GRAVITY = 9.81
-#: Tolerance of mechanisms, as `gearfe.tables.mechanism` has it.
+#: Tolerance of mechanisms, as `gearfe.base.tables.mechanism` has it.
 DEFAULT = 1e-9
 
 

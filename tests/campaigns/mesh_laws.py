@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.contact.half_plane import half_plane_pair, solve_half_plane
-from gearfe.meshlaw.make import LEAST_FORCE, mesh_law
-from gearfe.stiffness.job import read_stiffness_job
+from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
+from gearfe.gears.meshlaw.make import LEAST_FORCE, mesh_law
+from gearfe.gears.stiffness.job import read_stiffness_job
 
 from .campaign import Campaign, Case, Columns
 from .outcome import Check, Finding, Outcome

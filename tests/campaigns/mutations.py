@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from gearfe.tables.examples import HOUSING, MECHANISM, PAIR, TRAIN
+from gearfe.base.tables.examples import HOUSING, MECHANISM, PAIR, TRAIN
 
 from .toml_text import toml_text
 

@@ -12,21 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.config import build
-from gearfe.errors import InputError
-from gearfe.gear.pair import GearPair
-from gearfe.tables.pair import PairTable
+from gearfe.base.config import build
+from gearfe.base.errors import InputError
+from gearfe.base.tables.pair import PairTable
+from gearfe.gears.geometry.pair import GearPair
 
 Table = dict[str, Any]
 
-#: Numbers of teeth, and the largest overlap (modules): within what `gearfe.gear.validity` allows.
+#: Numbers of teeth, and the largest overlap (modules): within what `gearfe.gears.geometry.validity` allows.
 TEETH, LARGEST_OVERLAP = (10, 150), 0.1
 #: Torques as shares of what the material bears.
 TORQUES = (1e-4, 1.0)
 #: Strain E/sigma_FE that a tooth root bears, and the factors Y_F Y_S of ISO 6336-3 on the nominal stress F/(b m). A
 #: case-hardened steel has sigma_FE = 1000 N/mm2 (ISO 6336-5, grade MQ), 0.5 % of its modulus.
 BORNE, ROOT_FACTORS = 5e-3, 4.3
-#: Young's modulus of gears without a [material] (GPa), as `gearfe.tables.pair` has it.
+#: Young's modulus of gears without a [material] (GPa), as `gearfe.base.tables.pair` has it.
 STEEL_GPA = 200.0
 #: One in so many cases has another value than the default of a numerical option.
 SELDOM = 0.1

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from gearfe import __version__
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
 
 from .outcome import Outcome
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.files import whole_file, write_csv
+from gearfe.base.files import whole_file, write_csv
 
 from .campaign import Campaign
 from .outcome import CLASSES, Outcome

@@ -25,7 +25,7 @@ KINDS = (
     "order",
     "stiff",
 )
-#: Tolerance of trains, as `gearfe.tables.train` has it.
+#: Tolerance of trains, as `gearfe.base.tables.train` has it.
 DEFAULT = 1e-6
 MODULE, ALPHA = 2.5, 25.0
 #: Length of a run that is to settle, times its damping per mass.

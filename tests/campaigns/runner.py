@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gearfe.progress import count
+from gearfe.base.progress import count
 
 from .campaign import Campaign, campaign_named
 from .outcome import Outcome

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.errors import InputError
+from gearfe.base.errors import InputError
+from gearfe.cli.main import main
 
 from ..script import answered
 from . import command

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.train import Bearing, Damping, build_train, simulate
+from gearfe.drivetrain.train import Bearing, Damping, build_train, simulate
 
 from ..trains import changed, train
 from .campaign import Case, campaign_named

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from gearfe.errors import InputError
-from gearfe.stiffness.job import read_stiffness_job
-from gearfe.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.base.errors import InputError
+from gearfe.gears.stiffness.job import read_stiffness_job
+from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .campaign import Case
 from .gears import run

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.cli import main
-from gearfe.errors import InputError
-from gearfe.files import whole_set
+from gearfe.base.errors import InputError
+from gearfe.base.files import whole_set
+from gearfe.cli.main import main
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import trajectory_error
 from gearfe.multibody import integrate

@@ -23,12 +23,12 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.gearbox.job import job_train, read_train_job, train_body
-from gearfe.gearbox.mesh_stiffness import train_curves
+from gearfe.drivetrain.gearbox.job import job_train, read_train_job, train_body
+from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
+from gearfe.drivetrain.runup.train_stability import train_stability
+from gearfe.drivetrain.train import TrainModel, TrainResponse, build_train, simulate
+from gearfe.drivetrain.train.states import train_states
 from gearfe.multibody import integrate
-from gearfe.runup.train_stability import train_stability
-from gearfe.train import TrainModel, TrainResponse, build_train, simulate
-from gearfe.train.states import train_states
 
 from .campaign import Campaign, Case
 from .frames import symmetric_frame

@@ -10,7 +10,7 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from gearfe.errors import InputError, MissingLibraryError
+from gearfe.base.errors import InputError, MissingLibraryError
 
 from .campaign import Campaign, campaign_named
 from .outcome import Outcome, judged

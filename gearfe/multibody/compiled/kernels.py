@@ -4,7 +4,7 @@ The kernel modules hold plain functions that call one another by name. `bind` pu
 those that Python calls. With `NUMBA_DISABLE_JIT=1` in the environment, numba's own switch for debugging, they stay
 Python functions: a debugger steps through them, some hundred times slower.
 
-Compiled code (`multibody.compiled.object_code`) is kept in the cache folder (`gearfe.cache`) below a hash of its
+Compiled code (`multibody.compiled.object_code`) is kept in the cache folder (`gearfe.base.cache`) below a hash of its
 sources, of the compiler and of the processor: no stale code after an upgrade, one form for all installations of the
 same sources, nothing written to the installed package.
 """
@@ -25,9 +25,9 @@ from pathlib import Path
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
-from ... import cache
-from ...environment import interpreted, named_folder
-from ...progress import announce, stage
+from ...base import cache
+from ...base.environment import interpreted, named_folder
+from ...base.progress import announce, stage
 from .object_code import Entry, ObjectCode, import_numba
 from .packed import Layout, Packed
 from .parts import part_options, uncollected

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...isolation import load
+from ...base.isolation import load
 
 if TYPE_CHECKING:
     from .packed import Layout, Packed

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...typing import Array
+from ...base.typing import Array
 
 #: Bytes at a multiple of which vectors of the processor begin.
 ALIGNED = 64

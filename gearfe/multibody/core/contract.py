@@ -69,7 +69,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...typing import Array, IntArray
+from ...base.typing import Array, IntArray
 
 if TYPE_CHECKING:
     from ..series.tape import Tape

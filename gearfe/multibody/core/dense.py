@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import InputError
-from ...typing import Array
+from ...base.errors import InputError
+from ...base.typing import Array
 
 #: Times may lie outside of the run by so much of its length: rounding of output times.
 SLACK = 1e-9

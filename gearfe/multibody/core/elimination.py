@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...typing import Array
+from ...base.typing import Array
 from .contract import Element, LocalForce, ModalBlocks
 from .start import Start
 from .system import System

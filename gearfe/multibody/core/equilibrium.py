@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...errors import InputError
-from ...typing import Array
+from ...base.errors import InputError
+from ...base.typing import Array
 from .mass_regularisation import free_motions
 from .start import Start
 from .system import System

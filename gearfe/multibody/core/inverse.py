@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
-from ...typing import Array
+from ...base.errors import InputError
+from ...base.typing import Array
 from .dense import hermite
 from .mass_regularisation import RANK
 from .start import Start, close, closes

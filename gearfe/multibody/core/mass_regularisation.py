@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...errors import InputError
-from ...typing import Array
+from ...base.errors import InputError
+from ...base.typing import Array
 from .system import System
 
 #: Effective mass over own mass from which on a link counts as light: less costs no more than 4 of the 16 digits.

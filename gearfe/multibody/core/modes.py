@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...typing import Array
+from ...base.typing import Array
 from .equilibrium import Equilibrium, check_rests, stiffness_at
 from .mass_regularisation import free_motions
 from .start import Start

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...typing import Array
+from ...base.typing import Array
 from .system import System
 
 #: Singular values of the gradients below this share of the largest count as zero: a gap of 1e-10, which closed

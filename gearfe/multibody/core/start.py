@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...errors import InputError
-from ...typing import Array
+from ...base.errors import InputError
+from ...base.typing import Array
 from .mass_regularisation import RANK, added_masses, free_motions
 from .second_order import SINGULAR, hidden_freedoms, motions_of_second_order
 from .system import System

@@ -18,8 +18,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
-from ...progress import announce
-from ...typing import Array
+from ...base.progress import announce
+from ...base.typing import Array
 
 #: ``watch(t, steps, state)``: the time reached, the steps done, and a function that gives (q, v) there; False ends the
 #: run. Called once with no steps when all is loaded, then after every few steps.

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...typing import Array, BoolArray
+from ...base.typing import Array, BoolArray
 from .modes import rates
 from .start import Start
 from .system import System

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ...errors import InputError
-from ...typing import Array, IntArray
+from ...base.errors import InputError
+from ...base.typing import Array, IntArray
 from ..series.tape import Program, Tape
 from .contract import Element
 from .tape_evaluation import TapeElement

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...typing import Array, IntArray
-from ..series.tape import (  # fmt: skip
+from ...base.typing import Array, IntArray
+from ..series.tape import (
     ANGLE,
     COS,
     DIV,

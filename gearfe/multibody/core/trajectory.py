@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ...shown import Shown, library
-from ...typing import Array
+from ...base.shown import Shown, library
+from ...base.typing import Array
 from .contract import Element
 from .dense import Dense
 from .start import Start

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...typing import Array
+from ...base.typing import Array
 from ..core.steps import Status, StepControl
 from ..core.system import System
 

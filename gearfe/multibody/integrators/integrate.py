@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import InputError
-from ...progress import count, stage
-from ...typing import Array
+from ...base.errors import InputError
+from ...base.progress import count, stage
+from ...base.typing import Array
 from ..core.dense import Dense
 from ..core.elimination import is_linear, modal_coordinates
 from ..core.mass_regularisation import loose_link

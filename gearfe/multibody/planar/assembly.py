@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import InputError, shown, unknown_name
-from ...typing import Array, BoolArray
+from ...base.errors import InputError, shown, unknown_name
+from ...base.typing import Array, BoolArray
 from ..series.ordering import elimination_order
 from ..series.timefunctions import TimeFunction, constant
 from .bodies import Body, Frames

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...typing import Array, IntArray
+from ...base.typing import Array, IntArray
 from ..core.contract import Element
 from .beam_link import NODES, BeamLink
 from .linkage import Linkage

@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ...errors import InputError
-from ...typing import Array
+from ...base.errors import InputError
+from ...base.typing import Array
 from .bodies import Body
 from .forms import Point
 

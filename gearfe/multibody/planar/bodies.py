@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...errors import InputError
+from ...base.errors import InputError
 from .forms import Form, Point, Vector
 
 #: Masses and inertias below this, or above its inverse, overflow in products.

@@ -13,7 +13,7 @@ import math
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 
-from ...errors import InputError
+from ...base.errors import InputError
 from .bodies import Frames
 from .forms import GROUND, Form, Point
 from .joints import Fixed, Hinge, Joint, Prismatic, Profile, Row, Slot

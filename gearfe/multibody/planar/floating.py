@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...typing import Array, IntArray
+from ...base.typing import Array, IntArray
 from ..core.contract import Element
 from .linkage import Linkage
 from .quadratic import QuadraticJoint

@@ -1,6 +1,6 @@
 """Planar forces as plain data, each with the forms and vectors that it acts along.
 
-A new force is a class here, or in a file of its own, with `parts`; its line in `gearfe.tables.kinds.FORCES` makes
+A new force is a class here, or in a file of its own, with `parts`; its line in `gearfe.base.tables.kinds.FORCES` makes
 it known to mechanism files.
 """
 
@@ -11,8 +11,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from ...errors import InputError
-from ...typing import Array
+from ...base.errors import InputError
+from ...base.typing import Array
 from ..series.timefunctions import TimeFunction, constant
 from .bodies import Frames
 from .forms import GROUND, Form, Point, Vector

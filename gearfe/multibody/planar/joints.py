@@ -1,6 +1,6 @@
 """Planar joints as plain data, each with the forms that it holds at zero.
 
-A new joint is a class here, or in a file of its own, with `rows`; its line in `gearfe.tables.kinds.JOINTS` makes it
+A new joint is a class here, or in a file of its own, with `rows`; its line in `base.tables.kinds.JOINTS` makes it
 known to mechanism files. Nothing else changes: every integrator gets the joint from its forms
 (`multibody.planar.forms`).
 """
@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ..series.timefunctions import TimeFunction
 from .bodies import Frames
 from .forms import GROUND, Form, Point

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import InputError
-from ...typing import Array, IntArray
+from ...base.errors import InputError
+from ...base.typing import Array, IntArray
 from ..core.tape_evaluation import TapeElement, TapeValues
 from ..series.tape import Tape
 from ..series.timefunctions import TimeFunction

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...typing import Array, IntArray
+from ...base.typing import Array, IntArray
 from ..core.contract import Element
 from ..core.tape_evaluation import TapeElement
 from ..series.tape import Tape

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...typing import Array
+from ...base.typing import Array
 from .bodies import Frames
 from .forces import Along, Force, StateFunction, Tension, Weight
 

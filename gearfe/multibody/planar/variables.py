@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ...typing import IntArray
+from ...base.typing import IntArray
 from ..series.tape import Tape
 from .forms import Form, Vector
 

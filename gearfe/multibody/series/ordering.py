@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...typing import IntArray
+from ...base.typing import IntArray
 
 
 class Factor(NamedTuple):

@@ -36,25 +36,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...typing import Array, IntArray
-from .tape import (  # fmt: skip
-    ANGLE,
-    COS,
-    DIV,
-    ENTRY,
-    EXP,
-    FUNCTION,
-    LINEAR,
-    LOG,
-    MUL,
-    POWER,
-    RATE,
-    SHIFT,
-    SIDE,
-    SIN,
-    SUM,
-    TANH,
-)
+from ...base.typing import Array, IntArray
+from .tape import ANGLE, COS, DIV, ENTRY, EXP, FUNCTION, LINEAR, LOG, MUL, POWER, RATE, SHIFT, SIDE, SIN, SUM, TANH
 
 if TYPE_CHECKING:
     from .row_tables import Equations

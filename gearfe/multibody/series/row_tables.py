@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...typing import Array, IntArray
+from ...base.typing import Array, IntArray
 from .ordering import Factor, symbolic_factor
 from .tape import Program
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...typing import Array, BoolArray, IntArray
+from ...base.typing import Array, BoolArray, IntArray
 from .timefunctions import TimeFunction, Times, time_arrays
 
 #: Operations: f a + g b + c; of the variables, of their rates; of time; products and so on, see `recurrences`.

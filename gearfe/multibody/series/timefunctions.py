@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import InputError
-from ...typing import Array, IntArray
+from ...base.errors import InputError
+from ...base.typing import Array, IntArray
 
 
 @dataclass(frozen=True)

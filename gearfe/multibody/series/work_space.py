@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...typing import Array, IntArray
+from ...base.typing import Array, IntArray
 from .row_tables import Equations
 
 

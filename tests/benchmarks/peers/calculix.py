@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.housing.model import Housing
+from gearfe.drivetrain.housing.model import Housing
 
 from .contact_mesh import ContactTask
 from .process import PeerError, Spent, run_process
@@ -122,8 +122,8 @@ def clamped_modes(housing: Housing, count: int) -> tuple[np.ndarray, Spent]:
 
 
 def _as_vtk(tets: np.ndarray) -> np.ndarray:
-    """Our midside nodes (order of `gearfe.solid.EDGES`) in the order of edges 01, 12, 20, 03, 13, 23."""
-    from gearfe.solid import EDGES
+    """Our midside nodes (order of `gearfe.fem.solid.EDGES`) in the order of edges 01, 12, 20, 03, 13, 23."""
+    from gearfe.fem.solid import EDGES
 
     wanted = [{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}]
     ours = [set(map(int, edge)) for edge in EDGES]

@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gearfe.drivetrain.train.forces import CurveFlank
+from gearfe.gears.stiffness.periodic import Curves, curve_arrays
 from gearfe.multibody.compiled.packed import Packed
 from gearfe.multibody.series.recurrences import time_series
 from gearfe.multibody.series.timefunctions import Times, time_arrays
-from gearfe.stiffness.periodic import Curves, curve_arrays
-from gearfe.train.forces import CurveFlank
 
 from ..subject import train_model, train_times
 from ..timing import measured
@@ -137,7 +137,7 @@ def law_parameters(forces: Any) -> Law:
 
 
 def train_law(t, u, du, law, out):  # type: ignore[no-untyped-def]
-    """Forces along all directions into `out`: the equations of `gearfe.train.forces`, written out for one time."""
+    """Forces along all directions into `out`: the equations of `drivetrain.train.forces`, written out for one time."""
     times, now, torques, flanks, curves, gyros = law.times, law.now, law.torques, law.flanks, law.curves, law.gyros
     time_series(times, t, True, 2, now)
     for i in range(out.shape[0]):

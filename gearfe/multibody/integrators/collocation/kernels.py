@@ -41,7 +41,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ....typing import Array, IntArray
+from ....base.typing import Array, IntArray
 from ...compiled.simd import NAMES as SIMD
 from ...compiled.simd import SimdArray
 from ...series.recurrences import NAMES as RECURRENCES

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ....typing import Array
+from ....base.typing import Array
 from ...compiled import simd
 from ...core.start import Start, on_constraints
 from ...core.system import System

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ....progress import announce
-from ....typing import Array
+from ....base.progress import announce
+from ....base.typing import Array
 from ...compiled.kernels import Kernels, bind, packed
 from ...core.contract import LocalForce
 from ...core.dense import Polynomials

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....typing import Array
+from ....base.typing import Array
 from ...compiled.simd import SimdArray, simd_copy
 from ...core.dense import Polynomials
 

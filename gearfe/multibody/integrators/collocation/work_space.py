@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....typing import Array, IntArray
+from ....base.typing import Array, IntArray
 from ...compiled.simd import SimdArray, simd_zeros
 from ...series.ordering import narrow_order
 from ...series.tape import Program

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....typing import Array, IntArray
+from ....base.typing import Array, IntArray
 from .kernels import next_goal
 
 #: Orders that are computed in any case: a force that sets in as a polynomial of degree 5 shows up to order 7.

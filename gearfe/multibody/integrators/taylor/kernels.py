@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ....typing import Array, IntArray
+from ....base.typing import Array, IntArray
 from ...core.steps import Status
 from ...series.recurrences import (
     OUTSIDE,

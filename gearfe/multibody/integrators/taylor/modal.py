@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ....typing import Array
+from ....base.typing import Array
 from ...compiled.kernels import Kernels, packed
 from ...core.contract import LocalForce, SeriesLaw
 from ...core.dense import Dense, within_run

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....typing import Array, IntArray
+from ....base.typing import Array, IntArray
 from ...compiled.kernels import Kernels, packed
 from ...core.dense import Polynomials
 from ...core.start import Start

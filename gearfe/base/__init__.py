@@ -1,0 +1,1 @@
+"""What every package may use: mistakes of users, files, tables of job files, expressions, spectra, progress."""

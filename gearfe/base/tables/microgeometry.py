@@ -1,0 +1,118 @@
+"""The [microgeometry] table: deviations of micrometres of both gears, in everyday units."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, fields
+
+from ..config import quantity
+from ..errors import InputError
+from .loadmap import LoadMapTable
+
+SHAPES = ("linear", "arc", "parabolic")
+#: Keys of which at most one says where a relief starts.
+STARTS = ("length_mm", "start_mm", "start_diameter_mm")
+#: Keys of which at most one says where it has its amount.
+ENDS = ("end_mm", "end_diameter_mm")
+
+
+@dataclass(frozen=True)
+class WavinessTable:
+    """A wave on the flanks of all teeth, which goes on from tooth to tooth."""
+
+    amplitude_um: float = quantity(doc="amplitude (um)", low=0.0)
+    waves: int = quantity(doc="whole waves round the gear", low=1, high=100_000)
+    phase_deg: float = quantity(0.0, doc="phase (deg)")
+
+
+@dataclass(frozen=True)
+class FlankTable:
+    """Deviations of the flanks of a gear along their normals, over the roll length; > 0 is more material."""
+
+    tip_relief_um: float | None = quantity(None, doc="tip relief (um), at the tip circle", low=0.0)
+    tip_relief_length_mm: float | None = quantity(None, doc="roll length of it from the tip circle (mm)", above=0.0)
+    tip_relief_start_mm: float | None = quantity(None, doc="or the roll length where it starts (mm)", above=0.0)
+    tip_relief_start_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
+    tip_relief_end_mm: float | None = quantity(
+        None, doc="roll length where it has its amount (mm), if not the tip circle", above=0.0
+    )
+    tip_relief_end_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
+    tip_relief_shape: str = quantity("linear", doc="linear, arc or parabolic", choices=SHAPES)
+    root_relief_um: float | None = quantity(None, doc="root relief (um), at the form circle", low=0.0)
+    root_relief_length_mm: float | None = quantity(None, doc="roll length of it from the form circle (mm)", above=0.0)
+    root_relief_start_mm: float | None = quantity(None, doc="or the roll length where it starts (mm)", above=0.0)
+    root_relief_start_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
+    root_relief_end_mm: float | None = quantity(
+        None, doc="roll length where it has its amount (mm), if not the form circle", low=0.0
+    )
+    root_relief_end_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
+    root_relief_shape: str = quantity("linear", doc="linear, arc or parabolic", choices=SHAPES)
+    crowning_um: float = quantity(0.0, doc="profile crowning (um), the ends lie that much back")
+    slope_um: float = quantity(0.0, doc="profile slope (um), from form to tip circle, > 0: more material at the tip")
+    waviness: tuple[WavinessTable, ...] = quantity((), doc="waves")
+    points: tuple[tuple[float, float], ...] = quantity(
+        (), doc="K-chart: [roll length (mm), deviation (um)] and straight lines between"
+    )
+    measured_csv: str | None = quantity(
+        None, doc="file with columns roll_length_mm (or diameter_mm), deviation_um, and tooth where teeth differ"
+    )
+    pitch_um: tuple[float, ...] = quantity((), doc="index deviations of all teeth (um), along the reference circle")
+    single_pitch_um: tuple[float, ...] = quantity((), doc="or the single pitch deviations (um), which add up to 0")
+    pitch_csv: str | None = quantity(None, doc="or a file with the columns tooth and pitch_um")
+    run_out_um: float = quantity(
+        0.0, doc="amplitude of a sine of one turn (um) of the index deviations, those of an eccentric gear", low=0.0
+    )
+    run_out_phase_deg: float = quantity(0.0, doc="its phase (deg), of the left flanks where both have it")
+    pitch_class: int | None = quantity(None, doc="index deviations drawn for a class of ISO 1328-1", low=1, high=11)
+    pitch_seed: int = quantity(1, doc="seed of the draw", low=0, high=2**63 - 1)
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for keys that contradict each other."""
+        for name, keys in itertools.product(("tip_relief", "root_relief"), (STARTS, ENDS)):
+            given = [f"{name}_{key}" for key in keys if getattr(self, f"{name}_{key}") is not None]
+            if len(given) > 1:
+                value = getattr(self, given[1])
+                raise InputError(f"{where}.{given[1]}", value, f"stands beside {given[0]}", "leave one of them out")
+        pitch = [key for key in ("pitch_um", "single_pitch_um", "pitch_csv", "pitch_class") if getattr(self, key)]
+        if len(pitch) > 1:
+            value = getattr(self, pitch[1])
+            raise InputError(f"{where}.{pitch[1]}", value, f"stands beside {pitch[0]}", "leave one of them out")
+
+
+@dataclass(frozen=True)
+class GearMicrogeometryTable(FlankTable):
+    """Deviations of one gear: of both flanks of its teeth, or of one, which then wins key by key.
+
+    Pitch errors of both flanks displace teeth, see `gears.geometry.pitch_errors`; those of one side are of its flanks.
+    """
+
+    left: FlankTable | None = quantity(None, doc="of the left (counter-clockwise) flanks")  # noqa: RUF009
+    right: FlankTable | None = quantity(None, doc="of the right flanks")  # noqa: RUF009
+
+    def flank(self, side: str) -> FlankTable:
+        """What holds on the flanks `side` (left or right)."""
+        own, default = getattr(self, side), FlankTable()
+        made = {f.name: getattr(self, f.name) for f in fields(FlankTable)}
+        if own is not None:
+            given = {f.name: getattr(own, f.name) for f in fields(FlankTable)}
+            changed = {name: value for name, value in given.items() if value != getattr(default, name)}
+            # another start or end takes the place of the shared one
+            for relief, keys in itertools.product(("tip_relief", "root_relief"), (STARTS, ENDS)):
+                if any(f"{relief}_{key}" in changed for key in keys):
+                    made |= dict.fromkeys((f"{relief}_{key}" for key in keys), None)
+            made |= changed
+        return FlankTable(**made)
+
+
+@dataclass(frozen=True)
+class MicrogeometryTable(LoadMapTable):
+    """Deviations of both gears, and the torques and angles of their load map where there is no [loadmap]."""
+
+    NAME = "microgeometry"
+
+    flank: str = quantity("left", doc="the driving flanks of both gears: left or right", choices=("left", "right"))
+    tolerance_class: int | None = quantity(
+        None, doc="class of ISO 1328-1 whose profile tolerances the picture of the flanks shows", low=1, high=11
+    )
+    pinion: GearMicrogeometryTable = quantity(GearMicrogeometryTable, doc="the driving gear")  # noqa: RUF009
+    wheel: GearMicrogeometryTable = quantity(GearMicrogeometryTable, doc="the driven gear")  # noqa: RUF009

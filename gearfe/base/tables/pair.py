@@ -1,0 +1,315 @@
+"""The tables [pair] and [stiffness]: a pair of spur gears, their materials, and how its mesh stiffness is computed, in
+everyday units; which contact laws there are: their names, and where their classes stand. NumPy is not loaded for them.
+
+Keys of the tooth form may stand in [pair], for both gears, or in [pair.pinion] and [pair.wheel], which then win.
+
+A new law is one class (its contract is in `gears.contact.laws`) and one line: here, or for another package the entry
+point ``name = "module:Class"`` in the group ``gearfe.laws``. Job files, the command line and Python then know it by its
+name; its numbers are the table ``law_parameters``, the option ``--law-parameter``, the fields of the class.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+from ..config import quantity
+from ..errors import InputError, given, nearest
+
+#: What holds where the file gives no value; the other keys are required.
+DEFAULTS: dict[str, float] = {
+    "profile_shift": 0.0,
+    "addendum": 1.0,
+    "dedendum": 1.25,
+    "rack_tip_radius": 0.3,
+    "tip_round_mm": 0.0,
+    "tip_shortening": 0.0,
+    "tip_relief_amount_um": 0.0,
+    "tip_relief_exponent": 1.0,
+    "tooth_thinning_um": 0.0,
+}
+#: Keys of a gear's drawing -> those of the tooth form that they stand for.
+INSTEAD: dict[str, tuple[str, ...]] = {
+    "tip_diameter_mm": ("addendum", "tip_shortening"),
+    "root_diameter_mm": ("dedendum",),
+    "span_mm": ("tooth_thinning_um",),
+}
+REQUIRED = ("pressure_angle_deg", "face_width_mm")
+OPTIONAL = ("tip_relief_length_mm",)
+
+
+@dataclass(frozen=True)
+class MaterialTable:
+    """Isotropic linear elastic material; without any key, structural steel."""
+
+    youngs_modulus_GPa: float = quantity(200.0, doc="Young's modulus (GPa)", low=1e-9, high=2000.0)
+    poisson_ratio: float = quantity(0.30, doc="Poisson's ratio (-)", low=0.0, below=0.5)
+    density_kg_per_m3: float = quantity(7850.0, doc="density (kg/m3)", above=0.0)
+
+
+@dataclass(frozen=True)
+class ToothFormTable:
+    """Keys that both gears may share; coefficients are in units of the module."""
+
+    module_mm: float | None = quantity(None, doc="module (mm), instead of pitch_diameter_mm", above=0.0)
+    pressure_angle_deg: float | None = quantity(
+        None, doc="pressure angle at the reference circle (deg)", low=5.0, high=45.0
+    )
+    face_width_mm: float | None = quantity(None, doc="face width (mm)", above=0.0)
+    profile_shift: float | None = quantity(None, doc="profile shift coefficient x (times module), by default 0")
+    addendum: float | None = quantity(None, doc="addendum (times module), by default 1", above=0.0)
+    dedendum: float | None = quantity(None, doc="dedendum (times module), by default 1.25", above=0.0)
+    rack_tip_radius: float | None = quantity(
+        None, doc="tip radius of the generating rack (times module), by default 0.3", low=0.0
+    )
+    tip_round_mm: float | None = quantity(
+        None, doc="radius of the round between flank and tip circle (mm), by default 0", low=0.0
+    )
+    tip_shortening: float | None = quantity(None, doc="tip shortening k (times module), by default 0", low=0.0)
+    tip_relief_amount_um: float | None = quantity(None, doc="tip relief at the tip circle (um), by default 0", low=0.0)
+    tip_relief_length_mm: float | None = quantity(None, doc="roll length of the relief from the tip (mm)", above=0.0)
+    tip_relief_exponent: float | None = quantity(
+        None, doc="exponent of the relief: 1 linear (default), 2 parabolic", low=1.0
+    )
+    tooth_thinning_um: float | None = quantity(
+        None, doc="arc taken off each tooth at the reference circle, for backlash (um), by default 0", low=0.0
+    )
+
+
+def tooth_form(*tables: ToothFormTable) -> dict[str, Any]:
+    """Keys of a tooth form but the module, each from the first table that gives it, else its default."""
+    return {
+        key: next((v for v in (getattr(table, key) for table in tables) if v is not None), DEFAULTS.get(key))
+        for key in (*DEFAULTS, *REQUIRED, *OPTIONAL)
+    }
+
+
+@dataclass(frozen=True)
+class GearTable(ToothFormTable):
+    """One gear of a pair."""
+
+    teeth: int = quantity(doc="number of teeth of an external gear", low=8, high=1000)
+    bore_diameter_mm: float = quantity(doc="diameter of the rigid bore (mm); it decides the stiffness level", above=0.0)
+    pitch_diameter_mm: float | None = quantity(None, doc="reference diameter (mm), instead of module_mm", above=0.0)
+    tip_diameter_mm: float | None = quantity(
+        None, doc="tip diameter (mm), instead of addendum and tip_shortening", above=0.0
+    )
+    root_diameter_mm: float | None = quantity(None, doc="root diameter (mm), instead of dedendum", above=0.0)
+    span_mm: float | None = quantity(
+        None, doc="span size over span_teeth teeth, W_k (mm), instead of tooth_thinning_um", above=0.0
+    )
+    span_teeth: int | None = quantity(None, doc="number of teeth k of span_mm", low=2)
+    material: MaterialTable | None = quantity(None, doc="material of this gear, if not the shared one")  # noqa: RUF009
+
+
+@dataclass(frozen=True)
+class PairTable(ToothFormTable):
+    """A gear pair: shared keys here, [pair.pinion] and [pair.wheel] below, [pair.material] for both or one per gear."""
+
+    pinion: GearTable = quantity(doc="the driving gear")  # noqa: RUF009
+    wheel: GearTable = quantity(doc="the driven gear")  # noqa: RUF009
+    centre_distance_mm: float | None = quantity(
+        None, doc="centre distance (mm); without it, from the profile shifts without backlash", above=0.0
+    )
+    material: MaterialTable = quantity(MaterialTable, doc="material of both gears")  # noqa: RUF009
+
+    def tooth_form(self, side: str) -> dict[str, Any]:
+        """Keys of the tooth form of the gear `side` ("pinion" or "wheel"), shared values and defaults filled in."""
+        return tooth_form(getattr(self, side), self)
+
+    def module_mm_of(self, side: str) -> float:
+        """Module of the gear `side` (mm), from its own pitch diameter or module, or from the shared module."""
+        own: GearTable = getattr(self, side)
+        if own.pitch_diameter_mm is not None:
+            return own.pitch_diameter_mm / own.teeth
+        return given(own.module_mm if own.module_mm is not None else self.module_mm, "pair.module_mm")
+
+    def material_of(self, side: str) -> MaterialTable:
+        """Material of the gear `side`."""
+        own: GearTable = getattr(self, side)
+        return own.material if own.material is not None else self.material
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for keys that are missing or contradict each other."""
+        for side in ("pinion", "wheel"):
+            own: GearTable = getattr(self, side)
+            label = f"{where}.{side}"
+            for key, others in INSTEAD.items():
+                for other in others if getattr(own, key) is not None else ():
+                    if getattr(own, other) is not None:
+                        problem = f"says what {other} = {getattr(own, other):g} says"
+                        raise InputError(f"{label}.{key}", getattr(own, key), problem, "leave one out")
+            if (own.span_mm is None) != (own.span_teeth is None):
+                lacking = "span_mm" if own.span_mm is None else "span_teeth"
+                raise InputError(f"{label}.{lacking}", None, "is required with the other one", "give both, or neither")
+            module = own.module_mm if own.module_mm is not None else self.module_mm
+            if own.pitch_diameter_mm is None and module is None:
+                doc = "give the module (mm), here or in the shared table, or pitch_diameter_mm"
+                raise InputError(f"{label}.module_mm", None, "is required", doc)
+            if own.pitch_diameter_mm is not None and module is not None:
+                implied = own.pitch_diameter_mm / own.teeth
+                if abs(implied - module) > 1e-9 * module:
+                    problem = f"contradicts module_mm = {module:g}: {own.teeth} teeth make it {module * own.teeth:.9g}"
+                    raise InputError(f"{label}.pitch_diameter_mm", own.pitch_diameter_mm, problem, "leave one out")
+            form = self.tooth_form(side)
+            for key in REQUIRED:
+                if form[key] is None:
+                    raise InputError(f"{where}.{key}", None, "is required", f"add it to [{where}] or to each gear")
+            if form["tip_relief_amount_um"] and form["tip_relief_length_mm"] is None:
+                cure = "add it, or leave out tip_relief_amount_um"
+                raise InputError(f"{label}.tip_relief_length_mm", None, "is required with a tip relief", cure)
+
+
+#: Law that holds where none is named.
+DEFAULT_LAW = "half_plane"
+#: Name -> "module:class" of the laws of this package.
+LAWS: dict[str, str] = {
+    "half_plane": "gearfe.gears.contact.laws:HalfPlane",
+    "nitsche": "gearfe.gears.contact.laws:Nitsche",
+    "penalty": "gearfe.gears.contact.laws:Penalty",
+}
+#: Group of entry points in which other packages name theirs.
+GROUP = "gearfe.laws"
+#: Names of laws that were, and what to write instead.
+REMOVED = {"exact": ("is gone", "use half_plane")}
+
+
+def known_laws() -> dict[str, str]:
+    """Name -> "module:class" of all laws, those of other packages included; none takes the name of one of these."""
+    from importlib import metadata  # which takes longer to load than a file to read
+
+    return {point.name: point.value for point in metadata.entry_points(group=GROUP)} | LAWS
+
+
+def check_law(label: str, name: str) -> None:
+    """Raise `InputError` unless there is a law called `name`; `label` names the key or option in the message."""
+    if name in LAWS:
+        return
+    if name in REMOVED:
+        raise InputError(label, name, *REMOVED[name])
+    known = known_laws()
+    if name not in known:
+        problem = "must be one of " + ", ".join([*LAWS, *sorted(known.keys() - LAWS)])
+        raise InputError(label, name, problem, nearest(name, known))
+
+
+#: More positions than this are a slip of the keyboard.
+MOST_POSITIONS = 100_000
+
+
+#: Beyond these angles rounding is more than 1e-10 deg.
+FAR_DEG = 1e6
+
+#: Finest flank elements, in default ones: some 1,200 on a flank, whose compliances take gigabytes.
+FINEST = 0.1
+
+
+def check_flank_coarsen(coarsen: float, flank_coarsen: float, field: str) -> None:
+    """Raise `InputError` unless the flanks' elements are within the range that is known to work."""
+    least = max(FINEST, FINEST / coarsen)
+    if not least * (1 - 1e-12) <= flank_coarsen <= 10.0:
+        problem = f"must be >= {least:g} with coarsen {coarsen:g}, and <= 10"
+        raise InputError(field, flank_coarsen, problem, "1 leaves the flanks to coarsen")
+
+
+#: Keys of [stiffness] that give its load, at most one of them.
+LOADS = ("twist_deg", "torque_Nm")
+
+
+@dataclass(frozen=True)
+class StiffnessTable:
+    """Load, positions, model and mesh of a rotation sweep."""
+
+    #: Keys that were: what became of them, and what to write instead.
+    REMOVED: ClassVar[dict[str, tuple[str, str]]] = {
+        "route": (
+            "is gone: one law answers every load",
+            'leave it out; law = "half_plane" (the default) needs no mesh that resolves the contact',
+        ),
+        "law_sides": (
+            "is gone: the law fixes the flanks that it is integrated on (nitsche both, penalty the nearer tip's)",
+            "leave it out; other sides are in Python: gearfe.gears.contact.laws",
+        ),
+        "nitsche_theta": (
+            "is gone: theta is 0",
+            "leave it out",
+        ),
+    }
+
+    twist_deg: float | None = quantity(
+        None, doc="twist of the wheel against the pinion (deg), or give torque_Nm", above=0.0, below=36.0
+    )
+    torque_Nm: float | None = quantity(None, doc="torque at the wheel's hub (N m), or give twist_deg", above=0.0)
+    twist_from: Literal["contact", "centred"] = quantity(
+        "contact",
+        doc="where twist_deg counts from: contact (where unmodified driving flanks touch) or centred (a wheel space "
+        "faces the pinion tooth; half the backlash is then lost motion)",
+        choices=("contact", "centred"),
+    )
+    angle_start_deg: float = quantity(0.0, doc="first pinion angle (deg)", low=-FAR_DEG, high=FAR_DEG)
+    angle_step_deg: float = quantity(1.0, doc="step of the pinion angle (deg)", above=0.0)
+    angle_stop_deg: float | None = quantity(
+        None, doc="last pinion angle (deg); without it, one mesh cycle", low=-FAR_DEG, high=FAR_DEG
+    )
+    plane: Literal["strain", "stress"] = quantity(
+        "strain", doc="plane strain or plane stress", choices=("strain", "stress")
+    )
+    law: str = quantity(
+        DEFAULT_LAW,
+        doc="contact law: half_plane (every load), nitsche or penalty (on the flanks' elements), or another package's",
+    )
+    law_parameters: dict[str, float] = quantity(  # noqa: RUF009
+        dict, doc="parameters of a law of another package, by name (in its own units)"
+    )
+    kinematics: Literal["small", "finite"] = quantity(
+        "finite",
+        doc="small (small strain) or finite (with the first-order effect of finite strain on the torque)",
+        choices=("small", "finite"),
+    )
+    nitsche_gamma0: float | None = quantity(
+        None, doc="parameter of the law nitsche, gamma h/E (-), by default 1, the most accurate", low=1e-6, high=1e9
+    )
+    penalty_stiffness_N_per_mm3: float | None = quantity(
+        None,
+        doc="parameter of the law penalty (N/mm3), by default 300 E/h with the flank's largest element h",
+        low=1e3,
+        high=1e13,
+    )
+    points_per_edge: int = quantity(4, doc="contact points on each element edge of a flank", low=2, high=10)
+    coarsen: float = quantity(
+        1.0, doc="factor on all element sizes; 2 is faster and about four times less accurate", low=0.2, high=5.0
+    )
+    flank_coarsen: float = quantity(
+        1.0, doc="factor on the element sizes of the driving flanks, besides coarsen", low=0.1, high=10.0
+    )
+    solve_all: bool = quantity(False, doc="true: solve also positions that differ by whole mesh cycles")
+    interpolation: str = quantity(
+        "cubic", doc="how the curve runs between its positions: cubic (monotone) or linear", choices=("cubic", "linear")
+    )
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for keys that contradict each other."""
+        if self.twist_deg is not None and self.torque_Nm is not None:
+            raise InputError(f"{where}.torque_Nm", self.torque_Nm, "stands beside twist_deg", "leave one of them out")
+        check_flank_coarsen(self.coarsen, self.flank_coarsen, f"{where}.flank_coarsen")
+        check_law(f"{where}.law", self.law)
+        if self.angle_stop_deg is not None and self.angle_stop_deg < self.angle_start_deg:
+            problem = f"must be >= angle_start_deg = {self.angle_start_deg:g}"
+            raise InputError(f"{where}.angle_stop_deg", self.angle_stop_deg, problem, "swap them")
+
+    def angles_deg(self, mesh_cycle_deg: float) -> list[float]:
+        """Pinion angles (deg), the last one included.
+
+        Raises
+        ------
+        InputError
+            For steps that make more than `MOST_POSITIONS`.
+        """
+        start, step, stop = self.angle_start_deg, self.angle_step_deg, self.angle_stop_deg
+        if (mesh_cycle_deg if stop is None else stop - start) / step > MOST_POSITIONS:
+            problem = f"makes more than {MOST_POSITIONS} positions"
+            raise InputError("stiffness.angle_step_deg", step, problem, "use a larger step")
+        if stop is None:
+            count = max(1, round(mesh_cycle_deg / step))
+            return [start + mesh_cycle_deg * i / count for i in range(count)]
+        return [start + step * i for i in range(int((stop - start) / step + 1e-9) + 1)]

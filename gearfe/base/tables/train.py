@@ -1,0 +1,392 @@
+"""Table ``[train]``: shafts, gears, meshes, drive and loads of a gear train, and how it is simulated.
+
+All shafts run along y, in the frame of the housing. Lengths in millimetres; speeds and torques count positive about +y.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from ..config import Removed, quantity
+from ..errors import InputError, unknown_name
+from .kinds import GONE_METHODS
+from .pair import StiffnessTable, ToothFormTable
+from .timefunction import TrainFunctionTable
+
+Five = tuple[float, float, float, float, float]
+
+#: What a mesh is made of unless its stiffness is given.
+POTENTIAL, VARIABLE, MEAN = MESH_MODELS = ("potential", "variable_stiffness", "mean_stiffness")
+#: Former name of a mesh model -> its name.
+FORMER_MODELS = {"map": POTENTIAL, "curve": VARIABLE, "linear": MEAN}
+#: Former name of a mesh model -> what to write instead.
+GONE_MODELS = {former: f'write mesh_model = "{name}"' for former, name in FORMER_MODELS.items()}
+
+
+def _mesh_model_for(law: object) -> str:
+    """Return the line that replaces the removed key ``law`` of a mesh or of the curves."""
+    names = " or ".join(f'"{name}"' for name in MESH_MODELS)
+    return GONE_MODELS.get(str(law), f"write mesh_model = {names}")
+
+
+#: Why meshes and curves have no key ``law``.
+LAW_REMOVED: Removed = (
+    "names the contact law, a key of [stiffness]; what a mesh is made of is its model",
+    _mesh_model_for,
+)
+
+
+@dataclass(frozen=True)
+class TrainShaftTable:
+    """A round shaft along y and the attachments (bores) that carry it."""
+
+    name: str = quantity(doc="name of the shaft, used in the names of columns")
+    x_mm: float = quantity(doc="x of the axis (mm)")
+    z_mm: float = quantity(0.0, doc="z of the axis (mm)")
+    y_mm: float = quantity(0.0, doc="y of the middle of the shaft (mm)")
+    length_mm: float = quantity(above=0.0, doc="length (mm)")
+    radius_mm: float = quantity(above=0.0, doc="radius (mm)")
+    attachments: tuple[int | str, ...] = quantity(doc='attachments that carry it, as ["1", "2"]')
+    density_kg_per_m3: float = quantity(7850.0, above=0.0, doc="density (kg/m3)")
+    initial_speed_rad_per_s: float | None = quantity(
+        None, doc="spin at the start (rad/s); left out: rolling with the drive"
+    )
+    mass_kg: float | None = quantity(None, above=0.0, doc="mass with gears (kg); left out: from the geometry")
+    polar_inertia_kg_m2: float | None = quantity(
+        None, above=0.0, doc="inertia about the axis with gears; left out: computed"
+    )
+    transverse_inertia_kg_m2: float | None = quantity(
+        None, above=0.0, doc="inertia about a transverse line through the mass centre, with gears; left out: computed"
+    )
+
+
+@dataclass(frozen=True)
+class TrainGearTable(ToothFormTable):
+    """A gear on a shaft: one of [pair], or one with its own teeth; missing keys come from [pair]'s shared ones."""
+
+    name: str = quantity(doc="name of the gear")
+    shaft: str = quantity(doc="shaft that carries it")
+    y_mm: float = quantity(doc="y of its middle plane (mm)")
+    gear: str = quantity("", choices=("pinion", "wheel", ""), doc="pinion or wheel of [pair]; left out: give teeth")
+    teeth: int | None = quantity(None, low=8, doc="number of teeth of an external gear, for a gear of its own")
+    bore_diameter_mm: float | None = quantity(None, above=0.0, doc="bore (mm); left out: 0.2 times the pitch diameter")
+    density_kg_per_m3: float | None = quantity(
+        None, above=0.0, doc="density (kg/m3); left out: of [pair.material], or steel"
+    )
+
+    def check(self, where: str) -> None:
+        """Either a gear of [pair] or one with its own teeth."""
+        own = [
+            key
+            for key in (*ToothFormTable.__dataclass_fields__, "teeth", "bore_diameter_mm")
+            if getattr(self, key) is not None
+        ]
+        if self.gear and own:
+            raise InputError(
+                f"{where}.{own[0]}", getattr(self, own[0]), f"stands beside gear = {self.gear!r}", "leave one out"
+            )
+        if not self.gear and self.teeth is None:
+            raise InputError(
+                f"{where}.teeth", None, "is required", 'give the number of teeth, or gear = "pinion" or "wheel"'
+            )
+
+
+@dataclass(frozen=True)
+class TrainMeshTable:
+    """Two gears in mesh. What it is made of is computed with [stiffness] unless one of the keys below gives it."""
+
+    driver: str = quantity(doc="name of the driving gear")
+    driven: str = quantity(doc="name of the driven gear")
+    phase_deg: float | None = quantity(
+        None,
+        doc="rotation of the driver, in its driving sense, past a tooth on the line of centres at the start (deg), for "
+        "a gear keyed at an angle; left out: 0, and where gears are shared by meshes what their teeth make it",
+    )
+    damping_N_s_per_m: float = quantity(0.0, low=0.0, doc="damping along the line of action (N s/m)")
+    damping_acts: str | None = quantity(
+        None,
+        choices=("always", "in_contact"),
+        doc="when the damper of the mesh acts, its part of rayleigh_beta_s included: always, or in_contact, only while "
+        "teeth are in contact (with a potential in proportion to the force); left out: in_contact with a potential, "
+        "always with a stiffness",
+    )
+    centre_distance_mm: float | None = quantity(
+        None, above=0.0, doc="working centre distance (mm); left out: no backlash"
+    )
+    mesh_model: str | None = quantity(
+        None,
+        choices=MESH_MODELS,
+        gone=GONE_MODELS,
+        doc="potential: mesh law with transmission error and separation; variable_stiffness: k(phi) delta; "
+        "mean_stiffness: the mean of k over the mesh cycle; left out: that of [train.curves]",
+    )
+    mesh_model_torque_Nm: float | None = quantity(
+        None,
+        above=0.0,
+        doc="largest torque at the driven gear that the potential is made for; left out: 5 times the steady one",
+    )
+    backlash_um: float | None = quantity(
+        None,
+        doc="normal backlash (um); left out: with a potential that of the gears, or no back flanks where they have "
+        "none; with a stiffness a spring that acts both ways",
+    )
+    friction: float | None = quantity(
+        None,
+        low=0.0,
+        high=0.5,
+        doc="coefficient of friction of the teeth, with a potential; left out: none, or by the oil",
+    )
+    oil_viscosity_mPa_s: float | None = quantity(
+        None, above=0.0, doc="viscosity of the oil: mean coefficient of friction by Schlenk (ISO/TR 14179-2), instead"
+    )
+    roughness_um: float | None = quantity(None, above=0.0, doc="mean Ra of both gears' flanks, for that")
+    oil_factor: float | None = quantity(None, above=0.0, doc="X_L for that; left out: 1, mineral oil")
+    curve: str | None = quantity(None, doc="CSV file with pinion_angle_deg and k_mesh_N_per_m, beside the job file")
+    stiffness_N_per_m: float | None = quantity(None, above=0.0, doc="constant stiffness (N/m)")
+    rigid: bool = quantity(False, doc="true: an ideal rigid mesh, a constraint")
+
+    #: Removed keys, see `gearfe.base.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {
+        "load_map": (
+            "is gone: trains solve the contacts of their meshes themselves",
+            'leave it out (mesh_model = "variable_stiffness": the curve at the mesh\'s torque), or give a file of '
+            "gearfe stiffness: curve",
+        ),
+        "law": LAW_REMOVED,
+        "law_torque_Nm": ("has another name", lambda torque: f"write mesh_model_torque_Nm = {torque}"),
+    }
+
+    def check(self, where: str) -> None:
+        """At most one source of the stiffness."""
+        given = [k for k in ("curve", "stiffness_N_per_m", "rigid") if getattr(self, k) not in (None, False)]
+        if len(given) > 1:
+            raise InputError(
+                f"{where}.{given[1]}", getattr(self, given[1]), f"stands beside {given[0]}", "leave one out"
+            )
+        if given and self.mesh_model is not None and (given[0], self.mesh_model) != ("curve", VARIABLE):
+            cure = f"leave mesh_model out, or leave {given[0]} out: a mesh model is computed from contact solutions"
+            raise InputError(f"{where}.mesh_model", self.mesh_model, f"contradicts {given[0]}", cure)
+        oil = [k for k in ("oil_viscosity_mPa_s", "roughness_um", "oil_factor") if getattr(self, k) is not None]
+        if oil and self.friction is not None:
+            problem = f"stands beside friction = {self.friction:g}"
+            raise InputError(f"{where}.{oil[0]}", getattr(self, oil[0]), problem, "give the coefficient or the oil")
+        for key in ("oil_viscosity_mPa_s", "roughness_um"):
+            if oil and getattr(self, key) is None:
+                raise InputError(f"{where}.{key}", None, f"is required beside {oil[0]}", "add it")
+        if (oil or self.friction) and (given or self.mesh_model in (VARIABLE, MEAN)):
+            key = oil[0] if oil else "friction"
+            problem = "needs a mesh law: a stiffness does not say how tooth pairs share the load"
+            cure = 'write mesh_model = "potential", or leave friction out'
+            raise InputError(f"{where}.{key}", getattr(self, key), problem, cure)
+        if self.backlash_um is not None and self.backlash_um < 0.0:
+            problem = "must be >= 0 um: less is a wedged mesh, whose flanks all bear without a load"
+            raise InputError(
+                f"{where}.backlash_um", self.backlash_um, problem, "thin the teeth, or move the shafts apart"
+            )
+        if self.backlash_um is not None and self.rigid:
+            problem = "stands beside rigid = true: rigid teeth never part"
+            raise InputError(f"{where}.backlash_um", self.backlash_um, problem, "leave one out")
+        for key in ("damping_N_s_per_m", "damping_acts"):
+            if getattr(self, key) and self.rigid:
+                problem = "stands beside rigid = true: a rigid mesh does not yield, so nothing damps it"
+                raise InputError(f"{where}.{key}", getattr(self, key), problem, "leave one out")
+
+
+@dataclass(frozen=True)
+class TrainDriveTable:
+    """Rotation of a shaft relative to one of its bores, prescribed."""
+
+    shaft: str = quantity(doc="shaft that is driven")
+    attachment: int | str = quantity(doc="bore against which its rotation is prescribed")
+    speed_rad_per_s: float | TrainFunctionTable = quantity(  # noqa: RUF009
+        doc="speed about +y (rad/s), or a function of time"
+    )
+    ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from rest to the speed (ms)")
+    ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant speed")
+    stiffness_Nm_per_rad: float | None = quantity(
+        None, above=0.0, doc="of an elastic coupling (N m/rad); left out: rigid"
+    )
+    damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of that coupling (N m s/rad)")
+
+    def check(self, where: str) -> None:
+        """A ramp is of a number."""
+        _check_ramp(where, "speed_rad_per_s", self.speed_rad_per_s, self.ramp_width_ms)
+
+
+@dataclass(frozen=True)
+class TrainLoadTable:
+    """Torque on a shaft and its reaction on a bore."""
+
+    shaft: str = quantity(doc="shaft that is loaded")
+    attachment: int | str | None = quantity(None, doc="bore on which the torque reacts; left out: outside of the train")
+    torque_Nm: float | TrainFunctionTable = quantity(  # noqa: RUF009
+        doc="torque about +y on the shaft (N m), or a function of time"
+    )
+    ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from 0 to the torque (ms)")
+    ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant torque")
+
+    def check(self, where: str) -> None:
+        """A ramp is of a number."""
+        _check_ramp(where, "torque_Nm", self.torque_Nm, self.ramp_width_ms)
+
+
+def _check_ramp(where: str, key: str, value: float | TrainFunctionTable, width: float | None) -> None:
+    if isinstance(value, TrainFunctionTable) and width is not None:
+        problem = f"stands beside a function of time in {key}"
+        raise InputError(f"{where}.ramp_width_ms", width, problem, "write the ramp in steps of the function")
+
+
+def value_text(value: float | TrainFunctionTable, unit: str) -> str:
+    """A number with its unit, or that it changes."""
+    return "changing" if isinstance(value, TrainFunctionTable) else f"{value:g} {unit}"
+
+
+@dataclass(frozen=True)
+class TrainBearingTable:
+    """Springs between a shaft and a bore instead of a hinge."""
+
+    attachment: int | str = quantity(doc="bore")
+    stiffness: Five = quantity(low=0.0, doc="along x, y, z (N/m) and for tilt about x, z (N m/rad)")  # noqa: RUF009
+    damping: Five = quantity((0.0, 0.0, 0.0, 0.0, 0.0), low=0.0, doc="the same in N s/m and N m s/rad")  # noqa: RUF009
+
+
+@dataclass(frozen=True)
+class TrainRigidBoreTable:
+    """A bore of a rigid housing, for trains without a table [housing]."""
+
+    attachment: int | str = quantity(doc="name of the bore")
+    x_mm: float = quantity(doc="x of its axis (mm)")
+    y_mm: float = quantity(doc="y of its reference point (mm)")
+    z_mm: float = quantity(0.0, doc="z of its axis (mm)")
+
+
+@dataclass(frozen=True)
+class TrainCurvesTable:
+    """What computed meshes are made of: mesh laws, or stiffness curves and how these are computed and read."""
+
+    mesh_model: str = quantity(
+        POTENTIAL,
+        choices=MESH_MODELS,
+        gone=GONE_MODELS,
+        doc="of computed meshes",
+    )
+    load: str | None = quantity(
+        None,
+        choices=("stiffness", "torque"),
+        doc="of curves: load and angles of [stiffness] (when left out), or the torque that each mesh carries",
+    )
+    positions: int | None = quantity(
+        None, low=8, high=10_000, doc='positions in one mesh cycle, for load = "torque"; left out: 36'
+    )
+    interpolation: str = quantity(
+        "cubic", choices=("cubic", "linear"), doc="between the positions: cubic (monotone) or linear"
+    )
+
+    #: Removed keys, see `gearfe.base.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {"law": LAW_REMOVED}
+
+
+@dataclass(frozen=True)
+class TrainDampingTable:
+    """Damping of the whole coupled system, beside [housing.damping], bearings and meshes."""
+
+    ratio: float | tuple[float, ...] = quantity(0.0, low=0.0, below=1.0, doc="modal damping ratio, one or one a mode")
+    rayleigh_alpha_per_s: float = quantity(0.0, low=0.0, doc="Rayleigh damping: factor of the mass (1/s)")
+    rayleigh_beta_s: float = quantity(0.0, low=0.0, doc="Rayleigh damping: factor of the stiffness (s)")
+    gyroscopic: bool = quantity(True, doc="false: leave the gyroscopic moments out, for comparison")
+
+
+@dataclass(frozen=True)
+class TrainVariantTable:
+    """A named alternative to [train.curves] and [train.damping]; keys of its `stiffness` win over [stiffness]."""
+
+    curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.variants.NAME.curves]")  # noqa: RUF009
+    damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.variants.NAME.damping]")  # noqa: RUF009
+    stiffness: StiffnessTable | None = quantity(None, doc="keys that win over those of [stiffness]")  # noqa: RUF009
+
+
+@dataclass(frozen=True)
+class TrainTable:
+    """The whole ``[train]`` table."""
+
+    housing: str = quantity("elastic", choices=("elastic", "rigid"), doc="elastic ([housing]) or rigid")
+    duration_ms: float = quantity(7.0, above=0.0, doc="end of the simulation (ms)")
+    step_us: float = quantity(35.0, above=0.0, doc="step of the output (us); spectra end at half its frequency")
+    tolerance: float = quantity(1e-6, low=1e-12, high=0.1, doc="relative tolerance of the integration")
+    method: str = quantity(
+        "auto",
+        choices=("auto", "taylor", "implicit"),
+        gone=GONE_METHODS,
+        doc="integrator (auto: taylor or implicit by a rule)",
+    )
+    shafts: tuple[TrainShaftTable, ...] = quantity(doc="[[train.shafts]]")
+    gears: tuple[TrainGearTable, ...] = quantity(doc="[[train.gears]]")
+    meshes: tuple[TrainMeshTable, ...] = quantity((), doc="[[train.meshes]]")
+    drive: TrainDriveTable | None = quantity(None, doc="[train.drive]")  # noqa: RUF009
+    loads: tuple[TrainLoadTable, ...] = quantity((), doc="[[train.loads]]")
+    bearings: tuple[TrainBearingTable, ...] = quantity((), doc="[[train.bearings]]")
+    rigid_bores: tuple[TrainRigidBoreTable, ...] = quantity((), doc="[[train.rigid_bores]]")
+    curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.curves]")  # noqa: RUF009
+    damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.damping]")  # noqa: RUF009
+    variant: str = quantity("", doc="variant that is simulated when none is asked for; left out: [train] as it stands")
+    variants: dict[str, TrainVariantTable] = quantity(dict, doc="[train.variants.NAME]")  # noqa: RUF009
+
+    def check(self, where: str) -> None:
+        """Rules that join several keys."""
+        if self.step_us * 1e-3 > self.duration_ms * (1 + 1e-12):
+            problem = f"is longer than duration_ms = {self.duration_ms:g}"
+            raise InputError(f"{where}.step_us", self.step_us, problem, "use a smaller step")
+        if self.duration_ms > 5e6 * (self.step_us * 1e-3):  # no division: the step may round to zero
+            raise InputError(f"{where}.step_us", self.step_us, "makes more than 5 million outputs", "use a larger step")
+        if self.variant:
+            self.chosen(self.variant)
+        self._check_names(where)
+
+    def model_of(self, mesh: TrainMeshTable) -> str:
+        """Return the mesh model of a mesh, an empty text for one whose stiffness is given."""
+        if mesh.curve or mesh.stiffness_N_per_m or mesh.rigid:
+            return ""
+        return mesh.mesh_model or self.curves.mesh_model
+
+    def check_models(self) -> None:
+        """Raise `InputError` for keys of stiffness curves where all meshes have mesh laws, and friction without one."""
+        computed = {self.model_of(mesh) for mesh in self.meshes} - {""}
+        for key in ("load", "positions"):
+            value = getattr(self.curves, key)
+            if value is not None and computed == {POTENTIAL}:
+                cure = 'leave it out, or write mesh_model = "variable_stiffness" beside it for k(phi) delta'
+                problem = (
+                    'is of stiffness curves, but the meshes have mesh laws (mesh_model = "potential", the default)'
+                )
+                raise InputError(f"train.curves.{key}", value, problem, cure)
+        for i, mesh in enumerate(self.meshes):
+            if (mesh.friction or mesh.roughness_um) and self.model_of(mesh) != POTENTIAL:
+                problem = f"needs a mesh law, but mesh_model = {self.curves.mesh_model!r} in train.curves"
+                cure = 'write mesh_model = "potential" in the mesh'
+                raise InputError(f"train.meshes[{i}].friction", mesh.friction, problem, cure)
+
+    def _check_names(self, where: str) -> None:
+        """Names of shafts and gears are unique, and references to them exist."""
+        names: dict[str, list[str]] = {}
+        for kind, rows in (("shafts", self.shafts), ("gears", self.gears)):
+            known = names[kind] = [row.name for row in rows]
+            for i, name in enumerate(known):
+                if name in known[:i]:
+                    raise InputError(f"{where}.{kind}[{i}].name", name, "is used twice", "give each its own name")
+        used = [(f"gears[{i}].shaft", gear.shaft, "shafts") for i, gear in enumerate(self.gears)]
+        for i, mesh in enumerate(self.meshes):
+            used += [(f"meshes[{i}].{key}", getattr(mesh, key), "gears") for key in ("driver", "driven")]
+        used += [] if self.drive is None else [("drive.shaft", self.drive.shaft, "shafts")]
+        used += [(f"loads[{i}].shaft", load.shaft, "shafts") for i, load in enumerate(self.loads)]
+        for key, name, kind in used:
+            if name not in names[kind]:
+                raise unknown_name(f"{where}.{key}", name, names[kind])
+
+    def chosen(self, name: str) -> TrainTable:
+        """The table with the curves and damping of a variant; an empty name leaves it as it stands."""
+        if not name:
+            return self
+        if name not in self.variants:
+            raise unknown_name("variant", name, self.variants)
+        return replace(self, curves=self.variants[name].curves, damping=self.variants[name].damping, variant=name)

@@ -1,0 +1,168 @@
+"""``gearfe gear JOB.toml``: derived geometry of a gear pair and a drawing of it in mesh."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..base.progress import stage
+from .arguments import add_folder, add_job, check_option, print_results
+
+if TYPE_CHECKING:
+    from ..base.tables.microgeometry import MicrogeometryTable
+    from ..gears.geometry.face import ToothDeviations
+    from ..gears.geometry.pair import Gear, GearPair
+
+#: Forms of ``--export``, and the files that they are.
+EXPORTS = ("csv", "dxf", "step", "brep")
+FILES = tuple(f"{side}.{form}" for side in ("pinion", "wheel") for form in EXPORTS)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_job(parser, "job", "job file with the table [pair]")
+    add_folder(parser)
+    parser.add_argument(
+        "--export",
+        metavar="NAME",
+        default="",
+        help=f"each gear also as {', '.join(EXPORTS)}, or several, as dxf,step, or one gear, as pinion.dxf: outline of "
+        "a tooth (csv), of the gear (dxf), solid (step, brep); mm",
+    )
+    parser.add_argument(
+        "--angle-deg", type=float, default=0.0, metavar="X", help="pinion angle of the drawing (deg, default: 0)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the geometry, write gear_pair.png and gear_pair.json."""
+    from ..base.tables.jobs import load_job
+    from ..base.tables.pair import StiffnessTable
+
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
+    tables = load_job(args.job, ("pair",), ("stiffness", "microgeometry"))
+    check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
+    exports = _exports(args.export)
+
+    from ..gears.geometry.pair import GearPair
+
+    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
+
+    from ..base.files import output_folder, whole_set, write_json
+    from ..gears.geometry.derived import derived_geometry, iso_values
+    from ..gears.stiffness.job import StiffnessJob
+
+    job = StiffnessJob(tables["pair"], tables.get("stiffness", StiffnessTable()), pair)
+    folder = output_folder(args.out)
+    geometry = derived_geometry(pair, (tables["pair"].pinion.span_teeth, tables["pair"].wheel.span_teeth))
+    moduli = [material.youngs_modulus for material in job.materials]
+    iso = iso_values(pair, moduli[0], moduli[1])
+    with whole_set(folder, ("gear_pair.png", *FILES)) as made:
+        for name in exports:
+            with stage(f"writing {name}"):
+                _export(made / name, pair, tables.get("microgeometry"), Path(args.job).parent)
+        if not args.no_pictures:
+            from ..figures.gears import pair_picture
+            from ..figures.style import save
+
+            with stage("drawing"):
+                save(pair_picture(pair, math.radians(args.angle_deg), _notes(geometry)), made / "gear_pair.png")
+        write_json(made / "gear_pair.json", {**geometry, "iso_6336": iso, "warnings": list(pair.warnings)})
+        names = sorted(path.name for path in made.iterdir())
+    _show(geometry)
+    _show({"iso_6336": iso})
+    if exports and "microgeometry" in tables:
+        print("flanks with the deviations of [microgeometry]: dxf, step and brep all teeth, csv tooth 0")
+    print_results((), folder, names, {}, pair.warnings)
+    return 0
+
+
+def _exports(text: str) -> list[str]:
+    """Files that a value of ``--export`` names."""
+    from ..base.errors import InputError, nearest
+
+    made: list[str] = []
+    for name in (word.strip() for word in text.split(",") if word.strip()):
+        if name not in (*EXPORTS, *FILES):
+            problem = f"must be {', '.join(EXPORTS)}, or a file of one gear, as pinion.dxf"
+            raise InputError("--export", name, problem, nearest(name, FILES) or "--out tells the folder")
+        made += [file for file in FILES if name in (file, Path(file).suffix[1:])]
+    return sorted(set(made))
+
+
+def _export(path: Path, pair: GearPair, table: MicrogeometryTable | None, folder: Path) -> None:
+    """A gear in the form that the suffix names; its deviations are looked for in `folder`."""
+    import numpy as np
+
+    from ..base.files import write_csv
+    from ..gears.geometry.outline import outline_columns, whole_outline
+    from ..gears.teeth.gear_solid import write_solid
+    from ..output.dxf import write_dxf
+
+    gear = pair.pinion if path.stem == "pinion" else pair.wheel
+    sides = _deviations(pair, path.stem, table, folder)
+    if path.suffix == ".csv":
+        columns = outline_columns(gear)
+        write_csv(path, columns if table is None else _with_deviations(columns, gear, sides))
+    elif path.suffix == ".dxf":
+        circles = {"bore": gear.bore_diameter, "reference_circle": gear.pitch_diameter}
+        radii = {name: 0.5e3 * diameter for name, diameter in circles.items()}
+        radii["base_circle"] = 1e3 * gear.base_radius
+        teeth = whole_outline(gear, sides, per_piece=100)
+        write_dxf(path, {"outline": 1e3 * np.concatenate([p.points[:-1] for tooth in teeth for p in tooth])}, radii)
+    else:
+        write_solid(path, gear, sides)
+
+
+def _deviations(
+    pair: GearPair, name: str, table: MicrogeometryTable | None, folder: Path
+) -> tuple[ToothDeviations, ToothDeviations]:
+    """Deviations of the left and the right flanks of a gear."""
+    from ..gears.geometry.deviation_job import GEARS, FlankOf, flank_deviations
+    from ..gears.geometry.face import NOMINAL
+
+    if table is None:
+        return NOMINAL
+    number = GEARS.index(name)
+    left, right = (flank_deviations(FlankOf(table, pair, number, side, folder)) for side in ("left", "right"))
+    return left, right
+
+
+def _with_deviations(
+    columns: dict[str, Any], gear: Gear, sides: tuple[ToothDeviations, ToothDeviations]
+) -> dict[str, Any]:
+    """The outline with the deviations of tooth 0 on its involutes, along the normals (um)."""
+    import numpy as np
+
+    roll = 1e-3 * np.sqrt(np.maximum(columns["radius_mm"] ** 2 - (1e3 * gear.base_radius) ** 2, 0.0))
+    made = np.full(len(roll), np.nan)
+    for side, own in zip(("left", "right"), sides, strict=True):
+        curve = own.profiles[own.profile[0]]
+        there = columns["piece"] == f"involute_{side}"
+        made[there] = 0.0 if curve is None else 1e6 * curve.at(roll[there])[0]
+    return {**columns, "deviation_um": made}
+
+
+def _notes(geometry: dict[str, Any]) -> str:
+    rows = {
+        "centre distance": f"{geometry['centre_distance_mm']:.6g} mm",
+        "working pressure angle": f"{geometry['working_pressure_angle_deg']:.5g}°",
+        "contact ratio": f"{geometry['contact_ratio']:.4g}",
+        "  less tip rounds": f"{geometry['contact_ratio_active']:.4g}",
+        "  less relief": f"{geometry['contact_ratio_effective']:.4g}",
+        "backlash": f"{geometry['backlash_mm']:.4g} mm",
+    }
+    return "\n".join(f"{name:<23}{value}" for name, value in rows.items())
+
+
+def _show(values: dict[str, Any], indent: str = "") -> None:
+    for name, value in values.items():
+        if isinstance(value, dict):
+            print(f"{indent}{name}")
+            _show(value, indent + "  ")
+        elif isinstance(value, float):
+            print(f"{indent}{name:<{34 - len(indent)}} {value:.9g}")
+        else:
+            print(f"{indent}{name:<{34 - len(indent)}} {value}")

@@ -1,0 +1,119 @@
+"""``gearfe loadmap JOB.toml --out DIR``: a gear pair, with its deviations, over pinion angle and torque."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..base.tables.loadmap import LoadMapTable, loads_of
+from ..base.tables.pair import StiffnessTable, check_law
+from .arguments import add_folder, add_job, add_keys, add_removed, check_option, print_results, with_keys
+
+#: Keys of [stiffness], and of the table of loads, that options stand for.
+MODEL = ("law", "plane", "kinematics", "coarsen")
+LOADS = ("positions", "mesh_cycles", "root_stress")
+#: Files that a run can leave.
+FILES = ("loadmap*.csv", "loadmap*.png", "loadmap.json")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_job(parser, "job", "job file with the tables [pair], [stiffness], [loadmap] and [microgeometry]")
+    add_folder(parser)
+    load = parser.add_mutually_exclusive_group()
+    load.add_argument(
+        "--torques-Nm", type=float, nargs="+", metavar="T", dest="torques_Nm", help="torques at the wheel's hub (N m)"
+    )
+    load.add_argument(
+        "--torque-range", type=float, nargs=3, metavar=("START", "STOP", "COUNT"), help="a range of torques (N m)"
+    )
+    add_keys(parser, LoadMapTable, *LOADS, spacing="torque_spacing")
+    add_keys(parser, StiffnessTable, *MODEL)
+    add_removed(parser, StiffnessTable.REMOVED)
+    add_removed(parser, {"flank": ("is a key of [microgeometry]", "write --set microgeometry.flank=right")})
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compute the map and write the files; 1 when a cell failed."""
+    started = time.perf_counter()
+    from ..base.tables.jobs import load_job
+
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
+    tables = load_job(args.job, ("pair",), ("stiffness", "loadmap", "microgeometry"))
+    tables["stiffness"] = _overridden_model(tables.get("stiffness", StiffnessTable()), args)
+    table = _with_loads(args, loads_of(tables))
+    table.torques()
+
+    from ..gears.geometry.pair import GearPair
+
+    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
+
+    from ..base.files import output_folder, whole_set, write_csvs, write_json
+    from ..base.progress import Stopwatch
+    from ..gears.loadmap.report import report_lines, summary, warnings
+    from ..gears.loadmap.report import tables as map_tables
+    from ..gears.loadmap.sweep import job_map
+    from ..gears.stiffness.job import stiffness_job
+    from ..gears.stiffness.report import deviation_lines
+
+    watch, beside = Stopwatch({"program start": time.perf_counter() - started}), Path(args.job).parent
+    with watch.stage("geometry"):
+        job = stiffness_job(tables, beside, pair)
+        deviations = deviation_lines(job)  # impossible ones are refused before the folder is made
+    folder = output_folder(args.out)
+    made_map = job_map(job, table)
+    watch.seconds.update(made_map.timings)
+    with whole_set(folder, FILES) as made:
+        with watch.stage("tables"):
+            write_csvs(made, map_tables(made_map))
+        if not args.no_pictures:
+            from ..figures.flanks import flank_picture
+            from ..figures.load_map import load_map_picture
+            from ..figures.style import save
+
+            with watch.stage("pictures"):
+                gears = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}"
+                title = f"{gears}, {made_map.span}, plane {job.table.plane}, law {job.table.law}"
+                save(load_map_picture(made_map, title), made / "loadmap.png", dpi=110)
+                if job.microgeometry is not None:
+                    picture = flank_picture(job.microgeometry, pair, beside)
+                    save(picture, made / "loadmap_flanks.png", dpi=110)
+        watch.seconds["total"] = time.perf_counter() - started
+        write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
+        names = sorted(path.name for path in made.iterdir())
+    print_results([*report_lines(made_map), *deviations], folder, names, watch.seconds, warnings(job, made_map))
+    return 1 if made_map.failed.any() else 0
+
+
+def _overridden_model(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:
+    """The table with the command's options in place of the file's values, checked like these."""
+    if args.law is not None:
+        check_law("--law", args.law)
+    made = with_keys(args, table, *MODEL)
+    made.check("stiffness")
+    return made
+
+
+def _with_loads(args: argparse.Namespace, table: LoadMapTable) -> LoadMapTable:
+    """The table with the options of loads in place of the file's values, checked like these."""
+    from ..base.errors import InputError
+
+    more: dict[str, Any] = {}
+    if args.torques_Nm is not None:
+        for torque in args.torques_Nm:
+            check_option("--torques-Nm", torque, LoadMapTable, "torques_Nm")
+        more |= {"torques_Nm": tuple(args.torques_Nm), "torque_start_Nm": None, "torque_stop_Nm": None}
+    if args.torque_range is not None:
+        start, stop, count = args.torque_range
+        if not float(count).is_integer():
+            raise InputError("--torque-range COUNT", count, "must be a whole number")
+        ends = {"torque_start_Nm": start, "torque_stop_Nm": stop, "torque_count": int(count)}
+        for key, value in ends.items():
+            check_option("--torque-range", value, LoadMapTable, key)
+        more |= {"torques_Nm": None, **ends}
+    made = with_keys(args, replace(table, **more), *LOADS, spacing="torque_spacing")
+    made.check(table.NAME)
+    return made

@@ -1,0 +1,292 @@
+r"""Fields of a gear train over time: the housing's vibration and the turning gears, as VTKHDF series and as pictures.
+
+A point of a gear or shaft at :math:`X_0`, with c the gear's centre at rest, d its displacement, :math:`\varphi` the
+angle turned about the axis a and :math:`\theta` the small tilt, is at
+
+.. math:: X = c + d + (I + \theta\times)\, R(a, \varphi)\,(X_0 - c) .
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+from ...base.progress import count
+from ...base.typing import Array, IntArray
+from ...fem.reduction.modal_body import ModalBody
+from ...gears.geometry.derived import gear_outline
+from ...gears.geometry.spur_gear import Gear
+from ...output.vtkhdf import VtkHdfSeries
+from ..train.gear_train import GearTrain, ShaftGear
+from ..train.response import TrainResponse
+
+#: Steps whose fields are in memory at a time.
+_AT_ONCE = 25
+#: Points round a shaft.
+_ROUND = 32
+#: Largest displacement of the housing in a picture, in parts of its size.
+_SHOWN = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """Surface of a body that moves with a gear.
+
+    Attributes
+    ----------
+    gear
+        Number of the gear whose motion it follows.
+    points : (n, 3)
+        At the start of the run (m).
+    quads : (f, 4)
+    triangles : (t, 3)
+    """
+
+    gear: int
+    points: Array
+    quads: IntArray
+    triangles: IntArray
+
+
+def gear_surface(gear: Gear, angle: float, *, per_segment: int = 3) -> tuple[Array, IntArray]:
+    """Surface of a gear about its own axis (the third coordinate): points (4 k, 3) in m and quadrilaterals.
+
+    Parameters
+    ----------
+    angle
+        Where tooth 0 points (rad).
+    per_segment
+        Pieces of each of the profile's curves.
+    """
+    outline = 1e-3 * gear_outline(gear, angle, (0.0, 0.0), per_segment=per_segment)[:-1]
+    inner = outline * (0.5 * gear.bore_diameter / np.linalg.norm(outline, axis=1, keepdims=True))
+    k, half = len(outline), 0.5 * gear.face_width
+    rings = [np.column_stack([ring, np.full(k, z)]) for z in (-half, half) for ring in (inner, outline)]
+    here, after = np.arange(k), np.roll(np.arange(k), -1)
+    # rings: 0 inner and 1 outer at the bottom, 2 inner and 3 outer at the top; each quad anticlockwise from outside
+    sides = ((1, 0), (2, 3), (3, 1), (0, 2))
+    quads = [np.column_stack([a * k + here, b * k + here, b * k + after, a * k + after]) for a, b in sides]
+    return np.concatenate(rings), np.concatenate(quads)
+
+
+def cylinder_surface(radius: float, low: float, high: float) -> tuple[Array, IntArray, IntArray]:
+    """Cylinder about the third axis: points, quadrilaterals, triangles of the ends."""
+    angle = 2.0 * np.pi * np.arange(_ROUND) / _ROUND
+    circle = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    ends = [np.column_stack([circle, np.full(_ROUND, z)]) for z in (low, high)]
+    points = np.concatenate([*ends, [[0.0, 0.0, low], [0.0, 0.0, high]]])
+    here, after = np.arange(_ROUND), np.roll(np.arange(_ROUND), -1)
+    quads = np.column_stack([here, after, _ROUND + after, _ROUND + here])
+    bottom = np.column_stack([np.full(_ROUND, 2 * _ROUND), after, here])
+    top = np.column_stack([np.full(_ROUND, 2 * _ROUND + 1), _ROUND + here, _ROUND + after])
+    return points, quads, np.concatenate([bottom, top])
+
+
+def solids(train: GearTrain, response: TrainResponse, *, per_segment: int = 2) -> tuple[Solid, ...]:
+    """Surfaces of all gears and of the shafts that carry them, where they stand at the start."""
+    frame = train.frame
+    angles = train.kinematics.angles
+    found = []
+    carried: set[str] = set()
+    for gear in train.gears:
+        number = response.gear_names.index(gear.name)
+        points, quads = gear_surface(gear.gear, angles[gear.name], per_segment=per_segment)
+        none = np.zeros((0, 3), dtype=np.int64)
+        found.append(Solid(number, response.gear_centres[number] + points @ frame, quads, none))
+        if gear.shaft not in carried:
+            carried.add(gear.shaft)
+            found.append(_shaft(train, gear, number))
+    return tuple(found)
+
+
+def moved(solid: Solid, response: TrainResponse, frame: Array, step: int, exaggeration: float = 1.0) -> Array:
+    """Return the points of a surface at an output step.
+
+    Displacement and tilt are exaggerated, the turning is not.
+
+    Parameters
+    ----------
+    solid : Solid
+        The surface.
+    response : TrainResponse
+        The motion.
+    frame : ndarray, shape (3, 3)
+        Directions of the train, its axis last.
+    step : int
+        Number of the output step.
+    exaggeration : float
+        Factor on displacement and tilt.
+
+    Returns
+    -------
+    points : ndarray, shape (n, 3)
+        In m.
+    """
+    pose, centre = response.gear_pose[step, solid.gear], response.gear_centres[solid.gear]
+    angle = float(pose[3:] @ frame[2])
+    tilt = exaggeration * (pose[3:] - angle * frame[2])
+    turned = _turned(solid.points - centre, frame[2], angle)
+    return np.asarray(centre + exaggeration * pose[:3] + turned + np.cross(tilt, turned))
+
+
+def _rolled(solid: Solid, train: GearTrain, response: TrainResponse, step: int) -> Array:
+    """(n, 3) points of a surface at an output step, had all shafts only rolled with the drive: no vibration."""
+    ratio = float(train.kinematics.ratios[train.shaft_number(train.gears[solid.gear].shaft)])
+    centre = response.gear_centres[solid.gear]
+    return np.asarray(
+        centre + _turned(solid.points - centre, train.frame[2], ratio * float(response.drive_angle[step]))
+    )
+
+
+def _turned(arm: Array, axis: Array, angle: float) -> Array:
+    """(n, 3) vectors turned about a unit axis."""
+    along = np.outer(arm @ axis, axis)
+    return np.asarray(along + np.cos(angle) * (arm - along) + np.sin(angle) * np.cross(axis, arm))
+
+
+def write_gears(path: Path, train: GearTrain, response: TrainResponse, steps: Sequence[int] | IntArray) -> None:
+    """Write a VTKHDF series of the gears and shafts.
+
+    It has places, displacement from the start and from rolling (m), and the number of the gear.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    train : GearTrain
+        The train.
+    response : TrainResponse
+        Its motion.
+    steps : sequence of int
+        Numbers of the output steps.
+    """
+    parts, frame = solids(train, response), train.frame
+    starts = np.cumsum([0, *(len(part.points) for part in parts)])
+    cells = {
+        "quad": np.concatenate([part.quads + s for part, s in zip(parts, starts, strict=False)]),
+        "triangle": np.concatenate([part.triangles + s for part, s in zip(parts, starts, strict=False)]),
+    }
+    rest = np.concatenate([part.points for part in parts])
+    number = np.repeat([part.gear + 1 for part in parts], np.diff(starts)).astype(np.uint8)
+    with VtkHdfSeries(path) as series:
+        for count, step in enumerate(steps):
+            points = np.concatenate([moved(part, response, frame, int(step)) for part in parts])
+            smooth = np.concatenate([_rolled(part, train, response, int(step)) for part in parts])
+            moves = {"displacement_m": points - rest, "vibration_m": points - smooth}
+            data = {"gear": number} | {name: values.astype(np.float32) for name, values in moves.items()}
+            series.add(float(response.time[step]), points, None if count else cells, point_data=data)
+
+
+def write_housing(
+    path: Path,
+    body: ModalBody,
+    response: TrainResponse,
+    steps: Sequence[int] | IntArray,
+) -> None:
+    """Write a VTKHDF series of the housing: displacement (m), acceleration along the outward normal (m/s2).
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    body : ModalBody
+        The reduced housing.
+    response : TrainResponse
+        The motion.
+    steps : sequence of int
+        Numbers of the output steps.
+    """
+    position, acceleration = _coordinates(response)
+    chosen = np.asarray(steps, dtype=np.int64)
+    with VtkHdfSeries(path) as series:
+        for first in range(0, len(chosen), _AT_ONCE):
+            some = chosen[first : first + _AT_ONCE]
+            displacement = body.reconstruct(position[some]).astype(np.float32)
+            normal = body.normal_component(acceleration[some]).astype(np.float32)
+            for i, step in enumerate(some):
+                start = first + i == 0
+                data = {"displacement_m": displacement[i], "normal_acceleration_m_per_s2": normal[i]}
+                series.add(
+                    float(response.time[step]),
+                    body.nodes if start else None,
+                    body.cells if start else None,
+                    point_data=data,
+                )
+            count(first + len(some), len(chosen), "fields")
+
+
+def frames(
+    train: GearTrain, response: TrainResponse, steps: Sequence[int] | IntArray, *, exaggeration: float | None = None
+) -> dict[str, NDArray[np.generic]]:
+    """Return the arrays that `gearfe.figures.train_scene` draws: surfaces in m, and their colours.
+
+    Parameters
+    ----------
+    train : GearTrain
+        The train.
+    response : TrainResponse
+        Its motion.
+    steps : sequence of int
+        Numbers of the output steps.
+    exaggeration
+        Factor on displacement and tilt; by default such that the housing's largest one is seen.
+    """
+    body, chosen = train.housing, np.asarray(steps, dtype=np.int64)
+    arrays: dict[str, NDArray[np.generic]] = {"time": response.time[chosen]}
+    factor = 1.0 if exaggeration is None else exaggeration
+    if body is not None and body.has_mesh:
+        from ..housing.mesh_checks import boundary_faces
+
+        faces = boundary_faces(body.elements)
+        used, renumbered = np.unique(faces, return_inverse=True)
+        rows = (3 * used[:, None] + np.arange(3)).ravel()
+        shapes = np.asarray(body.shapes[rows])
+        position, acceleration = _coordinates(response)
+        shift = (position[chosen] @ shapes.T).reshape(len(chosen), -1, 3)
+        if exaggeration is None:
+            size, most = float(np.ptp(body.nodes, axis=0).max()), float(np.abs(shift).max(initial=0.0))
+            factor = _rounded(_SHOWN * size / most) if most > 0.0 else 1.0
+        normal = (acceleration[chosen] @ shapes.T).reshape(len(chosen), -1, 3)
+        arrays |= {
+            "housing_faces": renumbered.reshape(faces.shape),
+            "housing_points": (body.nodes[used] + factor * shift).astype(np.float32),
+            "housing_values": np.einsum("snk,nk->sn", normal, body.normals[used]).astype(np.float32),
+        }
+    parts, frame = solids(train, response, per_segment=4), train.frame
+    smooth = [np.concatenate([_rolled(part, train, response, int(s)) for part in parts]) for s in chosen]
+    true = [np.concatenate([moved(part, response, frame, int(s)) for part in parts]) for s in chosen]
+    shown = [np.concatenate([moved(part, response, frame, int(s), factor) for part in parts]) for s in chosen]
+    starts = np.cumsum([0, *(len(part.points) for part in parts)])
+    arrays |= {
+        "gear_quads": np.concatenate([part.quads + s for part, s in zip(parts, starts, strict=False)]),
+        "gear_triangles": np.concatenate([part.triangles + s for part, s in zip(parts, starts, strict=False)]),
+        "gear_points": np.array(shown, dtype=np.float32),
+        "gear_values": np.array(
+            [1e6 * np.linalg.norm(p - q, axis=1) for p, q in zip(true, smooth, strict=True)], dtype=np.float32
+        ),
+        "exaggeration": np.array(factor),
+    }
+    return arrays
+
+
+def _coordinates(response: TrainResponse) -> tuple[Array, Array]:
+    if response.modal is None or response.modal_acceleration is None:
+        raise InputError("housing", None, "is rigid and has no field", "take an elastic housing")
+    return response.modal, response.modal_acceleration
+
+
+def _shaft(train: GearTrain, gear: ShaftGear, number: int) -> Solid:
+    shaft = train.shaft(gear.shaft)
+    points, quads, triangles = cylinder_surface(shaft.radius, -0.5 * shaft.length, 0.5 * shaft.length)
+    return Solid(number, np.array(shaft.point) + points @ train.frame, quads, triangles)
+
+
+def _rounded(factor: float) -> float:
+    """Down to one digit."""
+    power = 10.0 ** np.floor(np.log10(factor))
+    return float(np.floor(factor / power) * power)

@@ -1,0 +1,119 @@
+"""Values that gears and meshes of a train take from elsewhere: other tables, the gears themselves, defaults.
+
+A gear of its own takes keys that it lacks from [pair]; a mesh takes its model, material, damping and backlash from
+other tables or its gears. The summary names each such value with its source, so that nothing is inherited unseen.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...base.tables.pair import PairTable, tooth_form
+from ...base.tables.train import POTENTIAL, VARIABLE, TrainGearTable, TrainMeshTable
+from ...gears.geometry.pair import gear_pair
+from ..train.gear_train import GearMesh, GearTrain
+from .job import TrainJob
+
+#: Where a value comes from that no table gives.
+DEFAULT = "default"
+Source = dict[str, Any]
+
+
+def inherited(job: TrainJob, train: GearTrain) -> dict[str, dict[str, dict[str, Source]]]:
+    """Values of gears and meshes that their own entries do not give: gear or mesh -> key -> value, from."""
+    gears, meshes = zip(job.table.gears, train.gears, strict=True), zip(job.table.meshes, train.meshes, strict=True)
+    return {
+        "gears": {table.name: _of_gear(job, table, made.gear.bore_diameter, made.density) for table, made in gears},
+        "meshes": {made.name: _of_mesh(job, train, table, made) for table, made in meshes},
+    }
+
+
+def _value(value: Any, source: str) -> Source:
+    return {"value": value, "from": source}
+
+
+def _of_gear(job: TrainJob, table: TrainGearTable, bore: float, density: float) -> dict[str, Source]:
+    """What a gear takes from [pair], and its defaults."""
+    found: dict[str, Source] = {}
+    if table.gear:
+        found["gear"] = _value(table.gear, f"[pair.{table.gear}] and [pair]: teeth, tooth form, deviations")
+    else:
+        for key, value in {"module_mm": None, **tooth_form(table)}.items():
+            if getattr(table, key) is not None:
+                continue
+            shared = None if job.pair is None else getattr(job.pair, key)
+            if shared is not None:
+                found[key] = _value(shared, "[pair]")
+            elif value is not None:
+                found[key] = _value(value, DEFAULT)
+        if table.bore_diameter_mm is None:
+            found["bore_diameter_mm"] = _value(1e3 * bore, f"{DEFAULT}: 0.2 times the pitch diameter")
+    if table.density_kg_per_m3 is None:
+        source = DEFAULT if job.pair is None else _material_source(job.pair, table.gear)
+        found["density_kg_per_m3"] = _value(density, source)
+    return found
+
+
+def _material_source(pair: PairTable, side: str) -> str:
+    """Table of the material of a gear: of `side` of [pair], or of its own teeth (an empty text)."""
+    return f"[pair.{side}.material]" if side and getattr(pair, side).material is not None else "[pair.material]"
+
+
+def _of_mesh(job: TrainJob, train: GearTrain, table: TrainMeshTable, mesh: GearMesh) -> dict[str, Source]:
+    """What a mesh takes from other tables and its gears, and its defaults."""
+    found: dict[str, Source] = {}
+    model = job.table.model_of(table)
+    curves = f"[train.variants.{job.table.variant}.curves]" if job.table.variant else "[train.curves]"
+    pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
+    if model and table.mesh_model is None:
+        found["mesh_model"] = _value(model, curves)
+    if model == VARIABLE or table.curve:
+        found["interpolation"] = _value(job.table.curves.interpolation, curves)
+    if model and job.pair is not None:
+        sides = {g.name: g.gear for g in job.table.gears}
+        for role in ("driver", "driven"):
+            side = sides[getattr(table, role)]
+            material = job.pair.material_of(side) if side else job.pair.material
+            found[f"youngs_modulus_GPa of {role}"] = _value(
+                material.youngs_modulus_GPa, _material_source(job.pair, side)
+            )
+        found["plane"] = _value(job.stiffness.plane, _stiffness_source(job))
+    if table.centre_distance_mm is None:
+        source = "the gears, without backlash" if mesh.centre_distance is None else "[pair]"
+        found["centre_distance_mm"] = _value(1e3 * pair.working_centre_distance, source)
+    if table.backlash_um is None and not table.rigid:
+        if model == POTENTIAL:
+            source = "tooth_thinning_um of the gears and the centre distance"
+            found["backlash_um"] = _value(1e6 * max(pair.normal_backlash, 0.0), source)
+        else:
+            found["backlash_um"] = _value(None, f"{DEFAULT}: a spring that acts both ways")
+    if table.damping_acts is None and not table.rigid:
+        found["damping_acts"] = _value("in_contact" if mesh.damps_in_contact else "always", DEFAULT)
+    damping = f"[train.variants.{job.table.variant}.damping]" if job.table.variant else "[train.damping]"
+    if job.table.damping.rayleigh_beta_s > 0.0 and not table.rigid:
+        found["rayleigh_beta_s"] = _value(job.table.damping.rayleigh_beta_s, damping)
+    return found
+
+
+def _stiffness_source(job: TrainJob) -> str:
+    """Tables that the keys of [stiffness] come from."""
+    name = job.table.variant
+    own = bool(name) and job.table.variants[name].stiffness is not None
+    return f"[stiffness] and [train.variants.{name}.stiffness]" if own else "[stiffness]"
+
+
+def inherited_lines(entries: dict[str, dict[str, dict[str, Source]]]) -> list[str]:
+    """Lines for the terminal: what gears with teeth of their own take from [pair], and meshes from their gears."""
+    lines: list[str] = []
+    taken: dict[str, list[str]] = {}
+    for name, found in entries.get("gears", {}).items():
+        values = [f"{key} = {x['value']:g}" for key, x in found.items() if x["from"] == "[pair]"]
+        if values:
+            taken.setdefault(", ".join(values), []).append(name)
+    for text, names in taken.items():
+        lines.append(f"gear{'s' * (len(names) > 1)} {', '.join(names)}: from [pair] {text}")
+    for name, found in entries.get("meshes", {}).items():
+        clearance = found.get("backlash_um", {}).get("value")
+        if clearance:
+            lines.append(f"mesh {name}: backlash_um = {clearance:.6g} from {found['backlash_um']['from']}")
+    return lines

@@ -1,0 +1,300 @@
+"""From the tables of a job file to a gear train: ``[train]`` with ``[pair]``, ``[stiffness]`` and ``[housing]``.
+
+job = read_train_job("geometry/gear_train.toml", variant="operating")
+model = build_train(job_train(job, train_curves(job), train_body(job)))
+response = simulate(model, job.times, tolerance=job.table.tolerance)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base.errors import InputError, given
+from ...base.tables.housing import HousingTable
+from ...base.tables.jobs import read_train_tables
+from ...base.tables.microgeometry import MicrogeometryTable
+from ...base.tables.pair import REQUIRED, PairTable, StiffnessTable, tooth_form
+from ...base.tables.spectrum import SpectrumTable
+from ...base.tables.timefunction import TrainFunctionTable
+from ...base.tables.train import POTENTIAL, TrainGearTable, TrainMeshTable, TrainTable
+from ...base.typing import Array
+from ...gears.geometry.deviation_job import pitch_errors_of
+from ...gears.geometry.pair import Gear, GearPair, gear_of_form, gear_pair, in_keys
+from ...gears.meshlaw.law import MeshLaw
+from ...gears.stiffness.curve import StiffnessCurve
+from ...multibody import TimeFunction, smoothed_step
+from ..housing.body import bore_points, reduced_housing
+from ..train.checks import check_flanks, check_layout
+from ..train.friction import Lubrication
+from ..train.gear_train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+from .timefunctions import time_function
+
+if TYPE_CHECKING:
+    from ...fem.reduction.modal_body import ModalBody
+
+Stiffness = MeshLaw | StiffnessCurve | float | None
+
+
+@dataclass(frozen=True, eq=False)
+class TrainJob:
+    """A train job as read.
+
+    Attributes
+    ----------
+    path
+        The job file; curves that it names lie beside it.
+    table
+        [train], with the chosen variant's curves and damping.
+    stiffness
+        [stiffness], with the keys that the variant has instead.
+    pair, housing, microgeometry
+        The other tables, None where the file has none.
+    spectrum
+        [spectrum], with its defaults where the file has none.
+    """
+
+    path: Path
+    table: TrainTable
+    pair: PairTable | None
+    stiffness: StiffnessTable
+    housing: HousingTable | None
+    microgeometry: MicrogeometryTable | None = None
+    spectrum: SpectrumTable = field(default_factory=SpectrumTable)
+
+    @cached_property
+    def gears_of_pair(self) -> GearPair:
+        """The gears of [pair].
+
+        Raises
+        ------
+        InputError
+            For gears that cannot run together, and a file without the table.
+        """
+        return GearPair.from_table(given(self.pair, "pair"))
+
+    @cached_property
+    def rigid_train(self) -> GearTrain:
+        """The train with rigid meshes that rub nothing, in a rigid housing: enough for kinematics and statics.
+
+        Raises
+        ------
+        InputError
+            For mistakes in the train, and loads that press flanks of which nothing is known.
+        """
+        train = _rigid_train(self)
+        _check_rigid(self, train)
+        return train
+
+    @property
+    def times(self) -> Array:
+        """Output times (s), from 0 to the end, the end included where the steps meet it."""
+        step = 1e-6 * self.table.step_us
+        count = int(1e-3 * self.table.duration_ms / step * (1 + 1e-12) + 1e-9)
+        return np.asarray(step * np.arange(count + 1), dtype=float)
+
+
+def read_train_job(path: str | Path, variant: str | None = None) -> TrainJob:
+    """Read a job file; `variant` None takes the one that the file names.
+
+    Raises
+    ------
+    InputError
+        For every mistake in the file, and an unknown variant.
+    """
+    return train_job(path, read_train_tables(path, variant))
+
+
+def train_job(path: str | Path, tables: Mapping[str, Any]) -> TrainJob:
+    """The job of tables that are read; curves that they name lie beside `path`."""
+    stiffness = tables.get("stiffness", StiffnessTable())
+    housing, uneven = tables.get("housing"), tables.get("microgeometry")
+    spectrum = tables.get("spectrum", SpectrumTable())
+    return TrainJob(Path(path), tables["train"], tables.get("pair"), stiffness, housing, uneven, spectrum)
+
+
+def train_body(job: TrainJob) -> ModalBody | None:
+    """Reduced housing of the job, from the cache when it was made before; None for a rigid one."""
+    if job.table.housing == "rigid":
+        return None
+    return reduced_housing(given(job.housing, "housing"), job.path.parent)
+
+
+def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: ModalBody | None = None) -> GearTrain:
+    """The train of a job with the stiffness of each mesh and its reduced housing; without `curves` its rigid train.
+
+    Raises
+    ------
+    InputError
+        For what `TrainJob.rigid_train` refuses, and pitch errors that cannot be read.
+    """
+    train = job.rigid_train
+    if curves is not None:
+        rows = zip(train.meshes, job.table.meshes, curves, strict=True)
+        meshes = tuple(replace(mesh, stiffness=curve, friction=_friction(table)) for mesh, table, curve in rows)
+        gears = tuple(_uneven(job, gear, table.gear) for gear, table in zip(train.gears, job.table.gears, strict=True))
+        train = replace(train, gears=gears, meshes=meshes)
+    return train if body is None else replace(train, housing=body, rigid_bores={})
+
+
+def _rigid_train(job: TrainJob) -> GearTrain:
+    t = job.table
+    shafts = tuple(
+        Shaft(
+            s.name,
+            (1e-3 * s.x_mm, 1e-3 * s.y_mm, 1e-3 * s.z_mm),
+            1e-3 * s.length_mm,
+            1e-3 * s.radius_mm,
+            tuple(str(a) for a in s.attachments),
+            s.density_kg_per_m3,
+            s.initial_speed_rad_per_s,
+            s.mass_kg,
+            s.polar_inertia_kg_m2,
+            s.transverse_inertia_kg_m2,
+        )
+        for s in t.shafts
+    )
+    gears = tuple(
+        ShaftGear(g.name, g.shaft, 1e-3 * g.y_mm, train_gear(job, g, f"train.gears[{i}]"), _density(job, g))
+        for i, g in enumerate(t.gears)
+    )
+    meshes = tuple(_mesh(job, m) for m in t.meshes)
+    drive = None
+    if t.drive is not None:
+        ramp = (t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
+        speed = _over_time(job, t.drive.speed_rad_per_s, *ramp, "train.drive.speed_rad_per_s")
+        coupling = (t.drive.stiffness_Nm_per_rad, t.drive.damping_Nm_s_per_rad)
+        drive = Drive(t.drive.shaft, str(t.drive.attachment), speed, *coupling)
+    loads = tuple(
+        Load(
+            x.shaft,
+            None if x.attachment is None else str(x.attachment),
+            _over_time(job, x.torque_Nm, x.ramp_centre_ms, x.ramp_width_ms, f"train.loads[{i}].torque_Nm"),
+        )
+        for i, x in enumerate(t.loads)
+    )
+    damping = Damping(t.damping.ratio, t.damping.rayleigh_alpha_per_s, t.damping.rayleigh_beta_s, t.damping.gyroscopic)
+    bearings = tuple(Bearing(str(b.attachment), b.stiffness, b.damping) for b in t.bearings)
+    return GearTrain(shafts, gears, meshes, drive, loads, None, _rigid_bores(job), bearings, damping)
+
+
+def _check_rigid(job: TrainJob, train: GearTrain) -> None:
+    meshes = tuple(replace(mesh, backlash=None, damping=0.0, damping_acts=None) for mesh in train.meshes)
+    check_layout(replace(train, meshes=meshes))
+    check_flanks(train, np.array([not back_flanks(job, train, i) for i in range(len(meshes))], dtype=bool))
+
+
+def back_flanks(job: TrainJob, train: GearTrain, number: int) -> bool:
+    """Whether a mesh has back flanks: behind its given backlash, or with a mesh law behind that of its gears."""
+    table, mesh = job.table.meshes[number], train.meshes[number]
+    if table.backlash_um is not None:
+        return True
+    if job.table.model_of(table) != POTENTIAL:
+        return False
+    pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
+    return pair.normal_backlash > 0.0
+
+
+def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:
+    """The gear that an entry of [[train.gears]] describes."""
+    pair = job.pair
+    if table.gear:
+        if pair is None:
+            raise InputError(
+                f"{where}.gear", table.gear, "needs a table [pair]", "add it, or give teeth, module_mm, ..."
+            )
+        return job.gears_of_pair.pinion if table.gear == "pinion" else job.gears_of_pair.wheel
+
+    sources = (table,) if pair is None else (table, pair)
+    form, modules = tooth_form(*sources), (source.module_mm for source in sources)
+    needed = {"module_mm": next((m for m in modules if m is not None), None), **{key: form[key] for key in REQUIRED}}
+    for key, value in needed.items():
+        if value is None:
+            raise InputError(f"{where}.{key}", None, "is required", "add it here, or to a table [pair]")
+    teeth, module_mm = given(table.teeth, f"{where}.teeth"), given(needed["module_mm"], f"{where}.module_mm")
+    bore_mm = 0.2 * module_mm * teeth if table.bore_diameter_mm is None else table.bore_diameter_mm
+    try:
+        return gear_of_form(teeth, {**form, "module_mm": module_mm, "bore_diameter_mm": bore_mm})
+    except InputError as error:
+        raise in_keys(error, where) from None
+
+
+def _uneven(job: TrainJob, made: ShaftGear, name: str) -> ShaftGear:
+    """A gear with the pitch errors of its table in [microgeometry]."""
+    if not name or job.microgeometry is None:
+        return made
+    return replace(made, pitch_errors=pitch_errors_of(job.microgeometry, made.gear, name, job.path.parent))
+
+
+def _density(job: TrainJob, table: TrainGearTable) -> float:
+    if table.density_kg_per_m3 is not None:
+        return table.density_kg_per_m3
+    if job.pair is None:
+        return 7850.0
+    return (job.pair.material_of(table.gear) if table.gear else job.pair.material).density_kg_per_m3
+
+
+def _mesh(job: TrainJob, table: TrainMeshTable) -> GearMesh:
+    distance = table.centre_distance_mm
+    if distance is None and job.pair is not None and job.pair.centre_distance_mm is not None:
+        sides = {g.name: g.gear for g in job.table.gears}
+        if {sides.get(table.driver), sides.get(table.driven)} == {"pinion", "wheel"}:
+            distance = job.pair.centre_distance_mm
+    return GearMesh(
+        table.driver,
+        table.driven,
+        None,
+        None if table.phase_deg is None else math.radians(table.phase_deg),
+        table.damping_N_s_per_m,
+        job.table.curves.interpolation,
+        None if distance is None else 1e-3 * distance,
+        None if table.backlash_um is None else 1e-6 * table.backlash_um,
+        damping_acts=table.damping_acts,
+    )
+
+
+def _friction(table: TrainMeshTable) -> float | Lubrication:
+    if table.oil_viscosity_mPa_s is None or table.roughness_um is None:
+        return table.friction or 0.0
+    factor = 1.0 if table.oil_factor is None else table.oil_factor
+    return Lubrication(1e-3 * table.oil_viscosity_mPa_s, 1e-6 * table.roughness_um, factor)
+
+
+def _over_time(
+    job: TrainJob, value: float | TrainFunctionTable, centre_ms: float, width_ms: float | None, where: str
+) -> TimeFunction:
+    """A number with its ramp, or a function of time."""
+    if width_ms is None or isinstance(value, TrainFunctionTable):
+        return time_function(value, where, job.path.parent, float(job.times[-1]))
+    return smoothed_step(1e-3 * centre_ms, 1e-3 * width_ms, value)
+
+
+def _rigid_bores(job: TrainJob) -> dict[str, tuple[float, float, float]]:
+    """Bores of a rigid housing: those of the table, else the places of [housing]'s bores."""
+    found = {str(b.attachment): (1e-3 * b.x_mm, 1e-3 * b.y_mm, 1e-3 * b.z_mm) for b in job.table.rigid_bores}
+    if found:
+        return found
+    if job.housing is None:
+        problem = "are not given: neither [[train.rigid_bores]] nor [housing] tells where the bores are"
+        raise InputError("train.rigid_bores", None, problem, "add one entry for each attachment")
+    return bore_places(job.housing, job.path.parent)
+
+
+def bore_places(table: HousingTable, folder: Path = Path()) -> dict[str, tuple[float, float, float]]:
+    """Name -> reference point (m) of the bores of a [housing] table: their middles, numbered as attachments.
+
+    Files that the table names are looked for in `folder`.
+    """
+    if table.reduced or table.mesh.file is not None:
+        return bore_points(table, folder)
+    ranges = [(shaft, *ends) for shaft in table.shafts for ends in table.bore_ranges(shaft)]
+    return {
+        str(number): (1e-3 * shaft.x_mm, 0.5e-3 * (low + high), 1e-3 * shaft.z_mm)
+        for number, (shaft, low, high) in enumerate(ranges, start=1)
+    }

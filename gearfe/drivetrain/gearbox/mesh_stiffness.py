@@ -1,0 +1,203 @@
+"""Stiffness of the meshes of a train job: from files or computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base.errors import InputError, given
+from ...base.progress import stage
+from ...base.tables.train import MEAN, POTENTIAL
+from ...gears.contact.laws import HalfPlane, check_alike, check_deviations
+from ...gears.geometry.deviation_job import deviations_of
+from ...gears.geometry.face import NOMINAL, ToothDeviations
+from ...gears.geometry.pair import GearPair, gear_pair
+from ...gears.meshlaw.law import MeshLaw
+from ...gears.meshlaw.store import cached_law
+from ...gears.stiffness.curve import NO_CYCLE, StiffnessCurve
+from ...gears.stiffness.job import StiffnessJob, cached_curve, material_of
+from ..train.gear_train import GearMesh, GearTrain
+from .job import Stiffness, TrainJob, back_flanks, job_train
+
+if TYPE_CHECKING:
+    from ...gears.contact.laws import ContactLaw
+
+#: A mesh law is made for so many times the torque in steady running: vibration has room.
+ROOM = 5.0
+#: Positions at which the error of a law's stiffness is estimated.
+ESTIMATED = 8
+#: Positions of a curve at the carried torque.
+POSITIONS = 36
+
+
+def train_curves(
+    job: TrainJob,
+    files: Sequence[str | Path] = (),
+    *,
+    estimate: bool = False,
+) -> tuple[Stiffness, ...]:
+    """Stiffness of each mesh: from `files`, from the file or number its table names, or computed (and cached).
+
+    Parameters
+    ----------
+    files
+        CSV files, one for all meshes or one a mesh; they win over the job's.
+    estimate
+        Whether computed curves carry an estimate of their error.
+    """
+    meshes = job.table.meshes
+    if files and len(files) not in (1, len(meshes)):
+        problem = f"{len(files)} files for {len(meshes)} meshes"
+        raise InputError("curve", [str(f) for f in files], problem, "give one for all, or one a mesh")
+    train = job_train(job)
+    found: list[Stiffness] = []
+    for number, (mesh, made) in enumerate(zip(meshes, train.meshes, strict=True)):
+        teeth = train.gear(made.driver).gear.teeth
+        if files:
+            found.append(_read_curve(Path(files[number if len(files) > 1 else 0]), teeth))
+        elif mesh.rigid:
+            found.append(None)
+        elif mesh.stiffness_N_per_m is not None:
+            found.append(mesh.stiffness_N_per_m)
+        elif mesh.curve is not None:
+            found.append(_read_curve(job.path.parent / mesh.curve, teeth))
+        elif job.table.model_of(mesh) == POTENTIAL:
+            found.append(_computed_law(job, train, number, estimate))
+        else:
+            curve = _computed_curve(job, train, number, estimate)
+            constant = job.table.model_of(mesh) == MEAN
+            found.append(curve.interpolant("k_mesh", method="cubic").mean if constant else curve)
+    return tuple(found)
+
+
+def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
+    """A curve from a CSV file; without a period in the file, that of the driver."""
+    try:
+        return StiffnessCurve.from_csv(path)
+    except InputError as error:
+        if error.problem != NO_CYCLE:
+            raise
+    return StiffnessCurve.from_csv(path, mesh_cycle=2.0 * math.pi / teeth)
+
+
+def _carried_torque(train: GearTrain, number: int) -> float:
+    """Torque (N m) at the driven gear of a mesh in steady running, without sign."""
+    driven = train.gear(train.meshes[number].driven).gear
+    return abs(float(train.kinematics.steady_forces[number])) * driven.base_radius
+
+
+def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> StiffnessCurve:
+    """Curve of a mesh with the driver as pinion, by [stiffness] or at the torque that the mesh carries."""
+    mesh = train.meshes[number]
+    one, two = train.gear(mesh.driver).gear, train.gear(mesh.driven).gear
+    pair = gear_pair(one, two, mesh.centre_distance)
+    if job.pair is None:
+        problem = "has no stiffness: there is no table [pair] to compute it with"
+        raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
+    tables = StiffnessJob(job.pair, job.stiffness, pair)
+    deviations, _ = _deviations(job, train, number, pair, tables.law)
+    model = replace(tables.model, materials=_materials(job, mesh), deviations=deviations)
+    if job.table.curves.load in (None, "stiffness"):
+        with stage(mesh.name):
+            return cached_curve(pair, model, estimate_error=estimate, **tables.sweep)
+    torque = _carried_torque(train, number)
+    if not torque > 0.0:
+        problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
+        raise InputError(f"mesh {mesh.name!r}", None, problem, 'add a load, or write load = "stiffness"')
+    count = job.table.curves.positions or POSITIONS
+    sweep: dict[str, Any] = {
+        "torque": torque,
+        "angles": pair.mesh_cycle * np.arange(count) / count,
+        "kinematics": job.stiffness.kinematics,
+    }
+    with stage(mesh.name):
+        return cached_curve(pair, model, estimate_error=estimate, **sweep)
+
+
+def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> MeshLaw:
+    """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
+
+    def gears(mesh: GearMesh) -> tuple[Any, ...]:
+        materials = None if job.pair is None else _materials(job, mesh)
+        return train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance, materials
+
+    mesh, table = train.meshes[number], job.table.meshes[number]
+    if job.pair is None:
+        problem = "has no stiffness: there is no table [pair] to compute it with"
+        raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
+    alike = [i for i, other in enumerate(train.meshes) if gears(other) == gears(mesh)]
+    steady = max(_carried_torque(train, i) for i in alike)
+    most = table.mesh_model_torque_Nm or ROOM * steady
+    if not most > 0.0:
+        problem = "carries no torque in steady running, so the range of its mesh law is unknown"
+        raise InputError(f"mesh {mesh.name!r} mesh_model_torque_Nm", None, problem, "give mesh_model_torque_Nm")
+    one, two, distance, materials = gears(mesh)
+    pair = gear_pair(one, two, distance)
+    tables = StiffnessJob(job.pair, job.stiffness, pair)
+    deviations, back = _deviations(job, train, number, pair, HalfPlane())
+    model = replace(tables.model, materials=materials, law=HalfPlane(), deviations=deviations)
+    with stage(mesh.name):
+        try:
+            law = cached_law(pair, model, most / pair.wheel.base_radius)
+            if back != deviations:
+                other = replace(model, deviations=back)
+                law = replace(law, back=cached_law(pair, other, most / pair.wheel.base_radius))
+        except InputError as error:
+            if error.field != "force":
+                raise
+            problem = f"is the largest of its law ({ROOM:g} times the steady one where none is given): {error.problem}"
+            label, cure = f"mesh {mesh.name!r} mesh_model_torque_Nm", "give a smaller load, or mesh_model_torque_Nm"
+            raise InputError(label, float(f"{most:.6g}"), problem, cure) from None
+        if not estimate:
+            return law
+        angles = pair.mesh_cycle * np.arange(ESTIMATED) / ESTIMATED
+        sweep: dict[str, Any] = {"torque": most / ROOM, "angles": angles, "kinematics": "small"}
+        curve = cached_curve(pair, model, estimate_error=True, **sweep)
+    fit = max(side.error for side in law.sides)
+    return replace(law, error=fit + curve.worst_error)
+
+
+def _deviations(
+    job: TrainJob, train: GearTrain, number: int, pair: GearPair, law: ContactLaw
+) -> tuple[tuple[ToothDeviations, ToothDeviations], tuple[ToothDeviations, ToothDeviations]]:
+    """Deviations of the driving flanks of a mesh, the left ones where the driver turns about the axis of the shafts,
+    and of its back flanks, those of the driving ones where these never bear. A mesh law's have no pitch errors.
+
+    Raises
+    ------
+    InputError
+        For deviations that the law or one mesh cycle cannot have, and where a curve's back flanks bear and are others.
+    """
+    if job.microgeometry is None:
+        return NOMINAL, NOMINAL
+    mesh, sides = train.meshes[number], {g.name: g.gear for g in job.table.gears}
+    gears = (sides[mesh.driver], sides[mesh.driven])
+    flanks = ("left", "right") if train.kinematics.senses[number] > 0.0 else ("right", "left")
+    driving, back = (
+        deviations_of(job.microgeometry, pair, job.path.parent, flank=flank, gears=gears) for flank in flanks
+    )
+    mapped = job.table.model_of(job.table.meshes[number]) == POTENTIAL
+    if mapped:  # pitch errors are the train's own
+        driving, back = ((replace(a, turn=(0.0,)), replace(b, turn=(0.0,))) for a, b in (driving, back))
+    if not back_flanks(job, train, number):
+        back = driving
+    for one in (driving, back):
+        check_alike(one)
+        check_deviations(one, law)
+    if back != driving and not mapped:
+        problem = f"left and right flanks differ, but mesh {mesh.name!r} has one curve for both"
+        cure = 'write mesh_model = "potential", or give the mesh no backlash'
+        raise InputError("microgeometry", None, problem, cure)
+    return driving, back
+
+
+def _materials(job: TrainJob, mesh: GearMesh) -> Any:
+    pair = given(job.pair, "pair")
+    sides = {g.name: g.gear for g in job.table.gears}
+    names = (sides[mesh.driver], sides[mesh.driven])
+    return tuple(material_of(pair.material_of(name) if name else pair.material) for name in names)

@@ -1,0 +1,161 @@
+"""From functions of time in a job file to those that the integrators take: pieces of polynomials and sines.
+
+An expression becomes pieces of polynomials of degree `DEGREE` through Chebyshev's points (Trefethen, Approximation
+Theory and Approximation Practice, 2nd ed. 2020, chapters 2 and 8), halved until each has the accuracy `CLOSE`;
+a kink, at which halving would not end, stays within `KINK` of the largest value.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from ...base.errors import InputError, unknown_name
+from ...base.expressions import syntax
+from ...base.files import read_numbers
+from ...base.tables.timefunction import TrainFunctionTable, check_rising
+from ...base.typing import Array
+from ...multibody import TimeFunction, constant, sine, smoothed_step
+
+#: Degree of a piece, its error in parts of the largest value, the same at kinks, halvings, and pieces at most.
+DEGREE, CLOSE, KINK, HALVINGS, PIECES = 12, 1e-11, 1e-6, 22, 4000
+
+
+def time_function(value: float | TrainFunctionTable, where: str, folder: Path, end: float) -> TimeFunction:
+    """The function of time that a key describes.
+
+    Parameters
+    ----------
+    value
+        A number, or the table of the function.
+    where
+        Name of the key, for messages.
+    folder
+        Where files lie that it names.
+    end
+        Of the run (s): an expression is known up to there.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read, times that do not rise, expressions that are none or jump.
+    """
+    if not isinstance(value, TrainFunctionTable):
+        return constant(value)
+    made = constant(value.constant)
+    if value.points:
+        made = made + _through(np.array(value.points), value.interpolation)
+    if value.csv is not None:
+        made = made + _through(_table(value.csv, f"{where}.csv", folder), value.interpolation)
+    for one in value.steps:
+        made = made + smoothed_step(1e-3 * one.centre_ms, 1e-3 * one.width_ms, one.height)
+    for wave in value.sines:
+        made = made + sine(wave.amplitude, 2.0 * math.pi * wave.frequency_Hz, math.radians(wave.phase_deg))
+    if value.expression is not None:
+        made = made + _of_expression(value.expression, f"{where}.expression", end)
+    return made
+
+
+def _through(points: Array, interpolation: str) -> TimeFunction:
+    """Through points (n, 2) of times (ms) and values, which hold before the first and after the last."""
+    time, value = 1e-3 * points[:, 0], points[:, 1]
+    if len(time) == 1:
+        return constant(float(value[0]))
+    if interpolation == "cubic" and len(time) > 2:
+        from scipy.interpolate import PchipInterpolator
+
+        pieces = PchipInterpolator(time, value).c[::-1].T
+    else:
+        pieces = np.column_stack([value[:-1], np.diff(value) / np.diff(time)])
+    starts = [*time.tolist()]
+    rows = [tuple(float(c) for c in row) for row in pieces] + [(float(value[-1]),)]
+    if starts[0] <= 0.0:
+        starts[0] = -math.inf  # the run begins at 0
+        return TimeFunction(tuple(starts), tuple(time.tolist()), tuple(rows))
+    first = float(time[0])
+    return TimeFunction((-math.inf, *starts), (first, *time.tolist()), ((float(value[0]),), *rows))
+
+
+def _table(name: str, where: str, folder: Path) -> Array:
+    """Points of a CSV file with the columns time_ms and value, (n, 2)."""
+    columns = read_numbers(folder / name, where, ("time_ms", "value"))
+    points = np.column_stack([columns["time_ms"], columns["value"]])
+    check_rising(f"{where} time_ms", tuple(points[:, 0].tolist()))
+    return points
+
+
+def _of_expression(text: str, where: str, end: float) -> TimeFunction:
+    """Pieces of polynomials that are the expression of `time` from 0 to the end."""
+    from ...mechanisms.expressions import FUNCTIONS, compute, parse  # few jobs have expressions
+
+    known = ("time", "pi", *FUNCTIONS)
+    for name in (node.id for node in ast.walk(syntax(text, where)) if isinstance(node, ast.Name)):
+        if name not in known:
+            raise unknown_name(f"{where} = {text!r}", name, known)
+    tree = parse(text, where)
+
+    def at(time: Array) -> Array:
+        value = np.broadcast_to(np.asarray(compute(tree, {("time", None): time}), dtype=float), time.shape)
+        if not np.isfinite(value).all():
+            bad = float(time[~np.isfinite(value)][0])
+            raise InputError(where, text, f"has no value at {1e3 * bad:.6g} ms", "change it, or end the run before")
+        return value
+
+    return fitted(at, end, where, text)
+
+
+def fitted(at: Callable[[Array], Array], end: float, where: str, text: str) -> TimeFunction:
+    """Fit pieces of polynomials to a function from 0 to the end; see the module.
+
+    Parameters
+    ----------
+    at : callable
+        Function of an array of times (s).
+    end : float
+        End of the run (s).
+    where : str
+        Name of the key in messages.
+    text : str
+        Its value in messages.
+
+    Raises
+    ------
+    InputError
+        For functions that jump, and those that would need more than `PIECES`.
+    """
+    u = np.cos(math.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+    to_powers = np.stack([_padded(chebyshev.cheb2poly(row)) for row in np.eye(DEGREE + 1)], axis=1)
+    fit = to_powers @ np.linalg.inv(chebyshev.chebvander(u, DEGREE))
+    between = np.linspace(-1.0, 1.0, 3 * DEGREE)
+    largest = float(np.abs(at(np.linspace(0.0, end, 1001))).max()) or 1.0
+    pieces: list[tuple[float, float, tuple[float, ...]]] = []  # begin, middle, coefficients
+    left = [(0.0, end, 0)]
+    while left:
+        begin, stop, halved = left.pop()
+        middle, half = 0.5 * (begin + stop), 0.5 * (stop - begin)
+        power = fit @ at(middle + half * u)
+        power[np.abs(power) < 0.1 * CLOSE * largest] = 0.0
+        value = at(middle + half * between)
+        off = float(np.abs(np.polynomial.polynomial.polyval(between, power) - value).max())
+        if off > (CLOSE if halved < HALVINGS else KINK) * max(largest, float(np.abs(value).max())):
+            if halved == HALVINGS:
+                problem = f"jumps at {1e3 * middle:.6g} ms"
+                raise InputError(where, text, problem, "let it change over some time, as smoothed steps do")
+            if len(pieces) + len(left) > PIECES:
+                problem = f"needs more than {PIECES} pieces of polynomials"
+                raise InputError(where, text, problem, "write slower changes; fast sines belong into sines")
+            left += [(middle, stop, halved + 1), (begin, middle, halved + 1)]
+            continue
+        last = int(np.flatnonzero(power).max(initial=0))
+        pieces.append((begin, middle, tuple((power[: last + 1] / half ** np.arange(last + 1)).tolist())))
+    starts = (-math.inf, *(begin for begin, _, _ in pieces[1:]))
+    return TimeFunction(starts, tuple(m for _, m, _ in pieces), tuple(row for _, _, row in pieces))
+
+
+def _padded(row: Array) -> Array:
+    return np.pad(row, (0, DEGREE + 1 - len(row)))

@@ -1,0 +1,388 @@
+r"""Steady motions by harmonic balance: linear behind a few freedoms, everything else evaluated in time.
+
+With the harmonics :math:`u(\theta) = \mathrm{Re}\sum_k \hat u_k e^{ik\cdot\theta}`, :math:`\theta = \omega t`, of the
+freedoms and the forces :math:`f(\theta, u, \dot u)` over one phase (a periodic motion) or several (a quasi-periodic
+one; Schilder, Vogt, Schreiber & Osinga, Int. J. Numer. Meth. Eng. 67, 2006; Guskov & Thouverez, J. Vib. Acoust. 134,
+2012; Krack & Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019),
+
+.. math::
+    r_k = \hat u_k - \hat u^0_k - H(ik\cdot\omega)\,\hat f_k(\hat u) = 0
+
+for the first K harmonics of `gearfe.drivetrain.runup.torus`.
+
+Forces are sampled over the phases and transformed (alternating frequency/time; Cameron & Griffin, J. Appl. Mech. 56,
+1989). Newton's method takes their derivatives from the same samples: a change of the amplitudes is made a motion, times
+the derivatives a change of the forces, and transformed back,
+
+.. math:: \delta r = \delta\hat u - H\,\mathcal F\Big[\frac{\partial f}{\partial u}\,\delta u
+    + \frac{\partial f}{\partial\dot u}\,\delta\dot u\Big] .
+
+H falls with the frequency, so this is the identity and a compact part, for which the method of generalised minimal
+residuals converges in a few products without a matrix (`runup.krylov`). The error is estimated from what is left
+of the equations with twice the harmonics and four times the samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ...base.typing import Array, ComplexArray
+from . import torus
+from .krylov import gmres
+from .linear import Linear
+from .torus import Lattice
+
+#: Newton steps, and halvings of one of them.
+STEPS, HALVINGS = 60, 8
+#: A motion is found where what is left of the equations is smaller than this part of the tolerance.
+FOUND = 3e-2
+#: Where Newton's method goes to and fro over a touch of flanks that falls on a sample, this many steps without halving
+#: what is left end it; less than this is left to the error estimate, which adds samples.
+IDLE, LEFT = 8, 1e-4
+#: What a step of Newton's method leaves of the linear equations, and of those for the error estimate.
+INEXACT, ROUGH = 0.03, 0.1
+#: A step from within the range of convergence leaves less than this part (Deuflhard, Newton Methods for Nonlinear
+#: Problems, 2004, Sec. 5.1: continuation with contractions of a half).
+CONTRACTS = 0.5
+#: The error estimate is multiplied by this.
+SAFETY = 2.0
+#: Where the estimate misses the tolerance, harmonics grow by this factor.
+GROWTH = 1.5
+#: Harmonics to begin with, at most, where there are several phases.
+PLENTY = 256
+#: Most harmonics: a bound on time and memory, not on the error, whose estimate stays.
+MOST_HARMONICS = 8192
+
+
+class Pushes(NamedTuple):
+    """Forces at S places of the phases, and their derivatives."""
+
+    value: Array  # (S, m)
+    by_place: Array  # (S, m, m): of force i with freedom j
+    by_rate: Array | None  # (S, m, m)
+    momentum: Array | None = None  # (S, m) whose rate of change is a further force: of dampers that act in contact only
+    momentum_by_place: Array | None = None  # (S, m, m)
+
+
+class SteadyForces(Protocol):
+    """What is not linear, or not constant."""
+
+    def __call__(self, theta: Array, speed: float, u: Array, du: Array, /) -> Pushes:
+        """Forces at phases theta (S, n), the freedoms and their rates (1/s) being u and du, (S, m)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Oscillator:
+    """A linear part with periodic forces.
+
+    Parameters
+    ----------
+    linear, forces
+        Its parts.
+    turns : (n,)
+        Turns of the drive in one period of each phase: ``omega = |speed| / turns``.
+    scale : (m,)
+        Size of each freedom, by which errors are measured.
+    orders : (meshes, n)
+        Harmonics that excite, one for each mesh: its cycles in a period of its phase.
+    limit
+        Largest motion that means something, in parts of the scale.
+    start : (m,), optional
+        Freedoms beside those of the state without vibration; those under the constant force alone when left out.
+    """
+
+    linear: Linear
+    forces: SteadyForces
+    turns: tuple[float, ...]
+    scale: Array
+    orders: tuple[tuple[int, ...], ...] = ((1,),)
+    limit: float = math.inf
+    start: Array | None = None
+
+    @cached_property
+    def periods(self) -> tuple[float, ...]:
+        """Of the phases, in parts of that of the first."""
+        return tuple(turns / self.turns[0] for turns in self.turns)
+
+    def omega(self, speed: float, count: int) -> Array:
+        """Angular frequencies (rad/s) of the harmonics 0 to `count`, none negative."""
+        waves, _ = torus.harmonics(self.periods, count)
+        return np.asarray((waves * (abs(speed) / np.array(self.turns))).sum(axis=1))
+
+    def lattice(self, count: int) -> Lattice:
+        """Places at which so many harmonics are sampled."""
+        return torus.lattice(self.periods, count)
+
+    def harmonics(self, speed: float, highest: float, multiples: int = 8) -> int:
+        """Number of harmonics: multiples up to an angular frequency (rad/s), so many of each mesh at least.
+
+        With several phases they reach less far where that would be more than `PLENTY`: the error estimate adds to them.
+        """
+        periods = self.periods
+        order = max(multiples * cycles / b for mesh in self.orders for cycles, b in zip(mesh, periods, strict=True))
+        most = torus.harmonics(periods, MOST_HARMONICS if len(periods) == 1 else PLENTY).order[-1]
+        band = min(highest * self.turns[0] / abs(speed), float(most))
+        return self.rounded(torus.count_below(periods, max(order, band)))
+
+    def rounded(self, harmonics: float) -> int:
+        """Number whose samples transform quickly, at least the given one, up to the most."""
+        return min(8 * math.ceil(harmonics / 8), MOST_HARMONICS)
+
+    def flexibility(self, speed: float, count: int) -> ComplexArray:
+        """H at harmonics 0 to `count`, (count + 1, m, m)."""
+        return self.linear.flexibility(self.omega(speed, count), speed)
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A periodic or quasi-periodic motion.
+
+    Attributes
+    ----------
+    speed
+        Of the drive (rad/s).
+    places : (K + 1, m)
+        Complex amplitudes of the freedoms at the harmonics 0 to K.
+    forces : (K + 1, m)
+        Of the forces on them.
+    error
+        Estimate of the error of the freedoms, in parts of their scale; not-a-number where there is none.
+    found
+        Whether the equations are solved.
+    steps
+        Newton steps taken.
+    """
+
+    speed: float
+    places: ComplexArray
+    forces: ComplexArray
+    error: float
+    found: bool
+    steps: int
+
+    @property
+    def harmonics(self) -> int:
+        """K."""
+        return len(self.places) - 1
+
+    def with_harmonics(self, count: int) -> ComplexArray:
+        """Amplitudes of the freedoms up to another harmonic, new ones 0."""
+        return widened(self.places, count)
+
+
+class Evaluated(NamedTuple):
+    """The equations at some amplitudes."""
+
+    residual: ComplexArray  # (K + 1, m)
+    forces: ComplexArray  # (K + 1, m)
+    pushes: Pushes
+    lattice: Lattice
+
+
+def widened(amplitudes: ComplexArray, count: int) -> ComplexArray:
+    """(count + 1, m) amplitudes up to another harmonic, new ones 0."""
+    made = np.zeros((count + 1, amplitudes.shape[1]), dtype=complex)
+    shared = min(count + 1, len(amplitudes))
+    made[:shared] = amplitudes[:shared]
+    return made
+
+
+def evaluate(
+    system: Oscillator, speed: float, places: ComplexArray, lattice: Lattice, flexibility: ComplexArray
+) -> Evaluated:
+    """Evaluate the residual r_k of the equations, and the forces, at given amplitudes.
+
+    Parameters
+    ----------
+    system : Oscillator
+        The oscillator.
+    speed : float
+        Speed of the drive (rad/s).
+    places : ndarray of complex, shape (K + 1, m)
+        Amplitudes of the freedoms (m, rad).
+    lattice : Lattice
+        Samples at which the forces are evaluated, of K harmonics at least.
+    flexibility : ndarray of complex, shape (K + 1, m, m)
+        H at the harmonics, see `flexibility_of`.
+    """
+    turning = 1j * system.omega(speed, len(places) - 1)[:, None]
+    u, du = lattice.synthesis(places), lattice.synthesis(turning * places)
+    pushes = system.forces(lattice.theta, speed, u, du)
+    forces = lattice.analysis(pushes.value)[: len(places)]
+    if pushes.momentum is not None:
+        forces = forces + turning * lattice.analysis(pushes.momentum)[: len(places)]
+    return Evaluated(places - moved(system, flexibility, forces), forces, pushes, lattice)
+
+
+def moved(system: Oscillator, flexibility: ComplexArray, forces: ComplexArray) -> ComplexArray:
+    """Amplitudes (K + 1, m) of the freedoms under forces of such amplitudes and the constant one."""
+    made = (flexibility @ forces[..., None])[..., 0]
+    made[0] += system.linear.rest
+    return np.asarray(made)
+
+
+def packed(amplitudes: ComplexArray, scale: Array) -> Array:
+    """Real vector of amplitudes in parts of the scale."""
+    return np.ascontiguousarray(amplitudes / scale).view(float).ravel()
+
+
+def unpacked(x: Array, scale: Array) -> ComplexArray:
+    """(K + 1, m) amplitudes: the reverse of `packed`."""
+    return np.asarray(x.view(complex).reshape(-1, len(scale)) * scale)
+
+
+def product(system: Oscillator, speed: float, at: Evaluated, flexibility: ComplexArray) -> Callable[[Array], Array]:
+    """Return the Jacobian of the residual as a function of a change of the amplitudes.
+
+    Parameters
+    ----------
+    system : Oscillator
+        The oscillator.
+    speed : float
+        Speed of the drive (rad/s).
+    at : Evaluated
+        The equations at the amplitudes of linearisation.
+    flexibility : ndarray of complex, shape (K + 1, m, m)
+        H at the harmonics, see `flexibility_of`.
+
+    Returns
+    -------
+    changed : callable
+        Change of the amplitudes -> change of the residual; real vectors as of `packed`.
+    """
+    lattice, scale, count = at.lattice, system.scale, len(at.residual)
+    by, rate, momentum = at.pushes.by_place, at.pushes.by_rate, at.pushes.momentum_by_place
+    turning = 1j * system.omega(speed, count - 1)[:, None]
+    if rate is not None:
+        by = np.concatenate([by, rate], axis=2)
+
+    def changed(x: Array) -> Array:
+        change = unpacked(x, scale)
+        moves = lattice.synthesis(change if rate is None else np.hstack([change, turning * change]))
+        forces = lattice.analysis(np.matmul(by, moves[..., None])[..., 0])[:count]
+        if momentum is not None:
+            moment = np.matmul(momentum, moves[:, : len(scale), None])[..., 0]
+            forces = forces + turning * lattice.analysis(moment)[:count]
+        return x - packed((flexibility @ forces[..., None])[..., 0], scale)
+
+    return changed
+
+
+def flexibility_of(system: Oscillator, speed: float, count: int) -> ComplexArray:
+    """H at harmonics 0 to `count`, computed at once up to the harmonics of `error_of`."""
+    return system.flexibility(speed, 2 * count)[: count + 1]
+
+
+def size_of(amplitudes: ComplexArray, scale: Array) -> float:
+    """Norm in parts of the scale."""
+    return float(np.linalg.norm(amplitudes / scale))
+
+
+def solve(
+    system: Oscillator, speed: float, guess: ComplexArray, tolerance: float, *, near: bool = False
+) -> tuple[Orbit, Evaluated]:
+    """Find the steady motion at a speed from a guess, without an error estimate.
+
+    Parameters
+    ----------
+    system : Oscillator
+        The oscillator.
+    speed : float
+        Speed of the drive (rad/s).
+    guess : ndarray of complex, shape (K + 1, m)
+        Amplitudes from which Newton's method starts (m, rad).
+    tolerance : float
+        Of the error in the end, in parts of the scale.
+    near : bool
+        Whether the search ends at a step that contracts too little: only a motion in the guess's own range of
+        convergence.
+
+    Returns
+    -------
+    orbit : Orbit
+        Best motion that was reached; `Orbit.found` is true if it solves the equations.
+    at : Evaluated
+        The equations there.
+    """
+    count = len(guess) - 1
+    H, lattice, scale = flexibility_of(system, speed, count), system.lattice(count), system.scale
+    places = guess.copy()
+    places[0] = places[0].real
+    with np.errstate(invalid="ignore"):  # at the resonance of an undamped mode
+        at = evaluate(system, speed, places, lattice, H)
+    size, taken = size_of(at.residual, scale), 0
+    best, idle = (size, places, at), 0
+    enough = FOUND * tolerance
+    while size >= enough and taken < STEPS and idle < IDLE and math.isfinite(size):
+        taken += 1
+        step = -unpacked(gmres(product(system, speed, at, H), packed(at.residual, scale), INEXACT), scale)
+        part = 1.0
+        for _ in range(HALVINGS):
+            new = evaluate(system, speed, places + part * step, lattice, H)
+            left = size_of(new.residual, scale)
+            if left <= (1.0 - 0.1 * part) * size:
+                break
+            part *= 0.5
+            if near:
+                break
+        if near and left > CONTRACTS * size:
+            break
+        places, at, size = places + part * step, new, left
+        idle = 0 if size < 0.5 * best[0] else idle + 1
+        if size < best[0]:
+            best = size, places, at
+    found = best[0] < (enough if idle < IDLE else max(enough, LEFT))
+    return Orbit(speed, best[1], best[2].forces, math.nan, bool(found), taken), best[2]
+
+
+def error_of(system: Oscillator, orbit: Orbit, at: Evaluated) -> tuple[float, ComplexArray]:
+    """Error estimate of an orbit, and the amplitudes that twice the harmonics would make at once.
+
+    What is left of the equations on four times the samples is taken to a change of the orbit's harmonics by the
+    Jacobian; the others change by it themselves.
+    """
+    count, speed, scale = 2 * orbit.harmonics, orbit.speed, system.scale
+    H = system.flexibility(speed, count)
+    places = orbit.with_harmonics(count)
+    left = evaluate(system, speed, places, system.lattice(2 * count), H).residual
+    step, inner = -left, orbit.harmonics + 1
+    step[:inner] = -unpacked(gmres(product(system, speed, at, H[:inner]), packed(left[:inner], scale), ROUGH), scale)
+    return SAFETY * size_of(step, scale), places + step
+
+
+def settled(system: Oscillator, orbit: Orbit, at: Evaluated, tolerance: float) -> Orbit:
+    """Add harmonics to an orbit until its error estimate meets a tolerance.
+
+    Parameters
+    ----------
+    system : Oscillator
+        The oscillator.
+    orbit : Orbit
+        A solution of the equations.
+    at : Evaluated
+        The equations there.
+    tolerance : float
+        Of the error estimate, in parts of the scale.
+
+    Returns
+    -------
+    orbit : Orbit
+        With its error estimate, above the tolerance if the most harmonics do not suffice; not found if a solution with
+        more harmonics was lost.
+    """
+    while orbit.found:
+        error, guess = error_of(system, orbit, at)
+        orbit = replace(orbit, error=error)
+        more = system.rounded(GROWTH * orbit.harmonics)
+        if error <= tolerance or more <= orbit.harmonics:
+            break
+        steps = orbit.steps
+        orbit, at = solve(system, orbit.speed, guess[: more + 1], tolerance)
+        orbit = replace(orbit, steps=steps + orbit.steps)
+    return orbit

@@ -1,0 +1,183 @@
+r"""What a steady motion of a train means: forces, transmission errors, vibration, power.
+
+All accelerations come from the forces of the motion and the flexibility of the whole train at once, so harmonics far
+above those of Newton's method are there too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.typing import Array, ComplexArray, IntArray
+from ..gearbox.radiation import AIR_IMPEDANCE
+from . import torus
+from .balance import Orbit
+from .condensed import CondensedTrain
+from .linear import real_times
+from .stability import STABLE, window
+from .torus import Lattice
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyState:
+    """Steady running at one speed: S places of its n phases, K + 1 harmonics, the constant first.
+
+    Attributes
+    ----------
+    speed
+        Of the drive (rad/s).
+    branch
+        0 for the branch that the run-up begins on; one more after each turning point.
+    orbit
+        The motion at the freedoms of the meshes.
+    period
+        Of the motion (s); infinite where it has several phases.
+    waves : (K + 1, n)
+        k: a harmonic has the phase k . theta. With one phase k = 0, 1, 2, ...
+    numbers
+        Number of a harmonic by its k.
+    frequency : (K + 1,)
+        Hz.
+    order : (K + 1,)
+        Frequency over that of the drive's turns.
+    lattice
+        Places S: ``lattice.theta`` (S, n), of one phase even over the period.
+    force : (S, meshes)
+        Contact force (N), of back flanks negative.
+    transmission_error : (S, meshes)
+        Approach along the line of action (m).
+    apart : (meshes,)
+        Share of the time without contact.
+    beyond
+        Whether a mesh goes beyond what its law is known for.
+    acceleration : (K + 1, bores)
+        Complex amplitudes along the shafts at the attachments (m/s2).
+    bearing : (K + 1, bores, 6)
+        Complex amplitudes of the force (N) and moment (N m) of the shaft on each bore about its reference point, along
+        x, y, z.
+    power : (K + 1,) or None
+        Equivalent radiated power of each line (W); None for a rigid housing.
+    span
+        Time over which multipliers are made (s): the period, or after which all phases are back.
+    multipliers : (2 modes,) or None
+        Floquet multipliers of the motion, largest modulus first; None where not computed, one not-a-number
+        where stability is undecided.
+    """
+
+    speed: float
+    branch: int
+    orbit: Orbit
+    period: float
+    waves: IntArray
+    numbers: Mapping[tuple[int, ...], int]
+    frequency: Array
+    order: Array
+    lattice: Lattice
+    force: Array
+    transmission_error: Array
+    apart: Array
+    beyond: bool
+    acceleration: ComplexArray
+    bearing: ComplexArray
+    power: Array | None
+    span: float
+    multipliers: ComplexArray | None = None
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether small disturbances die out; None where it was not computed or is undecided."""
+        largest = math.nan if self.multipliers is None else abs(self.multipliers[0])
+        return None if math.isnan(largest) else bool(largest <= STABLE)
+
+    @property
+    def growth(self) -> float:
+        """Rate (1/s) by which the slowest disturbance grows; not-a-number where it is not known."""
+        if self.multipliers is None or not abs(self.multipliers[0]) > 0.0:
+            return math.nan
+        return math.log(abs(self.multipliers[0])) / self.span
+
+    @property
+    def error(self) -> float:
+        """Estimate of the error of the meshes' approaches, in parts of those under the steady force."""
+        return self.orbit.error
+
+    def rms(self, band_hz: float) -> Array:
+        """(bores,) root mean square of the accelerations up to a frequency (m/s2)."""
+        inside = (self.frequency > 0.0) & (self.frequency <= band_hz)
+        return np.asarray(np.sqrt(0.5 * (np.abs(self.acceleration[inside]) ** 2).sum(axis=0)))
+
+    def lines(self, values: Array) -> ComplexArray:
+        """(K + 1, ...) complex amplitudes of samples (S, ...) at the harmonics."""
+        return self.lattice.analysis(values)[: len(self.frequency)]
+
+
+def steady_result(
+    train: CondensedTrain, orbit: Orbit, branch: int, multipliers: ComplexArray | None = None
+) -> SteadyState:
+    """Evaluate forces, transmission errors, accelerations, bearing loads and power of an orbit.
+
+    Parameters
+    ----------
+    train : CondensedTrain
+        The train.
+    orbit : Orbit
+        Its motion at the freedoms of the meshes.
+    branch : int
+        Number of the branch, see `SteadyState`.
+    multipliers : ndarray of complex, shape (2 modes,), optional
+        Floquet multipliers; None if they were not computed.
+    """
+    system, model = train.system, train.model
+    count = orbit.harmonics
+    omega, lattice = system.omega(orbit.speed, count), system.lattice(count)
+    theta, samples = lattice.theta, len(lattice.theta)
+    u, du = lattice.synthesis(orbit.places), lattice.synthesis(1j * omega[:, None] * orbit.places)
+    force, approach = np.zeros((samples, len(model.meshes))), np.zeros((samples, len(model.meshes)))
+    apart, beyond = np.zeros(len(model.meshes)), False
+    for i, (line, numbers) in enumerate(zip(model.meshes, train.flanks_of_mesh, strict=True)):
+        open_ = np.ones(samples, dtype=bool)
+        for number, sign in zip(numbers, (1.0, -1.0), strict=False):
+            at = train.forces.flank(number, theta, orbit.speed, u, du)
+            force[:, i] += sign * at.force
+            open_ &= at.apart
+            beyond |= bool(at.beyond.any())
+        along = train.forces.freedoms[numbers[0], 0]
+        approach[:, i], apart[i] = u[:, along], open_.mean()
+        if not line.in_contact:
+            force[:, i] += line.damping * du[:, along]
+    modal = system.linear.modal(omega, orbit.speed, orbit.forces)
+    acceleration = -(omega**2)[:, None] * real_times(modal, train.bores_of_modes.T)
+    power = None
+    if train.radiation_of_modes is not None:
+        square = (modal.conj() * real_times(modal, train.radiation_of_modes)).sum(axis=1).real
+        power = 0.5 * AIR_IMPEDANCE * omega**2 * np.maximum(square, 0.0)
+    bearing = _bearing(train, orbit, omega, modal)
+    second = 2.0 * math.pi / abs(orbit.speed)  # of one turn
+    waves, _ = torus.harmonics(system.periods, count)
+    period = second * system.turns[0] if len(system.turns) == 1 else math.inf
+    return SteadyState(
+        orbit.speed, branch, orbit, period, waves,
+        torus.numbers(system.periods, count), omega / (2.0 * math.pi), omega / abs(orbit.speed), lattice, force,
+        approach, apart, beyond, acceleration, bearing, power, second * window(system).turns, multipliers,
+    )  # fmt: skip
+
+
+def _bearing(train: CondensedTrain, orbit: Orbit, omega: Array, modal: ComplexArray) -> ComplexArray:
+    """Amplitudes of the loads on the bores."""
+    model, linear, turning = train.model, train.system.linear, 1j * omega[:, None]
+    q = real_times(modal, model.modal.T.T)
+    v, a = turning * q, -(omega**2)[:, None] * q
+    acting = real_times(orbit.forces, train.directions.T)
+    for line in model.meshes:
+        if line.in_contact:  # which the constant part has, too
+            acting += line.rayleigh * real_times(v, np.outer(line.row, line.row))
+    tilts = [column for g in model.forces.gyros for column in (g.direction, g.direction + 1)]
+    along = model.directions[:, tilts]
+    acting += orbit.speed * real_times(v, along @ linear.gyroscopic.T @ along.T)
+    acting[0] += train.torque
+    q[0] += model.modal.origin
+    return model.bearings(q, v, a, acting)

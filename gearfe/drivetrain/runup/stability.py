@@ -1,0 +1,244 @@
+r"""Stability of a steady motion: Floquet multipliers of the motion itself.
+
+Small motions beside it feel the forces' derivatives along it,
+
+.. math:: \ddot y + D\dot y + \Lambda y = P\,[A(t)\,P^T y + B(t)\,P^T\dot y] + \Omega\,G\dot y ,
+
+so it is stable where all multipliers, eigenvalues of the map of (y, y') over a time T after which A and B repeat, have
+a modulus below 1 (Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 3.2). `runup.monodromy` integrates the
+map. Modes that the forces reach little are not in it: they yield as they do at rest, and have the multipliers of free
+decay. A mode counts where its share in the forces' change, beside its damping, is more than `REACHED`.
+
+T is the period of the one phase. Several phases share one, too, as long as hunting teeth need to meet all others; up to
+`LONGEST` mesh cycles T is that one. Beyond, T is a time after which all phases are nearly back: the growth
+:math:`\ln|\mu|/T` then is a Lyapunov exponent but for a rest that falls with T. Where it differs from that over about
+half the time by as much as its own size, there are no multipliers but not-a-number.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...base.typing import Array, BoolArray, ComplexArray
+from . import torus
+from .balance import Orbit, Oscillator
+from .linear import Linear
+from .monodromy import KICKS, PLACES, flow, kick_times, monodromy
+
+#: Least strength of the forces on a mode, in parts of its damping.
+REACHED = 0.01
+#: Steps, of seven kicks each: of a period at least, and of a mesh cycle; most in parts of the first number. Where the
+#: forces' derivatives jump they are doubled until the largest modulus stands still to this part.
+STEPS, OF_CYCLE, MOST, SETTLED = 64, 16, 4, 3e-3
+#: Most steps for a given accuracy.
+MOST_STEPS = 1 << 14
+#: Change of a stiffness from one kick to the next, in parts of that of the whole system, that is a jump.
+JUMP = 0.5
+#: Imaginary part of a multiplier, in parts of its modulus, that is none.
+REAL = 1e-6
+#: A multiplier beyond this is an instability, not round-off.
+STABLE = 1.0 + 1e-6
+#: Cycles of the fastest mesh in the longest time of which multipliers are made: after which all phases are back, and
+#: nearly so.
+LONGEST, NEARLY = 200, 64
+#: Phases are back where they miss less than this part of a period.
+BACK = 1e-9
+
+
+class Bifurcation(NamedTuple):
+    """Where a branch changes its stability."""
+
+    speed: float  # rad/s
+    kind: str  # turning point, period doubling, Neimark-Sacker; of several phases: loss of stability
+    branch: int  # before it
+
+
+class Window(NamedTuple):
+    """Time after which all phases are back, or nearly so."""
+
+    turns: float  # of the drive
+    half: float | None  # another such time, about half as long; None where all are back exactly
+    cycles: float  # of the fastest mesh in all of it
+
+
+def window(system: Oscillator) -> Window:
+    """Time over which multipliers are made."""
+    turns = np.array(system.turns)
+    most = max(c / t for mesh in system.orders for c, t in zip(mesh, system.turns, strict=True))  # mesh cycles a turn
+    if len(turns) == 1:
+        return Window(float(turns[0]), None, float(most * turns[0]))
+    tried = turns.min() * np.arange(1, math.floor(LONGEST / (most * turns.min())) + 1)
+    off = np.abs(tried[:, None] / turns - np.round(tried[:, None] / turns)).max(axis=1)
+    if (off < BACK).any():
+        found = float(tried[np.argmax(off < BACK)])
+        return Window(found, None, float(most * found))
+    ends = [np.where((low < most * tried) & (most * tried <= high), off, math.inf)
+            for low, high in ((0.25 * NEARLY, 0.5 * NEARLY), (0.75 * NEARLY, NEARLY))]  # fmt: skip
+    half, whole = (float(tried[np.argmin(x)]) for x in ends)
+    return Window(whole, half, float(most * whole))
+
+
+def multipliers(system: Oscillator, orbit: Orbit, accuracy: float | None = None) -> ComplexArray:
+    """Floquet multipliers of an orbit over `window`, largest modulus first, (2 n,); (1,) not-a-number if undecided.
+
+    Parameters
+    ----------
+    accuracy
+        Steps are doubled until no modulus changes by more than this part of the largest, and all modes are integrated.
+        None, and where phases are nearly back only: until the largest changes by `SETTLED`, without the modes that the
+        forces reach little.
+    """
+    span = window(system)
+    quick = accuracy is None or span.half is not None
+    reached, accuracy = (REACHED, SETTLED) if accuracy is None or quick else (0.0, accuracy)
+    steps = steps_of(span)
+    most = MOST * steps if quick else MOST_STEPS
+    made, jumps = _multipliers(system, orbit, span, reached, steps)
+    while (jumps or not quick) and steps < most:
+        steps, before = 2 * steps, made
+        made, _ = _multipliers(system, orbit, span, reached, steps)
+        compared = slice(1 if quick else None)
+        with np.errstate(invalid="ignore"):  # both infinite
+            off = np.abs(np.abs(made[compared]) - np.abs(before[compared])).max()
+        if off <= accuracy * abs(made[0]):
+            break
+    return made
+
+
+def steps_of(span: Window) -> int:
+    """Steps to begin with."""
+    return max(STEPS, math.ceil(OF_CYCLE * span.cycles - 1e-6))
+
+
+def _multipliers(
+    system: Oscillator, orbit: Orbit, span: Window, reached: float, steps: int
+) -> tuple[ComplexArray, bool]:
+    """Multipliers with so many steps, and whether derivatives jump."""
+    theta, u, du = _along(system, orbit, span.turns, steps)
+    pushes = system.forces(theta, orbit.speed, u, du)
+    A, B = pushes.by_place, pushes.by_rate
+    order = np.argsort(kick_times(np.linspace(0.0, 1.0, steps + 1)).ravel(), kind="stable")  # kicks step back, too
+    changes = np.abs(np.diff(A[order], axis=0)).max(axis=0)
+    jumps = bool((np.diag(changes) * np.diag(system.linear.statics) > JUMP).any())
+    kept = strengths(system.linear, A) >= reached * np.diag(system.linear.damping) / np.sqrt(system.linear.squares)
+    if pushes.momentum_by_place is not None:
+        step = 2.0 * math.pi * span.turns / abs(orbit.speed) / steps
+        A, B, touches = _with_momentum(A, B, pushes.momentum_by_place, step)
+        jumps |= touches
+    made = around(system, orbit.speed, A, B, kept, span)
+    return made, jumps
+
+
+def _with_momentum(A: Array, B: Array | None, momentum: Array, step: float) -> tuple[Array, Array, bool]:
+    """Add the derivatives of a force that is the rate of change of a momentum p(u), and say whether p_u jumps.
+
+    Its change is p_u u' + p_u' u. Where teeth touch p_u jumps, and p_u' is an impulse, spread over its step (s). It
+    is what the saltation matrix of a jump in the acceleration has (Leine & Nijmeijer, Dynamics and Bifurcations of
+    Non-Smooth Mechanical Systems, 2004, Ch. 7).
+    """
+    by_step = momentum.reshape(-1, len(KICKS), *momentum.shape[1:])
+    change = (by_step[:, -1] - by_step[:, 0]) / step
+    return A + np.repeat(change, len(KICKS), axis=0), momentum if B is None else B + momentum, bool(change.any())
+
+
+def _along(system: Oscillator, orbit: Orbit, turns: float, steps: int) -> tuple[Array, Array, Array]:
+    """Return phases (S, n), and freedoms and rates (S, m), at the kicks over some turns of the drive."""
+    waves, _ = torus.harmonics(system.periods, orbit.harmonics)
+    speeds = 2.0 * math.pi * turns / steps / np.array(system.turns)  # of the phases, in a step
+    line = waves @ speeds
+    both = np.hstack([orbit.places, 1j * system.omega(orbit.speed, orbit.harmonics)[:, None] * orbit.places])
+    begin = np.exp(1j * np.arange(steps)[:, None] * line)
+    values = np.stack([(begin @ (np.exp(1j * place * line)[:, None] * both)).real for place in PLACES], axis=1)
+    u, du = np.split(values.reshape(steps * len(PLACES), -1), 2, axis=1)
+    return kicks(system, turns, steps), u, du
+
+
+def kicks(system: Oscillator, turns: float, steps: int) -> Array:
+    """(steps stages, n) phases at which `around` takes derivatives, over some turns of the drive."""
+    return 2.0 * math.pi * kick_times(np.linspace(0.0, turns, steps + 1)).reshape(-1, 1) / np.array(system.turns)
+
+
+def strengths(linear: Linear, A: Array) -> Array:
+    """(n,) how much the largest derivatives of the forces change each mode's stiffness, relative to it."""
+    size, places = np.abs(A).max(axis=0), np.abs(linear.places)
+    return np.asarray(np.einsum("ni,ij,nj->n", places, size, places) / linear.squares)
+
+
+def around(
+    system: Oscillator, speed: float, A: Array, B: Array | None, kept: BoolArray, span: Window, *, damped: bool = True
+) -> ComplexArray:
+    """Return the multipliers for given derivatives of the forces at `kicks`, the largest modulus first.
+
+    Parameters
+    ----------
+    system : Oscillator
+        The oscillator, for its linear part.
+    speed : float
+        Speed of the drive (rad/s).
+    A : ndarray, shape (S, m, m)
+        Derivatives of the forces with the freedoms.
+    B : ndarray, shape (S, m, m), or None
+        Derivatives with their rates; None: there are none.
+    kept : ndarray of bool, shape (n,)
+        Modes that are integrated; the others yield as they do at rest.
+    span : Window
+        Time over which the multipliers are made.
+    damped : bool
+        Whether the linear part has its damping.
+
+    Returns
+    -------
+    multipliers : ndarray of complex, shape (2 n,)
+        Of shape (1,) and NaN if the growth over `span` and over half of it disagree.
+    """
+    linear, m = system.linear, system.linear.size
+    second = 2.0 * math.pi / abs(speed)  # of one turn
+    stages = len(KICKS)
+    edges = np.linspace(0.0, span.turns * second, len(A) // stages + 1)
+    places, tilts = linear.places[kept], linear.tilts[kept]
+    D = linear.damping if damped else np.zeros_like(linear.damping)
+    # what the other modes yield at once: u = P y + R f, f = A u
+    static = linear.places[~kept].T @ (linear.places[~kept] / linear.squares[~kept, None])
+    A = A @ np.linalg.inv(np.eye(m) - static @ A)
+    both = np.concatenate([A, np.zeros_like(A) if B is None else B], axis=2).reshape(-1, stages, m, 2 * m)
+    none = np.zeros_like(places)
+    reads = np.block([[places, none], [none, places]])
+    free = linear.squares[~kept], np.diag(D)[~kept]
+    with np.errstate(over="ignore", invalid="ignore"):
+        turning = speed * tilts @ linear.gyroscopic @ tilts.T
+        constant = flow(linear.squares[kept], D[np.ix_(kept, kept)] - turning, edges[-1])
+
+        def map_over(first: int, last: int) -> Array:
+            return monodromy(constant, edges[first : last + 1], places, reads, both[first:last])
+
+        if span.half is None:
+            return _sorted(map_over(0, len(edges) - 1), free, edges[-1])
+        middle = round(span.half / span.turns * (len(edges) - 1))
+        X = map_over(0, middle)
+        half, whole = _sorted(X, free, edges[middle]), _sorted(map_over(middle, len(edges) - 1) @ X, free, edges[-1])
+    growth, before = math.log(abs(whole[0])) / edges[-1], math.log(abs(half[0])) / edges[middle]
+    return whole if abs(growth) > abs(growth - before) else np.array([math.nan + 0j])
+
+
+def _sorted(X: Array, free: tuple[Array, Array], time: float) -> ComplexArray:
+    """Eigenvalues of a map over a time (s), and multipliers of modes that are free, largest modulus first."""
+    made = np.linalg.eigvals(X) if np.isfinite(X).all() else np.full(len(X), np.inf)
+    made = np.concatenate([made, _free(*free, time)]).astype(complex)
+    return np.asarray(made[np.argsort(-np.abs(made), kind="stable")])
+
+
+def kind_of(one: ComplexArray, two: ComplexArray) -> str:
+    """What happens between orbits of which one is stable, by the multiplier that leaves the unit circle."""
+    leaving = next((x for x in (one[0], two[0]) if abs(x) > STABLE), one[0])
+    if abs(leaving.imag) > REAL * abs(leaving):
+        return "Neimark-Sacker"
+    return "period doubling" if leaving.real < 0.0 else "turning point"
+
+
+def _free(squares: Array, damping: Array, period: float) -> ComplexArray:
+    """Multipliers of modes by themselves."""
+    root = np.sqrt((0.25 * damping**2 - squares).astype(complex))
+    return np.asarray(np.exp(period * np.concatenate([-0.5 * damping + root, -0.5 * damping - root])))

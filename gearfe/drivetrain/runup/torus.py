@@ -1,0 +1,146 @@
+r"""Harmonics of a motion with one or several phases, and where it is sampled.
+
+A motion with the n base frequencies :math:`\omega` is a function of n phases, :math:`\theta = \omega t`, with a
+harmonic for each vector k of n whole numbers,
+
+.. math:: u(\theta) = \mathrm{Re}\sum_k \hat u_k\,e^{ik\cdot\theta} ,\qquad
+    w(k) = \Big(\sum_p\sqrt{|k_p|\,\omega_p / \omega_1}\Big)^2 .
+
+Of k and -k, whose frequencies :math:`k\cdot\omega` are opposite, the positive one counts. Harmonics stand in rising
+order w: the first K of them hold the multiples of all base frequencies up to one frequency, and their combinations less
+far. With one phase they are 1, 2, 3, ... They are sampled at S places on a line that winds round all phases, a lattice
+of rank 1 (Sloan & Joe, Lattice Methods for Multiple Integration, 1994),
+
+.. math:: \theta_j = 2\pi j g / S ,\qquad e^{ik\cdot\theta_j} = e^{2\pi i j (k\cdot g) / S} ,
+
+so one Fourier transform of length S holds them all: four samples for each harmonic at least, and with several phases as
+many more as keep each of the K harmonics apart from all others of them.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from ...base.typing import Array, BoolArray, ComplexArray, IntArray
+
+#: Samples for each harmonic, at least; least harmonics that are so sampled.
+SAMPLES, LEAST = 4, 16
+#: Steps g that are tried for a number of samples, and factor to the next number.
+TRIED, MORE = 50, 1.1
+#: Orders nearer to each other, relatively, are one.
+ROUND_OFF = 1e-9
+#: Lattices of several phases are made for so many counts of harmonics between one and its double.
+RUNGS = 3
+#: Growth of the order up to which harmonics are listed.
+FARTHER = 1.3
+
+
+class Harmonics(NamedTuple):
+    """Harmonics in rising order, the constant first."""
+
+    waves: IntArray  # (K + 1, n): k
+    order: Array  # (K + 1,): w
+
+
+class Lattice(NamedTuple):
+    """Samples of K + 1 harmonics, and where these stand in the transform of real values."""
+
+    theta: Array  # (S, n) phases (rad)
+    residue: IntArray  # (K + 1,) k . g
+    place: IntArray  # (K + 1,) line of the transform
+    conjugate: BoolArray  # (K + 1,) which stand there as the conjugate
+
+    def synthesis(self, amplitudes: ComplexArray) -> Array:
+        """(S, m) values of ``Re sum a_k exp(i k theta)``."""
+        samples, count = len(self.theta), len(amplitudes)
+        flip = self.conjugate[:count]
+        spectrum = np.zeros((samples // 2 + 1, amplitudes.shape[1]), dtype=complex)
+        spectrum[self.place[:count]] = np.where(flip[:, None], amplitudes.conj(), amplitudes) * (0.5 * samples)
+        spectrum[0] *= 2.0
+        return np.asarray(np.fft.irfft(spectrum, samples, axis=0))
+
+    def analysis(self, values: Array) -> ComplexArray:
+        """(K + 1, ...) complex amplitudes of values (S, ...)."""
+        made = (np.fft.rfft(values, axis=0) * (2.0 / len(values)))[self.place]
+        made[0] *= 0.5
+        np.conjugate(made, out=made, where=self.conjugate.reshape(-1, *[1] * (made.ndim - 1)))
+        return np.asarray(made)
+
+
+def below(periods: tuple[float, ...], order: float) -> Harmonics:
+    """All harmonics of less than an order, the constant included."""
+    if len(periods) == 1:
+        rising = np.arange(math.ceil(order * (1.0 - ROUND_OFF)))
+        return Harmonics(rising[:, None], rising.astype(float))
+    waves, roots = np.zeros((1, 0), dtype=int), np.zeros(1)  # axis by axis, what is left of the order for the next
+    for period in periods:
+        most = np.floor(period * np.maximum(math.sqrt(order) - roots, 0.0) ** 2).astype(int)
+        before = np.repeat(np.arange(len(roots)), 2 * most + 1)
+        k = np.arange(len(before)) - (np.cumsum(2 * most + 1) - most - 1)[before]
+        waves, roots = np.column_stack([waves[before], k]), roots[before] + np.sqrt(np.abs(k) / period)
+    w = roots**2
+    frequency, first = (waves / np.array(periods)).sum(axis=1), np.argmax(waves != 0, axis=1)
+    none = np.abs(frequency) <= ROUND_OFF * w
+    kept = (w < order * (1.0 - ROUND_OFF)) & np.where(none, waves[np.arange(len(waves)), first] >= 0, frequency > 0.0)
+    waves, w = waves[kept], w[kept]
+    rising = np.lexsort((*waves.T[::-1], np.round(w / ROUND_OFF)))
+    return Harmonics(waves[rising], w[rising])
+
+
+@lru_cache(maxsize=64)
+def harmonics(periods: tuple[float, ...], count: int) -> Harmonics:
+    """The constant and the first `count` harmonics.
+
+    Parameters
+    ----------
+    periods
+        Of the phases, in parts of that of the first.
+    """
+    order = count + 2.0 if len(periods) == 1 else 4.0
+    while len(below(periods, order).waves) <= count:
+        order *= FARTHER
+    waves, w = (x[: count + 1] for x in below(periods, order))
+    for x in (waves, w):
+        x.setflags(write=False)
+    return Harmonics(waves, w)
+
+
+def count_below(periods: tuple[float, ...], order: float) -> int:
+    """Number of the first harmonic that is not below an order."""
+    return len(below(periods, order).waves)
+
+
+@lru_cache(maxsize=64)
+def numbers(periods: tuple[float, ...], count: int) -> dict[tuple[int, ...], int]:
+    """Number of each of the first harmonics by its k."""
+    return {tuple(k): number for number, k in enumerate(harmonics(periods, count).waves.tolist())}
+
+
+def lattice(periods: tuple[float, ...], count: int) -> Lattice:
+    """Samples for the constant and the first `count` harmonics at least."""
+    if len(periods) > 1:  # it takes a search: the same for many
+        count = math.ceil(2.0 ** (math.ceil(RUNGS * math.log2(max(count, LEAST))) / RUNGS))
+    return _searched(periods, count)
+
+
+@lru_cache(maxsize=64)
+def _searched(periods: tuple[float, ...], count: int) -> Lattice:
+    from scipy.fft import next_fast_len  # a train without steady motion needs no transforms
+
+    waves, _ = harmonics(periods, count)
+    every = np.concatenate([waves, -waves[1:]])
+    samples = SAMPLES * max(count, LEAST)
+    while True:
+        rng = np.random.default_rng(samples)  # the same in each run
+        for factor in rng.integers(1, samples, TRIED if len(periods) > 1 else 1).tolist():
+            step = np.array([pow(factor, p, samples) for p in range(len(periods))])
+            if np.bincount((every @ step) % samples).max() == 1:
+                residue = (waves @ step) % samples
+                theta = 2.0 * math.pi * ((np.arange(samples)[:, None] * step) % samples) / samples
+                conjugate = 2 * residue > samples
+                return Lattice(theta, residue, np.where(conjugate, samples - residue, residue), conjugate)
+        samples = next_fast_len(math.ceil(MORE * samples) + 1, real=True)

@@ -1,0 +1,51 @@
+"""Stability of the steady motion of a train at the speed and under the loads that a transient has in the end."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.progress import one_thread
+from ..gearbox.stability import Stability
+from ..train.model import TrainModel
+from .condensed import condense
+from .run_up import steady_state
+from .stability import multipliers
+
+#: Errors of the motion, in parts of the approach under the steady force, and of the multipliers' moduli.
+MOTION, MODULUS = 1e-4, 1e-6
+
+
+def train_stability(model: TrainModel) -> Stability:
+    """Floquet multipliers of a train's steady motion, or the reason for none."""
+    note = why_not(model)
+    if note:
+        return Stability(note=note)
+    try:
+        state = steady_state(model, model.steady_speed, tolerance=MOTION, stability=False)
+        with one_thread():
+            found = multipliers(condense(model).system, state.orbit, MODULUS)
+    except InputError as error:
+        return Stability(note=str(error))
+    if not np.isfinite(found).all():
+        return Stability(note="the multipliers do not tell: the phases of the meshes come back too late")
+    return Stability(found, state.span)
+
+
+def why_not(model: TrainModel) -> str:
+    """Why a train has no multipliers, or nothing."""
+    drive = model.train.driven
+    reasons = (
+        (not drive.speed.ends or model.steady_speed == 0.0, "the drive has no steady speed"),
+        (
+            not all(load.torque.ends for load in model.train.loads),
+            "a load changes all the time: no motion repeats with the meshes",
+        ),
+        (not len(model.modal.eigenvalues), "nothing can vibrate: rigid meshes in a rigid housing follow the drive"),
+        (
+            any(not (line.rigid or line.pulls) for line in model.meshes),
+            "the teeth may part, and which motion they settle to is open: `gearfe runup` finds the periodic motions "
+            "and the multipliers of each",
+        ),
+    )
+    return next((note for there, note in reasons if there), "")

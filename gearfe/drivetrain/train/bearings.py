@@ -1,0 +1,119 @@
+r"""Forces and moments of the bearings: what each shaft does to the bores that carry it.
+
+Of a hinge they are its multipliers, :math:`G^T\lambda = f - C\dot q - K q - M\ddot q`, of bearing springs
+:math:`k x + c\dot x` of the shaft's motion x against the bore. In a rigid housing statics do not tell how the hinges of
+a shaft share its load. Then moments are as small as can be, so two bores carry a shaft like simple supports, and of the
+forces that are left open those of least squares are taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from ...base.typing import Array, ComplexArray
+from ...fem.reduction.modal_body import ModalBody
+from ...multibody import System
+from .elements import bore_rows
+from .gear_train import GearTrain
+from .mesh_element import Shafts
+
+#: What a moment counts beside a force (1/m) where shares are open: so much that it is taken only where it must be.
+MOMENT = 1e6
+Values = TypeVar("Values", Array, ComplexArray)
+
+
+@dataclass(frozen=True, eq=False)
+class BearingLoads:
+    """Loads on the bores as linear functions of the motion.
+
+    Attributes
+    ----------
+    of_forces, of_places, of_rates, of_accelerations : (size, 6 bores)
+        Of the train's forces on the coordinates, the coordinates and their rates.
+    """
+
+    of_forces: Array
+    of_places: Array
+    of_rates: Array
+    of_accelerations: Array
+
+    def __call__(self, q: Values, v: Values, a: Values, acting: Values) -> Values:
+        """Force (N) and moment (N m) on each bore about its reference point, along x, y, z; shape (n, bores, 6).
+
+        Parameters
+        ----------
+        q, v, a : (n, size)
+            Coordinates, rates, second rates.
+        acting : (n, size)
+            Forces of the train on the coordinates, those of `TrainForces`.
+        """
+        found = acting @ self.of_forces + q @ self.of_places + v @ self.of_rates + a @ self.of_accelerations
+        return found.reshape(len(found), -1, 6)
+
+
+def bearing_loads(
+    train: GearTrain, system: System, shafts: Shafts, bores: tuple[str, ...], *, shared: bool
+) -> BearingLoads:
+    """Loads on the bores that carry shafts.
+
+    Parameters
+    ----------
+    train, system, shafts
+        The train, its system, and the shafts in this.
+    bores
+        Names of the bores, in the order of the results.
+    shared
+        Whether statics leave open how the hinges of a shaft share its load.
+    """
+    e1, e2, axis = train.frame
+    to_global = np.zeros((5, 6))
+    to_global[:3, :3], to_global[3, 3:], to_global[4, 3:] = np.array([e1, axis, e2]), e1, e2
+    G = system.jacobian(0.0, np.zeros(system.size))
+    ends = np.cumsum([0, *(element.rows for element, _ in system.joints)])
+    first = {element.name: int(row) for (element, _), row in zip(system.joints, ends, strict=False)}
+    counts = np.ones(len(G))
+    if shared:
+        for name, row in first.items():
+            if name.startswith("hinge "):
+                counts[row + 3 : row + 5] = MOMENT
+    multipliers = np.linalg.pinv(G / counts[:, None]) / counts
+    springs = {bearing.bore: bearing for bearing in train.bearings}
+    parts = [np.zeros((system.size, 6 * len(bores))) for _ in range(3)]
+    for number, bore in enumerate(bores):
+        at = slice(6 * number, 6 * number + 6)
+        if bore not in springs:
+            row = first[f"hinge {bore}"]
+            parts[0][:, at] = multipliers[:, row : row + 5] @ to_global
+            continue
+        rows = _moved(train, shafts, bore)
+        stiffness, damping = (np.array(x, dtype=float) for x in (springs[bore].stiffness, springs[bore].damping))
+        parts[1][:, at] = rows.T @ (stiffness[:, None] * to_global)
+        parts[2][:, at] = rows.T @ ((damping + train.damping.beta * stiffness)[:, None] * to_global)
+    hinges, places, rates = parts
+    return BearingLoads(
+        hinges, places - system.stiffness.T @ hinges, rates - system.damping.T @ hinges, -system.mass.T @ hinges
+    )
+
+
+def _moved(train: GearTrain, shafts: Shafts, bore: str) -> Array:
+    """Motion of a shaft against its bore for unit coordinates of the system, (5, size); see `bore_rows`."""
+    number = next(i for i, shaft in enumerate(train.shafts) if bore in shaft.bores)
+    selector = None if train.housing is None else np.eye(train.housing.size)[:, train.housing.attachment(bore)]
+    local = bore_rows(shafts.bodies[number], train.bore_points[bore], train.frame, selector)
+    rows, first = np.zeros((5, shafts.size)), int(shafts.first[number])
+    rows[:, first : first + 6] = local[:, :6]
+    rows[:, : local.shape[1] - 6] += local[:, 6:]
+    return rows
+
+
+def bore_motion(housing: ModalBody | None, bores: tuple[str, ...], size: int) -> Array:
+    """Displacement and rotation of each bore along x, y, z for unit coordinates, (6 bores, size); 0 if rigid."""
+    rows = np.zeros((6 * len(bores), size))
+    if housing is not None:
+        for number, bore in enumerate(bores):
+            selector = np.eye(housing.size)[housing.attachment(bore)]
+            rows[6 * number : 6 * number + 6, : housing.size] = selector
+    return rows

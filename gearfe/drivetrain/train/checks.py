@@ -1,0 +1,295 @@
+"""Does a train hold together? Every mistake is named, with the cure; rules on kinematics are in `kinematics`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from ...base.errors import InputError, unknown_name
+from ...gears.geometry.pair import gear_pair, in_keys
+from ...gears.meshlaw.law import MeshLaw
+from ...gears.stiffness.periodic import PeriodicInterpolant
+from .friction import check_friction
+from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+from .statics import check_flanks, one_sided
+
+#: Agreement of lengths and angles that count as equal (relative).
+SAME = 1e-6
+#: Longest stretch without a sample that a curve may have, as a share of its period.
+WIDEST_GAP = 0.15
+
+
+def check_train(train: GearTrain) -> None:
+    """Raise `InputError` for the first mistake."""
+    check_layout(train)
+    check_flanks(train, one_sided(train))
+
+
+def check_layout(train: GearTrain) -> None:
+    """Raise `InputError` for the first mistake but loads that press flanks of which nothing is known."""
+    _names("shaft", [s.name for s in train.shafts])
+    _names("gear", [g.name for g in train.gears])
+    _names("mesh", [m.name for m in train.meshes])
+    _check_shafts(train)
+    _check_ends(train)
+    for gear in train.gears:
+        _known("gear " + repr(gear.name), "shaft", gear.shaft, [s.name for s in train.shafts])
+        _check_on_shaft(train, gear)
+    for mesh in train.meshes:
+        _check_mesh(train, mesh)
+    _check_room(train)
+    _check_damping(train)
+    _ = train.kinematics  # which refuses trains that cannot roll or be assembled
+
+
+def _names(kind: str, names: list[str]) -> None:
+    if not names and kind != "mesh":
+        raise InputError(f"train.{kind}s", None, f"the train has no {kind}", f"add a {kind}")
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise InputError(f"{kind} {twice[0]!r}", None, "is named twice", "give each its own name")
+
+
+def _known(field: str, what: str, name: str, names: Iterable[str]) -> None:
+    names = list(names)
+    if name not in names:
+        made = unknown_name(field, name, names)
+        raise InputError(field, None, f"names an unknown {what} {name!r}", made.cure)
+
+
+def _check_shafts(train: GearTrain) -> None:
+    points, a = train.bore_points, train.frame[2]
+    taken: dict[str, str] = {}
+    for shaft in train.shafts:
+        label = f"shaft {shaft.name!r}"
+        for key in ("length", "radius", "density", "mass", "polar_inertia", "transverse_inertia"):
+            value = getattr(shaft, key)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"{label} {key}", value, "must be finite and > 0", "give it in SI units")
+        if not shaft.bores:
+            raise InputError(f"{label} bores", None, "no bore holds the shaft", "name the attachments that carry it")
+        for bore in shaft.bores:
+            _known(f"{label} bores", "attachment", bore, points)
+            if bore in taken:
+                problem = f"holds shaft {taken[bore]!r} and shaft {shaft.name!r}"
+                raise InputError(f"attachment {bore!r}", None, problem, "a bore carries one shaft")
+            taken[bore] = shaft.name
+            _check_bore(train, shaft, bore, a)
+    for bearing in train.bearings:
+        if bearing.bore not in taken:
+            raise unknown_name("bearing", bearing.bore, taken)
+        for key in ("stiffness", "damping"):
+            values = getattr(bearing, key)
+            if len(values) != 5 or not all(math.isfinite(x) and x >= 0.0 for x in values):
+                problem = "must be five numbers >= 0: three translations, two tilts"
+                raise InputError(
+                    f"bearing at {bearing.bore!r} {key}", values, problem, "see the documentation of Bearing"
+                )
+
+
+def _check_bore(train: GearTrain, shaft: Shaft, bore: str, a: np.ndarray) -> None:
+    arm = train.bore_points[bore] - np.array(shaft.point)
+    off = float(np.linalg.norm(arm - (arm @ a) * a))
+    if off > SAME * max(shaft.length, 1e-3):
+        problem = f"lies {1e3 * off:.6g} mm off the axis of shaft {shaft.name!r}"
+        cure = "name the bores on that axis, or move the shaft (x_mm, z_mm): it runs along y"
+        raise InputError(f"attachment {bore!r}", None, problem, f"{cure} (housing.mesh.axes turns a mesh)")
+    beyond = abs(float(arm @ a)) - 0.5 * shaft.length
+    if beyond > SAME * shaft.length:
+        problem = f"lies {1e3 * beyond:.6g} mm beyond the end of shaft {shaft.name!r}"
+        raise InputError(f"attachment {bore!r}", None, problem, "lengthen the shaft (length_mm), or move it (y_mm)")
+    if train.housing is not None:
+        own = train.housing.attachment_axes[train.housing.attachment_names.index(bore)]
+        if abs(abs(float(own @ a)) - 1.0) > SAME:
+            problem = "its bore is not parallel to the train's axis"
+            raise InputError(f"attachment {bore!r}", list(map(float, own)), problem, "all shafts must be parallel")
+
+
+def _check_ends(train: GearTrain) -> None:
+    drive = train.driven
+    if drive.stiffness is not None and not (math.isfinite(drive.stiffness) and drive.stiffness > 0.0):
+        raise InputError("drive stiffness", drive.stiffness, "must be finite and > 0 N m/rad", "None for a rigid drive")
+    if not (math.isfinite(drive.damping) and drive.damping >= 0.0):
+        raise InputError("drive damping", drive.damping, "must be finite and >= 0", "negative damping feeds energy in")
+    shafts = {s.name: s for s in train.shafts}
+    parts: list[tuple[str, Drive | Load]] = [("drive", drive)]
+    parts += [(f"load on {x.shaft!r}", x) for x in train.loads]
+    for label, part in parts:
+        _known(label, "shaft", part.shaft, shafts)
+        if part.bore is not None:
+            _known(label, "attachment", part.bore, train.bore_points)
+            if part.bore not in shafts[part.shaft].bores:
+                problem = f"attachment {part.bore!r} does not carry shaft {part.shaft!r}"
+                raise InputError(label, part.bore, problem, f"choose one of {', '.join(shafts[part.shaft].bores)}")
+    if not train.meshes and len(train.shafts) > 1:
+        raise InputError("train.meshes", None, "no gear is driven: the train has no mesh", "add a mesh")
+
+
+def _check_on_shaft(train: GearTrain, item: ShaftGear) -> None:
+    shaft = train.shaft(item.shaft)
+    middle = float(np.array(shaft.point) @ train.frame[2])
+    reach = abs(item.along - middle) + 0.5 * item.gear.face_width
+    if reach > 0.5 * shaft.length * (1 + SAME):
+        problem = f"reaches {1e3 * (reach - 0.5 * shaft.length):.6g} mm beyond the end of shaft {shaft.name!r}"
+        raise InputError(f"gear {item.name!r}", None, problem, "move the gear, or lengthen the shaft")
+
+
+def _check_mesh(train: GearTrain, mesh: GearMesh) -> None:
+    label = f"mesh {mesh.name!r}"
+    for name in (mesh.driver, mesh.driven):
+        _known(label, "gear", name, [g.name for g in train.gears])
+    one, two = train.gear(mesh.driver), train.gear(mesh.driven)
+    if one.shaft == two.shaft:
+        raise InputError(label, None, f"both gears are on shaft {one.shaft!r}", "mesh gears of two shafts")
+    try:
+        expected = gear_pair(one.gear, two.gear, mesh.centre_distance).working_centre_distance
+    except InputError as error:
+        side, _, name = error.field.rpartition(".")
+        error = InputError(name, error.value, error.problem, error.cure)
+        raise in_keys(error, f"{label} {side}".rstrip()) from None
+    distance = shaft_distance(train, one.shaft, two.shaft)
+    if abs(distance - expected) > SAME * expected:
+        apart = f"shafts {one.shaft!r} and {two.shaft!r} are {1e3 * distance:.9g} mm apart"
+        problem = f"{apart}, the gears need {1e3 * expected:.9g} mm"
+        cure = "move a shaft, change the gears, or give the gears another centre distance (with backlash)"
+        raise InputError(label, None, problem, cure)
+    if overlap(one, two) <= 0.0:
+        problem = f"the gears do not face each other: {1e3 * -overlap(one, two):.6g} mm lie between them along the axis"
+        raise InputError(label, None, problem, "move one along its shaft")
+    if not (math.isfinite(mesh.damping) and mesh.damping >= 0.0):
+        raise InputError(
+            f"{label} damping", mesh.damping, "must be finite and >= 0 N s/m", "negative damping feeds energy in"
+        )
+    _check_damper(mesh)
+    check_friction(label, mesh.friction, isinstance(mesh.stiffness, MeshLaw))
+    for gear in (one, two):
+        _check_pitch_errors(label, gear, isinstance(mesh.stiffness, MeshLaw))
+    check_curve(mesh, one.gear.teeth)
+
+
+def _check_damper(mesh: GearMesh) -> None:
+    """The damper of a mesh acts at times that the mesh has."""
+    label, acts = f"mesh {mesh.name!r} damping_acts", mesh.damping_acts
+    if acts not in (None, ALWAYS, IN_CONTACT):
+        raise InputError(label, acts, f"must be {ALWAYS!r} or {IN_CONTACT!r}", "leave it out for the default")
+    if acts == IN_CONTACT and not isinstance(mesh.stiffness, MeshLaw) and mesh.backlash is None:
+        problem = (
+            "needs teeth that part, and a mesh without a law and without a backlash is a spring that acts both ways"
+        )
+        raise InputError(label, acts, problem, "give backlash_um, or leave it out: such a damper acts always")
+    if mesh.stiffness is None and (acts or mesh.damping):
+        problem = "stands beside a rigid mesh, which does not yield, so nothing damps it"
+        raise InputError(
+            label if acts else label.replace("damping_acts", "damping"), acts or mesh.damping, problem, "leave it out"
+        )
+
+
+def _check_pitch_errors(label: str, gear: ShaftGear, law: bool) -> None:
+    """Pitch errors are one a tooth, at meshes that know their tooth pairs."""
+    for errors in gear.pitch_errors:
+        if errors and not law:
+            problem = f"has teeth with pitch errors on gear {gear.name!r}, which curves and rigid meshes do not know"
+            cure = 'take a mesh law (mesh_model = "potential"), or leave the pitch errors out'
+            raise InputError(label, None, problem, cure)
+        if len(errors) not in (0, gear.gear.teeth) or not np.isfinite(errors).all():
+            problem = f"must be finite, one for each of the {gear.gear.teeth} teeth of gear {gear.name!r}, or none"
+            raise InputError("pitch_errors", len(errors), problem, "give as many as the gear has teeth")
+
+
+def check_curve(mesh: GearMesh, teeth: int) -> None:
+    """The curve of a mesh covers one cycle of its driver, with positive values."""
+    label, curve = f"mesh {mesh.name!r} stiffness", mesh.stiffness
+    if mesh.backlash is not None and not (math.isfinite(mesh.backlash) and mesh.backlash >= 0.0):
+        problem = "must be finite and >= 0 m: less is a wedged mesh, whose flanks all bear without a load"
+        raise InputError(
+            f"mesh {mesh.name!r} backlash", mesh.backlash, problem, "thin the teeth, or move the shafts apart"
+        )
+    if curve is None:
+        if mesh.backlash is not None:
+            problem = "stands beside a rigid mesh, whose teeth never part"
+            raise InputError(f"mesh {mesh.name!r} backlash", mesh.backlash, problem, "leave one out")
+        return
+    if isinstance(curve, (int, float)):
+        if not (math.isfinite(curve) and curve > 0.0):
+            raise InputError(label, curve, "must be finite and > 0 N/m", "or None for a rigid mesh")
+        return
+    period = (
+        curve.period
+        if isinstance(curve, PeriodicInterpolant)
+        else curve.cycle
+        if isinstance(curve, MeshLaw)
+        else curve.mesh_cycle
+    )
+    expected = 2.0 * math.pi / teeth
+    if abs(period - expected) > SAME * expected:
+        needs = f"the driver of {teeth} teeth needs {math.degrees(expected):.9g} deg"
+        problem = f"has a period of {math.degrees(period):.9g} deg, {needs}"
+        raise InputError(label, None, problem, "take the curve of these gears, the driver as pinion")
+    if isinstance(curve, MeshLaw):
+        if abs(curve.sides[1].cycle - expected) > SAME * expected:
+            problem = f"has a law of the back flanks with a period of {math.degrees(curve.sides[1].cycle):.9g} deg"
+            raise InputError(label, None, problem, "take that of the same gears, seen from behind")
+        return
+    table = mesh.interpolant()
+    gaps = np.diff(table.nodes)
+    widest = float(gaps.max()) / table.period
+    if widest > max(WIDEST_GAP, 1.5 * float(np.median(gaps)) / table.period):
+        start = math.degrees(table.nodes[int(gaps.argmax())])
+        problem = f"has a gap: no value from {start:.6g} deg on over {360.0 * widest / teeth:.6g} deg"
+        raise InputError(label, None, problem, "compute the missing positions of the curve")
+    if not table.values.min() > 0.0:
+        raise InputError(
+            label, float(table.values.min()), "must be > 0 N/m everywhere", "look for positions without contact"
+        )
+
+
+def shaft_distance(train: GearTrain, one: str, two: str) -> float:
+    """Distance of two shafts' axes (m)."""
+    a = train.frame[2]
+    arm = np.array(train.shaft(two).point) - np.array(train.shaft(one).point)
+    return float(np.linalg.norm(arm - (arm @ a) * a))
+
+
+def overlap(one: ShaftGear, two: ShaftGear) -> float:
+    """Length along the axis that two gears share (m); negative: the gap between them."""
+    high = min(one.along + 0.5 * one.gear.face_width, two.along + 0.5 * two.gear.face_width)
+    return high - max(one.along - 0.5 * one.gear.face_width, two.along - 0.5 * two.gear.face_width)
+
+
+def _check_room(train: GearTrain) -> None:
+    """No two gears in one place, and no gear in another shaft."""
+    meshing = {frozenset((m.driver, m.driven)) for m in train.meshes}
+    for i, one in enumerate(train.gears):
+        for two in train.gears[i + 1 :]:
+            if overlap(one, two) <= SAME * one.gear.face_width or frozenset((one.name, two.name)) in meshing:
+                continue
+            room = 0.0 if one.shaft == two.shaft else shaft_distance(train, one.shaft, two.shaft)
+            if one.shaft == two.shaft or room < one.gear.tip_radius + two.gear.tip_radius:
+                problem = f"overlaps gear {two.name!r} over {1e3 * overlap(one, two):.6g} mm along the axis"
+                raise InputError(f"gear {one.name!r}", None, problem, "move one along its shaft, or let them mesh")
+        for shaft in train.shafts:
+            middle = float(np.array(shaft.point) @ train.frame[2])
+            beside = abs(one.along - middle) - 0.5 * (shaft.length + one.gear.face_width) >= 0.0
+            if shaft.name == one.shaft or beside:
+                continue
+            room = shaft_distance(train, one.shaft, shaft.name) - shaft.radius
+            if one.gear.tip_radius > room:
+                problem = f"its tip cuts {1e3 * (one.gear.tip_radius - room):.4g} mm into shaft {shaft.name!r}"
+                raise InputError(f"gear {one.name!r}", None, problem, "thinner shaft, smaller gear, or a shorter shaft")
+
+
+def _check_damping(train: GearTrain) -> None:
+    ratios = np.atleast_1d(np.asarray(train.damping.ratio, dtype=float))
+    for name, value in (
+        ("ratio", ratios.min(initial=0.0)),
+        ("alpha", train.damping.alpha),
+        ("beta", train.damping.beta),
+    ):
+        if not (np.isfinite(value) and value >= 0.0):
+            raise InputError(
+                f"damping {name}", float(value), "must be finite and >= 0", "negative damping feeds energy in"
+            )
+    if ratios.max(initial=0.0) >= 1.0:
+        raise InputError("damping ratio", float(ratios.max()), "must be < 1", "0.01 is 1 % of critical damping")

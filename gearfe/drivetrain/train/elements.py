@@ -1,0 +1,212 @@
+r"""Elements of a train for the rigid core: shaft, hinge, bearing, constant springs and dampers.
+
+Coordinates of a shaft: displacement of its mass centre along x, y, z (m), small tilts about e1 and e2 (rad), and the
+rest of its spin about the axis a beside rolling with the drive (rad). A housing has the six coordinates of each bore,
+then its internal ones. Forces of second order in the small motions (torque times tilt) are left out.
+
+**Mass and inertia** of a shaft with its gears follow from geometry and density. A gear is its exact tooth outline of
+width b outside the shaft (or its bore, where that is wider); with the polygon's :math:`A = \tfrac12\sum c_i`, :math:`J
+= \tfrac1{12}\sum c_i(|p_i|^2 + p_i\cdot p_{i+1} + |p_{i+1}|^2)`, :math:`c_i = p_i \times p_{i+1}` (Green's theorem),
+its mass is :math:`\rho b A`, its polar inertia :math:`\rho b J`, its transverse one :math:`\rho b J/2 + m b^2/12`. All
+are summed about the common mass centre.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.typing import Array
+from ...gears.geometry.derived import gear_outline
+from ...gears.geometry.pair import Gear
+from ...multibody import Element, LinearJoint, ModalBlocks
+from .gear_train import GearTrain, Shaft
+
+#: Points on each piece of a tooth's outline: area good to 1e-7.
+POINTS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Rotor:
+    """A shaft with its gears as one rigid body.
+
+    Attributes
+    ----------
+    mass
+        kg.
+    polar, transverse
+        Moments of inertia about the axis and about any transverse line through the mass centre (kg m2).
+    centre : (3,)
+        Mass centre (m).
+    """
+
+    mass: float
+    polar: float
+    transverse: float
+    centre: Array
+
+
+@lru_cache(maxsize=64)
+def outline_moments(gear: Gear) -> tuple[float, float]:
+    """Area (m2) and polar second moment (m4) inside a gear's tooth outline."""
+    p = 1e-3 * gear_outline(gear, 0.0, (0.0, 0.0), per_segment=POINTS)[:-1]
+    q = np.roll(p, -1, axis=0)
+    cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
+    second = (cross * ((p * p).sum(axis=1) + (p * q).sum(axis=1) + (q * q).sum(axis=1))).sum() / 12.0
+    return abs(float(cross.sum())) / 2.0, abs(float(second))
+
+
+def rotor(train: GearTrain, shaft: Shaft) -> Rotor:
+    """Mass properties of a shaft with the gears on it."""
+    point, axis = np.array(shaft.point, dtype=float), train.frame[2]
+    m = shaft.density * math.pi * shaft.radius**2 * shaft.length
+    parts = [(m, 0.5 * m * shaft.radius**2, m * (3 * shaft.radius**2 + shaft.length**2) / 12.0, float(point @ axis))]
+    for item in (g for g in train.gears if g.shaft == shaft.name):
+        gear = item.gear
+        if shaft.radius >= gear.root_radius:
+            problem = f"radius {1e3 * shaft.radius:g} mm reaches the teeth of gear {item.name!r}"
+            cure = f"must be < {1e3 * gear.root_radius:.6g} mm, its root radius"
+            raise InputError(f"shaft {shaft.name!r}", None, problem, cure)
+        inner = max(shaft.radius, 0.5 * gear.bore_diameter)
+        area, second = outline_moments(gear)
+        width = gear.face_width
+        mass = item.density * width * (area - math.pi * inner**2)
+        polar = item.density * width * (second - 0.5 * math.pi * inner**4)
+        parts.append((mass, polar, 0.5 * polar + mass * width**2 / 12.0, item.along))
+    table = np.array(parts)
+    total = table[:, 0].sum()
+    along = float(table[:, 0] @ table[:, 3] / total)
+    transverse = float((table[:, 2] + table[:, 0] * (table[:, 3] - along) ** 2).sum())
+    centre = point + (along - float(point @ axis)) * axis
+    given = (shaft.mass, shaft.polar_inertia, shaft.transverse_inertia)
+    computed = (float(total), float(table[:, 1].sum()), transverse)
+    mass, polar, transverse = (m if g is None else g for g, m in zip(given, computed, strict=True))
+    return Rotor(mass, polar, transverse, centre)
+
+
+@dataclass(frozen=True, eq=False)
+class RigidShaft(Element):
+    """A shaft with its gears: six coordinates, constant diagonal mass.
+
+    Parameters
+    ----------
+    rotor
+        Mass properties.
+    start_rate
+        Spin beside rolling at the start (rad/s).
+    """
+
+    rotor: Rotor
+    start_rate: float = 0.0
+    name: str = "shaft"
+    size: int = 6
+
+    def mass(self) -> Array:
+        """diag(m, m, m, J_t, J_t, J_p)."""
+        r = self.rotor
+        return np.diag([r.mass, r.mass, r.mass, r.transverse, r.transverse, r.polar])
+
+    def start(self) -> tuple[Array, Array]:
+        """At rest but for the spin."""
+        return np.zeros(6), np.array([0.0, 0.0, 0.0, 0.0, 0.0, self.start_rate])
+
+    def point_rows(self, point: Array, frame: Array) -> Array:
+        """Displacement of a point of the shaft, beside rolling: rows x, y, z on its coordinates, shape (3, 6)."""
+        arm = point - self.rotor.centre
+        return np.hstack([np.eye(3), np.cross(frame, arm).T])
+
+
+@dataclass(frozen=True, eq=False)
+class LinearForce(Element):
+    """Constant springs and dampers between elements: force ``-C v - K q`` on their coordinates, (k, k) each."""
+
+    touches: tuple[Element, ...] = field()
+    C: Array = field()
+    K: Array = field()
+    name: str = "springs and dampers"
+
+    def blocks(self) -> tuple[Array, Array]:
+        """(C, K)."""
+        return self.C, self.K
+
+
+def bore_rows(shaft: RigidShaft, point: Array, frame: Array, bore: Array | None) -> Array:
+    """Return the motion of a shaft relative to a bore: along e1, a, e2 and tilt about e1, e2.
+
+    Parameters
+    ----------
+    shaft : RigidShaft
+        The shaft.
+    point : ndarray, shape (3,)
+        Reference point of the bore, on the shaft's axis (m).
+    frame : ndarray, shape (3, 3)
+        Rows e1, e2, a: directions of the train.
+    bore : ndarray, shape (N, 6), or None
+        Selects the bore's coordinates from the housing's; None for a rigid housing.
+
+    Returns
+    -------
+    rows : ndarray, shape (5, 6) or (5, 6 + N)
+        Relative displacements and tilts per unit coordinate of shaft and housing.
+    """
+    e1, e2, a = frame
+    directions = np.array([e1, a, e2])
+    moved = shaft.point_rows(point, frame)
+    moved[:, 5] = 0.0  # the point is on the axis
+    rows = np.zeros((5, 6))
+    rows[:3] = directions @ moved
+    rows[3, 3] = rows[4, 4] = 1.0
+    if bore is None:
+        return rows
+    other = np.zeros((5, 6))
+    other[:3, :3] = directions
+    other[3, 3:], other[4, 3:] = e1, e2
+    return np.hstack([rows, -other @ bore.T])
+
+
+def hinge(shaft: RigidShaft, housing: ModalBlocks | None, rows: Array, name: str) -> LinearJoint:
+    """Return the ideal bearing of a shaft in a bore: five constraints that leave the spin free.
+
+    Parameters
+    ----------
+    shaft : RigidShaft
+        The shaft.
+    housing : ModalBlocks or None
+        Body with the bore; None for a rigid housing.
+    rows : ndarray, shape (5, 6) or (5, 6 + N)
+        Motion of the shaft relative to the bore per unit coordinate, see `bore_rows`.
+    name : str
+        Name in messages.
+    """
+    touches: tuple[Element, ...] = (shaft,) if housing is None else (shaft, housing)
+    return LinearJoint(touches, rows, np.zeros(len(rows)), name=name)
+
+
+def bearing(
+    shaft: RigidShaft, housing: ModalBlocks | None, rows: Array, stiffness: Array, damping: Array, name: str
+) -> LinearForce:
+    """Return the springs and dampers of a bearing along the five relative motions of shaft and bore.
+
+    With the rows R, K = R^T diag(stiffness) R and C = R^T diag(damping) R.
+
+    Parameters
+    ----------
+    shaft : RigidShaft
+        The shaft.
+    housing : ModalBlocks or None
+        Body with the bore; None for a rigid housing.
+    rows : ndarray, shape (5, 6) or (5, 6 + N)
+        R: motion of the shaft relative to the bore per unit coordinate, see `bore_rows`.
+    stiffness : ndarray, shape (5,)
+        Along e1, a, e2 (N/m) and about e1, e2 (N m/rad).
+    damping : ndarray, shape (5,)
+        In the same order (N s/m, N m s/rad).
+    name : str
+        Name in messages.
+    """
+    touches: tuple[Element, ...] = (shaft,) if housing is None else (shaft, housing)
+    return LinearForce(touches, rows.T @ (damping[:, None] * rows), rows.T @ (stiffness[:, None] * rows), name)

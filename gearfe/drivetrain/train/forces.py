@@ -1,0 +1,353 @@
+r"""All forces of a train that are not constant matrices, along few directions: one formulation for many times at once.
+
+The motion is split into rolling and a small rest: the rotation of a shaft is :math:`g\,\psi(t) + u`, psi the drive's
+angle, g the shaft's ratio to it, u a coordinate. With u, u' along the directions, the forces are
+
+- of a *flank with a stiffness curve*: along the approach d, :math:`-(k(\varphi)\,(u_d - j) - k_0 u_d)` with
+  :math:`\varphi = s\,(g\psi + u_r) + \varphi_0` and r the driver's rotation. The part with the mean :math:`k_0` stands
+  in the system's stiffness. A flank that may part bears where :math:`u_d > j`. A damper that acts in contact only
+  adds :math:`-(c\,H(u_d - j)\,u_d' - c_0 u_d')`, H being Heaviside's step and :math:`c_0` what stands in the system's
+  damping;
+- of a *flank with a mesh law* (`gears.meshlaw.law`): :math:`-(F\,\langle 1 + \chi u_d'\rangle - k_0 u_d)` along d, and
+  :math:`-s M` along r, the driver's rotation relative to the line of centres; with *friction* (`train.friction`)
+  :math:`-\sum\mu N_k s(v_k/v_0)` across the line of action, and that times :math:`e_k` along the driver's turn
+  against the driven gear;
+- *gyroscopic*: :math:`-J_p\Omega\,(u_{d+1}', -u_d')`, :math:`\Omega = g\psi' + u_{d+2}'`, on the tilts d, d + 1 of a
+  shaft with the spin d + 2;
+- *torques*: functions of time along a direction.
+
+A mesh has one flank, or two: the back flank has its own approach, along the other line of action, and its law is
+the driving one's at the mirrored phase, behind the backlash j.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from ...base.typing import Array, BoolArray, IntArray
+from ...gears.meshlaw.law import MeshForces, MeshLaw
+from ...gears.stiffness.periodic import PeriodicInterpolant
+from ...multibody.series.timefunctions import TimeFunction
+from .friction import Sliding, smooth_sign
+
+
+class Drag(NamedTuple):
+    """Friction of a flank at n times, (n, 2) each: force across the line of action (N) and its moment about the pitch
+    point (N m), with their derivatives: with approach and phase, with the rates of approach, of the way across, and of
+    the turn. Last the power (W) that it takes, (n,).
+    """
+
+    value: Array
+    by_approach: Array
+    by_phase: Array
+    by_rate: Array
+    by_across_rate: Array
+    by_turn_rate: Array
+    power: Array
+
+
+class FlankForces(NamedTuple):
+    """Forces of a flank at n times, (n,) each."""
+
+    force: Array  # N along the approach, damping included
+    tangent: Array  # N/m
+    cross: Array  # N/rad: of the force with the phase
+    apart: BoolArray
+    beyond: BoolArray  # farther than the law is known
+    per_rate: Array | None = None  # N s/m
+    moment: Array | None = None  # N m on the phase
+    moment_by_approach: Array | None = None  # N m/m
+    bend: Array | None = None  # N m/rad: of the moment with the phase
+    drag: Drag | None = None
+    momentum: Array | None = None  # N s: its rate of change is the damper's part of the force, which jumps at the touch
+
+
+class Slip(NamedTuple):
+    """What friction and damping depend on: psi' (1/s), rates of approach, of the way across and of the turn (n, 3), and
+    the friction itself."""
+
+    rate: Array | float
+    rates: Array
+    sliding: Sliding | None
+
+
+@dataclass(frozen=True, eq=False)
+class MeshFlank(ABC):
+    """One side of a mesh.
+
+    Attributes
+    ----------
+    direction, turn
+        Numbers of the approach and of the driver's rotation among the directions.
+    ratio, sense, phase
+        The phase is ``sense (ratio psi + u[turn]) + phase`` (rad).
+    mean
+        Stiffness (N/m) that the system's constant part has along the approach already.
+    gap
+        Approach (m) at which unmodified flanks touch.
+
+    Flanks also have a `mean_damping` (N s/m), which the system's constant part has along the approach already, and a
+    `damping` that acts while their teeth bear.
+    """
+
+    direction: int
+    turn: int
+    ratio: float
+    sense: float
+    phase: float
+    mean: float
+    gap: float
+
+    @abstractmethod
+    def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:
+        """Return the flank's forces and their derivatives at n times.
+
+        Parameters
+        ----------
+        phase : ndarray, shape (n,)
+            Phase of the mesh (rad).
+        approach : ndarray, shape (n,)
+            Approach beyond the gap (m).
+        slip : Slip
+            Rates of the motion, and the friction.
+        begin : ndarray, shape (n, slots), optional
+            Pair forces (N) from which the law's iteration starts, and which it overwrites, see `MeshLaw`.
+        """
+
+    @abstractmethod
+    def bears(self, phase: Array, approach: Array) -> BoolArray:
+        """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
+
+    def phase_and_approach(self, angle: Array, u: Array) -> tuple[Array, Array]:
+        """Phase (rad) and approach beyond the gap (m), u of shape (n, directions)."""
+        return self.sense * (self.ratio * angle + u[:, self.turn]) + self.phase, u[:, self.direction] - self.gap
+
+
+@dataclass(frozen=True, eq=False)
+class CurveFlank(MeshFlank):
+    """Force k(phase) times approach; where `parts`, none before the touch.
+
+    `damping` is c (N s/m) of a damper that acts in contact only: at the touch its force jumps.
+    """
+
+    sliding: ClassVar[None] = None
+    curve: PeriodicInterpolant
+    parts: bool
+    damping: float = 0.0
+    mean_damping: float = 0.0
+
+    def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:  # noqa: ARG002
+        """Return the forces of a stiffness curve and of its contact damper at n times.
+
+        Parameters
+        ----------
+        phase : ndarray, shape (n,)
+            Phase of the mesh (rad).
+        approach : ndarray, shape (n,)
+            Approach beyond the gap (m).
+        slip : Slip
+            Rates of the motion; the damper uses that of the approach.
+        begin : ndarray, optional
+            Not used: a curve has no pair forces.
+        """
+        k, slope = self.curve(phase)
+        bears = self.bears(phase, approach)
+        force, tangent, cross = (np.where(bears, x, 0.0) for x in (k * approach, k, slope * approach))
+        never = np.zeros(len(phase), dtype=bool)
+        if not self.damping > 0.0:
+            return FlankForces(force, tangent, cross, ~bears, never)
+        c, momentum = np.where(bears, self.damping, 0.0), np.where(bears, self.damping * approach, 0.0)
+        force = force + c * slip.rates[:, 0]
+        return FlankForces(force, tangent, cross, ~bears, never, per_rate=c, momentum=momentum)
+
+    def bears(self, phase: Array, approach: Array) -> BoolArray:  # noqa: ARG002
+        """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
+        return np.asarray((approach > 0.0) | (not self.parts))
+
+
+@dataclass(frozen=True, eq=False)
+class LawFlank(MeshFlank):
+    """A mesh law; `damping` is chi (s/m), `sliding` its friction or None.
+
+    `shifts`, shape (L,), is the approach (m) by which tooth pair k touches later, k taken modulo L: its pitch errors.
+    """
+
+    law: MeshLaw
+    damping: float
+    sliding: Sliding | None = None
+    shifts: Array = field(default_factory=lambda: np.zeros(1))
+    mean_damping: float = 0.0
+
+    def bears(self, phase: Array, approach: Array) -> BoolArray:
+        """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
+        return np.asarray(approach > self.law.first_contact(phase, self.shifts_at(phase)))
+
+    def shifts_at(self, phase: Array) -> Array:
+        """Shifts (m) of the pairs in the law's slots at phases (n,), shape (n, slots), or (1,) of all pairs."""
+        if len(self.shifts) == 1:
+            return self.shifts
+        return np.asarray(self.shifts[self.law.pair_numbers(phase) % len(self.shifts)])
+
+    def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:
+        """Return the forces of a mesh law, with damping and friction, at n times.
+
+        Parameters
+        ----------
+        phase : ndarray, shape (n,)
+            Phase of the mesh (rad).
+        approach : ndarray, shape (n,)
+            Approach beyond the gap (m).
+        slip : Slip
+            Rates of the motion, and the friction.
+        begin : ndarray, shape (n, slots), optional
+            Pair forces (N) from which the law's iteration starts, and which it overwrites, see `MeshLaw`.
+
+        Raises
+        ------
+        ArithmeticError
+            If the pair forces do not settle; with `begin` their sum is NaN instead.
+        """
+        loads = self.law(phase, approach, self.shifts_at(phase), begin)
+        push = 1.0 + self.damping * slip.rates[:, 0]
+        more = np.where(push > 0.0, self.damping, 0.0)
+        push = np.maximum(push, 0.0)
+        return FlankForces(
+            loads.force * push, loads.tangent * push, loads.cross * push, loads.force <= 0.0, loads.beyond,
+            loads.force * more if self.damping > 0.0 else None, loads.moment, loads.cross, loads.bend,
+            None if slip.sliding is None else self._drag(phase, loads, slip, slip.sliding, push, more),
+        )  # fmt: skip
+
+    def _drag(self, phase: Array, loads: MeshForces, slip: Slip, sliding: Sliding, push: Array, more: Array) -> Drag:
+        """Friction of `gearfe.drivetrain.train.friction` with its derivatives."""
+        pairs, slopes = loads.pair_forces, loads.pair_slopes
+        arm = sliding.radius * (self.law.pair_phases(phase) - sliding.pitch_phase)
+        turning = (sliding.ratio * slip.rate + slip.rates[:, 2])[:, None]
+        speed = slip.rates[:, 1, None] + arm * turning
+        share, slope = smooth_sign(speed / sliding.speed)
+        steep = sliding.coefficient * pairs * push[:, None] * slope / sliding.speed
+        pulls = sliding.coefficient * share
+        drag = pulls * pairs * push[:, None]
+        arms = np.stack([np.ones_like(arm), arm])  # of the force and of its moment
+
+        def summed(x: Array) -> Array:
+            return np.asarray((arms * x).sum(axis=2).T)
+
+        by_phase = summed(pulls * slopes[1] * push[:, None] + steep * sliding.radius * turning)
+        by_phase[:, 1] += sliding.radius * drag.sum(axis=1)
+        return Drag(
+            summed(drag), summed(pulls * slopes[0] * push[:, None]), by_phase, summed(pulls * pairs * more[:, None]),
+            summed(steep), summed(steep * arm), (drag * speed).sum(axis=1),
+        )  # fmt: skip
+
+
+Flank = CurveFlank | LawFlank
+
+
+@dataclass(frozen=True)
+class Gyro:
+    """Gyroscopic moments on the tilts `direction` and the one after it; `polar` in kg m2."""
+
+    direction: int
+    ratio: float
+    polar: float
+
+
+@dataclass(frozen=True, eq=False)
+class TrainForces:
+    """The forces along `size` directions.
+
+    Attributes
+    ----------
+    angle
+        psi, rotation of the drive (rad).
+    gyros, flanks
+        What depends on the motion.
+    torques
+        Pairs (direction, torque over time in N m).
+    """
+
+    size: int
+    angle: TimeFunction
+    gyros: tuple[Gyro, ...]
+    flanks: tuple[Flank, ...]
+    torques: tuple[tuple[int, TimeFunction], ...]
+
+    def of_flanks(self, t: Array, u: Array, du: Array) -> list[FlankForces]:
+        """Forces of each flank at the times t (n,), u and du of shape (n, directions)."""
+        angle, rate, forces = self.angle(t), self.angle(t, 1), []
+        for flank in self.flanks:
+            sliding = flank.sliding
+            across = (flank.direction, flank.turn) if sliding is None else (sliding.across, sliding.spin)
+            slip = Slip(rate, du[:, [flank.direction, *across]], sliding)
+            forces.append(flank.forces(*flank.phase_and_approach(angle, u), slip))
+        return forces
+
+    def __call__(self, t: Array, u: Array, du: Array, flanks: list[FlankForces] | None = None) -> Array:
+        """Forces at the times t (n,), u and du of shape (n, directions); shape (n, directions).
+
+        `flanks`: what `of_flanks` says, where it is known already.
+        """
+        out = np.zeros_like(u)
+        rate = self.angle(t, 1)
+        for flank, made in zip(self.flanks, flanks or self.of_flanks(t, u, du), strict=True):
+            out[:, flank.direction] += flank.mean * u[:, flank.direction] + flank.mean_damping * du[:, flank.direction]
+            out[:, flank.direction] -= made.force
+            if made.moment is not None:
+                out[:, flank.turn] -= flank.sense * made.moment
+            if flank.sliding is not None and made.drag is not None:
+                out[:, flank.sliding.across] -= made.drag.value[:, 0]
+                out[:, flank.sliding.spin] -= made.drag.value[:, 1]
+        for gyro in self.gyros:
+            d = gyro.direction
+            momentum = gyro.polar * (gyro.ratio * rate + du[:, d + 2])
+            out[:, d] -= momentum * du[:, d + 1]
+            out[:, d + 1] += momentum * du[:, d]
+        for direction, torque in self.torques:
+            out[:, direction] += torque(t)
+        return out
+
+    @property
+    def at_one_time(self) -> Callable[[float, Array, Array], Array]:
+        """The same as a function ``(t, u, du) -> (size,)``."""
+
+        def law(t: float, u: Array, du: Array) -> Array:
+            made: Array = self(np.array([t]), u[None], du[None])[0]
+            return made
+
+        return law
+
+    @property
+    def jumps(self) -> bool:
+        """Whether forces jump where teeth touch: dampers of curves that act in contact only."""
+        return any(isinstance(flank, CurveFlank) and flank.damping > 0.0 for flank in self.flanks)
+
+    def pieces(self, t: float | Array, u: Array, du: Array) -> IntArray:  # noqa: ARG002
+        """Whether the teeth of each flank with a curve bear, 1 or 0, at times (...); shape (..., flanks).
+
+        u and du have the shape (..., directions).
+        """
+        flat, angle = u.reshape(-1, self.size), np.atleast_1d(self.angle(t)).ravel()
+        bearing = [
+            flank.bears(*flank.phase_and_approach(angle, flat))
+            for flank in self.flanks
+            if isinstance(flank, CurveFlank)
+        ]
+        return np.stack(bearing, axis=-1).astype(np.int64).reshape(*u.shape[:-1], -1)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Times at which a function of time is not smooth."""
+        return tuple(sorted({*self.angle.breaks, *(b for _, torque in self.torques for b in torque.breaks)}))
+
+
+def derivative(function: TimeFunction) -> TimeFunction:
+    """d/dt of a function of time, away from its breaks."""
+    rows = tuple(tuple(j * c for j, c in enumerate(row))[1:] or (0.0,) for row in function.coefficients)
+    sines = tuple((a * w, w, p + math.pi / 2) for a, w, p in function.sines)
+    return TimeFunction(function.starts, function.origins, rows, sines)

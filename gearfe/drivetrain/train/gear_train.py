@@ -1,0 +1,356 @@
+"""What a gear train is made of: plain descriptions in SI units, checked by `gearfe.drivetrain.train.checks`.
+
+All shafts are parallel to one unit vector `axis`; angles, speeds and torques count positive about it (right-hand rule).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.shown import Facts
+from ...base.typing import Array
+from ...fem.reduction.modal_body import ModalBody
+from ...gears.geometry.pair import Gear, MeshGeometry
+from ...gears.meshlaw.law import MeshLaw
+from ...gears.stiffness.curve import StiffnessCurve
+from ...gears.stiffness.periodic import PeriodicInterpolant
+from ...multibody.series.timefunctions import TimeFunction
+from .friction import Lubrication
+from .kinematics import Kinematics, kinematics
+from .layout import LayoutGear, LayoutMesh, PitchErrors, TrainLayout
+
+Vector = tuple[float, float, float]
+#: When the damper of a mesh acts.
+ALWAYS, IN_CONTACT = "always", "in_contact"
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """A rigid round shaft; its gears become part of it.
+
+    Parameters
+    ----------
+    name
+        How other parts call it.
+    point
+        Middle of the shaft (m).
+    length, radius
+        Of the cylinder (m).
+    bores
+        Names of the attachments (bores) that carry it; two hinges are usual.
+    density
+        kg/m3.
+    initial_speed
+        Spin at the start (rad/s); None: rolling with the drive.
+    mass, polar_inertia, transverse_inertia
+        Of shaft and gears together (kg, kg m2 about the mass centre), where they are known better than from the
+        geometry.
+    """
+
+    name: str
+    point: Vector
+    length: float
+    radius: float
+    bores: tuple[str, ...]
+    density: float = 7850.0
+    initial_speed: float | None = None
+    mass: float | None = None
+    polar_inertia: float | None = None
+    transverse_inertia: float | None = None
+
+
+@dataclass(frozen=True)
+class ShaftGear:
+    """A gear fixed on a shaft.
+
+    Parameters
+    ----------
+    along
+        Coordinate of its middle plane along the train's axis (m).
+    gear
+        Teeth and sizes.
+    density
+        kg/m3.
+    pitch_errors : (left, right), each a tuple of z numbers, or empty
+        How much earlier the flanks of each tooth touch along the line of action (m): index deviations times the cosine
+        of the pressure angle; a displaced tooth has opposite values on its sides. Teeth count about the axis of the
+        train, from the one that stands at the gear's angle in `train.kinematics.Kinematics`. Left flanks drive
+        where the driver turns about the axis. For meshes with a law.
+    """
+
+    name: str
+    shaft: str
+    along: float
+    gear: Gear
+    density: float = 7850.0
+    pitch_errors: PitchErrors = ((), ())
+
+
+@dataclass(frozen=True)
+class GearMesh:
+    """Two gears in mesh.
+
+    Parameters
+    ----------
+    driver, driven
+        Names of gears.
+    stiffness
+        A mesh law, a curve over the driver's rotation, its interpolant (N/m over rad), a constant (N/m), or None for
+        the ideal rigid mesh: a constraint whose multiplier is the contact force.
+    phase
+        Angle of the driver (rad), counted in its driving sense, at which it starts; 0: a driver's tooth stands on the
+        line of centres. None: from the teeth of the connected gears, the first of whose meshes has 0; see
+        `gearfe.drivetrain.train.phases`.
+    damping
+        N s/m along the line of action; with a law that damps in contact only, at the force of steady running.
+    damping_acts
+        ``always``, or ``in_contact``: only while teeth bear. None: in contact with a law, else always. The part of
+        `Damping.beta` acts alike.
+    interpolation
+        ``cubic`` (monotone) or ``linear``, for a curve.
+    centre_distance
+        Working centre distance of the gears (m); None: the one without backlash.
+    backlash
+        Normal backlash (m), along the line of action. None: with a law that of the gears, or no back flanks where they
+        have none; with a curve or a constant a spring that acts both ways.
+    friction
+        Coefficient of friction, or what it follows from; for meshes with a law. See `gearfe.drivetrain.train.friction`.
+    """
+
+    driver: str
+    driven: str
+    stiffness: MeshLaw | StiffnessCurve | PeriodicInterpolant | float | None
+    phase: float | None = None
+    damping: float = 0.0
+    interpolation: str = "cubic"
+    centre_distance: float | None = None
+    backlash: float | None = None
+    friction: float | Lubrication = 0.0
+    damping_acts: str | None = None
+
+    @property
+    def name(self) -> str:
+        """``driver-driven``."""
+        return f"{self.driver}-{self.driven}"
+
+    @property
+    def damps_in_contact(self) -> bool:
+        """Whether its damper acts only while teeth bear."""
+        if self.damping_acts is None:
+            return isinstance(self.stiffness, MeshLaw)
+        return self.damping_acts == IN_CONTACT
+
+    def interpolant(self) -> PeriodicInterpolant:
+        """Stiffness over the driver's rotation, of a mesh without a law; a constant becomes a flat curve."""
+        curve = self.stiffness
+        if isinstance(curve, StiffnessCurve):
+            try:
+                return curve.interpolant("k_mesh", method=self.interpolation)
+            except InputError as error:
+                raise InputError(f"mesh {self.name!r} stiffness", error.value, error.problem, error.cure) from None
+        if isinstance(curve, float | int):
+            flat = np.array([[float(curve), 0.0, 0.0, 0.0]])
+            return PeriodicInterpolant(2 * math.pi, np.array([0.0, 2 * math.pi]), flat)
+        if not isinstance(curve, PeriodicInterpolant):
+            raise InputError(f"mesh {self.name!r} stiffness", None, "is no curve", "ask its law, or give it a curve")
+        return curve
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """Springs and dampers between a shaft and a bore, instead of a hinge.
+
+    Parameters
+    ----------
+    bore
+        Name of the attachment.
+    stiffness, damping : five numbers
+        Diagonal: along the first transverse direction, the axis, the second transverse direction (N/m, N s/m), and for
+        tilt about the first and second transverse direction (N m/rad, N m s/rad). For shafts along y these are x, y, z
+        and tilts about x and z.
+    """
+
+    bore: str
+    stiffness: tuple[float, float, float, float, float]
+    damping: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Rotation of a shaft relative to one of its bores as a function of time.
+
+    Parameters
+    ----------
+    speed
+        Relative speed (rad/s); the rotation is its integral from time 0.
+    stiffness, damping
+        Of an elastic coupling between the prescribed rotation and the shaft (N m/rad, N m s/rad); None: rigid.
+    """
+
+    shaft: str
+    bore: str
+    speed: TimeFunction
+    stiffness: float | None = None
+    damping: float = 0.0
+
+
+@dataclass(frozen=True)
+class Load:
+    """Torque on a shaft (N m), and its reaction on a bore; `bore` None: it reacts outside of the train."""
+
+    shaft: str
+    bore: str | None
+    torque: TimeFunction
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Damping of the whole coupled system, beside that of housing, bearings and meshes.
+
+    Parameters
+    ----------
+    ratio
+        Modal damping ratio of the modes of the coupled system (mean mesh stiffnesses): one, or one a mode from the
+        lowest up, the last one holding for all above.
+    alpha, beta
+        Rayleigh damping ``alpha M + beta K`` (1/s, s) of all bodies, bearings and meshes, for motion beside the
+        rolling.
+    gyroscopic
+        Whether the shafts' gyroscopic moments act (they do no work; off for comparison only).
+    """
+
+    ratio: float | tuple[float, ...] = 0.0
+    alpha: float = 0.0
+    beta: float = 0.0
+    gyroscopic: bool = True
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GearTrain(Facts):
+    """A whole gear train.
+
+    Parameters
+    ----------
+    shafts, gears, meshes, drive, loads
+        The train.
+    housing
+        Reduced elastic housing, whose attachments are the bores; None: a rigid one with the bores `rigid_bores`.
+    rigid_bores
+        Name -> point on the bore's axis (m), for a rigid housing.
+    bearings
+        For bores whose shaft is not held by a hinge.
+    damping
+        Of the coupled system.
+    axis
+        Direction of all shafts.
+    """
+
+    shafts: tuple[Shaft, ...]
+    gears: tuple[ShaftGear, ...]
+    meshes: tuple[GearMesh, ...]
+    drive: Drive | None
+    loads: tuple[Load, ...] = ()
+    housing: ModalBody | None = None
+    rigid_bores: dict[str, Vector] = field(default_factory=dict)
+    bearings: tuple[Bearing, ...] = ()
+    damping: Damping = Damping()
+    axis: Vector = (0.0, 1.0, 0.0)
+
+    def facts(self) -> dict[str, str]:
+        """Shafts, gears, meshes, drive, loads, housing."""
+        housing, drive = self.housing, self.drive
+        rigid = f"rigid, {len(self.rigid_bores)} bores"
+        return {
+            "shafts": ", ".join(shaft.name for shaft in self.shafts),
+            "gears": ", ".join(f"{one.name} on {one.shaft}" for one in self.gears) or "none",
+            "meshes": ", ".join(f"{one.driver}-{one.driven}" for one in self.meshes) or "none",
+            "drive": "none" if drive is None else f"{drive.shaft}, against bore {drive.bore}",
+            "loads": ", ".join(one.shaft for one in self.loads) or "none",
+            "housing": rigid if housing is None else f"elastic, {len(housing.attachment_names)} bores",
+        }
+
+    @property
+    def driven(self) -> Drive:
+        """The drive, of a train that has one.
+
+        Raises
+        ------
+        InputError
+            For a train without.
+        """
+        if self.drive is None:
+            problem = "nothing holds the train: no shaft is driven, so any torque would spin it up without end"
+            raise InputError(
+                "train.drive", None, problem, "prescribe the speed of one shaft relative to one of its bores"
+            )
+        return self.drive
+
+    @property
+    def layout(self) -> TrainLayout:
+        """What the kinematics follow from, as values."""
+        gears = {gear.name: self._layout_gear(gear) for gear in self.gears}
+        loads = tuple((self.shaft_number(load.shaft), load.torque) for load in self.loads)
+        meshes = tuple(self._layout_mesh(mesh, gears[mesh.driver], gears[mesh.driven]) for mesh in self.meshes)
+        names, driven = tuple(shaft.name for shaft in self.shafts), self.shaft_number(self.driven.shaft)
+        return TrainLayout(names, driven, self.driven.speed, tuple(gears.values()), meshes, loads)
+
+    def _layout_gear(self, item: ShaftGear) -> LayoutGear:
+        gear, errors = item.gear, _tuples(item.pitch_errors)
+        return LayoutGear(item.name, self.shaft_number(item.shaft), gear.teeth, gear.base_radius, errors)
+
+    def _layout_mesh(self, mesh: GearMesh, driver: LayoutGear, driven: LayoutGear) -> LayoutMesh:
+        one, two = self.gear(mesh.driver), self.gear(mesh.driven)
+        arm = self.frame[:2] @ (np.array(self.shaft(two.shaft).point) - np.array(self.shaft(one.shaft).point))
+        twist = MeshGeometry(one.gear, two.gear, mesh.centre_distance).contact_twist
+        towards, distance = math.atan2(arm[1], arm[0]), float(np.linalg.norm(arm))
+        return LayoutMesh(mesh.name, driver, driven, towards, distance, twist, mesh.phase)
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """Ratios, senses, phases and steady forces; trains of equal layout share them.
+
+        Raises
+        ------
+        InputError
+            For a train without a drive, and for what `gearfe.drivetrain.train.kinematics.kinematics` refuses.
+        """
+        return kinematics(self.layout)
+
+    @property
+    def bore_points(self) -> dict[str, Array]:
+        """Name -> reference point of each bore (m)."""
+        if self.housing is None:
+            return {name: np.array(point, dtype=float) for name, point in self.rigid_bores.items()}
+        return dict(zip(self.housing.attachment_names, self.housing.attachment_points, strict=True))
+
+    @property
+    def frame(self) -> Array:
+        """Rows e1, e2, a: a right-handed frame, the axis last, e1 nearest to a coordinate direction; shape (3, 3)."""
+        a = np.array(self.axis, dtype=float) / np.linalg.norm(self.axis)
+        e1 = np.array([1.0, 0.0, 0.0]) if abs(a[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+        e1 = e1 - (e1 @ a) * a
+        e1 = e1 / np.linalg.norm(e1)
+        return np.array([e1, np.cross(a, e1), a])
+
+    def shaft_number(self, name: str) -> int:
+        """Number of the shaft of that name."""
+        return next(i for i, shaft in enumerate(self.shafts) if shaft.name == name)
+
+    def shaft(self, name: str) -> Shaft:
+        """The shaft of that name."""
+        return self.shafts[self.shaft_number(name)]
+
+    def gear(self, name: str) -> ShaftGear:
+        """The gear of that name."""
+        return next(g for g in self.gears if g.name == name)
+
+
+def _tuples(errors: PitchErrors) -> PitchErrors:
+    """Pitch errors as values, whatever sequences they are."""
+    left, right = (tuple(float(error) for error in side) for side in errors)
+    return left, right

@@ -1,0 +1,212 @@
+r"""Kinematics of a train: ratios of the shafts, driving senses, common period, teeth at the start, steady forces.
+
+With :math:`\Delta\varphi_2 = -(z_1/z_2)\,\Delta\varphi_1` at each mesh all ratios are rational, so the common period
+is exact: a mesh repeats after :math:`1/(|g| z)` turns of the drive (g the ratio of its driver, z the driver's teeth),
+and fractions have a least common multiple. In steady running the moments about the axis of each shaft that is not
+driven balance: base radius times force at each mesh.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.typing import Array
+from ...multibody.series.timefunctions import TimeFunction
+from .layout import TrainLayout
+from .phases import pair_shifts, tooth_places
+
+#: A common period of more cycles of the fastest mesh than this is of no practical use.
+MOST_CYCLES = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """How a train rolls, and the forces of its meshes in steady running.
+
+    Attributes
+    ----------
+    ratios
+        Speed of each shaft for unit speed of the drive, in the order of the shafts.
+    cycles
+        Mesh cycles in one turn of the drive, one a mesh.
+    common_turns
+        Turns of the drive after which all meshes are in phase again, the teeth with pitch errors, too; None beyond
+        `MOST_CYCLES`.
+    note
+        Why there is no common period, or nothing.
+    senses
+        For each mesh, +1 or -1: sense about the axis in which the driver pushes, that of its rotation. Where the drive
+        stands still, it follows from the loads.
+    steady_forces : ndarray, shape (meshes,)
+        Force of each mesh (N) under the final torques of the loads, without inertia; negative presses the back flanks.
+        In a loop of gears those of least squares: statics alone do not determine them.
+    angles
+        Gear -> angle (rad) of the middle of one of its teeth at the start, about the axis from the first direction e1.
+    phases
+        For each mesh, the driver's rotation (rad) past a tooth on the line of centres at the start, in its driving
+        sense.
+    shifts
+        For each mesh how much later the pairs of its driving and of its back flanks touch (m), see
+        `gearfe.drivetrain.train.phases.pair_shifts`.
+    """
+
+    ratios: tuple[Fraction, ...]
+    cycles: tuple[Fraction, ...]
+    common_turns: Fraction | None
+    note: str
+    senses: tuple[float, ...]
+    steady_forces: Array
+    angles: Mapping[str, float]
+    phases: tuple[float, ...]
+    shifts: tuple[tuple[Array, Array], ...]
+
+
+@lru_cache(maxsize=32)
+def kinematics(layout: TrainLayout) -> Kinematics:
+    """Kinematics of a layout; `gearfe.drivetrain.train.GearTrain.kinematics` are those of a train.
+
+    Raises
+    ------
+    InputError
+        For shafts that neither drive nor mesh hold, loops of gears whose ratios contradict each other, and what
+        `gearfe.drivetrain.train.phases.tooth_places` refuses.
+    """
+    ratios = rolling(layout)
+    cycles = tuple(abs(ratios[mesh.driver.shaft]) * mesh.driver.teeth for mesh in layout.meshes)
+    uneven = [gear.shaft for gear in layout.gears if any(gear.pitch_errors)]
+    common, note = _common((*cycles, *(abs(ratios[shaft]) for shaft in uneven)))
+    senses, forces = _senses_and_forces(layout, ratios)
+    forces.setflags(write=False)
+    places = tooth_places(layout, senses)
+    shifts = tuple(pair_shifts(mesh, sense, places) for mesh, sense in zip(layout.meshes, senses, strict=True))
+    return Kinematics(ratios, cycles, common, note, senses, forces, places.angles, places.phases, shifts)
+
+
+def rolling(layout: TrainLayout) -> tuple[Fraction, ...]:
+    """Speed of each shaft for unit speed of the drive.
+
+    Raises
+    ------
+    InputError
+        For shafts that neither drive nor mesh hold, and for loops of gears whose ratios contradict each other.
+    """
+    known = {layout.driven: Fraction(1)}
+    for _ in layout.shafts:
+        for mesh in layout.meshes:
+            driver, driven = mesh.driver.shaft, mesh.driven.shaft
+            ratio = Fraction(-mesh.driver.teeth, mesh.driven.teeth)
+            for first, second, factor in ((driver, driven, ratio), (driven, driver, 1 / ratio)):
+                if first not in known:
+                    continue
+                speed = known[first] * factor
+                if known.setdefault(second, speed) != speed:
+                    problem = f"closes a loop that cannot turn: shaft {layout.shafts[second]!r} would need two speeds"
+                    raise InputError(
+                        f"mesh {mesh.name!r}", None, problem, "take a gear out of the loop, or change its teeth"
+                    )
+    for number, name in enumerate(layout.shafts):
+        if number not in known:
+            problem = "is held by nothing: neither the drive nor a mesh connects it to the train"
+            raise InputError(f"shaft {name!r}", None, problem, "add a mesh between its gears and the train's")
+    return tuple(known[number] for number in range(len(layout.shafts)))
+
+
+def mesh_phases(cycles: Sequence[Fraction], most: int) -> list[tuple[Fraction, list[int]]]:
+    """Meshes in groups that are each in phase again after no more than `most` cycles of their fastest.
+
+    Parameters
+    ----------
+    cycles
+        Mesh cycles in one turn of the drive, one a mesh.
+
+    Returns
+    -------
+    For each group the turns of the drive after which it repeats, and the numbers of its meshes.
+    """
+    groups: list[tuple[Fraction, list[int]]] = []
+    for mesh, own in enumerate(cycles):
+        for number, (_, others) in enumerate(groups):
+            together = [*(cycles[i] for i in others), own]
+            turns = _repeating(together)
+            if turns * max(together) <= most:
+                groups[number] = turns, [*others, mesh]
+                break
+        else:
+            groups.append((1 / own, [mesh]))
+    return groups
+
+
+def _repeating(cycles: Sequence[Fraction]) -> Fraction:
+    """Turns after which what repeats so often in a turn is in phase again."""
+    periods = [1 / c for c in cycles]
+    return Fraction(math.lcm(*(p.numerator for p in periods)), math.gcd(*(p.denominator for p in periods)))
+
+
+def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
+    """Turns after which all meshes are in phase again, or why there are none."""
+    if not cycles:
+        return None, "the train has no meshes"
+    turns = _repeating(cycles)
+    if turns * max(cycles) > MOST_CYCLES:
+        count = int(turns * max(cycles))
+        note = f"the meshes share a period of {count} mesh cycles only, more than {MOST_CYCLES}: none within reason"
+        return None, note
+    return turns, ""
+
+
+def _senses_and_forces(layout: TrainLayout, ratios: Sequence[Fraction]) -> tuple[tuple[float, ...], Array]:
+    """Driving senses, and steady forces (N), see `Kinematics`."""
+    rolled = tuple(math.copysign(1.0, ratios[mesh.driver.shaft]) for mesh in layout.meshes)
+    forces = balanced_forces(layout, rolled, load_torques(layout, [load_end(layout)]))[:, 0]
+    sense = drive_sense(layout.speed)
+    if sense == 0.0:
+        sense = math.copysign(1.0, forces.sum())
+    return tuple(sense * s for s in rolled), sense * forces
+
+
+def load_end(layout: TrainLayout) -> float:
+    """Time at which all load ramps have ended (s)."""
+    return max((b for _, torque in layout.loads for b in torque.breaks), default=0.0)
+
+
+def load_torques(layout: TrainLayout, times: Sequence[float] | Array) -> Array:
+    """Torque of the loads on each shaft without its oscillating part (N m), shape (shafts, times)."""
+    torques = np.zeros((len(layout.shafts), len(times)))
+    for shaft, torque in layout.loads:
+        torques[shaft] += replace(torque, sines=())(times)
+    return torques
+
+
+def balanced_forces(layout: TrainLayout, senses: Sequence[float], torques: Array) -> Array:
+    """Mesh forces (N), shape (meshes, n), that balance the torques (N m) on the shafts, shape (shafts, n)."""
+    arms = np.zeros((len(layout.shafts), len(layout.meshes)))
+    for column, (mesh, sense) in enumerate(zip(layout.meshes, senses, strict=True)):
+        for gear in (mesh.driver, mesh.driven):
+            arms[gear.shaft, column] += sense * gear.base_radius
+    free = [shaft for shaft in range(len(layout.shafts)) if shaft != layout.driven]
+    return np.asarray(np.linalg.lstsq(arms[free], torques[free], rcond=None)[0])
+
+
+def drive_sense(speed: TimeFunction) -> float:
+    """Sense in which the drive turns: that of its first speed that is not zero; 0 where it stands still."""
+    speeds = [float(speed(t)) for t in _sample_times(speed)]
+    return next((math.copysign(1.0, s) for s in speeds if s != 0.0), 0.0)
+
+
+def fastest(speed: TimeFunction) -> float:
+    """Largest speed of the drive (rad/s), without sign and oscillating parts."""
+    steady = replace(speed, sines=())
+    return max(abs(float(steady(t))) for t in _sample_times(speed))
+
+
+def _sample_times(speed: TimeFunction) -> list[float]:
+    """Breaks of a function of time, and times between them."""
+    ends = (0.0, *speed.breaks)
+    return sorted([*ends, *(0.5 * (a + b) for a, b in zip(ends, speed.breaks, strict=False))])

@@ -1,0 +1,93 @@
+"""Layout of a gear train: what its kinematics follow from, as values.
+
+Trains that differ in stiffness, damping, friction or housing only have equal layouts, and so the same kinematics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...multibody.series.timefunctions import TimeFunction
+
+#: Pitch errors of the left and of the right flanks of a gear (m), one a tooth, or none.
+PitchErrors = tuple[tuple[float, ...], tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class LayoutGear:
+    """A gear as kinematics see it.
+
+    Attributes
+    ----------
+    name
+        Of the gear.
+    shaft
+        Number of its shaft.
+    teeth
+        Their number.
+    base_radius
+        Radius of the base circle (m).
+    pitch_errors
+        See `gearfe.drivetrain.train.ShaftGear`.
+    """
+
+    name: str
+    shaft: int
+    teeth: int
+    base_radius: float
+    pitch_errors: PitchErrors = ((), ())
+
+
+@dataclass(frozen=True)
+class LayoutMesh:
+    """A gear mesh as kinematics see it.
+
+    Attributes
+    ----------
+    name
+        Of the mesh.
+    driver, driven
+        The gears.
+    towards
+        Angle (rad) of the line of centres from driver to driven gear, from the train's first direction e1.
+    distance
+        Of the axes (m).
+    contact_twist
+        Half the backlash as a twist of the driven gear (rad).
+    phase
+        Given angle of the driver at the start (rad), or None.
+    """
+
+    name: str
+    driver: LayoutGear
+    driven: LayoutGear
+    towards: float
+    distance: float
+    contact_twist: float
+    phase: float | None
+
+
+@dataclass(frozen=True)
+class TrainLayout:
+    """Shafts, gears and meshes of a train with its drive and its loads.
+
+    Attributes
+    ----------
+    shafts
+        Their names.
+    driven
+        Number of the shaft that the drive turns.
+    speed
+        Of the drive (rad/s) over time.
+    gears, meshes
+        Of the train, in its order.
+    loads
+        Pairs (number of a shaft, torque over time in N m).
+    """
+
+    shafts: tuple[str, ...]
+    driven: int
+    speed: TimeFunction
+    gears: tuple[LayoutGear, ...]
+    meshes: tuple[LayoutMesh, ...]
+    loads: tuple[tuple[int, TimeFunction], ...]

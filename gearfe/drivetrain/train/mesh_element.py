@@ -1,0 +1,335 @@
+r"""The gear mesh: a spring and a damper between two shafts along the line of action, or the ideal rigid mesh.
+
+With t the direction of the driver's velocity at the pitch point P, c the unit vector from driver to driven centre and
+the working pressure angle :math:`\alpha_w`, the driven gear feels the force
+
+.. math::
+    F\,n,\quad n = \cos\alpha_w\,t + \sin\alpha_w\,c,\qquad F = k(\varphi)\,\delta + d\,\dot\delta,\qquad
+    \delta = n\cdot\big(u_1(P) - u_2(P)\big) ,
+
+the driver its opposite, u the displacements at P beside rolling: from rotations, housing motion and tilt. F > 0
+presses. The phase :math:`\varphi` follows the driver's actual rotation in its driving sense; the derivative of k makes
+no force. P lies in the middle of the face that both gears share. A rigid mesh is the constraint :math:`\delta = 0`, F
+its multiplier.
+
+A mesh law (`gears.meshlaw`) takes the place of :math:`k\,\delta`. Its phase is the driver's rotation relative to the
+line of centres, whose turn is :math:`t\cdot(u_2 - u_1)/a` with the displacements of the gears' centres, and its moment
+M acts on that: on the driver, and across the line of centres. The back flanks, where a backlash j is known, have the
+line of action :math:`n_b = -\cos\alpha_w\,t + \sin\alpha_w\,c` and bear behind j. Friction acts across the line of
+action, see `gearfe.drivetrain.train.friction`.
+
+The damper of a mesh acts always, :math:`d\,\dot\delta` along the driving line of action (Kahraman & Singh, J. Sound
+Vib. 142, 1990), or in contact only. With a curve that is :math:`d\,\dot\delta\,H(\delta)`, on each flank along its own
+line of action; with a mesh law it grows with the force, :math:`d\,\dot\delta\,F/F_0`, and never pulls (Hunt & Crossley,
+J. Appl. Mech. 42, 1975); :math:`F_0` is the force in steady running.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...base.typing import Array, IntArray
+from ...gears.geometry.pair import GearPair, gear_pair
+from ...gears.meshlaw.law import MeshLaw
+from ...gears.stiffness.periodic import PeriodicInterpolant
+from ...multibody import Element, LinearJoint
+from .elements import LinearForce, RigidShaft
+from .forces import CurveFlank, Flank, LawFlank
+from .friction import CREEP, NEAR, Lubrication, Sliding
+from .gear_train import GearMesh, GearTrain
+from .kinematics import fastest
+
+#: Least force F0 of a mesh's damping, in parts of the largest that its law is known for.
+LEAST_REFERENCE = 0.01
+#: Phases at which the mean stiffness of a law is taken.
+PHASES = 72
+
+
+@dataclass(frozen=True, eq=False)
+class MeshLine:
+    """A gear mesh in its train: where it acts, and the flanks that act there.
+
+    The compiled series (`gearfe.drivetrain.train.series`) has the numbers of the flanks as the columns of its tables.
+
+    Attributes
+    ----------
+    given
+        The mesh as described.
+    pair
+        Its gears, the driver as pinion.
+    driver
+        Number of the driver's shaft.
+    direction, point : ndarray, shape (3,)
+        n and P (m).
+    row : ndarray, shape (system size,)
+        Approach of the driving flanks for unit coordinates of the system.
+    columns : tuple of ndarray, shape (system size,)
+        Directions that its flanks count: approaches, then of a law the driver's turn, then those of friction.
+    flanks
+        Driving flanks, and the back flanks behind a backlash; none of a rigid mesh.
+    rayleigh
+        Rayleigh part of its damping (N s/m). For a damper that acts in contact only it is in the constant part,
+        which then is damped alike in all modes, and the forces of the flanks take it off again.
+    reference
+        F0 (N) of a law.
+    """
+
+    given: GearMesh
+    pair: GearPair
+    driver: int
+    direction: Array
+    point: Array
+    row: Array
+    columns: tuple[Array, ...]
+    flanks: tuple[Flank, ...]
+    rayleigh: float
+    reference: float
+
+    @property
+    def name(self) -> str:
+        """``driver-driven``."""
+        return self.given.name
+
+    @property
+    def module(self) -> float:
+        """Of the gears (m)."""
+        return self.pair.pinion.module
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the mesh is a constraint."""
+        return not self.flanks
+
+    @property
+    def curve(self) -> PeriodicInterpolant | None:
+        """Stiffness over the driver's rotation; None for a rigid mesh, and for one with a law."""
+        return next((flank.curve for flank in self.flanks if isinstance(flank, CurveFlank)), None)
+
+    @property
+    def law(self) -> MeshLaw | None:
+        """Mesh law of the driving flanks, or None."""
+        return next((flank.law for flank in self.flanks if isinstance(flank, LawFlank)), None)
+
+    @property
+    def backlash(self) -> float | None:
+        """Normal backlash j (m); None: without back flanks, a curve then acts both ways."""
+        return self.flanks[1].gap if len(self.flanks) > 1 else None
+
+    @property
+    def mean(self) -> float:
+        """Mean of k (N/m), infinite for a rigid mesh."""
+        return self.flanks[0].mean if self.flanks else math.inf
+
+    @property
+    def damping(self) -> float:
+        """d (N s/m), the Rayleigh part included."""
+        return self.given.damping + self.rayleigh
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether the damper acts in contact only, the Rayleigh part included."""
+        return self.given.damps_in_contact
+
+    @property
+    def ratio(self) -> float:
+        """Ratio of the driver's shaft to the drive, of a mesh that is not rigid."""
+        return self.flanks[0].ratio
+
+    @property
+    def sense(self) -> float:
+        """Driving sense (+1 or -1) of the driver, of a mesh that is not rigid."""
+        return self.flanks[0].sense
+
+    @property
+    def phase(self) -> float:
+        """Phase at the start (rad) of a mesh that is not rigid."""
+        return self.flanks[0].phase
+
+    @property
+    def sliding(self) -> Sliding | None:
+        """Friction of the driving flanks; None without."""
+        return self.flanks[0].sliding if self.flanks else None
+
+    @property
+    def pulls(self) -> bool:
+        """Whether its spring acts both ways."""
+        return self.curve is not None and self.backlash is None
+
+    @property
+    def description(self) -> str:
+        """Which flanks bear, in words."""
+        if self.rigid:
+            return "rigid"
+        if self.pulls:
+            return "a spring that acts both ways"
+        if self.backlash is None:
+            return "driving flanks only: the gears have no backlash, and backlash_um is not given"
+        return f"both flanks, {1e6 * self.backlash:.6g} um of normal backlash"
+
+    def stiffness(self, angle: Array, rest: Array | float = 0.0) -> Array:
+        """k (N/m) at rotations `angle` (rad) of the drive, the driver's rotation beside rolling being `rest` (rad)."""
+        assert self.curve is not None
+        return np.asarray(self.curve(self.sense * (self.ratio * angle + rest) + self.phase).value)
+
+    def element(self, bodies: Sequence[Element]) -> Element:
+        """The constant part for the core: mean spring and damper, or the constraint."""
+        if self.rigid:
+            return LinearJoint(tuple(bodies), self.row[None, :], np.zeros(1), name=f"mesh {self.name}")
+        square = np.outer(self.row, self.row)
+        damping = self.rayleigh if self.in_contact else self.damping
+        return LinearForce(tuple(bodies), damping * square, self.mean * square, f"mesh {self.name}")
+
+
+@dataclass(frozen=True)
+class Shafts:
+    """Shafts of a train, and where their coordinates stand in those of the system.
+
+    Attributes
+    ----------
+    bodies
+        The shafts.
+    first : ndarray, shape (shafts,)
+        Number of the first coordinate of each.
+    ratios
+        Their speeds over that of the drive.
+    size
+        Number of the system's coordinates.
+    """
+
+    bodies: tuple[RigidShaft, ...]
+    first: IntArray
+    ratios: tuple[float, ...]
+    size: int
+
+
+class _Directions(NamedTuple):
+    """Directions of a mesh in the coordinates of the system (system size,), and its line of action."""
+
+    direction: Array  # n (3,)
+    point: Array  # P (m), (3,)
+    row: Array  # approach of the driving flanks
+    back: Array  # approach of the back flanks
+    turn: Array  # the driver's rotation relative to the line of centres
+    across: tuple[Array, Array]  # displacement of driver against driven gear at P along a x n and a x n_b
+    spin: Array  # the driver's turn against the driven gear's
+
+
+def mesh_lines(train: GearTrain, shafts: Shafts) -> tuple[MeshLine, ...]:
+    """Records of all meshes of a train, whose directions follow three of each shaft.
+
+    Raises
+    ------
+    InputError
+        If friction follows from the lubrication and the gears stand still.
+    """
+    lines: list[MeshLine] = []
+    first = 3 * len(shafts.bodies)
+    for number in range(len(train.meshes)):
+        lines.append(_mesh_line(train, number, shafts, first))
+        first += len(lines[-1].columns)
+    return tuple(lines)
+
+
+def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> MeshLine:
+    """The record of one mesh, `first` the number of its first direction."""
+    mesh, rolled = train.meshes[number], train.kinematics
+    force, sense, shifts = float(rolled.steady_forces[number]), rolled.senses[number], rolled.shifts[number]
+    driver, driven = train.gear(mesh.driver), train.gear(mesh.driven)
+    i, j = train.shaft_number(driver.shaft), train.shaft_number(driven.shaft)
+    ratio, pair = shafts.ratios[i], gear_pair(driver.gear, driven.gear, mesh.centre_distance)
+    along = _directions(train, mesh, pair, sense, shafts)
+    law, backlash, mean, reference = _stiffness(mesh, force)
+    rayleigh = 0.0 if mesh.stiffness is None else train.damping.beta * mean
+    in_contact = (mesh.damping + rayleigh, rayleigh) if mesh.damps_in_contact else (0.0, 0.0)
+    sliding = _sliding(mesh, pair, force, (ratio, shafts.ratios[j]), fastest(train.driven.speed))
+    ends = [(1.0, mean, 0.0, in_contact[1])] + ([] if backlash is None else [(-1.0, 0.0, backlash, 0.0)])
+    columns, flanks = [along.row, along.back][: len(ends)], list[Flank]()
+    turn = 3 * i + 2
+    if law is not None:
+        turn = first + len(columns)
+        columns.append(along.turn)
+        if sliding is not None:
+            columns += [along.across[0], along.spin, along.across[1]][: 1 + len(ends)]
+    for side, (sign, stiffness, gap, mean_damping) in enumerate(ends):
+        place = (first + side, turn, ratio, sign * sense, sign * rolled.phases[number], stiffness, gap)
+        if law is not None:
+            rubs = None if sliding is None else replace(sliding, across=turn + 1 + 2 * side, spin=turn + 2)
+            chi = in_contact[0] / reference
+            flanks.append(LawFlank(*place, law.sides[side], chi, rubs, shifts[side], mean_damping))
+        elif mesh.stiffness is not None:
+            flanks.append(CurveFlank(*place, mesh.interpolant(), backlash is not None, in_contact[0], mean_damping))
+    return MeshLine(
+        mesh, pair, i, along.direction, along.point, along.row, tuple(columns) if flanks else (), tuple(flanks),
+        rayleigh, reference,
+    )  # fmt: skip
+
+
+def _stiffness(mesh: GearMesh, force: float) -> tuple[MeshLaw | None, float | None, float, float]:
+    """Law and backlash (m) of a mesh, or None; its mean stiffness (N/m); F0 (N) under a steady force (N)."""
+    law = mesh.stiffness
+    if law is None:
+        return None, mesh.backlash, math.inf, 1.0
+    if not isinstance(law, MeshLaw):
+        return None, mesh.backlash, mesh.interpolant().mean, 1.0
+    reference = min(max(abs(force), LEAST_REFERENCE * law.largest_force), law.largest_force)
+    backlash = law.backlash if mesh.backlash is None and law.backlash > 0.0 else mesh.backlash
+    return law, backlash, mean_tangent(law, reference), reference
+
+
+def _directions(train: GearTrain, mesh: GearMesh, pair: GearPair, sense: float, shafts: Shafts) -> _Directions:
+    """Directions of a mesh whose driver pushes in a sense (+1 or -1)."""
+    first, size = shafts.first, shafts.size
+    driver, driven = train.gear(mesh.driver), train.gear(mesh.driven)
+    i, j = train.shaft_number(driver.shaft), train.shaft_number(driven.shaft)
+    a, alpha = train.frame[2], pair.working_pressure_angle
+    base = np.array(train.shaft(driver.shaft).point)
+    arm = np.array(train.shaft(driven.shaft).point) - base
+    arm = arm - (arm @ a) * a
+    distance = float(np.linalg.norm(arm))
+    across = arm / distance
+    along = np.cross(a, across)
+    low = max(g.along - 0.5 * g.gear.face_width for g in (driver, driven))
+    high = min(g.along + 0.5 * g.gear.face_width for g in (driver, driven))
+    centre = base + (0.5 * (low + high) - float(base @ a)) * a
+    point = centre + pair.pinion_working_radius * across
+
+    def relative(line: Array, on_driver: Array, on_driven: Array) -> Array:
+        row = np.zeros(size)
+        row[first[i] : first[i] + 6] += line @ shafts.bodies[i].point_rows(on_driver, train.frame)
+        row[first[j] : first[j] + 6] -= line @ shafts.bodies[j].point_rows(on_driven, train.frame)
+        return row
+
+    line = math.cos(alpha) * sense * along + math.sin(alpha) * across
+    back = -math.cos(alpha) * sense * along + math.sin(alpha) * across
+    turn = relative(along / distance, centre, centre + arm)
+    turn[first[i] + 5] += 1.0
+    spin = np.zeros(size)
+    spin[first[i] + 5], spin[first[j] + 5] = 1.0, -1.0
+    slides = relative(np.cross(a, line), point, point), relative(np.cross(a, back), point, point)
+    rows = relative(line, point, point), relative(back, point, point)
+    return _Directions(line, point, *rows, turn, slides, spin)
+
+
+def _sliding(mesh: GearMesh, pair: GearPair, force: float, ratios: tuple[float, float], speed: float) -> Sliding | None:
+    """Friction of a mesh under a force (N), the drive turning with a speed (rad/s)."""
+    given = mesh.friction
+    if isinstance(given, Lubrication):
+        given = given.coefficient(pair, force, ratios[0] * speed)
+    if not given > 0.0:
+        return None
+    relative = ratios[0] - ratios[1]
+    slow = NEAR * pair.base_pitch * abs(relative * speed) or CREEP
+    arm = pair.pinion.base_radius * math.tan(pair.working_pressure_angle)
+    pitch = pair.pinion_angle_at(arm)
+    return Sliding(given, slow, 0, 0, relative, pair.pinion.base_radius, pitch, arm)
+
+
+def mean_tangent(law: MeshLaw, force: float) -> float:
+    """Mean over a mesh cycle of the law's dF/d approach (N/m) under a constant force (N)."""
+    angles = law.nodes[0] + law.cycle * (np.arange(PHASES) + 0.5) / PHASES
+    return float(law(angles, law.approach(angles, force)).tangent.mean())

@@ -1,0 +1,359 @@
+r"""From a `GearTrain` to a system of the rigid core, with all hinges eliminated at set-up.
+
+The rotation of shaft i is :math:`\varphi_i = g_i\psi(t) + u_i`: rolling with the drive, :math:`\psi = \int\Omega\,dt`,
+and a small coordinate. So every constraint is linear and constant, the drive's too: :math:`u_d - a\cdot\theta_b = 0`
+makes the rotation relative to the bore b equal to psi, and its multiplier is the torque that reacts on that bore. A
+drive of changing speed adds :math:`-J_p g_i\ddot\psi` on every shaft.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.shown import Facts
+from ...base.typing import Array, IntArray
+from ...fem.reduction.modal_body import ModalBody
+from ...multibody import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
+from ...multibody.core.elimination import ModalCoordinates, modal_coordinates
+from .bearings import BearingLoads, bearing_loads, bore_motion
+from .checks import check_train
+from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge, rotor
+from .forces import Gyro, TrainForces, derivative
+from .gear_train import Drive, GearTrain
+from .kinematics import Kinematics, load_end
+from .mesh_element import MeshLine, Shafts, mesh_lines
+from .program import train_series
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TrainModel(Facts):
+    """A train ready to be simulated.
+
+    Attributes
+    ----------
+    train
+        What it was made from.
+    system, modal, start
+        System of the rigid core, its minimal coordinates, its start.
+    angle
+        psi(t), rotation of the drive (rad).
+    shafts, housing
+        Bodies.
+    meshes
+        The record of each mesh.
+    torques
+        Pairs (direction in the system, torque over time): loads, and the shafts' inertia under a changing drive.
+    forces, directions
+        All that is not constant, and its directions, (system size, directions).
+    first : (shafts,)
+        Number of each shaft's first coordinate in the system.
+    spin_reference : (shafts, system size)
+        Rotation of each shaft relative to the bore it is measured against, beside rolling.
+    axial : (bores, system size)
+        Displacement along the axis of each bore's reference point.
+    bores
+        Names of the bores that carry shafts, in the housing's order.
+    """
+
+    train: GearTrain
+    system: System
+    modal: ModalCoordinates
+    start: Start
+    angle: TimeFunction
+    shafts: tuple[RigidShaft, ...]
+    housing: ModalBlocks | None
+    meshes: tuple[MeshLine, ...]
+    torques: tuple[tuple[Array, TimeFunction], ...]
+    forces: TrainForces
+    directions: Array
+    first: IntArray
+    spin_reference: Array
+    axial: Array
+    bores: tuple[str, ...]
+
+    def facts(self) -> dict[str, str]:
+        """Shafts, meshes, housing, unknowns."""
+        frequencies = self.coupled_frequencies_hz
+        return {
+            "shafts": ", ".join(shaft.name for shaft in self.train.shafts),
+            "meshes": ", ".join(line.name for line in self.meshes) or "none",
+            "housing": "elastic" if self.housing is not None else "rigid",
+            "unknowns": str(len(frequencies)),
+            "lowest frequencies": ", ".join(f"{f:.4g}" for f in frequencies[:6]) + " Hz",
+        }
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """Those of the train."""
+        return self.train.kinematics
+
+    @property
+    def ratios(self) -> Array:
+        """Speed of each shaft for unit speed of the drive."""
+        return np.array([float(r) for r in self.kinematics.ratios])
+
+    @property
+    def steady_speed(self) -> float:
+        """Speed of the drive once its function of time has ended (rad/s)."""
+        breaks = self.train.driven.speed.breaks
+        return float(self.train.driven.speed(max(breaks, default=0.0)))
+
+    @property
+    def torque_end(self) -> float:
+        """Time at which all torques have reached what they stay at (s)."""
+        return max((b for _, torque in self.torques for b in torque.breaks), default=0.0)
+
+    @property
+    def load_end(self) -> float:
+        """Time at which all load ramps have ended (s)."""
+        return load_end(self.train.layout)
+
+    @property
+    def coupled_frequencies_hz(self) -> Array:
+        """Natural frequencies with mean mesh stiffness (Hz)."""
+        return np.sqrt(np.maximum(self.modal.eigenvalues, 0.0)) / (2.0 * math.pi)
+
+    @cached_property
+    def bearings(self) -> BearingLoads:
+        """Loads on the bores that carry shafts."""
+        shafts = Shafts(self.shafts, self.first, tuple(self.ratios), self.system.size)
+        shared = len(self.start.freedoms.redundant) > 0
+        return bearing_loads(self.train, self.system, shafts, self.bores, shared=shared)
+
+    @cached_property
+    def bore_motion(self) -> Array:
+        """Displacement and rotation of each bore along x, y, z for unit coordinates, (6 bores, system size)."""
+        return bore_motion(self.train.housing, self.bores, self.system.size)
+
+    @cached_property
+    def multipliers_of_forces(self) -> Array:
+        """Force left over on the coordinates to the least multipliers that hold it, (system size, rows)."""
+        return np.asarray(np.linalg.pinv(self.system.jacobian(0.0, np.zeros(self.system.size))))
+
+
+def build_train(train: GearTrain) -> TrainModel:
+    """Check a gear train and set up its system.
+
+    Raises
+    ------
+    InputError
+        For the first thing in the train that does not fit, with the cure.
+    """
+    check_train(train)
+    return _assembled(train)
+
+
+def on_body(model: TrainModel, body: ModalBody) -> TrainModel:
+    """The same train on another body with as many coordinates, such as a softened one: its meshes stay as they are."""
+    return _assembled(replace(model.train, housing=body), model.meshes)
+
+
+def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel:
+    """The model of a train that is checked; `lines` are its meshes where they are known."""
+    angle = train.driven.speed.integral(0.0, 0.0)
+    housing = _housing(train)
+    ratios = [float(r) for r in train.kinematics.ratios]
+    begin = float(train.driven.speed(0.0))
+    shafts = tuple(
+        RigidShaft(
+            rotor(train, shaft),
+            0.0 if shaft.initial_speed is None else shaft.initial_speed - g * begin,
+            name=f"shaft {shaft.name}",
+        )
+        for shaft, g in zip(train.shafts, ratios, strict=True)
+    )
+    bodies: list[Element] = [*shafts] if housing is None else [housing, *shafts]
+    first = np.array([0 if housing is None else housing.size] + [6] * (len(shafts) - 1)).cumsum()
+    size = sum(b.size for b in bodies)
+    placed = Shafts(shafts, first, tuple(ratios), size)
+    lines = lines or mesh_lines(train, placed)
+    torques = _torques(train, placed, angle)
+    forces, directions = _forces(train, lines, torques, angle, placed)
+    series = train_series(forces)
+    changing = LocalForce(
+        tuple(bodies), directions, forces.at_one_time, series, forces.breaks, forces.pieces if forces.jumps else None,
+        name="forces of the train",
+    )  # fmt: skip
+    elements = [*bodies, *_supports(train, shafts, housing), *(line.element(bodies) for line in lines), changing]
+    system, modal = _damped(train, elements, bodies)
+    return TrainModel(
+        train=train,
+        system=system,
+        modal=modal,
+        start=_start(train, system, shafts, first),
+        angle=angle,
+        shafts=shafts,
+        housing=housing,
+        meshes=lines,
+        torques=torques,
+        forces=forces,
+        directions=directions,
+        first=first,
+        spin_reference=_spin_reference(train, size, first),
+        axial=_axial(train, size),
+        bores=_used_bores(train),
+    )
+
+
+def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tuple[Array, TimeFunction], ...]:
+    """Directions in the system with torques over time: loads, and the shafts' inertia when the drive changes speed."""
+    made, first, size = [], shafts.first, shafts.size
+    change = derivative(derivative(angle))
+    for i, (shaft, ratio) in enumerate(zip(shafts.bodies, shafts.ratios, strict=True)):
+        if change.sines or any(any(row) for row in change.coefficients):
+            direction = np.zeros(size)
+            direction[first[i] + 5] = 1.0
+            made.append((direction, -ratio * shaft.rotor.polar * change))
+    for load in train.loads:
+        direction = np.zeros(size)
+        direction[first[train.shaft_number(load.shaft)] + 5] = 1.0
+        if train.housing is not None and load.bore is not None:
+            direction[: train.housing.size] -= bore_selector(train, load.bore)[:, 3:] @ train.frame[2]
+        made.append((direction, load.torque))
+    return tuple(made)
+
+
+def _forces(
+    train: GearTrain, lines: tuple[MeshLine, ...], torques: tuple[tuple[Array, TimeFunction], ...],
+    angle: TimeFunction, shafts: Shafts,
+) -> tuple[TrainForces, Array]:  # fmt: skip
+    """All that is not constant: three directions a shaft (tilts, spin), up to six a mesh, one a torque."""
+    unit = np.eye(shafts.size)
+    columns = [column for i in shafts.first for column in unit[i + 3 : i + 6]]
+    gyros: tuple[Gyro, ...] = ()
+    if train.damping.gyroscopic:
+        gyros = tuple(
+            Gyro(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(shafts.ratios, shafts.bodies, strict=True))
+        )
+    columns += [column for line in lines for column in line.columns]
+    flanks = tuple(flank for line in lines for flank in line.flanks)
+    at = len(columns)
+    columns += [direction for direction, _ in torques]
+    numbered = tuple((at + i, function) for i, (_, function) in enumerate(torques))
+    made = TrainForces(len(columns), angle, gyros, flanks, numbered)
+    return made, np.array(columns).T
+
+
+def bore_selector(train: GearTrain, bore: str) -> Array:
+    """Columns that pick a bore's six coordinates from the housing's, shape (N, 6)."""
+    assert train.housing is not None
+    return np.eye(train.housing.size)[:, train.housing.attachment(bore)]
+
+
+def _housing(train: GearTrain) -> ModalBlocks | None:
+    body = train.housing
+    if body is None:
+        return None
+    damping = body.damping + train.damping.alpha * body.mass + train.damping.beta * body.stiffness
+    return ModalBlocks(body.mass, damping, body.stiffness, name="housing")
+
+
+def _supports(train: GearTrain, shafts: tuple[RigidShaft, ...], housing: ModalBlocks | None) -> list[Element]:
+    """Hinges or bearings of all bores, and the drive."""
+    made: list[Element] = []
+    bearings = {b.bore: b for b in train.bearings}
+    for shaft, body in zip(train.shafts, shafts, strict=True):
+        for bore in shaft.bores:
+            chosen = None if housing is None else bore_selector(train, bore)
+            rows = bore_rows(body, train.bore_points[bore], train.frame, chosen)
+            if bore in bearings:
+                stiffness, damping = (
+                    np.array(x, dtype=float) for x in (bearings[bore].stiffness, bearings[bore].damping)
+                )
+                damping = damping + train.damping.beta * stiffness
+                made.append(bearing(body, housing, rows, stiffness, damping, f"bearing {bore}"))
+            else:
+                made.append(hinge(body, housing, rows, f"hinge {bore}"))
+        if train.damping.alpha > 0.0:
+            made.append(
+                LinearForce((body,), train.damping.alpha * body.mass(), np.zeros((6, 6)), f"damping of {body.name}")
+            )
+        if shaft.name == train.driven.shaft:
+            row = np.eye(6)[5:]
+            touches: tuple[Element, ...] = (body,)
+            if housing is not None:
+                row = np.hstack([row, -(bore_selector(train, train.driven.bore)[:, 3:] @ train.frame[2])[None, :]])
+                touches = (body, housing)
+            made.append(_drive(train.driven, touches, row))
+    return made
+
+
+def _drive(drive: Drive, touches: tuple[Element, ...], row: Array) -> Element:
+    """Rigid drive: a constraint on the relative rotation beside rolling; with a coupling: spring and damper on it."""
+    if drive.stiffness is None:
+        return LinearJoint(touches, row, np.zeros(1), name="drive")
+    square = row.T @ row
+    return LinearForce(touches, drive.damping * square, drive.stiffness * square, "drive")
+
+
+def _damped(train: GearTrain, elements: list[Element], bodies: list[Element]) -> tuple[System, ModalCoordinates]:
+    """System and minimal coordinates; modal damping is written in the modes of the coupled system itself."""
+    system = System(elements)
+    modal = modal_coordinates(system)
+    ratios = np.atleast_1d(np.asarray(train.damping.ratio, dtype=float))
+    if not ratios.any():
+        return system, modal
+    count = len(modal.eigenvalues)
+    per_mode = np.append(ratios, np.full(max(0, count - len(ratios)), ratios[-1]))[:count]
+    factors = 2.0 * per_mode * np.sqrt(np.maximum(modal.eigenvalues, 0.0))
+    back = modal.T.T @ system.mass
+    whole = LinearForce(tuple(bodies), back.T @ (factors[:, None] * back), np.zeros_like(system.mass), "modal damping")
+    damped = System([*elements, whole])
+    # the modes are those without damping, and its matrix stays exactly diagonal
+    in_modes = replace(modal, system=damped, damping=modal.damping + np.diag(factors))
+    return damped, damped.once("modal coordinates", lambda: in_modes)
+
+
+def _start(train: GearTrain, system: System, shafts: tuple[RigidShaft, ...], first: IntArray) -> Start:
+    """At rest beside rolling but for the given initial speeds, which the constraints must allow."""
+    start = consistent_start(system, 0.0)
+    open_rows = {system.row_names()[i] for i in start.freedoms.redundant}
+    for mesh in train.meshes:
+        if f"mesh {mesh.name} (0)" in open_rows:
+            problem = (
+                "leaves the forces open: rigid meshes close a loop in a rigid housing, and statics do not share it"
+            )
+            raise InputError(f"mesh {mesh.name!r} rigid", True, problem, "give the meshes of the loop a stiffness")
+    for shaft, body, i in zip(train.shafts, shafts, first, strict=True):
+        off = float(start.v[i + 5]) - body.start_rate
+        if shaft.initial_speed is not None and abs(off) > 1e-6 * max(1.0, abs(shaft.initial_speed)):
+            problem = f"contradicts the drive and the rigid parts, which make it {shaft.initial_speed + off:.9g} rad/s"
+            cure = "leave it out, or give the drive or the mesh an elastic coupling"
+            raise InputError(f"shaft {shaft.name!r} initial speed", shaft.initial_speed, problem, cure)
+    return start
+
+
+def _used_bores(train: GearTrain) -> tuple[str, ...]:
+    used = {b for s in train.shafts for b in s.bores}
+    return tuple(name for name in train.bore_points if name in used)
+
+
+def _measured_against(train: GearTrain, name: str) -> str:
+    """Bore against which a shaft's rotation is measured: the drive's, the load's, or its first."""
+    ends = [(train.driven.shaft, train.driven.bore), *((x.shaft, x.bore) for x in train.loads)]
+    return next((bore for shaft, bore in ends if shaft == name and bore is not None), train.shaft(name).bores[0])
+
+
+def _spin_reference(train: GearTrain, size: int, first: IntArray) -> Array:
+    rows = np.zeros((len(train.shafts), size))
+    for i, shaft in enumerate(train.shafts):
+        rows[i, first[i] + 5] = 1.0
+        if train.housing is not None:
+            bore = bore_selector(train, _measured_against(train, shaft.name))
+            rows[i, : len(bore)] -= bore[:, 3:] @ train.frame[2]
+    return rows
+
+
+def _axial(train: GearTrain, size: int) -> Array:
+    bores = _used_bores(train)
+    rows = np.zeros((len(bores), size))
+    if train.housing is not None:
+        for i, bore in enumerate(bores):
+            selector = bore_selector(train, bore)
+            rows[i, : len(selector)] = selector[:, :3] @ train.frame[2]
+    return rows

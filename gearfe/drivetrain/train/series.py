@@ -1,0 +1,393 @@
+r"""The forces of a train by the orders of their Taylor series: those of `drivetrain.train.forces`, as recurrences.
+
+Over x, time :math:`t + s x`, all forces follow order by order from Cauchy's rule for products. Rows of a memory hold
+series: first the functions of time, then those of the gyroscopic moments and of the flanks. The forces of tooth pairs
+(mesh laws) are solved for from :math:`t + \Lambda(z, f) + \sum C F = \delta`, in which their highest order is linear.
+Whole numbers tell on which cells of their laws the flanks are; a step ends where one leaves its cell
+(`train.discontinuities`). The functions see each other and the constants by name, in plain Python and compiled.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ...base.typing import Array, IntArray
+from ...gears.meshlaw.law import Laws
+from ...gears.stiffness.periodic import Curves
+from ...multibody.series.recurrences import time_series
+from ...multibody.series.timefunctions import Times
+from .friction import product, smoothed_sign
+
+#: Rows of a flank: phase from the cell's node with its square and cube, approach, numbers of the cell (four
+#: coefficients, then the phase of its node); of one with a curve then its stiffness; of one with a mesh law 1 + chi
+#: delta', J, forces at the end of the step before, sliding for unit e.
+Z, Z2, Z3, DELTA, CELL, STIFFNESS, PER_CURVE = range(7)
+DAMPED, JACOBIAN, BEFORE, SPIN, SLOTS = range(STIFFNESS, STIFFNESS + 5)
+#: Rows of a slot: f = F - F_0, F, gap of a pair that does not bear, Lambda's inner polynomials (Horner), coefficients
+#: of t (then F_0), and of the energy; t', inner polynomials of the energy's slope, normal force; of friction e with its
+#: coefficients, v/v0, its smoothed sign with what makes it, force.
+F, FULL, GAP, H1, H2, H3, TOUCHES, ENERGIES, RISE, E1, E2, E3, E4 = range(13)
+NORMAL, ARM, LEVER, SPEED, SIGN, SQUARE, INNER, DRAG, PER_SLOT = range(E4 + 1, E4 + 10)
+#: Rows of a couple of slots: C, its coefficients, C', product of both forces.
+COUPLE, NUMBERS, COUPLE_SLOPE, BOTH, PER_COUPLE = range(5)
+#: Rows of a gyroscopic moment: angular momentum, rates of both tilts.
+MOMENTUM, TILT, OTHER, PER_GYRO = range(4)
+#: Column of the phase of a cell's node, and of F_0 beside the coefficients of t.
+ORIGIN = 4
+#: What a step may not pass: the cell of a phase, touch of a flank with a curve, pull of a damper, the cell of a pair,
+#: the range of its sliding speed.
+PHASE, TOUCH, PULL, PAIR, SLIDE = range(5)
+#: Whole numbers of a flank: mesh cycle, cell, whether it bears (a curve) or damping acts (>= 0: it does); then the
+#: cells of the slots, -1 for pairs that do not bear; then the ranges of
+#: v/v0, see `gearfe.drivetrain.train.friction.smoothed_sign`.
+PER_FLANK = 3
+#: Most Newton steps for order 0 of the pair forces, and their relative change in the last one.
+NEWTON, CHANGED = 50, 1e-9
+
+
+class Gyros(NamedTuple):
+    """Gyroscopic moments, see `gearfe.drivetrain.train.forces.Gyro`."""
+
+    direction: IntArray
+    ratio: Array
+    polar: Array
+
+
+class Flanks(NamedTuple):
+    """Flanks, see `gearfe.drivetrain.train.forces`: `damping` is chi (s/m) of a law and c (N s/m) of a curve."""
+
+    direction: IntArray
+    turn: IntArray
+    ratio: Array
+    sense: Array
+    phase: Array
+    mean: Array
+    gap: Array
+    damping: Array
+    mean_damping: Array
+
+
+class Slides(NamedTuple):
+    """Friction of each flank, see `drivetrain.train.friction.Sliding`; the coefficient is 0 where there is none."""
+
+    coefficient: Array
+    speed: Array
+    across: IntArray
+    spin: IntArray
+    ratio: Array
+    radius: Array
+    pitch_phase: Array
+
+
+class Places(NamedTuple):
+    """Which tables and rows belong to each flank."""
+
+    curve: IntArray  # (f,) number of the curve, -1 for one with a mesh law
+    law: IntArray  # (f,) number of the mesh law
+    row: IntArray  # (f,) first row
+    piece: IntArray  # (f,) first whole number
+    shifted: IntArray  # (f + 1,) first of the shifts of each flank
+    shifts: Array  # of the tooth pairs (m), one flank after the other
+
+
+class Program(NamedTuple):
+    """The whole."""
+
+    times: Times  # psi and the torques
+    torques: IntArray  # directions
+    gyros: Gyros
+    flanks: Flanks
+    slides: Slides
+    places: Places
+    watches: IntArray  # (w, 4): what, flank, row, slot
+    curves: Curves
+    laws: Laws
+
+
+def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array) -> None:
+    """Write order j of the train's forces over x, at time t + s x; see the module's docstring.
+
+    Parameters
+    ----------
+    j : int
+        Order; all lower ones have been computed, 0 starts the step.
+    t : float
+        Time at the start of the step (s).
+    s : float
+        Trial step (s), negative backwards in time.
+    u : ndarray, shape (directions, orders)
+        Series of the motion along the directions, known up to order j + 1.
+    p : Program
+        Tables of the train's forces.
+    memory : ndarray, shape (rows, orders)
+        Series of the step; order j is written.
+    pieces : ndarray of int, shape (whole numbers,)
+        Cells that the flanks are on.
+    out : ndarray, shape (directions,)
+        Order j of the forces (N, N m).
+    """
+    if j == 0:
+        _step_begins(t, s, p, memory, pieces)
+    rate = (j + 1) / s
+    for i in range(out.shape[0]):
+        out[i] = 0.0
+    for i in range(p.torques.shape[0]):
+        out[p.torques[i]] += memory[1 + i, j]
+    for i in range(p.gyros.polar.shape[0]):
+        d = p.gyros.direction[i]
+        row = 1 + p.torques.shape[0] + PER_GYRO * i
+        memory[row + MOMENTUM, j] = p.gyros.polar[i] * rate * (p.gyros.ratio[i] * memory[0, j + 1] + u[d + 2, j + 1])
+        memory[row + TILT, j] = rate * u[d, j + 1]
+        memory[row + OTHER, j] = rate * u[d + 1, j + 1]
+        out[d] -= product(j, row + MOMENTUM, row + OTHER, memory)
+        out[d + 1] += product(j, row + MOMENTUM, row + TILT, memory)
+    for k in range(p.places.row.shape[0]):
+        row = p.places.row[k]
+        d = p.flanks.direction[k]
+        memory[row + Z, j] = p.flanks.sense[k] * (p.flanks.ratio[k] * memory[0, j] + u[p.flanks.turn[k], j])
+        memory[row + DELTA, j] = u[d, j]
+        if j == 0:
+            memory[row + Z, 0] += p.flanks.phase[k] - memory[row + CELL, ORIGIN]
+            memory[row + DELTA, 0] -= p.flanks.gap[k]
+        memory[row + Z2, j] = product(j, row + Z, row + Z, memory)
+        memory[row + Z3, j] = product(j, row + Z2, row + Z, memory)
+        out[d] += p.flanks.mean[k] * u[d, j]
+        out[d] += p.flanks.mean_damping[k] * rate * u[d, j + 1]
+        if p.places.curve[k] < 0:
+            _contact(j, k, rate, u, p, memory, pieces, out)
+        else:
+            memory[row + STIFFNESS, j] = _cubic(j, row, row + CELL, 0, memory)
+            if pieces[p.places.piece[k] + 2] >= 0:
+                out[d] -= product(j, row + STIFFNESS, row + DELTA, memory)
+                out[d] -= p.flanks.damping[k] * rate * u[d, j + 1]
+
+
+def _cubic(j: int, z: int, numbers: int, column: int, memory: Array) -> float:
+    """Return order j of a cubic of the phase in row z; its square and cube are in the next rows."""
+    value = memory[numbers, column + 1] * memory[z, j] + memory[numbers, column + 2] * memory[z + 1, j]
+    value += memory[numbers, column + 3] * memory[z + 2, j]
+    return value + memory[numbers, column] if j == 0 else value
+
+
+def _cubic_slope(j: int, z: int, numbers: int, column: int, memory: Array) -> float:
+    """Return order j of the slope of a cubic of the phase in row z."""
+    value = 2.0 * memory[numbers, column + 2] * memory[z, j] + 3.0 * memory[numbers, column + 3] * memory[z + 1, j]
+    return value + memory[numbers, column + 1] if j == 0 else value
+
+
+def _contact(
+    j: int, k: int, rate: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array
+) -> None:  # fmt: skip
+    """Add order j of the forces of flank k with a mesh law, after solving for its pair forces."""
+    slots = p.laws.touch.shape[1]
+    row = p.places.row[k]
+    at = p.places.piece[k] + PER_FLANK
+    d = p.flanks.direction[k]
+    turn = p.flanks.turn[k]
+    memory[row + DAMPED, j] = p.flanks.damping[k] * rate * u[d, j + 1]
+    if j == 0:
+        memory[row + DAMPED, 0] += 1.0
+    settled = False
+    for _ in range(NEWTON):  # for order 0 alone, whose forces then are those that make the gaps vanish
+        _gaps(j, slots, memory, row, pieces, at)
+        if settled:
+            break
+        change = _pair_forces(j, slots, memory, row, pieces, at)
+        if j > 0:
+            break
+        settled = change <= CHANGED
+    moment = 0.0
+    couple = row + SLOTS + PER_SLOT * slots
+    for slot in range(slots):
+        pair = row + SLOTS + PER_SLOT * slot
+        loaded = pieces[at + slot] >= 0
+        if loaded:
+            memory[pair + RISE, j] = _cubic_slope(j, row, pair + TOUCHES, 0, memory)
+            memory[pair + E4, j] = _cubic_slope(j, row, pair + ENERGIES, 16, memory)
+            moment += product(j, pair + FULL, pair + RISE, memory)
+            for power in range(3, -1, -1):  # Horner over f of the energy's slope
+                slope = _cubic_slope(j, row, pair + ENERGIES, 4 * power, memory)
+                slope += product(j, pair + E1 + power, pair + F, memory)
+                if power > 0:
+                    memory[pair + E1 + power - 1, j] = slope
+                else:
+                    moment += slope
+            memory[pair + NORMAL, j] = product(j, pair + FULL, row + DAMPED, memory)
+            if pieces[at - 1] >= 0:
+                out[d] -= memory[pair + NORMAL, j]
+        for up in range(slot + 1, slots):
+            if loaded and pieces[at + up] >= 0:
+                other = row + SLOTS + PER_SLOT * up
+                memory[couple + COUPLE_SLOPE, j] = _cubic_slope(j, row, couple + NUMBERS, 0, memory)
+                memory[couple + BOTH, j] = product(j, pair + FULL, other + FULL, memory)
+                moment += product(j, couple + COUPLE_SLOPE, couple + BOTH, memory)
+            couple += PER_COUPLE
+    out[turn] += p.flanks.sense[k] * moment
+    if p.slides.coefficient[k] > 0.0:
+        _friction(j, k, rate, u, p, memory, pieces, out)
+
+
+def _gaps(j: int, slots: int, memory: Array, row: int, pieces: IntArray, at: int) -> None:
+    """Write order j of the residual of each pair's equation, with the pair forces known so far."""
+    for slot in range(slots):
+        pair = row + SLOTS + PER_SLOT * slot
+        if j == 0:
+            memory[pair + F, 0] = memory[pair + FULL, 0] - memory[pair + TOUCHES, ORIGIN]
+        else:
+            memory[pair + F, j] = 0.0
+            memory[pair + FULL, j] = 0.0
+        gap = memory[row + DELTA, j] - _cubic(j, row, pair + TOUCHES, 0, memory)
+        if pieces[at + slot] >= 0:  # less Lambda, by Horner over f
+            memory[pair + H3, j] = 4.0 * _cubic(j, row, pair + ENERGIES, 16, memory)
+            for power in range(3, 0, -1):
+                value = power * _cubic(j, row, pair + ENERGIES, 4 * power, memory)
+                value += product(j, pair + H1 + power - 1, pair + F, memory)
+                if power > 1:
+                    memory[pair + H1 + power - 2, j] = value
+                else:
+                    gap -= value
+        memory[pair + GAP, j] = gap
+    couple = row + SLOTS + PER_SLOT * slots
+    for low in range(slots):
+        pair = row + SLOTS + PER_SLOT * low
+        for up in range(low + 1, slots):
+            other = row + SLOTS + PER_SLOT * up
+            memory[couple, j] = _cubic(j, row, couple + NUMBERS, 0, memory)
+            if pieces[at + up] >= 0:
+                memory[pair + GAP, j] -= product(j, couple, other + FULL, memory)
+            if pieces[at + low] >= 0:
+                memory[other + GAP, j] -= product(j, couple, pair + FULL, memory)
+            couple += PER_COUPLE
+
+
+def _friction(
+    j: int, k: int, rate: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array
+) -> None:  # fmt: skip
+    """Add order j of the friction of flank k, whose pair forces are known."""
+    slots = p.laws.touch.shape[1]
+    row = p.places.row[k]
+    at = p.places.piece[k] + PER_FLANK
+    across = p.slides.across[k]
+    spin = p.slides.spin[k]
+    scale = rate / p.slides.speed[k]
+    memory[row + SPIN, j] = scale * (p.slides.ratio[k] * memory[0, j + 1] + u[spin, j + 1])
+    for slot in range(slots):
+        pair = row + SLOTS + PER_SLOT * slot
+        memory[pair + SPEED, j] = scale * u[across, j + 1]
+        if pieces[at + slot] < 0:
+            continue
+        memory[pair + ARM, j] = _cubic(j, row, pair + LEVER, 0, memory)
+        memory[pair + SPEED, j] += product(j, pair + ARM, row + SPIN, memory)
+        smoothed_sign(j, pair + SPEED, pair + SIGN, at + slots + slot, memory, pieces)
+        if pieces[at - 1] >= 0:
+            memory[pair + DRAG, j] = p.slides.coefficient[k] * product(j, pair + NORMAL, pair + SIGN, memory)
+            out[across] -= memory[pair + DRAG, j]
+            out[spin] -= product(j, pair + DRAG, pair + ARM, memory)
+
+
+def _step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray) -> None:
+    """Write the functions of time, and the coefficients of the cells that the flanks are on, for a step."""
+    time_series(p.times, t, s > 0.0, memory.shape[1], memory)
+    for k in range(p.times.first.shape[0] - 1):
+        scale = 1.0
+        for i in range(memory.shape[1]):
+            memory[k, i] *= scale
+            scale *= s
+    slots = p.laws.touch.shape[1]
+    for k in range(p.places.row.shape[0]):
+        row = p.places.row[k]
+        at = p.places.piece[k]
+        cell = pieces[at + 1]
+        if p.places.curve[k] >= 0:
+            first = p.curves.first[p.places.curve[k]]
+            last = p.curves.first[p.places.curve[k] + 1] - 1
+            cycle = p.curves.nodes[last] - p.curves.nodes[first]
+            memory[row + CELL, ORIGIN] = p.curves.nodes[first + cell] + pieces[at] * cycle
+            for a in range(4):
+                memory[row + CELL, a] = p.curves.cubics[first + cell, a]
+            continue
+        law = p.places.law[k]
+        cycle = p.laws.nodes[law, p.laws.cells[law]] - p.laws.nodes[law, 0]
+        memory[row + CELL, ORIGIN] = p.laws.nodes[law, cell] + pieces[at] * cycle
+        couple = row + SLOTS + PER_SLOT * slots + NUMBERS
+        for slot in range(slots):
+            pair = row + SLOTS + PER_SLOT * slot
+            part = pieces[at + PER_FLANK + slot]
+            memory[pair + FULL, 0] = memory[row + BEFORE, slot] if part >= 0 else 0.0
+            memory[pair + TOUCHES, ORIGIN] = p.laws.forces[law, part] if part >= 0 else 0.0
+            for a in range(4):
+                memory[pair + TOUCHES, a] = p.laws.touch[law, slot, cell, a]
+            period = p.places.shifted[k + 1] - p.places.shifted[k]
+            number = (slot - pieces[at]) % period  # of the pair
+            memory[pair + TOUCHES, 0] += p.places.shifts[p.places.shifted[k] + number]
+            for power in range(5):
+                for a in range(4):
+                    if part >= 0:
+                        memory[pair + ENERGIES, 4 * power + a] = p.laws.energies[law, slot, cell, part, power, a]
+            for up in range(slot + 1, slots):
+                for a in range(4):
+                    memory[couple, a] = p.laws.coupling[law, slot * slots + up, cell, a]
+                couple += PER_COUPLE
+            begin = p.laws.nodes[law, cell] + slot * cycle - p.slides.pitch_phase[k]
+            memory[pair + LEVER, 0] = p.slides.radius[k] * begin
+            memory[pair + LEVER, 1] = p.slides.radius[k]
+
+
+def _pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, at: int) -> float:
+    """Solve J f = residual for order j of the pair forces.
+
+    For j = 0 this is a step of Newton's method. Returns the largest change, relative to the largest force.
+    """
+    column = max(j, 1)  # column 0 is the state at which J is taken
+    J = row + JACOBIAN
+    couple = row + SLOTS + PER_SLOT * slots
+    for low in range(slots):
+        pair = row + SLOTS + PER_SLOT * low
+        loaded = pieces[at + low] >= 0
+        f = memory[pair + F, 0]
+        slope = memory[pair + H1, 0] + f * (memory[pair + H2, 0] + f * memory[pair + H3, 0])
+        memory[J, low * slots + low] = slope if loaded else 1.0
+        memory[pair + F, column] = memory[pair + GAP, j] if loaded else 0.0
+        for up in range(low + 1, slots):
+            both = loaded and pieces[at + up] >= 0
+            memory[J, low * slots + up] = memory[couple, 0] if both else 0.0
+            memory[J, up * slots + low] = memory[J, low * slots + up]
+            couple += PER_COUPLE
+    for a in range(slots):
+        for b in range(a + 1, slots):
+            factor = memory[J, b * slots + a] / memory[J, a * slots + a]
+            for c in range(a, slots):
+                memory[J, b * slots + c] -= factor * memory[J, a * slots + c]
+            force = row + SLOTS + PER_SLOT * a + F
+            memory[force + PER_SLOT * (b - a), column] -= factor * memory[force, column]
+    change = 0.0
+    largest = 1e-300
+    for a in range(slots - 1, -1, -1):
+        pair = row + SLOTS + PER_SLOT * a
+        for c in range(a + 1, slots):
+            memory[pair + F, column] -= memory[J, a * slots + c] * memory[pair + PER_SLOT * (c - a) + F, column]
+        memory[pair + F, column] /= memory[J, a * slots + a]
+        f = memory[pair + F, column]
+        memory[pair + FULL, j] += f
+        change = max(change, abs(f))
+        largest = max(largest, abs(memory[pair + FULL, 0]))
+    if j == 0:
+        return change / largest
+    couple = row + SLOTS + PER_SLOT * slots
+    for low in range(slots):  # what depends on the forces
+        pair = row + SLOTS + PER_SLOT * low
+        f = memory[pair + F, j]
+        bend = f * memory[pair + H3, 0]
+        memory[pair + H2, j] += bend
+        memory[pair + H1, j] += f * memory[pair + H2, 0] + memory[pair + F, 0] * bend
+        for up in range(low + 1, slots):
+            other = row + SLOTS + PER_SLOT * up
+            memory[pair + GAP, j] -= memory[couple, 0] * memory[other + F, j]
+            memory[other + GAP, j] -= memory[couple, 0] * f
+            couple += PER_COUPLE
+    return 0.0
+
+
+FUNCTIONS = (
+    _step_begins, product, _cubic, _cubic_slope, _contact, _gaps, _friction, smoothed_sign, _pair_forces, time_series,
+)  # fmt: skip

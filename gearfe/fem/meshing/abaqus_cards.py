@@ -1,0 +1,166 @@
+"""Keyword lines of Abaqus' (CalculiX') input files with their data, and those that a mesh cannot be read without.
+
+A keyword line begins with one asterisk and goes on after a comma at its end; blanks in keywords and case do not count,
+a comment begins with two asterisks (Abaqus Analysis User's Guide, section "Input syntax rules").
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from ...base.errors import InputError
+from .included import Inclusion, Line
+
+#: Cards that make or move nodes and elements, join parts, add mass or stiffness, or change the file's text, and that
+#: are not supported: without them the body would be another one. Name -> what it does, and the cure.
+_WRITE = "write all nodes and elements in full (preprint of Abaqus, or an export of the mesh)"
+_RIGID = "delete it: bores are rigid by [[housing.bores]], held faces by [[housing.held]]"
+_SOLID = "delete it with its elements if it does not matter, or model it by solid elements"
+_MERGE = "merge the meshes so that the parts share their nodes, then delete it"
+REFUSED = {
+    **dict.fromkeys(("NGEN", "NFILL", "NCOPY", "NMAP", "ADJUST"), ("makes or moves nodes", _WRITE)),
+    **dict.fromkeys(("ELGEN", "ELCOPY", "SYMMETRICMODELGENERATION", "MODELCHANGE"), ("changes the elements", _WRITE)),
+    **dict.fromkeys(("IMPERFECTION", "IMPORT", "IMPORTNODESET", "IMPORTELSET"), ("takes data of another run", _WRITE)),
+    **dict.fromkeys(("PARAMETER", "MANIFEST"), ("replaces text of the file", "write numbers and names in full")),
+    **dict.fromkeys(
+        ("TIE", "EMBEDDEDELEMENT", "SHELLTOSOLIDCOUPLING", "FASTENER", "CYCLICSYMMETRYMODEL"), ("joins parts", _MERGE)
+    ),
+    **dict.fromkeys(
+        ("EQUATION", "MPC", "RIGIDBODY", "COUPLING", "KINEMATICCOUPLING", "DISTRIBUTINGCOUPLING", "PRE-TENSIONSECTION"),
+        ("ties nodes to each other", _RIGID),
+    ),
+    **dict.fromkeys(
+        (
+            "MASS",
+            "ROTARYINERTIA",
+            "NONSTRUCTURALMASS",
+            "SPRING",
+            "DASHPOT",
+            "JOINT",
+            "CONNECTORSECTION",
+            "GAP",
+            "FOUNDATION",
+        ),
+        ("adds mass or stiffness", _SOLID),
+    ),
+    **dict.fromkeys(
+        (
+            *("SHELLSECTION", "SHELLGENERALSECTION", "MEMBRANESECTION", "SURFACESECTION", "REBARLAYER"),
+            *("BEAMSECTION", "BEAMGENERALSECTION", "FRAMESECTION", "REBAR"),
+        ),
+        ("adds shells or beams", _SOLID),
+    ),
+    **dict.fromkeys(
+        ("USERELEMENT", "MATRIXINPUT", "MATRIXASSEMBLE", "SUPERELEMENT", "SUBSTRUCTUREPROPERTY"),
+        ("adds matrices", "give a substructure as [housing.superelement]"),
+    ),
+}
+_INCLUDE = re.compile(r"\*\s*INCLUDE\s*,", re.IGNORECASE)
+#: Cards whose data may stand in a file of its own; files of other cards, such as loads, do not matter.
+FROM_FILES = ("INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")
+_FROM_FILES = re.compile(rf"\*\s*({'|'.join(FROM_FILES)})\s*,", re.IGNORECASE)
+_INPUT = re.compile(r",\s*INPUT\s*=\s*(\"[^\"]*\"|[^,]*)", re.IGNORECASE)
+_PARTS = re.compile(r'((?:[^,"]|"[^"]*")*)(?:,|$)')
+
+
+class Card(NamedTuple):
+    """A keyword line without blanks in capitals, its parameters (capitals -> value), its data lines, and its place."""
+
+    name: str
+    keys: dict[str, str]
+    data: list[Line]
+    line: Line
+
+
+class Fault(NamedTuple):
+    """How mistakes of a file are reported: key that named it, and the file."""
+
+    field: str
+    path: Path
+
+    def at(self, line: Line, problem: str, cure: str = "correct that line") -> InputError:
+        """Error at a line."""
+        return InputError(self.field, self.path.name, f"{line.place}: {problem}", cure)
+
+
+def inclusion(line: str) -> Inclusion | None:
+    """File whose lines follow: that of an *INCLUDE, or the data of another card."""
+    if not _FROM_FILES.match(line.lstrip()):
+        return None
+    named = _INPUT.search(line)
+    return None if named is None else Inclusion(named[1].strip().strip('"'), not _INCLUDE.match(line.lstrip()))
+
+
+def cards(lines: Iterable[Line], fault: Fault) -> Iterator[Card]:
+    """Yield the cards of a file.
+
+    Raises
+    ------
+    InputError
+        For cards of `REFUSED`, and for data before the first card.
+    """
+    card: Card | None = None
+    begun: Line | None = None  # a keyword line that goes on
+    for line in lines:
+        text = line.text.strip()
+        if not text or text.startswith("**"):
+            continue
+        if begun is None and not text.startswith("*"):
+            if card is None:
+                problem = f"data before the first card: {text[:40]!r}"
+                raise fault.at(line, problem, "is it an input file of Abaqus or CalculiX?")
+            card.data.append(line._replace(text=text))
+            continue
+        begun = line._replace(text=text) if begun is None else begun._replace(text=begun.text + text)
+        if begun.text.endswith(","):
+            continue
+        if card is not None:
+            yield card
+        card, begun = _card(begun, fault), None
+    if begun is not None:
+        raise fault.at(begun, "the card goes on after its last comma, but the file ends", "is the file whole?")
+    if card is not None:
+        yield card
+
+
+def _card(line: Line, fault: Fault) -> Card:
+    first, *others = split(line.text)
+    name = "".join(first[1:].split()).upper()
+    keys = {}
+    for word in others:
+        key, _, value = word.partition("=")
+        keys["".join(key.split()).upper()] = value.strip().strip('"')
+    if name in REFUSED:
+        does, cure = REFUSED[name]
+        problem = f"the card {first} {does}, which is not supported"
+        raise fault.at(line, problem, cure)
+    if name == "INCLUDE" or (name in FROM_FILES and "INPUT" in keys and inclusion(line.text) is None):
+        raise fault.at(line, "a file is included that cannot be found", "write *INCLUDE, INPUT=file in one line")
+    return Card(name, keys, [], line)
+
+
+def split(text: str) -> list[str]:
+    """Cells between commas, those within quotes whole; a comma at the end makes none."""
+    if '"' not in text:
+        cells = [cell.strip() for cell in text.split(",")]
+    else:
+        cells = [found[1].strip() for found in _PARTS.finditer(text)]
+        cells = cells[:-1] if cells and not cells[-1] else cells  # the empty match at the end
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def real(text: str) -> float:
+    """A real of Abaqus: 2.5, 2.5E3, 2.5D3; an empty cell is 0. Raises `ValueError` for anything else."""
+    if not text:
+        return 0.0
+    if "_" in text:  # which Python allows
+        raise ValueError(text)
+    try:
+        return float(text)
+    except ValueError:
+        return float(text.upper().replace("D", "E"))

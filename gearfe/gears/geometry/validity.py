@@ -1,0 +1,277 @@
+"""What pairs are meant for: what lies beyond is refused, loads beyond it are flagged. `spur_gear` checks single gears.
+
+- *Pair*: gears that run together, with a contact ratio of 1 and more; whether tips enter the material of the mate is
+  answered by rolling the pair.
+- *Overlap* r_b times twist, by which rigid flanks would overlap along the line of action: up to 0.12 modules. That is
+  how far the contact laws were held against each other (0.5 deg of twist of the 20/30 pair, docs/contact_laws.md). Each
+  tooth, 2.25 modules high and 1.8 thick at its root, then yields by d = 0.06 modules: as a cantilever it has the strain
+  3 t d/(2 h^2), 3 %, there. Steel would not bear it, and linear elasticity is a first order of it. A torque that
+  makes twice that by the standard's stiffness is refused.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from numbers import Real
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.errors import InputError
+from ...base.typing import Array, IntArray
+from .curves import inv, inverse_inv
+from .involute import least_shift
+from .mesh_geometry import MeshGeometry
+from .spur_gear import LEAST_ROUND, Gear
+
+#: Largest overlap, times module.
+MOST_OVERLAP = 0.12
+#: Largest yield of a tooth pair (modules) by the standard's stiffness under a given torque.
+MOST_YIELD = 0.25
+#: Penetrations below this many modules are taken for the discretisation of the outlines.
+TOLERANCE = 1e-4
+#: Rotations through the engagement of one tooth at which tips are looked at.
+POSITIONS = 241
+
+
+def check_pair(pair: MeshGeometry) -> None:
+    """Raise `InputError` for gears that cannot run together."""
+    pinion, wheel = pair.pinion, pair.wheel
+    for name, what, unit in (("module", "module", 1e3), ("pressure_angle", "pressure angle", 180.0 / math.pi)):
+        value, other = getattr(wheel, name), getattr(pinion, name)
+        if abs(value - other) > 1e-9 * abs(other):
+            symbol = "mm" if name == "module" else "deg"
+            both = f"{unit * value:.9g} {symbol} and {unit * other:.9g} {symbol} (pinion)"
+            problem = f"gears that differ in {what}, {both}, do not mesh"
+            raise InputError(f"wheel.{name}", value, problem, f"give both the same {what}")
+    _check_distance(pair)
+    a = pair.working_centre_distance
+    for name, gear, mate in (("pinion", pinion, wheel), ("wheel", wheel, pinion)):
+        if gear.tip_radius + mate.root_radius >= a:
+            room = (a - mate.root_radius - gear.tip_radius) / gear.module
+            problem, limit = "makes the tip circle hit the mate's root circle", ("<", gear.addendum + room, "")
+            cure = "use more tip_shortening, less addendum, more dedendum or more centre distance"
+            raise InputError(f"{name}.addendum", gear.addendum, problem, cure, limit)
+    _check_ratio(pair)
+    for name, mate_name in (("pinion", "wheel"), ("wheel", "pinion")):
+        _check_interference(pair, name, mate_name)
+
+
+def _check_distance(pair: MeshGeometry) -> None:
+    pinion, wheel = pair.pinion, pair.wheel
+    alpha, lowest = pinion.pressure_angle, pinion.base_radius + wheel.base_radius
+    if pair.centre_distance is None:
+        shift = pinion.profile_shift + wheel.profile_shift
+        least = -0.5 * (pinion.teeth + wheel.teeth) * inv(alpha) / math.tan(alpha)
+        if shift <= least:
+            limit = (">", least - wheel.profile_shift, "")
+            problem, cure = (
+                f"leaves no working pressure angle (sum of both: > {least:.6g})",
+                "use larger profile shifts",
+            )
+            raise InputError("pinion.profile_shift", pinion.profile_shift, problem, cure, limit)
+        return
+    a = pair.centre_distance
+    if isinstance(a, bool) or not isinstance(a, Real) or not math.isfinite(a) or a <= lowest:
+        problem = f"leaves no working pressure angle: must be finite and > {1e3 * lowest:.9g} mm"
+        raise InputError("centre_distance", a, problem, "use a larger centre distance, or leave it out")
+    if pair.normal_backlash < 0.0:
+        angles = pinion.base_radius * pinion.base_angle + wheel.base_radius * wheel.base_angle - pair.base_pitch / 2
+        tight = lowest / math.cos(inverse_inv(angles / lowest))
+        problem = f"jams the teeth (backlash {1e3 * pair.backlash:.6g} mm): must be >= {1e3 * tight:.12g} mm"
+        cure = "use a larger centre distance, less profile shift or more tooth thinning, or leave it out"
+        raise InputError("centre_distance", a, problem, cure)
+
+
+def _tips_ratio(pair: MeshGeometry, *, rounded: bool) -> float:
+    """Contact ratio between the tips alone, as if no flank were undercut."""
+    rolls = [
+        (g.profile.round_roll if rounded and g.tip_round > 0.0 else g.profile.tip_roll)
+        for g in (pair.pinion, pair.wheel)
+    ]
+    return (sum(rolls) - pair.tangent_length) / pair.base_pitch
+
+
+def _check_ratio(pair: MeshGeometry) -> None:
+    nominal, active = _tips_ratio(pair, rounded=False), pair.contact_ratio_active
+    if nominal < 1.0:
+        gear: Gear
+        problem, cure = f"gives a contact ratio of {nominal:.4g} < 1", "use less tip_shortening, or more teeth"
+        # the distance of the points of tangency that leaves one base pitch between the tips
+        tangent = pair.tangent_length - (1.0 - nominal) * pair.base_pitch
+        if pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch and tangent > 0.0:
+            most = math.hypot(tangent, pair.pinion.base_radius + pair.wheel.base_radius)
+            cure = "use a smaller centre distance"
+            raise InputError("centre_distance", pair.centre_distance, problem, cure, ("<=", 1e3 * most, "mm"))
+        name = min(("pinion", "wheel"), key=lambda name: getattr(pair, name).addendum)
+        gear = getattr(pair, name)
+        roll = gear.profile.tip_roll + (1.0 - nominal) * pair.base_pitch
+        more = (math.hypot(gear.base_radius, roll) - gear.tip_radius) / gear.module
+        raise InputError(f"{name}.addendum", gear.addendum, problem, cure, (">=", gear.addendum + more, ""))
+    if active >= 1.0:
+        return
+    rounded = _tips_ratio(pair, rounded=True)
+    if rounded < 1.0:
+        name = "pinion" if pair.pinion.tip_round >= pair.wheel.tip_round else "wheel"
+        gear = getattr(pair, name)
+        problem, cure = f"leaves a contact ratio of {rounded:.4g} < 1", "use a smaller tip round"
+        limit = _largest_round(gear, gear.profile.round_roll + (1.0 - rounded) * pair.base_pitch)
+        raise InputError(f"{name}.tip_round", gear.tip_round, problem, cure, limit)
+    cuts = {name: lost for name, lost in _lost_to_form_points(pair).items() if lost > 0.0}
+    name = max(cuts, key=cuts.__getitem__)
+    gear = getattr(pair, name)
+    problem = f"leaves an undercut root that eats the path of contact: contact ratio {active:.4g}, must be >= 1"
+    cure = f"use more profile shift (no undercut from {least_shift(gear):.4g} on), more teeth or less dedendum"
+    raise InputError(f"{name}.profile_shift", gear.profile_shift, problem, cure)
+
+
+def _largest_round(gear: Gear, roll: float) -> tuple[str, float, str] | None:
+    """Limit of a tip round that begins at a roll length (m) or farther out; None where no round does."""
+    least, most = LEAST_ROUND * gear.module, gear.tip_round
+    if replace(gear, tip_round=least).profile.round_roll < roll:
+        return None
+    while most - least > 1e-9 * gear.module:
+        middle = 0.5 * (least + most)
+        least, most = (middle, most) if replace(gear, tip_round=middle).profile.round_roll >= roll else (least, middle)
+    return ("<=", 1e3 * least, "mm")
+
+
+def _lost_to_form_points(pair: MeshGeometry) -> dict[str, float]:
+    """Length (m) of path that the mate's active tip reaches below each gear's form point; <= 0 when there is none."""
+
+    def lost(gear: Gear, mate: Gear) -> float:
+        tip = min(mate.profile.round_roll, mate.profile.tip_roll)
+        return gear.form_roll - (pair.tangent_length - tip)
+
+    return {"pinion": lost(pair.pinion, pair.wheel), "wheel": lost(pair.wheel, pair.pinion)}
+
+
+def _check_interference(pair: MeshGeometry, name: str, mate_name: str) -> None:
+    gear, mate = getattr(pair, name), getattr(pair, mate_name)
+    cure = "use less addendum or more tip_shortening there, more dedendum or a smaller rack_tip_radius here"
+    lost = _lost_to_form_points(pair)[name]
+    if lost > 1e-7 * gear.module and not gear.undercut:
+        allowed = math.hypot(mate.base_radius, pair.tangent_length - gear.form_roll)
+        most = mate.addendum - (mate.tip_radius - allowed) / mate.module
+        problem = (
+            f"makes the tip reach {1e3 * lost:.4g} mm of roll length below the start of the {name}'s involute "
+            f"(form diameter {2e3 * gear.form_radius:.6g} mm), where the root is no involute"
+        )
+        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure, ("<", most, ""))
+    depth = tip_penetration(gear, mate, pair.working_centre_distance, 0.5 * pair.normal_backlash / mate.base_radius)
+    if depth > TOLERANCE * gear.module:
+        problem = f"makes the tip cut {1e3 * depth:.4g} mm into the {name}'s root"
+        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure)
+
+
+def tip_penetration(gear: Gear, mate: Gear, centre_distance: float, twist: float) -> float:
+    """Return the largest depth by which tips of a mate enter a gear while the pair rolls.
+
+    The left flanks are in contact. The mate's outline from the middle of its addendum outwards is followed through the
+    space of the gear. In the gear's frame the outline of its tooth is a single-valued polar angle over the radius,
+    which separates inside from outside; the depth of a point inside is its distance to that outline.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    mate : Gear
+        The gear whose tips are followed.
+    centre_distance
+        Distance (m) between the axes; the gear is at the origin, the mate on +x.
+    twist
+        Turn (rad) of the mate that closes the backlash on the left flanks.
+
+    Returns
+    -------
+    depth : float
+        In m.
+    """
+    outline, tip = _outline(gear), _tip_outline(mate)
+    reach = (centre_distance**2 + mate.tip_radius**2 - gear.tip_radius**2) / (2.0 * centre_distance * mate.tip_radius)
+    if reach >= 1.0:
+        return 0.0
+    widest = math.acos(max(reach, 0.0)) + mate.profile.tip_half_angle
+    swing = np.linspace(-widest, widest, POSITIONS)
+    gear_angle = -(swing - math.pi / mate.teeth - twist) * mate.teeth / gear.teeth
+    turn = np.exp(1j * (math.pi + swing))[:, None]
+    placed = (centre_distance + turn * tip) * np.exp(-1j * gear_angle)[:, None]
+    radius, angle = np.abs(placed), np.angle(placed)
+    pitch = 2.0 * math.pi / gear.teeth
+    angle = np.abs(angle - pitch * np.round(angle / pitch))
+    inside = angle < np.interp(radius, np.abs(outline), np.angle(outline), left=math.inf, right=-math.inf)
+    suspects = (radius * np.exp(1j * angle))[inside]
+    deepest = 0.0
+    for part in np.array_split(suspects, 1 + suspects.size // 2000):
+        if part.size:
+            deepest = max(deepest, float(_distance(part, outline).max()))
+    return deepest
+
+
+def _distance(points: Array, outline: Array) -> Array:
+    """Distance of complex points to the chords next to the nearest vertex of a complex polyline."""
+    nearest = np.abs(points[:, None] - outline).argmin(axis=1)
+    best = np.abs(points - outline[nearest])
+    for step in (-1, 0):
+        first = np.clip(nearest + step, 0, len(outline) - 2)
+        start, chord = outline[first], outline[first + 1] - outline[first]
+        along = np.clip(np.real((points - start) * np.conj(chord)) / np.abs(chord) ** 2, 0.0, 1.0)
+        best = np.minimum(best, np.abs(points - start - along * chord))
+    return best
+
+
+def _outline(gear: Gear) -> Array:
+    """Left half profile as complex numbers with growing radius."""
+    t = np.linspace(0.0, 1.0, 401)
+    made = np.concatenate([s.curve.point(t) for s in gear.profile.segments if s.name != "tip"])
+    radius = np.abs(made)
+    return made[np.concatenate([[True], np.diff(np.maximum.accumulate(radius)) > 0.0])]
+
+
+def _tip_outline(gear: Gear) -> Array:
+    """Both sides of a tooth from half the roll length above the form point outwards, as complex numbers."""
+    profile = gear.profile
+    t = np.linspace(0.0, 1.0, 17)
+    pieces = [profile.flank.point(0.5 * (1 + t))]
+    pieces += [s.curve.point(t) for s in profile.segments if s.name in ("tip_round", "tip")]
+    made = np.concatenate(pieces)
+    return np.concatenate([made, np.conj(made)])
+
+
+def pair_warnings(pair: MeshGeometry) -> list[str]:
+    """What is legal but deserves a look, one sentence each."""
+    said = []
+    for name, lost in _lost_to_form_points(pair).items():
+        gear: Gear = getattr(pair, name)
+        if not gear.undercut:
+            continue
+        if lost > 0.0:
+            said.append(
+                f"the {name} is undercut and loses {1e3 * lost:.4g} mm of the path of contact: contact ratio "
+                f"{pair.contact_ratio_active:.4g} instead of {_tips_ratio(pair, rounded=True):.4g}"
+            )
+        else:
+            said.append(f"the {name} is undercut below its active flank; the path of contact is whole")
+    if pair.contact_ratio_effective < 1.0:
+        said.append(
+            f"tip relief leaves a contact ratio of {pair.contact_ratio_effective:.4g} on the unrelieved flanks: "
+            "unloaded, the teeth hand over on the relieved part"
+        )
+    return said
+
+
+def overlaps(pair: MeshGeometry, twist: ArrayLike) -> Array:
+    """Overlaps (modules) of the rigid flanks at twists (rad) from where they touch."""
+    return np.asarray(twist, dtype=float) * pair.wheel.base_radius / pair.pinion.module
+
+
+def overlap_warnings(pair: MeshGeometry, twist: Array, beyond: IntArray) -> list[str]:
+    """What is said of the positions flagged as beyond validity, at twists (rad) from where flanks touch."""
+    found = overlaps(pair, twist[beyond == 1])
+    if not found.size:
+        return []
+    reason = (
+        f"the flanks overlap by up to {found.max():.3g} modules, beyond the {MOST_OVERLAP:g} that the laws hold for"
+    )
+    return [f"{found.size} positions are beyond validity (column beyond_validity): {reason}; use less load"]

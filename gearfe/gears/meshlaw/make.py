@@ -1,0 +1,299 @@
+"""A mesh law from contact solutions of the half-plane law: which positions, and the pair forces in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.typing import Array, IntArray
+from ..contact.half_plane import HalfPlanePair, coupling_compliances, solve_half_plane
+from ..contact.position import Positions, joined
+from ..geometry.first_contact import FirstContacts
+from .fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
+from .law import NO_CONTACT, MeshLaw
+
+#: Cells of the phase in a mesh cycle to begin with, and places in each (parts of its width) where contacts are solved.
+CELLS, PLACES = 12, (0.25, 0.75)
+#: Approaches beyond the first touch, in parts of the largest: small ones show how a pair comes into contact.
+DEPTHS = (0.0025, 0.008, 0.025, 0.06, 0.12, 0.2, 0.32, 0.5, 0.75, 1.0)
+#: Places and approaches at which the law is held against contacts: beside the nodes, where kinks are; between `DEPTHS`.
+HELD_PLACES, HELD_DEPTHS = (0.1, 0.9), (0.0015, 0.0045, 0.039, 0.155, 0.4, 0.87)
+#: It is held against contacts also where a further pair touches by these parts of the reach after the first one, found
+#: among so many samples of each cell.
+LATE, CHANGE_SAMPLES = (0.01, 0.1, 0.4, 0.9), 100
+#: Error of force and torque there from which on a cell is halved, in parts of them, or of this part of the largest
+#: where that is more: what contacts on elements of the default sizes err by (0.11 % in the shipped pair).
+TOLERANCE, LEAST_FORCE = 1e-3, 0.1
+#: Error of the first-contact curve's cubics (parts of the reach) from which on a cell is halved, a tenth of
+#: `TOLERANCE`, as forces of a tenth of the largest count; and how often: a few cells at the ends of the path need it.
+CLOSE, TOUCH_HALVINGS = 1e-4, 8
+#: Where in a cell (parts of its width) the first-contact curve's cubics are compared with the curve.
+TOUCH_PLACES = (0.25, 0.5, 0.75)
+#: How often a cell is halved for its forces.
+HALVINGS = 3
+#: Least reach (m): what contact solutions are off by (`gearfe.gears.meshlaw.fit.NOISE`) is then 1 % of it.
+LEAST_REACH = 1e-7
+#: The law's tables go on to where pairs touch at this many times its reach, so that no pair bears at their ends.
+BEYOND = 1.1
+#: Pinion angles at which the approach is searched for that makes the largest force.
+ANGLES = 6
+#: Corners of the first-contact curve are nodes; others are left out so near to them, and of corners so near to each
+#: other one stays (parts of a cell).
+NEAR, SAME = 0.4, 0.02
+
+
+def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE) -> MeshLaw:
+    """Law of a pair for mesh forces up to `force` (N), its error from contact solutions that it was not made from.
+
+    Cells of the phase where that is more than `tolerance` are halved; the solutions that showed it then count, too.
+
+    Raises
+    ------
+    InputError
+        For forces that contact solutions do not reach.
+    """
+    geometry = pair.pair
+    radius = geometry.wheel.base_radius
+    reach = max(_reach(pair, force), LEAST_REACH)
+    nodes, slots = _nodes(pair, reach)
+    C = coupling_curve(pair, _phases(nodes, slots), reach)
+    known: list[PairForces] = []
+
+    def solve(angles: Array, depths: Sequence[float]) -> Positions:
+        """Contacts at pinion angles and at parts of the reach; their pair forces become known."""
+        met, first = _first_contacts(pair, angles)
+        twists = first[:, None] + reach * np.array(depths) / radius
+        solved = solve_half_plane(pair, np.repeat(angles, len(depths)), twists.ravel())
+        known.append(_pair_forces(pair, solved, met, C))
+        return solved
+
+    begin, width, error = nodes[:-1], np.diff(nodes), 0.0
+    for rest in range(HALVINGS, -1, -1):
+        solve(_places(begin, width, PLACES), DEPTHS)
+        law = fit_law(
+            joined(known),
+            touch_curve(pair, _phases(nodes, slots)),
+            C,
+            cells=len(nodes) - 1,
+            hertz=0.5 * pair.compliance / pair.width,
+            base_radii=(geometry.pinion.base_radius, radius),
+            reach=reach,
+        )
+        order = np.argsort(begin)
+        begin, width = begin[order], width[order]
+        changes = _changes(law)
+        cell = np.searchsorted(begin, changes, side="right") - 1
+        inside = (cell >= 0) & (changes < (begin + width)[cell])
+        held = np.concatenate([_places(begin, width, HELD_PLACES), changes[inside]])
+        cell = np.concatenate([np.repeat(np.arange(len(begin)), len(HELD_PLACES)), cell[inside]])
+        misses = _misses(law, pair, solve(held, HELD_DEPTHS), LEAST_FORCE * force)
+        off = np.zeros(len(begin))
+        np.maximum.at(off, np.repeat(cell, len(HELD_DEPTHS)), misses)
+        coarse = (off > tolerance) & (rest > 0)
+        error = max(error, float(off[~coarse].max(initial=0.0)))
+        if not coarse.any():
+            break
+        begin, width = np.append(begin[coarse], begin[coarse] + 0.5 * width[coarse]), np.tile(0.5 * width[coarse], 2)
+        nodes = np.union1d(nodes, begin)
+    return replace(law, backlash=geometry.normal_backlash, error=error)
+
+
+def _places(begin: Array, width: Array, parts: Sequence[float] | Array) -> Array:
+    """Angles (rad) at these parts of the width of each cell, cell by cell."""
+    angles: Array = (begin[:, None] + width[:, None] * np.array(parts)).ravel()
+    return angles
+
+
+def _changes(law: MeshLaw) -> Array:
+    """Angles (rad) of one mesh cycle at which a further pair touches at `LATE` parts of the reach after the first one.
+
+    Between these the loaded pairs change; under light loads that is a small part of a cell.
+    """
+    angles = _places(law.nodes[:-1], np.diff(law.nodes), np.arange(CHANGE_SAMPLES) / CHANGE_SAMPLES)
+    touch = law.pair_touches(angles)
+    late = (touch - touch.min(axis=1, keepdims=True)) / law.reach
+    changes = []
+    for part in LATE:
+        sample, _ = np.nonzero((late[1:] > part) != (late[:-1] > part))
+        changes.append(0.5 * (angles[sample] + angles[sample + 1]))
+    return np.unique(np.concatenate(changes))
+
+
+def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) -> Array:
+    """Error of force, or of the driver's torque, in parts of contact solutions, or of a least force (N)."""
+    r1, r2 = law.base_radii
+    found = law(solved.pinion_angle, r2 * (solved.twist - pair.pair.contact_twist))
+    force = solved.torque_wheel / r2
+    moment = solved.torque_pinion - r1 * force
+    off = np.maximum(np.abs(found.force - force), np.abs(found.moment - moment) / r1)
+    # a force that was not found is an infinite error: NaN would pass every comparison
+    missed = np.where(np.isnan(found.force), math.inf, off / np.maximum(force, least))
+    return np.where(np.isfinite(force), missed, 0.0)  # some contacts are not solved, as of flanks with short waves
+
+
+def _pair_forces(pair: HalfPlanePair, solved: Positions, met: FirstContacts, coupling: Sequence[Couple]) -> PairForces:
+    """Forces and approaches of the loaded pairs in contact solutions; forces are the wheel's torques over r_b2."""
+    radius = pair.pair.wheel.base_radius
+    contacts = solved.contacts
+    # a pair may be loaded on several stretches of its flanks, each of which is a contact
+    (position, number), inverse = np.unique([contacts.position, contacts.pair], axis=1, return_inverse=True)
+    force = np.bincount(inverse.ravel(), contacts.torque_wheel, minlength=len(position)) / radius
+    k = number - number.min(initial=0)
+    table = np.zeros((len(solved), int(k.max(initial=0)) + 1))
+    table[position, k] = force
+    angle = solved.pinion_angle[position]
+    own = angle + number * pair.pair.mesh_cycle
+    others = np.zeros(len(force))
+    for apart, couple in enumerate(coupling, start=1):
+        for other, lower in ((k - apart, own - apart * pair.pair.mesh_cycle), (k + apart, own)):
+            inside = (other >= 0) & (other < table.shape[1])
+            others[inside] += couple(lower[inside]) * table[position[inside], other[inside]]
+    touch = _of_pairs(met, angle, number)
+    approach = radius * (solved.twist[position] - touch) - others
+    return PairForces(own, force, force / table.sum(axis=1)[position], approach)
+
+
+def touch_curve(pair: HalfPlanePair, phases: Array) -> TouchCurve:
+    """t and its slope at pinion angles of a pair's own tooth (rad), from where the rigid driving flanks touch."""
+    geometry = pair.pair
+    radius = geometry.wheel.base_radius
+    met = pair.teeth.first_contacts(phases)
+    own = np.flatnonzero(met.pair == 0)
+    value, slope = np.full(len(phases), NO_CONTACT), np.zeros(len(phases))
+    at = met.position[own]
+    value[at] = radius * (met.twist[own] - geometry.contact_twist)
+    slope[at] = radius * (1.0 / geometry.gear_ratio - met.arm[own, 0] / met.arm[own, 1])
+    return TouchCurve(phases, value, slope)
+
+
+def _late(pair: HalfPlanePair, phases: Array) -> Array:
+    """How much later (m) than the first pair there a pair touches, at pinion angles of its own tooth (rad)."""
+    met, first = _first_contacts(pair, phases)
+    own = np.flatnonzero(met.pair == 0)
+    late = np.full(len(phases), NO_CONTACT)
+    late[met.position[own]] = pair.pair.wheel.base_radius * (met.twist[own] - first[met.position[own]])
+    return late
+
+
+def coupling_curve(pair: HalfPlanePair, phases: Array, reach: float) -> list[Couple]:
+    """C of pairs one, two, ... teeth apart over the angle of the lower pair's tooth; 0 beyond its ends."""
+    cycle, radius = pair.pair.mesh_cycle, pair.pair.wheel.base_radius
+    angles = phases[phases < phases[0] + cycle * (1 - 1e-9)]
+    _, first = _first_contacts(pair, angles)
+    angle, apart, compliance = coupling_compliances(pair, angles, first + BEYOND * reach / radius)
+    made = []
+    for number in range(1, int(apart.max(initial=0)) + 1):
+        here = apart == number
+        order = np.argsort(angle[here])
+        own, beside = angle[here][order], float(np.diff(phases).max())
+        # level up to the next angle that was looked at, since pairs may touch till there; then none
+        places = np.concatenate([own[0] - beside * np.array([2.0, 1.0]), own, own[-1] + beside * np.array([1.0, 2.0])])
+        level = np.pad(compliance[here][order], 1, mode="edge")
+        made.append(Couple(places, np.pad(level, 1)))
+    return made
+
+
+def _first_contacts(pair: HalfPlanePair, angles: Array) -> tuple[FirstContacts, Array]:
+    """All touches at pinion angles, and the first twist at each (rad)."""
+    met = pair.teeth.first_contacts(angles)
+    first = np.full(len(angles), np.inf)
+    np.minimum.at(first, met.position, met.twist)
+    return met, first
+
+
+def _of_pairs(met: FirstContacts, angle: Array, number: IntArray) -> Array:
+    """Twists (rad) at which pairs touch, by pinion angle and pair number."""
+    known = {(a, k): t for a, k, t in zip(met.angle.tolist(), met.pair.tolist(), met.twist.tolist(), strict=True)}
+    return np.array([known[a, k] for a, k in zip(angle.tolist(), number.tolist(), strict=True)])
+
+
+def _reach(pair: HalfPlanePair, force: float) -> float:
+    """Approach beyond the first touch (m) at which the mesh force is at least `force` at every phase."""
+    geometry = pair.pair
+    radius = geometry.wheel.base_radius
+    angles = geometry.mesh_cycle * np.arange(ANGLES) / ANGLES
+    _, first = _first_contacts(pair, angles)
+    reach = 1e-2 * geometry.pinion.module
+    for _ in range(4):
+        solved = solve_half_plane(pair, angles, first + reach / radius)
+        least = float(solved.torque_wheel.min()) / radius
+        if not math.isfinite(least):
+            break
+        if force <= least <= 1.1 * force:
+            return reach
+        reach *= 1.03 * (force / least) ** (0.95 if least < force else 1.0)
+    problem = f"no contact solution of this pair makes a mesh force of {force:.6g} N at all phases"
+    raise InputError("force", force, problem, "ask for a law up to smaller forces")
+
+
+def _nodes(pair: HalfPlanePair, reach: float) -> tuple[Array, int]:
+    """Nodes of one mesh cycle (rad), and how many mesh cycles a pair's contact takes."""
+    geometry = pair.pair
+    cycle = geometry.mesh_cycle
+    step = 0.1 * cycle / CELLS
+
+    def bearing(places: Array) -> Array:
+        """Angles at which a pair can bear, of these numbers of steps."""
+        return step * places[_late(pair, step * places) < BEYOND * reach]
+
+    found = bearing(10.0 * np.arange(-3.0 * CELLS, 3 * CELLS + 1))
+    ends = np.round(found[[0, -1]] / step)[:, None] + np.arange(-10.0, 11.0)
+    close = bearing(ends.ravel())
+    low, high = close.min() - step, close.max() + step
+    slots = math.ceil((high - low) / cycle)
+    begin = 0.5 * (low + high - slots * cycle)
+    width = cycle / CELLS
+    limits = {s for relieved in (False, True) for s in geometry.path_limits(relieved=relieved)} | _kinks(pair)
+    corners = np.sort([(geometry.pinion_angle_at(s) - begin) % cycle for s in limits])
+    corners = corners[np.diff(corners, prepend=-np.inf) > SAME * width]
+    corners = corners[(corners > SAME * width) & (corners < cycle - SAME * width)]
+    even = width * np.arange(1, CELLS)
+    even = even[np.abs(even[:, None] - corners).min(axis=1, initial=np.inf) > NEAR * width]
+    nodes = begin + np.sort(np.concatenate([[0.0, cycle], corners, even]))
+    for _ in range(TOUCH_HALVINGS):
+        off = _touch_error(pair, nodes, slots, BEYOND * reach)
+        coarse = np.flatnonzero(off > CLOSE * reach)
+        if not len(coarse):
+            break
+        nodes = np.sort(np.append(nodes, 0.5 * (nodes[coarse] + nodes[coarse + 1])))
+    return nodes, slots
+
+
+def _kinks(pair: HalfPlanePair) -> set[float]:
+    """Roll lengths of the pinion (m) on the path of contact at which a deviation of either gear has a kink."""
+    geometry, made = pair.pair, set()
+    start, end = geometry.path_limits()
+    for g, own in enumerate(pair.teeth.deviations):
+        for kink in (s for one in own.profiles if one is not None for s in one.kinks):
+            made.add(kink if g == 0 else geometry.tangent_length - kink)
+    return {s for s in made if start < s < end}
+
+
+def _touch_error(pair: HalfPlanePair, nodes: Array, slots: int, reach: float) -> Array:
+    """Error of the cubics of t in each cell of the phase (m), the largest over the slots.
+
+    A cell counts where a pair can be loaded in it, within the reach of the first touch, by its true t or by its cubic.
+    """
+    ends = _phases(nodes, slots)
+    cubics = touch_cubics(touch_curve(pair, ends)).T
+    late = _late(pair, ends)
+    least, largest = np.minimum(late[1:], late[:-1]), np.zeros(len(ends) - 1)
+    for part in TOUCH_PLACES:
+        z = part * np.diff(ends)
+        phases = ends[:-1] + z
+        off = cubics[0] + z * (cubics[1] + z * (cubics[2] + z * cubics[3])) - touch_curve(pair, phases).value
+        late = _late(pair, phases)
+        least = np.minimum(least, np.minimum(late, late + off))
+        largest = np.maximum(largest, np.abs(off))
+    error: Array = np.where(least < reach, largest, 0.0).reshape(slots, -1).max(axis=0)
+    return error
+
+
+def _phases(nodes: Array, slots: int) -> Array:
+    """The nodes of so many mesh cycles."""
+    cycle = nodes[-1] - nodes[0]
+    return np.append((nodes[:-1] + cycle * np.arange(slots)[:, None]).ravel(), nodes[-1] + (slots - 1) * cycle)

@@ -1,0 +1,208 @@
+"""From the [pair] and [stiffness] tables of a job file to the arguments of `gears.stiffness.sweep.sweep_stiffness`.
+
+Curves are kept on disk: a second run with the same gears, load and mesh sizes reads its curve.
+
+A stored curve is named by a hash of all that decides it: the pair, materials, contact law, sizes and positions, the
+versions of numpy, scipy and gmsh, and the text of this package's own rooms that compute it.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base.cache import cache_key, cached_arrays, source_hash, versions
+from ...base.errors import InputError
+from ...base.tables.jobs import load_job
+from ...base.tables.pair import MaterialTable, PairTable, StiffnessTable
+from ...fem.plane import Material
+from ..contact.laws import ContactLaw, PairModel, check_alike, check_poisson, check_torque, law_named
+from ..geometry.deviation_job import deviations_of
+from ..geometry.face import NOMINAL, ToothDeviations
+from ..geometry.pair import GearPair
+from .curve import StiffnessCurve
+
+if TYPE_CHECKING:
+    from ...base.progress import Stopwatch
+    from ...base.tables.microgeometry import MicrogeometryTable
+    from ..contact.compliance import MeshingPair
+
+#: Packages whose text decides a curve.
+PACKAGES = ("fem", "fem/meshing", "gears/contact", "gears/geometry", "gears/stiffness", "gears/teeth")
+#: Gives what a function makes, or what was made under that name before.
+Keep = Callable[[str, Callable[[], Any]], Any]
+
+
+@dataclass(frozen=True)
+class StiffnessJob:
+    """A stiffness job: its tables and what they mean in SI.
+
+    Attributes
+    ----------
+    pair_table, table
+        The tables as read, with any overrides.
+    pair
+        The gears.
+    microgeometry
+        Their deviations, or None.
+    folder
+        Where the files that these name are looked for.
+    """
+
+    pair_table: PairTable
+    table: StiffnessTable
+    pair: GearPair
+    microgeometry: MicrogeometryTable | None = None
+    folder: Path = Path()
+
+    @property
+    def materials(self) -> tuple[Material, Material]:
+        """Materials of pinion and wheel."""
+        return material_of(self.pair_table.material_of("pinion")), material_of(self.pair_table.material_of("wheel"))
+
+    @property
+    def law(self) -> ContactLaw:
+        """Contact law with its parameter."""
+        t = self.table
+        parameters = dict(t.law_parameters)
+        if t.law == "nitsche" and t.nitsche_gamma0 is not None:
+            parameters["gamma0"] = t.nitsche_gamma0
+        if t.law == "penalty" and t.penalty_stiffness_N_per_mm3 is not None:
+            parameters["stiffness"] = 1e9 * t.penalty_stiffness_N_per_mm3
+        return law_named(t.law, **parameters)
+
+    @property
+    def deviations(self) -> tuple[ToothDeviations, ToothDeviations]:
+        """Deviations of the driving flanks of pinion and wheel."""
+        return self._flanks() or NOMINAL
+
+    @property
+    def back_deviations(self) -> tuple[ToothDeviations, ToothDeviations] | None:
+        """Those of the back flanks, of the pair seen from the other side; None without [microgeometry]."""
+        return self._flanks(back=True)
+
+    def _flanks(self, *, back: bool = False) -> tuple[ToothDeviations, ToothDeviations] | None:
+        if self.microgeometry is None:
+            return None
+        other = {"left": "right", "right": "left"}[self.microgeometry.flank]
+        return deviations_of(self.microgeometry, self.pair, self.folder, flank=other if back else None)
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """The tables as plain data, for summaries."""
+        made = {"pair": asdict(self.pair_table), "stiffness": asdict(self.table)}
+        return made if self.microgeometry is None else {**made, "microgeometry": asdict(self.microgeometry)}
+
+    @property
+    def model(self) -> PairModel:
+        """What `gearfe.gears.stiffness.sweep.elastic_pair` makes of the gears."""
+        t = self.table
+        for side, material in zip(("pinion", "wheel"), self.materials, strict=True):
+            own = getattr(self.pair_table, side).material is not None
+            check_poisson(
+                material.poisson_ratio, t.plane, f"pair.{side if own else ''}{'.' * own}material.poisson_ratio"
+            )
+        sizes = t.coarsen, t.flank_coarsen, t.points_per_edge
+        return PairModel(self.materials, t.plane, self.law, *sizes, self.deviations)
+
+    def elastic(self, keep: Keep | None = None, watch: Stopwatch | None = None) -> MeshingPair:
+        """The condensed gears, kept without deviations, which cost nothing."""
+        from .sweep import elastic_pair
+
+        model = self.model
+
+        def make() -> MeshingPair:
+            return elastic_pair(self.pair, replace(model, deviations=NOMINAL), watch=watch)
+
+        made: MeshingPair = make() if keep is None else keep("elastic", make)
+        return replace(made, model=model)
+
+    @property
+    def sweep(self) -> dict[str, Any]:
+        """Keyword arguments of `gearfe.gears.stiffness.sweep.sweep_stiffness` beside `model`.
+
+        Raises
+        ------
+        InputError
+            When the job has neither a twist nor a torque, and for teeth that differ.
+        """
+        check_alike(self.deviations)
+        t = self.table
+        if t.twist_deg is None and t.torque_Nm is None:
+            cure = "add twist_deg or torque_Nm to [stiffness], or give --twist-deg or --torque-Nm"
+            raise InputError("stiffness.twist_deg", None, "no load: neither twist_deg nor torque_Nm is given", cure)
+        if t.twist_deg is not None:
+            lost = math.degrees(self.pair.contact_twist) if t.twist_from == "contact" else 0.0
+            most = 180.0 / self.pair.wheel.teeth - lost
+            if not t.twist_deg < most:
+                problem = f"must be < {most:.6g} deg, half a pitch of the wheel"
+                raise InputError("stiffness.twist_deg", t.twist_deg, problem, "0.01 to 0.5 deg is usual")
+        if t.torque_Nm is not None:
+            check_torque(self.pair, self.model, t.torque_Nm, "stiffness.torque_Nm")
+        return {
+            "twist": None if t.twist_deg is None else math.radians(t.twist_deg),
+            "torque": t.torque_Nm,
+            "angles": np.radians(t.angles_deg(math.degrees(self.pair.mesh_cycle))),
+            "kinematics": t.kinematics,
+            "twist_from": t.twist_from,
+            "solve_all": t.solve_all,
+        }
+
+
+def material_of(table: MaterialTable) -> Material:
+    """The material that a table describes."""
+    return Material(table.youngs_modulus_GPa * 1e9, table.poisson_ratio, density=table.density_kg_per_m3)
+
+
+def stiffness_job(tables: Mapping[str, Any], folder: Path, pair: GearPair | None = None) -> StiffnessJob:
+    """The job of tables that are read, with the defaults of [stiffness] where they have none; `pair`: its gears.
+
+    Raises
+    ------
+    InputError
+        For gears that cannot run together.
+    """
+    pair = GearPair.from_table(tables["pair"]) if pair is None else pair
+    table = tables.get("stiffness", StiffnessTable())
+    return StiffnessJob(tables["pair"], table, pair, tables.get("microgeometry"), folder)
+
+
+def read_stiffness_job(path: str | Path) -> StiffnessJob:
+    """Read a job file; without a [stiffness] table its defaults hold.
+
+    Raises
+    ------
+    InputError
+        For every mistake in the file, and for gears that cannot run together.
+    """
+    return stiffness_job(load_job(path, ("pair",), ("stiffness", "microgeometry")), Path(path).parent)
+
+
+def cached_curve(pair: GearPair, model: PairModel, **sweep: Any) -> StiffnessCurve:
+    """Curve of `gearfe.sweep_stiffness` with these arguments, from disk when it was computed before."""
+
+    def made() -> dict[str, Any]:
+        from .sweep import sweep_stiffness
+
+        curve = sweep_stiffness(pair, model, **sweep)
+        return {own.name: np.asarray(getattr(curve, own.name)) for own in fields(curve) if own.name != "timings"}
+
+    found = cached_arrays("curve", curve_key(pair, model, sweep), made)
+    return StiffnessCurve(**{name: values if values.ndim else values.item() for name, values in found.items()})
+
+
+def curve_key(pair: GearPair, model: PairModel, sweep: dict[str, Any]) -> str:
+    """Hash (hex) of all that decides a curve."""
+    law, text = type(model.law), ""
+    with suppress(OSError, TypeError):  # laws of other packages have no version here, those without a file no text
+        text = inspect.getsource(sys.modules[law.__module__])
+    code = [law.__module__, law.__qualname__, text, source_hash(*PACKAGES), versions()]
+    return cache_key("curve", {"pair": pair, "model": model, "sweep": sweep, "code": code})

@@ -1,0 +1,338 @@
+r"""Positions of a sweep at given twists or at given torques, and their discretisation error.
+
+**The twist of a torque** by safeguarded Newton's method on many positions at once. The torque T rises with the twist,
+from nothing where the rigid flanks just touch. With the deflection :math:`\delta` beyond that, :math:`\ln\delta` is
+nearly straight over :math:`\ln T` for line contacts; Newton's step there,
+
+.. math:: \delta^+ = \delta\,(T_0/T)^{T/(\delta\,T')},
+
+is taken with the solver's own tangent T' where it stays between the largest twist that was too little and the smallest
+that was too much; otherwise the interval is halved, or the deflection doubled while nothing has been too much yet.
+
+**Discretisation error of the half-plane law**, from the same positions and twists with coarser gears, whose torque is
+another by :math:`\delta T`. They are solved: the change to first order, from the energy, is cheaper, but misses two
+thirds of it where a sharp edge bears.
+
+With sizes larger by the factor c and errors of order p, one position's error is
+:math:`d_i = |\delta T_i/T_i|/(c^p-1)`. Alone that is not to be trusted: both meshes often agree by chance. The
+errors are alike at all n positions of a sweep, hence
+
+.. math:: e_i = \max\Big(d_i,\; 2\,\big(\tfrac1n\sum_j d_j^2\big)^{1/2}\Big),
+
+twice the standard deviation, which covers 95 % of what is normally distributed (JCGM 100:2008, *Guide to the
+expression of uncertainty in measurement*, 6.2.2). p is 1, the lowest order that was measured.
+
+**Laws on the elements** start from the half-plane law's solution :math:`T^{HP}` of the same gears, whose contact is on
+no mesh. From the truth they are as far as from that, and that from the truth, at most:
+
+.. math:: e_i = |T_i/T_i^{HP} - 1| + e_i^{HP} .
+
+What a law yields by itself (the overlap of a soft penalty) is in it.
+
+Not in it: the model (plane, no friction, rigid bores, small strain with its first-order correction) and what no
+refinement of one mesh family shows: of the half-plane law, the wedge that stands for a sharp tip (0.2 to 0.4 % where
+one bears; docs/contact_laws.md). `scripts/measure_curve_accuracy.py` measures over random pairs how often it covers
+the true error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...base.typing import Array, IntArray
+from ..contact.compliance import MeshingPair, finite_strain_shares, flank_loads, panel_pressures
+from ..contact.elements import solve_elements
+from ..contact.half_plane import HalfPlanePair, expected_twists, half_plane_pair, solve_half_plane
+from ..contact.laws import COARSENING, HalfPlane
+from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, in_batches, taken
+from ..geometry.pair import GearPair
+
+#: Solutions of a position in search of its torque; random pairs, laws and torques took three at most.
+MAX_SOLUTIONS = 12
+#: Relative miss of a torque from which one step leads to it.
+NEARLY = 1e-4
+#: Status of a position whose torque was not found although single solutions converged.
+NOT_REACHED = "torque_not_reached"
+
+
+def _newton_twist(twist: Array, first_contact: Array, torque: Array, tangent: Array, goal: Array) -> Array:
+    """Newton's step above, shape (n,) (rad); not-a-number without a torque."""
+    with np.errstate(all="ignore"):
+        delta = twist - first_contact
+        return np.asarray(first_contact + delta * (goal / torque) ** (torque / (delta * tangent)))
+
+
+def twists_for_torque(
+    solve: Callable[[IntArray, Array], Positions], found: Positions, goal: Array, *, first_contact: Array, most: float
+) -> Positions:
+    """Bring positions nearly (`NEARLY`) to given torques; iterations are those of all solutions.
+
+    Parameters
+    ----------
+    solve
+        ``solve(numbers, twists)`` gives the positions of these numbers.
+    found
+        Solutions at first guesses of the twist.
+    goal : ndarray, shape (n,)
+        Torques at the wheel (N m), > 0.
+    first_contact : ndarray, shape (n,)
+        Twists (rad) at which the rigid flanks touch.
+    most
+        Largest twist tried (rad).
+    """
+    low, high = first_contact.copy(), np.full(len(goal), np.inf)
+    for solutions in range(MAX_SOLUTIONS + 1):
+        twist, torque = found.twist, found.torque_wheel
+        miss, seen = torque - goal, np.nan_to_num(ANGLE_ROUNDING * found.tangent)
+        open_ = np.flatnonzero(np.abs(miss) > np.maximum(NEARLY * goal, seen))  # none that failed
+        if len(open_) == 0 or solutions == MAX_SOLUTIONS:
+            break
+        low, high = np.where(miss < 0, twist, low), np.where(miss > 0, twist, high)
+        step = _newton_twist(twist, first_contact, torque, found.tangent, goal)
+        between = np.where(np.isfinite(high), 0.5 * (low + high), np.clip(2 * twist - first_contact, twist, most))
+        step = np.where((low < step) & (step < high), np.minimum(step, most), between)
+        made = solve(open_, step[open_])
+        found = found.replaced(open_, replace(made, iterations=made.iterations + found.iterations[open_]))
+    status = np.where(np.isin(np.arange(len(goal)), open_), NOT_REACHED, found.status)
+    return found.with_status(status) if len(open_) else found
+
+
+NONE: IntArray = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class PositionSolver:
+    """Positions of one pair of gears by a contact law.
+
+    Attributes
+    ----------
+    elastic
+        The gears.
+    contact_model
+        The gears as the half-plane law sees them.
+    on_elements
+        Whether the law is one on the finite elements of the flanks; it starts from the half-plane law's loads.
+    """
+
+    elastic: MeshingPair
+    contact_model: HalfPlanePair
+    on_elements: bool
+
+    @property
+    def pair(self) -> GearPair:
+        """Geometry of the gears."""
+        return self.contact_model.pair
+
+    @property
+    def half_plane(self) -> PositionSolver:
+        """The solver of the same gears by the half-plane law."""
+        return replace(self, on_elements=False)
+
+    def solve(self, angles: Array, twists: Array, kept: IntArray = NONE) -> Positions:
+        r"""Positions at pinion angles and twists (rad), both of shape (n,); those numbered `kept` with loads.
+
+        For laws on elements the half-plane law tells which tooth pairs bear, with the forces :math:`F_k`, and how wide
+        their contacts are (:math:`2b_k`). Where
+
+        .. math:: \sum_k F_k\,\frac{h_k}{2b_k} > \sum_k F_k
+
+        with the longer of both flanks' elements there, :math:`h_k`, the contact is narrower than an element. The torque
+        then swings with the place of the nodes (docs/contact_laws.md), and the position is ``under_resolved``.
+        """
+        every = np.arange(len(angles))
+        if not self.on_elements:
+            return self._with_loads(solve_half_plane(self.contact_model, angles, twists), kept)
+        expected = self.half_plane.solve(angles, twists, every)
+        thin = (expected.status == "converged") & (self.elements_per_contact(expected) < 1.0)
+        expected = expected.with_status(np.where(thin, "under_resolved", expected.status))
+        found = in_batches(lambda part: solve_elements(self.elastic, expected.take(part)), len(angles))
+        return found.with_loads(np.isin(every, kept))
+
+    def _with_loads(self, found: Positions, kept: IntArray) -> Positions:
+        """Positions of the half-plane law, those numbered `kept` with loads."""
+        if len(kept) == 0:
+            return found
+        loaded = taken(found.contacts, np.isin(found.contacts.position, kept))
+        loads = flank_loads(self.elastic, loaded, found.pinion_angle, found.twist)
+        return replace(found, loads=loads, points=panel_pressures(self.elastic, loaded))
+
+    def elements_per_contact(self, found: Positions) -> Array:
+        """Elements that see the contact of positions of `half_plane`, shape (n,): harmonic means, by force, over their
+        tooth pairs; not-a-number without contact.
+        """
+        contacts = found.contacts
+        sizes = np.zeros(len(contacts))
+        for gear, body in enumerate(self.elastic.bodies):
+            edge, _ = body.flank.place(contacts.arc[:, gear])
+            sizes = np.maximum(sizes, body.flank.sizes[edge])
+        weights = contacts.force, contacts.force * sizes / (2 * contacts.half_width)
+        force, spread = (np.bincount(contacts.position, weight, len(found)) for weight in weights)
+        return np.divide(force, spread, out=np.full(len(found), np.nan), where=spread > 0)
+
+
+def position_solver(elastic: MeshingPair) -> PositionSolver:
+    """The solver of the elastic pair's law."""
+    return PositionSolver(elastic, half_plane_pair(elastic), not isinstance(elastic.law, HalfPlane))
+
+
+def at_twists(solver: PositionSolver, angles: Array, twists: Array, *, finite: bool = False) -> Positions:
+    """Solve positions at given twists.
+
+    Parameters
+    ----------
+    solver : PositionSolver
+        The gears.
+    angles, twists : ndarray, shape (n,)
+        Pinion angles, and twists from the centred position (rad).
+    finite : bool
+        Whether the torque has the effect of finite strain.
+    """
+    found = solver.solve(angles, twists, np.arange(len(angles)) if finite else NONE)
+    return found.raised(finite_strain_shares(solver.elastic, found)) if finite else found
+
+
+def at_torques(
+    solver: PositionSolver,
+    angles: Array,
+    torques: Array,
+    *,
+    kept: IntArray = NONE,
+    finite: bool = False,
+) -> Positions:
+    """Solve positions that carry given torques.
+
+    The twist is expected by the half-plane law (laws on elements start from its solution, so that they are asked for
+    loads near the goal) and searched for until the torque is off by no more than `NEARLY`; the last step is Newton's,
+    whose error is some hundredths of the square of the step. Finite strain changes the torque by a share c, which grows
+    about as the torque does: at the goal T of the whole, small strain carries T/(1 + c') with c' = c/(1 + c). What that
+    misses is of the second order in c, as is what the share itself leaves out.
+
+    Parameters
+    ----------
+    solver : PositionSolver
+        The gears.
+    angles : ndarray, shape (n,)
+        Pinion angles (rad).
+    torques : ndarray, shape (n,)
+        At the wheel (N m), > 0.
+    kept
+        Numbers of the positions with loads; all have them where finite strain counts.
+    finite : bool
+        Whether the torque has the effect of finite strain.
+    """
+    kept = np.arange(len(angles)) if finite else kept
+    first_contact, most = solver.contact_model.first_contact_twists(angles), math.pi / solver.pair.wheel.teeth
+
+    def solve(numbers: IntArray, twists: Array) -> Positions:
+        return solver.solve(angles[numbers], twists, np.flatnonzero(np.isin(numbers, kept)))
+
+    if solver.on_elements:
+        first = at_torques(solver.half_plane, angles, torques).twist
+    else:
+        first = expected_twists(solver.contact_model, torques, solver.contact_model.first_contacts(angles))
+    found = solve(np.arange(len(angles)), np.minimum(first, most))
+    found = twists_for_torque(solve, found, torques, first_contact=first_contact, most=most)
+    if finite:
+        share = finite_strain_shares(solver.elastic, found)
+        share = share / (1 + share)
+        found = twists_for_torque(solve, found, torques / (1 + share), first_contact=first_contact, most=most)
+        found = found.raised(share)
+    return closed(found, torques, first_contact)
+
+
+def closed(found: Positions, goal: Array, first_contact: Array) -> Positions:
+    """Positions whose torques are nearly the goals, brought there by the last small step of their twists.
+
+    Moments change with the torque, the energy by the work, loads and contacts of the half-plane law at their own rates.
+    """
+    good = found.status == "converged"
+    factor = np.where(good, goal / np.where(good, found.torque_wheel, 1.0), 1.0)
+    moments = {name: getattr(found, name) * factor for name in TORQUES if name != "tangent"}
+    moments["torque_wheel"] = np.where(good, goal, found.torque_wheel)
+    twist = _newton_twist(found.twist, first_contact, found.torque_wheel, found.tangent, goal)
+    twist = np.where(good, twist, found.twist)
+    by = twist - found.twist
+    energy = found.energy + 0.5 * (found.torque_wheel + moments["torque_wheel"]) * by
+    loads = tuple(replace(one, force=one.force + by[one.position, None] * one.rate) for one in found.loads)
+    contacts = found.contacts.moved(by)
+    whole = np.bincount(contacts.position, contacts.torque_wheel, len(found))  # but for what the step errs
+    right = moments["torque_wheel"][contacts.position] / whole[contacts.position]
+    contacts = replace(contacts, torque_wheel=contacts.torque_wheel * right)
+    return replace(found, twist=twist, energy=energy, contacts=contacts, loads=loads, **moments)
+
+
+def checked_contact(solver: PositionSolver, found: Positions) -> Positions:
+    """Mark positions without contact whose exact rigid flanks overlap, and take all numbers off failed ones."""
+    first_contact = solver.contact_model.first_contact_twists(found.pinion_angle)
+    overlap = (found.status == "no_contact") & (found.twist > first_contact + ANGLE_ROUNDING)
+    return found.with_status(np.where(overlap, "not_converged", found.status))
+
+
+def load_shares(found: Positions) -> tuple[Array, Array]:
+    """Number of the leading pair of each position, and the shares of it and of the pairs behind it."""
+    contacts, count = found.contacts, len(found)
+    carry = contacts.torque_wheel > 0
+    position, pair = contacts.position[carry], contacts.pair[carry]
+    leading = np.full(count, -np.inf)
+    np.maximum.at(leading, position, pair)
+    behind = leading[position].astype(np.int64) - pair
+    shares = np.zeros((count, int(behind.max(initial=0)) + 1))
+    np.add.at(shares, (position, behind), contacts.torque_wheel[carry] / found.torque_wheel[position])
+    leading[np.isinf(leading)] = np.nan
+    shares[np.isnan(found.torque_wheel)] = np.nan
+    return leading, shares
+
+
+#: Assumed order of convergence p.
+ORDER = 1.0
+#: Standard deviations that cover 95 %.
+COVERAGE = 2.0
+
+
+def curve_error(solver: PositionSolver, coarse: MeshingPair, solved: Positions, *, finite: bool) -> Array:
+    """Estimate the relative error of solved positions by coarser gears, see the module's docstring.
+
+    Parameters
+    ----------
+    solver : PositionSolver
+        The gears.
+    coarse : MeshingPair
+        Coarser gears.
+    solved : Positions
+        n solved positions.
+    finite : bool
+        Whether the torque has the effect of finite strain.
+
+    Returns
+    -------
+    error : ndarray, shape (n,)
+        NaN for positions that did not converge.
+    """
+    numbers, made = np.flatnonzero(solved.status == "converged"), np.full(len(solved), np.nan)
+    if len(numbers) == 0:
+        return made
+    own = chosen = solved.take(numbers)
+    error = np.zeros(len(numbers))
+    if solver.on_elements:
+        own = at_twists(solver.half_plane, chosen.pinion_angle, chosen.twist, finite=finite)
+        error = np.abs(chosen.torque_wheel / own.torque_wheel - 1)
+    again = at_twists(position_solver(coarse).half_plane, own.pinion_angle, own.twist, finite=finite)
+    single = np.abs(again.torque_wheel / own.torque_wheel - 1) / (COARSENING**ORDER - 1)
+    error += np.fmax(single, COVERAGE * np.sqrt(np.nanmean(single**2)))
+    made[numbers] = error + unseen_twists(solver.contact_model, own) * np.abs(chosen.tangent / chosen.torque_wheel)
+    return made
+
+
+def unseen_twists(contact_model: HalfPlanePair, found: Positions) -> Array:
+    """Twists (rad) from the touch that mean nothing at positions of the half-plane law, shape (n,): the rounding of the
+    gears' angles, and what the tabulated flanks miss of the exact ones, whose touch it is.
+    """
+    contacts, worst = found.contacts, np.zeros(len(found))
+    tables = contact_model.tables.of(contact_model.teeth.flank(contacts.pair))
+    missed = tables.misses.take(tables.piece_at(contacts.arc[:, :, None])).sum(axis=(1, 2))
+    np.maximum.at(worst, contacts.position, missed)
+    return ANGLE_ROUNDING + worst / contact_model.pair.wheel.base_radius
