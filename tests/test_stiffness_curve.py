@@ -8,7 +8,7 @@ import pytest
 
 from gearfe import StiffnessCurve
 from gearfe.base.errors import InputError
-from gearfe.gears.stiffness.curve import as_text, numbers
+from gearfe.gears.stiffness.curve import NO_CYCLE, as_text, numbers
 
 #: The first columns of the file, in the order that is promised to readers.
 PROMISED = (
@@ -28,17 +28,18 @@ def invented(n=20, failed=()):
         return np.where(bad, np.nan, scale * rng.uniform(0.1, 1.0, n))
 
     share, stiffness, radius = rng.uniform(0, 1, n), numbers(1e8), 33.98654e-3
+    twist = numbers(1e-3)
     return StiffnessCurve(
         pinion_angle=np.arange(n) * math.radians(18) / n,
         wheel_angle=-rng.uniform(0, 1, n),
-        twist=numbers(1e-3),
+        twist=twist,
         torque_wheel=numbers(100),
         torque_pinion=numbers(70),
         torque_wheel_reaction=numbers(100),
         k_torsional=stiffness * radius**2,
         k_mesh=stiffness,
         k_tangent=numbers(1e8),
-        transmission_error=numbers(1e-5),
+        transmission_error=twist * radius,
         transmission_error_unloaded=rng.uniform(0, 1e-6, n),
         leading_pair=np.where(bad, np.nan, np.arange(n) % 3 - 1.0),
         load_share=np.where(bad[:, None], np.nan, np.stack([share, 1 - share], axis=1)),
@@ -188,12 +189,18 @@ def test_a_file_that_contradicts_itself_one_mesh_cycle_on(tmp_path) -> None:
         ("contact_law", ("half_plane", "half_plane", "penalty"), r"contact_law holds half_plane and penalty"),
         # 1e8 N/m at a base radius of 30 mm are 9e4 N m/rad
         ("k_torsional_Nm_per_rad", ("9e4", "9e4", "1.8e5"), r"row 3 has k_torsional 180000 N m/rad and k_mesh 1e\+08"),
+        # 1 mrad at a base radius of 30 mm is 30 um
+        ("transmission_error_um", ("30", "30", "33"), r"row 3 has transmission_error 33 um, but .* is 30 um"),
+        ("load_share_1", ("1", "", "0.7"), r"row 3 has load shares that add up to 0.7, not to 1"),
+        ("status", ("converged", "", "not_converged"), r"row 3 has a stiffness and the status 'not_converged'"),
+        ("mesh_cycle_deg", ("18", "", "-18"), r"mesh_cycle_deg holds 18 and -18"),
+        ("teeth_in_contact", ("2", "", "1.5"), r"teeth_in_contact holds 1.5, which is no whole number"),
     ],
 )
 def test_columns_that_contradict_each_other(column, cells, message, tmp_path) -> None:
     path = tmp_path / "curve.csv"
     table = {"pinion_angle_deg": ("0", "6", "12"), "k_mesh_N_per_m": ("1e8",) * 3, "mesh_cycle_deg": ("18",) * 3}
-    table |= {"wheel_base_radius_mm": ("30",) * 3, column: cells}
+    table |= {"wheel_base_radius_mm": ("30",) * 3, "twist_deg": (f"{math.degrees(1e-3):.15g}",) * 3, column: cells}
     lines = [",".join(row) for row in (table, *zip(*table.values(), strict=True))]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     with pytest.raises(InputError, match=message):
@@ -202,3 +209,13 @@ def test_columns_that_contradict_each_other(column, cells, message, tmp_path) ->
     lines = [",".join(row) for row in (table, *zip(*table.values(), strict=True))]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     assert StiffnessCurve.from_csv(path).mesh_cycle == pytest.approx(math.radians(18.0))
+
+
+@pytest.mark.parametrize("cycle", ["-18", "0"])
+def test_a_mesh_cycle_of_the_file_is_not_replaced_where_it_is_impossible(cycle, tmp_path):
+    """A train fills in the cycle of its driver only where a file has none."""
+    path = tmp_path / "curve.csv"
+    path.write_text(f"pinion_angle_deg,k_mesh_N_per_m,mesh_cycle_deg\n0,1e8,{cycle}\n5,1e8,\n10,1e8,\n")
+    with pytest.raises(InputError, match=f"mesh cycle of {cycle} deg, which must be finite and > 0") as failure:
+        StiffnessCurve.from_csv(path)
+    assert failure.value.problem != NO_CYCLE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
@@ -13,10 +14,11 @@ from gearfe.base.errors import InputError
 from gearfe.drivetrain.train import Damping, Drive, Load, build_train, simulate
 from gearfe.drivetrain.train.states import train_states
 from gearfe.drivetrain.train.statics import static_errors
+from gearfe.gears.stiffness.curve import StiffnessCurve
 from gearfe.multibody import TimeFunction, constant, integrate, smoothed_step
 
 from .mesh_laws import hertzian_law
-from .trains import base_radius, curve, train
+from .trains import MODULE, TORQUE, base_radius, curve, train
 
 R1, R2 = base_radius(20), base_radius(30)
 
@@ -245,3 +247,26 @@ def test_parting_and_back_flanks_against_runge_kutta():
         assert off < tolerance + own
         assert np.abs(made.transmission_error[:, 0] - approach).max() < (tolerance + own) * np.abs(approach).max()
         assert off < made.estimates["integration"] + own
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1e-6])
+def test_a_stiffness_in_another_unit_is_refused(factor):
+    """N/mm or N/um for N/m: the flanks would approach by more than a quarter of a module."""
+    force = abs(TORQUE) / base_radius(30)
+    for stiffness in (1e8 * factor, curve(20, 1e8 * factor)):
+        yields = force / (1e8 * factor * (1.0 if isinstance(stiffness, float) else 0.9))
+        words = re.escape(f"yields by {1e3 * yields:.3g} mm, {yields / MODULE:.3g} modules, under the force")
+        with pytest.raises(InputError, match=rf"{words}.*stiffnesses are in N/m"):
+            build_train(train([(20, 30)], stiffness=lambda _, k=stiffness: k))
+
+
+def test_a_curve_of_another_wheel_is_refused():
+    """The mesh cycle is that of the pinion, so the wheel's base radius alone shows whose curve it is."""
+    angle = np.radians(np.arange(18.0))
+    table = StiffnessCurve(
+        pinion_angle=angle, k_mesh=np.full(18, 1e8), mesh_cycle=math.radians(18.0), base_radius=base_radius(40)
+    )
+    words = rf"base radius of {1e3 * base_radius(40):.6g} mm, the driven gear has {1e3 * base_radius(30):.6g} mm"
+    with pytest.raises(InputError, match=words):
+        build_train(train([(20, 30)], stiffness=lambda _: table))
+    build_train(train([(20, 40)], stiffness=lambda _: table))

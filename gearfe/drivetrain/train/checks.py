@@ -8,15 +8,18 @@ from collections.abc import Iterable
 import numpy as np
 
 from ...base.errors import InputError, unknown_name
-from ...gears.geometry.pair import gear_pair, in_keys
+from ...gears.geometry.pair import Gear, gear_pair, in_keys
 from ...gears.meshlaw.law import MeshLaw
+from ...gears.stiffness.curve import StiffnessCurve
 from ...gears.stiffness.periodic import PeriodicInterpolant
 from .friction import check_friction
 from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
-from .statics import check_flanks, one_sided
+from .statics import check_flanks, check_yields, one_sided
 
 #: Agreement of lengths and angles that count as equal (relative).
 SAME = 1e-6
+#: Base radii of a wheel that count as equal (relative): tables may hold four digits.
+ALIKE = 1e-3
 #: Longest stretch without a sample that a curve may have, as a share of its period.
 WIDEST_GAP = 0.15
 
@@ -25,6 +28,7 @@ def check_train(train: GearTrain) -> None:
     """Raise `InputError` for the first mistake."""
     check_layout(train)
     check_flanks(train, one_sided(train))
+    check_yields(train)
 
 
 def check_layout(train: GearTrain) -> None:
@@ -166,7 +170,7 @@ def _check_mesh(train: GearTrain, mesh: GearMesh) -> None:
     check_friction(label, mesh.friction, isinstance(mesh.stiffness, MeshLaw))
     for gear in (one, two):
         _check_pitch_errors(label, gear, isinstance(mesh.stiffness, MeshLaw))
-    check_curve(mesh, one.gear.teeth)
+    check_curve(mesh, one.gear.teeth, two.gear)
 
 
 def _check_damper(mesh: GearMesh) -> None:
@@ -198,8 +202,8 @@ def _check_pitch_errors(label: str, gear: ShaftGear, law: bool) -> None:
             raise InputError("pitch_errors", len(errors), problem, "give as many as the gear has teeth")
 
 
-def check_curve(mesh: GearMesh, teeth: int) -> None:
-    """The curve of a mesh covers one cycle of its driver, with positive values."""
+def check_curve(mesh: GearMesh, teeth: int, wheel: Gear) -> None:
+    """Check that the curve of a mesh covers one cycle of its driver with positive values, and is that of its wheel."""
     label, curve = f"mesh {mesh.name!r} stiffness", mesh.stiffness
     if mesh.backlash is not None and not (math.isfinite(mesh.backlash) and mesh.backlash >= 0.0):
         problem = "must be finite and >= 0 m: less is a wedged mesh, whose flanks all bear without a load"
@@ -232,6 +236,12 @@ def check_curve(mesh: GearMesh, teeth: int) -> None:
             problem = f"has a law of the back flanks with a period of {math.degrees(curve.sides[1].cycle):.9g} deg"
             raise InputError(label, None, problem, "take that of the same gears, seen from behind")
         return
+    if isinstance(curve, StiffnessCurve) and abs(curve.base_radius - wheel.base_radius) > ALIKE * wheel.base_radius:
+        problem = (
+            f"belongs to a wheel with a base radius of {1e3 * curve.base_radius:.6g} mm, "
+            f"the driven gear has {1e3 * wheel.base_radius:.6g} mm"
+        )
+        raise InputError(label, None, problem, "take the curve of these gears, the driver as pinion")
     table = mesh.interpolant()
     gaps = np.diff(table.nodes)
     widest = float(gaps.max()) / table.period

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.typing import Array, BoolArray
+from ...gears.geometry.validity import MOST_YIELD
 from ...gears.meshlaw.law import MeshLaw
 from .elements import rotor
 from .gear_train import GearMesh, GearTrain
@@ -94,6 +95,26 @@ def _back_flank_error(train: GearTrain, number: int, time: float) -> InputError:
         problem = f"brakes, but gear {mesh.driven!r} drives gear {mesh.driver!r}; {flanks}"
         cure = f"exchange driver and driven of mesh {mesh.name!r}, or change the sign of the torque"
     return InputError(f"load on {load.shaft!r} torque_Nm", torque, problem, cure)
+
+
+def check_yields(train: GearTrain) -> None:
+    """Raise `InputError` where the steady force moves the flanks of a mesh further than the gears' geometry holds.
+
+    A stiffness in another unit (N/um or N/mm for N/m) is the usual cause. Mesh laws know their range themselves.
+    """
+    for mesh, force in zip(train.meshes, train.kinematics.steady_forces.tolist(), strict=True):
+        if mesh.stiffness is None or isinstance(mesh.stiffness, MeshLaw):
+            continue
+        stiffness = float(mesh.interpolant().values.min())
+        module = train.gear(mesh.driver).gear.module
+        modules = abs(force) / stiffness / module
+        if modules > MOST_YIELD:
+            problem = (
+                f"yields by {1e3 * modules * module:.3g} mm, {modules:.3g} modules, under the force of steady running, "
+                f"{abs(force):.5g} N: must be {MOST_YIELD:g} modules or less"
+            )
+            cure = "stiffnesses are in N/m (1 N/um is 1e6 N/m), torques in N m; write a larger one, or a lower torque"
+            raise InputError(f"mesh {mesh.name!r} stiffness", stiffness, problem, cure)
 
 
 def static_errors(train: GearTrain, angle: Array) -> tuple[Array | None, ...]:

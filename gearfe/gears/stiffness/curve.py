@@ -68,6 +68,8 @@ SOLVED = ("converged", "no_contact")
 EDGES = ("none", "rounded", "singular")
 ROUNDED, SINGULAR = 1, 2
 
+#: Largest whole number up to which all are doubles (-): IEEE 754.
+LARGEST_COUNT = 2.0**53
 #: Constants of a table differ by no more than rounding to 12 digits (-).
 SAME = 1e-11
 #: Problem of a table without a mesh cycle.
@@ -306,14 +308,22 @@ class StiffnessCurve(ShownTable):
             if column.name in columns and own not in values:
                 found = _values(columns, column, path)
                 values[own] = _constant(found, column.name, path) if column.constant else found
-        if not (math.isfinite(values.get("mesh_cycle", math.nan)) and values["mesh_cycle"] > 0):
-            cure = "add a column mesh_cycle_deg (360 deg/pinion teeth), or give mesh_cycle"
+        cycle = values.get("mesh_cycle", math.nan)
+        cure = "add a column mesh_cycle_deg (360 deg/pinion teeth), or give mesh_cycle"
+        if math.isnan(cycle):
             raise InputError("stiffness curve", str(path), NO_CYCLE, cure)
-        values.setdefault("status", np.where(np.isfinite(values["k_mesh"]), "converged", "missing"))
+        if not 0.0 < cycle < math.inf:
+            problem = f"has a mesh cycle of {math.degrees(cycle):.9g} deg, which must be finite and > 0"
+            raise InputError("stiffness curve", str(path), problem, "write 360 deg/pinion teeth")
+        status = values.get("status", np.full(len(values["k_mesh"]), ""))
+        values["status"] = np.where(
+            status == "", np.where(np.isfinite(values["k_mesh"]), "converged", "missing"), status
+        )
         shares = [numbers(columns, name, path) for name in columns if name.startswith(SHARE)]
         values["load_share"] = np.stack(shares, axis=1) if shares else np.zeros((len(values["k_mesh"]), 0))
         curve = cls(**values)
         curve._check_ratio(str(path))
+        curve._check_columns(str(path))
         check_repeats(curve.pinion_angle, curve.k_mesh, curve.mesh_cycle, str(path))
         return curve
 
@@ -333,6 +343,41 @@ class StiffnessCurve(ShownTable):
                 f"{self.k_mesh[row]:.6g} N/m, whose ratio is the squared base radius of the wheel, {right:.6g} m2"
             )
             raise InputError("stiffness curve", path, problem, "correct one of the columns, or leave one out")
+
+    def _check_columns(self, path: str) -> None:
+        """Raise `InputError` where a column contradicts another one by its definition."""
+        arc = self.twist * self.base_radius
+        total = np.nansum(self.load_share, axis=1)
+        loaded = np.isfinite(self.load_share).any(axis=1) & (total != 0.0)  # without contact all shares are 0
+        largest = np.abs(arc[np.isfinite(arc)]).max(initial=0.0)
+        checks = (
+            (
+                self.failed & np.isfinite(self.k_mesh),
+                "has a stiffness and the status {status!r} of a position that failed",
+                "leave the cell of k_mesh_N_per_m empty, or write the status converged",
+            ),
+            (
+                np.abs(self.transmission_error - arc) > AGREEING * largest,
+                "has transmission_error {error:.6g} um, but twist times wheel_base_radius_mm is {arc:.6g} um",
+                "correct one of the columns, or leave one out",
+            ),
+            (
+                loaded & (np.abs(total - 1.0) > AGREEING),
+                "has load shares that add up to {total:.6g}, not to 1",
+                "write the share of each tooth pair, or leave these columns out",
+            ),
+        )
+        for wrong, text, cure in checks:
+            if wrong.any():
+                row = int(wrong.argmax())
+                said = text.format(
+                    status=str(self.status[row]),
+                    error=1e6 * self.transmission_error[row],
+                    arc=1e6 * arc[row],
+                    total=total[row],
+                )
+                problem = f"contradicts itself: row {row + 1} {said}"
+                raise InputError("stiffness curve", path, problem, cure)
 
 
 #: Field -> its column, in the order of the table but for the shares.
@@ -357,4 +402,10 @@ def _values(columns: Mapping[str, Sequence[str]], column: Column, path: str | Pa
     if isinstance(column.unknown, str):
         return np.array([cell.strip() for cell in columns[column.name]])
     found = numbers(columns, column.name, path)
-    return np.where(np.isnan(found), column.unknown, found).astype(type(column.unknown))
+    values = np.where(np.isnan(found), column.unknown, found)
+    if isinstance(column.unknown, int):
+        other = (values != np.floor(values)) | (np.abs(values) > LARGEST_COUNT)
+        if other.any():
+            problem = f"column {column.name} holds {values[int(other.argmax())]:g}, which is no whole number below 2^53"
+            raise InputError("stiffness curve", str(path), problem, "write a whole number, or leave the cell empty")
+    return values.astype(type(column.unknown))
