@@ -240,6 +240,24 @@ def test_a_displaced_tooth_is_no_thicker(gear: str, teeth: int, sign: float) -> 
     assert rooms["thick"].min() == pytest.approx(backlash - 2 * moved, abs=2e-9)
 
 
+def test_one_tooth_with_another_back_flank_bears_once_in_a_turn(elastic) -> None:
+    """Driving flanks that are alike repeat after one mesh cycle, the room behind the teeth after the full period."""
+    table = build(MicrogeometryTable, {"pinion": {"right": {"pitch_um": [12.0] + [0.0] * 19}}}, "microgeometry")
+    own, back = (deviations_of(table, PAIR, flank=side) for side in ("left", "right"))
+    angles = PAIR.mesh_cycle * np.arange(-8.0, 33.0) / 4.0
+    made = loads(elastic, [0.001], own, angles=angles, back=back)
+    behind = made.transmission_error_unloaded_back
+    late = np.abs(behind + 12e-6 * math.cos(PAIR.pinion.pressure_angle)) < 1e-9
+    assert late.any()
+    turns = np.abs(angles[late]) * PAIR.pinion.teeth / (2 * math.pi)  # of the tooth from the line of centres (pitches)
+    assert turns.max() < 1.2
+    assert np.abs(behind[~late]).max() < 12e-6
+    assert np.abs(behind[angles > 2 * PAIR.mesh_cycle]).max() < 1e-9
+    assert made.back_clearance[0] == pytest.approx(PAIR.normal_backlash + behind, abs=2e-7)
+    whole = loads(elastic, [0.001], own, positions=2, back=back)
+    assert whole.mesh_cycles == 60
+
+
 def test_python_gets_the_back_flanks_of_displaced_teeth() -> None:
     """Turns of the back flanks, in the order of the pair seen from behind, are those of a job file."""
     pair = gear_pair()

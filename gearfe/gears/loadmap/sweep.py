@@ -29,6 +29,7 @@ from .load_map import BACK, LoadMap
 from .root_stress import pair_roots, root_map
 
 if TYPE_CHECKING:
+    from ..contact.half_plane_pair import HalfPlanePair
     from .root_stress import PairRoots, ToothRoots
 
 
@@ -67,8 +68,8 @@ def sweep_loads(
     angles : array_like, shape (n,), optional
         Pinion angles (rad), instead of `positions`. Those after which all teeth meet again are solved once.
     positions, mesh_cycles
-        Pinion angles in a mesh cycle, and how many cycles; None: one where all teeth of each gear are alike, else the
-        full period, the least common multiple of the teeth.
+        Pinion angles in a mesh cycle, and how many cycles; None: one where the teeth of each gear are alike on both
+        sides, else the full period, the least common multiple of the teeth.
     root_stress
         Also the tension at the tooth roots, on separate refined meshes, see `gearfe.gears.loadmap.root_stress`.
     back
@@ -91,11 +92,13 @@ def sweep_loads(
     if elastic is None:
         elastic = elastic_pair(pair, model, watch=watch, **changes)
     solver, cycles = position_solver(elastic), 0
+    behind_model = None if back is None else solver.contact_model.deviated(back)
+    period = max(model.mesh_cycles for model in (solver.contact_model, behind_model) if model is not None)
     if angles is None:
-        cycles = solver.contact_model.mesh_cycles if mesh_cycles is None else mesh_cycles
+        cycles = period if mesh_cycles is None else mesh_cycles
         angles = np.arange(positions * cycles) * pair.mesh_cycle / positions
     requested, finite = requested_angles(pair, angles, ANGLES, kinematics)
-    solved_angles, source = distinct_phases(requested, pair.mesh_cycle * solver.contact_model.mesh_cycles)
+    solved_angles, source = distinct_phases(requested, pair.mesh_cycle * period)
     if len(goals) * len(solved_angles) > MOST_CELLS:
         problem = f"makes more than {MOST_CELLS} cells with {len(solved_angles)} angles"
         raise InputError("torques", len(goals), problem, "use fewer torques or positions, or state mesh_cycles")
@@ -108,8 +111,8 @@ def sweep_loads(
     with watch.stage("cells"), one_thread():
         found, at_roots = _cells(solver, solved_angles, goals, roots, finite=finite)
     room = behind = None
-    if back is not None:
-        behind, room = _room(solver, solved_angles, found, back)
+    if behind_model is not None:
+        behind, room = _room(solver, behind_model, solved_angles, found)
         found = found.with_status(np.where(room < 0.0, BACK, found.status))
         behind, room = behind[source], room.reshape(len(goals), -1)[:, source]
     n = len(solved_angles)
@@ -178,15 +181,13 @@ def _cells(
     return together(parts), joined(at_roots) if at_roots else None
 
 
-def _room(
-    solver: PositionSolver, angles: Array, found: Positions, back: tuple[ToothDeviations, ToothDeviations]
-) -> tuple[Array, Array]:
+def _room(solver: PositionSolver, behind_model: HalfPlanePair, angles: Array, found: Positions) -> tuple[Array, Array]:
     """Unloaded transmission error of the back flanks at all angles, shape (n,), and their clearance in all cells (m).
 
     Seen from the other side the pinion turns the other way.
     """
     pair, radius = solver.pair, solver.pair.wheel.base_radius
-    behind = radius * (solver.contact_model.deviated(back).first_contact_twists(-angles) - pair.contact_twist)
+    behind = radius * (behind_model.first_contact_twists(-angles) - pair.contact_twist)
     error = radius * (found.twist - pair.contact_twist)
     room = pair.normal_backlash + np.tile(behind, len(found) // len(angles)) + error
     return behind, np.where(found.status == "converged", room, np.nan)
