@@ -22,7 +22,7 @@ import numpy as np
 from gearfe import GearPair, sweep_stiffness
 from gearfe.base.tables.pair import LAWS
 from gearfe.gears.contact.laws import DEFAULT_MODEL
-from gearfe.gears.stiffness.job import read_stiffness_job
+from gearfe.gears.gearmesh.job import read_stiffness_job
 from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 
 ROOT = Path(__file__).resolve().parents[1]

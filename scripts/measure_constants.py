@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from gearfe.base.errors import InputError
-from gearfe.gears.stiffness.job import StiffnessJob, read_stiffness_job
-from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.gearmesh.job import StiffnessJob, read_stiffness_job
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))

@@ -25,8 +25,8 @@ from gearfe import Gear, GearPair, StiffnessCurve, sweep_stiffness
 from gearfe.base.errors import InputError
 from gearfe.fem.plane import Material, Plane
 from gearfe.gears.contact.laws import Nitsche
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.pair import TipRelief
-from gearfe.gears.stiffness.sweep import elastic_pair
 
 Case = tuple[GearPair, tuple[Material, Material], Plane]
 

@@ -145,8 +145,8 @@ def gears() -> Answers:
 def curves() -> Answers:
     """Curve and load map of a coarse pair with their estimates."""
     from gearfe.gears.contact.laws import HalfPlane
-    from gearfe.gears.loadmap.sweep import sweep_loads
-    from gearfe.gears.stiffness.sweep import sweep_stiffness
+    from gearfe.gears.gearmesh.load_sweep import sweep_loads
+    from gearfe.gears.gearmesh.sweep import sweep_stiffness
 
     pair, law = coarse_pair(), HalfPlane()
     curve = sweep_stiffness(pair, torque=80.0, law=law, coarsen=3.0, estimate_error=True)
@@ -171,7 +171,7 @@ def coarse_pair() -> Any:
 
 def coarse_gears(law: Any) -> Any:
     """Both condensed."""
-    from gearfe.gears.stiffness.sweep import elastic_pair
+    from gearfe.gears.gearmesh.sweep import elastic_pair
 
     return elastic_pair(coarse_pair(), law=law, coarsen=3.0)
 

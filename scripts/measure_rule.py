@@ -25,7 +25,7 @@ import numpy as np
 
 from gearfe.drivetrain.gearbox.job import job_train, read_train_job
 from gearfe.drivetrain.train import Bearing, Damping, build_train
-from gearfe.gears.stiffness.periodic import periodic_interpolant
+from gearfe.gears.gearmesh.periodic import periodic_interpolant
 from gearfe.mechanisms import load_mechanism
 from gearfe.multibody import Body, CoordinateSpring, Gravity, Hinge, Linkage, Moment, Slot, Spring, System, constant
 from gearfe.multibody.core.modes import fastest_rate

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from gearfe import sweep_stiffness
-from gearfe.gears.stiffness.job import read_stiffness_job
+from gearfe.gears.gearmesh.job import read_stiffness_job
 
 
 def main(job_file: str = "geometry/gear_train.toml", out: str = "stiffness.csv") -> int:

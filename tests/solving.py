@@ -8,7 +8,7 @@ from gearfe.gears.contact.compliance import MeshingPair
 from gearfe.gears.contact.elements import solve_elements
 from gearfe.gears.contact.laws import HalfPlane
 from gearfe.gears.contact.position import NO_LOADS, STATUS, TORQUES, Contacts, FlankLoads, Positions
-from gearfe.gears.stiffness.positions import position_solver
+from gearfe.gears.gearmesh.positions import position_solver
 
 
 def solve_positions(elastic: MeshingPair, angles, twists) -> Positions:

@@ -169,6 +169,6 @@ def test_whole_gears_load_nothing_that_they_check() -> None:
     """Whatever they import, directly or not: neither condensed gears nor the solvers on them."""
     contact = ["compliance", "elements", "element_batch", "half_plane", "half_plane_pair", "half_plane_step"]
     contact += ["panels", "position", "zones", "flank_compliance"]
-    names = ["gearfe.fem.multifrontal", "gearfe.gears.stiffness", *(f"gearfe.gears.contact.{name}" for name in contact)]
+    names = ["gearfe.fem.multifrontal", "gearfe.gears.gearmesh", *(f"gearfe.gears.contact.{name}" for name in contact)]
     code = f"import gearfe.gears.contact.whole_gears.position, sys; print([n for n in {names} if n in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

@@ -153,7 +153,7 @@ def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatc
         bad = np.abs(made.pinion_angle - math.radians(4)) < 1e-9
         return made.with_status(np.where(bad, "not_converged", made.status))
 
-    monkeypatch.setattr("gearfe.gears.stiffness.positions.solve_elements", weak)
+    monkeypatch.setattr("gearfe.gears.gearmesh.positions.solve_elements", weak)
     code = main(["stiffness", str(JOB), "--out", str(tmp_path), "--twist-deg", "0.3", *QUICK, "--law", "nitsche"])
     assert code == 1
     said = capsys.readouterr()
@@ -362,7 +362,7 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
         bad = np.isclose(np.degrees(made.pinion_angle), 6.0)
         return made.with_status(np.where(bad, "not_converged", made.status))
 
-    monkeypatch.setattr("gearfe.gears.stiffness.positions.solve_elements", one_fails)
+    monkeypatch.setattr("gearfe.gears.gearmesh.positions.solve_elements", one_fails)
     options = ("--twist-deg", "0.3", "--angles", "3", "3", "9", "--fields", "9", "6", "3")
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, "--law", "nitsche", *options]) == 1
     assert [r["status"] for r in rows(tmp_path)] == ["converged", "not_converged", "converged"]

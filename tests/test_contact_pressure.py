@@ -16,8 +16,8 @@ from gearfe import Material, sweep_stiffness
 from gearfe.gears.contact.elements import half_widths
 from gearfe.gears.contact.laws import ContactLaw, Nitsche, Penalty
 from gearfe.gears.contact.position import Positions
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.gear_data import TipRelief
-from gearfe.gears.stiffness.sweep import elastic_pair
 
 from .condensed_bodies import condensed_body, pressed, pressed_pair
 from .gears import pair

@@ -9,8 +9,8 @@ import pytest
 from scipy.interpolate import LinearNDInterpolator
 
 from gearfe.gears.contact.panels import EDGES, MIDDLES
-from gearfe.gears.stiffness.fields import bumped, field_recovery, half_plane_stress
-from gearfe.gears.stiffness.sweep import elastic_pair
+from gearfe.gears.gearmesh.fields import bumped, field_recovery, half_plane_stress
+from gearfe.gears.gearmesh.sweep import elastic_pair
 
 from .gears import pair as gear_pair
 from .solving import solve_position

@@ -11,7 +11,7 @@ from gearfe.drivetrain.runup import critical
 from gearfe.drivetrain.runup.report import summary
 from gearfe.drivetrain.runup.run_up import run_up
 from gearfe.drivetrain.train import Damping, build_train
-from gearfe.gears.stiffness.periodic import periodic_interpolant
+from gearfe.gears.gearmesh.periodic import periodic_interpolant
 from gearfe.multibody import constant
 
 from .trains import train

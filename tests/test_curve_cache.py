@@ -8,7 +8,7 @@ import pytest
 
 from gearfe.fem.plane import Material
 from gearfe.gears.contact.laws import HalfPlane, Nitsche, PairModel, Penalty
-from gearfe.gears.stiffness.job import cached_curve, curve_key
+from gearfe.gears.gearmesh.job import cached_curve, curve_key
 
 from .gears import pair
 
@@ -30,7 +30,7 @@ def test_the_second_time_nothing_is_computed(folder, monkeypatch):
     assert first.worst_error > 0.0
     assert math.isnan(cached_curve(gears, MODEL, **SWEEP).worst_error)
     assert cached_curve(gears, MODEL, **SWEEP | {"twist": 1.1e-3}).k_mesh[0] != first.k_mesh[0]
-    monkeypatch.setattr("gearfe.gears.stiffness.sweep.sweep_stiffness", None)
+    monkeypatch.setattr("gearfe.gears.gearmesh.sweep.sweep_stiffness", None)
     second = cached_curve(gears, MODEL, estimate_error=True, **SWEEP)
     for field in fields(first):
         if field.name != "timings":

@@ -10,9 +10,9 @@ import pytest
 from gearfe import sweep_stiffness
 from gearfe.fem.plane import Material
 from gearfe.gears.contact.laws import Nitsche, Penalty
+from gearfe.gears.gearmesh.positions import at_torques, position_solver, unseen_twists
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.face import face_of
-from gearfe.gears.stiffness.positions import at_torques, position_solver, unseen_twists
-from gearfe.gears.stiffness.sweep import elastic_pair
 
 from . import gears
 from .solving import solve_positions

@@ -9,10 +9,10 @@ import pytest
 
 from gearfe import InputError
 from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.deviation import Deviation, total
 from gearfe.gears.geometry.face import NOMINAL, ToothDeviations, face_of
 from gearfe.gears.geometry.first_contact import ToothFlanks, first_contact_curve
-from gearfe.gears.stiffness.sweep import elastic_pair
 
 from .gears import gear as single_gear
 from .gears import pair as gear_pair

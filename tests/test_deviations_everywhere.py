@@ -17,13 +17,13 @@ from gearfe.drivetrain.gearbox.job import job_train, read_train_job
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.train.statics import static_errors
 from gearfe.gears.contact.half_plane import half_plane_pair
+from gearfe.gears.gearmesh.load_sweep import sweep_loads
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 from gearfe.gears.geometry import pitch_errors
 from gearfe.gears.geometry.deviation_job import deviations_of
 from gearfe.gears.geometry.face import NOMINAL
 from gearfe.gears.geometry.modifications import FlankModification, Relief, tooth_deviations
-from gearfe.gears.loadmap.sweep import sweep_loads
 from gearfe.gears.meshlaw.make import mesh_law
-from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.multibody import constant
 
 from .gears import pair as gear_pair

@@ -13,8 +13,8 @@ from gearfe.gears.contact.elements import solve_elements
 from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gears.contact.laws import ContactLaw, Nitsche, PairModel, Penalty
 from gearfe.gears.contact.position import Positions
-from gearfe.gears.stiffness.positions import position_solver
-from gearfe.gears.stiffness.sweep import elastic_pair
+from gearfe.gears.gearmesh.positions import position_solver
+from gearfe.gears.gearmesh.sweep import elastic_pair
 
 from .contact_cases import IRON, STEEL, WIDTH, condensed, gears, meshes
 from .solving import nodal, peak_pressure, solve_position, solve_positions

@@ -15,10 +15,10 @@ from gearfe.figures import stress
 from gearfe.figures.stress import color_limit
 from gearfe.gears.contact.compliance import turn
 from gearfe.gears.contact.laws import Penalty
+from gearfe.gears.gearmesh.fields import GearRecovery, field_recovery, flank_pressures, straight_triangles
+from gearfe.gears.gearmesh.fields_output import chosen_positions, fields_size, size_note, write_fields
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 from gearfe.gears.geometry.derived import path_place
-from gearfe.gears.stiffness.fields import GearRecovery, field_recovery, flank_pressures, straight_triangles
-from gearfe.gears.stiffness.fields_output import chosen_positions, fields_size, size_note, write_fields
-from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.gears.teeth.whole_gear import whole_gear
 
 from .gears import pair

@@ -14,9 +14,9 @@ from gearfe.fem.plane import Material, physical_gradients, triangle_shapes
 from gearfe.gears.contact.compliance import MeshingPair, finite_strain_shares, gear_body, sector_displacements
 from gearfe.gears.contact.laws import Nitsche, PairModel
 from gearfe.gears.contact.position import Positions
+from gearfe.gears.gearmesh.positions import at_torques, at_twists, position_solver
+from gearfe.gears.gearmesh.sweep import sweep_stiffness
 from gearfe.gears.geometry.pair import Gear, GearPair
-from gearfe.gears.stiffness.positions import at_torques, at_twists, position_solver
-from gearfe.gears.stiffness.sweep import sweep_stiffness
 from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 
 from .solving import solve_position, solve_positions

@@ -11,8 +11,8 @@ import pytest
 from gearfe.fem.plane import Material
 from gearfe.gears.contact.half_plane import NEAR, first_state, half_plane_pair, solve_half_plane
 from gearfe.gears.contact.half_plane_step import change, step
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.pair import GearPair
-from gearfe.gears.stiffness.sweep import elastic_pair
 
 from .gears import gear
 from .gears import pair as gear_pair

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.deviation import Deviation
 from gearfe.gears.geometry.face import ToothDeviations, face_of
 from gearfe.gears.geometry.first_contact import Faces
 from gearfe.gears.geometry.pair import TipRelief
-from gearfe.gears.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair
 from .half_plane_pairs import PAIRS, angles_of, law_of

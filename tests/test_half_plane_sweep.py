@@ -14,10 +14,10 @@ from gearfe.cli.main import main
 from gearfe.fem.plane import Material
 from gearfe.gears.contact.compliance import MeshingPair, finite_strain_shares
 from gearfe.gears.contact.laws import HalfPlane, on_elements
-from gearfe.gears.loadmap.sweep import sweep_loads
-from gearfe.gears.stiffness.curve import StiffnessCurve
-from gearfe.gears.stiffness.positions import position_solver
-from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.gearmesh.curve import StiffnessCurve
+from gearfe.gears.gearmesh.load_sweep import sweep_loads
+from gearfe.gears.gearmesh.positions import position_solver
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 
 from .gears import pair as gear_pair
 from .solving import solve_positions

@@ -20,7 +20,7 @@ def loaded_after(code):
 
 SWEEP = """
 from gearfe import sweep_stiffness
-from gearfe.gears.stiffness.job import read_stiffness_job
+from gearfe.gears.gearmesh.job import read_stiffness_job
 job = read_stiffness_job("geometry/gear_train.toml")
 curve = sweep_stiffness(job.pair, twist=1e-3, angles=[0.05], coarsen=4.0)
 assert not curve.failed.any()

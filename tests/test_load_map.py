@@ -15,9 +15,9 @@ from gearfe.base.tables.jobs import load_job
 from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.job import read_train_job
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
-from gearfe.gears.loadmap.load_map import RootMap
-from gearfe.gears.stiffness.job import read_stiffness_job
-from gearfe.gears.stiffness.sweep import elastic_pair
+from gearfe.gears.gearmesh.job import read_stiffness_job
+from gearfe.gears.gearmesh.load_map import RootMap
+from gearfe.gears.gearmesh.sweep import elastic_pair
 
 from .gears import pair
 from .test_train_job import BORES, SMALL

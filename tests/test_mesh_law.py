@@ -14,14 +14,14 @@ from gearfe.base.errors import InputError
 from gearfe.fem.plane import Material
 from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gears.contact.laws import PairModel, law_named
+from gearfe.gears.gearmesh.job import read_stiffness_job
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.pair import TipRelief
 from gearfe.gears.meshlaw.fit import touch_cubics
 from gearfe.gears.meshlaw.law import MeshLaw
 from gearfe.gears.meshlaw.make import _nodes as phase_nodes
 from gearfe.gears.meshlaw.make import coupling_curve, mesh_law, touch_curve
 from gearfe.gears.meshlaw.store import cached_law, load_law, save_law, write_law_csv
-from gearfe.gears.stiffness.job import read_stiffness_job
-from gearfe.gears.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair
 

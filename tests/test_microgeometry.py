@@ -15,14 +15,14 @@ from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gears.contact.laws import Nitsche
 from gearfe.gears.contact.whole_gears.pair import ElasticGear, WholePair
 from gearfe.gears.contact.whole_gears.position import solve_position
+from gearfe.gears.gearmesh.load_map import BACK, LoadMap
+from gearfe.gears.gearmesh.load_sweep import sweep_loads
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 from gearfe.gears.geometry import pitch_errors
 from gearfe.gears.geometry.deviation_job import deviations_of, pitch_errors_of
 from gearfe.gears.geometry.face import NOMINAL, ToothDeviations
 from gearfe.gears.geometry.modifications import FlankModification, Relief, Waviness, tooth_deviations
 from gearfe.gears.geometry.pair import GearPair, TipRelief
-from gearfe.gears.loadmap.load_map import BACK, LoadMap
-from gearfe.gears.loadmap.sweep import sweep_loads
-from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 
 from .gears import pair as gear_pair

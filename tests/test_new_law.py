@@ -14,8 +14,8 @@ import pytest
 from gearfe import InputError, sweep_stiffness
 from gearfe.cli.main import main
 from gearfe.gears.contact.laws import PairModel, Penalty, law_named
-from gearfe.gears.stiffness.curve import StiffnessCurve
-from gearfe.gears.stiffness.job import curve_key, read_stiffness_job
+from gearfe.gears.gearmesh.curve import StiffnessCurve
+from gearfe.gears.gearmesh.job import curve_key, read_stiffness_job
 
 from .gears import pair as gear_pair
 

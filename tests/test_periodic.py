@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from gearfe.base.errors import InputError
-from gearfe.gears.stiffness.periodic import METHODS, periodic_interpolant
+from gearfe.gears.gearmesh.periodic import METHODS, periodic_interpolant
 
 PERIOD = 0.31
 

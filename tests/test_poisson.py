@@ -14,9 +14,9 @@ from gearfe.base.typing import Array
 from gearfe.fem.plane import Material, Plane, triangle_shapes
 from gearfe.gears.contact import compliance
 from gearfe.gears.contact.laws import MOST_POISSON, PairModel, law_named
+from gearfe.gears.gearmesh.job import stiffness_job
+from gearfe.gears.gearmesh.sweep import sweep_stiffness
 from gearfe.gears.geometry.pair import Gear, GearPair
-from gearfe.gears.stiffness.job import stiffness_job
-from gearfe.gears.stiffness.sweep import sweep_stiffness
 
 
 def mixed_stiffness(coordinates: Array, material: Material, plane: Plane, thickness: float) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gearfe.cli import stiffness
-from gearfe.gears.stiffness.curve import COLUMNS
+from gearfe.gears.gearmesh.curve import COLUMNS
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

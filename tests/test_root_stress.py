@@ -9,9 +9,9 @@ from gearfe.fem.plane import element_stiffness
 from gearfe.gears.contact.compliance import gear_body
 from gearfe.gears.contact.flank import flank_of
 from gearfe.gears.contact.position import FlankLoads
-from gearfe.gears.loadmap.root_stress import fillet_radius, pair_roots, peaks, root_mesh, root_recipe, spread_of
-from gearfe.gears.stiffness.fields import GearRecovery
-from gearfe.gears.stiffness.sweep import elastic_pair
+from gearfe.gears.gearmesh.fields import GearRecovery
+from gearfe.gears.gearmesh.root_stress import fillet_radius, pair_roots, peaks, root_mesh, root_recipe, spread_of
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 from gearfe.gears.teeth.whole_gear import whole_gear
 

@@ -17,7 +17,7 @@ from gearfe.base.shown import Shown, as_numbers, percent
 from gearfe.base.spectrum import amplitude_spectrum
 from gearfe.drivetrain.train import Damping, Load
 from gearfe.figures.results import PICTURES
-from gearfe.gears.stiffness.sweep import elastic_pair
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.mechanisms import load_mechanism
 from gearfe.multibody import constant, integrate
 

@@ -15,7 +15,7 @@ from gearfe import sweep_stiffness
 from gearfe.cli.main import main
 from gearfe.drivetrain.housing.model import Housing
 from gearfe.drivetrain.train import build_train, simulate
-from gearfe.gears.stiffness.sweep import elastic_pair
+from gearfe.gears.gearmesh.sweep import elastic_pair
 
 from .gears import pair
 from .housing_meshes import box
@@ -54,7 +54,7 @@ def loaded_after(code, **environment):
 def test_one_sector_instead_of_the_gears(gears, monkeypatch):
     """The whole gear is never built; that both routes agree is shown by tests/test_contact_routes.py."""
     # the modules that use it first: they must not meet the stand-in when they are imported
-    for room in ("gears.stiffness.fields", "gears.teeth.whole_gear"):
+    for room in ("gears.gearmesh.fields", "gears.teeth.whole_gear"):
         monkeypatch.setattr(f"gearfe.{room}.whole_gear", touched)
     elastic = elastic_pair(gears, coarsen=COARSE)
     curve = sweep_stiffness(gears, twist=TWIST, angles=[0.0, 0.1], elastic=elastic)
@@ -79,7 +79,7 @@ def test_fields_only_where_asked(tmp_path):
     plain += ["--no-estimate", "--no-pictures"]
     code = f"from gearfe.cli.main import main; assert main({[*plain, '--out', str(tmp_path / 'a')]!r}) == 0"
     loaded, _ = loaded_after(code)
-    room = {"gearfe.gears.stiffness.fields", "gearfe.gears.stiffness.fields_output", "gearfe.output.vtkhdf"}
+    room = {"gearfe.gears.gearmesh.fields", "gearfe.gears.gearmesh.fields_output", "gearfe.output.vtkhdf"}
     assert not loaded & {*room, "h5py", "pyvista", "matplotlib"}
     assert sorted(p.name for p in (tmp_path / "a").iterdir()) == ["stiffness.csv", "summary.json"]
     assert main([*plain, "--out", str(tmp_path / "b"), "--fields", "5"]) == 0

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gearfe import InputError, Material, sweep_stiffness
+from gearfe.gears.gearmesh.load_sweep import sweep_loads
+from gearfe.gears.gearmesh.positions import PositionSolver
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.gear_data import TipRelief
-from gearfe.gears.loadmap.sweep import sweep_loads
-from gearfe.gears.stiffness.positions import PositionSolver
-from gearfe.gears.stiffness.sweep import elastic_pair
 
 from .counting import counted
 from .gears import pair

@@ -8,7 +8,7 @@ import pytest
 
 from gearfe import StiffnessCurve
 from gearfe.base.errors import InputError
-from gearfe.gears.stiffness.curve import NO_CYCLE, as_text, numbers
+from gearfe.gears.gearmesh.curve import NO_CYCLE, as_text, numbers
 
 #: The first columns of the file, in the order that is promised to readers.
 PROMISED = (

@@ -10,11 +10,11 @@ import pytest
 from gearfe.base.config import build
 from gearfe.base.errors import InputError
 from gearfe.base.tables.pair import PairTable, StiffnessTable
+from gearfe.gears.gearmesh.job import StiffnessJob
+from gearfe.gears.gearmesh.positions import twists_for_torque
+from gearfe.gears.gearmesh.sweep import sweep_stiffness
 from gearfe.gears.geometry.derived import iso_values
 from gearfe.gears.geometry.pair import GearPair
-from gearfe.gears.stiffness.job import StiffnessJob
-from gearfe.gears.stiffness.positions import twists_for_torque
-from gearfe.gears.stiffness.sweep import sweep_stiffness
 
 from .solving import given_positions
 

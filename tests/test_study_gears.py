@@ -14,9 +14,9 @@ from gearfe.base.config import read_toml
 from gearfe.base.tables.jobs import job_tables
 from gearfe.base.tables.text import toml_document
 from gearfe.cli.main import main
+from gearfe.gears.gearmesh import sweep
+from gearfe.gears.gearmesh.job import StiffnessJob
 from gearfe.gears.geometry.pair import GearPair
-from gearfe.gears.stiffness import sweep
-from gearfe.gears.stiffness.job import StiffnessJob
 from gearfe.study.design import study_cases
 from gearfe.study.job import read_study, run_study
 

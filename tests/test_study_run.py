@@ -182,9 +182,9 @@ def test_outputs_that_the_job_does_not_give_are_told_before_any_case(tmp_path):
 def test_gears_and_their_microgeometry(tmp_path):
     """A stiffness study gives what the sweep gives; cases that share gears have the digits of cases that do not."""
     from gearfe.base.tables.jobs import job_tables
+    from gearfe.gears.gearmesh.job import StiffnessJob
+    from gearfe.gears.gearmesh.sweep import sweep_stiffness
     from gearfe.gears.geometry.pair import GearPair
-    from gearfe.gears.stiffness.job import StiffnessJob
-    from gearfe.gears.stiffness.sweep import sweep_stiffness
 
     job = "[pair]\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"
     job += "[pair.pinion]\nteeth = 22\npitch_diameter_mm = 44.0\nbore_diameter_mm = 10.0\n"

@@ -14,7 +14,7 @@ from gearfe.base.errors import InputError
 from gearfe.drivetrain.train import Damping, Drive, Load, build_train, simulate
 from gearfe.drivetrain.train.states import train_states
 from gearfe.drivetrain.train.statics import static_errors
-from gearfe.gears.stiffness.curve import StiffnessCurve
+from gearfe.gears.gearmesh.curve import StiffnessCurve
 from gearfe.multibody import TimeFunction, constant, integrate, smoothed_step
 
 from .mesh_laws import hertzian_law

@@ -10,7 +10,7 @@ from gearfe.drivetrain.train.discontinuities import leaves, train_discontinuity
 from gearfe.drivetrain.train.forces import CurveFlank, Gyro, LawFlank, TrainForces
 from gearfe.drivetrain.train.program import train_series
 from gearfe.drivetrain.train.series import train_order
-from gearfe.gears.stiffness.periodic import periodic_interpolant
+from gearfe.gears.gearmesh.periodic import periodic_interpolant
 from gearfe.multibody import TimeFunction, constant, smoothed_step
 from gearfe.multibody.compiled import kernels as compiled
 from gearfe.multibody.integrators.taylor import kernel_modal

@@ -12,8 +12,8 @@ import pytest
 
 from gearfe.base.errors import InputError
 from gearfe.drivetrain.train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, build_train, simulate
-from gearfe.gears.stiffness.curve import StiffnessCurve
-from gearfe.gears.stiffness.periodic import periodic_interpolant
+from gearfe.gears.gearmesh.curve import StiffnessCurve
+from gearfe.gears.gearmesh.periodic import periodic_interpolant
 from gearfe.multibody import constant
 
 from .trains import SHIPPED, changed, curve, elastic, gear, train

@@ -18,8 +18,8 @@ from gearfe.base.tables.train import TrainCurvesTable, TrainGearTable
 from gearfe.drivetrain.gearbox.job import bore_places, job_train, read_train_job, train_gear
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.train import build_train, simulate
+from gearfe.gears.gearmesh.curve import StiffnessCurve
 from gearfe.gears.geometry.pair import GearPair
-from gearfe.gears.stiffness.curve import StiffnessCurve
 
 SHIPPED = Path(__file__).parent.parent / "geometry" / "gear_train.toml"
 

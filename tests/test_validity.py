@@ -10,8 +10,8 @@ import pytest
 
 from gearfe import StiffnessCurve, sweep_stiffness
 from gearfe.cli.main import main
+from gearfe.gears.gearmesh.load_sweep import sweep_loads
 from gearfe.gears.geometry.validity import MOST_OVERLAP
-from gearfe.gears.loadmap.sweep import sweep_loads
 
 from .gears import pair as gear_pair
 

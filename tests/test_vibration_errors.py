@@ -19,7 +19,7 @@ from gearfe.drivetrain.vibration.errors import FORCES, PEAKS, STARTS, Run, with_
 from gearfe.drivetrain.vibration.follow import follow
 from gearfe.drivetrain.vibration.report import train_summary
 from gearfe.drivetrain.vibration.spectra import TrainRecord
-from gearfe.gears.stiffness.curve import StiffnessCurve
+from gearfe.gears.gearmesh.curve import StiffnessCurve
 from gearfe.multibody import constant
 from tests.test_cli_vibration import SMALL
 from tests.trains import SHIPPED, curve, elastic, train

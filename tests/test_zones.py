@@ -15,9 +15,9 @@ from gearfe.gears.contact.elements import solve_elements
 from gearfe.gears.contact.half_plane import HalfPlanePair, half_plane_pair, solve_half_plane
 from gearfe.gears.contact.panels import MIDDLES, PANELS, WIDTHS, couplings, influence, log_integral, unilateral
 from gearfe.gears.contact.position import Positions
+from gearfe.gears.gearmesh.job import read_stiffness_job
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.face import ToothDeviations
-from gearfe.gears.stiffness.job import read_stiffness_job
-from gearfe.gears.stiffness.sweep import elastic_pair
 
 from .gears import pair as gear_pair
 from .solving import solve_positions

@@ -10,8 +10,8 @@ import numpy as np
 
 from gearfe.drivetrain.train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from gearfe.fem.reduction.modal_body import ModalBody
+from gearfe.gears.gearmesh.periodic import PeriodicInterpolant, periodic_interpolant
 from gearfe.gears.geometry.pair import Gear
-from gearfe.gears.stiffness.periodic import PeriodicInterpolant, periodic_interpolant
 from gearfe.multibody import TimeFunction, constant, smoothed_step
 
 MODULE, ALPHA = 2.5e-3, math.radians(25.0)

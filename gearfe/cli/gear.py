@@ -51,8 +51,8 @@ def run(args: argparse.Namespace) -> int:
     pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
 
     from ..base.files import output_folder, whole_set, write_json
+    from ..gears.gearmesh.job import StiffnessJob
     from ..gears.geometry.derived import derived_geometry, iso_values
-    from ..gears.stiffness.job import StiffnessJob
 
     job = StiffnessJob(tables["pair"], tables.get("stiffness", StiffnessTable()), pair)
     folder = output_folder(args.out)

@@ -53,11 +53,11 @@ def run(args: argparse.Namespace) -> int:
 
     from ..base.files import output_folder, whole_set, write_csvs, write_json
     from ..base.progress import Stopwatch
-    from ..gears.loadmap.report import report_lines, summary, warnings
-    from ..gears.loadmap.report import tables as map_tables
-    from ..gears.loadmap.sweep import job_map
-    from ..gears.stiffness.job import stiffness_job
-    from ..gears.stiffness.report import deviation_lines
+    from ..gears.gearmesh.job import stiffness_job
+    from ..gears.gearmesh.load_report import report_lines, summary, warnings
+    from ..gears.gearmesh.load_report import tables as map_tables
+    from ..gears.gearmesh.load_sweep import job_map
+    from ..gears.gearmesh.report import deviation_lines
 
     watch, beside = Stopwatch({"program start": time.perf_counter() - started}), Path(args.job).parent
     with watch.stage("geometry"):

@@ -13,7 +13,7 @@ from .arguments import add_job, add_json, add_keys, add_pictures, check_option, 
 
 if TYPE_CHECKING:
     from ..fem.meshing.export import MeshPart
-    from ..gears.stiffness.job import StiffnessJob
+    from ..gears.gearmesh.job import StiffnessJob
 
 
 #: Teeth of each gear whose flanks are fine in a deck, by default.
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..base.files import output_folder
     from ..fem.meshing.export import export_mesh, format_of, group_sizes
-    from ..gears.stiffness.job import StiffnessJob
+    from ..gears.gearmesh.job import StiffnessJob
 
     format_of(args.out)
     job = StiffnessJob(tables["pair"], table, pair)
@@ -151,7 +151,7 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, MeshPa
 
     from ..base.errors import InputError
     from ..fem.meshing.deck import Deck, write_deck
-    from ..gears.stiffness.sweep import sweep_stiffness
+    from ..gears.gearmesh.sweep import sweep_stiffness
     from ..version import VERSION
 
     sweep = {**job.sweep, "angles": np.array([math.radians(args.angle_deg)])}

@@ -97,34 +97,34 @@ def run(args: argparse.Namespace) -> int:
 
     from ..base.files import output_folder, whole_set, write_json
     from ..base.progress import Stopwatch
-    from ..gears.stiffness.job import stiffness_job
-    from ..gears.stiffness.report import report_lines, summary, warnings
-    from ..gears.stiffness.sweep import sweep_stiffness
+    from ..gears.gearmesh.job import stiffness_job
+    from ..gears.gearmesh.report import report_lines, summary, warnings
+    from ..gears.gearmesh.sweep import sweep_stiffness
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
         job = stiffness_job(tables, Path(args.job).parent, pair)
         sweep = job.sweep
         if chosen is not None:
-            from ..gears.stiffness.fields_output import angle_numbers
+            from ..gears.gearmesh.fields_output import angle_numbers
 
             angle_numbers(np.degrees(sweep["angles"]), chosen)
         if args.check is not None:
-            from ..gears.stiffness.check import checked_rows, whole_law
+            from ..gears.gearmesh.check import checked_rows, whole_law
 
             checked_rows(args.check, len(sweep["angles"]), "--check")
             whole_law(job.model, "--check")
     folder = output_folder(args.out)
     elastic = job.elastic(watch=watch)
     if args.fields is not None:
-        from ..gears.stiffness.fields_output import size_note
+        from ..gears.gearmesh.fields_output import size_note
 
         announce(size_note(elastic, np.degrees(sweep["angles"]), chosen))
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, **sweep)
     watch.seconds.update(curve.timings)
     check = None
     if args.check is not None:
-        from ..gears.stiffness.check import check_positions
+        from ..gears.gearmesh.check import check_positions
 
         with watch.stage("check"):
             check = check_positions(curve, job.pair, args.check, job.model, kinematics=sweep["kinematics"])
@@ -137,7 +137,7 @@ def run(args: argparse.Namespace) -> int:
                 check.to_csv(made / "stiffness_check.csv")
         if args.fields is not None:
             with watch.stage("fields"):
-                from ..gears.stiffness.fields_output import write_fields
+                from ..gears.gearmesh.fields_output import write_fields
 
                 def draw(position: Any, fields: Any) -> None:
                     from ..figures.stress import stress_figure

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..base.typing import Array
+from ..gears.gearmesh.load_map import LoadMap
 from ..gears.geometry.deviation_job import GEARS
-from ..gears.loadmap.load_map import LoadMap
 from .style import BLUE, ORANGE, RED, headed, labelled, new_figure, shades, some_of
 
 #: Lines of a panel; of more torques, so many are drawn.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..base.typing import Array
     from ..drivetrain.train.response import TrainResponse
     from ..fem.reduction.modal_body import ModalBody
-    from ..gears.stiffness.curve import StiffnessCurve
+    from ..gears.gearmesh.curve import StiffnessCurve
     from ..multibody.core.trajectory import Trajectory
 
 #: Faces of a body that are drawn at most.

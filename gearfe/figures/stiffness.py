@@ -11,15 +11,15 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.typing import Array, IntArray
+from ..gears.gearmesh.curve import StiffnessCurve
+from ..gears.gearmesh.job import StiffnessJob
+from ..gears.gearmesh.periodic import distinct_phases
 from ..gears.geometry.derived import single_pair_stretches
 from ..gears.geometry.pair import GearPair
-from ..gears.stiffness.curve import StiffnessCurve
-from ..gears.stiffness.job import StiffnessJob
-from ..gears.stiffness.periodic import distinct_phases
 from .style import BLUE, GREEN, GREY, ORANGE, RED, headed, new_figure, save, shades, some_of, tidy
 
 if TYPE_CHECKING:
-    from ..gears.stiffness.fields import FlankPressure
+    from ..gears.gearmesh.fields import FlankPressure
 
 #: Positions in the picture of the pressures at most.
 MOST_LINES = 12

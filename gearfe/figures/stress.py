@@ -15,10 +15,10 @@ from ..base.progress import one_thread
 from ..base.typing import Array, IntArray
 from ..gears.contact.compliance import MeshingPair
 from ..gears.contact.position import Positions
+from ..gears.gearmesh.curve import StiffnessCurve
+from ..gears.gearmesh.fields import GearField, solved_fields, straight_triangles
 from ..gears.geometry.derived import zone
 from ..gears.geometry.pair import GearPair
-from ..gears.stiffness.curve import StiffnessCurve
-from ..gears.stiffness.fields import GearField, solved_fields, straight_triangles
 from .style import new_figure, save, write_film
 
 #: Points, shape (n, 2) (mm), straight triangles, shape (m, 3), and stress at the points (MPa) of one gear.

@@ -24,7 +24,7 @@ from ..gears.geometry.face import NOMINAL
 from .expressions import Answer
 
 if TYPE_CHECKING:
-    from ..gears.stiffness.job import Keep
+    from ..gears.gearmesh.job import Keep
 
 #: Tables of a job as parsed from TOML.
 Raw = dict[str, Any]
@@ -71,8 +71,8 @@ def solve(kind: str, raw: Raw, path: Path, shared: Shared, *, estimate: bool = F
 
 
 def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool) -> Answer:
-    from ..gears.stiffness.report import summary
-    from ..gears.stiffness.sweep import sweep_stiffness
+    from ..gears.gearmesh.report import summary
+    from ..gears.gearmesh.sweep import sweep_stiffness
 
     job = _pair_job(job_tables(raw, path, ("pair",), ("stiffness", "microgeometry")), path)
     sweep, elastic = job.sweep, job.elastic(_kept(job, shared))
@@ -81,8 +81,8 @@ def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool) -> Answer:
 
 
 def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
-    from ..gears.loadmap.report import summary, tables
-    from ..gears.loadmap.sweep import job_map
+    from ..gears.gearmesh.load_report import summary, tables
+    from ..gears.gearmesh.load_sweep import job_map
 
     read = job_tables(raw, path, ("pair",), ("stiffness", "microgeometry", "loadmap"))
     table, job = loads_of(read), _pair_job(read, path)
@@ -146,7 +146,7 @@ def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
 
 
 def _pair_job(tables: dict[str, Any], path: Path) -> Any:
-    from ..gears.stiffness.job import stiffness_job
+    from ..gears.gearmesh.job import stiffness_job
 
     return stiffness_job(tables, path.parent)
 

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gearfe.gears.gearmesh.sweep import sweep_stiffness
 from gearfe.gears.geometry.derived import mesh_stiffness, single_stiffness
-from gearfe.gears.stiffness.sweep import sweep_stiffness
 from gearfe.multibody import integrate
 
 from ..housing_meshes import reference_housing

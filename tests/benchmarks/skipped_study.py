@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from gearfe.gears.stiffness.positions import position_solver
-from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.gearmesh.positions import position_solver
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 
 from .record import Record
 from .subject import GEOMETRY, ROOT, housing_of, shipped_housing, shipped_pair
@@ -92,7 +92,7 @@ def neighbours(quick: bool) -> tuple[float, float, str]:
 
 def fields(quick: bool) -> tuple[float, float, str]:
     """A sweep without fields; with displacement and stress of the whole gears at every position."""
-    from gearfe.gears.stiffness.fields import field_recovery
+    from gearfe.gears.gearmesh.fields import field_recovery
 
     pair = shipped_pair()
     elastic = elastic_pair(pair, coarsen=5.0 if quick else 1.0)

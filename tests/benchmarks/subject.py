@@ -41,7 +41,7 @@ def given_file(path: Path) -> Path:
 
 def shipped_pair() -> GearPair:
     """20/30 teeth with tip rounds of 0.1 mm, `geometry/gear_train.toml`."""
-    from gearfe.gears.stiffness.job import read_stiffness_job
+    from gearfe.gears.gearmesh.job import read_stiffness_job
 
     return read_stiffness_job(given_file(GEOMETRY / "gear_train.toml")).pair
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
 from typing import Any
 
-from gearfe.gears.stiffness.sweep import sweep_stiffness
+from gearfe.gears.gearmesh.sweep import sweep_stiffness
 
 from .peers.process import missing
 from .record import Record, Table

@@ -15,9 +15,9 @@ import numpy as np
 
 from gearfe.base.tables.pair import DEFAULT_LAW, LAWS
 from gearfe.gears.contact.laws import DEFAULT_MODEL
+from gearfe.gears.gearmesh.curve import StiffnessCurve
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 from gearfe.gears.geometry.pair import GearPair
-from gearfe.gears.stiffness.curve import StiffnessCurve
-from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
 from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 
 from .record import Record

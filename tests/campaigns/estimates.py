@@ -89,8 +89,8 @@ def _draw_curve(random: np.random.Generator, number: int, kind: str) -> Case:
 
 def _run_curve(case: Case, job_path: Path) -> Found:
     """Worst relative error over six positions."""
-    from gearfe.gears.stiffness.job import read_stiffness_job
-    from gearfe.gears.stiffness.sweep import sweep_stiffness
+    from gearfe.gears.gearmesh.job import read_stiffness_job
+    from gearfe.gears.gearmesh.sweep import sweep_stiffness
 
     job = read_stiffness_job(job_path)
     del case

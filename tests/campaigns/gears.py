@@ -25,11 +25,11 @@ from gearfe.base.tables.pair import DEFAULT_LAW, LAWS
 from gearfe.gears.contact.compliance import MeshingPair
 from gearfe.gears.contact.laws import HalfPlane
 from gearfe.gears.contact.position import Positions
+from gearfe.gears.gearmesh.curve import SOLVED
+from gearfe.gears.gearmesh.job import read_stiffness_job
+from gearfe.gears.gearmesh.positions import ANGLE_ROUNDING, PositionSolver, position_solver
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 from gearfe.gears.geometry.pair import GearPair
-from gearfe.gears.stiffness.curve import SOLVED
-from gearfe.gears.stiffness.job import read_stiffness_job
-from gearfe.gears.stiffness.positions import ANGLE_ROUNDING, PositionSolver, position_solver
-from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
 
 from .campaign import Campaign, Case
 from .outcome import Check, Finding

@@ -19,8 +19,8 @@ import numpy as np
 
 from gearfe.gears.contact.compliance import MeshingPair
 from gearfe.gears.contact.laws import HalfPlane, Nitsche
-from gearfe.gears.stiffness.job import StiffnessJob, read_stiffness_job
-from gearfe.gears.stiffness.sweep import elastic_pair
+from gearfe.gears.gearmesh.job import StiffnessJob, read_stiffness_job
+from gearfe.gears.gearmesh.sweep import elastic_pair
 
 from ..solving import solve_positions
 from .campaign import Campaign, Case, Columns

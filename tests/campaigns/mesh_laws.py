@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
+from gearfe.gears.gearmesh.job import read_stiffness_job
 from gearfe.gears.meshlaw.make import LEAST_FORCE, mesh_law
-from gearfe.gears.stiffness.job import read_stiffness_job
 
 from .campaign import Campaign, Case, Columns
 from .outcome import Check, Finding, Outcome

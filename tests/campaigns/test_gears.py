@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from gearfe.base.errors import InputError
-from gearfe.gears.stiffness.job import read_stiffness_job
-from gearfe.gears.stiffness.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.gearmesh.job import read_stiffness_job
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 
 from .campaign import Case
 from .gears import run

@@ -25,10 +25,10 @@ from ...base.tables.spectrum import SpectrumTable
 from ...base.tables.timefunction import TrainFunctionTable
 from ...base.tables.train import POTENTIAL, TrainGearTable, TrainMeshTable, TrainTable
 from ...base.typing import Array
+from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.geometry.deviation_job import pitch_errors_of
 from ...gears.geometry.pair import Gear, GearPair, gear_of_form, gear_pair, in_keys
 from ...gears.meshlaw.law import MeshLaw
-from ...gears.stiffness.curve import StiffnessCurve
 from ...multibody import TimeFunction, smoothed_step
 from ..housing.body import bore_points, reduced_housing
 from ..train.checks import check_flanks, check_layout

@@ -14,13 +14,13 @@ from ...base.errors import InputError, given
 from ...base.progress import stage
 from ...base.tables.train import MEAN, POTENTIAL
 from ...gears.contact.laws import HalfPlane, check_alike, check_deviations
+from ...gears.gearmesh.curve import NO_CYCLE, StiffnessCurve
+from ...gears.gearmesh.job import StiffnessJob, cached_curve, material_of
 from ...gears.geometry.deviation_job import deviations_of
 from ...gears.geometry.face import NOMINAL, ToothDeviations
 from ...gears.geometry.pair import GearPair, gear_pair
 from ...gears.meshlaw.law import MeshLaw
 from ...gears.meshlaw.store import cached_law
-from ...gears.stiffness.curve import NO_CYCLE, StiffnessCurve
-from ...gears.stiffness.job import StiffnessJob, cached_curve, material_of
 from ..train.gear_train import GearMesh, GearTrain
 from .job import Stiffness, TrainJob, back_flanks, job_train
 

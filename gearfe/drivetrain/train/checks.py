@@ -8,10 +8,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from ...base.errors import InputError, unknown_name
+from ...gears.gearmesh.curve import StiffnessCurve
+from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.pair import Gear, gear_pair, in_keys
 from ...gears.meshlaw.law import MeshLaw
-from ...gears.stiffness.curve import StiffnessCurve
-from ...gears.stiffness.periodic import PeriodicInterpolant
 from .friction import check_friction
 from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from .statics import check_flanks, check_yields, one_sided

@@ -31,8 +31,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ...base.typing import Array, BoolArray, IntArray
+from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.meshlaw.law import MeshForces, MeshLaw
-from ...gears.stiffness.periodic import PeriodicInterpolant
 from ...multibody.series.timefunctions import TimeFunction
 from .friction import Sliding, smooth_sign
 

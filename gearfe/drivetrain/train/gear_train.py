@@ -15,10 +15,10 @@ from ...base.errors import InputError
 from ...base.shown import Facts
 from ...base.typing import Array
 from ...fem.reduction.modal_body import ModalBody
+from ...gears.gearmesh.curve import StiffnessCurve
+from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.pair import Gear, MeshGeometry
 from ...gears.meshlaw.law import MeshLaw
-from ...gears.stiffness.curve import StiffnessCurve
-from ...gears.stiffness.periodic import PeriodicInterpolant
 from ...multibody.series.timefunctions import TimeFunction
 from .friction import Lubrication
 from .kinematics import Kinematics, kinematics

@@ -34,9 +34,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.typing import Array, IntArray
+from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.pair import GearPair, gear_pair
 from ...gears.meshlaw.law import MeshLaw
-from ...gears.stiffness.periodic import PeriodicInterpolant
 from ...multibody import Element, LinearJoint
 from .elements import LinearForce, RigidShaft
 from .forces import CurveFlank, Flank, LawFlank

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...base.spectrum import OrderLine, nearest_line, order_lines, peaks
 from ...base.typing import Array
+from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.meshlaw.law import MeshLaw
-from ...gears.stiffness.curve import StiffnessCurve
 from ..gearbox.stability import Stability
 from ..train.gear_train import GearTrain
 from ..train.mesh_element import LEAST_REFERENCE, PHASES

@@ -347,7 +347,7 @@ def flank_loads(
 
     They are the consistent ones of the pressures on the panels, at their places on the deformed flanks and along the
     common normal. Displacements recovered from them are those of the teeth; nearer to a contact than an element or two
-    they show what the coarse flank makes of the pressure. Stresses there: `gearfe.gears.stiffness.fields`.
+    they show what the coarse flank makes of the pressure. Stresses there: `gearfe.gears.gearmesh.fields`.
 
     Parameters
     ----------

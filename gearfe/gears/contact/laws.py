@@ -228,7 +228,7 @@ HALF_PLANE_FLANK, HALF_PLANE_COARSEST = 4.0, 6.0
 
 @dataclass(frozen=True)
 class PairModel:
-    """Model of a pair: what `gearfe.gears.stiffness.sweep.elastic_pair` makes of its gears.
+    """Model of a pair: what `gearfe.gears.gearmesh.sweep.elastic_pair` makes of its gears.
 
     Parameters
     ----------

@@ -20,8 +20,8 @@ from ...base.progress import stage
 from ...base.typing import Array
 from ...output.arrays import load_arrays, save_arrays
 from ..contact.laws import HalfPlane, PairModel
+from ..gearmesh.job import curve_key
 from ..geometry.pair import GearPair
-from ..stiffness.job import curve_key
 from .law import NO_CONTACT, MeshLaw
 
 #: Fields that are arrays, with the number of their axes.
@@ -97,7 +97,7 @@ def cached_law(pair: GearPair, model: PairModel, force: float) -> MeshLaw:
 
     def made() -> dict[str, Array]:
         from ..contact.half_plane import half_plane_pair
-        from ..stiffness.sweep import elastic_pair
+        from ..gearmesh.sweep import elastic_pair
         from .make import mesh_law
 
         with stage("mesh law"):

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearfe.drivetrain.train.forces import CurveFlank
-from gearfe.gears.stiffness.periodic import Curves, curve_arrays
+from gearfe.gears.gearmesh.periodic import Curves, curve_arrays
 from gearfe.multibody.compiled.packed import Packed
 from gearfe.multibody.series.recurrences import time_series
 from gearfe.multibody.series.timefunctions import Times, time_arrays

@@ -26,8 +26,8 @@ from ...base.shown import ShownTable
 from ...base.typing import Array, BoolArray
 from ..geometry.deviation_job import GEARS
 from ..geometry.pair import GearPair
-from ..stiffness.curve import StiffnessCurve, as_text, numbers
-from ..stiffness.sweep import PairLoads
+from .curve import StiffnessCurve, as_text, numbers
+from .sweep import PairLoads
 
 #: Column of the torque that a row belongs to.
 TORQUE = "torque_Nm"
@@ -47,7 +47,7 @@ class RootMap:
     diameter : ndarray, shape (m, n, 2)
         Where the largest one of them acts (m).
     error : ndarray, shape (m, n, 2)
-        Its estimated relative error (-), see `gearfe.gears.loadmap.root_stress`.
+        Its estimated relative error (-), see `gearfe.gears.gearmesh.root_stress`.
     """
 
     stress: Array

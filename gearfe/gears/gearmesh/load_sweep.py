@@ -1,6 +1,6 @@
 r"""A load map computed: the twist at which each pinion angle carries each torque.
 
-Each torque is a curve as `gearfe.gears.stiffness.sweep` makes it; all cells are solved side by side.
+Each torque is a curve as `gearfe.gears.gearmesh.sweep` makes it; all cells are solved side by side.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from ..contact.laws import DEFAULT_MODEL, PairModel
 from ..contact.position import Positions, joined, taken, together
 from ..geometry.face import ToothDeviations
 from ..geometry.pair import GearPair
-from ..stiffness.job import Keep, StiffnessJob
-from ..stiffness.periodic import distinct_phases
-from ..stiffness.positions import PositionSolver, at_torques, position_solver
-from ..stiffness.sweep import assembled_curve, elastic_pair, requested_angles
+from .job import Keep, StiffnessJob
 from .load_map import BACK, LoadMap
+from .periodic import distinct_phases
+from .positions import PositionSolver, at_torques, position_solver
 from .root_stress import pair_roots, root_map
+from .sweep import assembled_curve, elastic_pair, requested_angles
 
 if TYPE_CHECKING:
     from ..contact.half_plane_pair import HalfPlanePair
@@ -64,19 +64,19 @@ def sweep_loads(
     torques : array_like, shape (m,)
         Torques at the wheel's hub (N m), > 0.
     model, kinematics, elastic, changes
-        See `gearfe.gears.stiffness.sweep.sweep_stiffness`; teeth may differ (``deviations=(pinion, wheel)``).
+        See `gearfe.gears.gearmesh.sweep.sweep_stiffness`; teeth may differ (``deviations=(pinion, wheel)``).
     angles : array_like, shape (n,), optional
         Pinion angles (rad), instead of `positions`. Those after which all teeth meet again are solved once.
     positions, mesh_cycles
         Pinion angles in a mesh cycle, and how many cycles; None: one where the teeth of each gear are alike on both
         sides, else the full period, the least common multiple of the teeth.
     root_stress
-        Also the tension at the tooth roots, on separate refined meshes, see `gearfe.gears.loadmap.root_stress`.
+        Also the tension at the tooth roots, on separate refined meshes, see `gearfe.gears.gearmesh.root_stress`.
     back
         Deviations of the back flanks of pinion and wheel, of the pair seen from the other side as
         `geometry.deviation_job.deviations_of` and, for displaced teeth, `geometry.pitch_errors.back_turns` give
         them, to know the room behind the teeth: positions without
-        have the status `gearfe.gears.loadmap.load_map.BACK` and no numbers.
+        have the status `gearfe.gears.gearmesh.load_map.BACK` and no numbers.
 
     Returns
     -------

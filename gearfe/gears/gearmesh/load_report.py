@@ -17,10 +17,10 @@ from ..geometry import pitch_errors
 from ..geometry.derived import derived_geometry
 from ..geometry.deviation_job import GEARS
 from ..geometry.validity import overlap_warnings
-from ..stiffness.curve import EDGES
-from ..stiffness.job import StiffnessJob
-from ..stiffness.report import cure_of, largest_pressures, pressure_lines
+from .curve import EDGES
+from .job import StiffnessJob
 from .load_map import BACK, LoadMap
+from .report import cure_of, largest_pressures, pressure_lines
 
 #: Harmonics of the mesh order in the table by torque.
 HARMONICS = 5

@@ -130,7 +130,7 @@ class StiffnessCurve(ShownTable):
         Tooth pairs that carry load; -1 where the position failed.
     peak_pressure, peak_pressure_error
         Largest Hertzian pressure of the tooth pairs that bear on smooth flanks (Pa), and how far the computed contacts
-        are from Hertz's (-), see `gearfe.gears.stiffness.sweep`; not-a-number where none does.
+        are from Hertz's (-), see `gearfe.gears.gearmesh.sweep`; not-a-number where none does.
     edge_pressure
         The like where an edge bears (Pa), blunted by a hundredth of a module; not-a-number where none bears.
     edge
@@ -158,7 +158,7 @@ class StiffnessCurve(ShownTable):
         Seconds by stage; not in the CSV file.
     relative_error
         Estimated discretisation error of k_mesh (-), which covers the true one at about 19 of 20 positions, see
-        `gearfe.gears.stiffness.positions`; not-a-number where there is none.
+        `gearfe.gears.gearmesh.positions`; not-a-number where there is none.
     """
 
     pinion_angle: Array = _column("pinion_angle_deg")

@@ -1,4 +1,4 @@
-"""From the [pair] and [stiffness] tables of a job file to the arguments of `gears.stiffness.sweep.sweep_stiffness`.
+"""From the [pair] and [stiffness] tables of a job file to the arguments of `gears.gearmesh.sweep.sweep_stiffness`.
 
 Curves are kept on disk: a second run with the same gears, load and mesh sizes reads its curve.
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from ..contact.compliance import MeshingPair
 
 #: Packages whose text decides a curve.
-PACKAGES = ("fem", "fem/meshing", "gears/contact", "gears/geometry", "gears/stiffness", "gears/teeth")
+PACKAGES = ("fem", "fem/meshing", "gears/contact", "gears/geometry", "gears/gearmesh", "gears/teeth")
 #: Gives what a function makes, or what was made under that name before.
 Keep = Callable[[str, Callable[[], Any]], Any]
 
@@ -103,7 +103,7 @@ class StiffnessJob:
 
     @property
     def model(self) -> PairModel:
-        """What `gearfe.gears.stiffness.sweep.elastic_pair` makes of the gears."""
+        """What `gearfe.gears.gearmesh.sweep.elastic_pair` makes of the gears."""
         t = self.table
         for side, material in zip(("pinion", "wheel"), self.materials, strict=True):
             own = getattr(self.pair_table, side).material is not None
@@ -127,7 +127,7 @@ class StiffnessJob:
 
     @property
     def sweep(self) -> dict[str, Any]:
-        """Keyword arguments of `gearfe.gears.stiffness.sweep.sweep_stiffness` beside `model`.
+        """Keyword arguments of `gearfe.gears.gearmesh.sweep.sweep_stiffness` beside `model`.
 
         Raises
         ------

@@ -1,1 +1,0 @@
-"""Mesh stiffness and tooth-root stress over twist and rotation: sweep, map, report."""
