@@ -13,6 +13,7 @@ from gearfe.base.config import build, quantity, read_toml
 from gearfe.base.errors import InputError
 from gearfe.base.files import read_csv, read_numbers
 from gearfe.base.tables.jobs import load_job
+from gearfe.base.tables.pair import MaterialTable
 
 
 @dataclass(frozen=True)
@@ -147,3 +148,11 @@ def test_gears_load_no_finite_element_or_plotting_library():
         "assert not bad, bad\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+@pytest.mark.parametrize("key", ["youngs_modulus_GPa", "density_kg_per_m3"])
+@pytest.mark.parametrize("number", [10**400, -(10**400)])
+def test_materials_with_whole_numbers_beyond_floats_are_refused(key, number):
+    """Keys whose cure tries other units: a whole number of 400 digits is no float."""
+    with pytest.raises(InputError, match=f"t.{key} = .*must be finite"):
+        build(MaterialTable, {key: number}, "t")

@@ -19,15 +19,15 @@ from typing import Any, TypeVar
 
 from .errors import InputError, nearest, unknown_key
 from .files import read_text
-from .suspects import other_unit
+from .suspects import LARGEST, other_unit
 
 T = TypeVar("T")
 
 #: Of a removed key: what became of it, and what to write instead, which may depend on its value.
 Removed = tuple[str, str | Callable[[Any], str]]
 
-#: No number in everyday units is larger: the fourth powers of such numbers overflow; whole ones have 64 bits in arrays.
-LARGEST, LARGEST_WHOLE = 1e75, 2**63 - 1
+#: Whole numbers have 64 bits in arrays.
+LARGEST_WHOLE = 2**63 - 1
 
 
 def quantity(

@@ -46,6 +46,8 @@ MATERIALS = {
     ),
 }  # fmt: skip
 
+#: No number in everyday units is larger (-): the fourth powers of such numbers overflow.
+LARGEST = 1e75
 #: A length so many times the median of all lengths is suspected: a millimetre is 1000 times too long as a metre.
 FAR = 200.0
 #: Terms of a function of time that have its unit.
@@ -63,7 +65,7 @@ def _numbers(value: Any, name: str, key: str) -> Iterator[tuple[str, str, float]
     elif isinstance(value, list):
         for i, item in enumerate(value):
             yield from _numbers(item, f"{name}[{i}]", key)
-    elif isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e75:
+    elif isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < LARGEST:
         yield name, key, float(value)
 
 
@@ -97,7 +99,7 @@ def _tables(raw: Any) -> Iterator[tuple[str, dict[str, Any]]]:
 def other_unit(key: str, number: float) -> str:
     """Return how to write a material's value that, as it is, may be in another unit; an empty text for all others."""
     known = MATERIALS.get(key)
-    if known is None or not number > 0.0 or known.low <= number <= known.high:
+    if known is None or not 0.0 < number < LARGEST or known.low <= number <= known.high:
         return ""
     for unit, factor in known.units.items():
         if known.usual[0] <= factor * number <= known.usual[1]:
