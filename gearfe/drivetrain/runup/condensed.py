@@ -25,6 +25,9 @@ from .mesh_forces import WHOLE, MeshForces, Rubbing, SwingingTorque
 
 #: Meshes whose common period is of no more cycles share a phase: two phases then cost more than the longer period.
 SHARED = 12
+#: Most mesh cycles in a turn of the drive, after which motions repeat under torques of whole orders of its shaft, as
+#: motors and engines have them. Harmonics and samples grow with their number.
+LONGEST = 64
 #: Most phases: harmonics and samples grow with their number.
 MOST_PHASES = 3
 
@@ -83,7 +86,7 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
         Meshes that are in phase again after so many cycles at most share a phase.
     speeds
         Of the drive (rad/s), for loads that oscillate: periods of phases grow to those of torques that repeat after no
-        more than `shared` cycles of the fastest mesh.
+        more than `SHARED` cycles of the fastest mesh, or after a turn of the drive of no more than `LONGEST`.
 
     Raises
     ------
@@ -97,7 +100,7 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     if len(phases) > MOST_PHASES:
         problem = f"need {len(phases)} phases of their own, more than {MOST_PHASES}: {rolled.note}"
         raise InputError("train.meshes", None, problem, "look at it with gearfe vibration")
-    phases = _with_torques(model, phases, shared, speeds)
+    phases = _with_torques(model, phases, speeds)
     turns = [turns for turns, _ in phases]
     flanks = model.forces.flanks
     reads = [_directions(f) for f in flanks]
@@ -183,17 +186,19 @@ def _check(model: TrainModel) -> None:
 
 
 def _with_torques(
-    model: TrainModel, phases: list[tuple[Fraction, list[int]]], shared: int, speeds: Sequence[float]
+    model: TrainModel, phases: list[tuple[Fraction, list[int]]], speeds: Sequence[float]
 ) -> list[tuple[Fraction, list[int]]]:
     """Phases whose periods hold whole cycles of the torques that oscillate, at as many of the speeds as can be."""
     cycles = model.kinematics.cycles
     for omega in {wave[1] for _, function in model.torques for wave in function.sines}:
         for speed in speeds:
             for number, (turns, meshes) in enumerate(phases):
-                part = Fraction(omega / abs(speed) * float(turns)).limit_denominator(shared)
+                part = Fraction(omega / abs(speed) * float(turns)).limit_denominator(LONGEST)
                 longer = turns * part.denominator
                 near = abs(omega / abs(speed) * float(turns) - float(part)) <= WHOLE * float(part)
-                if part > 0 and near and longer * max(cycles[i] for i in meshes) <= shared:
+                fastest_mesh = longer * max(cycles[i] for i in meshes)
+                most = LONGEST if (1 / longer).denominator == 1 else SHARED
+                if part > 0 and near and fastest_mesh <= most:
                     phases = [*phases[:number], (longer, meshes), *phases[number + 1 :]]
                     break
     return phases
@@ -206,7 +211,10 @@ def unmatched(train: CondensedTrain, speed: float) -> str:
             hertz = torque.omega / (2.0 * math.pi)
             meshes = float(train.model.kinematics.cycles[0]) * abs(speed) / (2.0 * math.pi)
             said = f"a torque oscillates with {hertz:.9g} Hz, {hertz / meshes:.9g} times the frequency of mesh 1"
-            return f"{said}: the motion does not repeat within {SHARED} mesh cycles"
+            return (
+                f"{said}: the motion does not repeat within {SHARED} mesh cycles, nor within a turn of the drive of up "
+                f"to {LONGEST}"
+            )
     return ""
 
 

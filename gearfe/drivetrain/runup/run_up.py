@@ -226,7 +226,7 @@ def _one_by_one(train: CondensedTrain, speeds: Array, made: _Curves, options: di
         else:
             made.orbits.append((orbit, 0))
     if refused:
-        many = f"at {len(refused)} of {len(speeds)} speeds no motion repeats: at {refused[0][0]:.9g} rad/s "
+        many = f"at {len(refused)} of {len(speeds)} speeds no motion was sought: at {refused[0][0]:.9g} rad/s "
         made.notes.append(many + refused[0][1] + "; look at it with gearfe vibration")
     return lost
 
