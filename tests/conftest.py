@@ -2,13 +2,14 @@
 
 import os
 import signal
-from pathlib import Path
 
 import pytest
 
+from tests.places import ROOT
+
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell without job control starts what runs behind it so
     signal.signal(signal.SIGINT, signal.default_int_handler)  # commands under test inherit it and would ignore Ctrl-C
-os.environ.setdefault("GEARFE_CACHE", str(Path(__file__).parents[1] / ".test_cache"))
+os.environ.setdefault("GEARFE_CACHE", str(ROOT / ".test_cache"))
 
 
 class FailuresAsTheyHappen:

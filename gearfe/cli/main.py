@@ -25,8 +25,8 @@ USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
 MOVED = {
     "microgeometry": "it is a load map of the same job file: gearfe loadmap, which takes [microgeometry]",
     "relief": "the best relief is a search of gearfe study: gearfe new relief.toml, gearfe study relief.toml",
-    "benchmark": "in a copy of the repository: python scripts/benchmark.py",
-    "stress": "in a copy of the repository: python scripts/stress.py",
+    "benchmark": "in a copy of the repository: python scripts/benchmarks/benchmark.py",
+    "stress": "in a copy of the repository: python scripts/benchmarks/stress.py",
 }
 
 #: Exit codes as shells give them (128 + signal): of an interrupted program (SIGINT), and where the reader of the output

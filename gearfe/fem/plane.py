@@ -6,7 +6,7 @@ Find :math:`u` with :math:`-\nabla\cdot\sigma(u) = 0`,
 :math:`2\lambda\mu/(\lambda+2\mu)` (Zienkiewicz, Taylor & Zhu, *The Finite Element Method*, sec. 2.2). The weak form,
 :math:`w\int\sigma(u):\varepsilon(v)`, is assembled by `element_stiffness` in one batch of dense products.
 
-The same in scikit-fem forms is `gears.contact.whole_gears.bodies.stiffness_form`; `tests/test_plane_forms.py` holds
+The same in scikit-fem forms is `gears.contact.whole_gears.bodies.stiffness_form`; `tests/fem/test_plane_forms.py` holds
 stiffness, stresses and finite strain equal to forms. They are batched by hand here because forms are 11 times slower on
 the 4,335 triangles of both sectors of the shipped pair (0.18 s against 0.016 s): 40 positions would take 1.25 times as
 long, and 1.2 times from cold, where the import of scikit-fem alone (0.07 s) costs 6 %.

@@ -25,7 +25,7 @@ from gearfe.base.errors import unknown_name
 
 from .outcome import Finding, Outcome
 
-#: Name -> module below ``tests.campaigns``, in the order of ``scripts/stress.py all``.
+#: Name -> module below ``tests.campaigns``, in the order of ``scripts/benchmarks/stress.py all``.
 CAMPAIGNS: dict[str, str] = {
     "gears": "gears",
     "laws": "laws",

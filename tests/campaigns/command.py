@@ -1,4 +1,4 @@
-"""``python scripts/stress.py CAMPAIGN``: random cases in great number, each answered, refused or told."""
+"""``python scripts/benchmarks/stress.py CAMPAIGN``: random cases in great number, each answered, refused or told."""
 
 from __future__ import annotations
 

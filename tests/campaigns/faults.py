@@ -17,6 +17,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from tests.places import ROOT
+
 from .campaign import Case
 from .outcome import Check, Finding
 
@@ -32,7 +34,7 @@ def command(case: Case, job: Path, out: str) -> list[str]:
 
 def environment(folder: Path, **more: str) -> dict[str, str]:
     """Environment with a cache of its own and the package that runs here."""
-    package = str(Path(__file__).resolve().parents[2])
+    package = str(ROOT)
     path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
     return {**os.environ, "PYTHONPATH": path, "GEARFE_CACHE": str(folder / "cache"), "OMP_NUM_THREADS": "1", **more}
 

@@ -21,8 +21,8 @@ from gearfe.gears.contact.compliance import MeshingPair
 from gearfe.gears.contact.laws import HalfPlane, Nitsche
 from gearfe.gears.gearmesh.job import StiffnessJob, read_stiffness_job
 from gearfe.gears.gearmesh.sweep import elastic_pair
+from tests.makers.solving import solve_positions
 
-from ..solving import solve_positions
 from .campaign import Campaign, Case, Columns
 from .outcome import Finding, Outcome
 from .pairs import LARGEST_OVERLAP, log_uniform, running_pair, twist_of_overlap

@@ -93,7 +93,7 @@ def keep_worst(folder: Path, campaign: Campaign, seed: int, outcomes: Sequence[O
         own = made / f"{row.case:05d}"
         own.mkdir(parents=True, exist_ok=True)
         case.write(own)
-        again = f"python scripts/stress.py {campaign.name} --seed {seed} --case {row.case}"
+        again = f"python scripts/benchmarks/stress.py {campaign.name} --seed {seed} --case {row.case}"
         said = {**row.plain(), "seed": seed, "command": case.command, "again": again, "data": _json(case.data)}
         (own / "outcome.json").write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
 

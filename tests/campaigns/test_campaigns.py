@@ -14,8 +14,9 @@ import pytest
 
 from gearfe.base.errors import InputError
 from gearfe.cli.main import main
+from scripts.benchmarks.script import answered
+from tests.places import KEPT
 
-from ..script import answered
 from . import command
 from .campaign import CAMPAIGNS, Campaign, Case, campaign_named
 from .mutations import base_jobs, mutated
@@ -25,7 +26,7 @@ from .runner import _answer, run_campaign
 from .toml_text import toml_text
 from .worker import _timed, work
 
-KEPT = sorted((Path(__file__).parent / "kept").glob("*.toml"))
+CASES = sorted(KEPT.glob("*.toml"))
 
 
 @pytest.mark.parametrize("name", list(CAMPAIGNS))
@@ -42,7 +43,7 @@ def test_short_form_finds_no_defect(name: str, tmp_path: Path) -> None:
     assert all((folder / "job.toml").exists() and (folder / "outcome.json").exists() for folder in kept)
 
 
-@pytest.mark.parametrize("path", KEPT, ids=[path.stem for path in KEPT])
+@pytest.mark.parametrize("path", CASES, ids=[path.stem for path in CASES])
 def test_cases_that_once_failed(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Each file says its command and exit code; nothing but a line with the reason may come."""
     text = path.read_text(encoding="utf-8")
@@ -56,7 +57,7 @@ def test_cases_that_once_failed(path: Path, tmp_path: Path, capsys: pytest.Captu
 
 
 def test_both_contradicting_values_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = next(path for path in KEPT if path.stem == "contradicting_values")
+    path = next(path for path in CASES if path.stem == "contradicting_values")
     assert main(["mechanism", str(path), "--out", str(tmp_path)]) == 2
     told = capsys.readouterr().err
     assert "angle(crank)" in told
@@ -202,11 +203,13 @@ def test_mutations_change_files_and_base_jobs_run(tmp_path: Path) -> None:
 
 
 def stress(*arguments: str) -> int:
-    """Exit code of ``python scripts/stress.py``."""
-    return answered(command, "scripts/stress.py", list(arguments))
+    """Exit code of ``python scripts/benchmarks/stress.py``."""
+    return answered(command, "scripts/benchmarks/stress.py", list(arguments))
 
 
-@pytest.mark.parametrize(("name", "script"), [("stress", "scripts/stress.py"), ("benchmark", "scripts/benchmark.py")])
+@pytest.mark.parametrize(
+    ("name", "script"), [("stress", "scripts/benchmarks/stress.py"), ("benchmark", "scripts/benchmarks/benchmark.py")]
+)
 def test_commands_that_left_the_program_say_where_they_went(
     name: str, script: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gearfe.drivetrain.train import Bearing, Damping, build_train, simulate
+from tests.makers.trains import changed, train
 
-from ..trains import changed, train
 from .campaign import Case, campaign_named
 from .faults import disk_run, read_only_run
 from .frames import symmetric_frame

@@ -9,14 +9,15 @@ import pytest
 from gearfe.base.errors import InputError
 from gearfe.gears.gearmesh.job import read_stiffness_job
 from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
+from tests.places import KEPT
 
 from .campaign import Case
 from .gears import run
 
-KEPT = sorted((Path(__file__).parent / "kept" / "gears").glob("*.toml"))
+CASES = sorted((KEPT / "gears").glob("*.toml"))
 
 
-@pytest.mark.parametrize("path", KEPT, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", CASES, ids=lambda p: p.stem)
 def test_kept_cases(path: Path, tmp_path: Path) -> None:
     found = run(Case(0, "kept", {"job.toml": path.read_text(encoding="utf-8")}, "gearfe stiffness job.toml"), tmp_path)
     assert found.outcome == "done"
@@ -25,7 +26,7 @@ def test_kept_cases(path: Path, tmp_path: Path) -> None:
 
 
 def test_a_torque_beyond_small_strain_is_refused() -> None:
-    job = read_stiffness_job(Path(__file__).parent / "kept" / "gears" / "bent_teeth.toml")
+    job = read_stiffness_job(KEPT / "gears" / "bent_teeth.toml")
     elastic = elastic_pair(job.pair, coarsen=5.0)
     with pytest.raises(InputError, match="modules"):
         sweep_stiffness(job.pair, torque=3e4, angles=[0.1], elastic=elastic)

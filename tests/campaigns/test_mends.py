@@ -20,14 +20,12 @@ from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import trajectory_error
 from gearfe.multibody import integrate
 from gearfe.multibody.series.timefunctions import smoothed_step
+from tests.makers.rigid_cases import folding_angle, folding_links, pendulum
+from tests.places import GEOMETRY, KEPT, ROOT
 
-from ..rigid_cases import folding_angle, folding_links, pendulum
 from .campaign import Case, campaign_named
 from .linkages import four_bar
 from .toml_text import toml_text
-
-ROOT = Path(__file__).resolve().parents[2]
-KEPT = Path(__file__).parent / "kept"
 
 
 @pytest.mark.parametrize("method", ["taylor", "implicit"])
@@ -44,7 +42,7 @@ def test_dense_output_does_not_leave_the_run(method: str, back: bool) -> None:
 
 def test_the_stated_error_covers_the_exact_motion() -> None:
     """The folding crank's angle from its closed equation of motion, which the reference solves to about 1e-12."""
-    mechanism = load_mechanism(ROOT / "geometry" / "slider_crank.toml")
+    mechanism = load_mechanism(GEOMETRY / "slider_crank.toml")
     start, times = mechanism.start(), np.linspace(0.0, 3.0, 61)
     exact = folding_angle(start.q[2], start.v[2], times)
     for tolerance in (1e-4, 1e-6, 1e-8):
@@ -61,7 +59,7 @@ def test_the_stated_error_covers_rounding(tolerance: float) -> None:
     exact = np.genfromtxt(
         ROOT / "tests" / "data" / "slider_crank_reference.csv", delimiter=",", names=True, skip_header=1
     )[:81]
-    mechanism = load_mechanism(ROOT / "geometry" / "slider_crank.toml")
+    mechanism = load_mechanism(GEOMETRY / "slider_crank.toml")
     start = mechanism.start()
     options = {"tolerance": tolerance, "start": start, "method": "taylor"}
     made = integrate(mechanism.system, exact["t"], **options)
@@ -91,7 +89,7 @@ def test_the_stated_error_covers_the_shortest_steps(tmp_path: Path, tolerance: f
 
 
 def test_the_summary_states_the_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    command = ["mechanism", str(ROOT / "geometry" / "slider_crank.toml"), "--until", "0.5", "--no-pictures", "--out"]
+    command = ["mechanism", str(GEOMETRY / "slider_crank.toml"), "--until", "0.5", "--no-pictures", "--out"]
     assert main([*command, str(tmp_path / "a")]) == 0
     stated = json.loads((tmp_path / "a" / "summary.json").read_text())["error_estimate"]
     assert 0.0 < stated["coordinates_m_or_rad"] < 1e-7
@@ -102,7 +100,7 @@ def test_the_summary_states_the_error(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def test_files_of_an_earlier_run_do_not_stay(tmp_path: Path) -> None:
-    command = ["mechanism", str(ROOT / "geometry" / "slider_crank.toml"), "--until", "0.1", "--out", str(tmp_path)]
+    command = ["mechanism", str(GEOMETRY / "slider_crank.toml"), "--until", "0.1", "--out", str(tmp_path)]
     assert main([*command, "--reactions", "--no-estimate"]) == 0
     assert {"curves.png", "picture.png", "reactions.csv"} <= {p.name for p in tmp_path.iterdir()}
     (tmp_path / "notes.txt").write_text("mine\n")

@@ -31,8 +31,8 @@ What a law yields by itself (the overlap of a soft penalty) is in it.
 
 Not in it: the model (plane, no friction, rigid bores, small strain with its first-order correction) and what no
 refinement of one mesh family shows: of the half-plane law, the wedge that stands for a sharp tip (0.2 to 0.4 % where
-one bears; docs/contact_laws.md). `scripts/measure_curve_accuracy.py` measures over random pairs how often it covers
-the true error.
+one bears; docs/contact_laws.md). `scripts/benchmarks/measure_curve_accuracy.py` measures over random pairs how often
+it covers the true error.
 """
 
 from __future__ import annotations

@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""Write docs/keys.md, the reference page of all keys of the job files, from the tables' own descriptions."""
+
+from __future__ import annotations
+
+import dataclasses
+import types
+import typing
+from pathlib import Path
+from typing import Any
+
+from gearfe.base.config import type_hints
+from gearfe.base.tables.jobs import TABLES, table_class
+from gearfe.base.tables.mechanism import MechanismFile
+from gearfe.base.tables.text import inner_table, toml_value
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "keys.md"
+HEAD = """# Keys of the job files
+
+Made from the descriptions in `gearfe/base/tables/` by `python scripts/build/write_keys.py`; the messages, `gearfe new` and
+the options of the commands say the same. A key whose default is *required* must be given; where it is -, it may be
+left out.
+"""
+
+
+def reference_page() -> str:
+    """Markdown of all tables, each nested one below the one that holds it."""
+    parts = [HEAD]
+    top = {table_class(name): name for name in TABLES}
+    for name in TABLES:
+        parts.append(f"## `[{name}]`\n")
+        parts += _sections(table_class(name), name, dict(top))
+    parts.append("## Mechanism files\n")
+    parts += _sections(MechanismFile, "", {})
+    return "\n".join(parts).rstrip("\n") + "\n"
+
+
+def _sections(table: type, name: str, seen: dict[type, str]) -> list[str]:
+    """The table's keys, then its nested tables; one that was described before is named only."""
+    seen[table] = name
+    hints = type_hints(table)
+    rows: list[str] = []
+    below: list[str] = []
+    for field in dataclasses.fields(table):
+        inner, many = inner_table(hints[field.name])
+        full = f"{name}.{field.name}".lstrip(".")
+        title = {"list": f"[[{full}]]", "dict": f"[{full}.NAME]", "": f"[{full}]"}[many]
+        if inner is None:
+            rows.append(_row(field, hints[field.name]))
+        elif inner in seen:
+            rows.append(f"| `{title}` | table | - | {_same(field.metadata['doc'], seen[inner])} |")
+        else:
+            doc = field.metadata["doc"]
+            below += [f"### `{title}`\n", f"{doc[:1].upper()}{doc[1:]}.\n" if not doc.startswith("[") else ""]
+            below += _sections(inner, full if many != "dict" else f"{full}.NAME", seen)
+    head = ["| key | value | default | meaning |", "|---|---|---|---|"]
+    return [*((*head, *rows, "") if rows else ()), *below]
+
+
+def _same(doc: str, other: str) -> str:
+    """What is said of a table whose keys are those of another."""
+    keys = f"keys as in `[{other}]`"
+    return keys if doc.startswith("[") else f"{_cell(doc)}: {keys}"
+
+
+def _row(field: Any, hint: Any) -> str:
+    known = field.metadata
+    if field.default is not dataclasses.MISSING:
+        default = "-" if field.default is None else f"`{toml_value(field.default)}`"
+    elif field.default_factory is not dataclasses.MISSING:
+        default = f"`{toml_value(field.default_factory())}`"
+    else:
+        default = "*required*"
+    return f"| `{field.name}` | {_cell(_value(hint, known))} | {_cell(default)} | {_cell(known['doc'])} |"
+
+
+def _value(hint: Any, known: Any) -> str:
+    """Kind of value with its range or choices."""
+    if known["choices"]:
+        return ", ".join(f'`"{choice}"`' for choice in known["choices"])
+    low, high, above, below = (known[k] for k in ("low", "high", "above", "below"))
+    bounds = [f">= {low:g}"] if low is not None else [f"> {above:g}"] if above is not None else []
+    bounds += [f"<= {high:g}"] if high is not None else [f"< {below:g}"] if below is not None else []
+    return " ".join([_kind(hint), ", ".join(bounds)]).strip()
+
+
+def _kind(hint: Any) -> str:
+    plain = {int: "whole number", float: "number", bool: "true or false", str: "text", Any: "value"}
+    if hint in plain:
+        return plain[hint]
+    origin, inside = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType):
+        return " or ".join(dict.fromkeys(_kind(option) for option in inside if option is not type(None)))
+    if origin is tuple:
+        return "list" if inside[-1:] == (Ellipsis,) else f"list of {len(inside)}"
+    return "table"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(reference_page(), encoding="utf-8", newline="\n")
+    print(f"written: {PAGE}")

@@ -1,5 +1,0 @@
-"""Run time against error, beside the programs a user would otherwise take: ``python scripts/benchmark.py``.
-
-One module a study (`sweep_study`, `mechanism_study`, ...), one a peer (`peers`), `timing` and `record` for measuring
-and keeping rows, `pictures` and `page` for what people read.
-"""

@@ -1,0 +1,1 @@
+"""What several tests make: gears, trains, meshes, mechanisms, files."""
