@@ -10,6 +10,8 @@ from tests.places import ROOT
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell without job control starts what runs behind it so
     signal.signal(signal.SIGINT, signal.default_int_handler)  # commands under test inherit it and would ignore Ctrl-C
 os.environ.setdefault("GEARFE_CACHE", str(ROOT / ".test_cache"))
+#: A list of fonts of its own: one that another environment wrote may lack the fonts that Matplotlib brings along.
+os.environ.setdefault("MPLCONFIGDIR", str(ROOT / ".test_cache" / "matplotlib"))
 
 
 class FailuresAsTheyHappen:

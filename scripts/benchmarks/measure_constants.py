@@ -24,21 +24,21 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 #: Module -> constants, with two other values each.
 CONSTANTS: dict[str, dict[str, tuple[Any, Any]]] = {
-    "contact.flank_compliance": {"SPACING": (0.7, 0.9), "TOO_NEAR": (0.6, 0.9)},
-    "contact.half_plane_step": {
+    "gears.contact.flank_compliance": {"SPACING": (0.7, 0.9), "TOO_NEAR": (0.6, 0.9)},
+    "gears.contact.half_plane_step": {
         "WINDOW": (1.1, 1.6), "WIDER": (1.3, 2.2), "LEAST_FORCE": (5e-5, 2e-4), "LEAST_WIDTH": (5e-7, 2e-6),
         "REFERENCE_WIDTH": (5e-3, 2e-2), "MOVED": (0.05, 0.2), "WIDENED_BELOW": (5e-4, 2e-3),
     },
-    "contact.half_plane": {
+    "gears.contact.half_plane": {
         "HELD_STEPS": (2, 6), "NEAR": (1e-5, 4e-5), "TOLERANCE": (5e-7, 2e-6),
         "SEARCHES": (6, 24), "AHEAD": (5e-4, 2e-3), "STEPS": (20, 60),
         "SHARPEST": (0.01, 0.04),
     },
-    "gear.first_contact": {"NEAR": (5e-4, 2e-3), "STEEPEST": (0.1, 0.4)},
-    "contact.elements": {"AHEAD": (5e-5, 2e-4), "BESIDE": (3, 10), "CHORD": (1e-4, 1e-2), "STEPS": (30, 80)},
+    "gears.geometry.first_contact": {"NEAR": (5e-4, 2e-3), "STEEPEST": (0.1, 0.4)},
+    "gears.contact.elements": {"AHEAD": (5e-5, 2e-4), "BESIDE": (3, 10), "CHORD": (1e-4, 1e-2), "STEPS": (30, 80)},
 }  # fmt: skip
 #: Modules whose constants the condensed gears depend on.
-OF_GEARS = ("contact.flank_compliance",)
+OF_GEARS = ("gears.contact.flank_compliance",)
 
 
 def jobs(count: int) -> list[StiffnessJob]:

@@ -1,11 +1,11 @@
-"""What each constant of the rooms around the contact changes in the answers of short jobs, halved and doubled.
+"""What each constant of the packages around the contact changes in the answers of short jobs, halved and doubled.
 
 Every number in a module-level constant is a candidate; those that number table columns, scale pictures or bound memory
-and messages are left out by room or name. An answer counts in parts of its largest value, and in parts of what its
+and messages are left out by module or name. An answer counts in parts of its largest value, and in parts of what its
 job tells of its own error (the tolerance asked for, or its estimate): a constant that moves an answer by more than that
 chooses between answers. Mechanisms and trains run as plain Python, so that their kernels' constants count too.
 
-    python scripts/benchmarks/measure_package_constants.py [ROOM ...]      # a Markdown table
+    python scripts/benchmarks/measure_package_constants.py [PACKAGE ...]      # a Markdown table
 """
 
 from __future__ import annotations
@@ -176,30 +176,37 @@ def coarse_gears(law: Any) -> Any:
     return elastic_pair(coarse_pair(), law=law, coarsen=3.0)
 
 
-#: Room -> its job, and modules or names that are left out.
-ROOMS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
+#: Package or module -> its job, and modules or names that are left out.
+PARTS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
     "multibody": (mechanisms, ("packed", "LARGEST", "MOST_STEPS", "FIRST_")),
-    "train": (trains, ("program",)),
-    "meshlaw": (laws, ("NANO", "NO_CONTACT", "kernel.FORCE")),
-    "runup": (run_ups, ("swinging", "report")),
-    "housing": (housings, ("modal_test", "superelement", "_NEW", "_OLD", "_ALL", "_FOURTH")),
-    "reduction": (housings, ("FORMAT",)),
-    "solid": (housings, ()),
-    "prisms": (housings, ()),
-    "meshing.housing_mesh": (housings, ()),
-    "gear": (gears, ("pitch_", "modif", "deviation", "face", "first_contact", "derived", "validity", "spur_gear")),
-    "gear.face": (curves, ()),
-    "gear.first_contact": (curves, ()),
-    "stiffness": (curves, ("SIDE_BY_SIDE", "report")),
-    "loadmap": (curves, ("MOST_CELLS",)),
-    "meshing.tooth_sector": (curves, ("RECIPE",)),
+    "drivetrain.train": (trains, ("program",)),
+    "gears.meshlaw": (laws, ("NANO", "NO_CONTACT", "kernel.FORCE")),
+    "drivetrain.runup": (run_ups, ("swinging", "report")),
+    "drivetrain.housing": (housings, ("modal_test", "superelement", "_NEW", "_OLD", "_ALL", "_FOURTH")),
+    "fem.reduction": (housings, ("FORMAT",)),
+    "fem.solid": (housings, ()),
+    "fem.prisms": (housings, ()),
+    "fem.meshing.housing_mesh": (housings, ()),
+    "gears.geometry": (
+        gears,
+        ("pitch_", "modif", "deviation", "face", "first_contact", "derived", "validity", "spur_gear"),
+    ),
+    "gears.geometry.face": (curves, ()),
+    "gears.geometry.first_contact": (curves, ()),
+    "gears.gearmesh": (curves, ("SIDE_BY_SIDE", "report", "MOST_CELLS")),
+    "gears.teeth.tooth_sector": (curves, ("RECIPE",)),
 }
 
 
-def constants(room: str, left_out: tuple[str, ...]) -> Iterator[tuple[str, str, float]]:
-    """(module, name, value) of the numbers of a room."""
-    paths = sorted((PACKAGE / room).rglob("*.py")) or [(PACKAGE / room.replace(".", "/")).with_suffix(".py")]
-    for path in paths:
+def sources(part: str) -> list[Path]:
+    """Files of a package, or of a module."""
+    path = PACKAGE / part.replace(".", "/")
+    return sorted(path.rglob("*.py")) or [path.with_suffix(".py")]
+
+
+def constants(part: str, left_out: tuple[str, ...]) -> Iterator[tuple[str, str, float]]:
+    """(module, name, value) of the numbers of a package or module."""
+    for path in sources(part):
         module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             target = node.targets[0] if isinstance(node, ast.Assign) else None
@@ -228,16 +235,16 @@ def holders(module: str, name: str, value: float) -> list[Any]:
     return [sys.modules[module], *copies]
 
 
-def main(rooms: list[str]) -> int:
+def main(parts: list[str]) -> int:
     """Print the table."""
     warnings.simplefilter("ignore")
     print("| constant | value | others | largest change | in parts of the told error | of |\n|---|---|---|---|---|---|")
-    for room in rooms or list(ROOMS):
-        job, left_out = ROOMS[room]
-        # meshes differ a little from run to run: one for all, but where it is they that change
-        os.environ["GEARFE_CACHE"] = tempfile.mkdtemp() if job is housings and "mesh" not in room else "off"
+    for part in parts or list(PARTS):
+        job, left_out = PARTS[part]
+        # meshes differ a little from run to run: one for all, except where they are what changes
+        os.environ["GEARFE_CACHE"] = tempfile.mkdtemp() if job is housings and "mesh" not in part else "off"
         before = job()
-        for module, name, value in list(constants(room, left_out)):
+        for module, name, value in list(constants(part, left_out)):
             where = holders(module, name, value)
             others = (max(1, value // 2), 2 * value) if isinstance(value, int) else (0.5 * value, 2.0 * value)
             worst = (0.0, 0.0, "")

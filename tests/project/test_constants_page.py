@@ -8,6 +8,7 @@ import re
 import pytest
 
 from scripts.benchmarks.measure_constants import CONSTANTS
+from scripts.benchmarks.measure_package_constants import PARTS, sources
 from tests.places import DOCS
 
 PAGE = DOCS / "development/verification.md"
@@ -41,3 +42,8 @@ def test_constants_have_the_printed_values(cells: list[str]) -> None:
 @pytest.mark.parametrize(("module", "name"), [(module, name) for module, names in CONSTANTS.items() for name in names])
 def test_measured_constants_exist(module: str, name: str) -> None:
     assert hasattr(importlib.import_module(f"gearfe.{module}"), name)
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_measured_packages_exist(part: str) -> None:
+    assert all(path.is_file() for path in sources(part))
