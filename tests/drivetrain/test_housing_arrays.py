@@ -273,6 +273,14 @@ def test_folded_elements_follow_the_surface(sag: float, thickness: float) -> Non
     assert housing.reduce(2).added_kg == housing.added_kg
 
 
+def test_unfolding_that_makes_another_body_is_refused() -> None:
+    """A bulge beyond the other face: at most its part within the thickness can stay, so the rest comes back as mass."""
+    nodes, tets, lost = folded_disc(0.2, 0.05)
+    assert lost > 0.1 * 0.05
+    with pytest.raises(InputError, match=r"curved edges folded .* changes the mass by \+\S+ %, more than 5 %"):
+        Housing.from_arrays(nodes, tets)
+
+
 def test_midside_nodes_are_moved_no_further_than_needed() -> None:
     """A midside node slid along its edge folds at a quadrature point beyond a quarter of it; it stays near there."""
     nodes, tets = broken("folded")

@@ -39,6 +39,8 @@ LINEAR_NOTE = (
 )
 FREE_NOTE = "nothing is fixed: the housing is free and has six rigid-body modes"
 STEEL = Material()
+#: Largest part of the mass (-) by which unfolding may change it: beyond, frequencies are those of another body.
+MOST_ADDED = 0.05
 #: Most modes that are sought by frequency, as `modes` allows.
 MOST_MODES = 2000
 #: Part of the largest energy below which a field is contained in the others.
@@ -232,16 +234,33 @@ class Housing(Facts):
         return float(self.matrices().nodal_mass.sum())
 
     def unfolding_notes(self, shape: Unfolded) -> tuple[str, ...]:
-        """What was moved to unfold elements, and the mass that it adds."""
+        """Return what was moved to unfold elements, and the mass that it adds.
+
+        Raises
+        ------
+        InputError
+            Where the mass changes by more than `MOST_ADDED`: that is another body.
+        """
         if not shape.folded:
             return ()
         note = f"curved edges folded {shape.folded} elements; inner nodes beside them were moved"
         if not shape.moved:
             return (f"{note}; the surface and the mass stay what they are",)
         added, mass = self.material.density * shape.volume, self.mass_kg
+        share = added / (mass - added)
+        if abs(share) > MOST_ADDED:
+            problem = (
+                f"curved edges folded {shape.folded} elements, and straightening them changes the mass by "
+                f"{100.0 * share:+.2g} %, more than {100.0 * MOST_ADDED:g} %"
+            )
+            cure = (
+                "mesh the curved walls with smaller elements, let the mesher keep them from folding (gmsh: "
+                "Mesh.HighOrderOptimize), or with straight edges (gmsh: Mesh.SecondOrderLinear)"
+            )
+            raise InputError("housing.mesh", None, problem, cure)
         return (
             f"{note}, and {shape.moved} midside nodes of the surface by up to {1e3 * shape.farthest:.2g} mm: the mass "
-            f"changes by {added:+.2g} kg ({100.0 * added / (mass - added):+.2g} %), which no error estimate covers",
+            f"changes by {added:+.2g} kg ({100.0 * share:+.2g} %), which no error estimate covers",
         )
 
     def reduce(
