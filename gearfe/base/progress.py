@@ -38,6 +38,7 @@ class _Stage:
     first: float = 0.0  # what was done then
     apart: float = 0.0  # when it began, of what is no part of the counts outside
     marks: list[tuple[float, float]] = field(default_factory=list)  # (when, what was done then), ever farther apart
+    steps: tuple[int, float] = (0, 0.0)  # made of those expected, which take equal times; (0, 0): not known
 
     @property
     def is_counted(self) -> bool:
@@ -76,8 +77,12 @@ class _Stage:
         parts = [f"{what} {far}".strip()]
         if elapsed >= SETTLED and made > 0.0 and share < 1.0:
             parts += [f"{made / elapsed:.3g}/s"] if whole else []
-            if (rate := self._steady(now)) > 0.0:
-                parts.append(f"{_duration((self.total - self.done) / rate)} left")
+            steps, expected = self.steps
+            if expected > steps > 0:
+                parts.append(f"{steps} of about {expected:.1g} steps")
+                parts.append(f"about {duration((expected - steps) * elapsed / steps)} left")
+            elif (rate := self._steady(now)) > 0.0:
+                parts.append(f"{duration((self.total - self.done) / rate)} left")
         return f"{self.name}: {', '.join(parts)}"
 
 
@@ -115,7 +120,7 @@ class Display:
             if not self._stages:
                 self._clear()
 
-    def count(self, done: float, total: float | None, what: str) -> None:
+    def count(self, done: float, total: float | None, what: str, steps: tuple[int, float] = (0, 0.0)) -> None:
         """How far the innermost stage is."""
         with self._lock:
             if not self._stages:
@@ -123,7 +128,7 @@ class Display:
             at = self._stages[-1]
             if at.what != what or done < at.done or not at.counted:
                 at.counted, at.first, at.marks = time.monotonic(), done, []
-            at.done, at.total, at.what = done, total, what
+            at.done, at.total, at.what, at.steps = done, total, what, steps
             at.mark(time.monotonic())
 
     def say(self, text: str) -> None:
@@ -156,7 +161,7 @@ class Display:
         text = ": ".join([*(s.name for s in stages[:-1]), stages[-1].text(now)])
         if self._rewritten:
             width = shutil.get_terminal_size().columns - 1
-            line = f"{_duration(now - self._begun)} {text}"[:width]
+            line = f"{duration(now - self._begun)} {text}"[:width]
             if line != self._line:
                 self._write(f"\r{line}\033[K")
                 self._line = line
@@ -169,7 +174,7 @@ class Display:
         else:
             self._wait *= 2.0
             self._next = now + self._wait
-        self._write(f"gearfe: {_duration(now - self._begun)}: {text}\n")
+        self._write(f"gearfe: {duration(now - self._begun)}: {text}\n")
 
     def _clear(self) -> None:
         if self._line:
@@ -182,7 +187,7 @@ class Display:
             self._stream.flush()
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
     """Time for people."""
     if seconds < 100.0:
         return f"{seconds:.0f} s"
@@ -235,13 +240,20 @@ def stage(name: str, *, apart: bool = False) -> Iterator[None]:
         display.leave()
 
 
-def count(done: float, total: float | None, what: str = "") -> None:
+def count(done: float, total: float | None, what: str = "", *, steps: tuple[int, float] = (0, 0.0)) -> None:
     """Report how far the stage is: whole numbers of a whole number of things, or as floats a share.
 
-    A total of None is not known: no time is left then.
+    Parameters
+    ----------
+    done, total : float
+        What is done, and of how much; a total of None is not known: no time is left then.
+    what : str
+        What is counted.
+    steps : (int, float)
+        Steps made and expected in all, where these tell the time that is left and `done` does not.
     """
     if display := _display():
-        display.count(done, total, what)
+        display.count(done, total, what, steps)
 
 
 def announce(text: str) -> None:

@@ -106,6 +106,8 @@ def test_short_runs_are_silent():
 def test_rate_and_remaining_time():
     assert _Stage("positions", 30, 120, "positions", 10.0).text(20.0) == "positions: 30 of 120, 3/s, 30 s left"
     assert _Stage("integrating", 0.25, 1.0, "ms", 0.0).text(100.0) == "integrating: ms 25 %, 5 min 00 s left"
+    unsteady = _Stage("integrating", 0.25, 1.0, "", 0.0, steps=(1000, 5000.0))  # steps take equal times
+    assert unsteady.text(10.0) == "integrating: 25 %, 1000 of about 5e+03 steps, about 40 s left"
     gone_on = _Stage("cases", 930, 1000, "cases", 10.0, 900.0)  # 900 stood there before
     assert gone_on.text(20.0) == "cases: 930 of 1000, 3/s, 23 s left"
     assert _Stage("meshing").text(50.0) == "meshing"
@@ -135,7 +137,7 @@ def test_a_time_left_is_shown_where_the_rate_is_steady_alone(later, told):
     ("seconds", "text"), [(3.4, "3 s"), (99.0, "99 s"), (150.0, "2 min 30 s"), (7300.0, "2 h 01 min")]
 )
 def test_durations(seconds, text):
-    assert progress._duration(seconds) == text
+    assert progress.duration(seconds) == text
 
 
 def test_nobody_watches_and_other_threads():

@@ -115,7 +115,12 @@ def test_steps_that_grow_by_a_power_of_time_do_not_stop_a_run(power: float) -> N
     """t**power steps by the time t, 1e6 at its end, as where a shaft runs up."""
     end = 1e6 ** (1.0 / power)
     pace = Pace(0.0, end, 1_000_000)
-    assert not any(pace.hopeless(n ** (1.0 / power), n) for n in range(64, 1_000_000, 64))
+    needed = []
+    for n in range(64, 1_000_000, 64):
+        assert not pace.hopeless(n ** (1.0 / power), n)
+        needed.append(pace.needed)
+    assert min(needed[512 // 64 * 8 :]) > 0.8e6
+    assert max(needed[512 // 64 * 8 :]) < 1.25e6
 
 
 def test_a_run_with_too_many_steps_names_what_makes_them_short() -> None:

@@ -2,7 +2,7 @@
 
 An integrator asks for a step, tries it, and tells what came of it:
 
-    while (step := control.next_step(state)) is not None:
+    while (step := control.next_step()) is not None:
         ...
         if error <= 1.0: control.accept(error)      # error relative to the tolerance
         else: control.reject(error)             # or fail(status) where it has no size
@@ -12,18 +12,16 @@ An error of order h^(1/e) in the step h gives the next one h 0.9 error^-e (Haire
 
 from __future__ import annotations
 
-import itertools
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
-from ...base.progress import announce
-from ...base.typing import Array
+import numpy as np
 
-#: ``watch(t, steps, state)``: the time reached, the steps done, and a function that gives (q, v) there; False ends the
-#: run. Called once with no steps when all is loaded, then after every few steps.
-Watch = Callable[[float, int, Callable[[], tuple[Array, Array]]], bool]
+from ...base.progress import announce, count, duration
+from ...base.typing import Array
 
 #: Share of the step that the error allows; the least part of a step that is tried after one that was rejected.
 SAFETY, LEAST = 0.9, 0.2
@@ -34,14 +32,11 @@ CUT = 0.01
 ROUNDING, NO_SIZE = 1e-14, 1e-12
 #: Share of a step by which it is made longer to end at a break or at the end: rounding of the time leaves no step.
 STRETCH = 1e-6
-#: Steps between two looks at the pace; how many times the steps allowed a run may need by its pace before it stops.
-PACE, ENDLESS = 4096, 100.0
-#: How many times the steps allowed a run may need by each of so many looks in a row, none below the one before by more
-#: than this factor.
-STEADY_ENDLESS, AGREEING, ALIKE = 3.0, 4, 1.1
-#: Steps before the first doubling of their number that counts; doublings in a row, each in at most this many times the
-#: time of the last, after which the number of steps counts as growing exponentially.
-FIRST_DOUBLING, DOUBLINGS, SLOWER = 512, 3, 1.05
+#: Steps before the first look at the pace, and how many times as many are made at the next.
+FIRST_LOOK, FARTHER = 512, 1.2
+#: How many times the steps allowed a run may need by its pace before it stops, from the first and the second of these
+#: numbers of steps on.
+ENDLESS, STEADY_ENDLESS, SURE = 100.0, 3.0, (4096, 16384)
 
 
 @dataclass(frozen=True)
@@ -72,9 +67,9 @@ class StepLaw:
 class Pace:
     """The number of steps that a run needs, extrapolated from the steps so far.
 
-    Two rules: the pace of the last steps stays (trusted sooner where it does not improve), or the number of steps
-    doubles in equal times, as where a force feeds the motion. (Where steps grow shorter by a power of the time, up to
-    the fourteenth, every doubling takes longer.)
+    The times in which the number of steps doubles go on as the geometric series of the last three: they double at a
+    steady pace, stay where a force feeds the motion, grow by 2**(1/p) where the number is as time to the power p. Of
+    the ratios of successive times the largest counts, so that a burst of short steps ends no run.
 
     Parameters
     ----------
@@ -85,38 +80,46 @@ class Pace:
     """
 
     def __init__(self, begin: float, end: float, most: int) -> None:
-        self.end, self.most = end, most
-        self._last = begin, 0
-        self._doubled = begin, FIRST_DOUBLING
-        self._times: list[float] = []  # that doublings took (s)
+        self.begin, self.end, self.most = begin, end, most
+        self.needed = 0.0  # steps in all; 0: not known yet
+        self._marks = [(0, begin)]  # (steps, time) at numbers ever farther apart
+        self._begun = time.monotonic()
         self._announced = False
-        self._needed: list[float] = []  # steps that the run needs, by the last looks
 
     def hopeless(self, t: float, steps: int) -> bool:
-        """Whether the rest of the run needs `ENDLESS` times the steps allowed, at time t (s) after so many steps."""
-        left = abs(self.end - t)
-        if steps >= 2 * self._doubled[1]:
-            doublings = math.log2(steps / self._doubled[1])
-            self._times.append(abs(t - self._doubled[0]) / doublings)
-            self._doubled = t, steps
-        elif steps >= FIRST_DOUBLING and not self._times and self._doubled[1] == FIRST_DOUBLING:
-            self._doubled = (t, steps) if steps < 2 * FIRST_DOUBLING else self._doubled
-        recent = self._times[-DOUBLINGS:]
-        steady = len(recent) == DOUBLINGS and all(b <= SLOWER * a for a, b in itertools.pairwise(recent))
-        needed = 0.0
-        if steady:
-            needed = steps * 2.0 ** min(left / max(recent[-1], 1e-300), 1000.0)
-        if steps >= self._last[1] + PACE:
-            passed = abs(t - self._last[0])
-            by_pace = steps + left * (steps - self._last[1]) / max(passed, 1e-300)
-            needed = max(needed, by_pace)
-            self._last, self._needed = (t, steps), [*self._needed[1 - AGREEING :], by_pace]
-        stays = len(self._needed) == AGREEING and all(a <= ALIKE * b for a, b in itertools.pairwise(self._needed))
-        hopeless = needed > ENDLESS * self.most or (stays and min(self._needed) > STEADY_ENDLESS * self.most)
-        if needed > self.most and not (hopeless or self._announced):
+        """Report how far the run is at time t (s) after so many steps; whether the rest needs far too many."""
+        if steps == 0:
+            self._begun = time.monotonic()
+        looked = steps >= FARTHER * self._marks[-1][0] and steps > 0
+        if looked:
+            self._marks.append((steps, t))
+            self.needed = self._extrapolated(t, steps)
+        count(abs(t - self.begin), abs(self.end - self.begin), steps=(steps, min(self.needed, float(self.most))))
+        if not looked or self.needed <= self.most:
+            return False
+        hopeless = steps >= SURE[0] and self.needed > (ENDLESS if steps < SURE[1] else STEADY_ENDLESS) * self.most
+        if not (hopeless or self._announced) and steps >= SURE[0]:
             self._announced = True
-            announce(f"at this pace the run would need {needed:.1g} steps; it stops after {self.most:.1g}")
+            each = (time.monotonic() - self._begun) / steps
+            needs = f"{self.needed:.1g} steps, {duration(each * self.needed)}"
+            stops = f"{self.most:.1g} steps, {duration(each * self.most)}"
+            announce(f"at this pace the run would need {needs}; it stops after {stops}")
         return hopeless
+
+    def _extrapolated(self, t: float, steps: int) -> float:
+        """Steps that the run needs in all; 0 where too few are made to tell."""
+        if steps < FIRST_LOOK:
+            return 0.0
+        counts, times = zip(*self._marks, strict=True)
+        at = np.interp([steps / 8, steps / 4, steps / 2, steps], counts, times)
+        took = np.maximum(np.abs(np.diff(at)), 1e-300)
+        ratio, left = float((took[1:] / took[:-1]).max()), abs(self.end - t)
+        if abs(ratio - 1.0) < 1e-6:
+            doublings = left / took[-1]
+        else:
+            inside = 1.0 + left * (ratio - 1.0) / (took[-1] * ratio)
+            doublings = math.log(inside) / math.log(ratio) if inside > 0.0 else math.inf
+        return float(steps * 2.0 ** min(doublings, 1000.0))
 
 
 class StepControl:
@@ -132,10 +135,10 @@ class StepControl:
         First trial step (s), > 0.
     breaks
         Times at which forces are not smooth: steps end there.
-    longest, most
-        Longest step (s), largest number of steps.
-    watch
-        See `Watch`.
+    longest
+        Longest step (s).
+    pace
+        Bounds the number of steps and reports it.
     """
 
     def __init__(
@@ -146,10 +149,9 @@ class StepControl:
         *,
         breaks: Array,
         longest: float = math.inf,
-        most: int = 1_000_000,
-        watch: Watch | None = None,
+        pace: Pace | None = None,
     ) -> None:
-        self.law, self.longest, self.most, self.watch = law, longest, most, watch
+        self.law, self.longest, self.pace = law, longest, pace
         self.t, self.end = span
         self.sign = 1.0 if self.end >= self.t else -1.0
         self.span = abs(self.end - self.t)
@@ -159,22 +161,18 @@ class StepControl:
         self.status = Status.DONE
         self.accepted = self.rejected = 0
         self._step, self._cut, self._before = 0.0, False, 0.0
-        self._pace = Pace(self.t, self.end, most)
         self._added = False  # whether the first goal is one of `end_at`
 
-    def next_step(self, state: Callable[[], tuple[Array, Array]]) -> float | None:
+    def next_step(self) -> float | None:
         """The next step to try, with the sign of time; None when the run has ended, `status` then says why."""
         rounding = ROUNDING * max(abs(self.t), self.span)
         if self.status is not Status.DONE or self.sign * (self.end - self.t) <= rounding:
             return None
-        if self.accepted >= self.most:
+        if self.pace is not None and self.accepted >= self.pace.most:
             self.status = Status.MOST_STEPS
             return None
-        if self._pace.hopeless(self.t, self.accepted):
+        if self.pace is not None and self.pace.hopeless(self.t, self.accepted):
             self.status = Status.ENDLESS
-            return None
-        if self.watch is not None and not self.watch(self.t, self.accepted, state):
-            self.status = Status.STOPPED
             return None
         while self.sign * (self.goals[0] - self.t) <= rounding:
             self.goals.pop(0)
@@ -227,14 +225,12 @@ class StepControl:
 
 def run_in_pieces(
     fill: Callable[[int], tuple[int, float, int]],
-    span: tuple[float, float],
-    state: Callable[[], tuple[Array, Array]],
+    begin: float,
     *,
     room: int,
     largest: int,
-    most: int,
-    watch: Watch | None,
-    stiff: Callable[[float, float, Array, Array], bool] | None = None,
+    pace: Pace | None = None,
+    stiff: Callable[[float, float], bool] | None = None,
 ) -> tuple[Status, int]:
     """A compiled loop by pieces of its output; (why it ended, number of steps).
 
@@ -242,32 +238,28 @@ def run_in_pieces(
     ----------
     fill
         Goes on by at most so many steps and keeps its output; (status, time reached, steps made).
-    span, state
-        Begin and end (s), and the state reached.
+    begin
+        Time at the begin (s).
     room, largest
         Steps of the first piece; the next ones have twice as many, up to this.
-    most
-        Steps in all.
-    watch
-        See `Watch`; it looks between two pieces.
+    pace
+        Bounds the number of steps and reports it, between two pieces.
     stiff
-        Whether to end the run with `Status.STIFF`, by the time (s), the mean step of the last piece (s), q and v.
+        Whether to end the run with `Status.STIFF`, by the time (s) and the mean step of the last piece (s).
     """
-    done, pace, before = 0, Pace(*span, most), span[0]
-    if watch is not None:
-        watch(span[0], 0, state)
-    while done < most:
-        status, t, count = fill(min(room, most - done))
-        done += count
+    done, before = 0, begin
+    if pace is not None:
+        pace.hopeless(begin, 0)
+    while pace is None or done < pace.most:
+        status, t, made = fill(room if pace is None else min(room, pace.most - done))
+        done += made
         if status != Status.MOST_STEPS:
             return Status(status), done
-        if stiff is not None and stiff(t, abs(t - before) / count, *state()):
+        if stiff is not None and stiff(t, abs(t - before) / made):
             return Status.STIFF, done
         before = t
-        if pace.hopeless(t, done):
+        if pace is not None and pace.hopeless(t, done):
             return Status.ENDLESS, done
-        if done < most and watch is not None and not watch(t, done, state):
-            return Status.STOPPED, done
         room = min(2 * room, max(largest, room))
     return Status.MOST_STEPS, done
 
@@ -300,7 +292,6 @@ def first_step(q: Array, v: Array, a: Array, span: float) -> float:
 class Status(IntEnum):
     """Why a run ended; the compiled loops return these numbers, too."""
 
-    STOPPED = -1
     DONE = 0
     STEP_TOO_SMALL = 1
     MOST_STEPS = 2
@@ -322,7 +313,6 @@ class Status(IntEnum):
 
 
 _MESSAGES = {
-    Status.STOPPED: "ended by its watch",
     Status.DONE: "done",
     Status.STEP_TOO_SMALL: "the step became too small for the tolerance",
     Status.MOST_STEPS: "the largest number of steps was reached",

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.errors import InputError
-from ...base.progress import count, stage
+from ...base.progress import stage
 from ...base.typing import Array
 from ..core.dense import Dense
 from ..core.elimination import is_linear, modal_coordinates
 from ..core.mass_regularisation import loose_link
 from ..core.modes import fastest_rate, rates
 from ..core.start import Start, consistent_start
-from ..core.steps import Status, Watch
+from ..core.steps import Pace, Status
 from ..core.stopped import locked, short_steps
 from ..core.system import System
 from ..core.trajectory import IntegrationError, Trajectory
@@ -108,16 +108,16 @@ def integrate(
     duration = abs(float(output_times[-1]) - start.time)
     chosen = chosen_method(system, start, duration) if method == "auto" else method
     options = {"tolerance": tolerance, "longest": longest}
-    counted = partial(_counted, start.time, output_times[-1])
-    stiff = partial(_stiff, system, start, float(output_times[-1])) if method == "auto" and not _modal(system) else None
+    end = float(output_times[-1])
+    stiff = partial(_stiff, system, start, end) if method == "auto" and not _modal(system) else None
     with np.errstate(all="ignore"):  # a state that is not finite has a status of its own
-        dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps, counted, stiff)
+        dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps, stiff)
         # a decay limits the steps, or a load has no series at a state on the way
         if status is Status.STIFF or (
             method == "auto" and chosen == "taylor" and status is Status.STEP_TOO_SMALL and not system.algebraic
         ):
             chosen = "implicit"
-            dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps, counted)
+            dense, status, statistics = _run(system, chosen, options, start, output_times, most_steps)
     sign = 1.0 if output_times[-1] >= output_times[0] else -1.0
     reached = sign * dense.times[-1] + 1e-12 * abs(dense.times[-1])
     kept = output_times if status is Status.DONE else output_times[sign * output_times <= reached]
@@ -139,12 +139,6 @@ def integrate(
     if raise_on_failure and made.status is not Status.DONE:
         raise IntegrationError(made, made.message, made.reached, float(output_times[-1]))
     return made
-
-
-def _counted(begin: float, end: float, t: float, steps: int, state: Any) -> bool:  # noqa: ARG001 - a `Watch`
-    """Report how far the run is."""
-    count(abs(t - begin), abs(float(end) - begin))
-    return True
 
 
 def _dropped_rows_hold(system: System, start: Start, dense: Dense, tolerance: float) -> bool:
@@ -202,28 +196,27 @@ def _rates(system: System, start: Start) -> tuple[float, float]:
 
 
 def _run(
-    system: System, method: str, options: dict[str, Any], start: Start, times: Array, most: int, watch: Watch | None,
+    system: System, method: str, options: dict[str, Any], start: Start, times: Array, most: int,
     stiff: Callable[[float, float, Array, Array], bool] | None = None,
 ) -> Run:  # fmt: skip
     """Integrate by one method; `stiff` may end Taylor series of a linkage, see `run_in_pieces`."""
+    pace = Pace(start.time, float(times[-1]), most)
     if method in COLLOCATION:
         program = None if system.program is None else system.program.without_redundant(start.active)
         more = options | {"family": COLLOCATION[method], "program": program}
-        return run_implicit(system, start, times, most=most, watch=watch, **more)
+        return run_implicit(system, start, times, pace=pace, **more)
     if _modal(system):
         if series_force(system) is None:
             problem = "needs a linkage, or linear constraints and one force whose law has a series"
             raise InputError("method", "taylor", problem, "use method='implicit'")
-        return run_modal_taylor(modal_coordinates(system), start, times, most=most, watch=watch, **options)
+        return run_modal_taylor(modal_coordinates(system), start, times, pace=pace, **options)
     if system.series is None:
         problem = "needs rows and forces that can be written on a tape (gearfe.multibody.core.contract)"
         raise InputError("method", "taylor", problem, "use method='implicit'")
     local = max(LOCAL_SHARE * options["tolerance"], 5e-16)
     prepared = taylor.prepare(system, start, taylor.order_for(local))
     end, longest = float(times[-1]), options["longest"]
-    return taylor.run_taylor(
-        prepared, start, end, tolerance=local, longest=longest, most=most, watch=watch, stiff=stiff
-    )
+    return taylor.run_taylor(prepared, start, end, tolerance=local, longest=longest, pace=pace, stiff=stiff)
 
 
 def _default_start(system: System, time: float) -> Start:

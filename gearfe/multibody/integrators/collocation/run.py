@@ -21,7 +21,7 @@ from ...core.contract import LocalForce
 from ...core.dense import Polynomials
 from ...core.elimination import in_modes, is_linear, modal_coordinates
 from ...core.start import Start
-from ...core.steps import Status, StepControl, StepLaw, Watch, first_step
+from ...core.steps import Pace, Status, StepControl, StepLaw, first_step
 from ...core.system import System
 from ...series.tape import Program
 from ..discontinuities import TRUSTED, Discontinuities, collocated_path, quiet_speeds
@@ -59,8 +59,8 @@ def _numpy_step() -> Any:
 
 
 def run_implicit(
-    system: System, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
-    watch: Watch | None = None, family: str = RADAU, program: Program | None = None,
+    system: System, start: Start, times: Array, *, tolerance: float, longest: float,
+    pace: Pace | None = None, family: str = RADAU, program: Program | None = None,
 ) -> tuple[Polynomials, Status, dict[str, Any]]:  # fmt: skip
     """Integrate by collocation, in modal coordinates if constraints and elements are linear.
 
@@ -76,10 +76,8 @@ def run_implicit(
         Of each step, relative to the largest value of each coordinate.
     longest : float
         Longest step (s).
-    most : int
-        Largest number of steps.
-    watch : Watch, optional
-        Called after every step; may end the run.
+    pace : Pace, optional
+        Bounds the number of steps and reports it.
     family : str
         ``Radau IIA`` or ``Gauss``.
     program : Program, optional
@@ -94,7 +92,7 @@ def run_implicit(
     statistics : dict
         Scheme, steps, iterations and rejected steps.
     """
-    options: dict[str, Any] = {"longest": longest, "most": most}
+    options: dict[str, Any] = {"longest": longest, "pace": pace}
     if system.joints and is_linear(system) and all(isinstance(e, LocalForce) for e, _ in system.forces):
         modal = modal_coordinates(system)
         if modal.T.shape[1] == 0:  # nothing is left to integrate
@@ -102,13 +100,7 @@ def run_implicit(
             return still, Status.DONE, {"scheme": "at rest", "steps": 1, "free_coordinates": 0}
         inner, begin = in_modes(modal, start)
         local = max(MODES_SHARE * tolerance, 1e-13)
-
-        def watch_modes(t: float, steps: int, state: Callable[[], tuple[Array, Array]]) -> bool:
-            return watch is None or watch(t, steps, lambda: (modal.origin + modal.T @ state()[0], modal.T @ state()[1]))
-
-        within, status, statistics = run_implicit(
-            inner, begin, times, tolerance=local, watch=watch_modes, family=family, **options
-        )
+        within, status, statistics = run_implicit(inner, begin, times, tolerance=local, family=family, **options)
         coefficients = within.coefficients @ modal.T.T
         coefficients[:, 0] += modal.origin
         return replace(within, coefficients=coefficients), status, {**statistics, "free_coordinates": inner.size}
@@ -116,7 +108,7 @@ def run_implicit(
         program = program._replace(code=program.code._replace(checked=program.code.checked[:0]))
     nonlinear = program is not None and len(program.code.checked) > 0
     step = Stepper(system, start, scheme(family, STAGES, rates=nonlinear), program)
-    return step.run(system, start, times, tolerance, watch, options)
+    return step.run(system, start, times, tolerance, options)
 
 
 class Stepper:
@@ -195,7 +187,7 @@ class Stepper:
         return max(float(self.w.measures[0]), float(self.w.measures[1]) / tolerance)
 
     def run(
-        self, system: System, start: Start, times: Array, tolerance: float, watch: Watch | None, options: dict[str, Any]
+        self, system: System, start: Start, times: Array, tolerance: float, options: dict[str, Any]
     ) -> tuple[Polynomials, Status, dict[str, Any]]:
         """Step from the start to the last time with errors below the tolerance.
 
@@ -209,10 +201,8 @@ class Stepper:
             Output times (s).
         tolerance : float
             Of each step, relative to the largest value of each coordinate.
-        watch : Watch or None
-            Called after every step; may end the run.
         options : dict
-            ``longest`` step (s) and ``most`` steps, for `StepControl`.
+            ``longest`` step (s) and ``pace``, for `StepControl`.
 
         Returns
         -------
@@ -242,15 +232,12 @@ class Stepper:
             size = 16.0 * abs(end - t) / first * (w.known.size + w.L.size + w.S.size)  # as it goes, and as it is kept
             if size > REPORTED_BYTES:
                 announce(f"about {abs(end - t) / first:.2g} steps will take {size / 1e9:.2g} GB of memory")
-        control = StepControl(law, (t, end), first, breaks=system.breaks, watch=watch, **options)
+        control = StepControl(law, (t, end), first, breaks=system.breaks, **options)
         discontinuities = Discontinuities(system, control, tolerance)
         ends, known, forces, accelerations, newton = [t], [], [], [a], 0
 
-        def state() -> tuple[Array, Array]:
-            return q, v
-
         speeds_count, fastest = tab.level == 1 and not steady, 1e-300
-        while (h := control.next_step(state)) is not None:
+        while (h := control.next_step()) is not None:
             if speeds_count:
                 fastest = max(fastest, float(np.abs(v / units).max()))
                 w.now[3] = min(float((reach / units).max()) / fastest, control.span)

@@ -19,7 +19,7 @@ from ...core.contract import LocalForce, SeriesLaw
 from ...core.dense import Dense, within_run
 from ...core.elimination import ModalCoordinates, is_linear
 from ...core.start import Start
-from ...core.steps import Status, Watch, run_in_pieces
+from ...core.steps import Pace, Status, run_in_pieces
 from ...core.system import System
 from . import kernel_modal
 
@@ -31,8 +31,8 @@ SERIES_SHARE = 0.1
 
 
 def run_modal_taylor(
-    modal: ModalCoordinates, start: Start, times: Array, *, tolerance: float, longest: float, most: int,
-    watch: Watch | None = None,
+    modal: ModalCoordinates, start: Start, times: Array, *, tolerance: float, longest: float,
+    pace: Pace | None = None,
 ) -> tuple[Dense, Status, dict[str, Any]]:  # fmt: skip
     """Integrate by Taylor series in modal coordinates, in compiled code.
 
@@ -48,10 +48,8 @@ def run_modal_taylor(
         Of each step, relative to the largest value of each modal coordinate.
     longest : float
         Longest step (s).
-    most : int
-        Largest number of steps.
-    watch : Watch, optional
-        Called between pieces of the run; may end it.
+    pace : Pace, optional
+        Bounds the number of steps and reports it.
 
     Returns
     -------
@@ -70,7 +68,7 @@ def run_modal_taylor(
     run = SeriesRun(modal, *found, local, longest)
     compiling = run.load()
     y0 = np.concatenate(modal.reduce(start.q, start.v))
-    ends, states, at_times, status, orders = run.steps(start.time, y0, float(times[-1]), times, most, watch)
+    ends, states, at_times, status, orders = run.steps(start.time, y0, float(times[-1]), times, pace)
     statistics = {
         "scheme": "Taylor series",
         "steps": len(ends) - 1,
@@ -125,11 +123,10 @@ class SeriesRun:
 
     def load(self) -> float:
         """Compile the kernels, or load them, by a run of no length; seconds that this took."""
-        return self._bound.load(lambda: self.steps(0.0, np.zeros(2 * self.modal.T.shape[1]), 0.0, np.zeros(1), 1))
+        return self._bound.load(lambda: self.steps(0.0, np.zeros(2 * self.modal.T.shape[1]), 0.0, np.zeros(1)))
 
     def steps(
-        self, t0: float, y0: Array, t1: float, output_times: Array, most: int,
-        watch: Watch | None = None,
+        self, t0: float, y0: Array, t1: float, output_times: Array, pace: Pace | None = None,
     ) -> tuple[Array, Array, Array, Status, int]:  # fmt: skip
         """Integrate from a state and keep the states at the asked times.
 
@@ -143,10 +140,8 @@ class SeriesRun:
             Time at the end (s).
         output_times : ndarray, shape (a,)
             Asked times in order of travel (s).
-        most : int
-            Largest number of steps.
-        watch : Watch, optional
-            Called between pieces of the run; may end it.
+        pace : Pace, optional
+            Bounds the number of steps and reports it.
 
         Returns
         -------
@@ -189,10 +184,7 @@ class SeriesRun:
             states.append(out.states[:count])
             return status, float(now[0]), count
 
-        def state() -> tuple[Array, Array]:
-            return modal.origin + modal.T @ work.state[:n], modal.T @ work.state[n:]
-
-        status, _ = run_in_pieces(fill, (t0, t1), state, room=512, largest=20_000, most=most, watch=watch)
+        status, _ = run_in_pieces(fill, t0, room=512, largest=20_000, pace=pace)
         return np.concatenate(ends), np.vstack(states), found[: counts[1]], status, orders[0]
 
 
@@ -216,7 +208,7 @@ class SeriesPieces:
         k = max(0, int(np.searchsorted(sign * self.times, sign * first, side="right")) - 1)
         out = np.tile(self.states[k], (len(t), 1))
         if last != self.times[k]:
-            made = self.run.steps(self.times[k], self.states[k], last, t[order], 1_000_000)
+            made = self.run.steps(self.times[k], self.states[k], last, t[order])
             out[order[: len(made[2])]] = made[2]
         return out
 

@@ -15,7 +15,7 @@ from ....base.typing import Array, IntArray
 from ...compiled.kernels import Kernels, packed
 from ...core.dense import Polynomials
 from ...core.start import Start
-from ...core.steps import Status, Watch, run_in_pieces
+from ...core.steps import Pace, Status, run_in_pieces
 from ...core.system import System
 from ...series import recurrences
 from ...series.row_tables import Equations, row_tables
@@ -112,8 +112,8 @@ def order_for(tolerance: float) -> int:
 
 
 def run_taylor(
-    shared: TaylorRun, start: Start, end: float, *, tolerance: float, longest: float = math.inf, most: int = 1_000_000,
-    watch: Watch | None = None, stiff: Callable[[float, float, Array, Array], bool] | None = None,
+    shared: TaylorRun, start: Start, end: float, *, tolerance: float, longest: float = math.inf,
+    pace: Pace | None = None, stiff: Callable[[float, float, Array, Array], bool] | None = None,
 ) -> tuple[Polynomials, Status, dict[str, Any]]:  # fmt: skip
     """Integrate from the consistent start to the time `end` by Taylor series.
 
@@ -129,12 +129,10 @@ def run_taylor(
         Of the last terms of the series, in units of the coordinates.
     longest : float
         Longest step (s).
-    most : int
-        Largest number of steps.
-    watch : Watch, optional
-        Called between pieces of the run; may end it.
+    pace : Pace, optional
+        Bounds the number of steps and reports it.
     stiff : callable, optional
-        Whether a decay limits the steps, see `run_in_pieces`.
+        Whether a decay limits the steps, by the time (s), the mean step (s), q and v; see `run_in_pieces`.
 
     Returns
     -------
@@ -174,14 +172,10 @@ def run_taylor(
         parts.append((times[: count + 1], coefficients[:count], singular[:count]))
         return status, float(state[kernels.TIME]), count
 
-    def look(t: float, steps: int, moving: Callable[[], tuple[Array, Array]]) -> bool:
-        regular = state[kernels.SINGULAR] == 0.0
-        return watch is None or (steps > 0 and not regular) or watch(t, steps, moving)
-
     with np.errstate(all="ignore"):
         status, done = run_in_pieces(
-            fill, (t0, end), lambda: (w.q, w.v), room=FIRST_STEPS,
-            largest=max(FIRST_STEPS, MOST_NUMBERS // ((order + 1) * width)), most=most, watch=look, stiff=stiff,
+            fill, t0, room=FIRST_STEPS, largest=max(FIRST_STEPS, MOST_NUMBERS // ((order + 1) * width)), pace=pace,
+            stiff=None if stiff is None else lambda t, step: stiff(t, step, w.q, w.v),
         )  # fmt: skip
     problem = ""
     if status in (Status.STEP_TOO_SMALL, Status.NOT_FINITE):
