@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,14 @@ import pytest
 from scipy.optimize import brentq
 
 from gearfe.base.typing import Array
+from gearfe.mechanisms import load_mechanism
 from gearfe.multibody import Body, Gravity, Hinge, Linkage, Moment, Status, System, Trajectory, integrate, polynomial
 from gearfe.multibody.planar.linkage import BodyVariables, StateFunction
 
 MASS, LENGTH, G = 2.0, 1.0, 9.81
 INERTIA = MASS * LENGTH**2 / 3  # of a bar about its end
 TIGHT = 1e-9
+GEOMETRY = Path(__file__).resolve().parents[1] / "geometry"
 
 
 class Friction(StateFunction):
@@ -130,3 +133,82 @@ def test_two_frictional_joints() -> None:
     kinetic = MASS / 2 * (rates[[0, 1, 3, 4]] ** 2).sum() + MASS / 24 * (rates[[2, 5]] ** 2).sum()
     assert MASS * G * (height[0] - height[-1]) - kinetic == pytest.approx(moment * travelled, rel=1e-5)
     assert abs(rates[5] - rates[2]) < 10.0 * width < abs(rates[2])
+
+
+ARM = """
+[run]
+end_s = 0.3
+step_s = 1e-3
+[bodies.arm]
+rate_rad_per_s = 2.0
+points_m = { root = [0.0, 0.0], tip = [0.5, 0.0] }
+[bodies.arm.beam]
+length_m = 0.5
+width_m = 0.02
+height_m = 0.02
+youngs_modulus_GPa = 2100.0
+density_kg_per_m3 = 7800.0
+elements = 2
+damping_s = 1e-5
+[bodies.weight]
+mass_kg = 10.0
+inertia_kg_m2 = 1e-6
+position_m = [0.5, 0.0]
+velocity_m_per_s = [0.0, 1.0]
+[joints.root]
+type = "hinge"
+body = "arm"
+point = "root"
+[joints.tip]
+type = "hinge"
+body = "weight"
+to = "arm"
+to_point = "tip"
+"""
+FRICTION = """
+[forces.friction]
+type = "moment"
+body = "{body}"
+moment_N_m = "-{moment}*tanh(rate({body})/{width})"
+"""
+
+
+def rubbed(folder: Path, text: str, tolerance: float = 1e-6, **friction: Any) -> Trajectory:
+    """Run a mechanism file with friction on a body; a few thousand steps must do."""
+    path = folder / "mechanism.toml"
+    path.write_text(text + FRICTION.format(**friction), encoding="utf-8")
+    mechanism = load_mechanism(path)
+    return integrate(
+        mechanism.system, np.linspace(0.0, mechanism.file.run.end_s, 101), start=mechanism.start(), tolerance=tolerance,
+        most_steps=5000,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_the_root_of_an_elastic_beam_slips_and_sticks(tmp_path: Path, width: float) -> None:
+    """A rigid arm would slip by I w^2/2M. The beam has M^2/2k of that energy when it sticks, k = 3 EI/L with shear.
+
+    The moment sets in at once, which makes it vibrate, and the damper takes up to as much again.
+    """
+    moment, length = 40.0, 0.5
+    inertia = 10.0 * length**2 + 7800.0 * 4e-4 * length**3 / 3.0
+    bending, shear = 2100e9 * 0.02**4 / 12.0, 2100e9 / 2.6 * 4e-4 * 5.0 / 6.0
+    energy = inertia * 2.0**2 / 2.0
+    share = moment**2 / 2.0 * (length / (3.0 * bending) + 1.0 / (shear * length)) / energy
+    moved = rubbed(tmp_path, ARM, body="arm", moment=moment, width=width)
+    assert -2.0 * share < moved.q[-1, 2] / (energy / moment) - 1.0 < -share
+    assert abs(moved.v[-1, 2]) < width
+
+
+@pytest.mark.parametrize(("job", "body"), [("elastic_slider_crank", "rod"), ("elastic_coupler", "rocker")])
+def test_friction_on_elastic_mechanisms_comes_to_its_limit(tmp_path: Path, job: str, body: str) -> None:
+    """Widths of 1e-5, 1e-7 and 1e-9 rad/s give one motion within the tolerance and the creeping of the first."""
+    text = (GEOMETRY / f"{job}.toml").read_text(encoding="utf-8")
+    for folder in ("a", "b", "c"):
+        (tmp_path / folder).mkdir()
+    first, second, third = (
+        rubbed(tmp_path / folder, text, 1e-5, body=body, moment=0.6, width=width).q
+        for folder, width in (("a", 1e-5), ("b", 1e-7), ("c", 1e-9))
+    )
+    assert np.abs(first - third).max() < 1e-5
+    assert np.abs(second - third).max() < 1e-5

@@ -27,9 +27,9 @@ from ...base.typing import Array
 SAFETY, LEAST = 0.9, 0.2
 #: A step that ended at a break or at the end was cut: unless its error was above this share, the next is not shorter.
 CUT = 0.01
-#: Steps below this share of the time, or of the run's length, are rounding; steps below the second whose errors have no
-#: size end the run.
-ROUNDING, NO_SIZE = 1e-14, 1e-12
+#: Steps below this share of the time, or of the run's length, are rounding. (Dry friction of the width 1e-9 rad/s at a
+#: node of a beam decays within 1e-16 s, and steps have to find the time at which it sticks as closely as that.)
+ROUNDING = 1e-15
 #: Share of a step by which it is made longer to end at a break or at the end: rounding of the time leaves no step.
 STRETCH = 1e-6
 #: Steps before the first look at the pace, and how many times as many are made at the next.
@@ -219,7 +219,7 @@ class StepControl:
         """The step is not made, and its error has no size: `share` of it is next, or the run ends with `status`."""
         self.rejected += 1
         self.trial = (0.5 if self.law.steady else share) * self._step
-        if self._step < NO_SIZE * max(1e-300, self.span):
+        if self._step < ROUNDING * max(1e-300, self.span):
             self.status = status
 
 

@@ -14,10 +14,10 @@ Stages lie side by side in SIMD vectors (`compiled.simd`), and so do these syste
 solved at once.
 
 The error is that of the stages' polynomials at the step's begin, v - V(0) and M (a - A(0)), filtered by the matrix of
-the real eigenvalue (Hairer & Wanner II, Secs. IV.8, VI.1, VII.4). With nonlinear loads the error of the speed counts,
-too, as the displacement that it makes in the time in which the fastest motion so far crosses the mechanism: a force
-that reverses within a short step shows in the speed alone. The end is projected onto the constraints of positions and
-velocities by the least changes in the mass norm.
+the real eigenvalue (Hairer & Wanner II, Secs. IV.8, VI.1, VII.4). Of coordinates on which nonlinear loads act the error
+of the speed counts, too, as the displacement that it makes in the time in which the fastest motion so far crosses the
+mechanism: a force that reverses within a short step shows in the speed alone. The end is projected onto the constraints
+of positions and velocities by the least changes in the mass norm.
 
 Read from the bottom up: `collocation_step` calls `begin`, `stages` (what is left of the equations, with the forces of
 beams (`beam.Beam`) and floating frames (`floating.Floating`)), `linearise` and `factorise` (matrices at one stage),
@@ -1049,7 +1049,7 @@ def left_over(eq: Equations, w: Stages, tab: Scheme) -> float:
 
 def defect(eq: Equations, w: Stages, tab: Scheme) -> float:
     """Error of the step over its limit; what rows can carry at the begin is none of it."""
-    own, band = eq.own, eq.band
+    tb, own, band, code = eq.program, eq.own, eq.band, eq.program.code
     n = w.q.shape[0]
     s = tab.c.shape[0]
     first, second, right, gap = own.F, own.q, own.v, own.gap
@@ -1088,7 +1088,11 @@ def defect(eq: Equations, w: Stages, tab: Scheme) -> float:
     sum_of = 0.0
     for a in range(n):
         sum_of += (found[a, 0] / w.limit[a]) ** 2
-    return math.sqrt(sum_of / n) * max(1.0, abs(one) * w.now[3])
+    quick = 0.0  # of coordinates on which nonlinear loads act: waves that run elsewhere along a link do not count
+    for c in range(code.checked.shape[0]):
+        i = coordinate(tb, code.push[code.checked[c], 1])
+        quick = max(quick, abs(found[i, 0]) / w.limit[i] - w.now[4])
+    return max(math.sqrt(sum_of / n), quick * abs(one) * w.now[3])
 
 
 def end_state(w: Stages, tab: Scheme) -> None:

@@ -44,6 +44,8 @@ STRAIGHT = 1e-12
 #: A step more than so many times as long as the last one begins anew: speeds and multipliers of a very short step are
 #: rounding over powers of its length.
 MOST_AHEAD = 10.0
+#: Rounding of a position, relative to the largest so far.
+ROUNDED = 4e-16
 #: Share of a step that is tried after Newton did not converge.
 NOT_SOLVED_SHARE = 0.3
 #: Rate of Newton's changes with which the next step is as long as the last; it grows with the step.
@@ -104,8 +106,6 @@ def run_implicit(
         coefficients = within.coefficients @ modal.T.T
         coefficients[:, 0] += modal.origin
         return replace(within, coefficients=coefficients), status, {**statistics, "free_coordinates": inner.size}
-    if program is not None and system.stressed:  # speeds of waves along stiff links are not to be followed
-        program = program._replace(code=program.code._replace(checked=program.code.checked[:0]))
     nonlinear = program is not None and len(program.code.checked) > 0
     step = Stepper(system, start, scheme(family, STAGES, rates=nonlinear), program)
     return step.run(system, start, times, tolerance, options)
@@ -237,6 +237,7 @@ class Stepper:
         ends, known, forces, accelerations, newton = [t], [], [], [a], 0
 
         speeds_count, fastest = tab.level == 1 and not steady, 1e-300
+        w.now[4] = ROUNDED / tolerance if system.stressed else 0.0
         while (h := control.next_step()) is not None:
             if speeds_count:
                 fastest = max(fastest, float(np.abs(v / units).max()))

@@ -19,8 +19,9 @@ from ...series.tape import Program
 class Stages(NamedTuple):
     """State and unknowns of a step: n coordinates, m rows, k stresses; W = s + 1 stages, last the begin."""
 
-    #: (4,) time at the begin and step (s), change over the limit at which Newton's method ends, time for which an error
-    #: of the speed lasts (s), 0 where it does not count
+    #: (5,) time at the begin and step (s), change over the limit at which Newton's method ends, time for which an error
+    #: of the speed lasts (s), 0 where it does not count, and rounding of positions over their limit, where a stiff link
+    #: takes it for a force
     now: Array
     #: (4,) error over the tolerance, gap of the rows between the stages, mean rate of Newton's changes, stages that are
     #: beyond the end of a table
@@ -136,7 +137,7 @@ def work(s: int, n: int, m: int, k: int, known: int) -> Stages:
     known : int
         Rows of ``Stages.known``, as `Scheme.path` has them.
     """
-    plain = [(4,), (4,), (n,), (n,), (m,), (s + 1, n), (n,)]
+    plain = [(5,), (4,), (n,), (n,), (m,), (s + 1, n), (n,)]
     W = s + 1
     wide = [(s + 1, W), *[(n, W)] * 4, (m, W), (k, W), *[(n, W), (m, W)] * 3]
     arrays: list[Array] = [np.zeros(shape) for shape in plain]
