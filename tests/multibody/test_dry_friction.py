@@ -18,7 +18,7 @@ from gearfe.multibody.planar.linkage import BodyVariables, StateFunction
 MASS, LENGTH, G = 2.0, 1.0, 9.81
 INERTIA = MASS * LENGTH**2 / 3  # of a bar about its end
 TIGHT = 1e-9
-GEOMETRY = Path(__file__).resolve().parents[1] / "geometry"
+GEOMETRY = Path(__file__).resolve().parents[2] / "geometry"
 
 
 class Friction(StateFunction):
