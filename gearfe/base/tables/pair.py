@@ -34,8 +34,14 @@ INSTEAD: dict[str, tuple[str, ...]] = {
     "root_diameter_mm": ("dedendum",),
     "span_mm": ("tooth_thinning_um",),
 }
+#: Profile shift that follows from the centre distance and the other gear's shift.
+FROM_DISTANCE = "from centre distance"
+#: Differences of given lengths that are taken for rounding (mm): a centre distance is printed to 0.001 mm.
+ROUNDING_MM = 1e-3
 REQUIRED = ("pressure_angle_deg", "face_width_mm")
 OPTIONAL = ("tip_relief_length_mm",)
+#: Modules that count as equal (relative).
+SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,11 @@ class ToothFormTable:
         None, doc="pressure angle at the reference circle (deg)", low=5.0, high=45.0
     )
     face_width_mm: float | None = quantity(None, doc="face width (mm)", above=0.0)
-    profile_shift: float | None = quantity(None, doc="profile shift coefficient x (times module), by default 0")
+    profile_shift: float | str | None = quantity(
+        None,
+        choices=(FROM_DISTANCE,),
+        doc='profile shift coefficient x (times module), by default 0; for one gear of a pair "from centre distance"',
+    )
     addendum: float | None = quantity(None, doc="addendum (times module), by default 1", above=0.0)
     dedendum: float | None = quantity(None, doc="dedendum (times module), by default 1.25", above=0.0)
     rack_tip_radius: float | None = quantity(
@@ -120,9 +130,23 @@ class PairTable(ToothFormTable):
     def module_mm_of(self, side: str) -> float:
         """Module of the gear `side` (mm), from its own pitch diameter or module, or from the shared module."""
         own: GearTable = getattr(self, side)
-        if own.pitch_diameter_mm is not None:
-            return own.pitch_diameter_mm / own.teeth
-        return given(own.module_mm if own.module_mm is not None else self.module_mm, "pair.module_mm")
+        module = own.module_mm if own.module_mm is not None else self.module_mm
+        if own.pitch_diameter_mm is None:
+            return given(module, "pair.module_mm")
+        implied = own.pitch_diameter_mm / own.teeth
+        if module is None:
+            module = self._common_module_mm()
+        if module is None or abs(implied - module) <= SAME * module:
+            return implied
+        return module if abs(module * own.teeth - own.pitch_diameter_mm) <= ROUNDING_MM else implied
+
+    def _common_module_mm(self) -> float | None:
+        """Module (mm) of both gears by the sum of their pitch diameters, or the one that a gear gives."""
+        gears = (self.pinion, self.wheel)
+        if named := [gear.module_mm for gear in gears if gear.module_mm is not None]:
+            return named[0]
+        diameters = [gear.pitch_diameter_mm for gear in gears if gear.pitch_diameter_mm is not None]
+        return sum(diameters) / sum(gear.teeth for gear in gears) if len(diameters) == len(gears) else None
 
     def material_of(self, side: str) -> MaterialTable:
         """Material of the gear `side`."""
@@ -131,6 +155,7 @@ class PairTable(ToothFormTable):
 
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that are missing or contradict each other."""
+        self._check_shifts(where)
         for side in ("pinion", "wheel"):
             own: GearTable = getattr(self, side)
             label = f"{where}.{side}"
@@ -148,7 +173,7 @@ class PairTable(ToothFormTable):
                 raise InputError(f"{label}.module_mm", None, "is required", doc)
             if own.pitch_diameter_mm is not None and module is not None:
                 implied = own.pitch_diameter_mm / own.teeth
-                if abs(implied - module) > 1e-9 * module:
+                if abs(implied - module) > SAME * module and abs(implied - module) * own.teeth > ROUNDING_MM:
                     problem = f"contradicts module_mm = {module:g}: {own.teeth} teeth make it {module * own.teeth:.9g}"
                     raise InputError(f"{label}.pitch_diameter_mm", own.pitch_diameter_mm, problem, "leave one out")
             form = self.tooth_form(side)
@@ -158,6 +183,20 @@ class PairTable(ToothFormTable):
             if form["tip_relief_amount_um"] and form["tip_relief_length_mm"] is None:
                 cure = "add it, or leave out tip_relief_amount_um"
                 raise InputError(f"{label}.tip_relief_length_mm", None, "is required with a tip relief", cure)
+
+    def _check_shifts(self, where: str) -> None:
+        """Raise `InputError` unless at most one profile shift follows from a centre distance, which is given then."""
+        sides = [side for side in ("pinion", "wheel") if self.tooth_form(side)["profile_shift"] == FROM_DISTANCE]
+        if not sides:
+            return
+        own = getattr(self, sides[-1]).profile_shift is not None
+        label = f"{where}.{sides[-1]}.profile_shift" if own else f"{where}.profile_shift"
+        if len(sides) == 2:
+            problem = "is written for both gears: a centre distance gives the sum of their profile shifts alone"
+            raise InputError(label, FROM_DISTANCE, problem, "write the number of one of them")
+        if self.centre_distance_mm is None:
+            cure = f"add {where}.centre_distance_mm, or write a number"
+            raise InputError(label, FROM_DISTANCE, "needs a centre distance", cure)
 
 
 #: Law that holds where none is named.

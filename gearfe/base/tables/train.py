@@ -11,7 +11,7 @@ from typing import ClassVar
 from ..config import Removed, quantity
 from ..errors import InputError, unknown_name
 from .kinds import GONE_METHODS
-from .pair import StiffnessTable, ToothFormTable
+from .pair import FROM_DISTANCE, StiffnessTable, ToothFormTable
 from .timefunction import TrainFunctionTable
 
 Five = tuple[float, float, float, float, float]
@@ -86,6 +86,9 @@ class TrainGearTable(ToothFormTable):
             raise InputError(
                 f"{where}.{own[0]}", getattr(self, own[0]), f"stands beside gear = {self.gear!r}", "leave one out"
             )
+        if self.profile_shift == FROM_DISTANCE:
+            problem = "is for a gear of [pair] with centre_distance_mm there"
+            raise InputError(f"{where}.profile_shift", FROM_DISTANCE, problem, "write the number")
         if not self.gear and self.teeth is None:
             raise InputError(
                 f"{where}.teeth", None, "is required", 'give the number of teeth, or gear = "pinion" or "wheel"'

@@ -20,7 +20,7 @@ from ...base.errors import InputError, given
 from ...base.tables.housing import HousingTable
 from ...base.tables.jobs import read_train_tables
 from ...base.tables.microgeometry import MicrogeometryTable
-from ...base.tables.pair import REQUIRED, PairTable, StiffnessTable, tooth_form
+from ...base.tables.pair import FROM_DISTANCE, REQUIRED, PairTable, StiffnessTable, tooth_form
 from ...base.tables.spectrum import SpectrumTable
 from ...base.tables.timefunction import TrainFunctionTable
 from ...base.tables.train import POTENTIAL, TrainGearTable, TrainMeshTable, TrainTable
@@ -209,7 +209,7 @@ def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:
             raise InputError(
                 f"{where}.gear", table.gear, "needs a table [pair]", "add it, or give teeth, module_mm, ..."
             )
-        return job.gears_of_pair.pinion if table.gear == "pinion" else job.gears_of_pair.wheel
+        return job.gears_of_pair.pinion if table.gear == "pinion" else job.gears_of_pair.given_wheel
 
     sources = (table,) if pair is None else (table, pair)
     form, modules = tooth_form(*sources), (source.module_mm for source in sources)
@@ -218,6 +218,9 @@ def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:
         if value is None:
             raise InputError(f"{where}.{key}", None, "is required", "add it here, or to a table [pair]")
     teeth, module_mm = given(table.teeth, f"{where}.teeth"), given(needed["module_mm"], f"{where}.module_mm")
+    if form["profile_shift"] == FROM_DISTANCE:
+        problem = "follows from a centre distance in [pair], for a gear of [pair] alone"
+        raise InputError(f"{where}.profile_shift", None, problem, "write the number here")
     bore_mm = 0.2 * module_mm * teeth if table.bore_diameter_mm is None else table.bore_diameter_mm
     try:
         return gear_of_form(teeth, {**form, "module_mm": module_mm, "bore_diameter_mm": bore_mm})

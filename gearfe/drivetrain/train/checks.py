@@ -10,6 +10,7 @@ import numpy as np
 from ...base.errors import InputError, unknown_name
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.periodic import PeriodicInterpolant
+from ...gears.geometry.gear_data import rounding
 from ...gears.geometry.pair import Gear, gear_pair, in_keys
 from ...gears.meshlaw.law import MeshLaw
 from .friction import check_friction
@@ -154,7 +155,7 @@ def _check_mesh(train: GearTrain, mesh: GearMesh) -> None:
         error = InputError(name, error.value, error.problem, error.cure)
         raise in_keys(error, f"{label} {side}".rstrip()) from None
     distance = shaft_distance(train, one.shaft, two.shaft)
-    if abs(distance - expected) > SAME * expected:
+    if abs(distance - expected) > max(SAME * expected, rounding(one.gear.module)):
         apart = f"shafts {one.shaft!r} and {two.shaft!r} are {1e3 * distance:.9g} mm apart"
         problem = f"{apart}, the gears need {1e3 * expected:.9g} mm"
         cure = "move a shaft, change the gears, or give the gears another centre distance (with backlash)"

@@ -306,7 +306,8 @@ class GearTrain(Facts):
     def _layout_mesh(self, mesh: GearMesh, driver: LayoutGear, driven: LayoutGear) -> LayoutMesh:
         one, two = self.gear(mesh.driver), self.gear(mesh.driven)
         arm = self.frame[:2] @ (np.array(self.shaft(two.shaft).point) - np.array(self.shaft(one.shaft).point))
-        twist = MeshGeometry(one.gear, two.gear, mesh.centre_distance).contact_twist
+        # teeth that jam by rounding have no backlash, and those that jam by more are refused elsewhere
+        twist = max(0.0, MeshGeometry(one.gear, two.gear, mesh.centre_distance).contact_twist)
         towards, distance = math.atan2(arm[1], arm[0]), float(np.linalg.norm(arm))
         return LayoutMesh(mesh.name, driver, driven, towards, distance, twist, mesh.phase)
 

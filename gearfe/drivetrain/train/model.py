@@ -118,6 +118,11 @@ class TrainModel(Facts):
         """Natural frequencies with mean mesh stiffness (Hz)."""
         return np.sqrt(np.maximum(self.modal.eigenvalues, 0.0)) / (2.0 * math.pi)
 
+    @property
+    def rounding_notes(self) -> list[str]:
+        """How gears of meshes were taken whose data fit each other except for rounding, one sentence each."""
+        return [f"mesh {line.name}: {note}" for line in self.meshes for note in line.pair.notes]
+
     @cached_property
     def bearings(self) -> BearingLoads:
         """Loads on the bores that carry shafts."""

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.tables.pair import ROUNDING_MM
 from ...base.typing import Array
 from .layout import LayoutMesh, TrainLayout
 
@@ -112,7 +113,7 @@ def tooth_places(layout: TrainLayout, senses: Sequence[float]) -> ToothPlaces:
         if join.mesh.driver.name not in angles and join.mesh.driven.name not in angles:
             angles[join.mesh.driver.name] = join.driver_tooth_at(join.mesh.phase or 0.0)
             _spread(joins, angles)
-    room = 2.0 * SAME * sum(mesh.distance for mesh in layout.meshes)
+    room = 2.0 * sum(max(SAME * mesh.distance, 1e-3 * ROUNDING_MM) for mesh in layout.meshes)
     for join in joins:
         _check(join, angles, room)
     phases = tuple(join.phase(angles[join.mesh.driver.name]) for join in joins)

@@ -9,7 +9,16 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from ...base.tables.pair import ROUNDING_MM
 from .curves import inv
+
+#: Differences of coefficients that are taken for rounding (times module): published ones have four digits.
+ROUNDED = 1e-4
+
+
+def rounding(module: float) -> float:
+    """Difference of lengths (m) of a gear that is taken for rounding: 1 um, or that of coefficients of four digits."""
+    return max(1e-3 * ROUNDING_MM, ROUNDED * module)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from ...base.errors import InputError
 from ...base.typing import Array
 from .curves import Arc, Involute, Segment, Trochoid, bisect, inverse_inv
 from .deviation import Deviation
-from .gear_data import GearData
+from .gear_data import GearData, rounding
 
 #: Arcs of a smaller polar angle (rad) are taken for none: below 1e-9 mm on a gear of 1 m radius.
 NIL_ANGLE = 1e-12
@@ -42,10 +42,10 @@ def least_shift(gear: GearData) -> float:
 def tooth_root(gear: GearData) -> tuple[Trochoid, float, bool]:
     """Trochoid up to the involute, roll length (m) of the form point, and whether it is undercut."""
     m, alpha = gear.module, gear.pressure_angle
-    r, rho = gear.reference_radius, gear.rack_tip_radius * m
-    depth = gear.dedendum * m - rho
     largest = largest_rack_tip_radius(gear)
-    if gear.rack_tip_radius > largest * (1.0 + 1e-12):
+    r, rho = gear.reference_radius, min(gear.rack_tip_radius, largest) * m
+    depth = gear.dedendum * m - rho
+    if largest < 0.0 or (gear.rack_tip_radius - largest) * m > rounding(m):
         limit = math.floor(1e4 * max(largest, 0.0)) / 1e4
         if largest < 0.0:
             most = (math.pi / 4 + 0.5 * gear.tooth_thinning / m) / math.tan(alpha)

@@ -6,19 +6,22 @@ SI units and radians. Whether two gears can run together is checked by `gearfe.g
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from numbers import Real
 from typing import Any
 
+import numpy as np
+
 from ...base.errors import InputError, given
 from ...base.shown import Shown
-from ...base.tables.pair import INSTEAD, GearTable, PairTable
-from .gear_data import TipRelief, nominal_span
+from ...base.tables.pair import FROM_DISTANCE, GearTable, PairTable
+from .curves import inv
+from .gear_data import TipRelief, nominal_span, rounding
 from .mesh_geometry import MeshGeometry, PathPoint
 from .spur_gear import Gear
-from .validity import check_pair, pair_warnings
+from .validity import check_pair, check_seat, missing_addendum, pair_warnings, rounding_notes
 
 __all__ = ["Gear", "GearPair", "MeshGeometry", "PathPoint", "TipRelief"]
 
@@ -32,7 +35,10 @@ class GearPair(MeshGeometry, Shown):
     pinion, wheel
         The gears; the pinion drives.
     centre_distance
-        Centre distance a (m); None: without backlash for the unthinned teeth, from the profile shifts.
+        Centre distance a (m); None: without backlash for the unthinned teeth, from the profile shifts. Where it jams
+        the teeth by no more than rounding (`gear_data.rounding`), the wheel's teeth are made so much thinner.
+    notes
+        How given data were taken that fit each other except for rounding, one sentence each.
 
     Raises
     ------
@@ -40,8 +46,25 @@ class GearPair(MeshGeometry, Shown):
         For gears that cannot mesh, jam, interfere, or have a contact ratio below 1.
     """
 
+    notes: tuple[str, ...] = field(default=(), kw_only=True, compare=False)
+    #: The wheel as given, whose teeth may be thicker.
+    given_wheel: Gear = field(init=False, compare=False)
+
     def __post_init__(self) -> None:
+        jam = check_seat(MeshGeometry(self.pinion, self.wheel, self.centre_distance))
+        object.__setattr__(self, "given_wheel", self.wheel)
+        notes = list(self.notes)
+        if jam > 0.0:
+            thinning = jam / math.cos(self.wheel.pressure_angle)
+            thinner = replace(self.wheel, tooth_thinning=self.wheel.tooth_thinning + thinning)
+            object.__setattr__(self, "wheel", thinner)
+            notes.append(
+                f"the centre distance jams the teeth by {1e6 * jam:.3g} um on the line of action, by rounding: the "
+                f"wheel's teeth are taken {1e6 * thinning:.3g} um thinner, without backlash"
+            )
         check_pair(self)
+        notes += [note for note in rounding_notes(self) if note not in notes]
+        object.__setattr__(self, "notes", tuple(notes))
 
     def facts(self) -> dict[str, str]:
         """Teeth, module, centre distance, contact ratio."""
@@ -57,18 +80,18 @@ class GearPair(MeshGeometry, Shown):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What is legal but deserves a look, one sentence each."""
-        return tuple(pair_warnings(self))
+        return (*self.notes, *pair_warnings(self))
 
     @classmethod
     def from_table(cls, table: PairTable) -> GearPair:
         """Pair that a job file's [pair] table describes; errors name the file's keys and units."""
-        pinion, wheel = _gear_from_table(table, "pinion"), _gear_from_table(table, "wheel")
-        distance = table.centre_distance_mm
+        written = _Written(table)
+        gears = {side: written.gear(side) for side in ("pinion", "wheel")}
         try:
-            return gear_pair(pinion, wheel, None if distance is None else distance * 1e-3)
+            return gear_pair(gears["pinion"], gears["wheel"], written.distance, tuple(written.notes()))
         except InputError as error:
             side, _, name = error.field.rpartition(".") if error.field.startswith(("pinion", "wheel")) else ("", "", "")
-            raise _renamed(error, table, side, name or error.field) from None
+            raise written.error(error, side, name or error.field, gears) from None
 
 
 #: Argument of `Gear` or `GearPair` -> its key in a job file and the key's unit in SI.
@@ -86,8 +109,8 @@ KEYS: dict[str, tuple[str, float]] = {
 }
 
 
-def gear_pair(pinion: Gear, wheel: Gear, centre_distance: float | None = None) -> GearPair:
-    """A checked pair; equal gears at an equal centre distance (m) share one.
+def gear_pair(pinion: Gear, wheel: Gear, centre_distance: float | None = None, notes: tuple[str, ...] = ()) -> GearPair:
+    """Return a checked pair; equal gears at an equal centre distance (m) with equal notes share one.
 
     Raises
     ------
@@ -96,40 +119,12 @@ def gear_pair(pinion: Gear, wheel: Gear, centre_distance: float | None = None) -
     """
     if centre_distance is not None and not isinstance(centre_distance, Real):
         return GearPair(pinion, wheel, centre_distance)  # which refuses it
-    return _shared_pair(pinion, wheel, centre_distance)
+    return _shared_pair(pinion, wheel, centre_distance, notes)
 
 
 @lru_cache(maxsize=256)
-def _shared_pair(pinion: Gear, wheel: Gear, centre_distance: float | None) -> GearPair:
-    return GearPair(pinion, wheel, centre_distance)
-
-
-def _gear_from_table(table: PairTable, side: str) -> Gear:
-    own: GearTable = getattr(table, side)
-    form = {**table.tooth_form(side), "module_mm": table.module_mm_of(side), "bore_diameter_mm": own.bore_diameter_mm}
-    form |= _of_drawing(own, form, f"pair.{side}")
-    try:
-        return gear_of_form(own.teeth, form)
-    except InputError as error:
-        raise _renamed(error, table, side, error.field) from None
-
-
-def _of_drawing(own: GearTable, form: Mapping[str, Any], where: str) -> dict[str, float]:
-    """Keys of the tooth form that the drawing values of a gear stand for: tip and root diameters, the span size."""
-    module_mm, half, x = form["module_mm"], 0.5 * own.teeth, float(form["profile_shift"])
-    made: dict[str, float] = {}
-    if own.tip_diameter_mm is not None:
-        made |= {"addendum": 0.5 * own.tip_diameter_mm / module_mm - half - x, "tip_shortening": 0.0}
-    if own.root_diameter_mm is not None:
-        made["dedendum"] = half + x - 0.5 * own.root_diameter_mm / module_mm
-    if own.span_mm is not None and own.span_teeth is not None:
-        angle = math.radians(form["pressure_angle_deg"])
-        most = module_mm * nominal_span(own.teeth, x, angle, own.span_teeth)
-        if own.span_mm > most:
-            problem = f"must be <= {most:.6g} mm, the span over {own.span_teeth} teeth without backlash"
-            raise InputError(f"{where}.span_mm", own.span_mm, problem, "use more profile_shift, or another span_teeth")
-        made["tooth_thinning_um"] = 1e3 * (most - own.span_mm) / math.cos(angle)
-    return made
+def _shared_pair(pinion: Gear, wheel: Gear, centre_distance: float | None, notes: tuple[str, ...]) -> GearPair:
+    return GearPair(pinion, wheel, centre_distance, notes=notes)
 
 
 def gear_of_form(teeth: int, form: Mapping[str, Any]) -> Gear:
@@ -160,42 +155,259 @@ def in_keys(error: InputError, where: str, *, key: str = "", unit: float = 0.0) 
     """
     named, own = KEYS.get(error.field, (error.field, 1.0))
     value = float(f"{error.value / (unit or own):.12g}") if isinstance(error.value, float) else error.value
-    return InputError(f"{where}.{key or named}", value, error.problem, error.cure)
+    limit = error.limit
+    if limit is not None and not limit[2] and own != 1.0:  # in SI
+        limit = (limit[0], limit[1] / own, "")
+    if limit is not None and unit:
+        limit = (limit[0], limit[1] * own / unit, limit[2])
+    return InputError(f"{where}.{key or named}", value, error.reason, error.cure, limit)
 
 
-def _of_drawn(error: InputError, table: PairTable, side: str, drawn: str, made: str) -> InputError:
-    """The error of a coefficient as that of the drawing value that it was made from, its bound as one of that value."""
-    own: GearTable = getattr(table, side)
-    field, value = f"pair.{side}.{drawn}", getattr(own, drawn)
-    if error.limit is None:
-        return InputError(field, value, f"{made}: {error.problem}", error.cure)
-    sign, bound, _ = error.limit
-    form, module = table.tooth_form(side), table.module_mm_of(side)
-    shift = float(form["profile_shift"])
-    if drawn != "tip_diameter_mm":  # these fall as the dedendum and the thinning grow
-        sign = {"<": ">", ">": "<", ">=": "<="}[sign]
-    if drawn == "span_mm":
-        angle = math.radians(form["pressure_angle_deg"])
-        whole = module * nominal_span(own.teeth, shift, angle, given(own.span_teeth, "span_teeth"))
-        limit = whole - 1e-3 * bound * math.cos(angle)
-    else:
-        limit = module * (own.teeth + 2.0 * shift + 2.0 * (bound if drawn == "tip_diameter_mm" else -bound))
-    cure = f"use a {'smaller' if '<' in sign else 'larger'} {drawn}"
-    return InputError(field, value, f"{made}: {error.reason}: must be {sign} {limit:.6g} mm", cure)
+#: Argument of `Gear` -> keys of a drawing that give it, the first that is written.
+GIVE: dict[str, tuple[str, ...]] = {
+    "addendum": ("tip_diameter_mm", "addendum", "tip_shortening"),
+    "dedendum": ("root_diameter_mm",),
+    "tooth_thinning": ("span_mm",),
+    "module": ("pitch_diameter_mm",),
+}
 
 
-def _renamed(error: InputError, table: PairTable, side: str, name: str) -> InputError:
-    """The same error in the words of the job file: its key where it was given, its unit."""
-    error = InputError(name, error.value, error.reason, error.cure, error.limit)
-    key, unit = KEYS.get(name, (name, 1.0))
-    if not side:
-        return in_keys(error, "pair")
-    own: GearTable = getattr(table, side)
-    for drawn, stands_for in INSTEAD.items():
-        if key in stands_for and getattr(own, drawn) is not None:
-            number = error.value / unit if isinstance(error.value, float) else error.value
-            return _of_drawn(error, table, side, drawn, f"makes {key} {number:.6g}")
-    if name == "module" and own.pitch_diameter_mm is not None:
-        return in_keys(error, f"pair.{side}", key="pitch_diameter_mm", unit=1e-3 / own.teeth)
-    shared = getattr(own, key, None) is None and getattr(table, key, None) is not None
-    return in_keys(error, "pair" if shared else f"pair.{side}")
+class _Written:
+    """A [pair] table as its user wrote it: its gears, and errors of their arguments in the keys that were written."""
+
+    def __init__(self, table: PairTable) -> None:
+        self.table = table
+        forms = {side: table.tooth_form(side) for side in ("pinion", "wheel")}
+        #: Gear whose profile shift follows from the centre distance, or nothing.
+        self.derived = next((side for side, form in forms.items() if form["profile_shift"] == FROM_DISTANCE), "")
+        self.shifts = {side: self._shift(side, table.centre_distance_mm) for side in forms}
+        self.thinned_um: dict[str, float] = {}
+
+    def _own(self, side: str) -> GearTable:
+        own: GearTable = getattr(self.table, side)
+        return own
+
+    def _shift(self, side: str, distance_mm: float | None) -> float:
+        """Profile shift of a gear, by a centre distance (mm) where it is to follow from one.
+
+        inv(alpha_w) = inv(alpha) + 2 (x_1 + x_2) tan(alpha)/(z_1 + z_2), cos(alpha_w) = a_0 cos(alpha)/a.
+        """
+        written = self.table.tooth_form(side)["profile_shift"]
+        if side != self.derived:
+            return float(written)
+        mate = "wheel" if side == "pinion" else "pinion"
+        teeth = self.table.pinion.teeth + self.table.wheel.teeth
+        angle = math.radians(self.table.tooth_form(side)["pressure_angle_deg"])
+        lowest = 0.5 * teeth * self.table.module_mm_of(side) * math.cos(angle)
+        a = given(distance_mm, "pair.centre_distance_mm")
+        if a <= lowest:
+            problem, cure = "leaves no working pressure angle", "use a larger centre distance"
+            problem = f"{problem}: must be > {lowest:.9g} mm"
+            raise InputError("pair.centre_distance_mm", a, problem, cure)
+        whole = teeth * (inv(math.acos(lowest / a)) - inv(angle)) / (2.0 * math.tan(angle))
+        return whole - float(self.table.tooth_form(mate)["profile_shift"])
+
+    def gear(self, side: str) -> Gear:
+        """The gear of a side.
+
+        Raises
+        ------
+        InputError
+            For data that no gear has, in the file's keys and units.
+        """
+        try:
+            return self._gear(side, self.shifts[side])
+        except InputError as error:
+            raise self.error(error, side, error.field) from None
+
+    def _gear(self, side: str, shift: float) -> Gear:
+        own, form = self._own(side), self._form(side) | {"profile_shift": shift}
+        return gear_of_form(own.teeth, form | self._of_drawing(side, form))
+
+    def _form(self, side: str) -> dict[str, Any]:
+        own = self._own(side)
+        form = {**self.table.tooth_form(side), "module_mm": self.table.module_mm_of(side)}
+        return form | {"bore_diameter_mm": own.bore_diameter_mm, "profile_shift": self.shifts[side]}
+
+    def _of_drawing(self, side: str, form: Mapping[str, Any]) -> dict[str, float]:
+        """Keys of the tooth form that drawing values stand for: tip and root diameters, the span size."""
+        own = self._own(side)
+        module_mm, half, x = form["module_mm"], 0.5 * own.teeth, form["profile_shift"]
+        made: dict[str, float] = {}
+        if own.tip_diameter_mm is not None:
+            made |= {"addendum": 0.5 * own.tip_diameter_mm / module_mm - half - x, "tip_shortening": 0.0}
+        if own.root_diameter_mm is not None:
+            made["dedendum"] = half + x - 0.5 * own.root_diameter_mm / module_mm
+        if own.span_mm is not None and own.span_teeth is not None:
+            angle = math.radians(form["pressure_angle_deg"])
+            most = module_mm * nominal_span(own.teeth, x, angle, own.span_teeth)
+            if own.span_mm > most + 1e3 * rounding(1e-3 * module_mm):
+                problem = f"must be <= {most:.6g} mm, the span over {own.span_teeth} teeth without backlash"
+                cure = "use more profile_shift, or another span_teeth"
+                raise InputError("span_mm", own.span_mm, problem, cure)
+            self.thinned_um[side] = 1e3 * (most - own.span_mm) / math.cos(angle)
+            made["tooth_thinning_um"] = max(0.0, self.thinned_um[side])
+        return made
+
+    def notes(self) -> list[str]:
+        """Return what follows from other keys, and what was taken although it differs by rounding."""
+        notes: list[str] = []
+        if self.derived:
+            x = self.shifts[self.derived]
+            notes.append(f"profile_shift of the {self.derived} by the centre distance: {x:.6g}")
+        for side, thinned in self.thinned_um.items():
+            if thinned < 0.0:
+                notes.append(
+                    f"span_mm of the {side} is {-thinned * math.cos(self._angle(side)):.3g} um larger than that "
+                    "without backlash, by rounding: tooth_thinning_um is taken as 0"
+                )
+        for side in ("pinion", "wheel"):
+            own, module = self._own(side), self.table.module_mm_of(side)
+            given_mm = own.pitch_diameter_mm
+            if given_mm is not None and abs(given_mm - own.teeth * module) > 1e-9 * given_mm:
+                notes.append(
+                    f"pitch_diameter_mm of the {side} differs from {own.teeth} teeth of the common module "
+                    f"{module:.9g} mm by {1e3 * abs(given_mm - own.teeth * module):.3g} um, by rounding: the module "
+                    "is taken"
+                )
+        return notes
+
+    def _angle(self, side: str) -> float:
+        return math.radians(self.table.tooth_form(side)["pressure_angle_deg"])
+
+    def _written(self, side: str, name: str) -> tuple[str, str]:
+        """Key that gives an argument of a gear, and its table; an empty text where the user wrote none."""
+        usual = KEYS.get(name, (name, 1.0))[0]
+        for where, table in ((f"pair.{side}", self._own(side)), ("pair", self.table)):
+            for key in (*GIVE.get(name, ()), usual):
+                if getattr(table, key, None) is not None:
+                    return key, where
+        return usual, ""
+
+    def error(self, error: InputError, side: str, name: str, gears: Mapping[str, Gear] | None = None) -> InputError:
+        """Return the error of an argument as that of the key that was written, its bound as one of that key.
+
+        Parameters
+        ----------
+        error : InputError
+            The error.
+        side : str
+            Gear; nothing for the pair.
+        name : str
+            Argument of the gear or of the pair.
+        gears : mapping of str to Gear, optional
+            Both gears, for errors of the pair.
+        """
+        error = InputError(name, error.value, error.reason, error.cure, error.limit)
+        if not side:
+            return in_keys(error, "pair")
+        if side == self.derived and (gears is None or name == "profile_shift"):
+            return self._of_distance(error, side, gears)
+        if gears is not None and error.limit is not None:
+            side, error = self._of_pair(error, side, gears)
+        key, where = self._written(side, error.field)
+        if gears is None and not where and error.field in ("addendum", "dedendum"):
+            shift = self._of_shift(error, side)
+            if shift is not None:
+                return shift
+        where = where or f"pair.{side}"
+        if key == "pitch_diameter_mm":
+            return in_keys(error, where, key=key, unit=1e-3 / self._own(side).teeth)
+        if key == KEYS.get(error.field, (error.field, 1.0))[0]:
+            return in_keys(error, where)
+        return self._of_key(error, side, key, where)
+
+    def _of_key(self, error: InputError, side: str, key: str, where: str) -> InputError:
+        """The error of a coefficient as that of the diameter, span size or tip shortening that gives it."""
+        value = getattr(self.table if where == "pair" else self._own(side), key)
+        if error.limit is None:
+            number = f"{error.value:.6g}" if isinstance(error.value, float) else str(error.value)
+            return InputError(f"{where}.{key}", value, f"makes {error.field} {number}: {error.reason}", error.cure)
+        form, teeth, (sign, bound, unit) = self._form(side), self._own(side).teeth, error.limit
+        module, x = form["module_mm"], form["profile_shift"]
+        if key != "tip_diameter_mm":  # these fall as what they stand for grows
+            sign = {"<": ">", ">": "<", ">=": "<=", "<=": ">="}[sign]
+        if key == "span_mm":
+            whole = module * nominal_span(teeth, x, self._angle(side), given(self._own(side).span_teeth, "span_teeth"))
+            limit = whole - 1e3 * bound * (1e-6 if unit == "um" else 1.0) * math.cos(self._angle(side))
+        elif key == "tip_shortening":
+            limit = form["tip_shortening"] + form["addendum"] - bound
+            if sign == "<=" and limit < 0.0:
+                cure = "use less tip_shortening of both gears, or more addendum"
+                return InputError(f"{where}.{key}", value, f"{error.reason}, even with 0 here", cure)
+        else:
+            limit = module * (teeth + 2.0 * x + 2.0 * (bound if key == "tip_diameter_mm" else -bound))
+        unit, cure = " mm" * key.endswith("_mm"), f"use a {'smaller' if '<' in sign else 'larger'} {key}"
+        return InputError(f"{where}.{key}", value, f"{error.reason}: must be {sign} {limit:.6g}{unit}", cure)
+
+    def _of_pair(self, error: InputError, side: str, gears: Mapping[str, Gear]) -> tuple[str, InputError]:
+        """Gear and error of a pair's bound: of the gear whose key was written, or of both where they share it."""
+        mate = "wheel" if side == "pinion" else "pinion"
+        name, (sign, bound, unit) = error.field, given(error.limit, "limit")
+        own, other = (self._written(each, name)[1] for each in (side, mate))
+        reason, cure, shared = error.reason, error.cure, own == other == "pair"
+        if name == "profile_shift":  # the bound of the sum
+            total = bound + gears[mate].profile_shift
+            side = mate if other and not own else side
+            bound = 0.5 * total if shared else total - gears["wheel" if side == "pinion" else "pinion"].profile_shift
+        elif name == "addendum" and sign == ">=":  # tips of both gears make the contact ratio
+            side = mate if other and not own else side
+            pair = MeshGeometry(gears["pinion"], gears["wheel"], self.distance)
+            bound = gears[side].addendum + missing_addendum(pair, ("pinion", "wheel") if shared else (side,))
+        elif name == "addendum" and not own and self._written(mate, "dedendum")[1] and "root circle" in reason:
+            reason = f"lets the {side}'s tip circle hit the root circle"
+            sign, bound = ">", gears[mate].dedendum + gears[side].addendum - bound
+            name, side, cure = "dedendum", mate, "use more dedendum"
+        return side, InputError(name, getattr(gears[side], name), reason, cure, (sign, bound, unit))
+
+    @property
+    def distance(self) -> float | None:
+        """Centre distance (m)."""
+        return None if self.table.centre_distance_mm is None else 1e-3 * self.table.centre_distance_mm
+
+    def _possible(self, side: str, shift: float, gears: Mapping[str, Gear] | None, distance: float | None) -> bool:
+        """Whether there is a gear with a profile shift, and with `gears` a pair with it at a distance (m)."""
+        try:
+            gear = self._gear(side, shift)
+            if gears is not None:
+                GearPair(**{**gears, side: gear}, centre_distance=distance)
+        except InputError:
+            return False
+        return True
+
+    def _of_shift(self, error: InputError, side: str) -> InputError | None:
+        """The error of a coefficient that the user did not write as one of the profile shift, where that makes it."""
+        key, where = self._written(side, "profile_shift")
+        x = self.shifts[side]
+        near = [s for s in np.linspace(-0.5, 1.0, 31).tolist() if self._possible(side, s, None, None)] if where else []
+        if not near or where == "pair":
+            return None
+        good = _last(lambda s: self._possible(side, s, None, None), min(near, key=lambda s: abs(s - x)), x, 1e-7)
+        cure = f"use {'less' if good < x else 'more'} {key}"
+        problem = f"{error.reason}: must be {'<=' if good < x else '>='} {good:.6g}"
+        return InputError(f"{where}.{key}", x, problem, cure)
+
+    def _of_distance(self, error: InputError, side: str, gears: Mapping[str, Gear] | None) -> InputError:
+        """The error of a gear whose profile shift follows from the centre distance as one of that distance."""
+        a, x = given(self.table.centre_distance_mm, "pair.centre_distance_mm"), self.shifts[side]
+        problem = f"makes profile_shift {x:.5g} of the {side}: {error.reason}"
+
+        def possible(a: float) -> bool:
+            return self._possible(side, self._shift(side, a), gears, 1e-3 * a)
+
+        reference = 0.5 * (self.table.pinion.teeth + self.table.wheel.teeth) * self.table.module_mm_of(side)
+        near = [d for d in np.linspace(0.99 * reference, 1.05 * reference, 121).tolist() if possible(d)]
+        if not near:
+            return InputError(f"pair.{side}.profile_shift", FROM_DISTANCE, problem, error.cure)
+        good = _last(possible, min(near, key=lambda d: abs(d - a)), a, 1e-7 * a)
+        cure = f"use a {'smaller' if good < a else 'larger'} centre distance, or write the profile shift"
+        problem = f"{problem}: must be {'<=' if good < a else '>='} {good:.7g} mm"
+        return InputError("pair.centre_distance_mm", a, problem, cure)
+
+
+def _last(possible: Callable[[float], bool], good: float, bad: float, close: float) -> float:
+    """Last possible value between one that is and one that is not, to `close`."""
+    while abs(bad - good) > close:
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if possible(middle) else (good, middle)
+    return good

@@ -118,9 +118,11 @@ def _check(name: str, value: float, low: float, high: float, closed: bool) -> No
     number = not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
     if number and (low <= value <= high if closed else low < value < high):
         return
-    if number and not closed and value <= low:  # a bound that a drawing value states in its own quantity
-        raise InputError(name, value, "is too small", "correct it", (">", low, ""))
     signs = (">=", "<=") if closed else (">", "<")
+    if number:  # a bound that other keys state in their own quantity
+        small = value <= low
+        sign, bound = (signs[0], low) if small else (signs[1], high)
+        raise InputError(name, value, f"is too {'small' if small else 'large'}", "correct it", (sign, bound, ""))
     limits = [f"{sign} {limit:g}" for sign, limit in zip(signs, (low, high), strict=True) if math.isfinite(limit)]
     raise InputError(name, value, "must be a finite number" + "".join(f", {limit}" for limit in limits), "correct it")
 

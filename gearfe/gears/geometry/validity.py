@@ -12,6 +12,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from numbers import Real
 
@@ -20,8 +21,9 @@ from numpy.typing import ArrayLike
 
 from ...base.errors import InputError
 from ...base.typing import Array, IntArray
-from .curves import inv, inverse_inv
-from .involute import least_shift
+from .curves import bisect, inv, inverse_inv
+from .gear_data import rounding
+from .involute import largest_rack_tip_radius, least_shift
 from .mesh_geometry import MeshGeometry
 from .spur_gear import LEAST_ROUND, Gear
 
@@ -35,8 +37,14 @@ TOLERANCE = 1e-4
 POSITIONS = 241
 
 
-def check_pair(pair: MeshGeometry) -> None:
-    """Raise `InputError` for gears that cannot run together."""
+def check_seat(pair: MeshGeometry) -> float:
+    """Return the jam (m) on the line of action that rounding leaves: how much too near to each other the axes are.
+
+    Raises
+    ------
+    InputError
+        For gears of different modules or pressure angles, and a centre distance that is impossible or jams the teeth.
+    """
     pinion, wheel = pair.pinion, pair.wheel
     for name, what, unit in (("module", "module", 1e3), ("pressure_angle", "pressure angle", 180.0 / math.pi)):
         value, other = getattr(wheel, name), getattr(pinion, name)
@@ -44,11 +52,17 @@ def check_pair(pair: MeshGeometry) -> None:
             symbol = "mm" if name == "module" else "deg"
             both = f"{unit * value:.9g} {symbol} and {unit * other:.9g} {symbol} (pinion)"
             problem = f"gears that differ in {what}, {both}, do not mesh"
-            raise InputError(f"wheel.{name}", value, problem, f"give both the same {what}")
-    _check_distance(pair)
+            limit = ("equal to", unit * other, symbol)
+            raise InputError(f"wheel.{name}", value, problem, f"give both the same {what}", limit)
+    return _check_distance(pair)
+
+
+def check_pair(pair: MeshGeometry) -> None:
+    """Raise `InputError` for gears that cannot run together; `check_seat` comes first."""
+    pinion, wheel = pair.pinion, pair.wheel
     a = pair.working_centre_distance
     for name, gear, mate in (("pinion", pinion, wheel), ("wheel", wheel, pinion)):
-        if gear.tip_radius + mate.root_radius >= a:
+        if gear.tip_radius + mate.root_radius >= a + rounding(gear.module):
             room = (a - mate.root_radius - gear.tip_radius) / gear.module
             problem, limit = "makes the tip circle hit the mate's root circle", ("<", gear.addendum + room, "")
             cure = "use more tip_shortening, less addendum, more dedendum or more centre distance"
@@ -58,7 +72,8 @@ def check_pair(pair: MeshGeometry) -> None:
         _check_interference(pair, name, mate_name)
 
 
-def _check_distance(pair: MeshGeometry) -> None:
+def _check_distance(pair: MeshGeometry) -> float:
+    """Raise `InputError` for an impossible centre distance; return the jam (m) that rounding leaves."""
     pinion, wheel = pair.pinion, pair.wheel
     alpha, lowest = pinion.pressure_angle, pinion.base_radius + wheel.base_radius
     if pair.centre_distance is None:
@@ -71,7 +86,7 @@ def _check_distance(pair: MeshGeometry) -> None:
                 "use larger profile shifts",
             )
             raise InputError("pinion.profile_shift", pinion.profile_shift, problem, cure, limit)
-        return
+        return 0.0
     a = pair.centre_distance
     if isinstance(a, bool) or not isinstance(a, Real) or not math.isfinite(a) or a <= lowest:
         problem = f"leaves no working pressure angle: must be finite and > {1e3 * lowest:.9g} mm"
@@ -79,9 +94,12 @@ def _check_distance(pair: MeshGeometry) -> None:
     if pair.normal_backlash < 0.0:
         angles = pinion.base_radius * pinion.base_angle + wheel.base_radius * wheel.base_angle - pair.base_pitch / 2
         tight = lowest / math.cos(inverse_inv(angles / lowest))
+        if tight - a <= rounding(pinion.module):
+            return -pair.normal_backlash
         problem = f"jams the teeth (backlash {1e3 * pair.backlash:.6g} mm): must be >= {1e3 * tight:.12g} mm"
         cure = "use a larger centre distance, less profile shift or more tooth thinning, or leave it out"
         raise InputError("centre_distance", a, problem, cure)
+    return 0.0
 
 
 def _tips_ratio(pair: MeshGeometry, *, rounded: bool) -> float:
@@ -91,6 +109,17 @@ def _tips_ratio(pair: MeshGeometry, *, rounded: bool) -> float:
         for g in (pair.pinion, pair.wheel)
     ]
     return (sum(rolls) - pair.tangent_length) / pair.base_pitch
+
+
+def missing_addendum(pair: MeshGeometry, names: Sequence[str]) -> float:
+    """Return by how much (times module) the addenda of named gears must grow for a contact ratio of 1 between tips."""
+
+    def ratio(more: float) -> float:
+        gears = ((getattr(pair, name), more if name in names else 0.0) for name in ("pinion", "wheel"))
+        rolls = sum(gear.roll_length(gear.tip_radius + add * gear.module) for gear, add in gears)
+        return (rolls - pair.tangent_length) / pair.base_pitch - 1.0
+
+    return bisect(ratio, 0.0, pair.tangent_length / pair.pinion.module)
 
 
 def _check_ratio(pair: MeshGeometry) -> None:
@@ -106,9 +135,8 @@ def _check_ratio(pair: MeshGeometry) -> None:
             raise InputError("centre_distance", pair.centre_distance, problem, cure, ("<=", 1e3 * most, "mm"))
         name = min(("pinion", "wheel"), key=lambda name: getattr(pair, name).addendum)
         gear = getattr(pair, name)
-        roll = gear.profile.tip_roll + (1.0 - nominal) * pair.base_pitch
-        more = (math.hypot(gear.base_radius, roll) - gear.tip_radius) / gear.module
-        raise InputError(f"{name}.addendum", gear.addendum, problem, cure, (">=", gear.addendum + more, ""))
+        limit = (">=", gear.addendum + missing_addendum(pair, (name,)), "")
+        raise InputError(f"{name}.addendum", gear.addendum, problem, cure, limit)
     if active >= 1.0:
         return
     rounded = _tips_ratio(pair, rounded=True)
@@ -151,7 +179,7 @@ def _check_interference(pair: MeshGeometry, name: str, mate_name: str) -> None:
     gear, mate = getattr(pair, name), getattr(pair, mate_name)
     cure = "use less addendum or more tip_shortening there, more dedendum or a smaller rack_tip_radius here"
     lost = _lost_to_form_points(pair)[name]
-    if lost > 1e-7 * gear.module and not gear.undercut:
+    if lost > rounding(gear.module) and not gear.undercut:
         allowed = math.hypot(mate.base_radius, pair.tangent_length - gear.form_roll)
         most = mate.addendum - (mate.tip_radius - allowed) / mate.module
         problem = (
@@ -159,10 +187,45 @@ def _check_interference(pair: MeshGeometry, name: str, mate_name: str) -> None:
             f"(form diameter {2e3 * gear.form_radius:.6g} mm), where the root is no involute"
         )
         raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure, ("<", most, ""))
-    depth = tip_penetration(gear, mate, pair.working_centre_distance, 0.5 * pair.normal_backlash / mate.base_radius)
-    if depth > TOLERANCE * gear.module:
+    depth = _tip_depth(pair, gear, mate)
+    if depth > _allowed_depth(gear):
         problem = f"makes the tip cut {1e3 * depth:.4g} mm into the {name}'s root"
-        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure)
+        raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure, _largest_addendum(pair, gear, mate))
+
+
+def _allowed_depth(gear: Gear) -> float:
+    """Depth (m) of tips in a root that is taken for rounding and for the discretisation of the outlines."""
+    return rounding(gear.module) + TOLERANCE * gear.module
+
+
+def _tip_depth(pair: MeshGeometry, gear: Gear, mate: Gear) -> float:
+    """Largest depth (m) by which tips of a mate enter a gear of the pair."""
+    return tip_penetration(gear, mate, pair.working_centre_distance, 0.5 * pair.normal_backlash / mate.base_radius)
+
+
+def _largest_addendum(pair: MeshGeometry, gear: Gear, mate: Gear) -> tuple[str, float, str] | None:
+    """Limit of a mate's addendum up to which its tips do not cut into a gear; None where they do with any."""
+
+    def cuts(addendum: float) -> bool:
+        try:
+            shorter = replace(mate, addendum=addendum)
+        except InputError:  # the tip round or relief does not fit
+            shorter = replace(mate, addendum=addendum, tip_round=0.0, tip_relief=None)
+        return _tip_depth(pair, gear, shorter) > _allowed_depth(gear)
+
+    most = mate.addendum
+    least = max(_addendum_at(mate, math.hypot(mate.base_radius, mate.form_roll)), 0.0) + 1e-3
+    if least >= most or cuts(least):
+        return None
+    while most - least > 1e-5:
+        middle = 0.5 * (least + most)
+        least, most = (least, middle) if cuts(middle) else (middle, most)
+    return ("<", least, "")
+
+
+def _addendum_at(gear: Gear, radius: float) -> float:
+    """Addendum (times module) that has its tip circle at a radius (m)."""
+    return gear.addendum + (radius - gear.tip_radius) / gear.module
 
 
 def tip_penetration(gear: Gear, mate: Gear, centre_distance: float, twist: float) -> float:
@@ -237,6 +300,31 @@ def _tip_outline(gear: Gear) -> Array:
     pieces += [s.curve.point(t) for s in profile.segments if s.name in ("tip_round", "tip")]
     made = np.concatenate(pieces)
     return np.concatenate([made, np.conj(made)])
+
+
+def rounding_notes(pair: MeshGeometry) -> list[str]:
+    """Return how the data of gears were taken where they fit each other except for rounding, one sentence each."""
+    notes = []
+    for name, gear, mate in (("pinion", pair.pinion, pair.wheel), ("wheel", pair.wheel, pair.pinion)):
+        largest = largest_rack_tip_radius(gear)
+        if gear.rack_tip_radius > largest * (1.0 + 1e-12):
+            notes.append(
+                f"rack_tip_radius {gear.rack_tip_radius:g} of the {name} exceeds a full fillet by rounding: "
+                f"{largest:.6g} is taken"
+            )
+        room = pair.working_centre_distance - mate.root_radius - gear.tip_radius
+        if room <= 0.0:
+            notes.append(
+                f"the tip clearance of the {name} is {1e6 * room:.3g} um, 0 except for rounding: tips that touch the "
+                "root circle are taken to carry nothing"
+            )
+    for name, lost in _lost_to_form_points(pair).items():
+        if lost > 1e-7 * pair.pinion.module and not getattr(pair, name).undercut:
+            notes.append(
+                f"the mate's tip reaches {1e6 * lost:.3g} um of roll length below the start of the {name}'s involute, "
+                "by rounding: the path of contact ends at that start"
+            )
+    return notes
 
 
 def pair_warnings(pair: MeshGeometry) -> list[str]:
