@@ -9,11 +9,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..base.errors import InputError, given
+from ..base.expressions import Node, compute, quantities, value_of, without_value
 from ..base.typing import Array
 from ..multibody import SpanFunction, StateFunction, polynomial
 from ..multibody.planar.variables import Affine, BodyVariables
 from ..multibody.series.tape import Tape
-from .expressions import OF_POINT, PLAIN, Node, compute, quantities, value_of, without_value
+from .quantities import OF_POINT, PLAIN
 from .tables import ValueTable
 
 #: What a load may depend on.
@@ -48,12 +49,8 @@ class Formula:
         The expression parsed.
     """
 
-    def __init__(self, text: str, label: str, node: Node, allowed: tuple[str, ...], what: str) -> None:
+    def __init__(self, text: str, label: str, node: Node) -> None:
         self.text, self.label, self.node, self.names = text, label, node, sorted(quantities(node), key=str)
-        for kind, _ in self.names:
-            if kind not in allowed:
-                problem = f"uses {kind}; {what} may depend on {', '.join(allowed)}"
-                raise InputError(label, text, problem, "use one of these")
         for base in constant_bases(node):
             if not base > 0.0:
                 raise InputError(label, text, f"raises {base:g} to a power that varies", "give a base > 0")
@@ -90,7 +87,7 @@ def constant_bases(node: Node) -> list[float]:
 
 
 class ExpressionLoad(Formula, StateFunction):
-    """A load given by an expression; `bind` tells it the mechanism whose quantities it names.
+    """A load given by an expression; `bind` sets the mechanism whose quantities it names.
 
     Parameters
     ----------
@@ -99,9 +96,6 @@ class ExpressionLoad(Formula, StateFunction):
     node
         The expression parsed.
     """
-
-    def __init__(self, text: str, label: str, node: Node) -> None:
-        super().__init__(text, label, node, ALLOWED, "a load")
 
     def bind(self, mechanism: Quantities) -> None:
         """Look up bodies, with signs, and points."""
@@ -154,9 +148,6 @@ class ExpressionLoad(Formula, StateFunction):
 class ExpressionTension(Formula, SpanFunction):
     """The tension of a spring given by an expression; text, label and node as of `ExpressionLoad`."""
 
-    def __init__(self, text: str, label: str, node: Node) -> None:
-        super().__init__(text, label, node, OF_SPAN, "a tension")
-
     def value(self, t: float, length: float, rate: float) -> float:
         """Tension (N)."""
         return self.at(_of_span(t, length, rate))
@@ -191,6 +182,7 @@ CALLS: Mapping[str, Callable[..., int]] = {
     "hypot": lambda tape, a, b: tape.power(tape.sum(tape.mul(a, a), tape.mul(b, b)), 0.5),
     "exp": lambda tape, a: tape.exp(a),
     "log": lambda tape, a: tape.log(a),
+    "log10": lambda tape, a: tape.sum(tape.log(a), f=1.0 / math.log(10.0)),
     "tanh": lambda tape, a: tape.tanh(a),
     "abs": lambda tape, a: tape.magnitude(a),
     "min": lambda tape, a, b: tape.larger(a, b, -1.0),

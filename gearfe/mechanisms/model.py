@@ -11,29 +11,17 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError, given, unknown_name
+from ..base.expressions import CONSTANTS, Node, compute, parse, quantities
 from ..base.tables.kinds import FORCES, JOINTS
 from ..base.tables.mechanism import FigureTable, MechanismFile, read_mechanism_file
 from ..base.typing import Array
 from ..multibody import GROUND, Forced, Linkage, Start, System, consistent_start
 from ..multibody.core.mass_regularisation import free_motions
-from .expressions import (
-    FUNCTIONS,
-    NAMED,
-    OF_BODY,
-    OF_LINK,
-    OF_PLATE,
-    OF_POINT,
-    OF_SECTION,
-    PLAIN,
-    Node,
-    compute,
-    parse,
-    quantities,
-)
 from .links import FlexibleLink, bent_start, flexible_links, link_of
 from .loads import ExpressionLoad
 from .parts import Links, body_of, known_until, part_of
 from .plates import PlateLink, part_of_plate, plate_links
+from .quantities import NAMED, OF_BODY, OF_LINK, OF_PLATE, OF_POINT, OF_SECTION, PLAIN, quantity_names
 from .tables import read_table
 
 Point = tuple[float, float]
@@ -279,12 +267,8 @@ class Mechanism:
     def _forced(self, text: str, target: float, level: int) -> Forced:
         label = f"start.{('positions', 'velocities')[level]} {text!r}"
         allowed = (("angle", "x", "y"), ("rate", "vx", "vy"))[level]
-        node = parse(text, label, known=allowed)
+        node = parse(text, label, quantity_names(allowed, what="a value of the start"))
         needed = quantities(node)
-        for kind, _ in needed:
-            if kind not in allowed:
-                problem = f"uses {kind}; only {', '.join(allowed)} can be forced here"
-                raise InputError(label, None, problem, "use one of these")
 
         def position(q: Array) -> float:
             return float(np.asarray(compute(node, self.values(needed, q[None, :]))).reshape(-1)[0])
@@ -343,7 +327,7 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     """Mechanism from its tables."""
     tables = {name: read_table(name, table, path.parent) for name, table in file.tables.items()}
     for name in tables:
-        if name in FUNCTIONS or name in (*NAMED, *PLAIN, "pi"):
+        if name in (*quantity_names().functions, *NAMED, *PLAIN, *CONSTANTS):
             raise InputError("tables", name, "is the name of a function or a quantity", "rename the table")
     parts = {n: part_of_plate(n, table, path.parent) for n, table in file.bodies.items() if table.plate is not None}
     links = {n: link_of(file, n, table) for n, table in file.bodies.items() if table.bends and table.beam is not None}
@@ -371,11 +355,12 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
         if isinstance(load, ExpressionLoad):
             load.bind(made)
     zero = np.zeros((1, system.size))
-    known = (*PLAIN, *OF_BODY, *OF_POINT, *((*OF_SECTION, *OF_LINK) if held else ()))
+    of_links = (*OF_SECTION, *OF_LINK) if held else ()
+    known = quantity_names((*PLAIN, *OF_BODY, *OF_POINT, *of_links), tables, "an output")
     for i, output in enumerate(file.outputs):
         if output.name in outputs or output.name == "time_s":
             raise InputError(f"outputs[{i}].name", output.name, "is used twice", "rename the column")
-        node = parse(output.value, f"outputs[{i}].value", tables, known=known)
+        node = parse(output.value, f"outputs[{i}].value", known)
         try:
             made.values(quantities(node), zero, zero, zero)  # names exist
         except InputError as error:

@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError, given, unknown_name
+from ..base.expressions import parse
 from ..base.tables.kinds import Kind
 from ..base.tables.mechanism import BodyTable, ForceTable, FunctionTable, JointTable, MechanismFile
 from ..multibody import GROUND, Body, TimeFunction, constant, polynomial, sine, smoothed_step
 from ..multibody.planar.beam_link import BeamLink
-from .expressions import parse
 from .links import link_of
 from .loads import ALLOWED, OF_SPAN, ExpressionLoad, ExpressionTension
 from .plates import PlatePart
+from .quantities import quantity_names
 from .tables import ValueTable
 
 Point = tuple[float, float]
@@ -149,10 +150,10 @@ def part_of(
         elif key == "profile":
             value = _profile(value, tables, f"{label}.profile")
         elif isinstance(value, str) and key in LOADS:
-            node = parse(value, f"{label}.{key}", tables, known=ALLOWED)
+            node = parse(value, f"{label}.{key}", quantity_names(ALLOWED, tables, "a load"))
             value = ExpressionLoad(value, f"{label}.{key}", node)
         elif key == "tension_N" and value is not None:
-            node = parse(value, f"{label}.{key}", tables, known=OF_SPAN)
+            node = parse(value, f"{label}.{key}", quantity_names(OF_SPAN, tables, "a tension"))
             value = ExpressionTension(value, f"{label}.{key}", node)
         elif key.endswith("_deg") and value is not None:
             value = math.radians(value)

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.expressions import compute, quantities
 from ..base.files import read_text
 from ..base.progress import stage
 from ..base.typing import Array
 from ..multibody import Linkage, Trajectory
-from .expressions import PLAIN, compute, quantities
 from .model import Mechanism
+from .quantities import PLAIN
 
 #: States that are evaluated at once: links of some dozen points take 6 kB each for their strains.
 BLOCK = 4096

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import copy
 import ctypes
 import functools
@@ -16,9 +15,8 @@ from typing import Any
 
 from ..base.config import set_key
 from ..base.errors import InputError
-from ..base.expressions import syntax
 from ..base.progress import one_thread
-from .expressions import Answer, value_of
+from .expressions import Answer, Output, read_output, value_of
 from .kinds import Shared, solve
 
 #: Of a row: solved; solved in part, the message says what failed; refused, as the job's command would; an error of
@@ -64,9 +62,9 @@ class Task:
                 set_key(made, key, value, f"study.parameters.{name}")
         return made
 
-    def expressions(self) -> dict[str, ast.expr]:
+    def expressions(self) -> dict[str, Output]:
         """Outputs, parsed."""
-        return {name: syntax(text, f"study.outputs.{name}") for name, text in self.outputs.items()}
+        return {name: read_output(text, f"study.outputs.{name}") for name, text in self.outputs.items()}
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ def evaluate(task: Task, values: Sequence[Any], shared: Shared) -> tuple[dict[st
         What the job's command would refuse, and outputs that the job does not give.
     """
     answer = solve(task.kind, task.tables(values), task.path, shared, estimate=task.estimate)
-    return {name: value_of(tree, answer, f"study.outputs.{name}") for name, tree in task.expressions().items()}, answer
+    return {name: value_of(output, answer) for name, output in task.expressions().items()}, answer
 
 
 def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -> Row:

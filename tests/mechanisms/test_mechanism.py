@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
+from gearfe.base.expressions import compute, parse, quantities
 from gearfe.cli.main import main
 from gearfe.mechanisms import evaluate, load_mechanism
-from gearfe.mechanisms.expressions import compute, parse, quantities
+from gearfe.mechanisms.quantities import quantity_names
 from gearfe.mechanisms.results import reactions, wrapped
 from gearfe.multibody import integrate
 from tests.makers.rigid_cases import reference
@@ -66,11 +67,11 @@ def write(folder: Path, text: str) -> Path:
     ],
 )
 def test_arithmetic(text, value):
-    assert compute(parse(text, "x"), {("time", None): 0.7}) == pytest.approx(value, rel=1e-15)
+    assert compute(parse(text, "x", quantity_names()), {("time", None): 0.7}) == pytest.approx(value, rel=1e-15)
 
 
 def test_quantities_of_an_expression():
-    assert quantities(parse("angle(rod) - 2 * ax(rod.tip) + kinetic", "x")) == {
+    assert quantities(parse("angle(rod) - 2 * ax(rod.tip) + kinetic", "x", quantity_names())) == {
         ("angle", "rod"),
         ("ax", "rod.tip"),
         ("kinetic", None),
@@ -85,7 +86,7 @@ def test_quantities_of_an_expression():
 )  # fmt: skip
 def test_what_is_not_arithmetic_is_refused(text):
     with pytest.raises(InputError):
-        parse(text, "outputs[0].value")
+        parse(text, "outputs[0].value", quantity_names())
 
 
 @pytest.mark.parametrize(

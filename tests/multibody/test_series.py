@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from gearfe.base.expressions import FUNCTIONS, compute, parse
 from gearfe.mechanisms import load_mechanism
-from gearfe.mechanisms.expressions import compute, parse
-from gearfe.mechanisms.loads import write_expression
+from gearfe.mechanisms.loads import CALLS, write_expression
+from gearfe.mechanisms.quantities import quantity_names
 from gearfe.multibody import (
     Body,
     Gravity,
@@ -32,11 +33,17 @@ from tests.places import GEOMETRY
 ORDER = 14
 
 
+def test_every_function_of_expressions_can_be_written() -> None:
+    assert {name for name, _ in FUNCTIONS} <= set(CALLS)
+
+
 @pytest.mark.parametrize(
     "text",
     [
         "angle(a)*rate(a) - 2*angle(a) + 3", "(2 + angle(a))/(3 - rate(a))", "(1 + angle(a))**4", "(2 + angle(a))**-2",
         "(2 + angle(a))**1.5", "(2 + angle(a))**angle(a)", "sqrt(2 + angle(a))", "exp(angle(a))", "log(2 + angle(a))",
+        "log10(2 + angle(a))",
+
         "sin(angle(a))", "cos(3*angle(a))", "tan(angle(a))", "asin(0.5*angle(a))", "acos(0.5*angle(a))",
         "atan(2*angle(a))", "atan2(angle(a), rate(a))", "atan2(angle(a), -2)", "hypot(angle(a), rate(a))",
         "tanh(3*angle(a))", "abs(angle(a) - 2)", "abs(angle(a))", "min(angle(a), 1)", "max(angle(a), 1)", "5",
@@ -47,7 +54,7 @@ def test_the_series_of_a_register_is_its_function(text: str) -> None:
     """At a distance h the sum of the series of f(a(t)) against f at a(t + h), for a(t) = 0.3 + 0.4 t - 0.2 t^2."""
     tape = Tape(1)
     leaf = {"angle": tape.linear({0: 1.0}), "rate": tape.rate({0: 1.0})}
-    node = parse(text, "text")
+    node = parse(text, "text", quantity_names())
     register = write_expression(node, tape, lambda name: leaf[name[0]])
     program = tape.program(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1))
     kernels = route.KERNELS.python

@@ -34,7 +34,6 @@ HEAVY = {
     ("gearfe.gears.gearmesh.check", "gearfe.gears.contact.whole_gears.position"): "finite elements of whole gears",
     ("gearfe.gears.gearmesh.job", "gearfe.gears.gearmesh.sweep"): "scipy; a curve is read from the cache",
     ("gearfe.drivetrain.gearbox.fields", "gearfe.drivetrain.housing.mesh_checks"): "sparse matrices",
-    ("gearfe.drivetrain.gearbox.timefunctions", "gearfe.mechanisms.expressions"): "all of planar mechanisms",
 }
 #: Modules that import by name, and what they name: parts of their own package, of packages below, of other programs.
 BY_NAME = {

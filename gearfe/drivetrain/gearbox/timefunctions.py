@@ -7,7 +7,6 @@ a kink, at which halving would not end, stays within `KINK` of the largest value
 
 from __future__ import annotations
 
-import ast
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -15,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from ...base.errors import InputError, unknown_name
-from ...base.expressions import syntax
+from ...base.errors import InputError
+from ...base.expressions import Names, compute, parse
 from ...base.files import read_numbers
 from ...base.tables.timefunction import TrainFunctionTable, check_rising
 from ...base.typing import Array
@@ -91,13 +90,7 @@ def _table(name: str, where: str, folder: Path) -> Array:
 
 def _of_expression(text: str, where: str, end: float) -> TimeFunction:
     """Pieces of polynomials that are the expression of `time` from 0 to the end."""
-    from ...mechanisms.expressions import FUNCTIONS, compute, parse  # few jobs have expressions
-
-    known = ("time", "pi", *FUNCTIONS)
-    for name in (node.id for node in ast.walk(syntax(text, where)) if isinstance(node, ast.Name)):
-        if name not in known:
-            raise unknown_name(f"{where} = {text!r}", name, known)
-    tree = parse(text, where)
+    tree = parse(text, where, Names(("time",)))
 
     def at(time: Array) -> Array:
         value = np.broadcast_to(np.asarray(compute(tree, {("time", None): time}), dtype=float), time.shape)
