@@ -21,6 +21,7 @@ import numpy as np
 
 from ...base.cache import cache_key, cached_arrays, source_hash, versions
 from ...base.errors import InputError
+from ...base.progress import Stopwatch
 from ...base.tables.jobs import load_job
 from ...base.tables.pair import MaterialTable, PairTable, StiffnessTable
 from ...fem.plane import Material
@@ -31,9 +32,10 @@ from ..geometry.pair import GearPair
 from .curve import StiffnessCurve
 
 if TYPE_CHECKING:
-    from ...base.progress import Stopwatch
+    from ...base.tables.loadmap import LoadMapTable
     from ...base.tables.microgeometry import MicrogeometryTable
     from ..contact.compliance import MeshingPair
+    from .load_map import LoadMap
 
 #: Packages whose text decides a curve.
 PACKAGES = ("fem", "fem/meshing", "gears/contact", "gears/geometry", "gears/gearmesh", "gears/teeth")
@@ -184,6 +186,24 @@ def read_stiffness_job(path: str | Path) -> StiffnessJob:
         For every mistake in the file, and for gears that cannot run together.
     """
     return stiffness_job(load_job(path, ("pair",), ("stiffness", "microgeometry")), Path(path).parent)
+
+
+def job_map(job: StiffnessJob, table: LoadMapTable, *, keep: Keep | None = None) -> LoadMap:
+    """Return the map of a job file: torques and angles of `table`, model of [stiffness], flanks of [microgeometry]."""
+    from .sweep import sweep_loads
+
+    watch = Stopwatch()
+    load_map = sweep_loads(
+        job.pair,
+        table.torques(),
+        positions=table.positions,
+        mesh_cycles=table.mesh_cycles,
+        root_stress=table.root_stress,
+        back=job.back_deviations,
+        kinematics=job.table.kinematics,
+        elastic=job.elastic(keep, watch),
+    )
+    return replace(load_map, timings={**watch.seconds, **load_map.timings})
 
 
 def cached_curve(pair: GearPair, model: PairModel, **sweep: Any) -> StiffnessCurve:
