@@ -40,7 +40,10 @@ OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
     r"bearing_(stiff|damp|clear|play)": ("elastic bearings", "spur gears on rigid shafts in a housing only"),
 }  # fmt: skip
 #: Tables of gear jobs.
-GEAR_TABLES = ("pair", "stiffness", "loadmap", "microgeometry", "train", "runup")
+GEAR_TABLES = (
+    *("pair", "stiffness", "loadmap", "microgeometry", "train", "runup"),
+    *("gears", "meshes", "shafts", "bearings", "materials"),
+)
 
 
 class _Short(reprlib.Repr):

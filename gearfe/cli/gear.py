@@ -11,7 +11,7 @@ from ..base.progress import stage
 from .arguments import add_folder, add_job, check_option, print_results
 
 if TYPE_CHECKING:
-    from ..base.tables.microgeometry import MicrogeometryTable
+    from ..base.tables.gearbox import NamedMesh
     from ..gears.geometry.face import ToothDeviations
     from ..gears.geometry.pair import Gear, GearPair
 
@@ -38,31 +38,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the geometry, write gear_pair.png and gear_pair.json."""
-    from ..base.tables.jobs import load_job
+    from ..base.config import read_toml
+    from ..base.tables.jobs import meshes_of
     from ..base.tables.pair import StiffnessTable
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load
-    tables = load_job(args.job, ("pair",), ("stiffness", "microgeometry"))
+    (mesh,) = meshes_of(read_toml(args.job), args.job, None)
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
     exports = _exports(args.export)
 
-    from ..gears.geometry.pair import GearPair
+    from ..gears.geometry.pair import pair_of
 
-    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
+    pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
 
     from ..base.files import output_folder, whole_set, write_json
-    from ..gears.gearmesh.job import StiffnessJob
+    from ..gears.gearmesh.job import materials_of
     from ..gears.geometry.derived import derived_geometry, iso_values
 
-    job = StiffnessJob(tables["pair"], tables.get("stiffness", StiffnessTable()), pair)
     folder = output_folder(args.out)
-    geometry = derived_geometry(pair, (tables["pair"].pinion.span_teeth, tables["pair"].wheel.span_teeth))
-    moduli = [material.youngs_modulus for material in job.materials]
+    spans = mesh.driver.drawn.get("span_teeth"), mesh.driven.drawn.get("span_teeth")
+    geometry = derived_geometry(pair, spans)
+    moduli = [material.youngs_modulus for material in materials_of(mesh)]
     iso = iso_values(pair, moduli[0], moduli[1])
     with whole_set(folder, ("gear_pair.png", *FILES)) as made:
         for name in exports:
             with stage(f"writing {name}"):
-                _export(made / name, pair, tables.get("microgeometry"), Path(args.job).parent)
+                _export(made / name, pair, mesh, Path(args.job).parent)
         if not args.no_pictures:
             from ..figures.gears import pair_picture
             from ..figures.style import save
@@ -73,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
         names = sorted(path.name for path in made.iterdir())
     _show(geometry)
     _show({"iso_6336": iso})
-    if exports and "microgeometry" in tables:
+    if exports and mesh.deviates:
         print("flanks with the deviations of [microgeometry]: dxf, step and brep all teeth, csv tooth 0")
     print_results((), folder, names, {}, pair.warnings)
     return 0
@@ -92,7 +93,7 @@ def _exports(text: str) -> list[str]:
     return sorted(set(made))
 
 
-def _export(path: Path, pair: GearPair, table: MicrogeometryTable | None, folder: Path) -> None:
+def _export(path: Path, pair: GearPair, mesh: NamedMesh, folder: Path) -> None:
     """A gear in the form that the suffix names; its deviations are looked for in `folder`."""
     import numpy as np
 
@@ -102,10 +103,10 @@ def _export(path: Path, pair: GearPair, table: MicrogeometryTable | None, folder
     from ..output.dxf import write_dxf
 
     gear = pair.pinion if path.stem == "pinion" else pair.wheel
-    sides = _deviations(pair, path.stem, table, folder)
+    sides = _deviations(pair, path.stem, mesh, folder)
     if path.suffix == ".csv":
         columns = outline_columns(gear)
-        write_csv(path, columns if table is None else _with_deviations(columns, gear, sides))
+        write_csv(path, columns if not mesh.deviates else _with_deviations(columns, gear, sides))
     elif path.suffix == ".dxf":
         circles = {"bore": gear.bore_diameter, "reference_circle": gear.pitch_diameter}
         radii = {name: 0.5e3 * diameter for name, diameter in circles.items()}
@@ -116,17 +117,15 @@ def _export(path: Path, pair: GearPair, table: MicrogeometryTable | None, folder
         write_solid(path, gear, sides)
 
 
-def _deviations(
-    pair: GearPair, name: str, table: MicrogeometryTable | None, folder: Path
-) -> tuple[ToothDeviations, ToothDeviations]:
+def _deviations(pair: GearPair, name: str, mesh: NamedMesh, folder: Path) -> tuple[ToothDeviations, ToothDeviations]:
     """Deviations of the left and the right flanks of a gear."""
     from ..gears.geometry.deviation_job import GEARS, FlankOf, flank_deviations
     from ..gears.geometry.face import NOMINAL
 
-    if table is None:
+    if not mesh.deviates:
         return NOMINAL
     number = GEARS.index(name)
-    left, right = (flank_deviations(FlankOf(table, pair, number, side, folder)) for side in ("left", "right"))
+    left, right = (flank_deviations(FlankOf(mesh, pair, number, side, folder)) for side in ("left", "right"))
     return left, right
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..base.tables.loadmap import LoadMapTable, loads_of
+from ..base.tables.loadmap import LoadMapTable
 from ..base.tables.pair import StiffnessTable, check_law
 from .arguments import add_folder, add_job, add_keys, add_removed, check_option, print_results, with_keys
 
@@ -39,33 +39,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compute the map and write the files; 1 when a cell failed."""
     started = time.perf_counter()
-    from ..base.tables.jobs import load_job
+    from ..base.config import read_toml
+    from ..base.tables.jobs import meshes_of
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load
-    tables = load_job(args.job, ("pair",), ("stiffness", "loadmap", "microgeometry"))
-    tables["stiffness"] = _overridden_model(tables.get("stiffness", StiffnessTable()), args)
-    table = _with_loads(args, loads_of(tables))
+    (mesh,) = meshes_of(read_toml(args.job), args.job, None)
+    mesh = replace(mesh, stiffness=_overridden_model(mesh.stiffness, args))
+    table = _with_loads(args, mesh.loads)
     table.torques()
 
-    from ..gears.geometry.pair import GearPair
+    from ..gears.geometry.pair import pair_of
 
-    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
+    pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
 
     from ..base.files import output_folder, whole_set, write_csvs, write_json
     from ..base.progress import Stopwatch
-    from ..gears.gearmesh.job import job_map, stiffness_job
-    from ..gears.gearmesh.report import deviation_lines, map_lines, map_summary, map_tables, warnings
+    from ..gears.gearmesh.job import stiffness_job
+    from ..gears.gearmesh.load_report import report_lines, summary, warnings
+    from ..gears.gearmesh.load_report import tables as map_tables
+    from ..gears.gearmesh.load_sweep import job_map
+    from ..gears.gearmesh.report import deviation_lines
 
     watch, beside = Stopwatch({"program start": time.perf_counter() - started}), Path(args.job).parent
     with watch.stage("geometry"):
-        job = stiffness_job(tables, beside, pair)
+        job = stiffness_job(mesh, beside, pair)
         deviations = deviation_lines(job)  # impossible ones are refused before the folder is made
     folder = output_folder(args.out)
-    load_map = job_map(job, table)
-    watch.seconds.update(load_map.timings)
+    made_map = job_map(job, table)
+    watch.seconds.update(made_map.timings)
     with whole_set(folder, FILES) as made:
         with watch.stage("tables"):
-            write_csvs(made, map_tables(load_map))
+            write_csvs(made, map_tables(made_map))
         if not args.no_pictures:
             from ..figures.flanks import flank_picture
             from ..figures.load_map import load_map_picture
@@ -73,16 +77,16 @@ def run(args: argparse.Namespace) -> int:
 
             with watch.stage("pictures"):
                 gears = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}"
-                title = f"{gears}, {load_map.span}, plane {job.table.plane}, law {job.table.law}"
-                save(load_map_picture(load_map, title), made / "loadmap.png", dpi=110)
-                if job.microgeometry is not None:
-                    picture = flank_picture(job.microgeometry, pair, beside)
+                title = f"{gears}, {made_map.span}, plane {job.table.plane}, law {job.table.law}"
+                save(load_map_picture(made_map, title), made / "loadmap.png", dpi=110)
+                if mesh.deviates:
+                    picture = flank_picture(mesh, pair, beside)
                     save(picture, made / "loadmap_flanks.png", dpi=110)
         watch.seconds["total"] = time.perf_counter() - started
-        write_json(made / "loadmap.json", map_summary(job, table, load_map, watch.seconds))
+        write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
-    print_results([*map_lines(load_map), *deviations], folder, names, watch.seconds, warnings(job, load_map))
-    return 1 if load_map.failed.any() else 0
+    print_results([*report_lines(made_map), *deviations], folder, names, watch.seconds, warnings(job, made_map))
+    return 1 if made_map.failed.any() else 0
 
 
 def _overridden_model(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,27 +56,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the file and name its groups."""
-    from ..base.tables.jobs import load_job
+    from ..base.config import read_toml
+    from ..base.tables.jobs import meshes_of
 
     out = Path(args.out) if args.out else Path("out") / Path(args.job).stem / "mesh"
     args.out = str(out if out.suffix else out / ("gears.inp" if args.deck else "gears.msh"))
     # mistakes in the file show before NumPy, SciPy and the finite elements load
-    tables = load_job(args.job, ("pair",), ("stiffness",))
-    table = with_keys(args, tables.get("stiffness", StiffnessTable()), "coarsen", "flank_coarsen")
+    (mesh,) = meshes_of(read_toml(args.job), args.job, None)
+    table = with_keys(args, mesh.stiffness, "coarsen", "flank_coarsen")
     table.check("stiffness")
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
     _check(args)
 
-    from ..gears.geometry.pair import GearPair
+    from ..gears.geometry.pair import pair_of
 
-    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
+    pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
 
     from ..base.files import output_folder
     from ..fem.meshing.export import export_mesh, format_of, group_sizes
     from ..gears.gearmesh.job import StiffnessJob
 
     format_of(args.out)
-    job = StiffnessJob(tables["pair"], table, pair)
+    one, two = (replace(gear, microgeometry=None) for gear in mesh.gears)
+    job = StiffnessJob(replace(mesh, stiffness=table, driver=one, driven=two), pair)
     output_folder(Path(args.out).parent)
     found: dict[str, float] = {}
     if args.deck:
@@ -137,8 +140,6 @@ def _parts(args: argparse.Namespace, job: StiffnessJob, wheel_angle: float) -> d
 
 
 def _placed(part: MeshPart, angle: float, x: float) -> MeshPart:
-    from dataclasses import replace
-
     import numpy as np
 
     c, s = math.cos(angle), math.sin(angle)

@@ -72,16 +72,11 @@ def run(args: argparse.Namespace) -> int:
     started = time.perf_counter()
     from ..base.config import read_toml
     from ..base.errors import InputError
-    from ..base.tables.jobs import job_tables
+    from ..base.tables.jobs import meshes_of
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load
-    raw = read_toml(args.job)
-    tables = job_tables(raw, args.job, ("pair",), ("stiffness", "microgeometry"))
-    if args.variant is not None:
-        from ..base.tables.jobs import variant_stiffness
-
-        tables["stiffness"] = variant_stiffness(raw, args.variant)
-    tables["stiffness"] = overridden(tables.get("stiffness", StiffnessTable()), args)
+    (mesh,) = meshes_of(read_toml(args.job), args.job, None, args.variant)
+    mesh = replace(mesh, stiffness=overridden(mesh.stiffness, args))
     given = args.fields or []
     chosen = [value for value in given if value != "all"] or None  # pinion angles (deg); None: all
     if chosen and len(chosen) < len(given):
@@ -89,9 +84,9 @@ def run(args: argparse.Namespace) -> int:
     if args.animation is not None and not 2 <= args.animation <= 1000:
         raise InputError("--animation", args.animation, "must be >= 2 and <= 1000 frames", "40 are usual")
 
-    from ..gears.geometry.pair import GearPair
+    from ..gears.geometry.pair import pair_of
 
-    pair = GearPair.from_table(tables["pair"])  # gears that cannot run together show with NumPy alone
+    pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
 
     import numpy as np
 
@@ -103,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
     with watch.stage("geometry"):
-        job = stiffness_job(tables, Path(args.job).parent, pair)
+        job = stiffness_job(mesh, Path(args.job).parent, pair)
         sweep = job.sweep
         if chosen is not None:
             from ..gears.gearmesh.fields_output import angle_numbers

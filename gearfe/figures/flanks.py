@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.tables.microgeometry import MicrogeometryTable
+from ..base.tables.gearbox import NamedMesh
 from ..base.typing import Array
 from ..gears.geometry import pitch_errors
-from ..gears.geometry.deviation_job import GEARS, FlankOf, flank_deviations
+from ..gears.geometry.deviation_job import FlankOf, flank_deviations
 from ..gears.geometry.pair import GearPair
 from .style import BLUE, GREY, ORANGE, headed, new_figure, some_of, tidy
 
@@ -43,18 +43,18 @@ class _Chart:
     pitch: Array | None
 
 
-def _chart(table: MicrogeometryTable, pair: GearPair, g: int, side: str, folder: Path) -> _Chart:
-    one = FlankOf(table, pair, g, side, folder)
+def _chart(mesh: NamedMesh, pair: GearPair, g: int, side: str, folder: Path) -> _Chart:
+    one = FlankOf(mesh, pair, g, side, folder)
     gear, active = one.gear, one.active
     ends = gear.form_roll, gear.profile.tip_roll
     roll = np.unique(np.concatenate([np.linspace(*ends, 400), active]))
     own = flank_deviations(one)
     index, band = 1e6 * np.array(own.turn) * gear.reference_radius, None
-    if table.tolerance_class is not None:
-        allowed = pitch_errors.tolerances(gear, table.tolerance_class)
+    if mesh.tolerance_class is not None:
+        allowed = pitch_errors.tolerances(gear, mesh.tolerance_class)
         band = 1e6 * (0.5 * allowed.form + allowed.slope * ((roll - ends[0]) / (ends[1] - ends[0])))
     return _Chart(
-        title=f"{GEARS[g]}, {side} flanks{', driving' if side == table.flank else ''}",
+        title=f"{mesh.gears[g].name}, {side} flanks{', driving' if side == mesh.flank else ''}",
         roll=1e3 * roll,
         active=tuple(1e3 * s for s in active),
         lines=[np.zeros(len(roll)) if one is None else 1e6 * one.at(roll)[0] for one in own.profiles],
@@ -63,9 +63,9 @@ def _chart(table: MicrogeometryTable, pair: GearPair, g: int, side: str, folder:
     )
 
 
-def flank_picture(table: MicrogeometryTable, pair: GearPair, folder: Path) -> Any:
+def flank_picture(mesh: NamedMesh, pair: GearPair, folder: Path) -> Any:
     """K-charts: deviation over roll length of both flanks of both gears, and their index deviations."""
-    charts = [_chart(table, pair, g, side, folder) for g in (0, 1) for side in ("left", "right")]
+    charts = [_chart(mesh, pair, g, side, folder) for g in (0, 1) for side in ("left", "right")]
     pitch = any(chart.pitch is not None for chart in charts)
     figure = new_figure(11.0, 7.6 if pitch else 5.0)
     grid = figure.subplots(2 if pitch else 1, len(charts), squeeze=False, height_ratios=(2.2, 1) if pitch else None)
@@ -95,8 +95,8 @@ def flank_picture(table: MicrogeometryTable, pair: GearPair, folder: Path) -> An
             below.set_xlabel("tooth", fontsize=9)
             if column == 0:
                 below.set_ylabel("index deviation (µm)", fontsize=9)
-    allowed = f"; grey: profile tolerances, ISO 1328-1 class {table.tolerance_class}"
-    grey = "" if table.tolerance_class is None else allowed
+    allowed = f"; grey: profile tolerances, ISO 1328-1 class {mesh.tolerance_class}"
+    grey = "" if mesh.tolerance_class is None else allowed
     title = "Deviations of the flanks; dashed: ends of the path of contact" + grey
     headed(figure, title)
     return figure

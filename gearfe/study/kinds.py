@@ -19,7 +19,6 @@ from ..base.config import build
 from ..base.files import read_csv
 from ..base.progress import Stopwatch
 from ..base.tables.jobs import job_tables
-from ..base.tables.loadmap import loads_of
 from ..gears.geometry.face import NOMINAL
 from .expressions import Answer
 
@@ -74,20 +73,20 @@ def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool) -> Answer:
     from ..gears.gearmesh.report import summary
     from ..gears.gearmesh.sweep import sweep_stiffness
 
-    job = _pair_job(job_tables(raw, path, ("pair",), ("stiffness", "microgeometry")), path)
+    job = _only_mesh(raw, path)
     sweep, elastic = job.sweep, job.elastic(_kept(job, shared))
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=estimate, **sweep)
     return Answer({"stiffness": curve.columns()}, summary(job, curve, {}), _positions(curve.failed))
 
 
 def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
-    from ..gears.gearmesh.job import job_map
-    from ..gears.gearmesh.report import map_summary, map_tables
+    from ..gears.gearmesh.load_report import summary, tables
+    from ..gears.gearmesh.load_sweep import job_map
 
-    read = job_tables(raw, path, ("pair",), ("stiffness", "microgeometry", "loadmap"))
-    table, job = loads_of(read), _pair_job(read, path)
-    load_map = job_map(job, table, keep=_kept(job, shared))
-    return Answer(map_tables(load_map), map_summary(job, table, load_map, {}), _positions(load_map.failed))
+    job = _only_mesh(raw, path)
+    table = job.mesh.loads
+    made = job_map(job, table, keep=_kept(job, shared))
+    return Answer(tables(made), summary(job, table, made, {}), _positions(made.failed))
 
 
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
@@ -145,15 +144,17 @@ def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     return Answer(made.tables(), summarise(mechanism, made.start, made.results, tolerance, {}, error), made.problem)
 
 
-def _pair_job(tables: dict[str, Any], path: Path) -> Any:
-    from ..gears.gearmesh.job import stiffness_job
+def _only_mesh(raw: Raw, path: Path) -> Any:
+    from ..gears.gearmesh.job import only_mesh, stiffness_job
 
-    return stiffness_job(tables, path.parent)
+    return stiffness_job(only_mesh(raw, path), path.parent)
 
 
 def _kept(job: Any, shared: Shared) -> Keep:
     """What decides the condensed gears is the key of all that cases share."""
-    return partial(shared.get, repr((job.pair_table, replace(job.model, deviations=NOMINAL))))
+    gears = [(gear.teeth, gear.form, gear.drawn) for gear in job.mesh.gears]
+    key = gears, job.mesh.centre_distance_mm, replace(job.model, deviations=NOMINAL)
+    return partial(shared.get, repr(key))
 
 
 def _positions(failed: Any) -> str:

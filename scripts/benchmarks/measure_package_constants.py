@@ -90,8 +90,8 @@ def run_ups() -> Answers:
     """Steady states of one stage with a mesh law, teeth in contact and apart."""
     from gearfe.drivetrain.runup.run_up import run_up
     from gearfe.drivetrain.train import build_train
+    from tests.drivetrain.test_runup_train import loaded
     from tests.makers.mesh_laws import hertzian_law
-    from tests.makers.trains import loaded
 
     model = build_train(loaded([(20, 30)], lambda _: hertzian_law(relief=4e-6), speed=700.0, flexible=False))
     speeds = np.linspace(500.0, 1100.0, 7)
@@ -145,7 +145,8 @@ def gears() -> Answers:
 def curves() -> Answers:
     """Curve and load map of a coarse pair with their estimates."""
     from gearfe.gears.contact.laws import HalfPlane
-    from gearfe.gears.gearmesh.sweep import sweep_loads, sweep_stiffness
+    from gearfe.gears.gearmesh.load_sweep import sweep_loads
+    from gearfe.gears.gearmesh.sweep import sweep_stiffness
 
     pair, law = coarse_pair(), HalfPlane()
     curve = sweep_stiffness(pair, torque=80.0, law=law, coarsen=3.0, estimate_error=True)

@@ -12,7 +12,10 @@ from typing import Any
 from gearfe.base.config import type_hints
 from gearfe.base.tables.jobs import TABLES, table_class
 from gearfe.base.tables.mechanism import MechanismFile
+from gearfe.base.tables.named import NAMED
+from gearfe.base.tables.pair import GearBodyTable, ToothFormTable
 from gearfe.base.tables.text import inner_table, toml_value
+from gearfe.base.tables.train import ShaftTable, TrainMeshTable
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "keys.md"
 HEAD = """# Keys of the job files
@@ -23,10 +26,25 @@ left out.
 """
 
 
+#: Classes whose keys several tables have -> what their section is called.
+SHARED: dict[type, str] = {
+    ToothFormTable: "Tooth form",
+    GearBodyTable: "Gear",
+    TrainMeshTable: "Mesh",
+    ShaftTable: "Shaft",
+}
+
+
 def reference_page() -> str:
-    """Markdown of all tables, each nested one below the one that holds it."""
-    parts = [HEAD]
-    top = {table_class(name): name for name in TABLES}
+    """Markdown of all tables, each nested one below the one that holds it, each key once."""
+    parts = [HEAD, "## Keys of several tables\n"]
+    seen: dict[type, str] = {}
+    for table, title in SHARED.items():
+        parts += [f"### {title}\n", *_sections(table, title, seen)]
+    top = seen | {table_class(name): name for name in TABLES}
+    for kind, table in NAMED.items():
+        parts.append(f"## `[{kind}.NAME]`\n")
+        parts += _sections(table, f"{kind}.NAME", top)
     for name in TABLES:
         parts.append(f"## `[{name}]`\n")
         parts += _sections(table_class(name), name, dict(top))
@@ -36,12 +54,16 @@ def reference_page() -> str:
 
 
 def _sections(table: type, name: str, seen: dict[type, str]) -> list[str]:
-    """The table's keys, then its nested tables; one that was described before is named only."""
+    """The table's keys, then its nested tables; one that was described before is named only, and so are its keys."""
+    known = next((base for base in table.__mro__[1:] if base in seen), None)
+    inherited = set() if known is None else {field.name for field in dataclasses.fields(known)}
     seen[table] = name
     hints = type_hints(table)
     rows: list[str] = []
     below: list[str] = []
     for field in dataclasses.fields(table):
+        if field.name in inherited:
+            continue
         inner, many = inner_table(hints[field.name])
         full = f"{name}.{field.name}".lstrip(".")
         title = {"list": f"[[{full}]]", "dict": f"[{full}.NAME]", "": f"[{full}]"}[many]
@@ -53,13 +75,18 @@ def _sections(table: type, name: str, seen: dict[type, str]) -> list[str]:
             doc = field.metadata["doc"]
             below += [f"### `{title}`\n", f"{doc[:1].upper()}{doc[1:]}.\n" if not doc.startswith("[") else ""]
             below += _sections(inner, full if many != "dict" else f"{full}.NAME", seen)
+    keys = [] if known is None else [f"All keys of {_place(seen[known])}{', and:' if rows else '.'}\n"]
     head = ["| key | value | default | meaning |", "|---|---|---|---|"]
-    return [*((*head, *rows, "") if rows else ()), *below]
+    return [*keys, *((*head, *rows, "") if rows else ()), *below]
+
+
+def _place(name: str) -> str:
+    return f"[{name}](#{name.lower().replace(' ', '-')})" if name in SHARED.values() else f"`[{name}]`"
 
 
 def _same(doc: str, other: str) -> str:
     """What is said of a table whose keys are those of another."""
-    keys = f"keys as in `[{other}]`"
+    keys = f"keys as in {_place(other)}"
     return keys if doc.startswith("[") else f"{_cell(doc)}: {keys}"
 
 

@@ -66,10 +66,10 @@ def _relief(random: np.random.Generator, end: str, module: float) -> Table:
 def run(case: Case, folder: Path) -> Finding:
     """Build the law, evaluate it everywhere, and compare it with contact solutions."""
     job = read_stiffness_job(case.write(folder))
-    assert job.microgeometry is not None
+    assert job.mesh.deviates
     random = np.random.default_rng(case.number)
     pair = half_plane_pair(job.elastic())
-    force = float(job.microgeometry.torques()[0]) / job.pair.wheel.base_radius
+    force = float(job.mesh.loads.torques()[0]) / job.pair.wheel.base_radius
     law = mesh_law(pair, force)
     angles = law.nodes[0] + law.cycle * random.uniform(0.0, 1.0, PLACES)
     depths = law.reach * np.exp(random.uniform(math.log(1e-4), 0.0, PLACES))

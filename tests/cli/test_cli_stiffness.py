@@ -1,5 +1,6 @@
 """The commands stiffness, gear and mesh, as a user runs them; coarse meshes."""
 
+import csv
 import json
 import math
 import os
@@ -13,7 +14,6 @@ import pytest
 from gearfe import StiffnessCurve
 from gearfe.cli.main import main
 from gearfe.gears.contact.elements import solve_elements
-from tests.makers.files import csv_rows
 from tests.places import EXAMPLES, GEOMETRY, ROOT
 
 JOB = GEOMETRY / "gear_train.toml"
@@ -21,7 +21,8 @@ QUICK = ("--coarsen", "3", "--no-estimate", "--law", "half_plane")
 
 
 def rows(folder):
-    return csv_rows(folder / "stiffness.csv")
+    with open(folder / "stiffness.csv", newline="") as stream:
+        return list(csv.DictReader(stream))
 
 
 def job_with(tmp_path, **changes):
@@ -56,7 +57,7 @@ def test_the_whole_command(tmp_path, capsys):
     summary = json.loads((out / "summary.json").read_text())
     assert summary["statuses"] == {"converged": 40}
     assert summary["job"]["stiffness"]["twist_deg"] == 0.05
-    assert summary["job"]["pair"]["pinion"]["teeth"] == 20
+    assert summary["job"]["gears"]["pinion"]["teeth"] == 20
     assert summary["derived_geometry"]["contact_ratio"] == pytest.approx(1.442, abs=5e-4)
     assert summary["iso_6336"]["c_prime_N_per_mm_um"] == pytest.approx(13.1, abs=0.05)
     assert summary["iso_6336"]["c_gamma_N_per_mm_um"] == pytest.approx(17.4, abs=0.05)

@@ -15,7 +15,7 @@ from gearfe.base.tables.housing import SuperelementTable
 from gearfe.drivetrain.housing.modal_test import read_modes
 from gearfe.drivetrain.housing.superelement import read_matrix, rigid_shapes, superelement, write_matrix
 from gearfe.fem.reduction.modal_body import ModalBody
-from tests.makers.files import damaged
+from tests.fem.test_foreign_meshes import damaged
 from tests.makers.nastran import Output2, output4_binary, output4_text
 
 POINTS = np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.01]])

@@ -24,7 +24,7 @@ from tests.places import GEOMETRY
 
 SHIPPED = GEOMETRY / "gear_train.toml"
 #: What follows from the layout of the train or from its gears alone.
-ONCE = ("rolling", "tooth_places", "from_table", "_rigid_train")
+ONCE = ("rolling", "tooth_places", "_rigid_train")
 #: The shipped train has two different gears, and both of its meshes have the same pair of them.
 GEARS, PAIRS = 2, 1
 

@@ -13,10 +13,12 @@ import pytest
 
 from gearfe import InputError
 from gearfe.base.config import build
+from gearfe.base.tables.gearbox import NamedMesh
 from gearfe.base.tables.microgeometry import GearMicrogeometryTable, MicrogeometryTable, WavinessTable
 from gearfe.cli.main import main
 from gearfe.gears.geometry.deviation_job import active_rolls, deviations_of
 from tests.makers.gears import pair as gear_pair
+from tests.makers.gears import uneven
 from tests.places import DOCS
 
 PAIR = gear_pair(tip_round=1e-4)
@@ -24,8 +26,8 @@ PINION = PAIR.pinion
 LOW, HIGH = PINION.form_roll, PINION.profile.tip_roll
 
 
-def table(**pinion) -> MicrogeometryTable:
-    return build(MicrogeometryTable, {"torques_Nm": [50.0], "pinion": pinion}, "microgeometry")
+def table(**pinion) -> NamedMesh:
+    return uneven(build(MicrogeometryTable, {"torques_Nm": [50.0], "pinion": pinion}, "microgeometry"))
 
 
 def test_measured_teeth_and_sides(tmp_path) -> None:

@@ -17,15 +17,16 @@ from gearfe.drivetrain.gearbox.job import job_train, read_train_job
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.train.statics import static_errors
 from gearfe.gears.contact.half_plane import half_plane_pair
-from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_loads, sweep_stiffness
+from gearfe.gears.gearmesh.load_sweep import sweep_loads
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 from gearfe.gears.geometry import pitch_errors
 from gearfe.gears.geometry.deviation_job import deviations_of
 from gearfe.gears.geometry.face import NOMINAL
 from gearfe.gears.geometry.modifications import FlankModification, Relief, tooth_deviations
 from gearfe.gears.meshlaw.make import mesh_law
 from gearfe.multibody import constant
+from tests.drivetrain.test_train_job import BORES, SMALL
 from tests.makers.gears import pair as gear_pair
-from tests.makers.job_texts import BARE_TRAIN, BORES
 
 PAIR = gear_pair(tip_round=1e-4)
 
@@ -151,7 +152,7 @@ def test_laws_on_meshes_have_no_deviations(tmp_path) -> None:
 
 def train_text(more: str, **curves: str) -> str:
     pair = JOB.split("[stiffness]", maxsplit=1)[0]
-    text = BARE_TRAIN.replace("stiffness_N_per_m = 2e8", "")
+    text = SMALL.replace("stiffness_N_per_m = 2e8", "")
     for name, gear, rest in (("a", "pinion", 18), ("b", "wheel", 27)):
         form = f"teeth = {rest}\nmodule_mm = 2.0\npressure_angle_deg = 20.0\nface_width_mm = 12.0\n"
         text = text.replace(form, f'gear = "{gear}"\n', 1)
@@ -197,9 +198,8 @@ def test_a_train_takes_the_pitch_errors_of_its_teeth(sign, tmp_path) -> None:
     path.write_text(text.replace("torque_Nm = -30.0", f"torque_Nm = {sign * torque}"))
     job = read_train_job(path)
     train = job_train(job, train_curves(job))
-    assert job.microgeometry is not None
     side = "left" if sign > 0 else "right"
-    own = deviations_of(job.microgeometry, PAIR, tmp_path, flank=side)
+    own = deviations_of(job.meshes[0], PAIR, tmp_path, flank=side)
     (found,) = sweep_loads(PAIR, [torque], positions=5, kinematics="small", coarsen=2.0, deviations=own).curves
     assert len(found.pinion_angle) == 5 * 60
     (static,) = static_errors(train, sign * found.pinion_angle)
@@ -243,8 +243,7 @@ def test_back_flanks_have_their_own_microgeometry(tmp_path) -> None:
     elastic = elastic_pair(pair, coarsen=2.0)
     for load, side, sign in ((-torque, "right", 1.0), (torque, "left", -1.0)):  # drive and so load turn against y
         (one,) = train.loads
-        assert job.microgeometry is not None
-        own = elastic.deviated(deviations_of(job.microgeometry, pair, tmp_path, flank=side))
+        own = elastic.deviated(deviations_of(job.meshes[0], pair, tmp_path, flank=side))
         (found,) = sweep_loads(pair, [torque], positions=12, elastic=own, kinematics="small").curves
         now = replace(train, loads=(replace(one, torque=constant(load)),))
         (static,) = static_errors(now, -sign * found.pinion_angle)

@@ -11,6 +11,7 @@ import pytest
 
 from gearfe.base.config import build
 from gearfe.base.errors import InputError
+from gearfe.base.tables.gearbox import pair_gearbox
 from gearfe.base.tables.jobs import load_job, table_class
 from gearfe.gears.geometry.pair import GearPair, TipRelief
 from tests.places import GEOMETRY
@@ -46,8 +47,8 @@ def test_the_shipped_pair():
     for gear in (one, two):
         form = (gear.face_width, gear.addendum, gear.dedendum, gear.rack_tip_radius, gear.tip_round)
         assert form == pytest.approx((10e-3, 1.0, 1.25, 0.3, 0.1e-3))
-    steel = table.material_of("pinion")
-    assert steel == table.material_of("wheel")
+    steel = pair_gearbox(table).gears["pinion"].material
+    assert steel == pair_gearbox(table).gears["wheel"].material
     assert (steel.youngs_modulus_GPa, steel.poisson_ratio, steel.density_kg_per_m3) == (200.0, 0.3, 7850.0)
 
 
@@ -99,8 +100,9 @@ def test_own_keys_win_over_shared_ones():
 
 def test_materials_may_differ():
     table = build(table_class("pair"), tomllib.loads(MINIMAL + "[wheel.material]\nyoungs_modulus_GPa = 70\n"), "pair")
-    assert table.material_of("pinion").youngs_modulus_GPa == 200.0
-    assert table.material_of("wheel").youngs_modulus_GPa == 70.0
+    gears = pair_gearbox(table).gears
+    assert gears["pinion"].material.youngs_modulus_GPa == 200.0
+    assert gears["wheel"].material.youngs_modulus_GPa == 70.0
 
 
 def test_every_key_of_the_table_is_documented():

@@ -15,9 +15,9 @@ from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gears.contact.laws import Nitsche
 from gearfe.gears.contact.whole_gears.pair import ElasticGear, WholePair
 from gearfe.gears.contact.whole_gears.position import solve_position
-from gearfe.gears.gearmesh.curve import BACK
-from gearfe.gears.gearmesh.load_map import LoadMap
-from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_loads, sweep_stiffness
+from gearfe.gears.gearmesh.load_map import BACK, LoadMap
+from gearfe.gears.gearmesh.load_sweep import sweep_loads
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 from gearfe.gears.geometry import pitch_errors
 from gearfe.gears.geometry.deviation_job import deviations_of, pitch_errors_of
 from gearfe.gears.geometry.face import NOMINAL, ToothDeviations
@@ -25,6 +25,7 @@ from gearfe.gears.geometry.modifications import FlankModification, Relief, Wavin
 from gearfe.gears.geometry.pair import GearPair, TipRelief
 from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 from tests.makers.gears import pair as gear_pair
+from tests.makers.gears import uneven
 
 PAIR = gear_pair(tip_round=1e-4)
 PINION, WHEEL = PAIR.pinion, PAIR.wheel
@@ -185,7 +186,9 @@ def test_the_room_behind_the_teeth(flank) -> None:
     elastic = elastic_pair(pair, coarsen=3.0)
 
     def room(left: dict, right: dict, angles) -> tuple[np.ndarray, np.ndarray]:
-        table = build(MicrogeometryTable, {"flank": flank, "pinion": {"left": left, "right": right}}, "microgeometry")
+        table = uneven(
+            build(MicrogeometryTable, {"flank": flank, "pinion": {"left": left, "right": right}}, "microgeometry")
+        )
         other = {"left": "right", "right": "left"}[flank]
         own, back = (deviations_of(table, pair, flank=side) for side in (flank, other))
         made = loads(elastic, [30.0], own, angles=angles, back=back)
@@ -228,7 +231,7 @@ def test_a_displaced_tooth_is_no_thicker(gear: str, teeth: int, sign: float) -> 
         "flanks": {"left": {"pitch_um": deviations}, "right": {"pitch_um": [-p for p in deviations]}},
         "thick": {side: {"pitch_um": [12.0] + [0.0] * (teeth - 1)} for side in ("left", "right")},
     }.items():
-        job = build(MicrogeometryTable, {gear: table}, "microgeometry")
+        job = uneven(build(MicrogeometryTable, {gear: table}, "microgeometry"))
         own, back = (deviations_of(job, pair, flank=side) for side in ("left", "right"))
         angles = pair.mesh_cycle * np.arange(-20, 21) / 10.0
         rooms[name] = loads(elastic, [0.001], own, angles=angles, back=back).back_clearance[0]
@@ -262,7 +265,7 @@ def test_python_gets_the_back_flanks_of_displaced_teeth() -> None:
     pair = gear_pair()
     lists = {"pinion": np.sin(np.arange(20.0)), "wheel": np.cos(np.arange(30.0))}
     keys = {name: {"pitch_um": values.tolist()} for name, values in lists.items()}
-    table = build(MicrogeometryTable, keys, "microgeometry")
+    table = uneven(build(MicrogeometryTable, keys, "microgeometry"))
     own, back = (deviations_of(table, pair, flank=side) for side in ("left", "right"))
     for number in (0, 1):
         assert pitch_errors.back_turns(own[number].turn, wheel=number == 1) == pytest.approx(back[number].turn)
@@ -291,9 +294,9 @@ def test_run_out_is_a_gear_off_its_axis() -> None:
         ]
         moved = side * radius * (np.array(crossing) - np.array(plain))
         assert found == pytest.approx(moved, abs=0.02 * off)
-    job = build(MicrogeometryTable, {"pinion": {"run_out_um": 8.0, "run_out_phase_deg": 25.0}}, "microgeometry")
+    job = uneven(build(MicrogeometryTable, {"pinion": {"run_out_um": 8.0, "run_out_phase_deg": 25.0}}, "microgeometry"))
     pair = gear_pair()
-    turns = [1e-6 * np.array(errors) for errors in pitch_errors_of(job, pair.pinion, "pinion")]
+    turns = [1e-6 * np.array(errors) for errors in pitch_errors_of(job.driver, pair.pinion)]
     cosine = math.cos(pair.pinion.pressure_angle)
     expected = pitch_errors.run_out(pair.pinion, 8.0, math.radians(25.0))
     assert 1e12 * turns[0] == pytest.approx(cosine * expected[0])
@@ -307,12 +310,14 @@ def test_pitch_deviations_by_single_ones_and_by_class() -> None:
     single -= single.mean()
     keys = [{"single_pitch_um": single.tolist()}, {"pitch_class": 6}]
     for given in keys:
-        table = build(MicrogeometryTable, {"pinion": given}, "microgeometry")
-        left, right = pitch_errors_of(table, gear, "pinion")
+        table = uneven(build(MicrogeometryTable, {"pinion": given}, "microgeometry"))
+        left, right = pitch_errors_of(table.driver, gear)
         assert np.ptp(left) > 1e-6
         assert left == pytest.approx([-e for e in right])
-    table = build(MicrogeometryTable, {"pinion": keys[0] | {"right": {"pitch_um": [3.0] * 20}}}, "microgeometry")
-    left, right = pitch_errors_of(table, gear, "pinion")
+    table = uneven(
+        build(MicrogeometryTable, {"pinion": keys[0] | {"right": {"pitch_um": [3.0] * 20}}}, "microgeometry")
+    )
+    left, right = pitch_errors_of(table.driver, gear)
     cosine = math.cos(gear.pressure_angle)
     assert np.diff(left) == pytest.approx(1e-6 * cosine * single[1:])
     assert right == pytest.approx([3e-6 * cosine] * 20)
@@ -325,7 +330,7 @@ def test_gears_that_jam_have_no_numbers() -> None:
     thick = 1e-6 * 10.0 * cosine
     elastic = elastic_pair(pair, coarsen=3.0)
     sides = {side: {"pitch_um": [10.0] * 20} for side in ("left", "right")}
-    table = build(MicrogeometryTable, {"pinion": sides}, "microgeometry")
+    table = uneven(build(MicrogeometryTable, {"pinion": sides}, "microgeometry"))
     own, back = (deviations_of(table, pair, flank=side) for side in ("left", "right"))
     angles = (np.arange(5) + 0.3) * pair.mesh_cycle / 5
     free = loads(elastic, [5.0, 250.0], own, angles=angles)

@@ -8,12 +8,12 @@ import pytest
 
 from gearfe.base.config import build
 from gearfe.base.errors import InputError
+from gearfe.base.tables.gearbox import pair_gearbox
 from gearfe.base.tables.pair import PairTable, StiffnessTable
-from gearfe.gears.gearmesh.job import StiffnessJob
+from gearfe.gears.gearmesh.job import StiffnessJob, stiffness_job
 from gearfe.gears.gearmesh.positions import twists_for_torque
 from gearfe.gears.gearmesh.sweep import sweep_stiffness
 from gearfe.gears.geometry.derived import iso_values
-from gearfe.gears.geometry.pair import GearPair
 from tests.makers.solving import given_positions
 
 #: A pair in which every feature is on, so that each change is a small step from it.
@@ -81,6 +81,11 @@ SWEEP_CHANGES = {
 }
 
 
+def job_of(table: PairTable, stiffness: StiffnessTable) -> StiffnessJob:
+    (mesh,) = pair_gearbox(table).meshes.values()
+    return stiffness_job(replace(mesh, stiffness=stiffness))
+
+
 def curve(pair_changes=None, sweep_changes=None):
     data = {key: dict(value) if isinstance(value, dict) else value for key, value in BASE.items()}
     for key, value in (pair_changes or {}).items():
@@ -90,9 +95,7 @@ def curve(pair_changes=None, sweep_changes=None):
         del data["module_mm"]
         data["pinion"]["pitch_diameter_mm"], data["wheel"]["pitch_diameter_mm"] = 50.02, 75.03
     table = build(PairTable, data, "pair")
-    job = StiffnessJob(
-        table, build(StiffnessTable, SWEEP | (sweep_changes or {}), "stiffness"), GearPair.from_table(table)
-    )
+    job = job_of(table, build(StiffnessTable, SWEEP | (sweep_changes or {}), "stiffness"))
     found = sweep_stiffness(job.pair, job.model, **job.sweep)
     assert set(found.status) == {"converged"}
     return found
@@ -128,7 +131,7 @@ def test_every_key_is_in_this_file():
 def test_a_torque_beyond_small_strain_names_its_key():
     """From where the mean stiffness of ISO 6336, of E' = E/(1 - nu^2), yields by 0.25 modules; and from Python."""
     pair = build(PairTable, {**BASE, "pinion": {**BASE["pinion"], "face_width_mm": 20.0}}, "pair")
-    job = StiffnessJob(pair, StiffnessTable(torque_Nm=1e6), GearPair.from_table(pair))
+    job = job_of(pair, StiffnessTable(torque_Nm=1e6))
     strain = 200e9 / (1 - 0.3**2)  # of the wheel; the pinion, twice as wide as the contact, is twice as stiff
     level = iso_values(job.pair, 2 * strain, strain)["c_gamma_times_width_N_per_m"]
     most = f"must be <= {level * 0.25 * 2.5e-3 * job.pair.wheel.base_radius:.3g} N m"

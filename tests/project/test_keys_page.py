@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import runpy
 
 import pytest
 
 from gearfe.base.tables.jobs import TABLES, table_class
+from gearfe.base.tables.named import NAMED
+from gearfe.base.tables.pair import GearBodyTable, ToothFormTable
+from gearfe.base.tables.train import TrainMeshTable
 from tests.places import DOCS, ROOT
 
 PAGE = DOCS / "keys.md"
@@ -18,10 +22,28 @@ def test_the_page_is_that_of_the_tables() -> None:
     assert PAGE.read_text(encoding="utf-8") == made, "run python scripts/build/write_keys.py"
 
 
-@pytest.mark.parametrize("name", list(TABLES))
-def test_every_key_has_a_row_or_a_section(name: str) -> None:
+def section(name: str) -> str:
+    """Section of a table, with those whose keys it has, too."""
     text = PAGE.read_text(encoding="utf-8")
-    begin = text.index(f"## `[{name}]`")
-    section = text[begin : text.find("\n## ", begin)]
-    for field in dataclasses.fields(table_class(name)):
-        assert f"`{field.name}`" in section or f"[{name}.{field.name}" in section
+    begin = re.search(rf"^###? `?\[*{re.escape(name)}\]*`?$", text, re.MULTILINE)
+    assert begin is not None, name
+    depth = text[begin.start() :].index(" ")
+    found = re.compile(rf"^#{{2,{depth}}} ", re.MULTILINE).search(text, begin.end())
+    own = text[begin.start() : None if found is None else found.start()]
+    shared = re.findall(r"All keys of (?:\[(.*?)\]\(|`\[(.*?)\]`)", own)
+    return own + "".join(section(one or other) for one, other in shared)
+
+
+@pytest.mark.parametrize("name", [*TABLES, *(f"{kind}.NAME" for kind in NAMED)])
+def test_every_key_has_a_row_or_a_section(name: str) -> None:
+    text, table = section(name), NAMED.get(name.partition(".")[0]) or table_class(name)
+    for field in dataclasses.fields(table):
+        assert f"`{field.name}`" in text or f"[{name}.{field.name}" in text, field.name
+
+
+def test_keys_that_tables_share_stand_once() -> None:
+    """The keys of a tooth form stood in [pair] and in [pair.pinion]."""
+    text = PAGE.read_text(encoding="utf-8")
+    for table in (ToothFormTable, GearBodyTable, TrainMeshTable):
+        keys = {field.name: field.metadata["doc"] for field in dataclasses.fields(table)}
+        assert {key: text.count(f"| {doc} |") for key, doc in keys.items()} == dict.fromkeys(keys, 1)

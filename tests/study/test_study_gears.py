@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from dataclasses import replace
@@ -10,15 +11,12 @@ from pathlib import Path
 import pytest
 
 from gearfe.base.config import read_toml
-from gearfe.base.tables.jobs import job_tables
 from gearfe.base.tables.text import toml_document
 from gearfe.cli.main import main
 from gearfe.gears.gearmesh import sweep
-from gearfe.gears.gearmesh.job import StiffnessJob
-from gearfe.gears.geometry.pair import GearPair
+from gearfe.gears.gearmesh.job import only_mesh, stiffness_job
 from gearfe.study.design import study_cases
 from gearfe.study.job import read_study, run_study
-from tests.makers.files import csv_rows
 from tests.makers.studies import rows_of
 from tests.places import DOCS, GEOMETRY
 
@@ -59,6 +57,11 @@ def study(tmp_path: Path):
     return read_study(tmp_path / "study.toml")
 
 
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
 def test_load_maps_are_the_same_on_processes_and_alone(study, tmp_path):
     """Bit for bit; a case that is written out gives the digits of its row by the job's own command."""
     made = run_study(study, tmp_path / "one", jobs=1)
@@ -68,8 +71,8 @@ def test_load_maps_are_the_same_on_processes_and_alone(study, tmp_path):
     case = tmp_path / "three.toml"
     assert main(["study", str(study.path), "--row", "3", "--write", str(case)]) == 0
     assert main(["loadmap", str(case), "--out", str(tmp_path / "alone"), "--no-pictures"]) == 0
-    least = min(float(row["k_mesh_N_per_m"]) for row in csv_rows(tmp_path / "alone" / "loadmap.csv"))
-    told = [row for row in csv_rows(tmp_path / "alone" / "loadmap_torques.csv") if float(row["torque_Nm"]) == 60.0]
+    least = min(float(row["k_mesh_N_per_m"]) for row in table(tmp_path / "alone" / "loadmap.csv"))
+    told = [row for row in table(tmp_path / "alone" / "loadmap_torques.csv") if float(row["torque_Nm"]) == 60.0]
     assert made.output("least")[3] == least
     assert made.output("peak_to_peak_um")[3] == float(told[0]["transmission_error_peak_to_peak_um"])
 
@@ -93,9 +96,8 @@ def test_error_estimates_are_outputs(tmp_path):
     (tmp_path / "study.toml").write_text(text)
     study = read_study(tmp_path / "study.toml")
     made = run_study(study, tmp_path / "out", jobs=1)
-    tables = job_tables(study.task.tables(study.cases[0]), "job", ("pair", "stiffness", "microgeometry"))
-    pair = GearPair.from_table(tables["pair"])
-    one = StiffnessJob(tables["pair"], tables["stiffness"], pair, tables["microgeometry"])
+    one = stiffness_job(only_mesh(study.task.tables(study.cases[0]), "job"))
+    pair = one.pair
     curve = sweep.sweep_stiffness(pair, one.model, estimate_error=True, **one.sweep)
     assert made.output("worst")[0] == pytest.approx(curve.worst_error, rel=1e-12)
     assert made.output("worst")[0] > 0.0

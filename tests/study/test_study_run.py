@@ -179,10 +179,8 @@ def test_outputs_that_the_job_does_not_give_are_told_before_any_case(tmp_path):
 
 def test_gears_and_their_microgeometry(tmp_path):
     """A stiffness study gives what the sweep gives; cases that share gears have the digits of cases that do not."""
-    from gearfe.base.tables.jobs import job_tables
-    from gearfe.gears.gearmesh.job import StiffnessJob
+    from gearfe.gears.gearmesh.job import only_mesh, stiffness_job
     from gearfe.gears.gearmesh.sweep import sweep_stiffness
-    from gearfe.gears.geometry.pair import GearPair
 
     job = "[pair]\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"
     job += "[pair.pinion]\nteeth = 22\npitch_diameter_mm = 44.0\nbore_diameter_mm = 10.0\n"
@@ -198,9 +196,8 @@ def test_gears_and_their_microgeometry(tmp_path):
     made = run_study(study, tmp_path, jobs=1)
     for case, k in zip(study.cases, made.output("k"), strict=True):
         raw = study.task.tables(case)
-        tables = job_tables(raw, "job", ("pair", "stiffness", "microgeometry"))
-        pair = GearPair.from_table(tables["pair"])
-        one = StiffnessJob(tables["pair"], tables["stiffness"], pair, tables["microgeometry"])
+        one = stiffness_job(only_mesh(raw, "job"))
+        pair = one.pair
         assert sweep_stiffness(pair, one.model, **one.sweep).k_mesh.mean() == pytest.approx(k, rel=1e-12)
     assert len(set(made.output("k"))) == 4
 

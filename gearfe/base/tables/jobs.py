@@ -9,11 +9,15 @@ from __future__ import annotations
 import importlib
 import typing
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..config import build, read_toml
 from ..errors import InputError, unknown_key, unknown_name
+from .gearbox import Gearbox, NamedMesh, named_gearbox, named_train, pair_gearbox, train_gearbox
+from .loadmap import TORQUES, LoadMapTable
+from .named import NAMED, named_tables
 from .pair import LOADS, StiffnessTable
 
 if TYPE_CHECKING:
@@ -75,27 +79,149 @@ def job_tables(
     for name, table in raw.items():
         if name in REMOVED_TABLES:
             raise InputError(f"[{name}]", None, *REMOVED_TABLES[name])
-        if name not in TABLES:
+        if name not in TABLES and name not in NAMED:
             if {"run", "bodies"} <= raw.keys():
                 raise InputError("job file", str(path), "describes a mechanism", "run it: gearfe mechanism FILE")
-            raise unknown_key("", name, table, TABLES, field=f"job file {Path(path).name}")
+            raise unknown_key("", name, table, [*TABLES, *NAMED], field=f"job file {Path(path).name}")
     for name in needed:
         if name not in raw:
             cure = f"add a table [{name}] (see gearfe new)"
             raise InputError(f"[{name}]", None, f"is missing in {Path(path).name}", cure)
     made: dict[str, Any] = {}
     for name, table in raw.items():
-        if name in needed or name in optional:
-            made[name] = build(table_class(name), table, name)
+        asked = name in needed or name in optional
+        if name in NAMED:
+            found = named_tables(name, table, rules=asked)
         else:
-            build(table_class(name), table, name, rules=False)
+            found = build(table_class(name), table, name, rules=asked)
+        if asked:
+            made[name] = found
+    _check_shorthand(raw)
     return made
+
+
+def _check_shorthand(raw: Mapping[str, Any]) -> None:
+    """Raise `InputError` for tables of gears by name beside the shorthand of a pair, and for some without others."""
+    named = next((kind for kind in NAMED if kind in raw), None)
+    if named is None:
+        return
+    for name, cure in (
+        ("pair", "write its gears and its mesh by name, too (docs/gearbox.md)"),
+        ("microgeometry", "write [gears.NAME.microgeometry]; flank and tolerance_class in [meshes.NAME]"),
+    ):
+        if name in raw:
+            raise InputError(f"[{name}]", None, f"stands beside [{named}.NAME], which says the same by name", cure)
+    pairs = (
+        ("meshes", "gears"),
+        ("gears", "meshes"),
+        ("materials", "gears"),
+        ("bearings", "shafts"),
+        ("shafts", "gears"),
+    )
+    for kind, needs in pairs:
+        if kind in raw and needs not in raw:
+            raise InputError(f"[{needs}]", None, f"is missing beside [{kind}]", f"add [{needs}.NAME]")
 
 
 def table_class(name: str) -> type:
     """Dataclass that describes the table `name` of a job file."""
     module, _, cls = TABLES[name].partition(":")
     return typing.cast(type, getattr(importlib.import_module(module), cls))
+
+
+#: Tables that say what gears and meshes there are.
+OF_GEARS = ("pair", "microgeometry", *NAMED)
+#: Tables of a gear train's job, beside [train].
+OF_TRAINS = (*OF_GEARS, "stiffness", "housing", "spectrum")
+
+
+def read_gearbox(path: str | Path, variant: str | None = None) -> Gearbox:
+    """Return the gears and meshes of a job file, for what is computed of single meshes; see `gearbox_of`."""
+    return gearbox_of(read_toml(path), path, variant)
+
+
+def gearbox_of(raw: dict[str, Any], path: str | Path, variant: str | None = None) -> Gearbox:
+    """Return the gears and meshes of a parsed job: those of [pair], else those by name, else those of [train].
+
+    Parameters
+    ----------
+    raw : dict
+        The parsed job.
+    path : path
+        Its file, named in messages.
+    variant : str, optional
+        Variant of [train] whose keys win over [stiffness].
+
+    Raises
+    ------
+    InputError
+        For every mistake in the tables, and a file without gears.
+    """
+    if "pair" not in raw and "gears" not in raw and "train" in raw:
+        box: Gearbox = train_tables(raw, path, variant or "")["gearbox"]
+        return box
+    needed = ("gears", "meshes") if "gears" in raw or "meshes" in raw else ("pair",)
+    tables = job_tables(raw, path, needed, (*OF_GEARS, "stiffness", "loadmap"))
+    box = _gearbox(tables)
+    return with_loads(box, raw, variant)
+
+
+def meshes_of(raw: dict[str, Any], path: str | Path, name: str | None, variant: str | None = None) -> list[NamedMesh]:
+    """Return the meshes that a command computes: that of `name`, or without a name all of `gearbox_of`.
+
+    A file with [pair] and [train] has the mesh of [pair], and by their names those of [train], too.
+
+    Parameters
+    ----------
+    raw : dict
+        The parsed job.
+    path : path
+        Its file, named in messages.
+    name : str, optional
+        Name of a mesh.
+    variant : str, optional
+        Variant of [train] whose keys win over [stiffness].
+
+    Raises
+    ------
+    InputError
+        For mistakes in the tables, and an unknown name.
+    """
+    box = gearbox_of(raw, path, variant)
+    if name is None:
+        return list(box.meshes.values())
+    if name not in box.meshes and "pair" in raw and "train" in raw:
+        more: Gearbox = train_tables(raw, path, variant or "")["gearbox"]
+        box = Gearbox({**more.gears, **box.gears}, {**more.meshes, **box.meshes})
+    return [box.mesh(name)]
+
+
+def _gearbox(tables: Mapping[str, Any]) -> Gearbox:
+    """Gears and meshes of [pair], or those by name."""
+    if "gears" in tables:
+        shafts = tables.get("shafts")
+        return named_gearbox(tables["gears"], tables["meshes"], tables.get("materials", {}), shafts=shafts)
+    return pair_gearbox(tables["pair"], tables.get("microgeometry"))
+
+
+def with_loads(box: Gearbox, raw: Mapping[str, Any], variant: str | None = None) -> Gearbox:
+    """Return the gearbox with [stiffness] and [loadmap] in each mesh, each with the keys that the mesh has instead."""
+    meshes = {
+        name: replace(mesh, stiffness=stiffness_of(raw, variant, name), loads=_loads_of(raw, name))
+        for name, mesh in box.meshes.items()
+    }
+    return replace(box, meshes=meshes)
+
+
+def _loads_of(raw: Mapping[str, Any], mesh: str) -> LoadMapTable:
+    """Torques and angles of a mesh: its own over those of [loadmap], or without that table those of [microgeometry]."""
+    own = raw.get("meshes", {}).get(mesh, {}).get("loadmap", {})
+    if "loadmap" not in raw and not own and "microgeometry" in raw:
+        return build(table_class("microgeometry"), raw["microgeometry"], "microgeometry")
+    shared = raw.get("loadmap", {})
+    if not own.keys().isdisjoint(TORQUES):
+        shared = {key: value for key, value in shared.items() if key not in TORQUES}
+    return build(LoadMapTable, {**shared, **own}, f"meshes.{mesh}.loadmap" if own else "loadmap")
 
 
 def read_train_tables(path: str | Path, variant: str | None = None) -> dict[str, Any]:
@@ -110,31 +236,60 @@ def read_train_tables(path: str | Path, variant: str | None = None) -> dict[str,
 
 
 def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = None) -> dict[str, Any]:
-    """The same of tables that are parsed; `path` is named in messages."""
-    tables = job_tables(raw, path, ("train",), ("pair", "stiffness", "microgeometry", "housing", "spectrum"))
+    """The same of tables that are parsed; `path` is named in messages; ``gearbox`` has the gears and meshes."""
+    tables = job_tables(raw, path, ("train",), OF_TRAINS)
     table: TrainTable = tables["train"]
     table = table.chosen(table.variant if variant is None else variant)
-    table.check_models()
-    if table.variant:
-        tables["stiffness"] = variant_stiffness(raw, table.variant)
+    if "gears" in tables:
+        if "shafts" not in tables:
+            raise InputError("[shafts]", None, "is missing: a train has shafts", "add [shafts.NAME]")
+        box = _gearbox(tables)
+        table = named_train(table, tables["meshes"], tables["shafts"], tables.get("bearings", {}))
+    else:
+        for key in ("shafts", "gears"):
+            if not getattr(table, key):
+                cure = f"add [[train.{key}]], or [{key}.NAME] for gears by name (docs/gearbox.md)"
+                raise InputError(f"train.{key}", None, "is required", cure)
+        box = train_gearbox(table, tables.get("pair"), tables.get("microgeometry"))
+    table.check_models([mesh.where for mesh in box.meshes.values()])
+    tables["gearbox"] = with_loads(box, raw, table.variant)
+    tables["stiffness"] = stiffness_of(raw, table.variant)
     if table.housing == "elastic" and "housing" not in tables:
         raise InputError("train.housing", "elastic", "needs a table [housing]", 'add it, or write housing = "rigid"')
     return {**tables, "train": table}
 
 
-def variant_stiffness(raw: Mapping[str, Any], name: str) -> StiffnessTable:
-    """Return [stiffness] of the parsed tables with the keys that variant `name` of [train] has instead.
+def stiffness_of(raw: Mapping[str, Any], variant: str | None = None, mesh: str | None = None) -> StiffnessTable:
+    """Return [stiffness] of the parsed tables with the keys that a mesh and a variant of [train] have instead.
+
+    Parameters
+    ----------
+    raw : mapping
+        The parsed job.
+    variant : str, optional
+        Name of a variant, whose keys win over all.
+    mesh : str, optional
+        Name of a mesh of [meshes.NAME].
 
     Raises
     ------
     InputError
-        For a variant that the file does not describe, and mistakes in its keys.
+        For a variant that the file does not describe, and mistakes in the keys.
     """
-    variants = raw.get("train", {}).get("variants", {})
-    if name not in variants:
-        raise unknown_name("variant", name, variants)
-    shared, own = raw.get("stiffness", {}), variants[name].get("stiffness", {})
-    if not own.keys().isdisjoint(LOADS):
-        shared = {key: value for key, value in shared.items() if key not in LOADS}
-    where = f"train.variants.{name}.stiffness" if own else "stiffness"
-    return build(StiffnessTable, {**shared, **own}, where)
+    layers = [("stiffness", raw.get("stiffness", {}))]
+    if mesh is not None:
+        layers.append((f"meshes.{mesh}.stiffness", raw.get("meshes", {}).get(mesh, {}).get("stiffness", {})))
+    if variant:
+        variants = raw.get("train", {}).get("variants", {})
+        if variant not in variants:
+            raise unknown_name("variant", variant, variants)
+        layers.append((f"train.variants.{variant}.stiffness", variants[variant].get("stiffness", {})))
+    keys: dict[str, Any] = {}
+    where = "stiffness"
+    for name, layer in layers:
+        if not layer:
+            continue
+        if not layer.keys().isdisjoint(LOADS):
+            keys = {key: value for key, value in keys.items() if key not in LOADS}
+        keys, where = {**keys, **layer}, name
+    return build(StiffnessTable, keys, where)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from ..config import quantity
 from ..errors import InputError
+
+#: Keys that say the torques.
+TORQUES = ("torques_Nm", "torque_start_Nm", "torque_stop_Nm", "torque_count", "torque_spacing")
 
 
 @dataclass(frozen=True)
@@ -65,9 +66,3 @@ class LoadMapTable:
             step = math.log(stop / start) / last
             return [start, *(start * math.exp(step * i) for i in range(1, last)), stop]
         return [start, *(start + (stop - start) * i / last for i in range(1, last)), stop]
-
-
-def loads_of(tables: Mapping[str, Any]) -> LoadMapTable:
-    """Torques and angles of a job: those of [loadmap], or without that table those of [microgeometry]."""
-    table: LoadMapTable = tables.get("loadmap") or tables.get("microgeometry") or LoadMapTable()
-    return table

@@ -10,6 +10,7 @@ name; its numbers are the table ``law_parameters``, the option ``--law-parameter
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -95,8 +96,8 @@ def tooth_form(*tables: ToothFormTable) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class GearTable(ToothFormTable):
-    """One gear of a pair."""
+class GearBodyTable(ToothFormTable):
+    """Teeth, bore and drawing of one gear."""
 
     teeth: int = quantity(doc="number of teeth of an external gear", low=8, high=1000)
     bore_diameter_mm: float = quantity(doc="diameter of the rigid bore (mm); it decides the stiffness level", above=0.0)
@@ -109,12 +110,94 @@ class GearTable(ToothFormTable):
         None, doc="span size over span_teeth teeth, W_k (mm), instead of tooth_thinning_um", above=0.0
     )
     span_teeth: int | None = quantity(None, doc="number of teeth k of span_mm", low=2)
+
+
+def check_gear(gear: GearBodyTable, where: str, shared: ToothFormTable | None = None, shared_where: str = "") -> None:
+    """Raise `InputError` for keys of a gear that are missing or contradict each other.
+
+    Parameters
+    ----------
+    gear : GearBodyTable
+        The gear.
+    where : str
+        Its table in messages.
+    shared : ToothFormTable, optional
+        Keys that it shares with others.
+    shared_where : str
+        Table of these in messages.
+    """
+    for key, others in INSTEAD.items():
+        for other in others if getattr(gear, key) is not None else ():
+            if getattr(gear, other) is not None:
+                problem = f"says what {other} = {getattr(gear, other):g} says"
+                raise InputError(f"{where}.{key}", getattr(gear, key), problem, "leave one out")
+    if (gear.span_mm is None) != (gear.span_teeth is None):
+        lacking = "span_mm" if gear.span_mm is None else "span_teeth"
+        raise InputError(f"{where}.{lacking}", None, "is required with the other one", "give both, or neither")
+    tables = (gear,) if shared is None else (gear, shared)
+    module = next((table.module_mm for table in tables if table.module_mm is not None), None)
+    if gear.pitch_diameter_mm is None and module is None:
+        places = "" if shared is None else ", here or in the shared table,"
+        raise InputError(
+            f"{where}.module_mm", None, "is required", f"give the module (mm){places} or pitch_diameter_mm"
+        )
+    if gear.pitch_diameter_mm is not None and module is not None:
+        implied = gear.pitch_diameter_mm / gear.teeth
+        if abs(implied - module) > SAME * module and abs(implied - module) * gear.teeth > ROUNDING_MM:
+            problem = f"contradicts module_mm = {module:g}: {gear.teeth} teeth make it {module * gear.teeth:.9g}"
+            raise InputError(f"{where}.pitch_diameter_mm", gear.pitch_diameter_mm, problem, "leave one out")
+    form = tooth_form(*tables)
+    for key in REQUIRED:
+        if form[key] is None:
+            cure = "add it" if shared is None else f"add it to [{shared_where}] or to each gear"
+            raise InputError(f"{shared_where or where}.{key}", None, "is required", cure)
+    if form["tip_relief_amount_um"] and form["tip_relief_length_mm"] is None:
+        cure = "add it, or leave out tip_relief_amount_um"
+        raise InputError(f"{where}.tip_relief_length_mm", None, "is required with a tip relief", cure)
+
+
+def module_mm_of(gear: GearBodyTable, written: float | None, common: float | None) -> float:
+    """Return the module of a gear (mm): that of its pitch diameter, or one that differs from it by rounding alone.
+
+    Parameters
+    ----------
+    gear : GearBodyTable
+        The gear.
+    written : float, optional
+        Module that its tables give (mm).
+    common : float, optional
+        Module of the gears that mesh with it (mm), see `common_module_mm`.
+    """
+    if gear.pitch_diameter_mm is None:
+        return given(written, "module_mm")
+    implied, module = gear.pitch_diameter_mm / gear.teeth, common if written is None else written
+    if module is None or abs(implied - module) <= SAME * module:
+        return implied
+    return module if abs(module * gear.teeth - gear.pitch_diameter_mm) <= ROUNDING_MM else implied
+
+
+def common_module_mm(gears: Iterable[GearBodyTable]) -> float | None:
+    """Return the module (mm) that one of meshing gears gives, or that of the sum of all their pitch diameters."""
+    gears = list(gears)
+    if named := [gear.module_mm for gear in gears if gear.module_mm is not None]:
+        return named[0]
+    diameters = [gear.pitch_diameter_mm for gear in gears if gear.pitch_diameter_mm is not None]
+    return sum(diameters) / sum(gear.teeth for gear in gears) if len(diameters) == len(gears) else None
+
+
+@dataclass(frozen=True)
+class GearTable(GearBodyTable):
+    """One gear of [pair]."""
+
     material: MaterialTable | None = quantity(None, doc="material of this gear, if not the shared one")  # noqa: RUF009
 
 
 @dataclass(frozen=True)
 class PairTable(ToothFormTable):
-    """A gear pair: shared keys here, [pair.pinion] and [pair.wheel] below, [pair.material] for both or one per gear."""
+    """Shorthand for two gears, pinion and wheel, and their mesh.
+
+    Shared keys stand here, those of one gear in [pair.pinion] and [pair.wheel], [pair.material] is of both.
+    """
 
     pinion: GearTable = quantity(doc="the driving gear")  # noqa: RUF009
     wheel: GearTable = quantity(doc="the driven gear")  # noqa: RUF009
@@ -130,59 +213,14 @@ class PairTable(ToothFormTable):
     def module_mm_of(self, side: str) -> float:
         """Module of the gear `side` (mm), from its own pitch diameter or module, or from the shared module."""
         own: GearTable = getattr(self, side)
-        module = own.module_mm if own.module_mm is not None else self.module_mm
-        if own.pitch_diameter_mm is None:
-            return given(module, "pair.module_mm")
-        implied = own.pitch_diameter_mm / own.teeth
-        if module is None:
-            module = self._common_module_mm()
-        if module is None or abs(implied - module) <= SAME * module:
-            return implied
-        return module if abs(module * own.teeth - own.pitch_diameter_mm) <= ROUNDING_MM else implied
-
-    def _common_module_mm(self) -> float | None:
-        """Module (mm) of both gears by the sum of their pitch diameters, or the one that a gear gives."""
-        gears = (self.pinion, self.wheel)
-        if named := [gear.module_mm for gear in gears if gear.module_mm is not None]:
-            return named[0]
-        diameters = [gear.pitch_diameter_mm for gear in gears if gear.pitch_diameter_mm is not None]
-        return sum(diameters) / sum(gear.teeth for gear in gears) if len(diameters) == len(gears) else None
-
-    def material_of(self, side: str) -> MaterialTable:
-        """Material of the gear `side`."""
-        own: GearTable = getattr(self, side)
-        return own.material if own.material is not None else self.material
+        written = own.module_mm if own.module_mm is not None else self.module_mm
+        return module_mm_of(own, written, common_module_mm((self.pinion, self.wheel)))
 
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that are missing or contradict each other."""
         self._check_shifts(where)
         for side in ("pinion", "wheel"):
-            own: GearTable = getattr(self, side)
-            label = f"{where}.{side}"
-            for key, others in INSTEAD.items():
-                for other in others if getattr(own, key) is not None else ():
-                    if getattr(own, other) is not None:
-                        problem = f"says what {other} = {getattr(own, other):g} says"
-                        raise InputError(f"{label}.{key}", getattr(own, key), problem, "leave one out")
-            if (own.span_mm is None) != (own.span_teeth is None):
-                lacking = "span_mm" if own.span_mm is None else "span_teeth"
-                raise InputError(f"{label}.{lacking}", None, "is required with the other one", "give both, or neither")
-            module = own.module_mm if own.module_mm is not None else self.module_mm
-            if own.pitch_diameter_mm is None and module is None:
-                doc = "give the module (mm), here or in the shared table, or pitch_diameter_mm"
-                raise InputError(f"{label}.module_mm", None, "is required", doc)
-            if own.pitch_diameter_mm is not None and module is not None:
-                implied = own.pitch_diameter_mm / own.teeth
-                if abs(implied - module) > SAME * module and abs(implied - module) * own.teeth > ROUNDING_MM:
-                    problem = f"contradicts module_mm = {module:g}: {own.teeth} teeth make it {module * own.teeth:.9g}"
-                    raise InputError(f"{label}.pitch_diameter_mm", own.pitch_diameter_mm, problem, "leave one out")
-            form = self.tooth_form(side)
-            for key in REQUIRED:
-                if form[key] is None:
-                    raise InputError(f"{where}.{key}", None, "is required", f"add it to [{where}] or to each gear")
-            if form["tip_relief_amount_um"] and form["tip_relief_length_mm"] is None:
-                cure = "add it, or leave out tip_relief_amount_um"
-                raise InputError(f"{label}.tip_relief_length_mm", None, "is required with a tip relief", cure)
+            check_gear(getattr(self, side), f"{where}.{side}", self, where)
 
     def _check_shifts(self, where: str) -> None:
         """Raise `InputError` unless at most one profile shift follows from a centre distance, which is given then."""

@@ -5,6 +5,7 @@ All shafts run along y, in the frame of the housing. Lengths in millimetres; spe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -38,16 +39,21 @@ LAW_REMOVED: Removed = (
 
 
 @dataclass(frozen=True)
-class TrainShaftTable:
-    """A round shaft along y and the attachments (bores) that carry it."""
+class _Named:
+    """What an entry of a list is called."""
 
     name: str = quantity(doc="name of the shaft, used in the names of columns")
+
+
+@dataclass(frozen=True)
+class ShaftTable:
+    """A round shaft along y."""
+
     x_mm: float = quantity(doc="x of the axis (mm)")
     z_mm: float = quantity(0.0, doc="z of the axis (mm)")
     y_mm: float = quantity(0.0, doc="y of the middle of the shaft (mm)")
     length_mm: float = quantity(above=0.0, doc="length (mm)")
     radius_mm: float = quantity(above=0.0, doc="radius (mm)")
-    attachments: tuple[int | str, ...] = quantity(doc='attachments that carry it, as ["1", "2"]')
     density_kg_per_m3: float = quantity(7850.0, above=0.0, doc="density (kg/m3)")
     initial_speed_rad_per_s: float | None = quantity(
         None, doc="spin at the start (rad/s); left out: rolling with the drive"
@@ -59,6 +65,13 @@ class TrainShaftTable:
     transverse_inertia_kg_m2: float | None = quantity(
         None, above=0.0, doc="inertia about a transverse line through the mass centre, with gears; left out: computed"
     )
+
+
+@dataclass(frozen=True)
+class TrainShaftTable(ShaftTable, _Named):
+    """A shaft with its name and the attachments (bores) that carry it."""
+
+    attachments: tuple[int | str, ...] = quantity(doc='attachments that carry it, as ["1", "2"]')
 
 
 @dataclass(frozen=True)
@@ -323,12 +336,12 @@ class TrainTable:
         gone=GONE_METHODS,
         doc="integrator (auto: taylor or implicit by a rule)",
     )
-    shafts: tuple[TrainShaftTable, ...] = quantity(doc="[[train.shafts]]")
-    gears: tuple[TrainGearTable, ...] = quantity(doc="[[train.gears]]")
-    meshes: tuple[TrainMeshTable, ...] = quantity((), doc="[[train.meshes]]")
+    shafts: tuple[TrainShaftTable, ...] = quantity((), doc="[[train.shafts]]; or [shafts.NAME]")
+    gears: tuple[TrainGearTable, ...] = quantity((), doc="[[train.gears]]; or [gears.NAME]")
+    meshes: tuple[TrainMeshTable, ...] = quantity((), doc="[[train.meshes]]; or [meshes.NAME]")
     drive: TrainDriveTable | None = quantity(None, doc="[train.drive]")  # noqa: RUF009
     loads: tuple[TrainLoadTable, ...] = quantity((), doc="[[train.loads]]")
-    bearings: tuple[TrainBearingTable, ...] = quantity((), doc="[[train.bearings]]")
+    bearings: tuple[TrainBearingTable, ...] = quantity((), doc="[[train.bearings]]; or [bearings.NAME]")
     rigid_bores: tuple[TrainRigidBoreTable, ...] = quantity((), doc="[[train.rigid_bores]]")
     curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.curves]")  # noqa: RUF009
     damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.damping]")  # noqa: RUF009
@@ -344,7 +357,8 @@ class TrainTable:
             raise InputError(f"{where}.step_us", self.step_us, "makes more than 5 million outputs", "use a larger step")
         if self.variant:
             self.chosen(self.variant)
-        self._check_names(where)
+        if self.shafts or self.gears or self.meshes:
+            self._check_names(where)
 
     def model_of(self, mesh: TrainMeshTable) -> str:
         """Return the mesh model of a mesh, an empty text for one whose stiffness is given."""
@@ -352,8 +366,11 @@ class TrainTable:
             return ""
         return mesh.mesh_model or self.curves.mesh_model
 
-    def check_models(self) -> None:
-        """Raise `InputError` for keys of stiffness curves where all meshes have mesh laws, and friction without one."""
+    def check_models(self, wheres: Sequence[str]) -> None:
+        """Raise `InputError` for keys of stiffness curves where all meshes have mesh laws, and friction without one.
+
+        `wheres` are the names of the meshes' tables in messages.
+        """
         computed = {self.model_of(mesh) for mesh in self.meshes} - {""}
         for key in ("load", "positions"):
             value = getattr(self.curves, key)
@@ -363,11 +380,11 @@ class TrainTable:
                     'is of stiffness curves, but the meshes have mesh laws (mesh_model = "potential", the default)'
                 )
                 raise InputError(f"train.curves.{key}", value, problem, cure)
-        for i, mesh in enumerate(self.meshes):
+        for where, mesh in zip(wheres, self.meshes, strict=True):
             if (mesh.friction or mesh.roughness_um) and self.model_of(mesh) != POTENTIAL:
                 problem = f"needs a mesh law, but mesh_model = {self.curves.mesh_model!r} in train.curves"
                 cure = 'write mesh_model = "potential" in the mesh'
-                raise InputError(f"train.meshes[{i}].friction", mesh.friction, problem, cure)
+                raise InputError(f"{where}.friction", mesh.friction, problem, cure)
 
     def _check_names(self, where: str) -> None:
         """Names of shafts and gears are unique, and references to them exist."""

@@ -8,23 +8,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...base.tables.pair import PairTable, tooth_form
-from ...base.tables.train import POTENTIAL, VARIABLE, TrainGearTable, TrainMeshTable
+from ...base.tables.gearbox import BORE, DEFAULT, NamedGear, NamedMesh
+from ...base.tables.train import POTENTIAL, VARIABLE, TrainMeshTable
 from ...gears.geometry.pair import gear_pair
 from ..train.gear_train import GearMesh, GearTrain
 from .job import TrainJob
 
-#: Where a value comes from that no table gives.
-DEFAULT = "default"
 Source = dict[str, Any]
 
 
 def inherited(job: TrainJob, train: GearTrain) -> dict[str, dict[str, dict[str, Source]]]:
     """Values of gears and meshes that their own entries do not give: gear or mesh -> key -> value, from."""
-    gears, meshes = zip(job.table.gears, train.gears, strict=True), zip(job.table.meshes, train.meshes, strict=True)
+    meshes = zip(job.table.meshes, job.meshes, train.meshes, strict=True)
     return {
-        "gears": {table.name: _of_gear(job, table, made.gear.bore_diameter, made.density) for table, made in gears},
-        "meshes": {made.name: _of_mesh(job, train, table, made) for table, made in meshes},
+        "gears": {name: _of_gear(gear) for name, gear in job.gearbox.gears.items()},
+        "meshes": {made.name: _of_mesh(job, train, table, named, made) for table, named, made in meshes},
     }
 
 
@@ -32,34 +30,27 @@ def _value(value: Any, source: str) -> Source:
     return {"value": value, "from": source}
 
 
-def _of_gear(job: TrainJob, table: TrainGearTable, bore: float, density: float) -> dict[str, Source]:
+def _bracketed(place: str) -> str:
+    return place if place == DEFAULT else f"[{place}]"
+
+
+def _of_gear(gear: NamedGear) -> dict[str, Source]:
     """What a gear takes from [pair], and its defaults."""
     found: dict[str, Source] = {}
-    if table.gear:
-        found["gear"] = _value(table.gear, f"[pair.{table.gear}] and [pair]: teeth, tooth form, deviations")
+    if gear.like:
+        found["gear"] = _value(gear.where.removeprefix("pair."), f"{gear.like}: teeth, tooth form, deviations")
     else:
-        for key, value in {"module_mm": None, **tooth_form(table)}.items():
-            if getattr(table, key) is not None:
-                continue
-            shared = None if job.pair is None else getattr(job.pair, key)
-            if shared is not None:
-                found[key] = _value(shared, "[pair]")
-            elif value is not None:
-                found[key] = _value(value, DEFAULT)
-        if table.bore_diameter_mm is None:
-            found["bore_diameter_mm"] = _value(1e3 * bore, f"{DEFAULT}: 0.2 times the pitch diameter")
-    if table.density_kg_per_m3 is None:
-        source = DEFAULT if job.pair is None else _material_source(job.pair, table.gear)
-        found["density_kg_per_m3"] = _value(density, source)
+        found = {key: _value(gear.form[key], _bracketed(place)) for key, place in gear.places.items()}
+        if gear.places.get("bore_diameter_mm") == DEFAULT:
+            found["bore_diameter_mm"]["from"] = f"{DEFAULT}: {BORE:g} times the pitch diameter"
+    if gear.density_where:
+        found["density_kg_per_m3"] = _value(gear.density_kg_per_m3, _bracketed(gear.density_where))
     return found
 
 
-def _material_source(pair: PairTable, side: str) -> str:
-    """Table of the material of a gear: of `side` of [pair], or of its own teeth (an empty text)."""
-    return f"[pair.{side}.material]" if side and getattr(pair, side).material is not None else "[pair.material]"
-
-
-def _of_mesh(job: TrainJob, train: GearTrain, table: TrainMeshTable, mesh: GearMesh) -> dict[str, Source]:
+def _of_mesh(
+    job: TrainJob, train: GearTrain, table: TrainMeshTable, named: NamedMesh, mesh: GearMesh
+) -> dict[str, Source]:
     """What a mesh takes from other tables and its gears, and its defaults."""
     found: dict[str, Source] = {}
     model = job.table.model_of(table)
@@ -69,15 +60,12 @@ def _of_mesh(job: TrainJob, train: GearTrain, table: TrainMeshTable, mesh: GearM
         found["mesh_model"] = _value(model, curves)
     if model == VARIABLE or table.curve:
         found["interpolation"] = _value(job.table.curves.interpolation, curves)
-    if model and job.pair is not None:
-        sides = {g.name: g.gear for g in job.table.gears}
-        for role in ("driver", "driven"):
-            side = sides[getattr(table, role)]
-            material = job.pair.material_of(side) if side else job.pair.material
-            found[f"youngs_modulus_GPa of {role}"] = _value(
-                material.youngs_modulus_GPa, _material_source(job.pair, side)
-            )
-        found["plane"] = _value(job.stiffness.plane, _stiffness_source(job))
+    if model:
+        for role, gear in zip(("driver", "driven"), named.gears, strict=True):
+            if gear.material is not None:
+                source = _bracketed(gear.material_where)
+                found[f"youngs_modulus_GPa of {role}"] = _value(gear.material.youngs_modulus_GPa, source)
+        found["plane"] = _value(named.stiffness.plane, _stiffness_source(job))
     if table.centre_distance_mm is None:
         source = "the gears, without backlash" if mesh.centre_distance is None else "[pair]"
         found["centre_distance_mm"] = _value(1e3 * pair.working_centre_distance, source)

@@ -1,4 +1,4 @@
-"""From the tables of a job file to a gear train: ``[train]`` with ``[pair]``, ``[stiffness]`` and ``[housing]``.
+"""From the tables of a job file to a gear train: ``[train]`` with its gears and meshes, ``[stiffness]``, ``[housing]``.
 
 job = read_train_job("geometry/gear_train.toml", variant="operating")
 model = build_train(job_train(job, train_curves(job), train_body(job)))
@@ -17,17 +17,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.errors import InputError, given
+from ...base.tables.gearbox import Gearbox, NamedMesh
 from ...base.tables.housing import HousingTable
 from ...base.tables.jobs import read_train_tables
-from ...base.tables.microgeometry import MicrogeometryTable
-from ...base.tables.pair import FROM_DISTANCE, REQUIRED, PairTable, StiffnessTable, tooth_form
+from ...base.tables.pair import StiffnessTable
 from ...base.tables.spectrum import SpectrumTable
 from ...base.tables.timefunction import TrainFunctionTable
-from ...base.tables.train import POTENTIAL, TrainGearTable, TrainMeshTable, TrainTable
+from ...base.tables.train import POTENTIAL, TrainMeshTable, TrainTable
 from ...base.typing import Array
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.geometry.deviation_job import pitch_errors_of
-from ...gears.geometry.pair import Gear, GearPair, gear_of_form, gear_pair, in_keys
+from ...gears.geometry.pair import Gear, gear_of, gear_pair, pair_of
 from ...gears.meshlaw.law import MeshLaw
 from ...multibody import TimeFunction, smoothed_step
 from ..housing.body import bore_points, reduced_housing
@@ -54,30 +54,40 @@ class TrainJob:
         [train], with the chosen variant's curves and damping.
     stiffness
         [stiffness], with the keys that the variant has instead.
-    pair, housing, microgeometry
-        The other tables, None where the file has none.
+    gearbox
+        Gears and meshes by name; the meshes are in the order of those of `table`.
+    housing
+        [housing], None where the file has none.
     spectrum
         [spectrum], with its defaults where the file has none.
     """
 
     path: Path
     table: TrainTable
-    pair: PairTable | None
+    gearbox: Gearbox
     stiffness: StiffnessTable
     housing: HousingTable | None
-    microgeometry: MicrogeometryTable | None = None
     spectrum: SpectrumTable = field(default_factory=SpectrumTable)
 
+    @property
+    def meshes(self) -> tuple[NamedMesh, ...]:
+        """The meshes, in the order of those of the train."""
+        return tuple(self.gearbox.meshes.values())
+
     @cached_property
-    def gears_of_pair(self) -> GearPair:
-        """The gears of [pair].
+    def gears(self) -> dict[str, Gear]:
+        """The gears by name, all of which can run in their meshes.
 
         Raises
         ------
         InputError
-            For gears that cannot run together, and a file without the table.
+            For gears that cannot be made, and gears that cannot run together.
         """
-        return GearPair.from_table(given(self.pair, "pair"))
+        made: dict[str, Gear] = {}
+        for mesh in self.meshes:
+            pair = pair_of(mesh)
+            made |= {mesh.driver.name: pair.pinion, mesh.driven.name: pair.given_wheel}
+        return made | {name: gear_of(named) for name, named in self.gearbox.gears.items() if name not in made}
 
     @cached_property
     def rigid_train(self) -> GearTrain:
@@ -113,10 +123,8 @@ def read_train_job(path: str | Path, variant: str | None = None) -> TrainJob:
 
 def train_job(path: str | Path, tables: Mapping[str, Any]) -> TrainJob:
     """The job of tables that are read; curves that they name lie beside `path`."""
-    stiffness = tables.get("stiffness", StiffnessTable())
-    housing, uneven = tables.get("housing"), tables.get("microgeometry")
-    spectrum = tables.get("spectrum", SpectrumTable())
-    return TrainJob(Path(path), tables["train"], tables.get("pair"), stiffness, housing, uneven, spectrum)
+    housing, spectrum = tables.get("housing"), tables.get("spectrum", SpectrumTable())
+    return TrainJob(Path(path), tables["train"], tables["gearbox"], tables["stiffness"], housing, spectrum)
 
 
 def train_body(job: TrainJob) -> ModalBody | None:
@@ -138,7 +146,11 @@ def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
     if curves is not None:
         rows = zip(train.meshes, job.table.meshes, curves, strict=True)
         meshes = tuple(replace(mesh, stiffness=curve, friction=_friction(table)) for mesh, table, curve in rows)
-        gears = tuple(_uneven(job, gear, table.gear) for gear, table in zip(train.gears, job.table.gears, strict=True))
+        named = job.gearbox.gears
+        gears = tuple(
+            replace(gear, pitch_errors=pitch_errors_of(named[gear.name], gear.gear, job.path.parent))
+            for gear in train.gears
+        )
         train = replace(train, gears=gears, meshes=meshes)
     return train if body is None else replace(train, housing=body, rigid_bores={})
 
@@ -161,10 +173,10 @@ def _rigid_train(job: TrainJob) -> GearTrain:
         for s in t.shafts
     )
     gears = tuple(
-        ShaftGear(g.name, g.shaft, 1e-3 * g.y_mm, train_gear(job, g, f"train.gears[{i}]"), _density(job, g))
-        for i, g in enumerate(t.gears)
+        ShaftGear(name, g.shaft, 1e-3 * g.y_mm, job.gears[name], g.density_kg_per_m3)
+        for name, g in job.gearbox.gears.items()
     )
-    meshes = tuple(_mesh(job, m) for m in t.meshes)
+    meshes = tuple(_mesh(job, m, named) for m, named in zip(t.meshes, job.meshes, strict=True))
     drive = None
     if t.drive is not None:
         ramp = (t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
@@ -201,54 +213,8 @@ def back_flanks(job: TrainJob, train: GearTrain, number: int) -> bool:
     return pair.normal_backlash > 0.0
 
 
-def train_gear(job: TrainJob, table: TrainGearTable, where: str) -> Gear:
-    """The gear that an entry of [[train.gears]] describes."""
-    pair = job.pair
-    if table.gear:
-        if pair is None:
-            raise InputError(
-                f"{where}.gear", table.gear, "needs a table [pair]", "add it, or give teeth, module_mm, ..."
-            )
-        return job.gears_of_pair.pinion if table.gear == "pinion" else job.gears_of_pair.given_wheel
-
-    sources = (table,) if pair is None else (table, pair)
-    form, modules = tooth_form(*sources), (source.module_mm for source in sources)
-    needed = {"module_mm": next((m for m in modules if m is not None), None), **{key: form[key] for key in REQUIRED}}
-    for key, value in needed.items():
-        if value is None:
-            raise InputError(f"{where}.{key}", None, "is required", "add it here, or to a table [pair]")
-    teeth, module_mm = given(table.teeth, f"{where}.teeth"), given(needed["module_mm"], f"{where}.module_mm")
-    if form["profile_shift"] == FROM_DISTANCE:
-        problem = "follows from a centre distance in [pair], for a gear of [pair] alone"
-        raise InputError(f"{where}.profile_shift", None, problem, "write the number here")
-    bore_mm = 0.2 * module_mm * teeth if table.bore_diameter_mm is None else table.bore_diameter_mm
-    try:
-        return gear_of_form(teeth, {**form, "module_mm": module_mm, "bore_diameter_mm": bore_mm})
-    except InputError as error:
-        raise in_keys(error, where) from None
-
-
-def _uneven(job: TrainJob, made: ShaftGear, name: str) -> ShaftGear:
-    """A gear with the pitch errors of its table in [microgeometry]."""
-    if not name or job.microgeometry is None:
-        return made
-    return replace(made, pitch_errors=pitch_errors_of(job.microgeometry, made.gear, name, job.path.parent))
-
-
-def _density(job: TrainJob, table: TrainGearTable) -> float:
-    if table.density_kg_per_m3 is not None:
-        return table.density_kg_per_m3
-    if job.pair is None:
-        return 7850.0
-    return (job.pair.material_of(table.gear) if table.gear else job.pair.material).density_kg_per_m3
-
-
-def _mesh(job: TrainJob, table: TrainMeshTable) -> GearMesh:
-    distance = table.centre_distance_mm
-    if distance is None and job.pair is not None and job.pair.centre_distance_mm is not None:
-        sides = {g.name: g.gear for g in job.table.gears}
-        if {sides.get(table.driver), sides.get(table.driven)} == {"pinion", "wheel"}:
-            distance = job.pair.centre_distance_mm
+def _mesh(job: TrainJob, table: TrainMeshTable, named: NamedMesh) -> GearMesh:
+    distance = named.centre_distance_mm
     return GearMesh(
         table.driver,
         table.driven,
@@ -259,6 +225,7 @@ def _mesh(job: TrainJob, table: TrainMeshTable) -> GearMesh:
         None if distance is None else 1e-3 * distance,
         None if table.backlash_um is None else 1e-6 * table.backlash_um,
         damping_acts=table.damping_acts,
+        name=named.name,
     )
 
 

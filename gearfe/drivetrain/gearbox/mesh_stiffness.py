@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...base.errors import InputError, given
+from ...base.errors import InputError
 from ...base.progress import stage
 from ...base.tables.train import MEAN, POTENTIAL
 from ...gears.contact.laws import HalfPlane, check_alike, check_deviations
 from ...gears.gearmesh.curve import NO_CYCLE, StiffnessCurve
-from ...gears.gearmesh.job import StiffnessJob, cached_curve, material_of
+from ...gears.gearmesh.job import StiffnessJob, cached_curve
 from ...gears.geometry.deviation_job import deviations_of
 from ...gears.geometry.face import NOMINAL, ToothDeviations
 from ...gears.geometry.pair import GearPair, gear_pair
 from ...gears.meshlaw.law import MeshLaw
 from ...gears.meshlaw.store import cached_law
-from ..train.gear_train import GearMesh, GearTrain
+from ..train.gear_train import GearTrain
 from .job import Stiffness, TrainJob, back_flanks, job_train
 
 if TYPE_CHECKING:
@@ -96,12 +96,9 @@ def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool
     mesh = train.meshes[number]
     one, two = train.gear(mesh.driver).gear, train.gear(mesh.driven).gear
     pair = gear_pair(one, two, mesh.centre_distance)
-    if job.pair is None:
-        problem = "has no stiffness: there is no table [pair] to compute it with"
-        raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
-    tables = StiffnessJob(job.pair, job.stiffness, pair)
+    tables = _plain_job(job, number, pair)
     deviations, _ = _deviations(job, train, number, pair, tables.law)
-    model = replace(tables.model, materials=_materials(job, mesh), deviations=deviations)
+    model = replace(tables.model, deviations=deviations)
     if job.table.curves.load in (None, "stiffness"):
         with stage(mesh.name):
             return cached_curve(pair, model, estimate_error=estimate, **tables.sweep)
@@ -113,7 +110,7 @@ def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool
     sweep: dict[str, Any] = {
         "torque": torque,
         "angles": pair.mesh_cycle * np.arange(count) / count,
-        "kinematics": job.stiffness.kinematics,
+        "kinematics": tables.table.kinematics,
     }
     with stage(mesh.name):
         return cached_curve(pair, model, estimate_error=estimate, **sweep)
@@ -122,25 +119,17 @@ def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool
 def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> MeshLaw:
     """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
 
-    def gears(mesh: GearMesh) -> tuple[Any, ...]:
-        materials = None if job.pair is None else _materials(job, mesh)
-        return train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance, materials
-
     mesh, table = train.meshes[number], job.table.meshes[number]
-    if job.pair is None:
-        problem = "has no stiffness: there is no table [pair] to compute it with"
-        raise InputError(f"mesh {mesh.name!r}", None, problem, "add curve, stiffness_N_per_m or rigid to it, or [pair]")
-    alike = [i for i, other in enumerate(train.meshes) if gears(other) == gears(mesh)]
+    pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
+    tables = _plain_job(job, number, pair)
+    alike = [i for i in range(len(train.meshes)) if _contact(job, train, i) == _contact(job, train, number)]
     steady = max(_carried_torque(train, i) for i in alike)
     most = table.mesh_model_torque_Nm or ROOM * steady
     if not most > 0.0:
         problem = "carries no torque in steady running, so the range of its mesh law is unknown"
         raise InputError(f"mesh {mesh.name!r} mesh_model_torque_Nm", None, problem, "give mesh_model_torque_Nm")
-    one, two, distance, materials = gears(mesh)
-    pair = gear_pair(one, two, distance)
-    tables = StiffnessJob(job.pair, job.stiffness, pair)
     deviations, back = _deviations(job, train, number, pair, HalfPlane())
-    model = replace(tables.model, materials=materials, law=HalfPlane(), deviations=deviations)
+    model = replace(tables.model, law=HalfPlane(), deviations=deviations)
     with stage(mesh.name):
         try:
             law = cached_law(pair, model, most / pair.wheel.base_radius)
@@ -162,6 +151,20 @@ def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) 
     return replace(law, error=fit + curve.worst_error)
 
 
+def _plain_job(job: TrainJob, number: int, pair: GearPair) -> StiffnessJob:
+    """The stiffness job of a mesh, whose deviations are those of the flanks that its sense of rotation lets drive."""
+    one, two = (replace(gear, microgeometry=None) for gear in job.meshes[number].gears)
+    return StiffnessJob(replace(job.meshes[number], driver=one, driven=two), pair, job.path.parent)
+
+
+def _contact(job: TrainJob, train: GearTrain, number: int) -> tuple[Any, ...]:
+    """What decides the mesh law of a mesh, load and deviations apart."""
+    mesh, named = train.meshes[number], job.meshes[number]
+    gears = train.gear(mesh.driver).gear, train.gear(mesh.driven).gear
+    model = replace(named.stiffness, twist_deg=None, torque_Nm=None)
+    return gears, mesh.centre_distance, [gear.material for gear in named.gears], model
+
+
 def _deviations(
     job: TrainJob, train: GearTrain, number: int, pair: GearPair, law: ContactLaw
 ) -> tuple[tuple[ToothDeviations, ToothDeviations], tuple[ToothDeviations, ToothDeviations]]:
@@ -173,14 +176,12 @@ def _deviations(
     InputError
         For deviations that the law or one mesh cycle cannot have, and where a curve's back flanks bear and are others.
     """
-    if job.microgeometry is None:
+    named = job.meshes[number]
+    if not named.deviates:
         return NOMINAL, NOMINAL
-    mesh, sides = train.meshes[number], {g.name: g.gear for g in job.table.gears}
-    gears = (sides[mesh.driver], sides[mesh.driven])
+    mesh = train.meshes[number]
     flanks = ("left", "right") if train.kinematics.senses[number] > 0.0 else ("right", "left")
-    driving, back = (
-        deviations_of(job.microgeometry, pair, job.path.parent, flank=flank, gears=gears) for flank in flanks
-    )
+    driving, back = (deviations_of(named, pair, job.path.parent, flank=flank) for flank in flanks)
     mapped = job.table.model_of(job.table.meshes[number]) == POTENTIAL
     if mapped:  # pitch errors are the train's own
         driving, back = ((replace(a, turn=(0.0,)), replace(b, turn=(0.0,))) for a, b in (driving, back))
@@ -192,12 +193,6 @@ def _deviations(
     if back != driving and not mapped:
         problem = f"left and right flanks differ, but mesh {mesh.name!r} has one curve for both"
         cure = 'write mesh_model = "potential", or give the mesh no backlash'
-        raise InputError("microgeometry", None, problem, cure)
+        wheres = [gear.microgeometry_where for gear in named.gears if gear.microgeometry is not None]
+        raise InputError(wheres[0].removesuffix(".pinion").removesuffix(".wheel"), None, problem, cure)
     return driving, back
-
-
-def _materials(job: TrainJob, mesh: GearMesh) -> Any:
-    pair = given(job.pair, "pair")
-    sides = {g.name: g.gear for g in job.table.gears}
-    names = (sides[mesh.driver], sides[mesh.driven])
-    return tuple(material_of(pair.material_of(name) if name else pair.material) for name in names)

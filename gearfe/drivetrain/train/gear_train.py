@@ -120,6 +120,8 @@ class GearMesh:
         have none; with a curve or a constant a spring that acts both ways.
     friction
         Coefficient of friction, or what it follows from; for meshes with a law. See `gearfe.drivetrain.train.friction`.
+    name
+        How results call it; empty: ``driver-driven``.
     """
 
     driver: str
@@ -132,11 +134,11 @@ class GearMesh:
     backlash: float | None = None
     friction: float | Lubrication = 0.0
     damping_acts: str | None = None
+    name: str = ""
 
-    @property
-    def name(self) -> str:
-        """``driver-driven``."""
-        return f"{self.driver}-{self.driven}"
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", f"{self.driver}-{self.driven}")
 
     @property
     def damps_in_contact(self) -> bool:
@@ -268,7 +270,7 @@ class GearTrain(Facts):
         return {
             "shafts": ", ".join(shaft.name for shaft in self.shafts),
             "gears": ", ".join(f"{one.name} on {one.shaft}" for one in self.gears) or "none",
-            "meshes": ", ".join(f"{one.driver}-{one.driven}" for one in self.meshes) or "none",
+            "meshes": ", ".join(one.name for one in self.meshes) or "none",
             "drive": "none" if drive is None else f"{drive.shaft}, against bore {drive.bore}",
             "loads": ", ".join(one.shaft for one in self.loads) or "none",
             "housing": rigid if housing is None else f"elastic, {len(housing.attachment_names)} bores",

@@ -1,4 +1,4 @@
-"""From the [pair] and [stiffness] tables of a job file to the arguments of `gears.gearmesh.sweep.sweep_stiffness`.
+"""From a mesh of a job file to the arguments of `gears.gearmesh.sweep.sweep_stiffness`.
 
 Curves are kept on disk: a second run with the same gears, load and mesh sizes reads its curve.
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 import inspect
 import math
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -20,22 +20,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.cache import cache_key, cached_arrays, source_hash, versions
-from ...base.errors import InputError
-from ...base.progress import Stopwatch
-from ...base.tables.jobs import load_job
-from ...base.tables.pair import MaterialTable, PairTable, StiffnessTable
+from ...base.config import read_toml
+from ...base.errors import InputError, given
+from ...base.tables.gearbox import NamedMesh
+from ...base.tables.jobs import meshes_of
+from ...base.tables.pair import MaterialTable, StiffnessTable
 from ...fem.plane import Material
 from ..contact.laws import ContactLaw, PairModel, check_alike, check_poisson, check_torque, law_named
 from ..geometry.deviation_job import deviations_of
 from ..geometry.face import NOMINAL, ToothDeviations
-from ..geometry.pair import GearPair
+from ..geometry.pair import GearPair, pair_of
 from .curve import StiffnessCurve
 
 if TYPE_CHECKING:
-    from ...base.tables.loadmap import LoadMapTable
-    from ...base.tables.microgeometry import MicrogeometryTable
+    from ...base.progress import Stopwatch
     from ..contact.compliance import MeshingPair
-    from .load_map import LoadMap
 
 #: Packages whose text decides a curve.
 PACKAGES = ("fem", "fem/meshing", "gears/contact", "gears/geometry", "gears/gearmesh", "gears/teeth")
@@ -45,30 +44,31 @@ Keep = Callable[[str, Callable[[], Any]], Any]
 
 @dataclass(frozen=True)
 class StiffnessJob:
-    """A stiffness job: its tables and what they mean in SI.
+    """A mesh of a job file: its tables and what they mean in SI.
 
     Attributes
     ----------
-    pair_table, table
-        The tables as read, with any overrides.
+    mesh
+        The mesh and its gears as read.
     pair
-        The gears.
-    microgeometry
-        Their deviations, or None.
+        The gears, the driver as pinion.
     folder
-        Where the files that these name are looked for.
+        Where the files that the tables name are looked for.
     """
 
-    pair_table: PairTable
-    table: StiffnessTable
+    mesh: NamedMesh
     pair: GearPair
-    microgeometry: MicrogeometryTable | None = None
     folder: Path = Path()
+
+    @property
+    def table(self) -> StiffnessTable:
+        """[stiffness] of the mesh, with any overrides."""
+        return self.mesh.stiffness
 
     @property
     def materials(self) -> tuple[Material, Material]:
         """Materials of pinion and wheel."""
-        return material_of(self.pair_table.material_of("pinion")), material_of(self.pair_table.material_of("wheel"))
+        return materials_of(self.mesh)
 
     @property
     def law(self) -> ContactLaw:
@@ -88,30 +88,31 @@ class StiffnessJob:
 
     @property
     def back_deviations(self) -> tuple[ToothDeviations, ToothDeviations] | None:
-        """Those of the back flanks, of the pair seen from the other side; None without [microgeometry]."""
+        """Those of the back flanks, of the pair seen from the other side; None for a file without deviations."""
         return self._flanks(back=True)
 
     def _flanks(self, *, back: bool = False) -> tuple[ToothDeviations, ToothDeviations] | None:
-        if self.microgeometry is None:
+        if not self.mesh.deviates:
             return None
-        other = {"left": "right", "right": "left"}[self.microgeometry.flank]
-        return deviations_of(self.microgeometry, self.pair, self.folder, flank=other if back else None)
+        other = {"left": "right", "right": "left"}[self.mesh.flank]
+        return deviations_of(self.mesh, self.pair, self.folder, flank=other if back else None)
 
     @property
     def tables(self) -> dict[str, Any]:
         """The tables as plain data, for summaries."""
-        made = {"pair": asdict(self.pair_table), "stiffness": asdict(self.table)}
-        return made if self.microgeometry is None else {**made, "microgeometry": asdict(self.microgeometry)}
+        mesh = asdict(self.mesh)
+        gears = {mesh[role]["name"]: mesh.pop(role) for role in ("driver", "driven")}
+        stiffness = mesh.pop("stiffness")
+        mesh.pop("loads")
+        roles = {"driver": self.mesh.driver.name, "driven": self.mesh.driven.name}
+        return {"gears": gears, "mesh": {**mesh, **roles}, "stiffness": stiffness}
 
     @property
     def model(self) -> PairModel:
         """What `gearfe.gears.gearmesh.sweep.elastic_pair` makes of the gears."""
         t = self.table
-        for side, material in zip(("pinion", "wheel"), self.materials, strict=True):
-            own = getattr(self.pair_table, side).material is not None
-            check_poisson(
-                material.poisson_ratio, t.plane, f"pair.{side if own else ''}{'.' * own}material.poisson_ratio"
-            )
+        for gear, material in zip(self.mesh.gears, self.materials, strict=True):
+            check_poisson(material.poisson_ratio, t.plane, f"{gear.material_where}.poisson_ratio")
         sizes = t.coarsen, t.flank_coarsen, t.points_per_edge
         return PairModel(self.materials, t.plane, self.law, *sizes, self.deviations)
 
@@ -164,46 +165,58 @@ def material_of(table: MaterialTable) -> Material:
     return Material(table.youngs_modulus_GPa * 1e9, table.poisson_ratio, density=table.density_kg_per_m3)
 
 
-def stiffness_job(tables: Mapping[str, Any], folder: Path, pair: GearPair | None = None) -> StiffnessJob:
-    """The job of tables that are read, with the defaults of [stiffness] where they have none; `pair`: its gears.
+def materials_of(mesh: NamedMesh) -> tuple[Material, Material]:
+    """Return the materials of driver and driven gear.
+
+    Raises
+    ------
+    InputError
+        For a gear whose material the file does not give.
+    """
+    for gear in mesh.gears:
+        if gear.material is None:
+            problem = f"has no stiffness: there is no table [pair] to compute it with, nor a material of {gear.where}"
+            cure = "add curve, stiffness_N_per_m or rigid to it, or [pair], or write all gears as [gears.NAME]"
+            raise InputError(f"mesh {mesh.name!r}", None, problem, cure)
+    one, two = (material_of(given(gear.material, gear.material_where)) for gear in mesh.gears)
+    return one, two
+
+
+def stiffness_job(mesh: NamedMesh, folder: Path = Path(), pair: GearPair | None = None) -> StiffnessJob:
+    """The job of a mesh as read; `pair`: its gears, where they were made before.
 
     Raises
     ------
     InputError
         For gears that cannot run together.
     """
-    pair = GearPair.from_table(tables["pair"]) if pair is None else pair
-    table = tables.get("stiffness", StiffnessTable())
-    return StiffnessJob(tables["pair"], table, pair, tables.get("microgeometry"), folder)
+    return StiffnessJob(mesh, pair_of(mesh) if pair is None else pair, folder)
 
 
-def read_stiffness_job(path: str | Path) -> StiffnessJob:
-    """Read a job file; without a [stiffness] table its defaults hold.
+def read_stiffness_job(path: str | Path, mesh: str | None = None) -> StiffnessJob:
+    """Read a mesh of a job file, the only one where no name is given; without [stiffness] its defaults hold.
 
     Raises
     ------
     InputError
-        For every mistake in the file, and for gears that cannot run together.
+        For every mistake in the file, for gears that cannot run together, and a file with several meshes.
     """
-    return stiffness_job(load_job(path, ("pair",), ("stiffness", "microgeometry")), Path(path).parent)
+    return stiffness_job(only_mesh(read_toml(path), path, mesh), Path(path).parent)
 
 
-def job_map(job: StiffnessJob, table: LoadMapTable, *, keep: Keep | None = None) -> LoadMap:
-    """Return the map of a job file: torques and angles of `table`, model of [stiffness], flanks of [microgeometry]."""
-    from .sweep import sweep_loads
+def only_mesh(raw: dict[str, Any], path: str | Path, name: str | None = None) -> NamedMesh:
+    """Return the mesh of that name of a parsed job, or the only one that it has.
 
-    watch = Stopwatch()
-    load_map = sweep_loads(
-        job.pair,
-        table.torques(),
-        positions=table.positions,
-        mesh_cycles=table.mesh_cycles,
-        root_stress=table.root_stress,
-        back=job.back_deviations,
-        kinematics=job.table.kinematics,
-        elastic=job.elastic(keep, watch),
-    )
-    return replace(load_map, timings={**watch.seconds, **load_map.timings})
+    Raises
+    ------
+    InputError
+        For mistakes in the tables, and several meshes without a name.
+    """
+    meshes = meshes_of(raw, path, name)
+    if len(meshes) > 1:
+        names = ", ".join(mesh.name for mesh in meshes)
+        raise InputError("mesh", None, f"is not named, and the file has several: {names}", "choose one")
+    return meshes[0]
 
 
 def cached_curve(pair: GearPair, model: PairModel, **sweep: Any) -> StiffnessCurve:

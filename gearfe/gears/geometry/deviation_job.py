@@ -1,9 +1,8 @@
-"""From the [microgeometry] table of a job file, and the files it names, to the deviations of both gears' flanks."""
+"""From the microgeometry of gears in a job file, and the files it names, to the deviations of their flanks."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +10,8 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.files import read_numbers
-from ...base.tables.microgeometry import ENDS, STARTS, FlankTable, GearMicrogeometryTable, MicrogeometryTable
+from ...base.tables.gearbox import NamedGear, NamedMesh
+from ...base.tables.microgeometry import ENDS, STARTS, FlankTable, GearMicrogeometryTable
 from ...base.typing import Array, IntArray
 from . import pitch_errors
 from .deviation import Deviation
@@ -20,16 +20,12 @@ from .modifications import FlankModification, Relief, Waviness, tooth_deviations
 from .pair import Gear, GearPair
 from .pitch_errors import seen_from_behind
 
+#: Roles of the gears of a mesh, in results.
 GEARS = ("pinion", "wheel")
 
 
 def deviations_of(
-    table: MicrogeometryTable,
-    pair: GearPair,
-    folder: str | Path = ".",
-    *,
-    flank: str | None = None,
-    gears: Sequence[str] = GEARS,
+    mesh: NamedMesh, pair: GearPair, folder: str | Path = ".", *, flank: str | None = None
 ) -> tuple[ToothDeviations, ToothDeviations]:
     """Return the deviations of the driving flanks of a pair's driver and driven gear.
 
@@ -37,28 +33,26 @@ def deviations_of(
 
     Parameters
     ----------
-    table : MicrogeometryTable
-        The table.
+    mesh : NamedMesh
+        The mesh of the job file.
     pair : GearPair
-        The gears.
+        Its gears.
     folder : path
-        Where files of the table are looked for.
+        Where files that the tables name are looked for.
     flank
-        ``left`` or ``right``; None: what the table says.
-    gears
-        Table of the driver and of the driven gear: ``pinion``, ``wheel``, or an empty text for a gear without one.
+        ``left`` or ``right``; None: what the mesh says.
 
     Raises
     ------
     InputError
-        For every mistake, in the table's own keys.
+        For every mistake, in the file's own keys.
     """
-    side = flank or table.flank
+    side = flank or mesh.flank
     driver, driven = (
-        flank_deviations(FlankOf(table, pair, g, side, Path(folder), name, mirrored=side == "right"))
-        if name
-        else ToothDeviations()
-        for g, name in enumerate(gears)
+        ToothDeviations()
+        if gear.microgeometry is None
+        else flank_deviations(FlankOf(mesh, pair, g, side, Path(folder), mirrored=side == "right"))
+        for g, gear in enumerate(mesh.gears)
     )
     return driver, driven
 
@@ -69,33 +63,34 @@ class FlankOf:
 
     Attributes
     ----------
-    table, pair
-        [microgeometry], and the gears.
+    mesh, pair
+        The mesh of the job file, and its gears.
     number
-        0 for the pinion, 1 for the wheel.
+        0 for the driver, 1 for the driven gear.
     side
         ``left`` or ``right``.
     folder
-        Of the files that the table names.
-    name
-        Table of the gear; empty: its own.
+        Of the files that the tables name.
     mirrored
         Whether the pair is seen from the other side, where right flanks are left ones.
     """
 
-    table: MicrogeometryTable
+    mesh: NamedMesh
     pair: GearPair
     number: int
     side: str
     folder: Path
-    name: str = ""
     mirrored: bool = False
+
+    @property
+    def named(self) -> NamedGear:
+        """The gear of the job file."""
+        return self.mesh.gears[self.number]
 
     @property
     def teeth(self) -> GearMicrogeometryTable:
         """The gear's table, of both sides of its teeth."""
-        found: GearMicrogeometryTable = getattr(self.table, self.name or GEARS[self.number])
-        return found
+        return self.named.microgeometry or GearMicrogeometryTable()
 
     @property
     def own(self) -> FlankTable:
@@ -110,7 +105,7 @@ class FlankOf:
     @property
     def where(self) -> str:
         """Name of the table in messages."""
-        return f"microgeometry.{self.name or GEARS[self.number]}"
+        return self.named.microgeometry_where
 
     @property
     def active(self) -> tuple[float, float]:
@@ -138,18 +133,16 @@ def flank_deviations(one: FlankOf) -> ToothDeviations:
 
 
 def pitch_errors_of(
-    table: MicrogeometryTable, gear: Gear, name: str, folder: str | Path = "."
+    named: NamedGear, gear: Gear, folder: str | Path = "."
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return how much earlier the flanks of each tooth touch by their pitch errors.
 
     Parameters
     ----------
-    table : MicrogeometryTable
-        The table.
+    named : NamedGear
+        The gear of the job file.
     gear : Gear
         The gear.
-    name : str
-        ``pinion`` or ``wheel``.
     folder : path
         Where files of the table are looked for.
 
@@ -163,14 +156,16 @@ def pitch_errors_of(
     InputError
         For every mistake, in the table's own keys.
     """
-    own, where = getattr(table, name), f"microgeometry.{name}"
+    table, where = named.microgeometry, named.microgeometry_where
+    if table is None:
+        return (), ()
     made = []
     for side in ("left", "right"):
         try:
-            index = _index_deviations(own, side, gear, where, Path(folder))
+            index = _index_deviations(table, side, gear, where, Path(folder))
             turn = pitch_errors.turns(gear, index) if index.any() else ()
         except InputError as error:
-            raise _named(error, where, own.flank(side)) from None
+            raise _named(error, where, table.flank(side)) from None
         made.append(tuple(gear.base_radius * e for e in turn))
     return made[0], made[1]
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from ...base.errors import InputError, given
 from ...base.shown import Shown
-from ...base.tables.pair import FROM_DISTANCE, GearTable, PairTable
-from .curves import inv
+from ...base.tables.gearbox import NamedGear, NamedMesh, pair_gearbox, shift_by_distance
+from ...base.tables.pair import FROM_DISTANCE, PairTable
 from .gear_data import TipRelief, nominal_span, rounding
 from .mesh_geometry import MeshGeometry, PathPoint
 from .spur_gear import Gear
@@ -85,13 +85,8 @@ class GearPair(MeshGeometry, Shown):
     @classmethod
     def from_table(cls, table: PairTable) -> GearPair:
         """Pair that a job file's [pair] table describes; errors name the file's keys and units."""
-        written = _Written(table)
-        gears = {side: written.gear(side) for side in ("pinion", "wheel")}
-        try:
-            return gear_pair(gears["pinion"], gears["wheel"], written.distance, tuple(written.notes()))
-        except InputError as error:
-            side, _, name = error.field.rpartition(".") if error.field.startswith(("pinion", "wheel")) else ("", "", "")
-            raise written.error(error, side, name or error.field, gears) from None
+        (mesh,) = pair_gearbox(table).meshes.values()
+        return pair_of(mesh)
 
 
 #: Argument of `Gear` or `GearPair` -> its key in a job file and the key's unit in SI.
@@ -172,40 +167,60 @@ GIVE: dict[str, tuple[str, ...]] = {
 }
 
 
-class _Written:
-    """A [pair] table as its user wrote it: its gears, and errors of their arguments in the keys that were written."""
+def pair_of(mesh: NamedMesh) -> GearPair:
+    """Return the pair of gears that a mesh of a job file has, the driver as pinion.
 
-    def __init__(self, table: PairTable) -> None:
-        self.table = table
-        forms = {side: table.tooth_form(side) for side in ("pinion", "wheel")}
+    Raises
+    ------
+    InputError
+        For gears that cannot be made or run together, in the file's keys and units.
+    """
+    written = _Written(mesh)
+    gears = {side: written.gear(side) for side in SIDES}
+    try:
+        return gear_pair(gears["pinion"], gears["wheel"], written.distance, tuple(written.notes()))
+    except InputError as error:
+        side, _, name = error.field.rpartition(".") if error.field.startswith(SIDES) else ("", "", "")
+        raise written.error(error, side, name or error.field, gears) from None
+
+
+def gear_of(named: NamedGear) -> Gear:
+    """Return a gear of a job file that needs no mesh.
+
+    Raises
+    ------
+    InputError
+        For a gear that cannot be made, in the file's keys and units.
+    """
+    return _Written(NamedMesh("", named.where, named, named, None, named.where)).gear("pinion")
+
+
+#: Roles of the gears of a mesh.
+SIDES = ("pinion", "wheel")
+
+
+class _Written:
+    """A mesh as its user wrote it: its gears, and errors of their arguments in the keys that were written."""
+
+    def __init__(self, mesh: NamedMesh) -> None:
+        self.mesh = mesh
+        self.named = dict(zip(SIDES, mesh.gears, strict=True))
+        #: What messages call the gears.
+        self.called = {
+            side: f"the {side}" if gear.name == side else f"gear {gear.name!r}" for side, gear in self.named.items()
+        }
         #: Gear whose profile shift follows from the centre distance, or nothing.
-        self.derived = next((side for side, form in forms.items() if form["profile_shift"] == FROM_DISTANCE), "")
-        self.shifts = {side: self._shift(side, table.centre_distance_mm) for side in forms}
+        self.derived = next((s for s, gear in self.named.items() if mesh.name and gear.shift_from == mesh.name), "")
         self.thinned_um: dict[str, float] = {}
 
-    def _own(self, side: str) -> GearTable:
-        own: GearTable = getattr(self.table, side)
-        return own
+    @property
+    def _distance_key(self) -> str:
+        return f"{self.mesh.centre_distance_where}.centre_distance_mm"
 
-    def _shift(self, side: str, distance_mm: float | None) -> float:
-        """Profile shift of a gear, by a centre distance (mm) where it is to follow from one.
-
-        inv(alpha_w) = inv(alpha) + 2 (x_1 + x_2) tan(alpha)/(z_1 + z_2), cos(alpha_w) = a_0 cos(alpha)/a.
-        """
-        written = self.table.tooth_form(side)["profile_shift"]
-        if side != self.derived:
-            return float(written)
-        mate = "wheel" if side == "pinion" else "pinion"
-        teeth = self.table.pinion.teeth + self.table.wheel.teeth
-        angle = math.radians(self.table.tooth_form(side)["pressure_angle_deg"])
-        lowest = 0.5 * teeth * self.table.module_mm_of(side) * math.cos(angle)
-        a = given(distance_mm, "pair.centre_distance_mm")
-        if a <= lowest:
-            problem, cure = "leaves no working pressure angle", "use a larger centre distance"
-            problem = f"{problem}: must be > {lowest:.9g} mm"
-            raise InputError("pair.centre_distance_mm", a, problem, cure)
-        whole = teeth * (inv(math.acos(lowest / a)) - inv(angle)) / (2.0 * math.tan(angle))
-        return whole - float(self.table.tooth_form(mate)["profile_shift"])
+    def _shift(self, side: str, distance_mm: float) -> float:
+        """Profile shift of the gear of a side that a centre distance (mm) gives."""
+        mate = self.named["wheel" if side == "pinion" else "pinion"]
+        return shift_by_distance(self.named[side], mate, distance_mm, self._distance_key)
 
     def gear(self, side: str) -> Gear:
         """The gear of a side.
@@ -216,36 +231,31 @@ class _Written:
             For data that no gear has, in the file's keys and units.
         """
         try:
-            return self._gear(side, self.shifts[side])
+            return self._gear(side, self.named[side].form["profile_shift"])
         except InputError as error:
             raise self.error(error, side, error.field) from None
 
     def _gear(self, side: str, shift: float) -> Gear:
-        own, form = self._own(side), self._form(side) | {"profile_shift": shift}
-        return gear_of_form(own.teeth, form | self._of_drawing(side, form))
-
-    def _form(self, side: str) -> dict[str, Any]:
-        own = self._own(side)
-        form = {**self.table.tooth_form(side), "module_mm": self.table.module_mm_of(side)}
-        return form | {"bore_diameter_mm": own.bore_diameter_mm, "profile_shift": self.shifts[side]}
+        form = {**self.named[side].form, "profile_shift": shift}
+        return gear_of_form(self.named[side].teeth, form | self._of_drawing(side, form))
 
     def _of_drawing(self, side: str, form: Mapping[str, Any]) -> dict[str, float]:
         """Keys of the tooth form that drawing values stand for: tip and root diameters, the span size."""
-        own = self._own(side)
-        module_mm, half, x = form["module_mm"], 0.5 * own.teeth, form["profile_shift"]
+        teeth, drawn = self.named[side].teeth, self.named[side].drawn
+        module_mm, half, x = form["module_mm"], 0.5 * teeth, form["profile_shift"]
         made: dict[str, float] = {}
-        if own.tip_diameter_mm is not None:
-            made |= {"addendum": 0.5 * own.tip_diameter_mm / module_mm - half - x, "tip_shortening": 0.0}
-        if own.root_diameter_mm is not None:
-            made["dedendum"] = half + x - 0.5 * own.root_diameter_mm / module_mm
-        if own.span_mm is not None and own.span_teeth is not None:
-            angle = math.radians(form["pressure_angle_deg"])
-            most = module_mm * nominal_span(own.teeth, x, angle, own.span_teeth)
-            if own.span_mm > most + 1e3 * rounding(1e-3 * module_mm):
-                problem = f"must be <= {most:.6g} mm, the span over {own.span_teeth} teeth without backlash"
+        if "tip_diameter_mm" in drawn:
+            made |= {"addendum": 0.5 * drawn["tip_diameter_mm"] / module_mm - half - x, "tip_shortening": 0.0}
+        if "root_diameter_mm" in drawn:
+            made["dedendum"] = half + x - 0.5 * drawn["root_diameter_mm"] / module_mm
+        if "span_mm" in drawn:
+            angle, span, over = math.radians(form["pressure_angle_deg"]), drawn["span_mm"], drawn["span_teeth"]
+            most = module_mm * nominal_span(teeth, x, angle, over)
+            if span > most + 1e3 * rounding(1e-3 * module_mm):
+                problem = f"must be <= {most:.6g} mm, the span over {over} teeth without backlash"
                 cure = "use more profile_shift, or another span_teeth"
-                raise InputError("span_mm", own.span_mm, problem, cure)
-            self.thinned_um[side] = 1e3 * (most - own.span_mm) / math.cos(angle)
+                raise InputError("span_mm", span, problem, cure)
+            self.thinned_um[side] = 1e3 * (most - span) / math.cos(angle)
             made["tooth_thinning_um"] = max(0.0, self.thinned_um[side])
         return made
 
@@ -253,36 +263,35 @@ class _Written:
         """Return what follows from other keys, and what was taken although it differs by rounding."""
         notes: list[str] = []
         if self.derived:
-            x = self.shifts[self.derived]
-            notes.append(f"profile_shift of the {self.derived} by the centre distance: {x:.6g}")
+            x = self.named[self.derived].form["profile_shift"]
+            notes.append(f"profile_shift of {self.called[self.derived]} by the centre distance: {x:.6g}")
         for side, thinned in self.thinned_um.items():
             if thinned < 0.0:
+                off = -thinned * math.cos(self._angle(side))
                 notes.append(
-                    f"span_mm of the {side} is {-thinned * math.cos(self._angle(side)):.3g} um larger than that "
+                    f"span_mm of {self.called[side]} is {off:.3g} um larger than that "
                     "without backlash, by rounding: tooth_thinning_um is taken as 0"
                 )
-        for side in ("pinion", "wheel"):
-            own, module = self._own(side), self.table.module_mm_of(side)
-            given_mm = own.pitch_diameter_mm
-            if given_mm is not None and abs(given_mm - own.teeth * module) > 1e-9 * given_mm:
+        for side in SIDES:
+            named = self.named[side]
+            module, given_mm = named.form["module_mm"], named.drawn.get("pitch_diameter_mm")
+            if given_mm is not None and abs(given_mm - named.teeth * module) > 1e-9 * given_mm:
+                off = 1e3 * abs(given_mm - named.teeth * module)
                 notes.append(
-                    f"pitch_diameter_mm of the {side} differs from {own.teeth} teeth of the common module "
-                    f"{module:.9g} mm by {1e3 * abs(given_mm - own.teeth * module):.3g} um, by rounding: the module "
-                    "is taken"
+                    f"pitch_diameter_mm of {self.called[side]} differs from {named.teeth} teeth of the common module "
+                    f"{module:.9g} mm by {off:.3g} um, by rounding: the module is taken"
                 )
         return notes
 
     def _angle(self, side: str) -> float:
-        return math.radians(self.table.tooth_form(side)["pressure_angle_deg"])
+        return math.radians(self.named[side].form["pressure_angle_deg"])
 
     def _written(self, side: str, name: str) -> tuple[str, str]:
         """Key that gives an argument of a gear, and its table; an empty text where the user wrote none."""
-        usual = KEYS.get(name, (name, 1.0))[0]
-        for where, table in ((f"pair.{side}", self._own(side)), ("pair", self.table)):
-            for key in (*GIVE.get(name, ()), usual):
-                if getattr(table, key, None) is not None:
-                    return key, where
-        return usual, ""
+        usual, named = KEYS.get(name, (name, 1.0))[0], self.named[side]
+        keys = {key: named.written(key) for key in (*GIVE.get(name, ()), usual)}
+        found = [(key, where) for key, where in keys.items() if where]
+        return min(found, key=lambda one: one[1] != named.where, default=(usual, ""))
 
     def error(self, error: InputError, side: str, name: str, gears: Mapping[str, Gear] | None = None) -> InputError:
         """Return the error of an argument as that of the key that was written, its bound as one of that key.
@@ -300,7 +309,7 @@ class _Written:
         """
         error = InputError(name, error.value, error.reason, error.cure, error.limit)
         if not side:
-            return in_keys(error, "pair")
+            return in_keys(error, self.mesh.centre_distance_where)
         if side == self.derived and (gears is None or name == "profile_shift"):
             return self._of_distance(error, side, gears)
         if gears is not None and error.limit is not None:
@@ -310,25 +319,26 @@ class _Written:
             shift = self._of_shift(error, side)
             if shift is not None:
                 return shift
-        where = where or f"pair.{side}"
+        where = where or self.named[side].where
         if key == "pitch_diameter_mm":
-            return in_keys(error, where, key=key, unit=1e-3 / self._own(side).teeth)
+            return in_keys(error, where, key=key, unit=1e-3 / self.named[side].teeth)
         if key == KEYS.get(error.field, (error.field, 1.0))[0]:
             return in_keys(error, where)
         return self._of_key(error, side, key, where)
 
     def _of_key(self, error: InputError, side: str, key: str, where: str) -> InputError:
         """The error of a coefficient as that of the diameter, span size or tip shortening that gives it."""
-        value = getattr(self.table if where == "pair" else self._own(side), key)
+        named = self.named[side]
+        value = named.drawn.get(key, named.form.get(key))
         if error.limit is None:
             number = f"{error.value:.6g}" if isinstance(error.value, float) else str(error.value)
             return InputError(f"{where}.{key}", value, f"makes {error.field} {number}: {error.reason}", error.cure)
-        form, teeth, (sign, bound, unit) = self._form(side), self._own(side).teeth, error.limit
+        form, teeth, (sign, bound, unit) = named.form, named.teeth, error.limit
         module, x = form["module_mm"], form["profile_shift"]
         if key != "tip_diameter_mm":  # these fall as what they stand for grows
             sign = {"<": ">", ">": "<", ">=": "<=", "<=": ">="}[sign]
         if key == "span_mm":
-            whole = module * nominal_span(teeth, x, self._angle(side), given(self._own(side).span_teeth, "span_teeth"))
+            whole = module * nominal_span(teeth, x, self._angle(side), named.drawn["span_teeth"])
             limit = whole - 1e3 * bound * (1e-6 if unit == "um" else 1.0) * math.cos(self._angle(side))
         elif key == "tip_shortening":
             limit = form["tip_shortening"] + form["addendum"] - bound
@@ -345,7 +355,7 @@ class _Written:
         mate = "wheel" if side == "pinion" else "pinion"
         name, (sign, bound, unit) = error.field, given(error.limit, "limit")
         own, other = (self._written(each, name)[1] for each in (side, mate))
-        reason, cure, shared = error.reason, error.cure, own == other == "pair"
+        reason, cure, shared = error.reason, error.cure, own == other != ""
         if name == "profile_shift":  # the bound of the sum
             total = bound + gears[mate].profile_shift
             side = mate if other and not own else side
@@ -363,7 +373,7 @@ class _Written:
     @property
     def distance(self) -> float | None:
         """Centre distance (m)."""
-        return None if self.table.centre_distance_mm is None else 1e-3 * self.table.centre_distance_mm
+        return None if self.mesh.centre_distance_mm is None else 1e-3 * self.mesh.centre_distance_mm
 
     def _possible(self, side: str, shift: float, gears: Mapping[str, Gear] | None, distance: float | None) -> bool:
         """Whether there is a gear with a profile shift, and with `gears` a pair with it at a distance (m)."""
@@ -378,9 +388,9 @@ class _Written:
     def _of_shift(self, error: InputError, side: str) -> InputError | None:
         """The error of a coefficient that the user did not write as one of the profile shift, where that makes it."""
         key, where = self._written(side, "profile_shift")
-        x = self.shifts[side]
+        x = self.named[side].form["profile_shift"]
         near = [s for s in np.linspace(-0.5, 1.0, 31).tolist() if self._possible(side, s, None, None)] if where else []
-        if not near or where == "pair":
+        if not near or where != self.named[side].where:
             return None
         good = _last(lambda s: self._possible(side, s, None, None), min(near, key=lambda s: abs(s - x)), x, 1e-7)
         cure = f"use {'less' if good < x else 'more'} {key}"
@@ -389,20 +399,21 @@ class _Written:
 
     def _of_distance(self, error: InputError, side: str, gears: Mapping[str, Gear] | None) -> InputError:
         """The error of a gear whose profile shift follows from the centre distance as one of that distance."""
-        a, x = given(self.table.centre_distance_mm, "pair.centre_distance_mm"), self.shifts[side]
-        problem = f"makes profile_shift {x:.5g} of the {side}: {error.reason}"
+        named = self.named[side]
+        a, x = given(self.mesh.centre_distance_mm, self._distance_key), named.form["profile_shift"]
+        problem = f"makes profile_shift {x:.5g} of {self.called[side]}: {error.reason}"
 
         def possible(a: float) -> bool:
             return self._possible(side, self._shift(side, a), gears, 1e-3 * a)
 
-        reference = 0.5 * (self.table.pinion.teeth + self.table.wheel.teeth) * self.table.module_mm_of(side)
+        reference = 0.5 * sum(gear.teeth for gear in self.mesh.gears) * named.form["module_mm"]
         near = [d for d in np.linspace(0.99 * reference, 1.05 * reference, 121).tolist() if possible(d)]
         if not near:
-            return InputError(f"pair.{side}.profile_shift", FROM_DISTANCE, problem, error.cure)
+            return InputError(f"{named.where}.profile_shift", FROM_DISTANCE, problem, error.cure)
         good = _last(possible, min(near, key=lambda d: abs(d - a)), a, 1e-7 * a)
         cure = f"use a {'smaller' if good < a else 'larger'} centre distance, or write the profile shift"
         problem = f"{problem}: must be {'<=' if good < a else '>='} {good:.7g} mm"
-        return InputError("pair.centre_distance_mm", a, problem, cure)
+        return InputError(self._distance_key, a, problem, cure)
 
 
 def _last(possible: Callable[[float], bool], good: float, bad: float, close: float) -> float:

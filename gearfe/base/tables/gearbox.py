@@ -1,0 +1,578 @@
+"""Gears and meshes by name, with all their keys: the one form of what a job file says about them.
+
+A file has [gears.NAME] and [meshes.NAME], or the shorthand of a pair ([pair], [microgeometry]), or the lists of a train
+([[train.gears]], [[train.meshes]]). The three functions `named_gearbox`, `pair_gearbox` and `train_gearbox` turn them
+into a `Gearbox`; nothing below them knows which of the three it was, except the names of keys in messages.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from ..errors import InputError, unknown_name
+from .loadmap import LoadMapTable
+from .microgeometry import GearMicrogeometryTable, MicrogeometryTable
+from .named import NamedBearingTable, NamedGearTable, NamedMeshTable, NamedShaftTable
+from .pair import (
+    FROM_DISTANCE,
+    REQUIRED,
+    SAME,
+    GearBodyTable,
+    GearTable,
+    MaterialTable,
+    PairTable,
+    StiffnessTable,
+    ToothFormTable,
+    common_module_mm,
+    module_mm_of,
+    tooth_form,
+)
+from .train import (
+    TrainBearingTable,
+    TrainGearTable,
+    TrainRigidBoreTable,
+    TrainShaftTable,
+    TrainTable,
+)
+
+#: Where a value comes from that no table gives.
+DEFAULT = "default"
+#: Keys of a gear's drawing, beside the tooth form.
+DRAWN = ("pitch_diameter_mm", "tip_diameter_mm", "root_diameter_mm", "span_mm", "span_teeth")
+#: Bore of a gear whose entry in [[train.gears]] gives none, times the pitch diameter.
+BORE = 0.2
+#: Gears of a pair.
+PINION, WHEEL = "pinion", "wheel"
+
+
+@dataclass(frozen=True)
+class NamedGear:
+    """A gear with all its keys, whatever tables they stand in.
+
+    Attributes
+    ----------
+    name
+        Of the gear.
+    where
+        Its table, for messages.
+    teeth
+        Number of teeth.
+    form
+        Keys of the tooth form, module_mm and bore_diameter_mm, defaults filled in.
+    drawn
+        Keys of its drawing that are given, see `DRAWN`.
+    material
+        Its material; None: not known, which a mesh that is computed refuses.
+    material_where, density_where, microgeometry_where
+        Tables of these; that of the density is empty where the gear's own key gives it.
+    density_kg_per_m3
+        Of its body.
+    places
+        Key -> another table that gives it, or `DEFAULT`.
+    microgeometry
+        Deviations of its flanks, or None.
+    shaft, y_mm
+        Shaft that carries it, and the place of its middle plane; an empty name: on none.
+    like
+        Tables that a gear of a train takes all of its teeth from; empty: none.
+    shift_from
+        Mesh whose centre distance its profile shift follows from; empty: the file gives the number.
+    """
+
+    name: str
+    where: str
+    teeth: int
+    form: Mapping[str, Any]
+    drawn: Mapping[str, Any]
+    material: MaterialTable | None
+    material_where: str
+    density_kg_per_m3: float
+    density_where: str
+    places: Mapping[str, str] = field(default_factory=dict)
+    microgeometry: GearMicrogeometryTable | None = None
+    microgeometry_where: str = ""
+    shaft: str = ""
+    y_mm: float = 0.0
+    like: str = ""
+    shift_from: str = ""
+
+    def written(self, key: str) -> str:
+        """Table that a key of the gear stands in; an empty text for one that the file does not give."""
+        if key in self.drawn:
+            return self.where
+        place = self.places.get(key, self.where)
+        return "" if place == DEFAULT or self.form.get(key) is None else place
+
+
+@dataclass(frozen=True)
+class NamedMesh:
+    """Two gears in mesh with all that decides their contact.
+
+    Attributes
+    ----------
+    name, where
+        Of the mesh, and its table, for messages.
+    driver, driven
+        The gears.
+    centre_distance_mm, centre_distance_where
+        Centre distance, None: without backlash; and the table that it stands in, or would.
+    flank
+        Driving flanks of both gears, ``left`` or ``right``, outside of trains, whose senses of rotation say it.
+    tolerance_class
+        Class of ISO 1328-1 in the picture of the flanks, or None.
+    stiffness
+        [stiffness], with the keys that this mesh and the variant have instead.
+    loads
+        [loadmap] alike.
+    """
+
+    name: str
+    where: str
+    driver: NamedGear
+    driven: NamedGear
+    centre_distance_mm: float | None
+    centre_distance_where: str
+    flank: str = "left"
+    tolerance_class: int | None = None
+    stiffness: StiffnessTable = field(default_factory=StiffnessTable)
+    loads: LoadMapTable = field(default_factory=LoadMapTable)
+
+    @property
+    def gears(self) -> tuple[NamedGear, NamedGear]:
+        """Driver and driven gear."""
+        return self.driver, self.driven
+
+    @property
+    def deviates(self) -> bool:
+        """Whether the file says anything of deviations of the flanks."""
+        return any(gear.microgeometry is not None for gear in self.gears)
+
+
+@dataclass(frozen=True)
+class Gearbox:
+    """Gears and meshes of a file, by name."""
+
+    gears: Mapping[str, NamedGear]
+    meshes: Mapping[str, NamedMesh]
+
+    def mesh(self, name: str, field_: str = "--mesh") -> NamedMesh:
+        """Return the mesh of that name.
+
+        Raises
+        ------
+        InputError
+            When there is none, with the names that there are; `field_` names what asked.
+        """
+        if name not in self.meshes:
+            raise unknown_name(field_, name, self.meshes)
+        return self.meshes[name]
+
+
+def mesh_name(driver: str, driven: str) -> str:
+    """Name of a mesh that its table does not name."""
+    return f"{driver}-{driven}"
+
+
+def shift_by_distance(gear: NamedGear, mate: NamedGear, distance_mm: float, where: str) -> float:
+    """Return the profile shift of a gear that runs with its mate at a centre distance (mm) without backlash.
+
+    inv(alpha_w) = inv(alpha) + 2 (x_1 + x_2) tan(alpha)/(z_1 + z_2), cos(alpha_w) = a_0 cos(alpha)/a.
+
+    Parameters
+    ----------
+    gear, mate : NamedGear
+        The gears; the profile shift of the mate is a number.
+    distance_mm : float
+        Centre distance.
+    where : str
+        Its key, for messages.
+
+    Raises
+    ------
+    InputError
+        For a distance that no pressure angle belongs to.
+    """
+    teeth, angle = gear.teeth + mate.teeth, math.radians(gear.form["pressure_angle_deg"])
+    lowest = 0.5 * teeth * gear.form["module_mm"] * math.cos(angle)
+    if distance_mm <= lowest:
+        problem = f"leaves no working pressure angle: must be > {lowest:.9g} mm"
+        raise InputError(where, distance_mm, problem, "use a larger centre distance")
+    working = math.acos(lowest / distance_mm)
+    involutes = (math.tan(working) - working) - (math.tan(angle) - angle)
+    return teeth * involutes / (2.0 * math.tan(angle)) - float(mate.form["profile_shift"])
+
+
+def _with_shifts(box: Gearbox) -> Gearbox:
+    """The gearbox with numbers for profile shifts that follow from a centre distance, mesh by mesh."""
+    gears, meshes = dict(box.gears), dict(box.meshes)
+    left = [name for name, gear in gears.items() if gear.form["profile_shift"] == FROM_DISTANCE]
+    while left:
+        found = [
+            (name, mesh)
+            for name in left
+            for mesh in meshes.values()
+            if name in (mesh.driver.name, mesh.driven.name) and mesh.centre_distance_mm is not None
+            if (mesh.driven if mesh.driver.name == name else mesh.driver).name not in left
+        ]
+        if not found:
+            problem = "needs a mesh with centre_distance_mm and with a gear whose profile shift is a number"
+            where = gears[left[0]].written("profile_shift")
+            cure = "add the centre distance, or write a number"
+            raise InputError(f"{where}.profile_shift", FROM_DISTANCE, problem, cure)
+        name, mesh = found[0]
+        left.remove(name)
+        gear, mate = (mesh.driver, mesh.driven) if mesh.driver.name == name else (mesh.driven, mesh.driver)
+        distance = mesh.centre_distance_mm or 0.0
+        shift = shift_by_distance(gear, mate, distance, f"{mesh.centre_distance_where}.centre_distance_mm")
+        gears[name] = replace(gear, form={**gear.form, "profile_shift": shift}, shift_from=mesh.name)
+        meshes = {
+            key: replace(one, driver=gears[one.driver.name], driven=gears[one.driven.name])
+            for key, one in meshes.items()
+        }
+    return Gearbox(gears, meshes)
+
+
+# --- [gears.NAME], [meshes.NAME] ------------------------------------------------------------------------------------
+
+
+def named_gearbox(
+    gears: Mapping[str, NamedGearTable],
+    meshes: Mapping[str, NamedMeshTable],
+    materials: Mapping[str, MaterialTable],
+    *,
+    shafts: Iterable[str] | None = None,
+) -> Gearbox:
+    """Return the gears and meshes of [gears.NAME] and [meshes.NAME], with the keys of [stiffness] left out.
+
+    Parameters
+    ----------
+    gears, meshes, materials
+        The tables by name.
+    shafts : iterable of str, optional
+        Names of the shafts, if the file has any: then every gear is on one.
+
+    Raises
+    ------
+    InputError
+        For materials, gears and shafts that do not exist, gears that mesh with themselves or on one shaft, modules and
+        pressure angles that differ.
+    """
+    known = None if shafts is None else list(shafts)
+    made = {name: _named_gear(name, table, materials, known) for name, table in gears.items()}
+    for mates in _meshing(meshes.values()):
+        common = common_module_mm(gears[name] for name in gears if name in mates)
+        for name in mates & gears.keys():
+            module = module_mm_of(gears[name], gears[name].module_mm, common)
+            made[name] = replace(made[name], form={**made[name].form, "module_mm": module})
+    found = {name: _named_mesh(name, table, made) for name, table in meshes.items()}
+    twins: dict[frozenset[str], str] = {}
+    for name, mesh in found.items():
+        both = frozenset((mesh.driver.name, mesh.driven.name))
+        if both in twins:
+            problem = f"has the gears of [meshes.{twins[both]}], too"
+            raise InputError(f"meshes.{name}", None, problem, "two gears have one mesh: leave one out")
+        twins[both] = name
+    return _with_shifts(Gearbox(made, found))
+
+
+def _meshing(meshes: Iterable[NamedMeshTable]) -> list[set[str]]:
+    """Names of gears that mesh with each other, directly or by others."""
+    groups: list[set[str]] = []
+    for mesh in meshes:
+        joined = {mesh.driver, mesh.driven}
+        apart = [group for group in groups if not group & joined]
+        groups = [*apart, joined.union(*(group for group in groups if group & joined))]
+    return groups
+
+
+def _named_gear(
+    name: str, table: NamedGearTable, materials: Mapping[str, MaterialTable], shafts: list[str] | None
+) -> NamedGear:
+    where = f"gears.{name}"
+    material, material_where = MaterialTable(), DEFAULT
+    if isinstance(table.material, MaterialTable):
+        material, material_where = table.material, f"{where}.material"
+    elif table.material is not None:
+        if table.material not in materials:
+            raise unknown_name(f"{where}.material", table.material, materials)
+        material, material_where = materials[table.material], f"materials.{table.material}"
+    if shafts is None and table.shaft is not None:
+        raise InputError(
+            f"{where}.shaft", table.shaft, "is no shaft of this file", "add [shafts.NAME], or leave it out"
+        )
+    if shafts is not None:
+        if table.shaft is None:
+            raise InputError(
+                f"{where}.shaft", None, "is required: the gear is on no shaft", f"add shaft = {_or(shafts)}"
+            )
+        if table.shaft not in shafts:
+            raise unknown_name(f"{where}.shaft", table.shaft, shafts)
+    form, places = _form(table, None, "")
+    return NamedGear(
+        name,
+        where,
+        table.teeth,
+        form,
+        _drawn(table),
+        material,
+        material_where,
+        material.density_kg_per_m3,
+        material_where,
+        places,
+        table.microgeometry,
+        f"{where}.microgeometry",
+        table.shaft or "",
+        table.y_mm or 0.0,
+    )
+
+
+def _or(names: Iterable[str]) -> str:
+    return " or ".join(f'"{name}"' for name in names)
+
+
+def _named_mesh(name: str, table: NamedMeshTable, gears: Mapping[str, NamedGear]) -> NamedMesh:
+    where = f"meshes.{name}"
+    for key in ("driver", "driven"):
+        if getattr(table, key) not in gears:
+            raise unknown_name(f"{where}.{key}", getattr(table, key), gears)
+    if table.driver == table.driven:
+        raise InputError(f"{where}.driven", table.driven, "is the driver, too", "a gear meshes with another gear")
+    one, two = gears[table.driver], gears[table.driven]
+    if one.shaft and one.shaft == two.shaft:
+        problem = f"is on shaft {two.shaft!r} with the driver {one.name!r}"
+        raise InputError(f"{where}.driven", two.name, problem, "mesh gears of two shafts")
+    for key, what in (("module_mm", "modules"), ("pressure_angle_deg", "pressure angles")):
+        a, b = one.form[key], two.form[key]
+        if abs(a - b) > SAME * abs(a):
+            given = "pitch_diameter_mm" if key == "module_mm" and "pitch_diameter_mm" in two.drawn else key
+            problem = f"makes {what} of {a:.9g} and {b:.9g} in mesh {name!r}: must be that of gear {one.name!r}"
+            value = two.drawn.get(given, b)
+            raise InputError(f"{two.where}.{given}", value, problem, "gears in mesh have one module and pressure angle")
+    return NamedMesh(name, where, one, two, table.centre_distance_mm, where, table.flank, table.tolerance_class)
+
+
+def _form(
+    table: ToothFormTable, shared: ToothFormTable | None, shared_where: str
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Keys of a gear's tooth form with module and bore, and where those come from that it does not give itself."""
+    tables = (table,) if shared is None else (table, shared)
+    module = next((t.module_mm for t in tables if t.module_mm is not None), None)
+    form: dict[str, Any] = {"module_mm": module, **tooth_form(*tables)}
+    places: dict[str, str] = {}
+    for key, value in form.items():
+        if getattr(table, key) is not None:
+            continue
+        if shared is not None and getattr(shared, key) is not None:
+            places[key] = shared_where
+        elif value is not None:
+            places[key] = DEFAULT
+    if isinstance(table, GearBodyTable):
+        if table.pitch_diameter_mm is not None:
+            form["module_mm"] = table.pitch_diameter_mm / table.teeth
+            places.pop("module_mm", None)
+        form["bore_diameter_mm"] = table.bore_diameter_mm
+    return form, places
+
+
+def _drawn(table: GearBodyTable) -> dict[str, Any]:
+    return {key: getattr(table, key) for key in DRAWN if getattr(table, key) is not None}
+
+
+def named_train(
+    table: TrainTable,
+    meshes: Mapping[str, NamedMeshTable],
+    shafts: Mapping[str, NamedShaftTable],
+    bearings: Mapping[str, NamedBearingTable],
+) -> TrainTable:
+    """Return [train] with the shafts, meshes and bearings of their own tables.
+
+    Parameters
+    ----------
+    table : TrainTable
+        [train], without lists of these.
+    meshes, shafts, bearings
+        The tables by name.
+
+    Raises
+    ------
+    InputError
+        For lists of [train] that stand beside these tables, and for names that do not exist.
+    """
+    for key in ("shafts", "gears", "meshes", "bearings"):
+        if getattr(table, key):
+            problem = f"stands beside [{'shafts' if key == 'gears' else key}.NAME]"
+            raise InputError(f"[[train.{key}]]", None, problem, f"write all {key} as [{key}.NAME], or all as lists")
+    held: dict[str, tuple[str, str]] = {}  # bore -> bearing and shaft
+    for name, bearing in bearings.items():
+        where = f"bearings.{name}"
+        if bearing.shaft not in shafts:
+            raise unknown_name(f"{where}.shaft", bearing.shaft, shafts)
+        bore = _bore(name, bearing)
+        if bore in held:
+            problem = f"is that of [bearings.{held[bore][0]}], too"
+            raise InputError(f"{where}.attachment", bore, problem, "a bore has one bearing")
+        held[bore] = name, bearing.shaft
+    carried = {
+        name: (*(_bore(b, bearing) for b, bearing in bearings.items() if bearing.shaft == name), *shaft.attachments)
+        for name, shaft in shafts.items()
+    }
+    for name, bores in carried.items():
+        if not bores:
+            cure = f'add [bearings.NAME] with shaft = "{name}", or attachments = ["1", "2"]'
+            raise InputError(f"shafts.{name}.attachments", None, "no bearing carries the shaft", cure)
+    rows = tuple(
+        TrainShaftTable(
+            name=name, **{f.name: getattr(shaft, f.name) for f in fields(shaft) if f.name != "attachments"},
+            attachments=tuple(map(str, carried[name])),
+        )
+        for name, shaft in shafts.items()
+    )  # fmt: skip
+    springs = tuple(
+        TrainBearingTable(attachment=_bore(name, bearing), stiffness=bearing.stiffness, damping=bearing.damping)
+        for name, bearing in bearings.items()
+        if bearing.stiffness is not None
+    )
+    places = tuple(
+        TrainRigidBoreTable(
+            attachment=_bore(name, b), x_mm=shafts[b.shaft].x_mm, y_mm=b.y_mm, z_mm=shafts[b.shaft].z_mm
+        )
+        for name, b in bearings.items()
+        if b.y_mm is not None
+    )
+    if places and table.rigid_bores:
+        problem = "stands beside [bearings.NAME] with y_mm"
+        raise InputError("[[train.rigid_bores]]", None, problem, "leave the list out, or y_mm of the bearings")
+    if places and len(places) < len(bearings):
+        lacking = next(name for name, b in bearings.items() if b.y_mm is None)
+        raise InputError(f"bearings.{lacking}.y_mm", None, "is required: other bearings have one", "give all, or none")
+    made = replace(table, shafts=rows, meshes=tuple(meshes.values()), bearings=springs)
+    made = replace(made, rigid_bores=places or table.rigid_bores)
+    ends: list[tuple[str, Any]] = [] if made.drive is None else [("train.drive", made.drive)]
+    ends += [(f"train.loads[{i}]", load) for i, load in enumerate(made.loads)]
+    for where, end in ends:
+        if end.shaft not in shafts:
+            raise unknown_name(f"{where}.shaft", end.shaft, shafts)
+        own = [name for name, bearing in bearings.items() if bearing.shaft == end.shaft]
+        if end.attachment is not None and str(end.attachment) not in (*own, *map(str, carried[end.shaft])):
+            raise unknown_name(f"{where}.attachment", str(end.attachment), own or map(str, carried[end.shaft]))
+
+    def at_bore(end: Any) -> Any:
+        name = str(end.attachment)
+        return replace(end, attachment=_bore(name, bearings[name])) if name in bearings else end
+
+    drive = None if made.drive is None else at_bore(made.drive)
+    return replace(made, drive=drive, loads=tuple(map(at_bore, made.loads)))
+
+
+def _bore(name: str, bearing: NamedBearingTable) -> str:
+    return name if bearing.attachment is None else str(bearing.attachment)
+
+
+# --- [pair] ---------------------------------------------------------------------------------------------------------
+
+
+def pair_gearbox(pair: PairTable, microgeometry: MicrogeometryTable | None = None) -> Gearbox:
+    """Return the two gears of [pair], pinion and wheel, and their mesh."""
+    gears = {side: _pair_gear(pair, side, microgeometry) for side in (PINION, WHEEL)}
+    name = mesh_name(PINION, WHEEL)
+    mesh = NamedMesh(name, "pair", gears[PINION], gears[WHEEL], pair.centre_distance_mm, "pair")
+    if microgeometry is not None:
+        mesh = replace(mesh, flank=microgeometry.flank, tolerance_class=microgeometry.tolerance_class)
+    return _with_shifts(Gearbox(gears, {name: mesh}))
+
+
+def _pair_gear(pair: PairTable, side: str, microgeometry: MicrogeometryTable | None) -> NamedGear:
+    table: GearTable = getattr(pair, side)
+    form, places = _form(table, pair, "pair")
+    form["module_mm"] = pair.module_mm_of(side)
+    material, where = pair.material, "pair.material"
+    if table.material is not None:
+        material, where = table.material, f"pair.{side}.material"
+    uneven = None if microgeometry is None else getattr(microgeometry, side)
+    return NamedGear(
+        side,
+        f"pair.{side}",
+        table.teeth,
+        form,
+        _drawn(table),
+        material,
+        where,
+        material.density_kg_per_m3,
+        where,
+        places,
+        uneven,
+        f"microgeometry.{side}",
+    )
+
+
+# --- [[train.gears]], [[train.meshes]] ------------------------------------------------------------------------------
+
+
+def train_gearbox(
+    table: TrainTable, pair: PairTable | None, microgeometry: MicrogeometryTable | None = None
+) -> Gearbox:
+    """Return the gears and meshes of the lists of [train], which take what they lack from [pair].
+
+    Raises
+    ------
+    InputError
+        For gears of a [pair] that is not there, and required keys that neither gives.
+    """
+    shared = None if pair is None else pair_gearbox(pair, microgeometry)
+    gears = {gear.name: _train_gear(gear, f"train.gears[{i}]", pair, shared) for i, gear in enumerate(table.gears)}
+    sides = {gear.name: gear.gear for gear in table.gears}
+    meshes: dict[str, NamedMesh] = {}
+    for i, mesh in enumerate(table.meshes):
+        name, where = mesh_name(mesh.driver, mesh.driven), f"train.meshes[{i}]"
+        distance, distance_where = mesh.centre_distance_mm, where
+        of_pair = {sides[mesh.driver], sides[mesh.driven]} == {PINION, WHEEL}
+        if distance is None and of_pair and pair is not None and pair.centre_distance_mm is not None:
+            distance, distance_where = pair.centre_distance_mm, "pair"
+        if name in meshes:
+            raise InputError(where, None, f"has the gears of another mesh, {name!r}", "two gears have one mesh")
+        meshes[name] = NamedMesh(name, where, gears[mesh.driver], gears[mesh.driven], distance, distance_where)
+    return Gearbox(gears, meshes)
+
+
+def _train_gear(table: TrainGearTable, where: str, pair: PairTable | None, shared: Gearbox | None) -> NamedGear:
+    if table.gear:
+        if shared is None:
+            cure = "add it, or give teeth, module_mm, ..."
+            raise InputError(f"{where}.gear", table.gear, "needs a table [pair]", cure)
+        like = f"[pair.{table.gear}] and [pair]"
+        made = replace(shared.gears[table.gear], name=table.name, shaft=table.shaft, y_mm=table.y_mm, like=like)
+    else:
+        form, places = _form(table, pair, "pair")
+        for key in ("module_mm", *REQUIRED):
+            if form[key] is None:
+                raise InputError(f"{where}.{key}", None, "is required", "add it here, or to a table [pair]")
+        if form["profile_shift"] == FROM_DISTANCE:
+            problem = "follows from a centre distance in [pair], for a gear of [pair] alone"
+            raise InputError(f"{where}.profile_shift", None, problem, "write the number here")
+        teeth = table.teeth or 0
+        bore = table.bore_diameter_mm
+        if bore is None:
+            bore, places["bore_diameter_mm"] = BORE * form["module_mm"] * teeth, DEFAULT
+        form["bore_diameter_mm"] = bore
+        material, material_where = (None, DEFAULT) if pair is None else (pair.material, "pair.material")
+        density = MaterialTable().density_kg_per_m3 if material is None else material.density_kg_per_m3
+        made = NamedGear(
+            table.name,
+            where,
+            teeth,
+            form,
+            {},
+            material,
+            material_where,
+            density,
+            material_where,
+            places,
+            shaft=table.shaft,
+            y_mm=table.y_mm,
+        )
+    if table.density_kg_per_m3 is None:
+        return made
+    return replace(made, density_kg_per_m3=table.density_kg_per_m3, density_where="")

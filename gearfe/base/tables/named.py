@@ -1,0 +1,136 @@
+"""Tables of gears, meshes, shafts and bearings by name: [gears.NAME], [meshes.NAME], [shafts.NAME], [bearings.NAME].
+
+The tables of a pair ([pair], [microgeometry]) and the lists of a train ([[train.gears]], ...) are shorthand for these.
+`gearfe.base.tables.gearbox` makes one form of either.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..config import build, quantity
+from ..errors import InputError
+from .loadmap import LoadMapTable
+from .microgeometry import GearMicrogeometryTable
+from .pair import GearBodyTable, MaterialTable, StiffnessTable, check_gear
+from .train import Five, ShaftTable, TrainMeshTable
+
+#: Letters, digits, _ and -: names become parts of column names, and of files and folders.
+_NAME = re.compile(r"[^\W_][\w-]*")
+
+
+@dataclass(frozen=True)
+class NamedGearTable(GearBodyTable):
+    """One gear: its teeth, its material, the deviations of its flanks, and where it is on a shaft."""
+
+    material: str | MaterialTable | None = quantity(  # noqa: RUF009
+        None, doc="name of a material of [materials.NAME], or a table of its constants; left out: steel"
+    )
+    microgeometry: GearMicrogeometryTable | None = quantity(  # noqa: RUF009
+        None, doc="deviations of its flanks"
+    )
+    shaft: str | None = quantity(None, doc="name of the one shaft that carries it")
+    y_mm: float | None = quantity(None, doc="y of its middle plane (mm)")
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for keys that are missing or contradict each other."""
+        check_gear(self, where)
+        if (self.shaft is None) != (self.y_mm is None):
+            lacking, there = ("shaft", "y_mm") if self.shaft is None else ("y_mm", "shaft")
+            raise InputError(f"{where}.{lacking}", None, f"is required beside {there}", "add it, or leave out both")
+
+
+@dataclass(frozen=True)
+class NamedMeshTable(TrainMeshTable):
+    """Two gears in mesh: how they stand, what loads them, and what the mesh is made of in a train."""
+
+    flank: str = quantity("left", doc="the driving flanks of both gears: left or right", choices=("left", "right"))
+    tolerance_class: int | None = quantity(
+        None, doc="class of ISO 1328-1 whose profile tolerances the picture of the flanks shows", low=1, high=11
+    )
+    stiffness: StiffnessTable | None = quantity(  # noqa: RUF009
+        None, doc="keys of this mesh that win over those of [stiffness]: load, positions, contact law, sizes"
+    )
+    loadmap: LoadMapTable | None = quantity(  # noqa: RUF009
+        None, doc="keys of this mesh that win over those of [loadmap]: torques and angles"
+    )
+
+
+@dataclass(frozen=True)
+class NamedShaftTable(ShaftTable):
+    """A shaft; what carries it are its bearings, or attachments of the housing that hold it as hinges."""
+
+    attachments: tuple[int | str, ...] = quantity((), doc="attachments of the housing that carry it as hinges")
+
+
+@dataclass(frozen=True)
+class NamedBearingTable:
+    """A bearing between a shaft and a bore of the housing: a hinge, or springs and dampers."""
+
+    shaft: str = quantity(doc="name of the shaft that it carries")
+    attachment: int | str | None = quantity(None, doc="bore (attachment) of the housing; left out: the bearing's name")
+    y_mm: float | None = quantity(None, doc="its place along the shaft (mm), in a rigid housing without [housing]")
+    stiffness: Five | None = quantity(  # noqa: RUF009
+        None, low=0.0, doc="along x, y, z (N/m) and for tilt about x, z (N m/rad); left out: a hinge"
+    )
+    damping: Five = quantity((0.0, 0.0, 0.0, 0.0, 0.0), low=0.0, doc="the same in N s/m and N m s/rad")  # noqa: RUF009
+
+    def check(self, where: str) -> None:
+        """A hinge has no damping."""
+        if self.stiffness is None and any(self.damping):
+            problem = "stands beside no stiffness: a hinge does not yield, so nothing damps it"
+            raise InputError(f"{where}.damping", list(self.damping), problem, "give the stiffness, or leave it out")
+
+
+#: Tables of tables -> dataclass of an entry.
+NAMED: dict[str, type] = {
+    "gears": NamedGearTable,
+    "meshes": NamedMeshTable,
+    "shafts": NamedShaftTable,
+    "bearings": NamedBearingTable,
+    "materials": MaterialTable,
+}
+
+
+def named_tables(kind: str, table: Any, *, rules: bool = True) -> dict[str, Any]:
+    """Return the entries of a table of tables by name.
+
+    Parameters
+    ----------
+    kind : str
+        Key of `NAMED`.
+    table : Any
+        The parsed table.
+    rules : bool
+        Whether rules that join keys are checked, too.
+
+    Raises
+    ------
+    InputError
+        For an empty table, keys outside an entry, names with other characters than letters, digits, _ and -, names
+        that differ by case only, and every mistake in an entry.
+    """
+    if not isinstance(table, Mapping):
+        problem = "must be a table of tables"
+        raise InputError(kind, table, problem, f"write [{kind}.NAME] and its keys below it, for each NAME")
+    if not table:
+        raise InputError(f"[{kind}]", None, "is empty", f"write at least one [{kind}.NAME], or leave it out")
+    for name, entry in table.items():
+        if not isinstance(entry, Mapping):
+            problem = f"stands in [{kind}], which has entries with names only"
+            raise InputError(f"{kind}.{name}", entry, problem, f"write it below [{kind}.NAME]")
+        if not _NAME.fullmatch(name):
+            problem = "must have letters, digits, _ and - only, a letter or digit first: it names columns and files"
+            raise InputError(f"name in [{kind}]", name, problem, f"rename it, as [{kind}.{_plain(name)}]")
+        twin = next((other for other in table if other != name and other.lower() == name.lower()), None)
+        if twin is not None:
+            problem = f"differs from {twin!r} by upper and lower case only"
+            raise InputError(f"name in [{kind}]", name, problem, "files of both would have one name: rename one")
+    return {name: build(NAMED[kind], entry, f"{kind}.{name}", rules=rules) for name, entry in table.items()}
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^\w-]+", "_", name).strip("_-") or "NAME"
