@@ -323,14 +323,16 @@ def _link_line(link: dict[str, Any]) -> str:
     return line
 
 
-def _undriven_line(f: dict[str, Any]) -> str:
-    """Freedoms that no joint drives: what a joint too few leaves, and what a free motion has."""
+def _undriven_line(f: dict[str, Any], *, elastic: bool) -> str:
+    """Freedoms that no joint drives: what a joint too few leaves, what a free motion has, and the shapes of links."""
     names = f["undriven_bodies"]
     listed = ", ".join(names[:MOST_NAMES]) + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
     one = f["net"] == 1
-    line = f"{f['net']} {'freedom is' if one else 'freedoms are'} driven by no joint: forces and start velocities move"
+    shapes = ", deformations of flexible links among them" if elastic else ""
+    counted = f"{f['net']} {'freedom is' if one else 'freedoms are'} driven by no joint{shapes}"
+    line = f"{counted}: forces and start velocities move"
     drives = f["prescribed"]
-    if not drives:
+    if elastic or not drives:  # flexible links vibrate in mechanisms without a joint too few
         return f"{line} {listed}"
     verb = "joint prescribes a motion" if drives == 1 else "joints prescribe motions"
     return f"{line} {listed}, while {drives} {verb}: check that no joint is missing"
@@ -341,7 +343,7 @@ def _text(summary: dict[str, Any]) -> str:
     lines = [
         f"{f['bodies']} bodies, {f['coordinates']} coordinates - {f['constraints']} constraints"
         f" + {f['redundant']} redundant = {f['net']} free",
-        *([_undriven_line(f)] if f["net"] > 0 else []),
+        *([_undriven_line(f, elastic=bool(summary["flexible_links"]))] if f["net"] > 0 else []),
         *(f"redundant: {name}" for name in f["redundant_constraints"]),
         *(_link_line(link) for link in summary["flexible_links"]),
         f"{summary['method']}: {summary['status']} at {summary['reached_s']:g} s in {summary['steps']} steps,"

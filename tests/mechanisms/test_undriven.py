@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
-from gearfe.base.config import build
+from gearfe.base.config import build, read_toml
 from gearfe.base.tables.mechanism import MechanismFile
 from gearfe.mechanisms.job import Outcome, run_mechanism
 from gearfe.mechanisms.model import make_mechanism
+from tests.places import GEOMETRY
 
 
 def four_bar() -> dict[str, Any]:
@@ -78,3 +79,14 @@ def test_a_third_crank_leaves_one_freedom(tmp_path: Path) -> None:
     freedoms = report(raw, tmp_path).summary["freedoms"]
     assert (freedoms["net"], freedoms["redundant"]) == (1, 2)
     assert freedoms["undriven_bodies"] == ["crank", "coupler", "rocker"]
+
+
+def test_flexible_links_do_not_suggest_a_missing_joint(tmp_path: Path) -> None:
+    """A driven slider crank whose rod bends has all its joints; its freedoms are the shapes of the rod."""
+    raw = read_toml(GEOMETRY / "elastic_slider_crank.toml")
+    raw["run"] |= {"end_s": 1e-4, "step_s": 1e-4}
+    raw["run"].pop("picture_s", None)
+    outcome = report(raw, tmp_path)
+    assert outcome.summary["freedoms"]["prescribed"] == 1
+    assert "driven by no joint, deformations of flexible links among them" in outcome.text
+    assert "joint is missing" not in outcome.text
