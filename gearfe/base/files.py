@@ -54,18 +54,7 @@ def read_text(path: str | Path, field: str, *, foreign: bool = False) -> str:
     InputError
         When there is no such file, it cannot be read, or is no UTF-8 text.
     """
-    try:
-        with Path(path).open("rb") as stream:
-            raw = stream.read(LARGEST + 1)
-    except FileNotFoundError:
-        raise InputError(field, str(path), "there is no such file", "check the path") from None
-    except IsADirectoryError:
-        raise InputError(field, str(path), "is a folder, not a file", "name a file in it") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(field, str(path), f"cannot be read ({reason})", "check the path and its rights") from None
-    if len(raw) > LARGEST:
-        raise InputError(field, str(path), f"is larger than {LARGEST >> 20} MB", "is it the right file?")
+    raw = read_bytes(path, field)
     encoding = next((name for mark, name in _MARKS.items() if raw.startswith(mark)), "")
     if encoding:
         raise InputError(field, str(path), f"is written in {encoding}", "save it as UTF-8")
@@ -77,6 +66,29 @@ def read_text(path: str | Path, field: str, *, foreign: bool = False) -> str:
         if foreign:
             return raw.decode(_single_bytes(raw)[1], "replace")
         raise InputError(field, str(path), *_encoding_problem(raw, error.start)) from None
+
+
+def read_bytes(path: str | Path, field: str, largest: int = LARGEST) -> bytes:
+    """Content of a file of at most `largest` bytes; `field` names it in messages.
+
+    Raises
+    ------
+    InputError
+        When there is no such file, or it cannot be read.
+    """
+    try:
+        with Path(path).open("rb") as stream:
+            raw = stream.read(largest + 1)
+    except FileNotFoundError:
+        raise InputError(field, str(path), "there is no such file", "check the path") from None
+    except IsADirectoryError:
+        raise InputError(field, str(path), "is a folder, not a file", "name a file in it") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(field, str(path), f"cannot be read ({reason})", "check the path and its rights") from None
+    if len(raw) > largest:
+        raise InputError(field, str(path), f"is larger than {largest >> 20} MB", "is it the right file?")
+    return raw
 
 
 def _single_bytes(raw: bytes) -> tuple[str, str]:

@@ -29,7 +29,7 @@ Table = TypeVar("Table", bound="DataclassInstance")
 METAVARS = {float: "X", int: "N", str: "NAME"}
 #: What a help calls a job file.
 METAVARS_OF_FILES = {"job": "JOB.toml", "study": "STUDY.toml"}
-#: Formats of ``--format`` beside CSV; their writers are in `gearfe.output.formats`.
+#: Formats of ``--format`` beside CSV; their writers are in `gearfe.output.exchange.tables`.
 FORMATS = ("npz", "h5", "mat", "uff")
 REPORT = "report.html"
 

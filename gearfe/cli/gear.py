@@ -100,7 +100,7 @@ def _export(path: Path, pair: GearPair, mesh: NamedMesh, folder: Path) -> None:
     from ..base.files import write_csv
     from ..gears.geometry.outline import outline_columns, whole_outline
     from ..gears.teeth.gear_solid import write_solid
-    from ..output.dxf import write_dxf
+    from ..output.exchange.dxf import write_dxf
 
     gear = pair.pinion if path.stem == "pinion" else pair.wheel
     sides = _deviations(pair, path.stem, mesh, folder)

@@ -185,12 +185,12 @@ def _write(folder: Path, body: ModalBody, fields: Any, errors: dict[str, Any], r
     import numpy as np
 
     from ..base.files import write_csv, write_json
-    from ..drivetrain.housing.superelement import write_matrix
-    from ..output.vtkhdf import write_vtkhdf
+    from ..output.exchange.matrix_market import write_market
+    from ..output.exchange.vtkhdf import write_vtkhdf
 
     body.save(folder / "housing.npz")
     for name, matrix in (("stiffness", body.stiffness), ("mass", body.mass)):
-        write_matrix(folder / f"housing_{name}.mtx", matrix)
+        write_market(folder / f"housing_{name}.mtx", matrix)
     shown = len(fields)
     vectors = body.coupled.vectors[:, :shown]
     participation = body.momentum @ vectors

@@ -272,7 +272,7 @@ def _keep(folder: Path, names: list[str], parsed: argparse.Namespace, said: str,
     from pathlib import Path
 
     from ..base.files import whole_set
-    from ..output.formats import read_csv, write_tables
+    from ..output.exchange.tables import read_csv, write_tables
     from ..output.report_page import PICTURES, Report, report_page
     from .arguments import REPORT, job_of
 

@@ -13,8 +13,8 @@ from ..base.tables.pair import StiffnessTable
 from .arguments import add_job, add_json, add_keys, add_pictures, check_option, with_keys
 
 if TYPE_CHECKING:
-    from ..fem.meshing.export import MeshPart
     from ..gears.gearmesh.job import StiffnessJob
+    from ..output.exchange.mesh_export import MeshPart
 
 
 #: Teeth of each gear whose flanks are fine in a deck, by default.
@@ -73,8 +73,8 @@ def run(args: argparse.Namespace) -> int:
     pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
 
     from ..base.files import output_folder
-    from ..fem.meshing.export import export_mesh, format_of, group_sizes
     from ..gears.gearmesh.job import StiffnessJob
+    from ..output.exchange.mesh_export import export_mesh, format_of, group_sizes
 
     format_of(args.out)
     one, two = (replace(gear, microgeometry=None) for gear in mesh.gears)
@@ -116,9 +116,9 @@ def _check(args: argparse.Namespace) -> None:
 
 def _parts(args: argparse.Namespace, job: StiffnessJob, wheel_angle: float) -> dict[str, MeshPart]:
     """The meshes in their places, the wheel turned by `wheel_angle` (rad) from where a space faces the pinion."""
-    from ..fem.meshing.export import MeshPart
     from ..gears.teeth.tooth_sector import sector_mesh, sector_recipes
     from ..gears.teeth.whole_gear import in_mesh, mixed_gear, teeth_near
+    from ..output.exchange.mesh_export import MeshPart
 
     pair, table = job.pair, job.table
     toward = in_mesh(pair)
@@ -151,8 +151,8 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, MeshPa
     import numpy as np
 
     from ..base.errors import InputError
-    from ..fem.meshing.deck import Deck, write_deck
     from ..gears.gearmesh.sweep import sweep_stiffness
+    from ..output.exchange.calculix_deck import Deck, write_deck
     from ..version import VERSION
 
     sweep = {**job.sweep, "angles": np.array([math.radians(args.angle_deg)])}

@@ -15,7 +15,7 @@ from ..gears.geometry.pair import GearPair
 from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save
 
 if TYPE_CHECKING:
-    from ..fem.meshing.export import MeshPart
+    from ..output.exchange.mesh_export import MeshPart
 
 PINION_FILL, WHEEL_FILL = "#dbe7f3", "#f3e6d8"
 

@@ -11,7 +11,7 @@ from ..base.files import csv_table
 from ..base.progress import stage
 from ..base.typing import Array
 from ..multibody import Trajectory
-from ..output.vtkhdf import VtkHdfSeries
+from ..output.exchange.vtkhdf import VtkHdfSeries
 from .model import Mechanism
 from .plates import PlateLink
 

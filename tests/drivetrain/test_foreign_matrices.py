@@ -13,8 +13,10 @@ from gearfe.base.config import build
 from gearfe.base.errors import InputError
 from gearfe.base.tables.housing import SuperelementTable
 from gearfe.drivetrain.housing.modal_test import read_modes
-from gearfe.drivetrain.housing.superelement import read_matrix, rigid_shapes, superelement, write_matrix
+from gearfe.drivetrain.housing.superelement import rigid_shapes, superelement
 from gearfe.fem.reduction.modal_body import ModalBody
+from gearfe.output.exchange.matrix_file import read_matrix
+from gearfe.output.exchange.matrix_market import write_market
 from tests.fem.test_foreign_meshes import damaged
 from tests.makers.nastran import Output2, output4_binary, output4_text
 
@@ -112,7 +114,7 @@ def test_a_substructure_without_the_names_of_its_nodes(matrices, wanted, tmp_pat
     ("old", "new", "text"),
     [
         ("*MATRIX, TYPE=MASS", "*MATRIX, TYPE=VISCOUS DAMPING", r"has no \*MATRIX, TYPE=MASS; there are: STIFFNESS"),
-        ("*MATRIX, TYPE=MASS", "*MATRIX, TYPE=STIFFNESS", "STIFFNESS stands twice"),
+        ("*MATRIX, TYPE=MASS", "*MATRIX, TYPE=STIFFNESS", "STIFFNESS is there twice"),
         ("NODES=3", "NODES=4", "do not fit|names 3 nodes"),
         ("3,1,2,3\n", "3,1,2\n", "must have 105 numbers, but has 120: rows are missing|must have 105 numbers"),
         ("3,1,2,3\n", "3,1,2,2\n", "a freedom of a node twice"),
@@ -204,7 +206,7 @@ def test_damaged_matrices_are_refused_in_words(matrices, tmp_path) -> None:
         "p.op2": pool.bytes(),
     }
     for name, values in both.items():
-        write_matrix(tmp_path / f"{name}.mtx", values)
+        write_market(tmp_path / f"{name}.mtx", values)
     files["market.mtx"] = (tmp_path / "KAAX.mtx").read_bytes()
     files["lines.mtx"] = lines(matrices[0]).encode()
     rng = np.random.default_rng(41)

@@ -149,7 +149,7 @@ def test_points_that_are_exchanged_or_reversed_are_named(body) -> None:
 def test_mistakes(body, tmp_path) -> None:
     test = measured(body, [0, 1, 2])
     far = TestModes(test.frequencies, test.damping, 1e3 * test.points, test.directions, test.shapes)
-    with pytest.raises(InputError, match="from the nearest node; times a thousandth all points fit: mend the unit"):
+    with pytest.raises(InputError, match="from the nearest node; times a thousandth all points fit: correct the unit"):
         compare(body, far)
     (tmp_path / "a.csv").write_text("frequency_Hz,x_mm\n1,2\n")
     for name, part in {"a.csv": "lacks the columns y_mm", "a.xls": "must end in", "no.csv": "no such file"}.items():

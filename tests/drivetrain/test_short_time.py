@@ -169,16 +169,16 @@ def universal(function: int, kind: int, count: int, spacing: int, data: str) -> 
 def test_universal_files():
     """Numbers as Fortran writes them, which may touch; even and uneven, real and complex."""
     even = "".join(f"{v:13.5E}" for v in (1.0, -2.0, -3.5, 4.0, 5.0, -6.0)) + "\n" + f"{7.0:13.5E}"
-    x, y, over_time = read_universal(universal(1, 2, 7, 1, even), 1, "f")
+    x, y, over_time = read_universal(universal(1, 2, 7, 1, even).encode(), 1, "f")
     assert over_time
     assert x.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
     assert y.tolist() == [1.0, -2.0, -3.5, 4.0, 5.0, -6.0, 7.0]
     twice = "\n".join(f"{x:13.5E}{3 * x:20.11E}{-4 * x:20.11E}" for x in (1.0, 2.0, 4.0, 8.0))
-    x, y, over_time = read_universal(universal(12, 6, 4, 0, twice), 1, "f")
+    x, y, over_time = read_universal(universal(12, 6, 4, 0, twice).encode(), 1, "f")
     assert not over_time
     assert x.tolist() == [1.0, 2.0, 4.0, 8.0]
     assert y.tolist() == [5.0, 10.0, 20.0, 40.0]
-    power = read_universal(universal(2, 2, 7, 1, even.replace("-", " ")), 1, "f")[1]
+    power = read_universal(universal(2, 2, 7, 1, even.replace("-", " ")).encode(), 1, "f")[1]
     assert power[0] == pytest.approx(math.sqrt(2.0))  # mean square 1: a sine of that amplitude
 
 
@@ -189,13 +189,13 @@ def test_universal_files():
         (universal(1, 2, 9, 1, "1 2 3"), 1, "cut off: 3 of 9"),
         (universal(4, 2, 3, 1, "1 2 3"), 1, "function type 4"),
         (universal(1, 2, 4, 1, "1 2 3 4"), 2, "the file has 1 data sets"),
-        (universal(1, 2, 4, 1, "1 2 3 4").replace("    58", "    58b"), 1, "binary"),
+        (universal(1, 2, 4, 1, "1 2 3 4").replace("    58", "    58b"), 1, "58b"),
         (universal(1, 2, 4, 0, "1 2 1 2 1 2 1 2"), 1, "rising"),
     ],
 )
 def test_universal_files_that_are_none_are_told(text, number, told):
     with pytest.raises(InputError, match=told):
-        read_universal(text, number, "f")
+        read_universal(text.encode(), number, "f")
 
 
 # ------------------------------------------------------------------------------------------------------- the command

@@ -20,10 +20,12 @@ from gearfe.drivetrain.gearbox.job import bore_places, job_train, read_train_job
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.housing.body import reduced_housing
 from gearfe.drivetrain.housing.build import housing_from_job
-from gearfe.drivetrain.housing.superelement import read_matrix, superelement, write_matrix
+from gearfe.drivetrain.housing.superelement import superelement
 from gearfe.drivetrain.train import build_train
 from gearfe.fem.reduction.error import accelerances
 from gearfe.fem.reduction.modal_body import ModalBody
+from gearfe.output.exchange.matrix_file import read_matrix
+from gearfe.output.exchange.matrix_market import write_market
 from tests.makers.nastran import Output2, output4_binary, output4_text
 from tests.places import EXAMPLES, MESHES
 
@@ -329,5 +331,5 @@ def test_exudyn_reads_the_matrices(bodies, tmp_path) -> None:
     script = runpy.run_path(str(path))
     body = bodies["held"]
     for name, matrix in (("stiffness", body.stiffness), ("mass", body.mass)):
-        write_matrix(tmp_path / f"housing_{name}.mtx", matrix)
+        write_market(tmp_path / f"housing_{name}.mtx", matrix)
     assert script["frequencies"](tmp_path) == pytest.approx(body.coupled.frequencies_hz, rel=1e-9)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
-from gearfe.fem.meshing.export import MeshPart, export_mesh
 from gearfe.fem.meshing.session import gmsh_session
 from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 from gearfe.gears.teeth.whole_gear import whole_gear
+from gearfe.output.exchange.mesh_export import MeshPart, export_mesh
 from tests.makers.gears import pair
 
 

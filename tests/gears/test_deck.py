@@ -14,9 +14,9 @@ import pytest
 
 from gearfe.base.tables.examples import job_file
 from gearfe.cli.main import main
-from gearfe.fem.meshing.deck import deck_torque
 from gearfe.gears.teeth.tooth_sector import sector_recipes
 from gearfe.gears.teeth.whole_gear import mixed_gear, teeth_near
+from gearfe.output.exchange.calculix_deck import deck_torque
 from tests.makers.gears import pair
 
 COARSE = ["--coarsen", "4"]

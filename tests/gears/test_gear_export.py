@@ -18,7 +18,7 @@ from gearfe.gears.geometry.face import ToothDeviations
 from gearfe.gears.geometry.outline import tooth_outline, whole_outline
 from gearfe.gears.geometry.pair import Gear
 from gearfe.gears.teeth.gear_solid import write_solid
-from gearfe.output.formats import read_csv
+from gearfe.output.exchange.tables import read_csv
 from tests.makers.gears import gear, pair
 
 

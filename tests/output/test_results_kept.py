@@ -18,7 +18,7 @@ from scipy.io import loadmat
 from gearfe.base.files import write_csv
 from gearfe.cli import COMMANDS
 from gearfe.cli.main import main
-from gearfe.output.formats import read_csv, write_tables
+from gearfe.output.exchange.tables import read_csv, write_tables
 from tests.places import GEOMETRY
 
 JOB = str(GEOMETRY / "gear_train.toml")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
-from gearfe.output.vtkhdf import VtkHdfSeries, write_vtkhdf
+from gearfe.output.exchange.vtkhdf import VtkHdfSeries, write_vtkhdf
 from tests.makers.housing_meshes import box
 
 READER = """

@@ -77,7 +77,7 @@ def test_fields_only_where_asked(tmp_path):
     plain += ["--no-estimate", "--no-pictures"]
     code = f"from gearfe.cli.main import main; assert main({[*plain, '--out', str(tmp_path / 'a')]!r}) == 0"
     loaded, _ = loaded_after(code)
-    room = {"gearfe.gears.gearmesh.fields", "gearfe.gears.gearmesh.fields_output", "gearfe.output.vtkhdf"}
+    room = {"gearfe.gears.gearmesh.fields", "gearfe.gears.gearmesh.fields_output", "gearfe.output.exchange.vtkhdf"}
     assert not loaded & {*room, "h5py", "pyvista", "matplotlib"}
     assert sorted(p.name for p in (tmp_path / "a").iterdir()) == ["stiffness.csv", "summary.json"]
     assert main([*plain, "--out", str(tmp_path / "b"), "--fields", "5"]) == 0

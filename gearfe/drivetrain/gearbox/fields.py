@@ -21,7 +21,7 @@ from ...base.typing import Array, IntArray
 from ...fem.reduction.modal_body import ModalBody
 from ...gears.geometry.derived import gear_outline
 from ...gears.geometry.spur_gear import Gear
-from ...output.vtkhdf import VtkHdfSeries
+from ...output.exchange.vtkhdf import VtkHdfSeries
 from ..train.gear_train import GearTrain, ShaftGear
 from ..train.response import TrainResponse
 

@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from ...base.errors import InputError, MissingLibraryError
+from ...base.errors import InputError
 from ...base.files import read_text
 from ...base.typing import Array, IntArray
 from ...fem.reduction.modal_body import ModalBody
+from ...output.exchange.universal import NORMAL, Mode, read_shapes
 
 #: Columns of a table of shapes: a row for each mode and measured direction.
 COLUMNS = ("frequency_Hz", "x_mm", "y_mm", "z_mm", "direction_x", "direction_y", "direction_z", "amplitude")
@@ -39,7 +40,7 @@ class TestModes:
     Attributes
     ----------
     frequencies, damping : ndarray, shape (m,)
-        Hz, and modal damping ratio (-), not-a-number where none was measured.
+        Hz, and modal damping ratio (-), NaN where none was measured.
     points, directions : ndarray, shape (d, 3)
         Place (m) and unit direction of each measured degree of freedom.
     shapes : ndarray, shape (m, d)
@@ -142,7 +143,7 @@ def compare(body: ModalBody, test: TestModes, modes: int = 20) -> Comparison:
         cure = "coordinates of test and housing must be the same, in the units that the file tells"
         for factor, unit in {1e-3: "a thousandth", 1e-2: "a hundredth", 25.4e-3: "0.0254", 1e3: "a thousand"}.items():
             if tree.query(factor * test.points)[0].max() <= APART * size:
-                cure = f"times {unit} all points fit: mend the unit (universal files: dataset 164; without it, m)"
+                cure = f"times {unit} all points fit: correct the unit (universal files: dataset 164; without it, m)"
         raise InputError("--compare", None, problem, cure)
     fields = body.reconstruct(body.coupled.vectors[:, numbers].T)[:, place]
     shapes = np.einsum("kdj,dj->kd", fields, test.directions)
@@ -219,7 +220,7 @@ def _of_table(path: Path) -> TestModes:
         table = {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS}
         more = {n: np.array([float(row.get(n) or "nan") for row in rows]) for n in ("damping_ratio", "amplitude_imag")}
     except (TypeError, ValueError) as error:
-        raise InputError("--compare", str(path), f"holds a cell that is no number ({error})", "mend it") from None
+        raise InputError("--compare", str(path), f"holds a cell that is no number ({error})", "correct it") from None
     hz, first, which = np.unique(table["frequency_Hz"], return_index=True, return_inverse=True)
     counts = np.bincount(which)
     if len(set(counts.tolist())) > 1:
@@ -241,55 +242,28 @@ def _of_table(path: Path) -> TestModes:
 
 
 def _of_universal(path: Path) -> TestModes:
-    """Datasets 15 or 2411 (nodes), 164 (unit of length), 55 (normal modes, or complex ones with their eigenvalue)."""
-    try:
-        import pyuff
-    except ImportError:
-        raise MissingLibraryError("universal files need pyuff: pip install 'gearfe[exchange]'") from None
-    if not path.exists():
-        raise InputError("--compare", str(path), "there is no such file", "check the path")
-    try:
-        sets = pyuff.UFF(str(path)).read_sets()
-    except Exception as error:
-        raise InputError("--compare", str(path), f"cannot be read ({error})", "write it anew") from None
-    try:
-        return _of_sets([sets] if isinstance(sets, dict) else sets, path)
-    except InputError:
-        raise
-    except (ValueError, TypeError, KeyError, IndexError, ZeroDivisionError) as error:  # pyuff checks little
-        problem = f"has datasets that contradict themselves or are cut short ({error})"
-        raise InputError("--compare", str(path), problem, "the file may be damaged: write it again") from None
-
-
-def _of_sets(sets: list[dict[str, Any]], path: Path) -> TestModes:
-    """Modes of datasets as pyuff reads them."""
-    length = next((float(one["length"]) for one in sets if one.get("type") == 164), 1.0)
-    nodes: dict[int, Array] = {}
-    for one in sets:
-        if one.get("type") in (15, 2411):
-            places = np.column_stack([one["x"], one["y"], one["z"]]) / length
-            nodes |= dict(zip(map(int, one["node_nums"]), places, strict=True))
-    modes = [one for one in sets if one.get("type") == 55 and one.get("analysis_type") in (2, 3, 7)]
+    """Modes of a universal file, normal or complex."""
+    shapes = read_shapes(path, "--compare")
+    nodes, modes = shapes.nodes, shapes.modes
     if not modes or not nodes:
         problem = f"holds {len(modes)} modes (datasets 55) and {len(nodes)} nodes (datasets 15, 2411)"
         raise InputError("--compare", str(path), problem, "export mode shapes together with the geometry")
-    numbers = [int(n) for n in modes[0]["node_nums"]]
-    if any([int(n) for n in one["node_nums"]] != numbers for one in modes) or not set(numbers) <= set(nodes):
+    numbers = modes[0].nodes
+    if any(mode.nodes != numbers for mode in modes) or not set(numbers) <= set(nodes):
         problem = "has modes over other nodes than the first one, or nodes without a place"
         raise InputError("--compare", str(path), problem, "export all modes over the same nodes")
-    found = [_frequency(one) for one in modes]
-    shapes = np.array([np.column_stack([one["r1"], one["r2"], one["r3"]]).ravel() for one in modes])
+    values = np.array([mode.values.ravel() for mode in modes])
     points = np.repeat([nodes[n] for n in numbers], 3, axis=0)
     directions = np.tile(np.eye(3), (len(numbers), 1))
-    measured = np.abs(shapes).max(axis=0) > 0.0  # directions that nobody measured are zeros in all modes
-    hz, damping = np.array(found).T
-    return TestModes(hz, damping, points[measured], directions[measured], shapes[:, measured])
+    measured = np.abs(values).max(axis=0) > 0.0  # directions that nobody measured are zeros in all modes
+    hz, damping = np.array([_frequency(mode) for mode in modes]).T
+    return TestModes(hz, damping, points[measured], directions[measured], values[:, measured])
 
 
-def _frequency(mode: dict[str, Any]) -> tuple[float, float]:
-    """Frequency (Hz) and damping ratio of a dataset 55."""
-    if mode["analysis_type"] == 2:
-        damping = float(mode.get("modal_damp_vis") or 0.0) or 0.5 * float(mode.get("modal_damp_his") or 0.0)
-        return float(mode["freq"]), damping or math.nan
-    value = complex(mode["eig"])
-    return abs(value) / (2.0 * math.pi), -value.real / abs(value)
+def _frequency(mode: Mode) -> tuple[float, float]:
+    """Frequency (Hz) and damping ratio; NaN where none was measured."""
+    if mode.analysis == NORMAL:
+        hz, _, viscous, hysteretic = mode.numbers[:4].tolist()
+        return hz, viscous or 0.5 * hysteretic or math.nan
+    value = complex(*mode.numbers[:2])
+    return abs(value) / (2.0 * math.pi), -value.real / abs(value) if value else math.nan

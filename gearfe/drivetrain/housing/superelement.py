@@ -4,31 +4,23 @@ With the attachments' six coordinates :math:`q_b` each and whatever the program 
 the attachments held, :math:`K_{ii}\Phi = M_{ii}\Phi\Lambda`, and the constraint modes :math:`\Psi = -K_{ii}^{-1}K_{ib}`
 turn the coordinates to those of `gearfe.ModalBody`, all of them kept: frequencies and response stay the matrices'.
 
-Matrices are in Matrix Market format, those of a substructure or of a model of Abaqus (`abaqus_matrix`), DMIG entries
-of Nastran, or its files of the kinds OUTPUT2 and OUTPUT4.
+The files are of any format that `output.exchange.matrix_file` reads.
 """
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.files import read_text, whole_file
 from ...base.tables.housing import FORCES, UNITS, AttachmentTable, SuperelementTable
 from ...base.typing import Array, IntArray
 from ...fem.reduction.modal_body import ModalBody
-from .abaqus_matrix import is_substructure, read_entries, read_substructure
+from ...output.exchange.matrix_entries import shown
+from ...output.exchange.matrix_file import Matrix, read_matrix
 from .attachments import rigid_motions
-from .dmig import read_dmig
-from .entries import Entries, Label, matrix_of, shown
-from .matrix_market import read_market
-from .nastran_files import read_nastran
 
 #: Parts of the largest entry up to which matrices are symmetric; energy, against the largest, that is none; masses,
 #: relative to each other, that are the same in all directions.
@@ -48,13 +40,6 @@ NO_ESTIMATE = "matrices of another program: nothing tells the error of their mes
 MOTIONS = ("x", "y", "z", "rotation about x", "rotation about y", "rotation about z")
 
 
-class Matrix(NamedTuple):
-    """A square matrix, and node and freedom of its rows where the file has them."""
-
-    values: Array
-    labels: list[Label]
-
-
 def superelement(table: SuperelementTable, folder: str | Path) -> ModalBody:
     """The body of a [housing.superelement] table; files are looked for in `folder`.
 
@@ -65,7 +50,7 @@ def superelement(table: SuperelementTable, folder: str | Path) -> ModalBody:
     """
     field = "housing.superelement"
     K, M = (
-        read_matrix(Path(folder) / getattr(table, name), f"{field}.{name}", initial)
+        _read(Path(folder) / getattr(table, name), f"{field}.{name}", initial)
         for name, initial in (("stiffness", "K"), ("mass", "M"))
     )
     M = _with_rows_of(K, M)
@@ -97,6 +82,16 @@ def superelement(table: SuperelementTable, folder: str | Path) -> ModalBody:
     return _body(k, m, points, table, field)
 
 
+def _read(path: Path, field: str, initial: str) -> Matrix:
+    """A matrix of a file, if its numbers can be those of an elastic body."""
+    matrix = read_matrix(path, field, initial)
+    largest = np.abs(matrix.values).max()
+    if largest > 0.0 and not TINY < largest < HUGE:
+        problem = f"has {largest:.3g} as its largest number, which no elastic body has in any unit"
+        raise InputError(field, path.name, problem, "the file may be damaged: write it again")
+    return matrix
+
+
 def _with_rows_of(stiffness: Matrix, mass: Matrix) -> Matrix:
     """The mass with zeros where its file leaves out freedoms that have none."""
     if not mass.labels or not set(mass.labels) < set(stiffness.labels):
@@ -105,72 +100,6 @@ def _with_rows_of(stiffness: Matrix, mass: Matrix) -> Matrix:
     values = np.zeros_like(stiffness.values)
     values[np.ix_(place, place)] = mass.values
     return Matrix(values, stiffness.labels)
-
-
-def read_matrix(path: Path, field: str, initial: str = "K") -> Matrix:
-    """A matrix of a file, the whole one where the file has half of it.
-
-    Of several matrices in a file of Nastran that one is taken whose name begins with `initial`, of those of a
-    substructure of Abaqus the stiffness (K) or the mass (M).
-    """
-    if path.suffix.lower() in (".op2", ".op4"):
-        return _made(_chosen(read_nastran(path, field), path, field, initial), field, path)
-    text = read_text(path, field, foreign=True)
-    if text.lstrip().lower().startswith("%%matrixmarket"):
-        return Matrix(_whole(_checked(read_market(text, path, field), field, path)), [])
-    if is_substructure(text):
-        values, labels = read_substructure(text, path, field, initial)
-        return Matrix(_checked(values, field, path), labels)
-    if re.search(r"^DMIG[ *,]", text, re.MULTILINE | re.IGNORECASE):
-        return _made(_chosen(read_dmig(text, path, field), path, field, initial), field, path)
-    return _made(read_entries(text, path, field), field, path)
-
-
-def _made(made: Array | Entries, field: str, path: Path) -> Matrix:
-    """The whole matrix, of values or of single entries."""
-    if not isinstance(made, dict):  # rows without names
-        return Matrix(_whole(_checked(made, field, path)), [])
-    values, labels = matrix_of(made, path, field)
-    return Matrix(_checked(values, field, path), labels)
-
-
-def _chosen(found: Mapping[str, Array | Entries], path: Path, field: str, initial: str) -> Array | Entries:
-    """The matrix of a file of Nastran whose name begins with `initial`, or the only one.
-
-    Files of external superelements hold others beside it: vectors, rows for recovery, fillers of one row, and
-    structural damping, K4.
-    """
-    square = {name: one for name, one in found.items() if _usable(one)}
-    names = [n for n in square if len(square) == 1 or (n.startswith(initial) and not n.startswith("K4"))]
-    if len(names) != 1:
-        problem = f"has no single matrix whose name begins with {initial}: there are {', '.join(square) or 'none'}"
-        raise InputError(field, path.name, problem, "leave one of them in the file, real and square")
-    return square[names[0]]
-
-
-def _usable(one: Array | Entries) -> bool:
-    """Whether a matrix has entries; of one without names, whether it is square and more than a filler of one row."""
-    return bool(one) if isinstance(one, dict) else 1 < len(one) == one.shape[1]
-
-
-def _checked(values: Array, field: str, path: Path) -> Array:
-    if values.ndim != 2 or values.shape[0] != values.shape[1] or not len(values):
-        raise InputError(field, path.name, f"must be a square matrix, but has the shape {values.shape}", "transpose?")
-    if not np.isfinite(values).all():
-        i, j = np.argwhere(~np.isfinite(values))[0] + 1
-        raise InputError(field, path.name, f"holds a number that is not finite, entry ({i}, {j})", "write it again")
-    largest = np.abs(values).max()
-    if largest > 0.0 and not TINY < largest < HUGE:
-        problem = f"has {largest:.3g} as its largest number, which no elastic body has in any unit"
-        raise InputError(field, path.name, problem, "the file may be damaged: write it again")
-    return values
-
-
-def _whole(values: Array) -> Array:
-    """The matrix, both halves of it where the file has one."""
-    if not np.triu(values, 1).any() or not np.tril(values, -1).any():
-        return values + values.T - np.diag(np.diag(values))
-    return values
 
 
 def _check_symmetric(values: Array, field: str, name: str) -> None:
@@ -358,11 +287,3 @@ def _check_length(stiffness: Array, points: Array, table: SuperelementTable, fie
             f"their points lie within {1e3 * span:.3g} mm"
         )
         raise InputError(f"{field}.unit", table.unit, problem, f"one of {', '.join(FORCES)}: that of the matrices")
-
-
-def write_matrix(path: Path, matrix: Array) -> None:
-    """Write a symmetric matrix in Matrix Market format; `read_matrix` gives back every number exactly."""
-    from scipy.io import mmwrite
-
-    with whole_file(path) as temporary:
-        mmwrite(str(temporary), matrix, symmetry="symmetric", precision=17)

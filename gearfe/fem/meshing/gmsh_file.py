@@ -19,8 +19,8 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.typing import IntArray
+from ...output.exchange.source_mesh import SourceMesh
 from .session import gmsh_session
-from .source import SourceMesh
 
 ENDINGS = (".msh", ".unv", ".med", ".mesh")
 #: What a file of each kind begins with; first words of scripts of gmsh's language are none of these.

@@ -11,15 +11,15 @@ import numpy as np
 
 from ...base.errors import InputError, nearest
 from ...base.typing import Array, IntArray
-from .abaqus import read_abaqus
-from .abaqus_cards import inclusion as card_inclusion
+from ...output.exchange.abaqus_cards import inclusion as card_inclusion
+from ...output.exchange.abaqus_mesh import read_abaqus
+from ...output.exchange.included import source_files
+from ...output.exchange.meshio_mesh import heavy_files, read_by_meshio
+from ...output.exchange.nastran_cards import inclusion as bulk_inclusion
+from ...output.exchange.nastran_mesh import read_bulk_mesh
+from ...output.exchange.source_mesh import SourceMesh, checked_source
 from .cad import CAD, mesh_cad_file
 from .gmsh_file import ENDINGS, read_by_gmsh
-from .included import source_files
-from .meshio_file import heavy_files, read_by_meshio
-from .nastran import inclusion as bulk_inclusion
-from .nastran_mesh import read_bulk_mesh
-from .source import SourceMesh, checked_source
 
 #: Formats of Nastran and Abaqus; and surfaces, which have no inside.
 NASTRAN = (".bdf", ".nas", ".fem")

@@ -130,7 +130,7 @@ class ModalBody(Reduction, Shown):
 
     @property
     def cells(self) -> dict[str, IntArray]:
-        """The elements by their name in `gearfe.output.vtkhdf`."""
+        """The elements by their name in `gearfe.output.exchange.vtkhdf`."""
         return {{4: "tetra", 6: "wedge", 10: "tetra10"}[self.elements.shape[1]]: self.elements}
 
     @property

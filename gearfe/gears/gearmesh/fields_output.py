@@ -13,7 +13,7 @@ from ...base.errors import InputError
 from ...base.files import write_csv
 from ...base.progress import count, one_thread
 from ...base.typing import Array, IntArray
-from ...output.vtkhdf import VtkHdfSeries
+from ...output.exchange.vtkhdf import VtkHdfSeries
 from ..contact.compliance import MeshingPair
 from ..contact.position import Positions
 from ..geometry.deviation_job import GEARS

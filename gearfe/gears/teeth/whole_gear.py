@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.typing import IntArray
-from ...fem.meshing.export import MeshPart
+from ...output.exchange.mesh_export import MeshPart
 from ..geometry.pair import Gear, GearPair
 from .tooth_sector import SectorMesh, SectorRecipe, sector_mesh
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearfe.fem.meshing.export import MeshPart
 from gearfe.gears.geometry.pair import GearPair
 from gearfe.gears.teeth.tooth_sector import sector_recipes
 from gearfe.gears.teeth.whole_gear import mixed_gear
+from gearfe.output.exchange.mesh_export import MeshPart
 
 #: Teeth on either side of the line of centres that are fine.
 REACH = 1

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError, MissingLibraryError
-from ..base.typing import Array
+from ...base.errors import InputError, MissingLibraryError
+from ...base.typing import Array
 
 Tables = Mapping[str, Mapping[str, Array]]
 #: Dataset 58: function type (1 time response, 0 general) and data type of the abscissa by the first column's name

@@ -15,7 +15,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.typing import Array
 from .included import Line
-from .nastran import number
+from .nastran_cards import number
 
 #: Sine of the angle between the axes that a system's three points give, below which they lie in a line.
 _LEAST_SINE = 1e-9

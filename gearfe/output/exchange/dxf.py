@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..base.errors import MissingLibraryError
-from ..base.isolation import load
-from ..base.typing import Array
+from ...base.errors import MissingLibraryError
+from ...base.isolation import load
+from ...base.typing import Array
 
 
 def write_dxf(path: Path, outlines: Mapping[str, Array], circles: Mapping[str, float]) -> None:

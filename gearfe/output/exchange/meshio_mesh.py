@@ -18,7 +18,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.typing import Array, IntArray
-from .source import SourceMesh
+from .source_mesh import SourceMesh
 
 #: Arrays of whole numbers by which formats number groups without a name.
 NUMBERED = ("medit:ref", "nastran:ref", "ref", "cell_tags", "point_tags", "avsucd:material", "gmsh:physical")

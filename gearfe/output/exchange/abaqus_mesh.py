@@ -21,8 +21,52 @@ from ...base.errors import InputError
 from ...base.typing import Array, IntArray
 from .abaqus_cards import Card, Fault, Line, cards, inclusion, real, split
 from .included import included_lines
-from .source import SourceMesh
+from .source_mesh import SourceMesh
 
+#: Cards that make or move nodes and elements, join parts, add mass or stiffness, or change the file's text, and that
+#: are not supported: without them the body would be another one. Name -> what it does, and the cure.
+_WRITE = "write all nodes and elements in full (preprint of Abaqus, or an export of the mesh)"
+_RIGID = "delete it: bores are rigid by [[housing.bores]], held faces by [[housing.held]]"
+_SOLID = "delete it with its elements if it does not matter, or model it by solid elements"
+_MERGE = "merge the meshes so that the parts share their nodes, then delete it"
+REFUSED = {
+    **dict.fromkeys(("NGEN", "NFILL", "NCOPY", "NMAP", "ADJUST"), ("makes or moves nodes", _WRITE)),
+    **dict.fromkeys(("ELGEN", "ELCOPY", "SYMMETRICMODELGENERATION", "MODELCHANGE"), ("changes the elements", _WRITE)),
+    **dict.fromkeys(("IMPERFECTION", "IMPORT", "IMPORTNODESET", "IMPORTELSET"), ("takes data of another run", _WRITE)),
+    **dict.fromkeys(("PARAMETER", "MANIFEST"), ("replaces text of the file", "write numbers and names in full")),
+    **dict.fromkeys(
+        ("TIE", "EMBEDDEDELEMENT", "SHELLTOSOLIDCOUPLING", "FASTENER", "CYCLICSYMMETRYMODEL"), ("joins parts", _MERGE)
+    ),
+    **dict.fromkeys(
+        ("EQUATION", "MPC", "RIGIDBODY", "COUPLING", "KINEMATICCOUPLING", "DISTRIBUTINGCOUPLING", "PRE-TENSIONSECTION"),
+        ("ties nodes to each other", _RIGID),
+    ),
+    **dict.fromkeys(
+        (
+            "MASS",
+            "ROTARYINERTIA",
+            "NONSTRUCTURALMASS",
+            "SPRING",
+            "DASHPOT",
+            "JOINT",
+            "CONNECTORSECTION",
+            "GAP",
+            "FOUNDATION",
+        ),
+        ("adds mass or stiffness", _SOLID),
+    ),
+    **dict.fromkeys(
+        (
+            *("SHELLSECTION", "SHELLGENERALSECTION", "MEMBRANESECTION", "SURFACESECTION", "REBARLAYER"),
+            *("BEAMSECTION", "BEAMGENERALSECTION", "FRAMESECTION", "REBAR"),
+        ),
+        ("adds shells or beams", _SOLID),
+    ),
+    **dict.fromkeys(
+        ("USERELEMENT", "MATRIXINPUT", "MATRIXASSEMBLE", "SUPERELEMENT", "SUBSTRUCTUREPROPERTY"),
+        ("adds matrices", "give a substructure as [housing.superelement]"),
+    ),
+}
 #: Families of elements: what a type begins with, and meshio's kinds by the number of nodes.
 _SOLIDS = {4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27", 6: "wedge"}
 _SOLIDS |= {15: "wedge15", 5: "pyramid", 13: "pyramid13"}
@@ -120,7 +164,7 @@ class _Reader:
             "ELSET": self._elset,
             "SURFACE": self._surface,
         }
-        for card in cards(included_lines(self.fault.path, self.fault.field, inclusion), self.fault):
+        for card in cards(included_lines(self.fault.path, self.fault.field, inclusion), self.fault, REFUSED):
             if card.name in acts:
                 acts[card.name](card)
             elif like := difflib.get_close_matches(card.name, acts, n=1, cutoff=MISSPELT):

@@ -33,11 +33,6 @@ def inclusion(line: str) -> Inclusion | None:
     return None if found is None else Inclusion(found[1].strip().strip("'\"").strip())
 
 
-def lines_of(text: str, name: str) -> list[Line]:
-    """Lines of a text."""
-    return [Line(line, name, i) for i, line in enumerate(text.splitlines(), start=1)]
-
-
 def entries(lines: Iterable[Line], names: Iterable[str]) -> Iterator[tuple[Line, list[str]]]:
     """Yield first line and fields of each entry of these names, with those of its continuation lines in their order."""
     chosen = set(names)

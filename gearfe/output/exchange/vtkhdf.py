@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import InputError
-from ..base.files import whole_file
-from ..base.typing import Array
+from ...base.errors import InputError
+from ...base.files import whole_file
+from ...base.typing import Array
 
 #: VTK's numbers of the cell types used here, and how many points each has.
 CELL_TYPES: dict[str, tuple[int, int]] = {

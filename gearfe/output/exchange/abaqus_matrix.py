@@ -15,7 +15,9 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.typing import Array
-from .entries import Entries, Label, add_entry, check_rows
+from .abaqus_cards import Card, Fault, cards, real, split
+from .included import lines_of
+from .matrix_entries import Entries, Label, add_entry, check_rows
 
 _KINDS = {"K": "STIFFNESS", "M": "MASS"}
 _KEYWORD = re.compile(r"^\s*\*\s*(USER\s+ELEMENT|MATRIX)\s*,", re.IGNORECASE | re.MULTILINE)
@@ -44,45 +46,32 @@ def read_substructure(text: str, path: Path, field: str, initial: str) -> tuple[
     InputError
         When there is no such matrix, or it has not the numbers that its nodes and freedoms ask for.
     """
-    kind = _KINDS[initial]
+    kind, fault = _KINDS[initial], Fault(field, path)
     nodes: list[int] = []
     freedoms: list[tuple[int, list[int]]] = []
-    count, symmetric, naming = 0, True, False
+    count, symmetric = 0, True
     blocks: dict[str, list[float]] = {}
-    block: list[float] | None = None
-    section = ""
-    for number, line in enumerate(text.splitlines(), start=1):
-        stripped = line.strip()
+    for card in cards(lines_of(text, path.name), fault, {}):
+        line = card.line
         try:
-            if stripped.startswith("**"):
-                words = stripped.strip("* ")
-                if naming and re.fullmatch(r"[\d\s,]+", words):
-                    nodes += [int(word) for word in re.split(r"[,\s]+", words) if word]
-                else:
-                    naming = words.upper() == "ELEMENT NODES"
-                continue
-            naming = False
-            if stripped.startswith("*"):
-                keys = "".join(stripped.upper().split()).split(",")
-                section, block = keys[0].lstrip("*"), None
-                given = dict(key.partition("=")[::2] for key in keys[1:])
-                if section == "USERELEMENT":
-                    count, symmetric = int(given["NODES"]), "UNSYMM" not in given
-                elif section == "MATRIX":
-                    if given["TYPE"] in blocks:
-                        problem = f"line {number}: the matrix {given['TYPE']} stands twice in the file"
-                        raise InputError(field, path.name, problem, "leave one substructure in the file")
-                    block = blocks.setdefault(given["TYPE"], [])
-            elif stripped and section == "USERELEMENT":
-                numbers = [int(word) for word in stripped.split(",") if word.strip()]
-                first, *own = numbers if freedoms else [1, *numbers]
-                freedoms.append((first, own))
-            elif stripped and block is not None:
-                block += [float(word.upper().replace("D", "E")) for word in stripped.split(",") if word.strip()]
+            nodes += _named_nodes(card)
+            if card.name == "USERELEMENT":
+                count, symmetric = int(card.keys["NODES"]), "UNSYMM" not in card.keys
+                for line in card.data:
+                    numbers = [int(word) for word in split(line.text) if word]
+                    first, *own = numbers if freedoms else [1, *numbers]
+                    freedoms.append((first, own))
+            elif card.name == "MATRIX":
+                name = card.keys["TYPE"].upper()
+                if name in blocks:
+                    raise fault.at(line, f"the matrix {name} is there twice", "leave one substructure in the file")
+                blocks[name] = []
+                for line in card.data:
+                    blocks[name] += [real(word) for word in split(line.text) if word]
         except InputError:
             raise
         except (ValueError, KeyError):
-            problem = f"line {number} of this substructure cannot be read: {stripped[:60]!r}"
+            problem = f"line {line.number} of this substructure cannot be read: {line.text.strip()[:60]!r}"
             raise InputError(field, path.name, problem, _WHOLE) from None
     if kind not in blocks:
         known = ", ".join(blocks) or "none"
@@ -99,6 +88,19 @@ def read_substructure(text: str, path: Path, field: str, initial: str) -> tuple[
     values = np.zeros((n, n))
     values[np.tril_indices(n)] = entries
     return values + np.tril(values, -1).T, labels if nodes else []
+
+
+def _named_nodes(card: Card) -> list[int]:
+    """Nodes of a substructure that the comments of a card name, after one that announces them."""
+    nodes: list[int] = []
+    naming = False
+    for line in card.comments:
+        words = line.text.strip().strip("* ")
+        if naming and re.fullmatch(r"[\d\s,]+", words):
+            nodes += [int(word) for word in re.split(r"[,\s]+", words) if word]
+        else:
+            naming = words.upper() == "ELEMENT NODES"
+    return nodes
 
 
 def _labels(nodes: list[int], freedoms: list[tuple[int, list[int]]], count: int, path: Path, field: str) -> list[Label]:
@@ -136,7 +138,7 @@ def read_entries(text: str, path: Path, field: str) -> Entries:
         cells = [cell for cell in re.split(r"\s*,\s*|\s+", line.strip()) if cell]
         try:
             a, b, c, d = (int(cell) for cell in cells[:4])
-            (value,) = (float(cell.upper().replace("D", "E")) for cell in cells[4:])
+            (value,) = (real(cell) for cell in cells[4:])
         except ValueError:
             problem = (
                 f"is neither Matrix Market nor matrices of Abaqus nor DMIG: line {number} is {line.strip()[:60]!r}"

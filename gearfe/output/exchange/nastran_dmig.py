@@ -9,8 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...base.errors import InputError
-from ...fem.meshing.nastran import entries, lines_of, number
-from .entries import Entries, add_entry
+from .included import lines_of
+from .matrix_entries import Entries, add_entry
+from .nastran_cards import entries, number
 
 
 def read_dmig(text: str, path: Path, field: str) -> dict[str, Entries]:

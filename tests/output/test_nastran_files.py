@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
-from gearfe.drivetrain.housing.nastran_files import output2, output4, read_nastran
-from gearfe.drivetrain.housing.superelement import read_matrix
+from gearfe.output.exchange.matrix_file import read_matrix
+from gearfe.output.exchange.nastran_output import output2, output4, read_nastran
 from tests.makers.nastran import Output2, output4_binary, output4_text
 
 LAYOUTS = ("full", "packed", "wide")

@@ -14,9 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.files import whole_file
+from ...base.files import read_text, whole_file
 from ...base.typing import Array
-from .export import MeshPart, abaqus_mesh
+from .abaqus_cards import Fault, cards, real, split
+from .included import lines_of
+from .mesh_export import MeshPart, abaqus_mesh
 
 #: Contact stiffness (N/mm3): stiffer ones change the torque by less than 1e-4 and cost iterations.
 PENALTY = 1e8
@@ -104,13 +106,11 @@ def deck_torque(deck: str | Path, centre: float, twist: float) -> float:
 
 
 def _nodes(path: Path) -> list[tuple[int, tuple[float, float]]]:
-    rows, inside = [], False
-    for line in path.read_text(encoding="ascii").splitlines():
-        if line.startswith("*"):
-            inside = line.startswith("*NODE,")
-        elif inside:
-            number, x, y, _ = line.split(",")
-            rows.append((int(number), (float(x), float(y))))
+    rows = []
+    for card in cards(lines_of(read_text(path, "deck"), path.name), Fault("deck", path), {}):
+        for line in card.data if card.name == "NODE" else ():
+            number, x, y, _ = split(line.text)
+            rows.append((int(number), (real(x), real(y))))
     return rows
 
 

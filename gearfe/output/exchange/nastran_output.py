@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.files import read_bytes
 from ...base.typing import Array
-from ...fem.meshing.nastran import number
-from .entries import Entries
+from .matrix_entries import Entries
+from .nastran_cards import number
 
 #: Matrices by name: values, or single entries with node and freedom.
 Matrices = dict[str, Array | Entries]
@@ -42,10 +43,9 @@ def read_nastran(path: Path, field: str) -> Matrices:
         When there is no such file, or it is not of its kind.
     """
     kind, read = ("OUTPUT2", output2) if path.suffix.lower() == ".op2" else ("OUTPUT4", output4)
+    content = read_bytes(path, field, 8 * MOST_ENTRIES)
     try:
-        return read(path.read_bytes())
-    except FileNotFoundError:
-        raise InputError(field, str(path), "there is no such file", "check the path") from None
+        return read(content)
     except (ValueError, IndexError, StopIteration, OverflowError, RuntimeError):
         cure = "the file may be cut short or damaged: write it again; a punch file of DMIG entries will do as well"
         raise InputError(field, path.name, f"cannot be read as {kind}", cure) from None

@@ -1,4 +1,4 @@
-"""Keyword lines of Abaqus' (CalculiX') input files with their data, and those that a mesh cannot be read without.
+"""Keyword lines of Abaqus' (CalculiX') input files with their data.
 
 A keyword line begins with one asterisk and goes on after a comma at its end; blanks in keywords and case do not count,
 a comment begins with two asterisks (Abaqus Analysis User's Guide, section "Input syntax rules").
@@ -7,57 +7,13 @@ a comment begins with two asterisks (Abaqus Analysis User's Guide, section "Inpu
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from ...base.errors import InputError
 from .included import Inclusion, Line
 
-#: Cards that make or move nodes and elements, join parts, add mass or stiffness, or change the file's text, and that
-#: are not supported: without them the body would be another one. Name -> what it does, and the cure.
-_WRITE = "write all nodes and elements in full (preprint of Abaqus, or an export of the mesh)"
-_RIGID = "delete it: bores are rigid by [[housing.bores]], held faces by [[housing.held]]"
-_SOLID = "delete it with its elements if it does not matter, or model it by solid elements"
-_MERGE = "merge the meshes so that the parts share their nodes, then delete it"
-REFUSED = {
-    **dict.fromkeys(("NGEN", "NFILL", "NCOPY", "NMAP", "ADJUST"), ("makes or moves nodes", _WRITE)),
-    **dict.fromkeys(("ELGEN", "ELCOPY", "SYMMETRICMODELGENERATION", "MODELCHANGE"), ("changes the elements", _WRITE)),
-    **dict.fromkeys(("IMPERFECTION", "IMPORT", "IMPORTNODESET", "IMPORTELSET"), ("takes data of another run", _WRITE)),
-    **dict.fromkeys(("PARAMETER", "MANIFEST"), ("replaces text of the file", "write numbers and names in full")),
-    **dict.fromkeys(
-        ("TIE", "EMBEDDEDELEMENT", "SHELLTOSOLIDCOUPLING", "FASTENER", "CYCLICSYMMETRYMODEL"), ("joins parts", _MERGE)
-    ),
-    **dict.fromkeys(
-        ("EQUATION", "MPC", "RIGIDBODY", "COUPLING", "KINEMATICCOUPLING", "DISTRIBUTINGCOUPLING", "PRE-TENSIONSECTION"),
-        ("ties nodes to each other", _RIGID),
-    ),
-    **dict.fromkeys(
-        (
-            "MASS",
-            "ROTARYINERTIA",
-            "NONSTRUCTURALMASS",
-            "SPRING",
-            "DASHPOT",
-            "JOINT",
-            "CONNECTORSECTION",
-            "GAP",
-            "FOUNDATION",
-        ),
-        ("adds mass or stiffness", _SOLID),
-    ),
-    **dict.fromkeys(
-        (
-            *("SHELLSECTION", "SHELLGENERALSECTION", "MEMBRANESECTION", "SURFACESECTION", "REBARLAYER"),
-            *("BEAMSECTION", "BEAMGENERALSECTION", "FRAMESECTION", "REBAR"),
-        ),
-        ("adds shells or beams", _SOLID),
-    ),
-    **dict.fromkeys(
-        ("USERELEMENT", "MATRIXINPUT", "MATRIXASSEMBLE", "SUPERELEMENT", "SUBSTRUCTUREPROPERTY"),
-        ("adds matrices", "give a substructure as [housing.superelement]"),
-    ),
-}
 _INCLUDE = re.compile(r"\*\s*INCLUDE\s*,", re.IGNORECASE)
 #: Cards whose data may stand in a file of its own; files of other cards, such as loads, do not matter.
 FROM_FILES = ("INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")
@@ -67,12 +23,16 @@ _PARTS = re.compile(r'((?:[^,"]|"[^"]*")*)(?:,|$)')
 
 
 class Card(NamedTuple):
-    """A keyword line without blanks in capitals, its parameters (capitals -> value), its data lines, and its place."""
+    """A keyword line without blanks in capitals, its parameters (capitals -> value), its data lines, and its place.
+
+    Comments are the lines with two asterisks that follow the keyword line.
+    """
 
     name: str
     keys: dict[str, str]
     data: list[Line]
     line: Line
+    comments: list[Line]
 
 
 class Fault(NamedTuple):
@@ -94,18 +54,29 @@ def inclusion(line: str) -> Inclusion | None:
     return None if named is None else Inclusion(named[1].strip().strip('"'), not _INCLUDE.match(line.lstrip()))
 
 
-def cards(lines: Iterable[Line], fault: Fault) -> Iterator[Card]:
+def cards(lines: Iterable[Line], fault: Fault, refused: Mapping[str, tuple[str, str]]) -> Iterator[Card]:
     """Yield the cards of a file.
+
+    Parameters
+    ----------
+    lines : iterable of Line
+        The file's lines.
+    fault : Fault
+        How mistakes are reported.
+    refused : mapping
+        Names of cards that are not supported -> what they do, and the cure.
 
     Raises
     ------
     InputError
-        For cards of `REFUSED`, and for data before the first card.
+        For cards of `refused`, and for data before the first card.
     """
     card: Card | None = None
     begun: Line | None = None  # a keyword line that goes on
     for line in lines:
         text = line.text.strip()
+        if text.startswith("**") and card is not None:
+            card.comments.append(line)
         if not text or text.startswith("**"):
             continue
         if begun is None and not text.startswith("*"):
@@ -119,27 +90,27 @@ def cards(lines: Iterable[Line], fault: Fault) -> Iterator[Card]:
             continue
         if card is not None:
             yield card
-        card, begun = _card(begun, fault), None
+        card, begun = _card(begun, fault, refused), None
     if begun is not None:
         raise fault.at(begun, "the card goes on after its last comma, but the file ends", "is the file whole?")
     if card is not None:
         yield card
 
 
-def _card(line: Line, fault: Fault) -> Card:
+def _card(line: Line, fault: Fault, refused: Mapping[str, tuple[str, str]]) -> Card:
     first, *others = split(line.text)
     name = "".join(first[1:].split()).upper()
     keys = {}
     for word in others:
         key, _, value = word.partition("=")
         keys["".join(key.split()).upper()] = value.strip().strip('"')
-    if name in REFUSED:
-        does, cure = REFUSED[name]
+    if name in refused:
+        does, cure = refused[name]
         problem = f"the card {first} {does}, which is not supported"
         raise fault.at(line, problem, cure)
     if name == "INCLUDE" or (name in FROM_FILES and "INPUT" in keys and inclusion(line.text) is None):
         raise fault.at(line, "a file is included that cannot be found", "write *INCLUDE, INPUT=file in one line")
-    return Card(name, keys, [], line)
+    return Card(name, keys, [], line, [])
 
 
 def split(text: str) -> list[str]:

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.files import whole_file
 from ...base.typing import Array
-from .entries import check_rows
+from .matrix_entries import check_rows
 
 _WHOLE = "the file may be cut short or damaged: write it again"
 
@@ -80,3 +81,11 @@ def read_market(text: str, path: Path, field: str) -> Array:
         np.fill_diagonal(mirrored, 0.0)
         values = values + mirrored
     return values
+
+
+def write_market(path: Path, matrix: Array) -> None:
+    """Write a symmetric matrix; `read_market` gives back every number exactly."""
+    from scipy.io import mmwrite
+
+    with whole_file(path) as temporary:
+        mmwrite(str(temporary), matrix, symmetry="symmetric", precision=17)

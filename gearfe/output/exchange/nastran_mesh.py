@@ -15,9 +15,9 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.typing import IntArray
 from .included import Line, included_lines
-from .nastran import entries, inclusion, number
+from .nastran_cards import entries, inclusion, number
 from .nastran_systems import Systems
-from .source import SourceMesh
+from .source_mesh import SourceMesh
 
 #: Elements by entry: meshio's names without and with midside nodes, and their numbers of nodes.
 KINDS = {

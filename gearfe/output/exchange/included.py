@@ -30,6 +30,11 @@ class Line(NamedTuple):
         return f"line {self.number} of {self.file}"
 
 
+def lines_of(text: str, name: str) -> list[Line]:
+    """Lines of a text that is the content of the file `name`."""
+    return [Line(line, name, number) for number, line in enumerate(text.splitlines(), start=1)]
+
+
 class Inclusion(NamedTuple):
     """A file that a line includes; whether the line itself is kept before it."""
 
