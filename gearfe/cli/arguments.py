@@ -12,7 +12,7 @@ import importlib
 import re
 import sys
 import typing
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,6 +23,8 @@ from ..base.errors import InputError, MissingLibraryError, nearest, unknown_name
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+    from ..base.tables.gearbox import NamedMesh
 
 Table = TypeVar("Table", bound="DataclassInstance")
 #: What a help calls the value of an option.
@@ -191,6 +193,54 @@ def add_job(parser: argparse.ArgumentParser, dest: str, help_: str) -> None:
         metavar="KEY=VALUE",
         help="another value for a key of the file, as table.key=21; may stand several times",
     )
+
+
+def add_mesh(parser: argparse.ArgumentParser) -> None:
+    """``--mesh``, for commands that compute single meshes."""
+    parser.add_argument(
+        "--mesh",
+        metavar="NAME",
+        help="a mesh of the file by its name, in a folder of that name (default: that of [pair], or all)",
+    )
+
+
+def each_mesh(
+    args: argparse.Namespace, run_mesh: Callable[[argparse.Namespace, NamedMesh], int], variant: str | None = None
+) -> int:
+    """Run a command for the mesh that ``--mesh`` names, else for all of the file, each in a folder of its own.
+
+    Parameters
+    ----------
+    args : Namespace
+        Parsed command line.
+    run_mesh : callable
+        What computes a mesh, with the arguments whose ``out`` is its folder; returns 0, or 1 where a part failed.
+    variant : str, optional
+        Variant of [train] whose keys win over [stiffness].
+
+    Returns
+    -------
+    int
+        Largest of what `run_mesh` returns.
+    """
+    from ..base.config import read_toml
+    from ..base.tables.jobs import meshes_of
+
+    # mistakes in the file show before NumPy, SciPy and the finite elements load
+    meshes = meshes_of(read_toml(args.job), args.job, args.mesh, variant)
+    if len(meshes) == 1 and args.mesh is None:
+        return run_mesh(args, meshes[0])
+    if len(meshes) > 1:
+        from ..gears.geometry.pair import pair_of
+
+        for mesh in meshes:  # mistakes in the last one show before the first is computed
+            pair_of(mesh)
+    codes = []
+    for mesh in meshes:
+        if len(meshes) > 1:
+            print(f"mesh {mesh.name}: {mesh.driver.name} drives {mesh.driven.name}")
+        codes.append(run_mesh(argparse.Namespace(**{**vars(args), "out": str(Path(args.out) / mesh.name)}), mesh))
+    return max(codes)
 
 
 def add_folder(parser: argparse.ArgumentParser) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.progress import stage
-from .arguments import add_folder, add_job, check_option, print_results
+from .arguments import add_folder, add_job, add_mesh, check_option, each_mesh, print_results
 
 if TYPE_CHECKING:
     from ..base.tables.gearbox import NamedMesh
@@ -23,6 +23,7 @@ FILES = tuple(f"{side}.{form}" for side in ("pinion", "wheel") for form in EXPOR
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "job", "job file with the table [pair]")
+    add_mesh(parser)
     add_folder(parser)
     parser.add_argument(
         "--export",
@@ -37,14 +38,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the geometry, write gear_pair.png and gear_pair.json."""
-    from ..base.config import read_toml
-    from ..base.tables.jobs import meshes_of
+    """Print the geometry of each mesh, write gear_pair.png and gear_pair.json; of shafts gearbox.png, too."""
     from ..base.tables.pair import StiffnessTable
 
-    # mistakes in the file show before NumPy, SciPy and the finite elements load
-    (mesh,) = meshes_of(read_toml(args.job), args.job, None)
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
+    _exports(args.export)
+    code = each_mesh(args, _run_mesh)
+    return code
+
+
+def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
+    """The geometry of one mesh."""
     exports = _exports(args.export)
 
     from ..gears.geometry.pair import pair_of

@@ -6,11 +6,24 @@ import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base.tables.loadmap import LoadMapTable
 from ..base.tables.pair import StiffnessTable, check_law
-from .arguments import add_folder, add_job, add_keys, add_removed, check_option, print_results, with_keys
+from .arguments import (
+    add_folder,
+    add_job,
+    add_keys,
+    add_mesh,
+    add_removed,
+    check_option,
+    each_mesh,
+    print_results,
+    with_keys,
+)
+
+if TYPE_CHECKING:
+    from ..base.tables.gearbox import NamedMesh
 
 #: Keys of [stiffness], and of the table of loads, that options stand for.
 MODEL = ("law", "plane", "kinematics", "coarsen")
@@ -22,6 +35,7 @@ FILES = ("loadmap*.csv", "loadmap*.png", "loadmap.json")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "job", "job file with the tables [pair], [stiffness], [loadmap] and [microgeometry]")
+    add_mesh(parser)
     add_folder(parser)
     load = parser.add_mutually_exclusive_group()
     load.add_argument(
@@ -37,13 +51,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compute the map and write the files; 1 when a cell failed."""
-    started = time.perf_counter()
-    from ..base.config import read_toml
-    from ..base.tables.jobs import meshes_of
+    """Compute the maps and write the files; 1 when a cell failed."""
+    return each_mesh(args, _run_mesh)
 
-    # mistakes in the file show before NumPy, SciPy and the finite elements load
-    (mesh,) = meshes_of(read_toml(args.job), args.job, None)
+
+def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
+    """The map of one mesh."""
+    started = time.perf_counter()
     mesh = replace(mesh, stiffness=_overridden_model(mesh.stiffness, args))
     table = _with_loads(args, mesh.loads)
     table.torques()

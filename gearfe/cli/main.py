@@ -240,7 +240,9 @@ def _run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Nam
     if as_json:
         entries = getattr(parsed, "summary", {})
         if folders and not entries:
-            entries = {"folder": str(folders[-1][0]), **_summary(*folders[-1])}
+            found = [{"folder": str(folder), **_summary(folder, names)} for folder, names in folders]
+            of_meshes = len(found) > 1 and hasattr(parsed, "mesh")  # one folder for each mesh
+            entries = {"results": found} if of_meshes else found[-1]
         print(json.dumps({"exit_code": code, **entries}, indent=2))
     return code
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..base.progress import stage
 from ..base.tables.pair import StiffnessTable
-from .arguments import add_job, add_json, add_keys, add_pictures, check_option, with_keys
+from .arguments import add_job, add_json, add_keys, add_mesh, add_pictures, check_option, with_keys
 
 if TYPE_CHECKING:
     from ..gears.gearmesh.job import StiffnessJob
@@ -23,7 +23,8 @@ DECK_TEETH = 3
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    add_job(parser, "job", "job file with the table [pair]")
+    add_job(parser, "job", "job file with the table [pair], or meshes by name")
+    add_mesh(parser)
     parser.add_argument(
         "--out",
         metavar="DIR|FILE",
@@ -57,12 +58,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the file and name its groups."""
     from ..base.config import read_toml
-    from ..base.tables.jobs import meshes_of
+    from ..base.tables.jobs import only_mesh
 
     out = Path(args.out) if args.out else Path("out") / Path(args.job).stem / "mesh"
     args.out = str(out if out.suffix else out / ("gears.inp" if args.deck else "gears.msh"))
     # mistakes in the file show before NumPy, SciPy and the finite elements load
-    (mesh,) = meshes_of(read_toml(args.job), args.job, None)
+    mesh = only_mesh(read_toml(args.job), args.job, args.mesh)
     table = with_keys(args, mesh.stiffness, "coarsen", "flank_coarsen")
     table.check("stiffness")
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")

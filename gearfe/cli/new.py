@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..base.tables.examples import JOBS, job_file
+from ..base.tables.examples import JOBS, RUN_BY, job_file
 
 #: Command that runs a job with these tables, the first one that is there.
 RUNS = {
@@ -69,7 +69,9 @@ def _command(kind: str, text: str) -> str:
     import tomllib
 
     tables = tomllib.loads(text)
-    return kind if kind in JOBS else next((RUNS[name] for name in RUNS if name in tables), "stiffness")
+    return (
+        RUN_BY.get(kind, kind) if kind in JOBS else next((RUNS[name] for name in RUNS if name in tables), "stiffness")
+    )
 
 
 def _folders() -> list[Path]:

@@ -6,12 +6,26 @@ import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base.config import check_range
 from ..base.progress import announce
 from ..base.tables.pair import LOADS, StiffnessTable, check_law
-from .arguments import add_folder, add_job, add_keys, add_removed, check_option, number, print_results, with_keys
+from .arguments import (
+    add_folder,
+    add_job,
+    add_keys,
+    add_mesh,
+    add_removed,
+    check_option,
+    each_mesh,
+    number,
+    print_results,
+    with_keys,
+)
+
+if TYPE_CHECKING:
+    from ..base.tables.gearbox import NamedMesh
 
 #: Keys of the [stiffness] table that options stand for, beside the load and the angles.
 KEYS = (
@@ -23,6 +37,7 @@ KEYS = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "job", "job file with the tables [pair] and [stiffness]")
+    add_mesh(parser)
     add_folder(parser)
     parser.add_argument("--variant", metavar="NAME", help="variant of [train] whose [stiffness] holds")
     add_keys(parser.add_mutually_exclusive_group(), StiffnessTable, *LOADS)
@@ -66,16 +81,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compute the curve and write the files; 1 when a position failed."""
+    """Compute the curves and write the files; 1 when a position failed."""
+    return each_mesh(args, _run_mesh, args.variant)
+
+
+def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
+    """The curve of one mesh."""
     if args.range is not None:
         check_range(args.range, "--range", {"above": 0.0, "doc": "end of the colours (MPa)"})
     started = time.perf_counter()
-    from ..base.config import read_toml
     from ..base.errors import InputError
-    from ..base.tables.jobs import meshes_of
 
-    # mistakes in the file show before NumPy, SciPy and the finite elements load
-    (mesh,) = meshes_of(read_toml(args.job), args.job, None, args.variant)
     mesh = replace(mesh, stiffness=overridden(mesh.stiffness, args))
     given = args.fields or []
     chosen = [value for value in given if value != "all"] or None  # pinion angles (deg); None: all

@@ -145,9 +145,10 @@ def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
 
 
 def _only_mesh(raw: Raw, path: Path) -> Any:
-    from ..gears.gearmesh.job import only_mesh, stiffness_job
+    from ..base.tables.jobs import only_mesh
+    from ..gears.gearmesh.job import stiffness_job
 
-    return stiffness_job(only_mesh(raw, path), path.parent)
+    return stiffness_job(only_mesh(raw, path, raw.get("study", {}).get("mesh")), path.parent)
 
 
 def _kept(job: Any, shared: Shared) -> Keep:

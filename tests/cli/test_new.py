@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gearfe.base.config import build, quantity
-from gearfe.base.tables.examples import JOBS, job_file
+from gearfe.base.tables.examples import JOBS, RUN_BY, job_file
 from gearfe.base.tables.jobs import TABLES, load_job, read_train_tables, table_class
 from gearfe.base.tables.mechanism import BodyTable, MechanismFile, RunTable, read_mechanism_file
 from gearfe.base.tables.microgeometry import GearMicrogeometryTable
@@ -24,7 +24,7 @@ SHIPPED = sorted(GEOMETRY.glob("*.toml"))
 def test_the_file_is_read_without_a_mistake(tmp_path, capsys, kind):
     path = tmp_path / "job.toml"
     assert main(["new", kind, str(path)]) == 0
-    assert f"gearfe {kind} {path}" in capsys.readouterr().out
+    assert f"gearfe {RUN_BY.get(kind, kind)} {path}" in capsys.readouterr().out
     if kind == "mechanism":
         build(MechanismFile, tomllib.loads(path.read_text()), "")
     else:

@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 from gearfe.base.config import read_toml
+from gearfe.base.tables.jobs import only_mesh
 from gearfe.base.tables.text import toml_document
 from gearfe.cli.main import main
 from gearfe.gears.gearmesh import sweep
-from gearfe.gears.gearmesh.job import only_mesh, stiffness_job
+from gearfe.gears.gearmesh.job import stiffness_job
 from gearfe.study.design import study_cases
 from gearfe.study.job import read_study, run_study
 from tests.makers.studies import rows_of

@@ -179,7 +179,8 @@ def test_outputs_that_the_job_does_not_give_are_told_before_any_case(tmp_path):
 
 def test_gears_and_their_microgeometry(tmp_path):
     """A stiffness study gives what the sweep gives; cases that share gears have the digits of cases that do not."""
-    from gearfe.gears.gearmesh.job import only_mesh, stiffness_job
+    from gearfe.base.tables.jobs import only_mesh
+    from gearfe.gears.gearmesh.job import stiffness_job
     from gearfe.gears.gearmesh.sweep import sweep_stiffness
 
     job = "[pair]\npressure_angle_deg = 20.0\nface_width_mm = 10.0\n"

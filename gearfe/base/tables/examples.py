@@ -8,6 +8,7 @@ from typing import Any
 
 from .jobs import table_class
 from .mechanism import MechanismFile
+from .named import NAMED
 from .text import table_text
 
 OPTIONAL_KEYS = "Keys behind a # are optional and stand with their defaults; those that are not set have none."
@@ -81,6 +82,68 @@ HOUSING: dict[str, Any] = {
     "feet": {"length_x_mm": 30.0, "width_y_mm": 22.0, "height_mm": 15.0},
 }
 
+#: A two-stage gearbox of three materials, every part by its name.
+GEARBOX: dict[str, dict[str, Any]] = {
+    "materials": {
+        "case_hardened_steel": {"youngs_modulus_GPa": 206.0, "poisson_ratio": 0.3, "density_kg_per_m3": 7830.0},
+        "cast_iron": {"youngs_modulus_GPa": 175.0, "poisson_ratio": 0.27, "density_kg_per_m3": 7200.0},
+    },
+    "gears": {
+        "input_pinion": {
+            "teeth": 20, "bore_diameter_mm": 20.0, "module_mm": 2.0, "pressure_angle_deg": 20.0, "face_width_mm": 18.0,
+            "tip_round_mm": 0.1, "tooth_thinning_um": 40.0, "material": "case_hardened_steel", "shaft": "input",
+            "y_mm": 20.0, "microgeometry": {"tip_relief_um": 10.0, "tip_relief_length_mm": 1.5},
+        },
+        "input_wheel": {
+            "teeth": 41, "bore_diameter_mm": 40.0, "module_mm": 2.0, "pressure_angle_deg": 20.0, "face_width_mm": 18.0,
+            "tip_round_mm": 0.1, "tooth_thinning_um": 40.0, "material": "cast_iron", "shaft": "intermediate",
+            "y_mm": 20.0,
+        },
+        "output_pinion": {
+            "teeth": 18, "bore_diameter_mm": 24.0, "module_mm": 2.5, "pressure_angle_deg": 20.0, "face_width_mm": 25.0,
+            "tip_round_mm": 0.1, "tooth_thinning_um": 50.0, "material": "case_hardened_steel",
+            "shaft": "intermediate", "y_mm": -15.0,
+        },
+        "output_wheel": {
+            "teeth": 43, "bore_diameter_mm": 60.0, "module_mm": 2.5, "pressure_angle_deg": 20.0, "face_width_mm": 25.0,
+            "tip_round_mm": 0.1, "tooth_thinning_um": 50.0, "shaft": "output", "y_mm": -15.0,
+        },
+    },
+    "meshes": {
+        "first": {"driver": "input_pinion", "driven": "input_wheel", "stiffness": {"torque_Nm": 60.0}},
+        "second": {"driver": "output_pinion", "driven": "output_wheel", "stiffness": {"torque_Nm": 145.0}},
+    },
+    "shafts": {
+        "input": {"x_mm": 0.0, "length_mm": 100.0, "radius_mm": 10.0},
+        "intermediate": {"x_mm": 61.0, "length_mm": 100.0, "radius_mm": 12.0},
+        "output": {"x_mm": 137.25, "length_mm": 100.0, "radius_mm": 15.0},
+    },
+    "bearings": {
+        name: {
+            "shaft": shaft, "y_mm": y, "stiffness": [1e8, 1e8, 1e8, 2e4, 2e4],
+            "damping": [200.0, 50.0, 200.0, 1.0, 1.0],
+        }
+        for name, shaft, y in (
+            ("A", "input", 40.0), ("B", "input", -40.0), ("C", "intermediate", 40.0), ("D", "intermediate", -40.0),
+            ("E", "output", 40.0), ("F", "output", -40.0),
+        )
+    },
+}  # fmt: skip
+
+GEARBOX_TRAIN: dict[str, Any] = {
+    "housing": "rigid",
+    "duration_ms": 10.0,
+    "step_us": 20.0,
+    "drive": {"shaft": "input", "attachment": "A", "speed_rad_per_s": 150.0},
+    "loads": [
+        {
+            "shaft": "output", "attachment": "E", "torque_Nm": -145.0, "ramp_centre_ms": 1.0, "ramp_width_ms": 2.0,
+        },
+    ],
+    "curves": {"mesh_model": "potential"},
+    "damping": {"rayleigh_beta_s": 2e-6},
+}  # fmt: skip
+
 MECHANISM: dict[str, Any] = {
     "title": "Crank and rod",
     "run": {"end_s": 10.0, "step_s": 0.005, "tolerance": 1e-9},
@@ -113,7 +176,8 @@ LOADMAP: dict[str, Any] = {"torques_Nm": [20.0, 50.0, 100.0, 200.0], "root_stres
 
 RUNUP: dict[str, Any] = {"speed_start_rad_per_s": 300.0, "speed_stop_rad_per_s": 1200.0, "speeds": 100}
 
-#: Kind, which is the command that runs it -> what the file is about, its tables, and what else its head says.
+#: Kind, which is the command that runs it except for those of `RUN_BY`
+#: -> what the file is about, its tables, and what else its head says.
 JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
     "stiffness": ("mesh stiffness of a gear pair", {"pair": PAIR, "stiffness": STIFFNESS}, ""),
     "loadmap": (
@@ -149,6 +213,19 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
         {"pair": PAIR, "stiffness": {"twist_deg": 0.05}, "train": TRAIN, "housing": HOUSING, "runup": RUNUP},
         "",
     ),
+    "gearbox": (
+        "a two-stage gearbox: gears, meshes, shafts and bearings by name",
+        {
+            **GEARBOX,
+            "stiffness": {"kinematics": "small"},
+            "loadmap": {"torques_Nm": [50.0, 100.0]},
+            "train": GEARBOX_TRAIN,
+            "runup": {"speed_start_rad_per_s": 50.0, "speed_stop_rad_per_s": 400.0, "speeds": 50},
+        },
+        "Look at it first: gearfe gear FILE. Its meshes alone: gearfe stiffness FILE, gearfe loadmap FILE (--mesh "
+        "NAME: one of them). Over its speed: gearfe runup FILE. Shafts run along y; speeds and torques count positive "
+        "about +y. ",
+    ),
     "housing": (
         "an elastic housing: frequencies, modes, reduced body",
         {"housing": HOUSING},
@@ -158,16 +235,29 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
 }
 
 
+#: Kinds that another command runs.
+RUN_BY = {"gearbox": "vibration"}
+
+
 def job_file(kind: str) -> str:
     """Text of an example job file: a kind of `JOBS`."""
     about, tables, more = JOBS[kind]
-    head = f"{about[0].upper()}{about[1:]}. Run it: gearfe {kind} FILE --out DIR. {more}{OPTIONAL_KEYS}"
+    seen: set[type] = set()
+    run = RUN_BY.get(kind, kind)
+    head = f"{about[0].upper()}{about[1:]}. Run it: gearfe {run} FILE --out DIR. {more}{OPTIONAL_KEYS}"
     return (
         textwrap.fill(head, 118, initial_indent="# ", subsequent_indent="# ")
         + "\n\n"
         + "\n".join(
             # a mechanism is one table, the file itself
-            table_text(table_class(name) if name else MechanismFile, example, name)
+            _text(name, example, seen)
             for name, example in tables.items()
         )
     )
+
+
+def _text(name: str, example: Mapping[str, Any], seen: set[type]) -> str:
+    """TOML of a table, or of the tables by name that it holds."""
+    if name in NAMED:
+        return "\n".join(table_text(NAMED[name], entry, f"{name}.{key}", seen=seen) for key, entry in example.items())
+    return table_text(table_class(name) if name else MechanismFile, example, name)

@@ -124,7 +124,9 @@ def _check_shorthand(raw: Mapping[str, Any]) -> None:
 
 
 def table_class(name: str) -> type:
-    """Dataclass that describes the table `name` of a job file."""
+    """Dataclass that describes the table `name` of a job file, or the entries of a table of tables by name."""
+    if name in NAMED:
+        return NAMED[name]
     module, _, cls = TABLES[name].partition(":")
     return typing.cast(type, getattr(importlib.import_module(module), cls))
 
@@ -194,6 +196,21 @@ def meshes_of(raw: dict[str, Any], path: str | Path, name: str | None, variant: 
         more: Gearbox = train_tables(raw, path, variant or "")["gearbox"]
         box = Gearbox({**more.gears, **box.gears}, {**more.meshes, **box.meshes})
     return [box.mesh(name)]
+
+
+def only_mesh(raw: dict[str, Any], path: str | Path, name: str | None = None) -> NamedMesh:
+    """Return the mesh of that name of a parsed job, or the only one that it has.
+
+    Raises
+    ------
+    InputError
+        For mistakes in the tables, and several meshes without a name.
+    """
+    meshes = meshes_of(raw, path, name)
+    if len(meshes) > 1:
+        names = ", ".join(mesh.name for mesh in meshes)
+        raise InputError("mesh", None, f"is not named, and the file has several: {names}", "name one (--mesh NAME)")
+    return meshes[0]
 
 
 def _gearbox(tables: Mapping[str, Any]) -> Gearbox:

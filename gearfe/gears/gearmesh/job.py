@@ -23,7 +23,7 @@ from ...base.cache import cache_key, cached_arrays, source_hash, versions
 from ...base.config import read_toml
 from ...base.errors import InputError, given
 from ...base.tables.gearbox import NamedMesh
-from ...base.tables.jobs import meshes_of
+from ...base.tables.jobs import only_mesh
 from ...base.tables.pair import MaterialTable, StiffnessTable
 from ...fem.plane import Material
 from ..contact.laws import ContactLaw, PairModel, check_alike, check_poisson, check_torque, law_named
@@ -202,21 +202,6 @@ def read_stiffness_job(path: str | Path, mesh: str | None = None) -> StiffnessJo
         For every mistake in the file, for gears that cannot run together, and a file with several meshes.
     """
     return stiffness_job(only_mesh(read_toml(path), path, mesh), Path(path).parent)
-
-
-def only_mesh(raw: dict[str, Any], path: str | Path, name: str | None = None) -> NamedMesh:
-    """Return the mesh of that name of a parsed job, or the only one that it has.
-
-    Raises
-    ------
-    InputError
-        For mistakes in the tables, and several meshes without a name.
-    """
-    meshes = meshes_of(raw, path, name)
-    if len(meshes) > 1:
-        names = ", ".join(mesh.name for mesh in meshes)
-        raise InputError("mesh", None, f"is not named, and the file has several: {names}", "choose one")
-    return meshes[0]
 
 
 def cached_curve(pair: GearPair, model: PairModel, **sweep: Any) -> StiffnessCurve:

@@ -105,7 +105,16 @@ KEYS: dict[str, tuple[str, float]] = {
 
 
 def gear_pair(pinion: Gear, wheel: Gear, centre_distance: float | None = None, notes: tuple[str, ...] = ()) -> GearPair:
-    """Return a checked pair; equal gears at an equal centre distance (m) with equal notes share one.
+    """Return a checked pair; equal gears at an equal centre distance with equal notes share one.
+
+    Parameters
+    ----------
+    pinion, wheel : Gear
+        The gears.
+    centre_distance : float, optional
+        In m; without it, without backlash.
+    notes : tuple of str
+        How given data were taken that fit each other except for rounding.
 
     Raises
     ------
