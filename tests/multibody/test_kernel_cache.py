@@ -155,3 +155,13 @@ def test_a_bound_call_keeps_the_memory_of_its_blocks() -> None:
     del run
     gc.collect()
     assert alive() is None
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems allow text only")
+def test_a_folder_whose_name_is_no_text_holds_kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Linux allows any bytes in names; Python hands them on as lone surrogates, which UTF-8 does not encode."""
+    folder = tmp_path / os.fsdecode(b"\xff\xfe")
+    monkeypatch.setenv("GEARFE_CACHE", str(folder))
+    kept = compiled.cache_folder((compiled.interpreted,))
+    assert kept is not None
+    assert kept.parent == folder

@@ -82,7 +82,7 @@ def _folders(functions: Iterable[Callable[..., Any]]) -> Iterator[Path]:
 def _key(root: str, functions: tuple[Callable[..., Any], ...], options: tuple[str, ...]) -> str:
     """What decides compiled code, as a name; neither sources nor the machine change while a program runs."""
     key = "\n".join((root, *_made_by(), *options, _text(functions)))
-    return hashlib.sha256(key.encode()).hexdigest()[:16]
+    return hashlib.sha256(os.fsencode(key)).hexdigest()[:16]  # folders may have names that are no text
 
 
 def _text(functions: Iterable[Callable[..., Any]]) -> str:
