@@ -29,8 +29,8 @@ RUN += ("mechanisms.md", "microgeometry.md", "runup.md", "start.md")
 SHORTER = {
     "cases = 128": "cases = 8",
     "positions = 12": "positions = 4",
-    "rounds=40": "rounds=2",
     "range(10)": "range(2)",
+    "range(8)": "range(2)",
     "jobs=2": "jobs=1",
 }
 PLACES = {"angles": np.zeros(3), "approaches": np.full(3, 1e-5)}
@@ -72,6 +72,7 @@ def shorter(text: str) -> str:
 
 
 def test_python_of_studies_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """All blocks except the search: `test_study_search` runs that one and holds its result against a grid."""
     pytest.importorskip("optuna")
     pytest.importorskip("xarray")
     monkeypatch.chdir(tmp_path)
@@ -80,11 +81,10 @@ def test_python_of_studies_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
         text = (GEOMETRY / name).read_text(encoding="utf-8")
         (tmp_path / "geometry" / name).write_text(shorter(text), encoding="utf-8")
     names = known()
-    code = blocks(DOCS / "study.md", "python")
+    code = [text for text in blocks(DOCS / "study.md", "python") if "evolve" not in text]
     assert set(SHORTER) == {long for long in SHORTER if long in "".join(code) + "cases = 128 positions = 12"}
     for text in code:
         exec(compile(shorter(text), "study.md", "exec"), names)
-    assert names["best"].outputs["error_um"] > 0
 
 
 def test_no_page_is_left_out() -> None:
