@@ -90,8 +90,8 @@ def run_ups() -> Answers:
     """Steady states of one stage with a mesh law, teeth in contact and apart."""
     from gearfe.drivetrain.runup.run_up import run_up
     from gearfe.drivetrain.train import build_train
-    from tests.drivetrain.test_runup_train import loaded
     from tests.makers.mesh_laws import hertzian_law
+    from tests.makers.trains import loaded
 
     model = build_train(loaded([(20, 30)], lambda _: hertzian_law(relief=4e-6), speed=700.0, flexible=False))
     speeds = np.linspace(500.0, 1100.0, 7)

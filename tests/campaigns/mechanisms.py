@@ -22,9 +22,10 @@ from gearfe.mechanisms.job import output_times
 from gearfe.mechanisms.model import Mechanism, load_mechanism
 from gearfe.mechanisms.results import evaluate
 from gearfe.multibody import Start, Trajectory, consistent_start, integrate
+from tests.makers.rigid_cases import folding_angle
 
 from .campaign import Campaign, Case
-from .linkages import GRAVITY, KINDS, linkage
+from .linkages import KINDS, linkage
 from .outcome import Check, Finding
 from .toml_text import toml_text
 
@@ -114,22 +115,6 @@ def _backwards(case: Case, mechanism: Mechanism, start: Start, made: Trajectory)
     growth = math.exp(min(12.0, float(case.data["growth_per_s"]) * made.reached))
     off = float(np.abs(back.q[-1] - start.q).max())
     return [Check("back", off, growth * max(AMPLIFIED * mechanism.tolerance, FLOOR))]
-
-
-def folding_angle(theta: float, omega: float, times: np.ndarray) -> np.ndarray:
-    """Crank angle of two equal links of 1 m and 1 kg, the end on the x axis, from their closed equation of motion.
-
-    (2/3 + 2 sin^2) theta'' + 2 sin cos theta'^2 + g cos = 0, by Runge-Kutta of order 8 (scipy, relative 3e-14).
-    """
-    from scipy.integrate import solve_ivp
-
-    def rhs(_t: float, y: np.ndarray) -> list[float]:
-        s, c = math.sin(y[0]), math.cos(y[0])
-        return [y[1], -(2 * s * c * y[1] ** 2 + GRAVITY * c) / (2 / 3 + 2 * s * s)]
-
-    span = (float(times[0]), float(times[-1]))
-    made = solve_ivp(rhs, span, [theta, omega], "DOP853", t_eval=times, rtol=3e-14, atol=1e-14)
-    return np.asarray(made.y[0])
 
 
 CAMPAIGN = Campaign("mechanisms", 400, (0, 1, 2, 3, 5, 7), 120.0, draw, run, compiles=True)

@@ -1,6 +1,5 @@
 """The commands stiffness, gear and mesh, as a user runs them; coarse meshes."""
 
-import csv
 import json
 import math
 import os
@@ -14,6 +13,7 @@ import pytest
 from gearfe import StiffnessCurve
 from gearfe.cli.main import main
 from gearfe.gears.contact.elements import solve_elements
+from tests.makers.files import csv_rows
 from tests.places import EXAMPLES, GEOMETRY, ROOT
 
 JOB = GEOMETRY / "gear_train.toml"
@@ -21,8 +21,7 @@ QUICK = ("--coarsen", "3", "--no-estimate", "--law", "half_plane")
 
 
 def rows(folder):
-    with open(folder / "stiffness.csv", newline="") as stream:
-        return list(csv.DictReader(stream))
+    return csv_rows(folder / "stiffness.csv")
 
 
 def job_with(tmp_path, **changes):

@@ -12,86 +12,17 @@ import numpy as np
 import pytest
 
 from gearfe.cli.main import main
+from tests.makers.job_texts import SMALL_TRAIN
 from tests.makers.train_responses import COLUMNS, table
 from tests.places import EXAMPLES, GEOMETRY, ROOT
 
 JOB = GEOMETRY / "gear_train.toml"
-#: Two shafts in a rigid housing, a constant stiffness: no finite elements.
-SMALL = """
-[pair]
-module_mm = 2.5
-pressure_angle_deg = 25.0
-face_width_mm = 10.0
-[pair.pinion]
-teeth = 20
-bore_diameter_mm = 10.0
-[pair.wheel]
-teeth = 30
-bore_diameter_mm = 15.0
-[train]
-housing = "rigid"
-duration_ms = 2.0
-step_us = 20.0
-[[train.shafts]]
-name = "one"
-x_mm = 0.0
-length_mm = 82.0
-radius_mm = 10.0
-attachments = ["a", "b"]
-[[train.shafts]]
-name = "two"
-x_mm = 62.5
-length_mm = 82.0
-radius_mm = 10.0
-attachments = ["c", "d"]
-[[train.gears]]
-name = "pinion"
-shaft = "one"
-y_mm = 0.0
-gear = "pinion"
-[[train.gears]]
-name = "wheel"
-shaft = "two"
-y_mm = 0.0
-gear = "wheel"
-[[train.meshes]]
-driver = "pinion"
-driven = "wheel"
-stiffness_N_per_m = 1e8
-damping_N_s_per_m = 2000.0
-[train.drive]
-shaft = "one"
-attachment = "a"
-speed_rad_per_s = 600.0
-[[train.loads]]
-shaft = "two"
-attachment = "c"
-torque_Nm = 75.0
-ramp_centre_ms = 0.25
-ramp_width_ms = 0.5
-[[train.rigid_bores]]
-attachment = "a"
-x_mm = 0.0
-y_mm = 30.0
-[[train.rigid_bores]]
-attachment = "b"
-x_mm = 0.0
-y_mm = -30.0
-[[train.rigid_bores]]
-attachment = "c"
-x_mm = 62.5
-y_mm = 30.0
-[[train.rigid_bores]]
-attachment = "d"
-x_mm = 62.5
-y_mm = -30.0
-"""
 
 
 @pytest.fixture
 def job(tmp_path):
     path = tmp_path / "job.toml"
-    path.write_text(SMALL)
+    path.write_text(SMALL_TRAIN)
     return path
 
 
@@ -144,7 +75,7 @@ def test_a_curve_from_a_file(job, tmp_path):
 
 def test_a_mesh_law_with_friction(job, tmp_path, capsys):
     """75 N m at 400 rad/s leave the mesh: what comes in is that and the loss, in table, summary and on the terminal."""
-    text = SMALL.replace(
+    text = SMALL_TRAIN.replace(
         "stiffness_N_per_m = 1e8\ndamping_N_s_per_m = 2000.0", "friction = 0.05\nmesh_model_torque_Nm = 200.0"
     )
     job.write_text(text + "[train.damping]\nratio = 0.05\n")
@@ -169,7 +100,7 @@ def test_teeth_that_part_are_told(job, tmp_path, capsys):
     """Contacts lost, share of the time and K_v of the summary are those of the table, whose damper acts when teeth are
     apart, too; the flanks that bear are named.
     """
-    text = SMALL.replace("2000.0", "100.0\nbacklash_um = 30.0").replace("= 75.0", "= 20.0")
+    text = SMALL_TRAIN.replace("2000.0", "100.0\nbacklash_um = 30.0").replace("= 75.0", "= 20.0")
     job.write_text(text.replace("speed_rad_per_s = 600.0", 'speed_rad_per_s = "600 + 20*sin(9000*time)"'))
     out = tmp_path / "out"
     assert main(["vibration", str(job), "--out", str(out), "--no-estimate"]) == 0
@@ -186,7 +117,9 @@ def test_teeth_that_part_are_told(job, tmp_path, capsys):
     steady = 20.0 / (37.5e-3 * math.cos(math.radians(25.0)))
     assert contact["dynamic_factors"][0] == pytest.approx(np.abs(force).max() / steady, rel=1e-9)
     assert contact["flanks"] == ["both flanks, 30 um of normal backlash"]
-    job.write_text(SMALL.replace("stiffness_N_per_m = 1e8", "mesh_model_torque_Nm = 200.0").replace("= 75.0", "= 0.0"))
+    job.write_text(
+        SMALL_TRAIN.replace("stiffness_N_per_m = 1e8", "mesh_model_torque_Nm = 200.0").replace("= 75.0", "= 0.0")
+    )
     assert main(["vibration", str(job), "--out", str(out), "--no-estimate", "--no-pictures"]) == 0
     assert "no load keeps the teeth of mesh pinion-wheel in contact" in capsys.readouterr().err
     (flanks,) = json.loads((out / "summary.json").read_text())["contact"]["flanks"]
@@ -230,10 +163,10 @@ def test_mistakes_in_the_options(job, tmp_path, capsys, options, message):
 
 
 def test_unknown_keys_and_missing_tables(job, tmp_path, capsys):
-    job.write_text(SMALL.replace("duration_ms", "duraton_ms"))
+    job.write_text(SMALL_TRAIN.replace("duration_ms", "duraton_ms"))
     assert main(["vibration", str(job), "--out", str(tmp_path / "out")]) == 2
     assert "did you mean 'duration_ms'?" in capsys.readouterr().err
-    job.write_text(SMALL.partition("[train]")[0])
+    job.write_text(SMALL_TRAIN.partition("[train]")[0])
     assert main(["vibration", str(job), "--out", str(tmp_path / "out")]) == 2
     assert "[train]: is missing" in capsys.readouterr().err
 

@@ -16,8 +16,7 @@ from gearfe.drivetrain.runup.run_up import steady_state
 from gearfe.drivetrain.runup.train_stability import train_stability
 from gearfe.drivetrain.train import Damping, Drive, Load, TrainModel, build_train
 from gearfe.multibody import constant, integrate
-from tests.drivetrain.test_runup_shooting import start_of
-from tests.makers.trains import SHIPPED, changed, curve, elastic, train
+from tests.makers.trains import SHIPPED, changed, curve, elastic, modal_start, train
 
 
 def around(eigenvalues, damping, gain, period: float, steps: int) -> np.ndarray:  # type: ignore[no-untyped-def]
@@ -132,7 +131,7 @@ def test_multipliers_are_those_of_the_train_that_is_integrated(method: str, damp
         assert found == pytest.approx(1.0, abs=1e-12)
         return
     orbit = steady_state(model, 600.0, tolerance=1e-6, stability=False)
-    expected = by_differences(model, start_of(model, orbit), period)
+    expected = by_differences(model, modal_start(model, orbit), period)
     assert found == pytest.approx(np.sort(np.abs(expected)), abs=2e-6)
     if damping.beta == 0.0:
         assert found.max() > 1.0 + 2e-5

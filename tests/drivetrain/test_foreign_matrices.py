@@ -17,7 +17,7 @@ from gearfe.drivetrain.housing.superelement import rigid_shapes, superelement
 from gearfe.fem.reduction.modal_body import ModalBody
 from gearfe.output.exchange.matrix_file import read_matrix
 from gearfe.output.exchange.matrix_market import write_market
-from tests.fem.test_foreign_meshes import damaged
+from tests.makers.files import damaged
 from tests.makers.nastran import Output2, output4_binary, output4_text
 
 POINTS = np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.01]])

@@ -22,14 +22,9 @@ from tests.makers.full_model import full_model
 from tests.makers.housing_meshes import surface_area
 from tests.places import GEOMETRY
 
+pytestmark = pytest.mark.usefixtures("own_cache")
+
 SHIPPED = GEOMETRY / "housing.toml"
-
-
-@pytest.fixture(autouse=True, scope="module")
-def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GEARFE_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
 
 
 def coarse(changes: dict[str, Any] | None = None) -> HousingTable:

@@ -18,12 +18,7 @@ from gearfe.fem.plane import Material
 from gearfe.fem.solid import curved_elements, jacobian_determinants
 from tests.makers.housing_meshes import box, second_order
 
-
-@pytest.fixture(autouse=True, scope="module")
-def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GEARFE_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def tube(cells: tuple[int, int, int] = (2, 12, 3), *, order: int = 2) -> tuple[np.ndarray, np.ndarray]:

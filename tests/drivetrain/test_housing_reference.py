@@ -7,19 +7,13 @@ exact mass.
 
 from __future__ import annotations
 
-import json
-from typing import Any
-
 import numpy as np
 import pytest
 
 from gearfe.drivetrain.housing.model import Housing
 from tests.makers.full_model import full_model
-from tests.makers.housing_meshes import reference_housing
-from tests.makers.newmark import newmark, smooth_ramp
-from tests.places import DATA
-
-REFERENCE: dict[str, Any] = json.loads((DATA / "gearbox_housing.json").read_text())
+from tests.makers.housing_meshes import REFERENCE, reference_housing
+from tests.makers.newmark import below, newmark, smooth_ramp
 
 
 @pytest.fixture(scope="module")
@@ -79,10 +73,3 @@ def test_ramp_response_below_5_khz_is_that_of_the_full_model(exact: Housing) -> 
         a, b = (below(signal.acceleration[:, at], step, 5000.0) for signal in (truth, small))
         error = np.sqrt(np.mean((a - b) ** 2) / np.mean(a**2))
         assert error < 1e-3, (at, error)
-
-
-def below(signal: np.ndarray, step: float, limit_hz: float) -> np.ndarray:
-    """The part of a signal below a frequency."""
-    spectrum = np.fft.rfft(signal)
-    spectrum[np.fft.rfftfreq(len(signal), step) > limit_hz] = 0.0
-    return np.fft.irfft(spectrum, len(signal))

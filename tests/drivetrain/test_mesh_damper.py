@@ -9,27 +9,13 @@ import pytest
 from gearfe import InputError
 from gearfe.drivetrain.runup.run_up import steady_state
 from gearfe.drivetrain.train import GearMesh, build_train, simulate
-from gearfe.multibody import constant
 from tests.makers.gear_oscillator import GearOscillator
 from tests.makers.mesh_laws import hertzian_law
-from tests.makers.trains import SPEED, base_radius, changed, curve, train
+from tests.makers.train_pairs import BACKLASH, damped_pair
+from tests.makers.trains import SPEED, base_radius, changed, train
 
 METHODS = ["taylor", "implicit"]
 RULES = ["always", "in_contact"]
-BACKLASH = 4e-5
-
-
-def pair(acts, *, torque, speed=SPEED, ratio=0.04, stiffness=None, backlash=BACKLASH):
-    """A pair on stiff axes whose wheel alone may move, its damper a part of the critical one of the mean stiffness."""
-    k = curve(20, swing=0.3, count=12) if stiffness is None else stiffness
-    bare = train([(20, 30)], stiffness=lambda _: k)
-    mass = build_train(bare).shafts[1].rotor.polar / base_radius(30) ** 2
-    mean = k if isinstance(k, float) else k.mean
-    damper = 2.0 * ratio * math.sqrt(mean * mass)
-    mesh = dataclasses.replace(bare.meshes[0], damping=damper, backlash=backlash, damping_acts=acts)
-    load = dataclasses.replace(bare.loads[0], torque=constant(torque))
-    drive = dataclasses.replace(bare.drive, speed=constant(speed))
-    return changed(bare, meshes=(mesh,), loads=(load,), drive=drive), mass, damper
 
 
 def oscillator(model, mass, damper, torque, speed, acts):
@@ -44,7 +30,7 @@ def oscillator(model, mass, damper, torque, speed, acts):
 @pytest.mark.parametrize("acts", RULES)
 def test_transients_meet_an_integration_that_locates_the_touches(acts, method):
     torque, speed = 20.0, 1150.0
-    made, mass, damper = pair(acts, torque=torque, speed=speed)
+    made, mass, damper = damped_pair(acts, torque=torque, speed=speed)
     model = build_train(made)
     rows = oscillator(model, mass, damper, torque, speed, acts).run(2e-3, 2.5e-7)
     assert len(set(rows[:, 3])) > 1  # teeth part
@@ -57,7 +43,7 @@ def test_the_rules_differ_where_teeth_part():
     """What the comparison above tells apart: by far more than its bound."""
     ends = []
     for acts in RULES:
-        made, mass, damper = pair(acts, torque=20.0, speed=1150.0)
+        made, mass, damper = damped_pair(acts, torque=20.0, speed=1150.0)
         rows = oscillator(build_train(made), mass, damper, 20.0, 1150.0, acts).run(2e-3, 1e-6)
         ends.append(rows[:, 1])
     assert np.abs(ends[0] - ends[1]).max() > 1e-3 * np.abs(ends[0]).max()
@@ -67,7 +53,7 @@ def test_the_rules_differ_where_teeth_part():
 def test_a_wheel_between_both_flanks_keeps_its_speed_or_not(acts):
     """Without a load a flank gives back exp(-pi zeta / sqrt(1 - zeta^2)) of the speed; in the gap c alone may brake."""
     k, ratio = 1e8, 0.05
-    made, mass, damper = pair(acts, torque=0.0, ratio=ratio, stiffness=k)
+    made, mass, damper = damped_pair(acts, torque=0.0, ratio=ratio, stiffness=k)
     start, radius = 0.2, base_radius(30)  # m/s
     shafts = (made.shafts[0], dataclasses.replace(made.shafts[1], initial_speed=-SPEED * 20 / 30 + start / radius))
     model = build_train(changed(made, shafts=shafts))
@@ -90,7 +76,7 @@ def test_a_wheel_between_both_flanks_keeps_its_speed_or_not(acts):
 def test_steady_motions_and_multipliers_meet_shooting(acts):
     """Where teeth part in each period: the motion, its force, and the map of small disturbances."""
     torque, speed = 20.0, 1150.0
-    made, mass, damper = pair(acts, torque=torque, speed=speed, ratio=0.08)
+    made, mass, damper = damped_pair(acts, torque=torque, speed=speed, ratio=0.08)
     model = build_train(made)
     state = steady_state(model, speed, tolerance=1e-4)
     assert 0.05 < state.apart[0] < 0.9
@@ -115,7 +101,7 @@ def test_steady_motions_and_multipliers_meet_shooting(acts):
 @pytest.mark.parametrize("acts", RULES)
 def test_a_transient_ends_in_the_steady_motion(acts):
     torque, speed = 20.0, 1150.0
-    model = build_train(pair(acts, torque=torque, speed=speed, ratio=0.08)[0])
+    model = build_train(damped_pair(acts, torque=torque, speed=speed, ratio=0.08)[0])
     state = steady_state(model, speed, tolerance=1e-4, stability=False)
     period = 2.0 * math.pi / (20 * speed)
     late = period * (150 + np.linspace(0.0, 1.0, 65))

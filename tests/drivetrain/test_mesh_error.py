@@ -18,8 +18,7 @@ from gearfe.fem.reduction.error import accelerances, mesh_error
 from gearfe.fem.reduction.lanczos import lowest_modes
 from gearfe.fem.reduction.sparse_solver import factorize
 from gearfe.fem.solid import assemble
-from tests.drivetrain.test_housing_reference import REFERENCE
-from tests.makers.housing_meshes import box, reference_housing
+from tests.makers.housing_meshes import REFERENCE, bent, box, reference_housing
 
 STEEL = Material()
 
@@ -78,11 +77,6 @@ def test_linear_elements_are_known_to_be_far_off() -> None:
 
 def test_rigid_motions_and_exact_fields_have_no_error() -> None:
     """Curved elements too: a rotation is exact; pure bending is quadratic, so quadratic elements contain it."""
-
-    def bent(points: np.ndarray) -> np.ndarray:
-        x, y, z = points.T
-        return np.column_stack([x + 0.05 * np.sin(3.0 * y), y + 0.04 * x * z, z + 0.03 * x**2])
-
     nodes, tets = box((2, 2, 2), (1.0, 1.0, 1.0), mapped=bent)
     scale = STEEL.youngs_modulus
     lost = energy_lost(nodes, tets, STEEL, rigid_motions(nodes), np.zeros(6), [])

@@ -17,9 +17,8 @@ from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.meshlaw.law import MeshLaw
 from gearfe.gears.meshlaw.make import mesh_law
 from gearfe.multibody import TimeFunction, constant, integrate, smoothed_step
-from tests.drivetrain.test_train_contact import R1, R2, free_energy, free_pair, pair
-from tests.gears.test_mesh_law import DESIGN, PAIR, STEEL
-from tests.makers.mesh_laws import CYCLE, hertzian_law
+from tests.makers.mesh_laws import CYCLE, DESIGN, PAIR, STEEL, hertzian_law
+from tests.makers.train_pairs import R1, R2, free_energy, free_pair, pair
 from tests.makers.trains import base_radius, train
 
 EXCHANGED = GearPair(PAIR.wheel, PAIR.pinion)

@@ -29,16 +29,11 @@ from gearfe.fem.meshing.mesh_file import read_mesh_file
 from gearfe.fem.meshing.session import gmsh_session
 from tests.places import MESHES
 
+pytestmark = pytest.mark.usefixtures("own_cache")
+
 BORES = [{"group": f"bore_{i}"} for i in (1, 2, 3, 4)]
 #: The reference points that scripts/build/make_box.py builds: middles of walls 8 mm thick.
 POINTS = [(0.0, 31.0, 0.0), (0.0, -31.0, 0.0), (62.5, 31.0, 0.0), (62.5, -31.0, 0.0)]
-
-
-@pytest.fixture(autouse=True, scope="module")
-def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GEARFE_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
 
 
 def table(**keys: Any) -> HousingTable:

@@ -18,13 +18,8 @@ from gearfe.drivetrain.housing.refinement import refined
 from gearfe.fem.plane import Material
 from gearfe.fem.reduction.error import mesh_error
 from gearfe.fem.solid import EDGES, FACES, assemble
-from tests.makers.housing_meshes import box, second_order, surface_area
+from tests.makers.housing_meshes import bent, box, second_order, surface_area
 from tests.places import MESHES
-
-
-def bent(points: np.ndarray) -> np.ndarray:
-    x, y, z = points.T
-    return np.column_stack([x + 0.05 * np.sin(3.0 * y), y + 0.04 * x * z, z + 0.03 * x**2])
 
 
 def shape(nodes: np.ndarray, tets: np.ndarray) -> float:

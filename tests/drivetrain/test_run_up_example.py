@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import shlex
@@ -13,17 +12,13 @@ import numpy as np
 import pytest
 
 from gearfe.cli.main import main
+from tests.makers.files import csv_rows
+from tests.makers.pages import command_lines
 from tests.places import DOCS, GEOMETRY
-from tests.project.test_pages import command_lines
 
 #: Multiples of the first shaft's turns: once each mesh.
 MESHES = {"contact_force_1_N": 20.0, "contact_force_2_N": 40.0 / 3.0}
 Rows = Sequence[Mapping[str, str]]
-
-
-def rows_of(path: Path) -> Rows:
-    with path.open(newline="") as stream:
-        return list(csv.DictReader(stream))
 
 
 def cut(rows: Rows, order: float, column: str) -> tuple[np.ndarray, np.ndarray]:
@@ -50,7 +45,7 @@ def folder(tmp_path_factory) -> Path:
 def test_files_and_the_speed(folder: Path) -> None:
     made = {path.name for path in (folder / "run_up").iterdir()}
     assert made >= {f"{name}.{kind}" for name in ("spectrogram", "order_tracks") for kind in ("csv", "png")}
-    tracks = rows_of(folder / "run_up" / "order_tracks.csv")
+    tracks = csv_rows(folder / "run_up" / "order_tracks.csv")
     for row in tracks:
         assert float(row["speed_rad_per_s"]) == pytest.approx(300.0 + 2000.0 * float(row["time_s"]), rel=0.01)
     summary = json.loads((folder / "run_up" / "summary.json").read_text())
@@ -65,7 +60,7 @@ def test_between_resonances_orders_are_those_of_steady_motions(folder: Path) -> 
     keys = [word for name, value in speeds.items() for word in ("--set", f"runup.{name}={value}")]
     job, out = str(GEOMETRY / "gear_train.toml"), folder / "steady"
     assert main(["runup", job, *keys, "--no-pictures", "--no-stability", "--out", str(out)]) == 0
-    tracks, steady = rows_of(folder / "run_up" / "order_tracks.csv"), rows_of(out / "orders.csv")
+    tracks, steady = csv_rows(folder / "run_up" / "order_tracks.csv"), csv_rows(out / "orders.csv")
     for column, order in MESHES.items():
         (speed, height), known = cut(tracks, order, column), cut(steady, order, column)
         calm = (speed > 405.0) & (speed < 650.0)

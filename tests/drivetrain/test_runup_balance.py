@@ -9,29 +9,21 @@ import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
-from gearfe.drivetrain.runup.balance import Oscillator, error_of, settled, solve
+from gearfe.drivetrain.runup.balance import Oscillator, error_of, solve
 from gearfe.drivetrain.runup.first import first_motion
-from gearfe.drivetrain.runup.follow import follow
 from gearfe.drivetrain.runup.linear import Linear
-from tests.makers.oscillators import around, duffing, meshing, rates, shooting, synthesis, turning_speed
-
-
-def start_of(orbit, samples=64):  # type: ignore[no-untyped-def]
-    """Place and rate at theta = 0."""
-    omega = abs(orbit.speed)
-    size = max(samples, 2 * len(orbit.places))
-    u, du = synthesis(orbit.places, size), synthesis(rates(orbit.places, omega), size)
-    return np.array([u[0, 0], du[0, 0]])
-
-
-def found(system, speed, tolerance=1e-8, harmonics=16):  # type: ignore[no-untyped-def]
-    guess = np.zeros((harmonics + 1, 1), dtype=complex)
-    guess[0] = system.linear.rest
-    return settled(system, *solve(system, speed, guess, tolerance), tolerance)
-
-
-def curve(system, speeds, tolerance=1e-7, highest=0.0):  # type: ignore[no-untyped-def]
-    return follow(system, speeds, found(system, speeds[0], tolerance), tolerance=tolerance, highest=highest)
+from tests.makers.oscillators import (
+    around,
+    duffing,
+    meshing,
+    rates,
+    response_curve,
+    settled_at,
+    shooting,
+    start_of,
+    synthesis,
+    turning_speed,
+)
 
 
 @pytest.mark.parametrize("heavy", [0.05, 3.0])
@@ -66,7 +58,7 @@ def test_a_part_that_moves_freely_is_refused():
 def test_a_linear_oscillator_has_its_closed_response():
     system = dataclasses.replace(duffing(0.0, 0.02, 0.5), load=0.3)
     for speed in (0.4, 1.0, 1.7):
-        orbit = found(system.oscillator, speed, 1e-10)
+        orbit = settled_at(system.oscillator, speed, 1e-10)
         assert orbit.places[0, 0].real == pytest.approx(0.3, rel=1e-9)
         assert abs(orbit.places[1, 0] - 0.5 / (1 - speed**2 + 0.04j * speed)) < 1e-8 * abs(orbit.places[1, 0])
 
@@ -75,14 +67,14 @@ def test_a_linear_oscillator_has_its_closed_response():
 def test_a_slowly_stiffening_spring_in_its_series(order):
     """``(1 + e cos) x = 1`` at no speed: x = 1/(1 + e cos), whose harmonics are known."""
     e = 0.3
-    orbit = found(meshing(e, 0.5, 1.0).oscillator, 1e-6, 1e-10)
+    orbit = settled_at(meshing(e, 0.5, 1.0).oscillator, 1e-6, 1e-10)
     r = (math.sqrt(1 - e * e) - 1) / e
     assert orbit.places[order, 0].real == pytest.approx(2 * r**order / math.sqrt(1 - e * e), rel=1e-5)
 
 
 def test_duffing_on_three_branches_and_its_turning_points():
     system = duffing(0.05, 0.03, 0.2)
-    made = curve(system.oscillator, np.arange(0.8, 1.4, 0.02))
+    made = response_curve(system.oscillator, np.arange(0.8, 1.4, 0.02))
     assert made.note == ""
     assert len(made.turns) == 2
     assert sorted(set(made.branch)) == [0, 1, 2]
@@ -102,9 +94,9 @@ def test_duffing_on_three_branches_and_its_turning_points():
 def test_a_given_speed_beside_a_turning_point_is_on_each_branch_once(beside):
     """Where the orbit at a given speed is the one nearest to the turning point, too."""
     system, speeds = duffing(0.05, 0.03, 0.2), np.arange(0.8, 1.4, 0.02)
-    up, down = (turn.speed for turn in curve(system.oscillator, speeds).turns)
+    up, down = (turn.speed for turn in response_curve(system.oscillator, speeds).turns)
     speeds = np.sort(np.append(speeds, [up * (1.0 - beside), down * (1.0 + beside)]))
-    made = curve(system.oscillator, speeds)
+    made = response_curve(system.oscillator, speeds)
     assert made.note == ""
     assert len(made.turns) == 2
     met = [(b, o.speed) for o, b in zip(made.orbits, made.branch, strict=True) if o.speed in speeds]
@@ -116,7 +108,7 @@ def test_a_given_speed_beside_a_turning_point_is_on_each_branch_once(beside):
 def test_an_oscillator_with_backlash_on_both_branches_and_its_jumps():
     """k (1 + e cos) with parting teeth: amplitude and jumps against shooting with located touches."""
     system, together = meshing(0.1, 0.03, 1.0), meshing(0.1, 0.03, 1.0, gap=0.0)
-    made = curve(system.oscillator, np.arange(0.85, 1.1, 0.01), 2e-4, highest=20.0)
+    made = response_curve(system.oscillator, np.arange(0.85, 1.1, 0.01), 2e-4, highest=20.0)
     assert made.note == ""
     assert len(made.turns) == 2
     for branch in (0, 1, 2):
@@ -127,7 +119,7 @@ def test_an_oscillator_with_backlash_on_both_branches_and_its_jumps():
             assert np.abs(start_of(orbit) - exact).max() < 5.0 * orbit.error
     up, down = (turn.speed for turn in made.turns)
     # up: where the motion of teeth that never part touches 0
-    least = [synthesis(found(together.oscillator, w, 1e-9).places, 4096).min() for w in (0.999 * up, 1.001 * up)]
+    least = [synthesis(settled_at(together.oscillator, w, 1e-9).places, 4096).min() for w in (0.999 * up, 1.001 * up)]
     assert least[0] > 0.0 > least[1]
     # down: by shooting
     one, two = (made.orbits[made.turns[1].number + k] for k in (-1, 1))
@@ -150,7 +142,7 @@ def test_a_first_motion_grows_out_of_rest(speed):
 def test_the_back_side_bears_behind_the_gap():
     """Light load, one mode, teeth that hit both ways: shooting finds the same motion."""
     system = dataclasses.replace(meshing(0.1, 0.2, 0.3, gap=0.5), swing=1.0)
-    orbit = found(system.oscillator, 0.7, 1e-4, 32)
+    orbit = settled_at(system.oscillator, 0.7, 1e-4, 32)
     u = synthesis(orbit.places, 512)[:, 0]
     assert u.min() < -0.5
     gap = around(system, 0.7, start_of(orbit)) - start_of(orbit)
@@ -160,7 +152,7 @@ def test_the_back_side_bears_behind_the_gap():
 @pytest.mark.parametrize("phase", [0.0, 1.3])
 def test_what_a_force_puts_in_the_damper_takes_out(phase):
     system = dataclasses.replace(duffing(0.05, 0.03, 0.2), phase=phase)
-    orbit = found(system.oscillator, 0.9, 1e-9)
+    orbit = settled_at(system.oscillator, 0.9, 1e-9)
     theta = 2 * math.pi * np.arange(256) / 256
     rate = synthesis(rates(orbit.places, 0.9), 256)[:, 0]
     put = (0.2 * np.cos(theta + phase) * rate).mean()
@@ -168,7 +160,9 @@ def test_what_a_force_puts_in_the_damper_takes_out(phase):
 
 
 def test_the_begin_of_the_period_does_not_matter():
-    made = [found(dataclasses.replace(duffing(0.05, 0.03, 0.2), phase=p).oscillator, 0.9, 1e-9) for p in (0.0, 1.3)]
+    made = [
+        settled_at(dataclasses.replace(duffing(0.05, 0.03, 0.2), phase=p).oscillator, 0.9, 1e-9) for p in (0.0, 1.3)
+    ]
     turned = np.exp(1.3j * np.arange(6))[:, None]
     assert np.abs(made[1].places[:6] - turned * made[0].places[:6]).max() < 1e-7
 
@@ -180,8 +174,8 @@ def test_the_estimate_covers_the_error():
     for _ in range(12):
         system = meshing(rng.uniform(0.05, 0.3), rng.uniform(0.05, 0.2), 1.0).oscillator
         speed = rng.uniform(0.3, 1.6)
-        orbit = found(system, speed, 1e-2, 4)
-        fine = found(system, speed, 1e-6, 64)
+        orbit = settled_at(system, speed, 1e-2, 4)
+        fine = settled_at(system, speed, 1e-6, 64)
         true = float(np.linalg.norm(fine.places - orbit.with_harmonics(fine.harmonics)))
         covered += orbit.error >= true
         factors.append(orbit.error / max(true, 1e-300))
@@ -192,14 +186,14 @@ def test_the_estimate_covers_the_error():
 def test_a_stretch_without_solution_is_told():
     """Without damping the response at a linear resonance is infinite."""
     system = duffing(0.0, 0.0, 0.2).oscillator
-    made = curve(system, np.array([0.9, 0.95, 1.0, 1.05]))
+    made = response_curve(system, np.array([0.9, 0.95, 1.0, 1.05]))
     assert made.note
     assert [o.speed for o in made.orbits] == [0.9, 0.95]
 
 
 def test_error_of_a_known_orbit_is_round_off():
     system: Oscillator = duffing(0.05, 0.03, 0.2).oscillator
-    orbit = found(system, 0.5, 1e-9, 64)
+    orbit = settled_at(system, 0.5, 1e-9, 64)
     assert error_of(system, *solve(system, 0.5, orbit.places, 1e-9))[0] < 1e-6
 
 
@@ -209,7 +203,7 @@ def test_a_curve_passes_each_speed_once_between_two_turning_points():
     speeds = np.linspace(0.15, 2.6, 60)
     for _ in range(10):
         ripple, damping, gap = rng.uniform(0.05, 0.4), 10 ** rng.uniform(-1.7, -1.0), rng.choice([math.inf, 2.0])
-        made = curve(meshing(ripple, damping, 1.0, gap=gap).oscillator, speeds, 1e-3)
+        made = response_curve(meshing(ripple, damping, 1.0, gap=gap).oscillator, speeds, 1e-3)
         assert not made.note
         passed = [(b, o.speed) for b, o in zip(made.branch, made.orbits, strict=True) if o.speed in speeds]
         assert len(passed) == len(set(passed))

@@ -26,8 +26,8 @@ from gearfe.drivetrain.runup.run_up import run_up, steady_state
 from gearfe.drivetrain.runup.stability import multipliers, window
 from gearfe.drivetrain.train import TrainModel, build_train, simulate
 from gearfe.drivetrain.train.kinematics import mesh_phases
-from tests.drivetrain.test_runup_train import loaded, smooth
 from tests.makers.mesh_laws import hertzian_law
+from tests.makers.trains import loaded, smooth
 
 HUNTING = [(17, 53), (19, 61)]
 

@@ -9,7 +9,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from gearfe.drivetrain.runup.balance import size_of, widened
 from gearfe.drivetrain.runup.condensed import condense
@@ -19,24 +18,14 @@ from gearfe.drivetrain.runup.run_up import run_up, steady_state
 from gearfe.drivetrain.train import TrainModel, build_train
 from gearfe.drivetrain.train.states import train_states
 from gearfe.multibody import constant, integrate
-from tests.drivetrain.test_runup_train import loaded, smooth
 from tests.makers.mesh_laws import hertzian_law
-from tests.makers.trains import curve
-
-Array = NDArray[np.float64]
+from tests.makers.trains import Array, curve, loaded, modal_start, smooth
 
 
 def at_speed(model: TrainModel, speed: float) -> TrainModel:
     return build_train(
         dataclasses.replace(model.train, drive=dataclasses.replace(model.train.driven, speed=constant(speed)))
     )
-
-
-def start_of(model: TrainModel, state: SteadyState) -> Array:
-    """Modal coordinates and their rates at the begin of the period."""
-    omega = 2.0 * np.pi * state.frequency
-    y = condense(model).system.linear.modal(omega, state.speed, state.orbit.forces)
-    return np.concatenate([y.sum(axis=0).real, (1j * omega[:, None] * y).sum(axis=0).real])
 
 
 def shot(model: TrainModel, start: Array, period: float, samples: int = 2) -> tuple[Array, Array]:
@@ -70,7 +59,7 @@ def orbit(model: TrainModel, start: Array, period: float) -> tuple[Array, Array]
 def compared(model: TrainModel, state: SteadyState, bound: float) -> None:
     """Start, forces over the period, and multipliers of a state against the orbit."""
     model = at_speed(model, state.speed)
-    guess = start_of(model, state)
+    guess = modal_start(model, state)
     exact, monodromy = orbit(model, guess, state.period)
     n = len(guess) // 2
     for part in (slice(None, n), slice(n, None)):

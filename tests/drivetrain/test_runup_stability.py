@@ -19,10 +19,9 @@ from gearfe.drivetrain.runup.run_up import run_up, steady_state
 from gearfe.drivetrain.runup.stability import STABLE, kind_of, multipliers
 from gearfe.drivetrain.runup.train_stability import train_stability
 from gearfe.drivetrain.train import build_train
-from tests.drivetrain.test_runup_balance import curve, found, start_of
-from tests.drivetrain.test_runup_train import loaded, smooth
-from tests.makers.oscillators import duffing, meshing, monodromy
+from tests.makers.oscillators import duffing, meshing, monodromy, response_curve, settled_at, start_of
 from tests.makers.trains import curve as stiffness_curve
+from tests.makers.trains import loaded, smooth
 
 
 def smooth_of(teeth, swing):  # type: ignore[no-untyped-def]
@@ -35,7 +34,7 @@ def test_the_borders_of_mathieus_equation(border):
     e = 0.3
     edge = brentq(lambda w: border(1, 2 * e / w**2) - 4 / w**2, 1.5, 2.5)
     system = meshing(e, 0.0, 1.0, gap=0.0).oscillator
-    sides = [multipliers(system, found(system, edge * (1 + s * 2e-4), 1e-8)) for s in (-1, 1)]
+    sides = [multipliers(system, settled_at(system, edge * (1 + s * 2e-4), 1e-8)) for s in (-1, 1)]
     stable, unstable = sorted(sides, key=lambda x: abs(x[0]))
     assert abs(stable[0]) == pytest.approx(1.0, abs=1e-5)
     assert abs(unstable[0]) > 1.003
@@ -47,7 +46,7 @@ def test_multipliers_of_oscillators_by_direct_integration():
         (duffing(0.05, 0.03, 0.2), np.arange(0.8, 1.3, 0.05), False),
         (meshing(0.1, 0.03, 1.0), np.arange(0.85, 1.0, 0.03), True),
     ):
-        made = curve(system.oscillator, speeds, 1e-4 if parts else 1e-7, highest=20.0)
+        made = response_curve(system.oscillator, speeds, 1e-4 if parts else 1e-7, highest=20.0)
         for orbit in made.orbits[::3]:
             exact = np.linalg.eigvals(monodromy(system, orbit.speed, start_of(orbit), parts=parts))
             mine = multipliers(system.oscillator, orbit)
@@ -56,7 +55,7 @@ def test_multipliers_of_oscillators_by_direct_integration():
 
 def test_branches_between_turning_points_are_unstable():
     system = duffing(0.05, 0.03, 0.2)
-    made = curve(system.oscillator, np.arange(0.8, 1.4, 0.02))
+    made = response_curve(system.oscillator, np.arange(0.8, 1.4, 0.02))
     for orbit, branch in zip(made.orbits, made.branch, strict=True):
         largest = abs(multipliers(system.oscillator, orbit)[0])
         if math.isnan(orbit.error):  # next to a turning point

@@ -10,15 +10,15 @@ from gearfe.base.errors import InputError
 from gearfe.drivetrain.runup.run_up import run_up, steady_state
 from gearfe.drivetrain.train import build_train
 from gearfe.multibody import TimeFunction, constant, sine
-from tests.drivetrain.test_mesh_damper import pair
 from tests.makers.gear_oscillator import GearOscillator
+from tests.makers.train_pairs import damped_pair
 from tests.makers.trains import base_radius, changed
 
 TORQUE, SPEED = 60.0, 700.0
 
 
 def oscillating(multiple, amplitude=4.0, phase=0.4):
-    made, mass, damper = pair("always", torque=TORQUE, speed=SPEED, ratio=0.08)
+    made, mass, damper = damped_pair("always", torque=TORQUE, speed=SPEED, ratio=0.08)
     omega = multiple * 20 * SPEED
     torque = constant(TORQUE) + sine(amplitude, omega, phase)
     load = dataclasses.replace(made.loads[0], torque=torque)

@@ -20,26 +20,14 @@ from gearfe.drivetrain.runup.orders import OrderCut
 from gearfe.drivetrain.runup.run_up import run_up, steady_state
 from gearfe.drivetrain.runup.stability import multipliers
 from gearfe.drivetrain.runup.swinging import mesh_modes, swinging, write_modes
-from gearfe.drivetrain.train import Damping, Load, build_train, simulate
+from gearfe.drivetrain.train import Damping, build_train, simulate
 from gearfe.drivetrain.train.friction import Lubrication
 from gearfe.figures.campbell import signal_of
 from gearfe.multibody import constant
-from tests.cli.test_cli_vibration import SMALL
+from tests.makers.job_texts import SMALL_TRAIN
 from tests.makers.mesh_laws import hertzian_law, numpy_law
 from tests.makers.oscillators import analysis, rates, synthesis
-from tests.makers.trains import curve, elastic, train
-
-
-def loaded(stages, stiffness, *, speed=600.0, torque=60.0, ratio=0.05, backlash=None, flexible=True, **options):  # type: ignore[no-untyped-def]
-    """A train with a constant load from the begin on, all modes damped."""
-    gear_train = train(stages, stiffness=stiffness, damping=Damping(ratio=ratio), **options)
-    last = f"s{len(stages)}"
-    load = Load(last, f"{last}+", constant(-torque * (-1) ** len(stages) * math.copysign(1.0, speed)))
-    gear_train = dataclasses.replace(
-        gear_train, loads=(load,), drive=dataclasses.replace(gear_train.drive, speed=constant(speed)),
-        meshes=tuple(dataclasses.replace(m, backlash=backlash) for m in gear_train.meshes),
-    )  # fmt: skip
-    return elastic(gear_train, uneven=0.2, skew=0.5) if flexible else gear_train
+from tests.makers.trains import loaded, smooth, train
 
 
 def settled_transient(model, state, periods, samples=256, tolerance=1e-7):  # type: ignore[no-untyped-def]
@@ -48,10 +36,6 @@ def settled_transient(model, state, periods, samples=256, tolerance=1e-7):  # ty
     made = simulate(model, times, tolerance=tolerance)
     last = slice(-samples - 1, -1)
     return made.contact_force[last], made.transmission_error[last], made.attachment_acceleration[last]
-
-
-def smooth(teeth):  # type: ignore[no-untyped-def]
-    return curve(teeth, mean=1e8, swing=0.15)
 
 
 @pytest.mark.parametrize(
@@ -320,7 +304,7 @@ speeds = 6
 def job(tmp_path):  # type: ignore[no-untyped-def]
     rows = "\n".join(f"{18.0 * i / 12},{1e8 * (1 + 0.1 * math.cos(2 * math.pi * i / 12))}" for i in range(12))
     (tmp_path / "k.csv").write_text("pinion_angle_deg,k_mesh_N_per_m\n" + rows + "\n")
-    text = SMALL.replace("stiffness_N_per_m = 1e8", 'curve = "k.csv"')
+    text = SMALL_TRAIN.replace("stiffness_N_per_m = 1e8", 'curve = "k.csv"')
 
     def write(extra):  # type: ignore[no-untyped-def]
         path = tmp_path / "job.toml"

@@ -14,7 +14,7 @@ from gearfe.cli.main import main
 from gearfe.drivetrain.train.response import TrainResponse
 from gearfe.drivetrain.vibration.measured import read_universal
 from gearfe.drivetrain.vibration.short_time import Tracked, averaged, order_tracks, short_time, steady_from
-from tests.cli.test_cli_vibration import SMALL
+from tests.makers.job_texts import SMALL_TRAIN
 
 STEP = 2e-5
 TIME = STEP * np.arange(25_001)  # 0.5 s
@@ -202,7 +202,7 @@ def test_universal_files_that_are_none_are_told(text, number, told):
 
 
 def job(tmp_path, spectrum: str, duration: float = 20.0, drive: str = "600.0"):
-    text = SMALL.replace("duration_ms = 2.0", f"duration_ms = {duration}")
+    text = SMALL_TRAIN.replace("duration_ms = 2.0", f"duration_ms = {duration}")
     path = tmp_path / "job.toml"
     path.write_text(text.replace("speed_rad_per_s = 600.0", f"speed_rad_per_s = {drive}") + f"[spectrum]\n{spectrum}\n")
     return path

@@ -8,7 +8,6 @@ import pytest
 from gearfe.drivetrain.train import build_train, simulate
 from gearfe.drivetrain.train.discontinuities import leaves, train_discontinuity
 from gearfe.drivetrain.train.forces import CurveFlank, Gyro, LawFlank, TrainForces
-from gearfe.drivetrain.train.program import train_series
 from gearfe.drivetrain.train.series import train_order
 from gearfe.gears.gearmesh.periodic import periodic_interpolant
 from gearfe.multibody import TimeFunction, constant, smoothed_step
@@ -16,7 +15,7 @@ from gearfe.multibody.compiled import kernels as compiled
 from gearfe.multibody.integrators.taylor import kernel_modal
 from tests.makers.mesh_laws import hertzian_law
 from tests.makers.rigid_cases import by_scipy
-from tests.makers.trains import SHIPPED, curve, train
+from tests.makers.trains import SHIPPED, curve, series_at_start, train
 
 SPEED = 600.0
 NODES = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
@@ -27,14 +26,6 @@ def flank(sense=1.0, method="linear", direction=0, spin=1, parts=False, gap=0.0)
     values = np.array([1e8, 1.1e8, 0.9e8, 1e8, 1.05e8])
     shape = periodic_interpolant(NODES, values, 0.6, widest_gap=0.3, method=method)
     return CurveFlank(direction, spin, 1.0, sense, 0.0, 1e8, gap, shape, parts)
-
-
-def began(forces, t, sign, u, s):
-    """Series law, memory and whole numbers at a start."""
-    law = train_series(forces)
-    memory, pieces = np.zeros((law.rows, u.shape[1])), np.zeros(law.pieces, dtype=np.int64)
-    law.begin(t, sign, u[:, 0], u[:, 1] / s, memory, pieces)
-    return law.parameters, memory, pieces
 
 
 @pytest.mark.parametrize("kind", ["linear", "cubic", "law"])
@@ -57,7 +48,7 @@ def test_the_series_sums_up_to_the_law(kind, s):
     u = np.zeros((6, most + 1))
     u[:, :5] = random.normal(size=(6, 5)) * [1e-6, 2e-7, 1e-7, 1e-7, 1e-7]
     u[3:5, 0] = 3.1e-5, 1.7e-5  # no pair leaves its cell of the force
-    parameters, memory, pieces = began(forces, t, math.copysign(1.0, s), u, s)
+    parameters, memory, pieces = series_at_start(forces, t, math.copysign(1.0, s), u, s)
     out, orders = np.zeros(6), np.zeros((most, 6))
     for j in range(most):
         train_order(j, t, s, u, parameters, memory, pieces, out)
@@ -86,7 +77,7 @@ def test_the_way_to_the_next_discontinuity(t, spin, sense, sign, way):
     s = sign * 0.3 / SPEED
     u, out = np.zeros((2, 11)), np.zeros(2)
     u[1, 0] = spin
-    parameters, memory, pieces = began(forces, t, sign, u, s)
+    parameters, memory, pieces = series_at_start(forces, t, sign, u, s)
     for j in range(10):
         train_order(j, t, s, u, parameters, memory, pieces, out)
     before = pieces.copy()
@@ -104,7 +95,7 @@ def test_a_flank_parts_where_its_approach_ends(ends):
     forces = TrainForces(2, constant(1.0).integral(0.0, 0.0), (), (flank(1.0, "linear", 0, 1, True),), ())
     s, out, u = 1e-6, np.zeros(2), np.zeros((2, 11))
     u[0, :3] = 1e-6 * np.array([ends[0] * ends[1], -sum(ends), 1.0])
-    parameters, memory, pieces = began(forces, 0.05, 1.0, u, s)
+    parameters, memory, pieces = series_at_start(forces, 0.05, 1.0, u, s)
     for j in range(10):
         train_order(j, 0.05, s, u, parameters, memory, pieces, out)
     assert train_discontinuity(9, 1.0, parameters, memory, pieces, False) == pytest.approx(ends[0], rel=1e-9)
@@ -116,7 +107,7 @@ def test_a_flank_parts_where_its_approach_ends(ends):
 
 def test_a_constant_stiffness_has_no_discontinuity():
     forces = TrainForces(1, constant(SPEED), (), (), ())
-    parameters, memory, pieces = began(forces, 0.0, 1.0, np.zeros((1, 11)), 1.0)
+    parameters, memory, pieces = series_at_start(forces, 0.0, 1.0, np.zeros((1, 11)), 1.0)
     assert train_discontinuity(9, 1.0, parameters, memory, pieces, False) == 2.0
 
 

@@ -15,7 +15,8 @@ from gearfe.drivetrain.gearbox.job import job_train, read_train_job
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.train import Drive, GearMesh, Load, build_train, simulate
 from gearfe.multibody import TimeFunction, constant, smoothed_step
-from tests.drivetrain.test_train_job import BORES, SMALL, written
+from tests.makers.files import job_file
+from tests.makers.job_texts import BARE_TRAIN, BORES
 from tests.makers.trains import SHIPPED, base_radius, braking, changed, train
 
 BASE = train(SHIPPED)
@@ -39,7 +40,7 @@ def loaded(*torques: TimeFunction | float, shafts: tuple[str, ...] = ("s2",), **
 
 def test_a_load_of_the_wrong_sign_says_so(tmp_path: Path) -> None:
     """Before any curve is computed: the curves of the file are made in between."""
-    path = written(tmp_path, SMALL.replace("torque_Nm = -30.0", "torque_Nm = 30.0") + BORES)
+    path = job_file(tmp_path, BARE_TRAIN.replace("torque_Nm = -30.0", "torque_Nm = 30.0") + BORES)
     job = read_train_job(path)
     force = 30.0 / (0.027 * math.cos(math.radians(20.0)))
     words = rf"load on 'out' torque_Nm = 30.0: drives the train.*is -{force:.6g} N.*write -30 to brake"
@@ -51,27 +52,31 @@ def test_a_load_of_the_wrong_sign_says_so(tmp_path: Path) -> None:
 
 def test_a_load_that_drives_works_on_back_flanks_that_are_known(tmp_path: Path) -> None:
     """By the backlash of the mesh, or with a mesh law that of the gears; a stiffness without backlash has none."""
-    wrong = SMALL.replace("torque_Nm = -30.0", "torque_Nm = 30.0") + BORES
+    wrong = BARE_TRAIN.replace("torque_Nm = -30.0", "torque_Nm = 30.0") + BORES
     force = 30.0 / (0.027 * math.cos(math.radians(20.0)))
-    job = read_train_job(written(tmp_path, wrong.replace("= 2e8", "= 2e8\nbacklash_um = 20.0")))
+    job = read_train_job(job_file(tmp_path, wrong.replace("= 2e8", "= 2e8\nbacklash_um = 20.0")))
     made = simulate(build_train(job_train(job, train_curves(job))), job.times, tolerance=job.table.tolerance)
     assert made.contact_force[-1, 0] == pytest.approx(-force, rel=0.2)
     mapped = wrong.replace("stiffness_N_per_m = 2e8", "") + PAIR
-    assert job_train(read_train_job(written(tmp_path, mapped))).kinematics.steady_forces == pytest.approx([-force])
+    assert job_train(read_train_job(job_file(tmp_path, mapped))).kinematics.steady_forces == pytest.approx([-force])
     for change in (
         ("thinning_um = 20.0", "thinning_um = 0.0"),
         ('driven = "b"', 'driven = "b"\nmesh_model = "variable_stiffness"'),
     ):
         with pytest.raises(InputError, match="drives the train"):
-            job_train(read_train_job(written(tmp_path, mapped.replace(*change))))
+            job_train(read_train_job(job_file(tmp_path, mapped.replace(*change))))
 
 
 def test_a_load_beyond_every_contact_names_the_mesh(tmp_path: Path) -> None:
-    text = SMALL.replace("stiffness_N_per_m = 2e8", "").replace("torque_Nm = -30.0", "torque_Nm = -3e5") + BORES + PAIR
+    text = (
+        BARE_TRAIN.replace("stiffness_N_per_m = 2e8", "").replace("torque_Nm = -30.0", "torque_Nm = -3e5")
+        + BORES
+        + PAIR
+    )
     with pytest.raises(
         InputError, match=r"mesh 'a-b' mesh_model_torque_Nm = 1500000.*no contact solution.*smaller load"
     ):
-        train_curves(read_train_job(written(tmp_path, text)))
+        train_curves(read_train_job(job_file(tmp_path, text)))
 
 
 @pytest.mark.parametrize("speed", [600.0, -600.0])
@@ -139,9 +144,11 @@ def test_what_is_no_mistake() -> None:
 @pytest.mark.parametrize("kind", ["stiffness", "potential"])
 def test_steady_states_on_back_flanks_begin_behind_the_backlash(tmp_path: Path, kind: str) -> None:
     """Slow motions carry the force of statics, of the load and of the opposite one, and the teeth stay in contact."""
-    text = SMALL + BORES if kind == "stiffness" else SMALL.replace("stiffness_N_per_m = 2e8", "") + BORES + PAIR
+    text = (
+        BARE_TRAIN + BORES if kind == "stiffness" else BARE_TRAIN.replace("stiffness_N_per_m = 2e8", "") + BORES + PAIR
+    )
     text = text.replace("= 2e8", "= 2e8\nbacklash_um = 20.0").replace("ratio = 0.05", "ratio = 0.2")
-    job = read_train_job(written(tmp_path, text))
+    job = read_train_job(job_file(tmp_path, text))
     curves = train_curves(job)
     driven = job_train(job, curves)
     driving = changed(driven, loads=tuple(dataclasses.replace(x, torque=-1.0 * x.torque) for x in driven.loads))

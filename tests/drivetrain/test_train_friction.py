@@ -15,10 +15,9 @@ from gearfe.drivetrain.train.friction import Lubrication, Sliding, smooth_sign
 from gearfe.drivetrain.train.series import train_order
 from gearfe.gears.geometry.pair import MeshGeometry
 from gearfe.multibody import TimeFunction, constant, smoothed_step
-from tests.drivetrain.test_train_contact import R1, R2, pair
-from tests.drivetrain.test_train_discontinuities import began
 from tests.makers.mesh_laws import hertzian_law
-from tests.makers.trains import gear
+from tests.makers.train_pairs import R1, R2, pair
+from tests.makers.trains import gear, series_at_start
 
 GEOMETRY = MeshGeometry(gear(20), gear(30))
 
@@ -46,7 +45,7 @@ def test_the_series_of_friction_sums_up_to_its_law(s):
     u = np.zeros((9, most + 1))
     u[:, :5] = random.normal(size=(9, 5)) * [1e-6, 2e-7, 1e-7, 1e-7, 1e-7]
     u[3:5, 0], u[6:] = (3.1e-5, 1.7e-5), 1e-2 * u[6:]
-    parameters, memory, pieces = began(forces, t, math.copysign(1.0, s), u, s)
+    parameters, memory, pieces = series_at_start(forces, t, math.copysign(1.0, s), u, s)
     out, orders = np.zeros(9), np.zeros((most, 9))
     for j in range(most):
         train_order(j, t, s, u, parameters, memory, pieces, out)

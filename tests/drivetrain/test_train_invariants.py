@@ -12,8 +12,8 @@ from gearfe.drivetrain.train import Drive, build_train
 from gearfe.drivetrain.train.forces import LawFlank
 from gearfe.drivetrain.train.states import train_states
 from gearfe.multibody import TimeFunction, constant, integrate
-from tests.drivetrain.test_train_contact import R1, R2, pair
 from tests.makers.mesh_laws import hertzian_law
+from tests.makers.train_pairs import R1, R2, pair
 
 
 def thrown(law, rate, **changes):  # type: ignore[no-untyped-def]

@@ -21,70 +21,11 @@ from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.train import build_train, simulate
 from gearfe.gears.gearmesh.curve import StiffnessCurve
 from gearfe.gears.geometry.pair import GearPair, gear_of
+from tests.makers.files import job_file
+from tests.makers.job_texts import BARE_TRAIN, BORES
 from tests.places import GEOMETRY
 
 SHIPPED = GEOMETRY / "gear_train.toml"
-
-SMALL = """
-[train]
-housing = "rigid"
-duration_ms = 2.0
-step_us = 100.0
-[[train.shafts]]
-name = "in"
-x_mm = 0.0
-length_mm = 60.0
-radius_mm = 8.0
-attachments = [1, 2]
-[[train.shafts]]
-name = "out"
-x_mm = 45.0
-length_mm = 60.0
-radius_mm = 8.0
-attachments = [3, 4]
-[[train.gears]]
-name = "a"
-shaft = "in"
-y_mm = 0.0
-teeth = 18
-module_mm = 2.0
-pressure_angle_deg = 20.0
-face_width_mm = 12.0
-[[train.gears]]
-name = "b"
-shaft = "out"
-y_mm = 0.0
-teeth = 27
-module_mm = 2.0
-pressure_angle_deg = 20.0
-face_width_mm = 12.0
-[[train.meshes]]
-driver = "a"
-driven = "b"
-stiffness_N_per_m = 2e8
-[train.drive]
-shaft = "in"
-attachment = 1
-speed_rad_per_s = -300.0
-[[train.loads]]
-shaft = "out"
-attachment = 3
-torque_Nm = -30.0
-ramp_centre_ms = 0.5
-ramp_width_ms = 1.0
-[train.damping]
-ratio = 0.05
-"""
-BORES = "".join(
-    f"[[train.rigid_bores]]\nattachment = {i + 1}\nx_mm = {45.0 * (i // 2)}\ny_mm = {20.0 - 40.0 * (i % 2)}\n"
-    for i in range(4)
-)
-
-
-def written(folder: Path, text: str) -> Path:
-    path = folder / "job.toml"
-    path.write_text(text)
-    return path
 
 
 def test_the_shipped_job_is_what_it_says() -> None:
@@ -124,7 +65,7 @@ def test_the_other_commands_read_the_same_file() -> None:
 
 
 def test_a_train_with_its_own_gears_runs(tmp_path: Path) -> None:
-    job = read_train_job(written(tmp_path, SMALL + BORES))
+    job = read_train_job(job_file(tmp_path, BARE_TRAIN + BORES))
     model = build_train(job_train(job, train_curves(job), None))
     response = simulate(model, job.times, tolerance=job.table.tolerance)
     assert response.status == "done"
@@ -139,7 +80,7 @@ def test_a_gear_of_its_own_with_the_keys_of_a_pair_is_the_pairs(tmp_path: Path) 
     form |= {"tip_relief_amount_um": 12.0, "tip_relief_length_mm": 2.0, "tip_relief_exponent": 2.0}
     gears = {"pinion": {"teeth": 20, "bore_diameter_mm": 10.0}, "wheel": {"teeth": 30, "bore_diameter_mm": 15.0}}
     expected = GearPair.from_table(build(PairTable, {**form, **gears}, "pair")).pinion
-    job = read_train_job(written(tmp_path, SMALL + BORES))
+    job = read_train_job(job_file(tmp_path, BARE_TRAIN + BORES))
     keys = {**form, **gears["pinion"], "name": "in", "shaft": "in", "y_mm": 0.0}
     own = build(TrainGearTable, keys, "gear")
     table = dataclasses.replace(job.table, gears=(own,), meshes=())
@@ -150,11 +91,11 @@ def test_files_for_curves(tmp_path: Path) -> None:
     angles = np.arange(20.0)
     rows = "\n".join(f"{a},{1.5e8 + 1e7 * math.cos(math.radians(18 * a))}" for a in angles)
     (tmp_path / "k.csv").write_text("pinion_angle_deg,k_mesh_N_per_m\n" + rows + "\n")
-    text = SMALL.replace("stiffness_N_per_m = 2e8", 'curve = "k.csv"') + BORES
-    (found,) = train_curves(read_train_job(written(tmp_path, text)))
+    text = BARE_TRAIN.replace("stiffness_N_per_m = 2e8", 'curve = "k.csv"') + BORES
+    (found,) = train_curves(read_train_job(job_file(tmp_path, text)))
     assert isinstance(found, StiffnessCurve)
     assert found.mesh_cycle == pytest.approx(2 * math.pi / 18)  # the driver's
-    job = read_train_job(written(tmp_path, SMALL + BORES))
+    job = read_train_job(job_file(tmp_path, BARE_TRAIN + BORES))
     assert isinstance(train_curves(job, [tmp_path / "k.csv"])[0], StiffnessCurve)
     with pytest.raises(InputError, match="2 files for 1 meshes"):
         train_curves(job, [tmp_path / "k.csv"] * 2)
@@ -208,8 +149,8 @@ def built(path: Path) -> None:
     ],
 )
 def test_mistakes_in_a_file(tmp_path: Path, old: str, new: str, words: str) -> None:
-    assert old in SMALL
-    path = written(tmp_path, SMALL.replace(old, new, 1) + BORES)
+    assert old in BARE_TRAIN
+    path = job_file(tmp_path, BARE_TRAIN.replace(old, new, 1) + BORES)
     with pytest.raises(InputError, match=words):
         built(path)
 
@@ -237,31 +178,31 @@ def test_removed_keys_and_values_of_mesh_models_name_the_new_line(
 ) -> None:
     """The contact law is the only thing that `law` names; a mesh of a train has a model."""
     in_mesh = where == "train.meshes[0]"
-    text = SMALL.replace("= 2e8", f"= 2e8\n{line}") if in_mesh else f"{SMALL}{BORES}[{where}]\n{line}\n"
+    text = BARE_TRAIN.replace("= 2e8", f"= 2e8\n{line}") if in_mesh else f"{BARE_TRAIN}{BORES}[{where}]\n{line}\n"
     key = line.partition(" ")[0]
     with pytest.raises(InputError, match=re.escape(f"{where}.{key} = ") + ".*" + re.escape(cure)):
-        read_train_job(written(tmp_path, text))
+        read_train_job(job_file(tmp_path, text))
 
 
 def test_the_removed_key_of_the_largest_torque_names_the_new_line(tmp_path: Path) -> None:
-    text = SMALL.replace("stiffness_N_per_m = 2e8", "law_torque_Nm = 450.5") + BORES
+    text = BARE_TRAIN.replace("stiffness_N_per_m = 2e8", "law_torque_Nm = 450.5") + BORES
     with pytest.raises(InputError, match=r"meshes\[0\].law_torque_Nm = 450.5.*write mesh_model_torque_Nm = 450.5"):
-        read_train_job(written(tmp_path, text))
+        read_train_job(job_file(tmp_path, text))
 
 
 def test_keys_of_a_variant_win_over_those_of_the_stiffness_table(tmp_path: Path) -> None:
     """The others are shared, and a load of either kind is instead of the shared one."""
     shared = "[stiffness]\ntorque_Nm = 20.0\ncoarsen = 2.0\nlaw = 'penalty'\n"
     own = "[train.variants.A.stiffness]\ntwist_deg = 0.3\nlaw = 'half_plane'\n[train.variants.B.curves]\n"
-    path = written(tmp_path, shared + SMALL + BORES + own)
+    path = job_file(tmp_path, shared + BARE_TRAIN + BORES + own)
     found = {name: read_train_job(path, name).stiffness for name in ("", "A", "B")}
     assert found[""] == found["B"] == StiffnessTable(torque_Nm=20.0, coarsen=2.0, law="penalty")
     assert found["A"] == StiffnessTable(twist_deg=0.3, coarsen=2.0, law="half_plane")
     with pytest.raises(InputError, match=r"train.variants.A.stiffness.coarsen = 9.0: must be finite and >= 0.2"):
-        read_train_job(written(tmp_path, SMALL + BORES + "[train.variants.A.stiffness]\ncoarsen = 9.0\n"))
+        read_train_job(job_file(tmp_path, BARE_TRAIN + BORES + "[train.variants.A.stiffness]\ncoarsen = 9.0\n"))
     both = "[train.variants.A.stiffness]\ntwist_deg = 0.3\ntorque_Nm = 1.0\n"
     with pytest.raises(InputError, match=r"train.variants.A.stiffness.torque_Nm = 1.0: stands beside twist_deg"):
-        read_train_job(written(tmp_path, SMALL + BORES + both))
+        read_train_job(job_file(tmp_path, BARE_TRAIN + BORES + both))
 
 
 def test_the_shipped_tutorial_is_the_published_load_by_nitsche() -> None:
@@ -273,4 +214,4 @@ def test_the_shipped_tutorial_is_the_published_load_by_nitsche() -> None:
 
 def test_missing_bores_are_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"neither .*rigid_bores.* nor"):
-        built(written(tmp_path, SMALL))
+        built(job_file(tmp_path, BARE_TRAIN))

@@ -15,7 +15,7 @@ from scipy.optimize import fsolve
 from gearfe.drivetrain.runup.run_up import run_up
 from gearfe.drivetrain.train import TrainModel, build_train, simulate
 from gearfe.multibody import TimeFunction, constant, smoothed_step
-from tests.drivetrain.test_train_contact import pair
+from tests.makers.train_pairs import pair
 from tests.makers.trains import base_radius, curve
 
 Array = NDArray[np.float64]

@@ -16,8 +16,8 @@ from gearfe.drivetrain.train.model import TrainModel
 from gearfe.drivetrain.train.statics import static_errors
 from gearfe.gears.geometry.curves import inv
 from gearfe.multibody import constant, smoothed_step
-from tests.drivetrain.test_train_contact import free_energy, free_pair, pair
 from tests.makers.mesh_laws import hertzian_law
+from tests.makers.train_pairs import free_energy, free_pair, pair
 from tests.makers.trains import curve, train
 
 

@@ -12,7 +12,7 @@ from gearfe.base.errors import InputError
 from gearfe.base.tables.timefunction import TrainFunctionTable
 from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.timefunctions import PIECES, fitted, time_function
-from tests.cli.test_cli_vibration import SMALL
+from tests.makers.job_texts import SMALL_TRAIN
 
 TIMES = np.linspace(0.0, 0.1, 4001)
 
@@ -101,7 +101,7 @@ LOAD = "torque_Nm = 75.0\nramp_centre_ms = 0.25\nramp_width_ms = 0.5"
 
 def job(tmp_path, drive: str = DRIVE, load: str = LOAD):
     path = tmp_path / "job.toml"
-    path.write_text(SMALL.replace(DRIVE, drive).replace(LOAD, load))
+    path.write_text(SMALL_TRAIN.replace(DRIVE, drive).replace(LOAD, load))
     return path
 
 

@@ -21,7 +21,7 @@ from gearfe.drivetrain.vibration.report import train_summary
 from gearfe.drivetrain.vibration.spectra import TrainRecord
 from gearfe.gears.gearmesh.curve import StiffnessCurve
 from gearfe.multibody import constant
-from tests.cli.test_cli_vibration import SMALL
+from tests.makers.job_texts import SMALL_TRAIN
 from tests.makers.trains import SHIPPED, curve, elastic, train
 
 TIMES = 20e-6 * np.arange(301)
@@ -170,7 +170,7 @@ def test_error_of_the_curve_is_that_of_a_stiffer_one() -> None:
 
 def test_command_tells_one_error_for_each_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     job, out = tmp_path / "job.toml", tmp_path / "out"
-    job.write_text(SMALL)
+    job.write_text(SMALL_TRAIN)
     assert main(["vibration", str(job), "--out", str(out), "--no-pictures"]) == 0
     printed = capsys.readouterr().out
     assert "N, " in printed or " N" in printed

@@ -13,6 +13,7 @@ import pytest
 from gearfe.base.errors import InputError
 from gearfe.fem.meshing.mesh_file import MeshFile, read_mesh_file, source_fingerprint
 from gearfe.fem.meshing.session import gmsh_session
+from tests.makers.files import damaged
 from tests.makers.housing_meshes import box
 
 SIZE = (0.03, 0.02, 0.04)
@@ -527,31 +528,6 @@ def test_xdmf_takes_numbers_from_its_folder_only(plain, tmp_path) -> None:
     path.write_text(path.read_text().replace("a.h5", "../a.h5"))
     with pytest.raises(InputError, match="outside of the folder"):
         read_mesh_file(path, "mesh", 1.0)
-
-
-def damaged(content: bytes, rng: np.random.Generator) -> bytes:
-    """One random fault: cut short, bytes changed or lost, a line lost or doubled, a word replaced."""
-    kind = rng.integers(5)
-    if kind == 0:
-        return content[: rng.integers(len(content))]
-    if kind == 1:
-        changed = bytearray(content)
-        for place in rng.integers(len(content), size=rng.integers(1, 6)):
-            changed[place] = rng.integers(256)
-        return bytes(changed)
-    if kind == 2:
-        start = int(rng.integers(len(content)))
-        return content[:start] + content[start + int(rng.integers(1, 64)) :]
-    lines = content.split(b"\n")
-    at = int(rng.integers(len(lines)))
-    if kind == 3:
-        lines[at : at + 1] = [[], [lines[at]] * 2][rng.integers(2)]
-        return b"\n".join(lines)
-    words = [b"-1", b"0", b"999999", b"99999999999999999999", b"nan", b"inf", b"1e400", b"x", b""]
-    cells = lines[at].split(b"," if b"," in lines[at] else b" ")
-    cells[rng.integers(len(cells))] = words[rng.integers(len(words))]
-    lines[at] = (b"," if b"," in lines[at] else b" ").join(cells)
-    return b"\n".join(lines)
 
 
 @pytest.mark.parametrize("ending", ["inp", "bdf", "vtk", "vtu", "msh", "unv", "med", "mesh"])

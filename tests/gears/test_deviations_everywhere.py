@@ -25,8 +25,8 @@ from gearfe.gears.geometry.face import NOMINAL
 from gearfe.gears.geometry.modifications import FlankModification, Relief, tooth_deviations
 from gearfe.gears.meshlaw.make import mesh_law
 from gearfe.multibody import constant
-from tests.drivetrain.test_train_job import BORES, SMALL
 from tests.makers.gears import pair as gear_pair
+from tests.makers.job_texts import BARE_TRAIN, BORES
 
 PAIR = gear_pair(tip_round=1e-4)
 
@@ -152,7 +152,7 @@ def test_laws_on_meshes_have_no_deviations(tmp_path) -> None:
 
 def train_text(more: str, **curves: str) -> str:
     pair = JOB.split("[stiffness]", maxsplit=1)[0]
-    text = SMALL.replace("stiffness_N_per_m = 2e8", "")
+    text = BARE_TRAIN.replace("stiffness_N_per_m = 2e8", "")
     for name, gear, rest in (("a", "pinion", 18), ("b", "wheel", 27)):
         form = f"teeth = {rest}\nmodule_mm = 2.0\npressure_angle_deg = 20.0\nface_width_mm = 12.0\n"
         text = text.replace(form, f'gear = "{gear}"\n', 1)

@@ -17,8 +17,8 @@ from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.gears.gearmesh.job import read_stiffness_job
 from gearfe.gears.gearmesh.load_map import RootMap
 from gearfe.gears.gearmesh.sweep import elastic_pair
-from tests.drivetrain.test_train_job import BORES, SMALL
 from tests.makers.gears import pair
+from tests.makers.job_texts import BARE_TRAIN, BORES
 from tests.places import GEOMETRY
 
 JOB = GEOMETRY / "gear_train.toml"
@@ -115,7 +115,7 @@ def test_torques_that_are_none(gears, elastic, torques):
 
 
 def test_a_train_names_what_stands_for_a_load_map(tmp_path):
-    (tmp_path / "job.toml").write_text(SMALL.replace("stiffness_N_per_m = 2e8", 'load_map = "map.csv"') + BORES)
+    (tmp_path / "job.toml").write_text(BARE_TRAIN.replace("stiffness_N_per_m = 2e8", 'load_map = "map.csv"') + BORES)
     with pytest.raises(InputError, match=r"load_map = 'map.csv': is gone.*mesh_model = \"variable_stiffness\".*curve"):
         read_train_job(tmp_path / "job.toml")
 

@@ -11,7 +11,6 @@ import pytest
 from gearfe import Gear, GearPair
 from gearfe.base.cache import entries
 from gearfe.base.errors import InputError
-from gearfe.fem.plane import Material
 from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gears.contact.laws import PairModel, law_named
 from gearfe.gears.gearmesh.job import read_stiffness_job
@@ -23,12 +22,7 @@ from gearfe.gears.meshlaw.make import _nodes as phase_nodes
 from gearfe.gears.meshlaw.make import coupling_curve, mesh_law, touch_curve
 from gearfe.gears.meshlaw.store import cached_law, load_law, save_law, write_law_csv
 from tests.makers.gears import pair as gear_pair
-
-FORM = {"module": 2.5e-3, "pressure_angle": math.radians(25), "face_width": 10e-3, "tip_round": 0.1e-3}
-PAIR = GearPair(Gear(20, bore_diameter=10e-3, **FORM), Gear(30, bore_diameter=15e-3, **FORM))
-#: 100 N m at the wheel: the force that accuracy is asked for against.
-DESIGN = 100.0 / PAIR.wheel.base_radius
-STEEL = Material(200e9, 0.3)
+from tests.makers.mesh_laws import DESIGN, PAIR, STEEL
 
 
 @pytest.fixture(scope="module")

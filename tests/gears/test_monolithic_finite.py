@@ -15,8 +15,8 @@ from gearfe.gears.contact.whole_gears.pair import ElasticGear, WholePair
 from gearfe.gears.contact.whole_gears.position import solve_position
 from gearfe.gears.geometry.pair import Gear, GearPair
 from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
-from tests.gears.test_patch import PRESS, two_blocks
 from tests.makers.contact_cases import whole
+from tests.makers.contact_problems import PRESS, two_blocks
 from tests.makers.solving import solve_positions
 
 

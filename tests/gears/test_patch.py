@@ -13,12 +13,11 @@ from gearfe.gears.contact.laws import ElementLaw, Nitsche, Penalty
 from gearfe.gears.contact.whole_gears.bodies import Bodies
 from gearfe.gears.contact.whole_gears.newton import ContactSolution
 from gearfe.gears.contact.whole_gears.problem import ContactProblem
-from tests.makers.contact_problems import contact_problem, solved
-from tests.makers.structured import block, quarter_ring
+from tests.makers.contact_problems import HARD, HEIGHTS, PRESS, PRESSURE, SOFT, contact_problem, solved, two_blocks
+from tests.makers.structured import quarter_ring
 
 Array = NDArray[np.float64]
 
-SOFT, HARD = Material(70e9, 0.30), Material(210e9, 0.25)
 #: Nitsche's law, unbiased and one-sided.
 NITSCHE = [Nitsche(), Nitsche(sides="pinion"), Nitsche(sides="wheel")]
 PRESSED = [*NITSCHE, Penalty(1e14), Penalty(1e15, sides="wheel")]
@@ -32,30 +31,11 @@ def name_of(law: ElementLaw) -> str:
 
 # ---- flat: two blocks between smooth rigid walls -------------------------------------------------------------------
 
-HEIGHTS = (0.6, 0.5)  # of the upper and the lower block (m)
-
 
 def confined_modulus(material: Material) -> float:
     """lam + 2 mu: stress over strain without lateral strain."""
     lam, mu = material.lame("strain")
     return lam + 2 * mu
-
-
-def two_blocks(law: ElementLaw, quadrature: str, *, load: dict, kinematics: str = "small") -> ContactProblem:
-    """4 x 2 cells of the soft material on 3 x 2 of the hard one: middles and ends of the edges nowhere coincide."""
-    upper = block((0, 1), (0, HEIGHTS[0]), 4, 2, SOFT)
-    lower = block((0, 1), (-HEIGHTS[1], 0), 3, 2, HARD)
-    walls = {(part, side): (0.0, None) for part in (0, 1) for side in ("left", "right")}
-    held = walls | {(1, "bottom"): (None, 0.0)} | load.get("prescribed", {})
-    return contact_problem(
-        Bodies((upper, lower)),
-        (((0, "bottom"), (1, "top")),),
-        law,
-        prescribed=held,
-        tractions=load.get("tractions"),
-        quadrature=quadrature,
-        kinematics=kinematics,
-    )
 
 
 def patch_errors(problem: ContactProblem, solution: ContactSolution, pressure: float) -> tuple[float, float]:
@@ -79,10 +59,6 @@ def patch_errors(problem: ContactProblem, solution: ContactSolution, pressure: f
         found = (trace + 2 * mu * h[0, 0], trace + 2 * mu * h[1, 1], mu * (h[0, 1] + h[1, 0]))
         worst = max(worst, *(float(np.abs(a - b).max()) for a, b in zip(found, expected, strict=True)))
     return displacement, worst / pressure
-
-
-PRESSURE = 50e6
-PRESS = {"tractions": {(0, "top"): (0.0, -PRESSURE)}}
 
 
 @pytest.mark.parametrize("law", PRESSED, ids=name_of)

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from gearfe.base.typing import Array, IntArray
+from gearfe.fem.plane import Material
 from gearfe.gears.contact.flank import edge_shapes, gauss_rule
 from gearfe.gears.contact.laws import ElementLaw
 from gearfe.gears.contact.whole_gears.bodies import Bodies, ElasticBody
 from gearfe.gears.contact.whole_gears.contact_state import contact_at
 from gearfe.gears.contact.whole_gears.newton import ContactSolution, solve_contact
 from gearfe.gears.contact.whole_gears.problem import ContactProblem, Surface
+from tests.makers.structured import block
 
 #: A prescribed displacement (m) or traction (Pa): a number, or a function of places, shape (n, 2), with values (n,).
 Value = float | Callable[[Array], Array]
@@ -90,3 +92,32 @@ def _by_component(
     for (part, name), components in given.items():
         edges = bodies.node_of[part][bodies.parts[part].boundaries[name]]
         yield from ((edges, bodies.parts[part], k, value) for k, value in enumerate(components) if value is not None)
+
+
+SOFT, HARD = Material(70e9, 0.30), Material(210e9, 0.25)
+
+
+HEIGHTS = (0.6, 0.5)  # of the upper and the lower block (m)
+
+
+def two_blocks(law: ElementLaw, quadrature: str, *, load: dict, kinematics: str = "small") -> ContactProblem:
+    """4 x 2 cells of the soft material on 3 x 2 of the hard one: middles and ends of the edges nowhere coincide."""
+    upper = block((0, 1), (0, HEIGHTS[0]), 4, 2, SOFT)
+    lower = block((0, 1), (-HEIGHTS[1], 0), 3, 2, HARD)
+    walls = {(part, side): (0.0, None) for part in (0, 1) for side in ("left", "right")}
+    held = walls | {(1, "bottom"): (None, 0.0)} | load.get("prescribed", {})
+    return contact_problem(
+        Bodies((upper, lower)),
+        (((0, "bottom"), (1, "top")),),
+        law,
+        prescribed=held,
+        tractions=load.get("tractions"),
+        quadrature=quadrature,
+        kinematics=kinematics,
+    )
+
+
+PRESSURE = 50e6
+
+
+PRESS = {"tractions": {(0, "top"): (0.0, -PRESSURE)}}

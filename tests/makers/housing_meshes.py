@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -83,3 +84,11 @@ def reference_housing(*, four_point: bool = False) -> Housing:
     feet = bottom & ((nodes[:, 0] < p["x0"] + 1e-9) | (nodes[:, 0] > p["x1"] - 1e-9))
     made = Housing.from_arrays(nodes, tets, bores, feet, material=Material(p["E"], p["nu"], p["rho"]))
     return replace(made, mesh=FourPoint(made.mesh.nodes, made.mesh.cells)) if four_point else made
+
+
+REFERENCE: dict[str, Any] = json.loads((DATA / "gearbox_housing.json").read_text())
+
+
+def bent(points: np.ndarray) -> np.ndarray:
+    x, y, z = points.T
+    return np.column_stack([x + 0.05 * np.sin(3.0 * y), y + 0.04 * x * z, z + 0.03 * x**2])

@@ -8,6 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gearfe import Gear, GearPair
+from gearfe.fem.plane import Material
 from gearfe.gears.meshlaw.fit import Couple, PairForces, TouchCurve, fit_law
 from gearfe.gears.meshlaw.law import MeshLaw
 
@@ -109,3 +111,16 @@ def pair_energies(law: MeshLaw, cell, z, F):
         approach=e[1] + f * (2 * e[2] + f * (3 * e[3] + f * 4 * e[4])),
         slope=2 * e[2] + f * (6 * e[3] + f * 12 * e[4]),
     )
+
+
+FORM = {"module": 2.5e-3, "pressure_angle": math.radians(25), "face_width": 10e-3, "tip_round": 0.1e-3}
+
+
+PAIR = GearPair(Gear(20, bore_diameter=10e-3, **FORM), Gear(30, bore_diameter=15e-3, **FORM))
+
+
+#: 100 N m at the wheel: the force that accuracy is asked for against.
+DESIGN = 100.0 / PAIR.wheel.base_radius
+
+
+STEEL = Material(200e9, 0.3)

@@ -104,3 +104,10 @@ def _solver(matrix: Any) -> Callable[[Array], Array]:
 
     factor = cho_factor(matrix)
     return lambda b: np.asarray(cho_solve(factor, b))
+
+
+def below(signal: np.ndarray, step: float, limit_hz: float) -> np.ndarray:
+    """The part of a signal below a frequency."""
+    spectrum = np.fft.rfft(signal)
+    spectrum[np.fft.rfftfreq(len(signal), step) > limit_hz] = 0.0
+    return np.fft.irfft(spectrum, len(signal))

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from gearfe.drivetrain.runup.balance import Oscillator, Pushes
+from gearfe.drivetrain.runup.balance import Oscillator, Pushes, settled, solve
+from gearfe.drivetrain.runup.follow import follow
 from gearfe.drivetrain.runup.linear import Linear
 
 
@@ -140,3 +141,21 @@ def turning_speed(system: Single, speed: float, one: np.ndarray, two: np.ndarray
     fit = np.polynomial.Polynomial.fit(part, found, 4)
     roots = [r.real for r in fit.deriv().roots() if abs(r.imag) < 1e-9 and 0.0 < r.real < 1.0]
     return float(fit(roots[0]))
+
+
+def start_of(orbit, samples=64):  # type: ignore[no-untyped-def]
+    """Place and rate at theta = 0."""
+    omega = abs(orbit.speed)
+    size = max(samples, 2 * len(orbit.places))
+    u, du = synthesis(orbit.places, size), synthesis(rates(orbit.places, omega), size)
+    return np.array([u[0, 0], du[0, 0]])
+
+
+def settled_at(system, speed, tolerance=1e-8, harmonics=16):  # type: ignore[no-untyped-def]
+    guess = np.zeros((harmonics + 1, 1), dtype=complex)
+    guess[0] = system.linear.rest
+    return settled(system, *solve(system, speed, guess, tolerance), tolerance)
+
+
+def response_curve(system, speeds, tolerance=1e-7, highest=0.0):  # type: ignore[no-untyped-def]
+    return follow(system, speeds, settled_at(system, speeds[0], tolerance), tolerance=tolerance, highest=highest)

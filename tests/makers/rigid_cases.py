@@ -101,3 +101,9 @@ def residuals(trajectory) -> tuple[float, float]:  # type: ignore[no-untyped-def
         for t, q, v in zip(trajectory.time, trajectory.q, trajectory.v, strict=True)
     ]
     return max(place), max(rate)
+
+
+def seven_angles(q: np.ndarray) -> np.ndarray:
+    """The angles of the literature from the seven absolute ones."""
+    a = q[:, 2::3]
+    return np.stack([a[:, 0], a[:, 1] - a[:, 0], a[:, 2], a[:, 3] - a[:, 4], a[:, 4], a[:, 5] - a[:, 6], a[:, 6]], 1)

@@ -7,8 +7,12 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gearfe.drivetrain.train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+from gearfe.drivetrain.runup.condensed import condense
+from gearfe.drivetrain.runup.results import SteadyState
+from gearfe.drivetrain.train import Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear, TrainModel
+from gearfe.drivetrain.train.program import train_series
 from gearfe.fem.reduction.modal_body import ModalBody
 from gearfe.gears.gearmesh.periodic import PeriodicInterpolant, periodic_interpolant
 from gearfe.gears.geometry.pair import Gear
@@ -122,3 +126,37 @@ def elastic(gear_train: GearTrain, **options: Any) -> GearTrain:
 
 def changed(gear_train: GearTrain, **changes: Any) -> GearTrain:
     return dataclasses.replace(gear_train, **changes)
+
+
+def loaded(stages, stiffness, *, speed=600.0, torque=60.0, ratio=0.05, backlash=None, flexible=True, **options):  # type: ignore[no-untyped-def]
+    """A train with a constant load from the begin on, all modes damped."""
+    gear_train = train(stages, stiffness=stiffness, damping=Damping(ratio=ratio), **options)
+    last = f"s{len(stages)}"
+    load = Load(last, f"{last}+", constant(-torque * (-1) ** len(stages) * math.copysign(1.0, speed)))
+    gear_train = dataclasses.replace(
+        gear_train, loads=(load,), drive=dataclasses.replace(gear_train.drive, speed=constant(speed)),
+        meshes=tuple(dataclasses.replace(m, backlash=backlash) for m in gear_train.meshes),
+    )  # fmt: skip
+    return elastic(gear_train, uneven=0.2, skew=0.5) if flexible else gear_train
+
+
+def smooth(teeth):  # type: ignore[no-untyped-def]
+    return curve(teeth, mean=1e8, swing=0.15)
+
+
+Array = NDArray[np.float64]
+
+
+def modal_start(model: TrainModel, state: SteadyState) -> Array:
+    """Modal coordinates and their rates at the begin of the period."""
+    omega = 2.0 * np.pi * state.frequency
+    y = condense(model).system.linear.modal(omega, state.speed, state.orbit.forces)
+    return np.concatenate([y.sum(axis=0).real, (1j * omega[:, None] * y).sum(axis=0).real])
+
+
+def series_at_start(forces, t, sign, u, s):
+    """Series law, memory and whole numbers at a start."""
+    law = train_series(forces)
+    memory, pieces = np.zeros((law.rows, u.shape[1])), np.zeros(law.pieces, dtype=np.int64)
+    law.begin(t, sign, u[:, 0], u[:, 1] / s, memory, pieces)
+    return law.parameters, memory, pieces

@@ -17,36 +17,13 @@ from gearfe.mechanisms.job import run_mechanism
 from gearfe.mechanisms.loads import ExpressionLoad
 from gearfe.multibody import IntegrationError, integrate
 from gearfe.multibody.core.inverse import prescribed_motion
+from tests.makers.files import mechanism_file
+from tests.makers.job_texts import MOMENT, ROD
 from tests.places import GEOMETRY
-
-ROD = """
-[run]
-end_s = 1.0
-step_s = 0.01
-[ground.points_m]
-O = [0.0, 0.0]
-[bodies.rod]
-mass_kg = 2.0
-inertia_kg_m2 = 0.5
-points_m = { tip = [0.7, 0.2] }
-angle_deg = 30.0
-rate_rad_per_s = 1.0
-[joints.O]
-type = "hinge"
-body = "rod"
-to_point = "O"
-"""
-MOMENT = '[forces.drive]\ntype = "moment"\nbody = "rod"\nmoment_N_m = "{}"\n'
-
-
-def write(folder: Path, text: str) -> Path:
-    path = folder / "mechanism.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 def ran(folder: Path, text: str, end: float = 1.0, **options):  # type: ignore[no-untyped-def]
-    mechanism = load_mechanism(write(folder, text))
+    mechanism = load_mechanism(mechanism_file(folder, text))
     times = np.linspace(0.0, end, 21)
     return mechanism, integrate(mechanism.system, times, start=mechanism.start(), **options)
 
@@ -128,7 +105,7 @@ def test_a_damper_that_differs_by_direction(tmp_path: Path) -> None:
 def test_slopes_are_those_of_the_value(tmp_path: Path) -> None:
     text = "min(10, 2*(1 - angle(rod))) * hypot(x(rod.tip), 1 + vy(rod.tip)**2) / (2 + cos(rate(O))) + exp(-y(rod.tip))"
     mechanism = load_mechanism(
-        write(tmp_path, ROD + MOMENT.format(text + " + atan2(vx(rod.tip), 3)**3 + log(2 + time)"))
+        mechanism_file(tmp_path, ROD + MOMENT.format(text + " + atan2(vx(rod.tip), 3)**3 + log(2 + time)"))
     )
     ((_, load),) = mechanism.linkage.assembly.state_loads
     assert isinstance(load, ExpressionLoad)
@@ -151,7 +128,9 @@ def test_a_table_holds_its_points_and_is_monotone(tmp_path: Path) -> None:
     assert torque[0] == pytest.approx(9.0)
     assert (np.diff(torque) <= 1e-9).all()
     np.testing.assert_allclose(run.a[:, 2] * 0.5, torque, atol=1e-6)
-    linear = load_mechanism(write(tmp_path, ROD + MOMENT.format("motor(3)") + table + 'interpolation = "linear"\n'))
+    linear = load_mechanism(
+        mechanism_file(tmp_path, ROD + MOMENT.format("motor(3)") + table + 'interpolation = "linear"\n')
+    )
     assert linear.linkage.assembly.state_loads[0][1].value(0.0, np.zeros(3), np.zeros(3)) == pytest.approx(4.5)
 
 
@@ -188,7 +167,7 @@ def test_a_run_out_of_the_table_tells_where(tmp_path: Path, how: dict[str, str])
 )
 def test_wrong_expressions(tmp_path: Path, expression: str, text: str) -> None:
     with pytest.raises(InputError, match=text):
-        load_mechanism(write(tmp_path, ROD + MOMENT.format(expression))).start()
+        load_mechanism(mechanism_file(tmp_path, ROD + MOMENT.format(expression))).start()
 
 
 SPRING = '\n[forces.spring]\ntype = "spring"\nbody = "rod"\npoint = "tip"\nto_point = [1.0, 1.0]\ntension_N = "{}"\n'
@@ -207,7 +186,7 @@ OUTPUT = '\n[[outputs]]\nname = "more"\nvalue = "{}"\n'
 def test_messages_offer_what_the_place_knows(tmp_path: Path, added: str, known: str, unknown: str) -> None:
     """Not the quantities of flexible links where there is none, nor those that no load depends on."""
     with pytest.raises(InputError, match=f"known names: .*{known}") as caught:
-        load_mechanism(write(tmp_path, ROD + added))
+        load_mechanism(mechanism_file(tmp_path, ROD + added))
     assert not re.search(unknown, str(caught.value))
 
 
@@ -224,7 +203,7 @@ def test_wrong_tables(tmp_path: Path, content: str, text: str) -> None:
     (tmp_path / "motor.csv").write_text(content, encoding="utf-8")
     table = '[tables.motor]\nfile = "motor.csv"\nx = "speed"\ny = "torque"\n'
     with pytest.raises(InputError, match=text):
-        load_mechanism(write(tmp_path, ROD + MOMENT.format("motor(1)") + table))
+        load_mechanism(mechanism_file(tmp_path, ROD + MOMENT.format("motor(1)") + table))
 
 
 def test_a_division_by_zero_on_the_way_tells_time_and_values(tmp_path: Path) -> None:
@@ -264,7 +243,7 @@ def test_a_load_that_grows_without_bound_ends_the_run_and_is_named(tmp_path: Pat
 
 
 def test_output_times_by_rounding_beyond_the_end_of_a_stopped_run_are_left_out(tmp_path: Path) -> None:
-    mechanism = load_mechanism(write(tmp_path, ROD + MOMENT.format("log(0.5 - time)")))
+    mechanism = load_mechanism(mechanism_file(tmp_path, ROD + MOMENT.format("log(0.5 - time)")))
     options = {"start": mechanism.start(), "method": "taylor", "raise_on_failure": False}
     end = integrate(mechanism.system, [0.0, 10.0], **options).dense.times[-1]  # type: ignore[arg-type]
     run = integrate(mechanism.system, [0.0, end + 5e-12, 10.0], **options)  # type: ignore[arg-type]
@@ -276,7 +255,7 @@ def test_a_prescribed_motion_under_a_load_without_value_is_refused(tmp_path: Pat
     (tmp_path / "motor.csv").write_text("t,torque\n0,1\n0.4,2\n", encoding="utf-8")
     drive = '[joints.d]\ntype = "prescribed"\nbody = "rod"\ncoordinate = "rate"\nmotion = 1.0\n'
     table = '[tables.motor]\nfile = "motor.csv"\nx = "t"\ny = "torque"\n'
-    mechanism = load_mechanism(write(tmp_path, ROD + drive + MOMENT.format(load) + table))
+    mechanism = load_mechanism(mechanism_file(tmp_path, ROD + drive + MOMENT.format(load) + table))
     with pytest.raises(InputError, match=text):
         prescribed_motion(mechanism.system, mechanism.start(), np.linspace(0.0, 1.0, 21))
 
@@ -321,7 +300,7 @@ def test_a_motion_from_a_table_over_time(tmp_path: Path, coordinate: str) -> Non
 )
 def test_wrong_tables_over_time(tmp_path: Path, content: str, extra: str, text: str) -> None:
     (tmp_path / "drive.csv").write_text("t,value\n" + content, encoding="utf-8")
-    path = write(tmp_path, ROD + TABLED.format(coordinate="rate") + extra)
+    path = mechanism_file(tmp_path, ROD + TABLED.format(coordinate="rate") + extra)
     with pytest.raises(InputError, match=text):
         run_mechanism(load_mechanism(path), tmp_path / "out")
 

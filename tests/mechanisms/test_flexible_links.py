@@ -14,6 +14,7 @@ from gearfe.cli.main import main
 from gearfe.mechanisms import evaluate, load_mechanism, solve
 from gearfe.mechanisms.results import reactions
 from gearfe.multibody import integrate
+from tests.makers.files import mechanism_file
 from tests.places import GEOMETRY
 
 CANTILEVER = """
@@ -64,17 +65,11 @@ value = "elastic_energy(arm)"
 """
 
 
-def write(folder: Path, text: str) -> Path:
-    path = folder / "mechanism.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def test_a_cantilever_with_an_end_load_creeps_to_its_static_state(tmp_path: Path) -> None:
     """With damping above the critical one the end is static: P L^3/(3 EI), P L^2/(2 EI), P L, P L e / I."""
     second = 0.02**4 / 12
     slope = 1.0 / (2e9 * second)
-    mechanism = load_mechanism(write(tmp_path, CANTILEVER.replace("end_s = 0.2", "end_s = 3.0")))
+    mechanism = load_mechanism(mechanism_file(tmp_path, CANTILEVER.replace("end_s = 0.2", "end_s = 3.0")))
     run = integrate(mechanism.system, [0.0, 3.0], start=mechanism.start(), tolerance=1e-6)
     assert run.method == "implicit"
     found = {k: v[-1] for k, v in evaluate(mechanism, run).outputs.items()}
@@ -91,7 +86,7 @@ def test_a_cantilever_with_an_end_load_creeps_to_its_static_state(tmp_path: Path
 
 
 def test_energies_balance_with_damping_and_work(tmp_path: Path) -> None:
-    mechanism = load_mechanism(write(tmp_path, CANTILEVER.replace("damping_s = 0.1", "damping_s = 0.01")))
+    mechanism = load_mechanism(mechanism_file(tmp_path, CANTILEVER.replace("damping_s = 0.1", "damping_s = 0.01")))
     run = integrate(mechanism.system, np.linspace(0.0, 0.2, 41), start=mechanism.start(), tolerance=1e-6)
     energy = evaluate(mechanism, run).energy
     assert np.abs(energy["total_J"]).max() < 2e-3 * energy["work_J"].max()
@@ -116,7 +111,7 @@ def test_flexible_false_is_the_rigid_link(tmp_path: Path) -> None:
         "[bodies.arm.beam]", "flexible = false\n[bodies.arm.beam]"
     )
     text = text.split("[[outputs]]")[0]
-    mechanism = load_mechanism(write(tmp_path, text))
+    mechanism = load_mechanism(mechanism_file(tmp_path, text))
     assert not mechanism.links
     body = mechanism.linkage.bodies[0]
     assert body.mass == pytest.approx(0.4)
@@ -147,7 +142,7 @@ body = "arm.middle"
 moment_N_m = 0.0
 """
     )
-    mechanism = load_mechanism(write(tmp_path, text))
+    mechanism = load_mechanism(mechanism_file(tmp_path, text))
     run = integrate(mechanism.system, [0.0, 0.05], start=mechanism.start(), tolerance=1e-6)
     assert np.abs(run.q[-1] - run.q[0]).max() < 1e-12
 
@@ -178,7 +173,7 @@ value = "angle(arm)"
 """
     if flexible == "false":
         text = text.replace('"angle(arm.tip)"', '"angle(arm)"')
-    results = solve(load_mechanism(write(tmp_path, text))).results
+    results = solve(load_mechanism(mechanism_file(tmp_path, text))).results
     time = results.trajectory.time
     np.testing.assert_allclose(results.outputs["tip_rad"], 0.5 * time**2, atol=1e-6)
     bent = float(np.abs(results.outputs["root_rad"] - results.outputs["tip_rad"]).max())
@@ -214,17 +209,17 @@ value = "angle(arm)"
 def test_wrong_files(tmp_path: Path, old: str, new: str, text: str) -> None:
     assert old in CANTILEVER
     with pytest.raises(InputError, match=text):
-        load_mechanism(write(tmp_path, CANTILEVER.replace(old, new, 1)))
+        load_mechanism(mechanism_file(tmp_path, CANTILEVER.replace(old, new, 1)))
 
 
 def test_a_section_without_edge_has_no_stress(tmp_path: Path) -> None:
     text = CANTILEVER.replace("width_m = 0.02\nheight_m = 0.02", "area_m2 = 4e-4\nsecond_moment_m4 = 1.3e-8")
     with pytest.raises(InputError, match="edge_m"):
-        load_mechanism(write(tmp_path, text))
+        load_mechanism(mechanism_file(tmp_path, text))
 
 
 def test_methods_with_tiny_steps_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    path = write(tmp_path, CANTILEVER)
+    path = mechanism_file(tmp_path, CANTILEVER)
     assert main(["mechanism", str(path), "--out", str(tmp_path / "out"), "--method", "taylor"]) == 2
     assert "flexible links" in capsys.readouterr().err
 
@@ -232,7 +227,9 @@ def test_methods_with_tiny_steps_are_refused(tmp_path: Path, capsys: pytest.Capt
 def test_the_command_writes_shape_and_forces(tmp_path: Path) -> None:
     out = tmp_path / "out"
     text = CANTILEVER + "[[paths]]\nbody = 'arm'\npoint = 'tip'\n[figure]\nmagnification = 5.0\n"
-    assert main(["mechanism", str(write(tmp_path, text)), "--out", str(out), "--no-estimate", "--reactions"]) == 0
+    assert (
+        main(["mechanism", str(mechanism_file(tmp_path, text)), "--out", str(out), "--no-estimate", "--reactions"]) == 0
+    )
     files = {p.name for p in out.iterdir()}
     assert {"links.csv", "links.vtkhdf", "links.png", "picture.png", "curves.png", "reactions.csv"} <= files
     summary = json.loads((out / "summary.json").read_text())

@@ -6,7 +6,6 @@ import json
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.quantities import quantity_names
 from gearfe.mechanisms.results import reactions, wrapped
 from gearfe.multibody import integrate
+from tests.makers.files import mechanism_file
 from tests.makers.rigid_cases import reference
 from tests.places import EXAMPLES, GEOMETRY, ROOT
 
@@ -45,12 +45,6 @@ acceleration_m_per_s2 = [0.0, -9.81]
 name = "tip_height_m"
 value = "y(rod.tip) + 1"
 """
-
-
-def write(folder: Path, text: str) -> Path:
-    path = folder / "mechanism.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 @pytest.mark.parametrize(
@@ -111,7 +105,7 @@ def test_what_is_not_arithmetic_is_refused(text):
 def test_errors_name_the_entry_and_the_cure(tmp_path, old, new, text):
     assert old in PENDULUM
     with pytest.raises(InputError, match=text):
-        load_mechanism(write(tmp_path, PENDULUM.replace(old, new))).start()
+        load_mechanism(mechanism_file(tmp_path, PENDULUM.replace(old, new))).start()
 
 
 def test_nothing_free_to_move(tmp_path):
@@ -119,25 +113,25 @@ def test_nothing_free_to_move(tmp_path):
         'type = "hinge"\nbody = "rod"\npoint = "O"\nto_point = "O"', 'type = "fixed"\nbody = "rod"'
     )
     with pytest.raises(InputError, match="nothing is free to move"):
-        load_mechanism(write(tmp_path, fixed)).start()
+        load_mechanism(mechanism_file(tmp_path, fixed)).start()
 
 
 def test_forced_values_and_contradictions(tmp_path):
     forced = PENDULUM + '[start.velocities]\n"vx(rod.tip)" = 1.0\n[start.positions]\n"angle(rod)" = -1.2\n'
-    start = load_mechanism(write(tmp_path, forced)).start()
+    start = load_mechanism(mechanism_file(tmp_path, forced)).start()
     assert start.q[2] == pytest.approx(-1.2, abs=1e-12)
     assert start.v[2] == pytest.approx(1.0 / -np.sin(-1.2), rel=1e-10)  # vx of the tip = -sin(angle) rate
     wrong = PENDULUM + '[start.velocities]\n"vx(rod.O)" = 1.0\n'
     with pytest.raises(InputError, match=r"start velocity .*vx\(rod.O\).* = 1.0: contradicts hinge O"):
-        load_mechanism(write(tmp_path, wrong)).start()
+        load_mechanism(mechanism_file(tmp_path, wrong)).start()
     far = PENDULUM + '[start.positions]\n"x(rod.tip)" = 3.0\n'
     with pytest.raises(InputError, match="contradicts hinge O"):
-        load_mechanism(write(tmp_path, far)).start()
+        load_mechanism(mechanism_file(tmp_path, far)).start()
 
 
 def test_reactions_balance_the_weight_and_the_motion(tmp_path):
     """Force of the hinge = m (a + g): a = acceleration of the mass centre."""
-    mechanism = load_mechanism(write(tmp_path, PENDULUM))
+    mechanism = load_mechanism(mechanism_file(tmp_path, PENDULUM))
     made = integrate(mechanism.system, np.linspace(0, 1, 11), start=mechanism.start())
     table = reactions(mechanism, made)
     assert np.abs(table["O_x_N"] - 2.0 * made.a[:, 0]).max() <= 1e-7
@@ -164,7 +158,7 @@ coordinate = "angle"
 stiffness = 1.0
 damping = 0.3
 """
-    mechanism = load_mechanism(write(tmp_path, PENDULUM + extra))
+    mechanism = load_mechanism(mechanism_file(tmp_path, PENDULUM + extra))
     times = np.linspace(0, 1, 41)
     made = integrate(mechanism.system, times, start=mechanism.start(), tolerance=1e-11)
     results = evaluate(mechanism, made)
@@ -175,7 +169,7 @@ damping = 0.3
 def test_driven_crank_closes_the_energy_balance(tmp_path):
     """The work of a prescribed motion is the multiplier times the rate."""
     driven = PENDULUM + '[joints.drive]\ntype = "prescribed"\nbody = "rod"\ncoordinate = "rate"\nmotion = 4.0\n'
-    mechanism = load_mechanism(write(tmp_path, driven))
+    mechanism = load_mechanism(mechanism_file(tmp_path, driven))
     made = integrate(mechanism.system, np.linspace(0, 1, 41), start=mechanism.start(), tolerance=1e-11)
     results = evaluate(mechanism, made)
     assert np.abs(made.v[:, 2] - 4.0).max() <= 1e-10
@@ -233,7 +227,7 @@ def test_command_on_andrews(tmp_path):
 
 @pytest.mark.parametrize("method", ["taylor", "implicit"])
 def test_command_runs_other_methods_to_the_end(tmp_path, method):
-    file = write(tmp_path, PENDULUM)
+    file = mechanism_file(tmp_path, PENDULUM)
     arguments = ["mechanism", str(file), "--out", str(tmp_path), "--no-pictures", "--method", method]
     assert main([*arguments, "--tolerance", "1e-6"]) == 0
     summary = json.loads((tmp_path / "summary.json").read_text())
@@ -242,21 +236,21 @@ def test_command_runs_other_methods_to_the_end(tmp_path, method):
 
 
 def test_a_tolerance_of_zero_is_refused(tmp_path, capsys):
-    file = write(tmp_path, PENDULUM)
+    file = mechanism_file(tmp_path, PENDULUM)
     assert main(["mechanism", str(file), "--out", str(tmp_path), "--no-pictures", "--tolerance", "0"]) == 2
     assert ">= 1e-13 and <= 0.1" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("text", "rate"), [("rate(rod) + 3", -1.0), ("2 * (rate(rod) - 1)", 2.0)])
 def test_forced_velocity_with_an_offset(tmp_path, text, rate):
-    start = load_mechanism(write(tmp_path, PENDULUM + f'[start.velocities]\n"{text}" = 2.0\n')).start()
+    start = load_mechanism(mechanism_file(tmp_path, PENDULUM + f'[start.velocities]\n"{text}" = 2.0\n')).start()
     assert start.v[2] == pytest.approx(rate, abs=1e-12)
 
 
 @pytest.mark.parametrize("text", ["rate(rod) ** 2", "abs(rate(rod))", "sqrt(rate(rod))"])
 def test_forced_velocity_that_is_not_linear(tmp_path, text):
     with pytest.raises(InputError, match="not linear"):
-        load_mechanism(write(tmp_path, PENDULUM + f'[start.velocities]\n"{text}" = 2.0\n')).start()
+        load_mechanism(mechanism_file(tmp_path, PENDULUM + f'[start.velocities]\n"{text}" = 2.0\n')).start()
 
 
 @pytest.mark.parametrize(
@@ -266,7 +260,7 @@ def test_forced_velocity_that_is_not_linear(tmp_path, text):
 )  # fmt: skip
 def test_names_fit_into_headers(tmp_path, old, new):
     with pytest.raises(InputError, match=r"must be a word|is the name of a body"):
-        load_mechanism(write(tmp_path, PENDULUM.replace(old, new)))
+        load_mechanism(mechanism_file(tmp_path, PENDULUM.replace(old, new)))
 
 
 def test_wrapped_angles_stay_below_the_period():
@@ -288,7 +282,7 @@ def test_figures_and_animation(tmp_path):
 
 
 def test_bad_file_is_one_line_and_exit_code_two(tmp_path, capsys):
-    bad = write(tmp_path, PENDULUM.replace("mass_kg = 2.0", "mass_kg = -1.0"))
+    bad = mechanism_file(tmp_path, PENDULUM.replace("mass_kg = 2.0", "mass_kg = -1.0"))
     assert main(["mechanism", str(bad), "--out", str(tmp_path / "out")]) == 2
     message = capsys.readouterr().err
     assert message.count("\n") == 1
@@ -356,7 +350,7 @@ def test_the_core_knows_no_mechanism():
 def test_outputs_that_are_not_finite_are_no_success(tmp_path, capsys, value, message):
     text = PENDULUM + f'[[outputs]]\nname = "odd"\nvalue = "{value}"\n'
     out = tmp_path / "out"
-    assert main(["mechanism", str(write(tmp_path, text)), "--out", str(out), "--until", "1"]) == 1
+    assert main(["mechanism", str(mechanism_file(tmp_path, text)), "--out", str(out), "--until", "1"]) == 1
     assert capsys.readouterr().err.count(f"gearfe: warning: trajectory.csv: {message}") == 1
     assert message in json.loads((out / "summary.json").read_text())["warnings"][0]
 
@@ -364,6 +358,6 @@ def test_outputs_that_are_not_finite_are_no_success(tmp_path, capsys, value, mes
 def test_a_wrong_type_is_told_what_exists(tmp_path, capsys):
     """Also where the wrong type brings keys of its own."""
     gear = '[joints.g]\ntype = "worm"\nstarts = 2\nbody = "rod"\n'
-    assert main(["mechanism", str(write(tmp_path, PENDULUM + gear)), "--out", str(tmp_path)]) == 2
+    assert main(["mechanism", str(mechanism_file(tmp_path, PENDULUM + gear)), "--out", str(tmp_path)]) == 2
     known = "hinge, slot, prismatic, distance, fixed, gear, belt, rack, rolling, cam, prescribed"
     assert f"joints.g.type = 'worm': must be one of {known}" in capsys.readouterr().err

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from pathlib import Path
@@ -33,6 +32,7 @@ from gearfe.multibody.core.modes import modes
 from gearfe.multibody.planar.beam import Beam
 from gearfe.multibody.planar.beam_link import BeamLink, Section
 from gearfe.multibody.planar.turning import TurningFrame
+from tests.makers.files import csv_rows, mechanism_file
 from tests.places import GEOMETRY
 
 ROD = """
@@ -71,29 +71,18 @@ motion = { constant = 0.5235987755982988, sine = 0.8, frequency_hz = 1.0 }
 """
 
 
-def write(folder: Path, text: str) -> Path:
-    path = folder / "mechanism.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
-
-
 def test_a_pendulum_hangs_and_swings(tmp_path: Path) -> None:
     """l^2 (I + m r^2) + l c + m g r = 0, from a start 120 deg away."""
     out = tmp_path / "out"
-    assert main(["mechanism", str(write(tmp_path, ROD)), "--analysis", "modes", "--out", str(out)]) == 0
+    assert main(["mechanism", str(mechanism_file(tmp_path, ROD)), "--analysis", "modes", "--out", str(out)]) == 0
     summary = json.loads((out / "summary.json").read_text())
     assert summary["outputs"]["angle_rad"] == pytest.approx(-math.pi / 2, abs=1e-10)
     inertia, stiffness = 0.5 + 2.0 * 0.25, 2.0 * 9.81 * 0.5
-    (mode,) = rows(out / "modes.csv")
+    (mode,) = csv_rows(out / "modes.csv")
     omega = math.sqrt(stiffness / inertia)
     assert float(mode["frequency_Hz"]) == pytest.approx(omega / (2 * math.pi), rel=1e-10)
     assert float(mode["damping_ratio"]) == pytest.approx(0.4 / (2 * inertia * omega), rel=1e-10)
-    (reaction,) = rows(out / "reactions.csv")
+    (reaction,) = csv_rows(out / "reactions.csv")
     assert float(reaction["O_y_N"]) == pytest.approx(2.0 * 9.81, rel=1e-10)
     assert {"equilibrium.csv", "bodies.csv", "shapes.csv", "modes.png", "picture.png"} <= {
         p.name for p in out.iterdir()
@@ -172,11 +161,11 @@ def test_a_free_body_in_a_turning_frame_moves_straight() -> None:
 
 def test_inverse_dynamics_of_a_driven_pendulum_is_the_closed_form(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    path = write(tmp_path, ROD + DRIVE)
+    path = mechanism_file(tmp_path, ROD + DRIVE)
     assert (
         main(["mechanism", str(path), "--analysis", "inverse", "--reactions", "--out", str(out), "--no-pictures"]) == 0
     )
-    table, motion = rows(out / "reactions.csv"), rows(out / "trajectory.csv")
+    table, motion = csv_rows(out / "reactions.csv"), csv_rows(out / "trajectory.csv")
     t = np.array([float(r["time_s"]) for r in table])
     w = 2 * math.pi
     angle, rate = math.radians(30) + 0.8 * np.sin(w * t), 0.8 * w * np.cos(w * t)
@@ -223,12 +212,12 @@ def test_inverse_is_forward_dynamics_of_a_four_bar() -> None:
 def test_what_has_no_rest_is_told(tmp_path: Path, change: tuple[str, str], analysis: str, text: str) -> None:
     made = ROD.replace(*change, 1).replace("[run]\n", f'[run]\nanalysis = "{analysis}"\n')
     with pytest.raises(InputError, match=text):
-        run_rest(load_mechanism(write(tmp_path, made)), tmp_path / "out")
+        run_rest(load_mechanism(mechanism_file(tmp_path, made)), tmp_path / "out")
     assert not list((tmp_path / "out").glob("*.csv"))
 
 
 def test_a_motion_that_is_not_prescribed_whole_has_no_inverse(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    path = write(tmp_path, ROD)
+    path = mechanism_file(tmp_path, ROD)
     assert main(["mechanism", str(path), "--analysis", "inverse", "--out", str(tmp_path / "out")]) == 2
     assert "prescribe a motion for each" in capsys.readouterr().err
 

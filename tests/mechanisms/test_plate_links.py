@@ -43,6 +43,7 @@ from gearfe.multibody.planar.beam_link import BeamLink, Section
 from gearfe.multibody.planar.floating import Floating, frame_joint
 from gearfe.multibody.planar.turning import TurningFrame
 from tests.makers.elastica import elastica
+from tests.makers.files import mechanism_file
 from tests.places import GEOMETRY
 
 
@@ -272,17 +273,11 @@ value = "x(arm.lug) - x(arm.tip)"
 """
 
 
-def write(folder: Path, text: str) -> Path:
-    path = folder / "mechanism.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def test_a_cantilever_with_an_end_load_creeps_to_its_static_state(tmp_path: Path) -> None:
     """P L^3/(3 EI), P L^2/(2 EI), P L e/I at the clamped edge; work, loss and energies balance."""
     second = 0.02**4 / 12
     slope = 1.0 / (2e9 * second)
-    mechanism = load_mechanism(write(tmp_path, ARM.replace("end_s = 0.2", "end_s = 3.0")))
+    mechanism = load_mechanism(mechanism_file(tmp_path, ARM.replace("end_s = 0.2", "end_s = 3.0")))
     run = integrate(mechanism.system, np.linspace(0.0, 3.0, 61), start=mechanism.start(), tolerance=1e-6)
     results = evaluate(mechanism, run)
     found = {k: v[-1] for k, v in results.outputs.items()}
@@ -307,7 +302,16 @@ def test_modes_equilibrium_and_a_mesh_file(tmp_path: Path) -> None:
     text = text.replace("y_N = { step = 1.0, step_centre_s = 0.05, step_width_s = 0.1 }", "y_N = 1.0")
     text = text.replace("damping_s = 0.1", "damping_s = 0.0")
     out = tmp_path / "out"
-    command = ["mechanism", str(write(tmp_path, text)), "--out", str(out), "--analysis", "modes", "--modes", "2"]
+    command = [
+        "mechanism",
+        str(mechanism_file(tmp_path, text)),
+        "--out",
+        str(out),
+        "--analysis",
+        "modes",
+        "--modes",
+        "2",
+    ]
     assert main(command) == 0
     summary = json.loads((out / "summary.json").read_text())
     second = 0.02**4 / 12
@@ -319,7 +323,7 @@ def test_modes_equilibrium_and_a_mesh_file(tmp_path: Path) -> None:
 
 def test_flexible_false_is_the_rigid_link(tmp_path: Path) -> None:
     text = ARM.replace("[bodies.arm]", "[bodies.arm]\nflexible = false").split("[[outputs]]")[0]
-    mechanism = load_mechanism(write(tmp_path, text.replace('"fixed"', '"hinge"')))
+    mechanism = load_mechanism(mechanism_file(tmp_path, text.replace('"fixed"', '"hinge"')))
     body = mechanism.linkage.bodies[0]
     assert not mechanism.elastic
     assert body.mass == pytest.approx(0.4)
@@ -347,8 +351,8 @@ def test_the_shipped_coupler_runs_and_writes_its_files(tmp_path: Path) -> None:
         assert np.hypot(*(points[-nodes:, :2] - place).T).min() == pytest.approx(0.006, rel=1e-4)
     text = Path(job).read_text(encoding="utf-8")
     text = text.partition('[[outputs]]\nname = "apex')[0]
-    stiff = write(tmp_path, text.replace("youngs_modulus_GPa = 70.0", "youngs_modulus_GPa = 7e4"))
-    rigid = write(out, text.replace("angle_deg = 18.0", "angle_deg = 18.0\nflexible = false"))
+    stiff = mechanism_file(tmp_path, text.replace("youngs_modulus_GPa = 70.0", "youngs_modulus_GPa = 7e4"))
+    rigid = mechanism_file(out, text.replace("angle_deg = 18.0", "angle_deg = 18.0\nflexible = false"))
     tools = []
     for path in (stiff, rigid):
         mechanism = load_mechanism(path)
@@ -366,7 +370,7 @@ def test_the_frame_may_go_with_any_interface(tmp_path: Path) -> None:
     turned = [*lines[:first], lines[first + 2], lines[first + 1], lines[first], *lines[first + 3 :]]
     found = []
     for given in (lines, turned):
-        mechanism = load_mechanism(write(tmp_path, "\n".join(given)))
+        mechanism = load_mechanism(mechanism_file(tmp_path, "\n".join(given)))
         run = integrate(mechanism.system, [0.0, 0.03, 0.05], start=mechanism.start(), tolerance=1e-6)
         found.append(evaluate(mechanism, run).outputs)
     assert found[0]["largest_stress_MPa"].max() > 5.0
@@ -402,7 +406,7 @@ value = "angle(arm)"
 """
     angles = []
     for made_of in (text, text.replace("[bodies.arm]", "[bodies.arm]\nflexible = false")):
-        mechanism = load_mechanism(write(tmp_path, made_of))
+        mechanism = load_mechanism(mechanism_file(tmp_path, made_of))
         run = integrate(mechanism.system, [0.0, 0.1, 0.3], start=mechanism.start(), tolerance=1e-6)
         angles.append(evaluate(mechanism, run).outputs["angle_rad"])
     assert angles[0] == pytest.approx(angles[1], abs=2e-5)
@@ -438,7 +442,7 @@ value = "angle(arm)"
 def test_wrong_files(tmp_path: Path, old: str, new: str, text: str) -> None:
     assert old in ARM
     with pytest.raises(InputError, match=text):
-        load_mechanism(write(tmp_path, ARM.replace(old, new, 1)))
+        load_mechanism(mechanism_file(tmp_path, ARM.replace(old, new, 1)))
 
 
 @pytest.mark.parametrize(("modulus", "told"), [("2.1e11", True), ("2.1e5", True), ("1100.0", False)])
@@ -449,12 +453,12 @@ def test_a_modulus_in_another_unit_is_told_before_the_run(
     old = re.search(r"youngs_modulus_GPa = .*", ARM)
     assert old is not None
     steel = ARM.replace("density_kg_per_m3 = 1000.0", "density_kg_per_m3 = 7850.0")
-    path = write(tmp_path, steel.replace(old[0], f"youngs_modulus_GPa = {modulus}"))
+    path = mechanism_file(tmp_path, steel.replace(old[0], f"youngs_modulus_GPa = {modulus}"))
     assert main(["mechanism", str(path), "--out", str(tmp_path / "out"), "--analysis", "modes", "--no-pictures"]) == 0
     assert (".plate.youngs_modulus_GPa" in capsys.readouterr().err) is told
 
 
 def test_methods_with_tiny_steps_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    path = write(tmp_path, ARM)
+    path = mechanism_file(tmp_path, ARM)
     assert main(["mechanism", str(path), "--out", str(tmp_path / "out"), "--method", "taylor"]) == 2
     assert "flexible links" in capsys.readouterr().err

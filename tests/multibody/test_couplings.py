@@ -27,6 +27,7 @@ from gearfe.multibody import (
 from gearfe.multibody.planar.bodies import Frames
 from gearfe.multibody.planar.couplings import Belt, GearRatio, Rack
 from gearfe.multibody.planar.joints import Joint, Rolling, Row
+from tests.makers.files import mechanism_file
 
 TIMES = np.linspace(0.0, 0.8, 5)
 METHODS = [("taylor", 1e-11), ("implicit", 1e-6)]
@@ -175,14 +176,8 @@ moment_N_m = 1.3
 GEAR = '"gear"\nbody = "motor"\nto = "load"\nratio = -0.5'
 
 
-def write(folder: Path, text: str) -> Path:
-    path = folder / "mechanism.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def test_a_file_with_gears_and_its_reaction(tmp_path: Path) -> None:
-    mechanism = load_mechanism(write(tmp_path, TRAIN))
+    mechanism = load_mechanism(mechanism_file(tmp_path, TRAIN))
     made = integrate(mechanism.system, [0.0, 0.5], start=mechanism.start())
     acceleration = 1.3 / (0.1 + 0.25 * 0.9)
     assert made.v[-1, 2] == pytest.approx(0.5 * acceleration)
@@ -207,17 +202,17 @@ def test_a_file_with_gears_and_its_reaction(tmp_path: Path) -> None:
 )
 def test_wrong_couplings(tmp_path: Path, old: str, new: str, text: str) -> None:
     with pytest.raises(InputError, match=text):
-        load_mechanism(write(tmp_path, TRAIN.replace(old, new)))
+        load_mechanism(mechanism_file(tmp_path, TRAIN.replace(old, new)))
 
 
 def test_couplings_that_contradict_each_other_are_told(tmp_path: Path) -> None:
     """Two gear pairs of different ratios hold both shafts: nothing is free, and a speed contradicts them."""
     second = TRAIN + '[joints.other]\ntype = "gear"\nbody = "motor"\nto = "load"\nratio = -0.4\n'
     with pytest.raises(InputError, match=r"nothing is free to move .*, without 'pair' or 'other' something would be"):
-        load_mechanism(write(tmp_path, second)).start()
+        load_mechanism(mechanism_file(tmp_path, second)).start()
     driven = second + '[joints.speed]\ntype = "prescribed"\nbody = "motor"\ncoordinate = "rate"\nmotion = 3.0\n'
     with pytest.raises(InputError, match="velocities cannot meet it"):
-        load_mechanism(write(tmp_path, driven)).start()
+        load_mechanism(mechanism_file(tmp_path, driven)).start()
 
 
 def test_wrong_radii() -> None:

@@ -10,17 +10,20 @@ import pytest
 
 from gearfe.mechanisms import load_mechanism
 from gearfe.multibody import consistent_start, integrate
-from tests.makers.rigid_cases import by_scipy, chain, folding_links, pendulum, reference, residuals, total_energy
-from tests.multibody.test_rigid_light_links import four_bar
+from tests.makers.four_bar import four_bar
+from tests.makers.rigid_cases import (
+    by_scipy,
+    chain,
+    folding_links,
+    pendulum,
+    reference,
+    residuals,
+    seven_angles,
+    total_energy,
+)
 from tests.places import GEOMETRY
 
 NAMES = ("beta", "Theta", "gamma", "Phi", "delta", "Omega", "epsilon")
-
-
-def seven_angles(q: np.ndarray) -> np.ndarray:
-    """The angles of the literature from the seven absolute ones."""
-    a = q[:, 2::3]
-    return np.stack([a[:, 0], a[:, 1] - a[:, 0], a[:, 2], a[:, 3] - a[:, 4], a[:, 4], a[:, 5] - a[:, 6], a[:, 6]], 1)
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,8 @@ from gearfe.multibody import (
 )
 from gearfe.multibody.integrators.taylor import run as route
 from gearfe.multibody.series.tape import Tape
-from tests.mechanisms.test_expression_loads import MOMENT, ROD, write
+from tests.makers.files import mechanism_file
+from tests.makers.job_texts import MOMENT, ROD
 from tests.places import GEOMETRY
 
 ORDER = 14
@@ -75,7 +76,7 @@ def test_the_series_of_a_register_is_its_function(text: str) -> None:
 
 def moved(folder: Path, load: str, times: list[float], tolerance: float = 1e-10, extra: str = ""):  # type: ignore[no-untyped-def]
     mechanism = load_mechanism(
-        write(folder, ROD.replace("angle_deg = 30.0", "angle_deg = 0.0") + MOMENT.format(load) + extra)
+        mechanism_file(folder, ROD.replace("angle_deg = 30.0", "angle_deg = 0.0") + MOMENT.format(load) + extra)
     )
     return integrate(mechanism.system, times, start=mechanism.start(), method="taylor", tolerance=tolerance)
 
@@ -157,7 +158,7 @@ def test_a_load_without_series_at_the_start_goes_on_otherwise(tmp_path: Path) ->
     text = ROD.replace("rate_rad_per_s = 1.0", "rate_rad_per_s = 0.0") + MOMENT.format(
         "1 - 0.5*hypot(rate(rod), 0)*rate(rod)"
     )
-    mechanism = load_mechanism(write(tmp_path, text))
+    mechanism = load_mechanism(mechanism_file(tmp_path, text))
     options = {"start": mechanism.start(), "tolerance": 1e-10, "raise_on_failure": False}
     run = integrate(mechanism.system, [0.0, 1.0], **options)
     # I w' = 1 - 0.5 w^2: w = sqrt(2) tanh(t sqrt(2))
@@ -229,7 +230,7 @@ def test_a_load_by_expression_passes_singular_positions(tmp_path: Path) -> None:
     text = (GEOMETRY / "slider_crank.toml").read_text(encoding="utf-8")
     text += '[forces.drive]\ntype = "moment"\nbody = "crank"\n'
     text += 'moment_N_m = "-0.1*rate(crank) + 0.3*tanh(rate(crank))"\n'
-    mechanism = load_mechanism(write(tmp_path, text))
+    mechanism = load_mechanism(mechanism_file(tmp_path, text))
     start, times = mechanism.start(), np.linspace(0.0, 4.0, 41)
 
     def slope(_t: float, y: np.ndarray) -> list[float]:

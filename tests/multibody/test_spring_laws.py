@@ -13,6 +13,7 @@ from gearfe.base.errors import InputError
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.multibody import IntegrationError, integrate
 from gearfe.multibody.core.equilibrium import equilibrium
+from tests.makers.files import mechanism_file
 
 #: A block of 2 kg on a guide along x; the wall is at 0.
 BLOCK = """
@@ -35,14 +36,8 @@ tension_N = "{law}"
 """
 
 
-def write(folder: Path, text: str) -> Path:
-    path = folder / "mechanism.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def ran(folder: Path, text: str, times: np.ndarray, **options):  # type: ignore[no-untyped-def]
-    mechanism = load_mechanism(write(folder, text))
+    mechanism = load_mechanism(mechanism_file(folder, text))
     return mechanism, integrate(mechanism.system, times, start=mechanism.start(), **options)
 
 
@@ -92,7 +87,9 @@ def test_a_linear_law_is_the_spring(tmp_path: Path, method: str, tolerance: floa
 
 def test_slopes_of_a_law_are_those_of_its_force(tmp_path: Path) -> None:
     mechanism = load_mechanism(
-        write(tmp_path, PENDULUM + 'tension_N = "5*length**3 - exp(-length)*length_rate**2 + time"\nstiffness = 3.0\n')
+        mechanism_file(
+            tmp_path, PENDULUM + 'tension_N = "5*length**3 - exp(-length)*length_rate**2 + time"\nstiffness = 3.0\n'
+        )
     )
     rng = np.random.default_rng(2)
     q, v = rng.standard_normal((2, 6))
@@ -185,7 +182,7 @@ type = "moment"
 body = "arm"
 moment_N_m = 3.0
 """
-    mechanism = load_mechanism(write(tmp_path, text))
+    mechanism = load_mechanism(mechanism_file(tmp_path, text))
     found = equilibrium(mechanism.system, mechanism.start())
     np.testing.assert_allclose(found.q, [0.01, -0.02, 0.1], rtol=1e-10)
 
@@ -194,7 +191,7 @@ def test_equilibrium_of_a_law_is_least_energy(tmp_path: Path) -> None:
     text = BLOCK.format(x=2.1, v=0.0, law="900*(length - 2)**3").replace("[1.0, 0.0]", "[0.0, 1.0]")
     text = text.replace("[2.1, 0.0]", "[0.0, -2.1]")
     text += '[forces.gravity]\ntype = "gravity"\nacceleration_m_per_s2 = [0.0, -9.81]\n'
-    mechanism = load_mechanism(write(tmp_path, text))
+    mechanism = load_mechanism(mechanism_file(tmp_path, text))
     found = equilibrium(mechanism.system, mechanism.start())
     assert found.q[1] == pytest.approx(-2.0 - (2.0 * 9.81 / 900.0) ** (1 / 3), rel=1e-10)
 
@@ -210,7 +207,7 @@ def test_equilibrium_of_a_law_is_least_energy(tmp_path: Path) -> None:
 )
 def test_wrong_laws(tmp_path: Path, law: str, told: str) -> None:
     with pytest.raises(InputError, match=told):
-        load_mechanism(write(tmp_path, BLOCK.format(x=0.5, v=0.0, law=law))).start()
+        load_mechanism(mechanism_file(tmp_path, BLOCK.format(x=0.5, v=0.0, law=law))).start()
 
 
 def test_a_law_without_a_value_on_the_way_tells_where(tmp_path: Path) -> None:
@@ -220,4 +217,4 @@ def test_a_law_without_a_value_on_the_way_tells_where(tmp_path: Path) -> None:
 
 def test_a_law_needs_points_apart(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="coincide"):
-        load_mechanism(write(tmp_path, BLOCK.format(x=0.0, v=0.0, law="length"))).start()
+        load_mechanism(mechanism_file(tmp_path, BLOCK.format(x=0.0, v=0.0, law="length"))).start()

@@ -155,7 +155,7 @@ def test_compiled_equations_of_the_train_for_other_programs_are_the_plain_ones()
 
     from gearfe.drivetrain.train import build_train
     from scripts.benchmarks.jobs.peers.train_transient import compiled_rhs, plain_rhs
-    from tests.drivetrain.test_runup_train import loaded, smooth
+    from tests.makers.trains import loaded, smooth
 
     model = build_train(loaded([(20, 30), (20, 30)], smooth, backlash=30e-6, flexible=False))
     modal = dataclasses.replace(model.modal, damping=np.diag(np.diagonal(model.modal.damping)))

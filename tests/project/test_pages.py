@@ -19,6 +19,7 @@ from gearfe.base.errors import InputError
 from gearfe.cli import COMMANDS
 from gearfe.cli.arguments import command_module, parser_of
 from tests.makers import gears, trains
+from tests.makers.pages import blocks, command_lines
 from tests.places import DOCS, GEOMETRY, ROOT
 
 PAGES = sorted([*DOCS.rglob("*.md"), ROOT / "README.md"])
@@ -34,11 +35,6 @@ SHORTER = {
     "jobs=2": "jobs=1",
 }
 PLACES = {"angles": np.zeros(3), "approaches": np.full(3, 1e-5)}
-BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-
-
-def blocks(page: Path, kind: str) -> list[str]:
-    return [text for name, text in BLOCK.findall(page.read_text(encoding="utf-8")) if name == kind]
 
 
 def name_of(page: Path) -> str:
@@ -105,16 +101,6 @@ def test_python_imports_what_there_is(page: Path) -> None:
 def test_tables_are_toml(page: Path) -> None:
     for text in blocks(page, "toml"):
         tomllib.loads(text)
-
-
-def command_lines(page: Path) -> list[str]:
-    text = page.read_text(encoding="utf-8")
-    shown = [line for block in blocks(page, "") for line in block.splitlines()]
-    quoted = re.findall(r"`(gearfe \w[^`]*)`", text)
-    lines = [line.partition(" #")[0].strip().removeprefix(".venv/bin/") for line in [*shown, *quoted]]
-    return [
-        line for line in lines if line.startswith("gearfe ") and len(line.split()) > 2 and not set("$[") & set(line)
-    ]
 
 
 def test_commands_are_understood() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from dataclasses import replace
@@ -18,6 +17,7 @@ from gearfe.gears.gearmesh import sweep
 from gearfe.gears.gearmesh.job import stiffness_job
 from gearfe.study.design import study_cases
 from gearfe.study.job import read_study, run_study
+from tests.makers.files import csv_rows
 from tests.makers.studies import rows_of
 from tests.places import DOCS, GEOMETRY
 
@@ -58,11 +58,6 @@ def study(tmp_path: Path):
     return read_study(tmp_path / "study.toml")
 
 
-def table(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as stream:
-        return list(csv.DictReader(stream))
-
-
 def test_load_maps_are_the_same_on_processes_and_alone(study, tmp_path):
     """Bit for bit; a case that is written out gives the digits of its row by the job's own command."""
     made = run_study(study, tmp_path / "one", jobs=1)
@@ -72,8 +67,8 @@ def test_load_maps_are_the_same_on_processes_and_alone(study, tmp_path):
     case = tmp_path / "three.toml"
     assert main(["study", str(study.path), "--row", "3", "--write", str(case)]) == 0
     assert main(["loadmap", str(case), "--out", str(tmp_path / "alone"), "--no-pictures"]) == 0
-    least = min(float(row["k_mesh_N_per_m"]) for row in table(tmp_path / "alone" / "loadmap.csv"))
-    told = [row for row in table(tmp_path / "alone" / "loadmap_torques.csv") if float(row["torque_Nm"]) == 60.0]
+    least = min(float(row["k_mesh_N_per_m"]) for row in csv_rows(tmp_path / "alone" / "loadmap.csv"))
+    told = [row for row in csv_rows(tmp_path / "alone" / "loadmap_torques.csv") if float(row["torque_Nm"]) == 60.0]
     assert made.output("least")[3] == least
     assert made.output("peak_to_peak_um")[3] == float(told[0]["transmission_error_peak_to_peak_um"])
 

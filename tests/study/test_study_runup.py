@@ -8,7 +8,7 @@ import math
 
 from gearfe.cli.main import main
 from gearfe.study.job import read_study, run_study
-from tests.cli.test_cli_vibration import SMALL
+from tests.makers.job_texts import SMALL_TRAIN
 
 STUDY = """
 [runup]
@@ -34,7 +34,7 @@ def test_a_run_up_in_a_study(tmp_path):
     rows = "\n".join(f"{18.0 * i / 12},{1e8 * (1 + 0.1 * math.cos(2 * math.pi * i / 12))}" for i in range(12))
     (tmp_path / "k.csv").write_text("pinion_angle_deg,k_mesh_N_per_m\n" + rows + "\n")
     job = tmp_path / "study.toml"
-    job.write_text(SMALL.replace("stiffness_N_per_m = 1e8", 'curve = "k.csv"') + STUDY)
+    job.write_text(SMALL_TRAIN.replace("stiffness_N_per_m = 1e8", 'curve = "k.csv"') + STUDY)
     made = run_study(read_study(job), tmp_path, jobs=1)
     assert list(made.cells["status"]) == ["done", "done"]
     out = tmp_path / "out"

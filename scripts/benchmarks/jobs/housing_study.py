@@ -16,7 +16,7 @@ import numpy as np
 from gearfe.drivetrain.housing.model import Housing
 from tests.makers.full_model import full_model
 from tests.makers.housing_meshes import reference_housing
-from tests.makers.newmark import newmark, smooth_ramp
+from tests.makers.newmark import below, newmark, smooth_ramp
 
 from .peers.process import missing, run_python
 from .record import Record
@@ -123,13 +123,6 @@ def reductions(record: Record) -> None:
 
     for modes, levels in QUICK_REDUCTIONS if record.quick else REDUCTIONS:
         record.row(table, {"modes": modes, "levels": levels}, partial(make, modes, levels))
-
-
-def below(signal: np.ndarray, step: float, limit_hz: float) -> np.ndarray:
-    """The part of a signal below a frequency."""
-    spectrum = np.fft.rfft(signal)
-    spectrum[np.fft.rfftfreq(len(signal), step) > limit_hz] = 0.0
-    return np.fft.irfft(spectrum, len(signal))
 
 
 def others(record: Record) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 
 from gearfe.mechanisms import load_mechanism
 from gearfe.multibody import Body, Gravity, Hinge, Linkage, Start, System, integrate
+from tests.makers.rigid_cases import chain, folding_angle, seven_angles
 from tests.places import DATA, GEOMETRY, ROOT
 
 from .flexible_study import flexible
@@ -48,14 +49,8 @@ class Subject(NamedTuple):
         """Largest error of all angles over the run (rad); nan when it ended early."""
         if len(q) != len(self.truth):
             return float("nan")
-        found = q[:, 2::3] if self.truth.ndim == 1 else _seven(q)
+        found = q[:, 2::3] if self.truth.ndim == 1 else seven_angles(q)
         return float(np.abs((found[:, 0] if self.truth.ndim == 1 else found) - self.truth).max())
-
-
-def _seven(q: np.ndarray) -> np.ndarray:
-    """The angles of the literature from the seven absolute ones."""
-    a = q[:, 2::3]
-    return np.stack([a[:, 0], a[:, 1] - a[:, 0], a[:, 2], a[:, 3] - a[:, 4], a[:, 4], a[:, 5] - a[:, 6], a[:, 6]], 1)
 
 
 @lru_cache(maxsize=2)
@@ -162,18 +157,6 @@ def folding_links(theta: float, omega: float) -> System:
     return System([Linkage(bodies, joints, (Gravity((0.0, -9.81)),))])
 
 
-def folding_angle(theta: float, omega: float, times: np.ndarray) -> np.ndarray:
-    """Crank angle of the exact equation (2/3 + 2 sin^2) theta'' + 2 sin cos theta'^2 + g cos = 0."""
-    from scipy.integrate import solve_ivp
-
-    def rhs(_t: float, y: np.ndarray) -> list[float]:
-        s, c = math.sin(y[0]), math.cos(y[0])
-        return [y[1], -(2 * s * c * y[1] ** 2 + 9.81 * c) / (2 / 3 + 2 * s * s)]
-
-    made = solve_ivp(rhs, (times[0], times[-1]), [theta, omega], "DOP853", t_eval=times, rtol=3e-14, atol=1e-13)
-    return np.asarray(made.y[0])
-
-
 def others(record: Record) -> None:
     """The same mechanisms by other programs, in the same table."""
     table = record.table("mechanism_tolerance", "mechanism", "program", "method", "tolerance")
@@ -219,22 +202,6 @@ def _peer_settings(peer: str, name: str, quick: bool) -> list[tuple[str, float]]
         methods = ["DOP853", "LSODA", "Radau"]
     tolerances = (1e-5,) if quick else (1e-6,) if name == "slider_crank" else (1e-6, 1e-9, 1e-12)
     return [(m, t) for m in (methods[:1] if quick else methods) for t in tolerances if (m, t) != ("Radau", 1e-12)]
-
-
-def chain(count: int, seed: int = 1) -> System:
-    """Hanging chain of uniform rods with random lengths, masses and start angles."""
-    random = np.random.default_rng(seed)
-    bodies, joints = [], []
-    x = y = 0.0
-    before, end = "ground", (0.0, 0.0)
-    for i in range(count):
-        length, mass = float(random.uniform(0.3, 1.0)), float(random.uniform(0.5, 2.0))
-        angle = float(random.uniform(-1.0, 1.0))
-        bodies.append(Body(f"b{i}", mass, mass * length**2 / 12, (length / 2, 0.0), (x, y), angle))
-        joints.append(Hinge(f"b{i}", before, (0.0, 0.0), end))
-        before, end = f"b{i}", (length, 0.0)
-        x, y = x + length * math.cos(angle), y + length * math.sin(angle)
-    return System([Linkage(tuple(bodies), tuple(joints), (Gravity((0.0, -9.81)),))])
 
 
 def chains(record: Record) -> None:
