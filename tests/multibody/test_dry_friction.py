@@ -14,11 +14,11 @@ from gearfe.base.typing import Array
 from gearfe.mechanisms import load_mechanism
 from gearfe.multibody import Body, Gravity, Hinge, Linkage, Moment, Status, System, Trajectory, integrate, polynomial
 from gearfe.multibody.planar.linkage import BodyVariables, StateFunction
+from tests.places import GEOMETRY
 
 MASS, LENGTH, G = 2.0, 1.0, 9.81
 INERTIA = MASS * LENGTH**2 / 3  # of a bar about its end
 TIGHT = 1e-9
-GEOMETRY = Path(__file__).resolve().parents[2] / "geometry"
 
 
 class Friction(StateFunction):

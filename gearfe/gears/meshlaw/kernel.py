@@ -104,9 +104,11 @@ def law_jets(law: LawTables, at: Jets) -> int:
             continue
         for k in range(slots):
             work[PART, k] = -1.0
-            for j in range(slots):
-                if j != k:
-                    work[ROWS + slots + k, j] = _coupled(coupling, k, j, cell, z, 0)
+            for j in range(k + 1, slots):
+                c = coupling[j - k - 1, k, cell]
+                both = c[0] + z * (c[1] + z * (c[2] + z * c[3]))
+                work[ROWS + slots + k, j] = both
+                work[ROWS + slots + j, k] = both
         _compliances(forces, energies, cell, z, pairs[i], work)
         energy = _slopes_of_energy(slots, pairs[i], work)
         largest = 0.0
@@ -123,10 +125,8 @@ def law_jets(law: LawTables, at: Jets) -> int:
             for k in range(slots):
                 if work[BEARS, k] == 0.0:
                     work[RIGHT1, k] = -pairs[i, k]
-                work[RIGHT2, k] = 0.0
-            solved(slots, work)
-            for k in range(slots):
                 work[RIGHT2, k] = work[OFF, k]  # where the step begins
+            solved(slots, 1, work)
             share = 1.0
             for _ in range(HALVINGS):
                 change = 0.0
@@ -164,20 +164,23 @@ def law_jets(law: LawTables, at: Jets) -> int:
             F = pairs[i, k]
             work[BEARS, k] = 1.0 if F > 0.0 else 0.0
             force += F
-            shift = work[TOUCH1, k] + work[SHIFT, k]
             moment -= F * work[TOUCH1, k] + work[TURN, k]
             bend -= F * work[TOUCH2, k] + work[TURN2, k]
-            for j in range(slots):
-                if j != k:
-                    once = _coupled(coupling, k, j, cell, z, 1) * pairs[i, j]
-                    shift += once
-                    moment -= 0.5 * once * F
-                    bend -= 0.5 * _coupled(coupling, k, j, cell, z, 2) * pairs[i, j] * F
-            work[BEFORE, k] = shift
-            work[RIGHT1, k] = 1.0 if F > 0.0 else 0.0
-            work[RIGHT2, k] = -shift if F > 0.0 else 0.0
+            work[BEFORE, k] = work[TOUCH1, k] + work[SHIFT, k]
+        for k in range(slots):
+            for j in range(k + 1, slots):
+                c = coupling[j - k - 1, k, cell]
+                once = c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
+                both = pairs[i, k] * pairs[i, j]
+                work[BEFORE, k] += once * pairs[i, j]
+                work[BEFORE, j] += once * pairs[i, k]
+                moment -= once * both
+                bend -= (2.0 * c[2] + 6.0 * z * c[3]) * both
+        for k in range(slots):
+            work[RIGHT1, k] = work[BEARS, k]
+            work[RIGHT2, k] = -work[BEFORE, k] * work[BEARS, k]
         matrix(slots, work)
-        solved(slots, work)
+        solved(slots, 2, work)
         tangent = 0.0
         cross = 0.0
         for k in range(slots):
@@ -247,16 +250,6 @@ def _turning(forces: Array, energies: Array, cell: int, z: float, pairs: Array, 
         work[TURN2, k] = turn2
 
 
-def _coupled(coupling: Array, k: int, j: int, cell: int, z: float, order: int) -> float:
-    """C between two slots, its slope or its second derivative with the angle."""
-    c = coupling[abs(k - j) - 1, min(k, j), cell]
-    if order == 0:
-        return c[0] + z * (c[1] + z * (c[2] + z * c[3]))
-    if order == 1:
-        return c[1] + z * (2.0 * c[2] + 3.0 * z * c[3])
-    return 2.0 * c[2] + 6.0 * z * c[3]
-
-
 def matrix(slots: int, work: Array) -> None:
     """J of the pairs that bear; ones on the diagonal for the others."""
     for k in range(slots):
@@ -268,29 +261,32 @@ def matrix(slots: int, work: Array) -> None:
                 work[ROWS + k, j] = work[ROWS + slots + k, j] if both else 0.0
 
 
-def solved(slots: int, work: Array) -> None:
-    """Both right sides over the matrix, by elimination in place: it is positive definite."""
+def solved(slots: int, sides: int, work: Array) -> None:
+    """One or both right sides over the matrix, by elimination in place: it is positive definite."""
     for k in range(slots):
+        over = 1.0 / work[ROWS + k, k]
         for i in range(k + 1, slots):
-            factor = work[ROWS + i, k] / work[ROWS + k, k]
+            factor = work[ROWS + i, k] * over
             if factor != 0.0:
                 for j in range(k + 1, slots):
                     work[ROWS + i, j] -= factor * work[ROWS + k, j]
-                work[RIGHT1, i] -= factor * work[RIGHT1, k]
-                work[RIGHT2, i] -= factor * work[RIGHT2, k]
-    for k in range(slots - 1, -1, -1):
-        for j in range(k + 1, slots):
-            work[RIGHT1, k] -= work[ROWS + k, j] * work[RIGHT1, j]
-            work[RIGHT2, k] -= work[ROWS + k, j] * work[RIGHT2, j]
-        work[RIGHT1, k] /= work[ROWS + k, k]
-        work[RIGHT2, k] /= work[ROWS + k, k]
+                for side in range(RIGHT1, RIGHT1 + sides):
+                    work[side, i] -= factor * work[side, k]
+        work[ROWS + k, k] = over
+    for side in range(RIGHT1, RIGHT1 + sides):
+        for k in range(slots - 1, -1, -1):
+            for j in range(k + 1, slots):
+                work[side, k] -= work[ROWS + k, j] * work[side, j]
+            work[side, k] *= work[ROWS + k, k]
 
 
-FUNCTIONS = (law_jets, _slopes_of_energy, _compliances, _turning, _coupled, matrix, solved)
+FUNCTIONS = (law_jets, _slopes_of_energy, _compliances, _turning, matrix, solved)
+#: Functions that are copied into the loop: a call costs as much as what they do.
+INLINE = tuple(function.__name__ for function in FUNCTIONS[1:])
 NAMES = {name: value for name, value in globals().items() if name == "math" or isinstance(value, int | float)}
 
 
-KERNELS = compiled.Kernels(FUNCTIONS, NAMES, ("law_jets",))
+KERNELS = compiled.Kernels(FUNCTIONS, NAMES, ("law_jets",), INLINE)
 
 
 def packed_tables(tables: LawTables) -> LawTables | Packed:
@@ -325,7 +321,7 @@ def evaluate(
     count, slots = pairs.shape
     out, slopes, work = np.zeros((count, RESULTS)), np.zeros((2, count, slots)), np.zeros((ROWS + 2 * slots, slots))
     at = Jets(phase, approach, shifts, pairs, slopes, work, out)
-    run = KERNELS.compiled.law_jets.on(tables, compiled.packed(at))
+    run = KERNELS.compiled.law_jets.on(tables, Packed(at) if isinstance(tables, Packed) else at)
     if KERNELS.loaded:
         run()
     else:
