@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ..base.files import whole_file
 from ..base.progress import count, stage
+from ..base.typing import Array
 from ..mechanisms.model import Mechanism
-from ..mechanisms.results import Results, reference_table
+from ..mechanisms.results import Results, evaluate, reference_table
 from ..multibody import Trajectory
 from ..multibody.core.modes import Modes
 from .mechanism_field import draw_field
 from .mechanism_scene import MOST_NAMES, draw_paths, draw_state, drawn_states, frame
 from .style import BLUE, COLOURS, ORANGE, fixed, new_figure, save_fixed, tidy
 
+#: Times at which curves are drawn at least: four for each pixel of their width.
+LEAST_TIMES = 2000
+
 
 @stage("pictures")
 def draw_figures(folder: Path, mechanism: Mechanism, results: Results) -> None:
     """curves.png (outputs over time, with reference markers where the file names a table), energy.png, picture.png."""
     trajectory = results.trajectory
+    smooth = _between(mechanism, results) if len(trajectory.time) > 1 else results
     if len(trajectory.time) > 1:
-        _curves(folder / "curves.png", mechanism, results)
-        _energy(folder / "energy.png", results)
+        _curves(folder / "curves.png", mechanism, smooth)
+        _energy(folder / "energy.png", smooth)
     picture_time = mechanism.file.run.picture_s
     time = trajectory.time[-1] if picture_time is None else min(picture_time, trajectory.time[-1])
     figure = new_figure(7, 6)
@@ -42,7 +48,7 @@ def draw_figures(folder: Path, mechanism: Mechanism, results: Results) -> None:
     axes.set_title(f"{mechanism.file.title or 'mechanism'} at {time:g} s", fontsize=11, loc="left")
     save_fixed(figure, folder / "picture.png")
     if mechanism.links:
-        _links(folder / "links.png", mechanism, results)
+        _links(folder / "links.png", mechanism, smooth)
     if mechanism.plates:
         _plates(folder / "plates.png", mechanism, results)
 
@@ -110,6 +116,30 @@ def draw_animation(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -
             writer.grab_frame()
 
 
+def _between(mechanism: Mechanism, results: Results) -> Results:
+    """Results that curves are drawn from: at the output times, and where these are few at times between them.
+
+    Links of finite elements are left at the output times: their stresses at all these times take too much memory.
+    """
+    trajectory = results.trajectory
+    time, steps = trajectory.time, trajectory.dense.times
+    if len(time) >= LEAST_TIMES or len(steps) < 2 or mechanism.plates:
+        return results
+    begin, end = sorted((time[0], time[-1]))
+    inside = steps[(steps > begin) & (steps < end)]
+    inside = inside[:: 1 + len(inside) // LEAST_TIMES]
+    times = np.unique(np.concatenate([time, inside, np.linspace(begin, end, LEAST_TIMES)]))
+    return evaluate(mechanism, replace(trajectory, time=times if time[-1] >= time[0] else times[::-1]))
+
+
+def _broken(values: Array, period: float | None) -> Array:
+    """Values of which each that begins a new turn of a wrapped angle is left out, so that no line joins both ends."""
+    if period is None:
+        return values
+    turns = np.abs(np.diff(values, prepend=values[:1])) > 0.5 * period
+    return np.where(turns, np.nan, values)
+
+
 def _curves(path: Path, mechanism: Mechanism, results: Results) -> None:
     table = mechanism.file.figure
     names = table.curves or tuple(results.outputs)
@@ -123,10 +153,10 @@ def _curves(path: Path, mechanism: Mechanism, results: Results) -> None:
     all_axes = figure.subplots(len(names), 1, sharex=True, squeeze=False, gridspec_kw=room)
     shown = False
     for axes, name in zip(all_axes[:, 0], names, strict=True):
-        axes.plot(time, results.outputs[name], lw=1.2, color=BLUE)
+        period = next(o.wrap for o in mechanism.file.outputs if o.name == name)
+        axes.plot(time, _broken(results.outputs[name], period), lw=1.2, color=BLUE)
         column = table.reference_columns.get(name)
         if reference is not None and column is not None:
-            period = next(o.wrap for o in mechanism.file.outputs if o.name == name)
             value = reference[column] if period is None else np.mod(reference[column], period)
             axes.plot(
                 reference["t"][:: table.every],

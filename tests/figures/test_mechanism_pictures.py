@@ -27,7 +27,7 @@ from tests.places import GEOMETRY
 ANGLE, RATE = 0.3, 2.0
 
 
-def crank(turns: float, step: float, colour: str | None = None) -> tuple[Mechanism, Results]:
+def crank(turns: float, step: float, colour: str | None = None, outputs: Any = ()) -> tuple[Mechanism, Results]:
     """A crank OA of 1.5 m that turns steadily."""
     raw: dict[str, Any] = {
         "run": {"end_s": turns * 2.0 * math.pi / RATE, "step_s": step * 2.0 * math.pi / RATE},
@@ -46,6 +46,7 @@ def crank(turns: float, step: float, colour: str | None = None) -> tuple[Mechani
         },
         "paths": [{"body": "crank", "point": "A"}, {"body": "crank", "point": [0.0, 0.7]}],
         "figure": {} if colour is None else {"colour": colour},
+        "outputs": list(outputs),
     }
     mechanism = make_mechanism(build(MechanismFile, raw, ""))
     return mechanism, solve(mechanism).results
@@ -155,3 +156,21 @@ def test_a_path_of_the_ground_is_refused() -> None:
     raw["paths"] = [{"body": "ground", "point": "O"}]
     with pytest.raises(InputError, match=r"paths\[0\]\.body"):
         build(MechanismFile, raw, "")
+
+
+@pytest.mark.parametrize("step", [1.0, 0.3, 0.01])
+def test_curves_follow_the_solution_between_output_times(step: float, tmp_path: Path, monkeypatch: Any) -> None:
+    """x of the crank's end is a cosine, whatever the output times are; no line joins the turns of a wrapped angle."""
+    outputs = [{"name": "x", "value": "x(crank.A)"}, {"name": "turn", "value": "angle(crank)", "wrap": 2.0 * math.pi}]
+    mechanism, results = crank(2.0, step, outputs=outputs)
+    figures = []
+    monkeypatch.setattr("gearfe.figures.mechanism.save_fixed", lambda figure, _: figures.append(figure))
+    draw_figures(tmp_path, mechanism, results)
+    x, turn = (axes.lines[0] for axes in figures[0].axes)
+    time, value = x.get_xdata(), x.get_ydata()
+    middle = 0.5 * (time[1:] + time[:-1])
+    chord = 0.5 * (value[1:] + value[:-1])
+    assert np.abs(chord - 1.5 * np.cos(ANGLE + RATE * middle)).max() < 1e-3
+    steps = np.diff(turn.get_ydata())
+    assert np.isnan(steps).sum() == 4  # on both sides of the two ends of turns
+    assert np.nanmin(steps) > 0.0
