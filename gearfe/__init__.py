@@ -23,8 +23,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .gears.gearmesh.check import StiffnessCheck, check_positions
     from .gears.gearmesh.curve import StiffnessCurve
     from .gears.gearmesh.load_map import LoadMap
-    from .gears.gearmesh.load_sweep import sweep_loads
-    from .gears.gearmesh.sweep import sweep_stiffness
+    from .gears.gearmesh.sweep import sweep_loads, sweep_stiffness
     from .gears.geometry import Gear, GearPair
     from .study.job import read_study, run_study
     from .study.search import Search
@@ -52,7 +51,7 @@ _PUBLIC: dict[str, str] = {
     "run_up": "drivetrain.runup.run_up",
     "simulate": "drivetrain.train",
     "steady_state": "drivetrain.runup.run_up",
-    "sweep_loads": "gears.gearmesh.load_sweep",
+    "sweep_loads": "gears.gearmesh.sweep",
     "sweep_stiffness": "gears.gearmesh.sweep",
 }
 

@@ -68,22 +68,19 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
 
     from ..base.files import output_folder, whole_set, write_csvs, write_json
     from ..base.progress import Stopwatch
-    from ..gears.gearmesh.job import stiffness_job
-    from ..gears.gearmesh.load_report import report_lines, summary, warnings
-    from ..gears.gearmesh.load_report import tables as map_tables
-    from ..gears.gearmesh.load_sweep import job_map
-    from ..gears.gearmesh.report import deviation_lines
+    from ..gears.gearmesh.job import job_map, stiffness_job
+    from ..gears.gearmesh.report import deviation_lines, map_lines, map_summary, map_tables, warnings
 
     watch, beside = Stopwatch({"program start": time.perf_counter() - started}), Path(args.job).parent
     with watch.stage("geometry"):
         job = stiffness_job(mesh, beside, pair)
         deviations = deviation_lines(job)  # impossible ones are refused before the folder is made
     folder = output_folder(args.out)
-    made_map = job_map(job, table)
-    watch.seconds.update(made_map.timings)
+    load_map = job_map(job, table)
+    watch.seconds.update(load_map.timings)
     with whole_set(folder, FILES) as made:
         with watch.stage("tables"):
-            write_csvs(made, map_tables(made_map))
+            write_csvs(made, map_tables(load_map))
         if not args.no_pictures:
             from ..figures.flanks import flank_picture
             from ..figures.load_map import load_map_picture
@@ -91,16 +88,16 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
 
             with watch.stage("pictures"):
                 gears = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}"
-                title = f"{gears}, {made_map.span}, plane {job.table.plane}, law {job.table.law}"
-                save(load_map_picture(made_map, title), made / "loadmap.png", dpi=110)
+                title = f"{gears}, {load_map.span}, plane {job.table.plane}, law {job.table.law}"
+                save(load_map_picture(load_map, title), made / "loadmap.png", dpi=110)
                 if mesh.deviates:
                     picture = flank_picture(mesh, pair, beside)
                     save(picture, made / "loadmap_flanks.png", dpi=110)
         watch.seconds["total"] = time.perf_counter() - started
-        write_json(made / "loadmap.json", summary(job, table, made_map, watch.seconds))
+        write_json(made / "loadmap.json", map_summary(job, table, load_map, watch.seconds))
         names = sorted(path.name for path in made.iterdir())
-    print_results([*report_lines(made_map), *deviations], folder, names, watch.seconds, warnings(job, made_map))
-    return 1 if made_map.failed.any() else 0
+    print_results([*map_lines(load_map), *deviations], folder, names, watch.seconds, warnings(job, load_map))
+    return 1 if load_map.failed.any() else 0
 
 
 def _overridden_model(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:

@@ -80,13 +80,13 @@ def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool) -> Answer:
 
 
 def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
-    from ..gears.gearmesh.load_report import summary, tables
-    from ..gears.gearmesh.load_sweep import job_map
+    from ..gears.gearmesh.job import job_map
+    from ..gears.gearmesh.report import map_summary, map_tables
 
     job = _only_mesh(raw, path)
     table = job.mesh.loads
-    made = job_map(job, table, keep=_kept(job, shared))
-    return Answer(tables(made), summary(job, table, made, {}), _positions(made.failed))
+    load_map = job_map(job, table, keep=_kept(job, shared))
+    return Answer(map_tables(load_map), map_summary(job, table, load_map, {}), _positions(load_map.failed))
 
 
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:

@@ -145,8 +145,7 @@ def gears() -> Answers:
 def curves() -> Answers:
     """Curve and load map of a coarse pair with their estimates."""
     from gearfe.gears.contact.laws import HalfPlane
-    from gearfe.gears.gearmesh.load_sweep import sweep_loads
-    from gearfe.gears.gearmesh.sweep import sweep_stiffness
+    from gearfe.gears.gearmesh.sweep import sweep_loads, sweep_stiffness
 
     pair, law = coarse_pair(), HalfPlane()
     curve = sweep_stiffness(pair, torque=80.0, law=law, coarsen=3.0, estimate_error=True)

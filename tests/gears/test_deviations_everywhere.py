@@ -17,8 +17,7 @@ from gearfe.drivetrain.gearbox.job import job_train, read_train_job
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.train.statics import static_errors
 from gearfe.gears.contact.half_plane import half_plane_pair
-from gearfe.gears.gearmesh.load_sweep import sweep_loads
-from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_loads, sweep_stiffness
 from gearfe.gears.geometry import pitch_errors
 from gearfe.gears.geometry.deviation_job import deviations_of
 from gearfe.gears.geometry.face import NOMINAL

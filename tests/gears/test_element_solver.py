@@ -11,9 +11,8 @@ import pytest
 
 from gearfe.cli.main import main
 from gearfe.gears.contact.compliance import MeshingPair
-from gearfe.gears.gearmesh.load_sweep import sweep_loads
 from gearfe.gears.gearmesh.positions import position_solver
-from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_loads, sweep_stiffness
 from gearfe.gears.geometry.pair import TipRelief
 from gearfe.gears.teeth.tooth_sector import sector_recipes
 from tests.makers.gears import pair as gear_pair

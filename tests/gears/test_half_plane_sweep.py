@@ -15,9 +15,8 @@ from gearfe.fem.plane import Material
 from gearfe.gears.contact.compliance import MeshingPair, finite_strain_shares
 from gearfe.gears.contact.laws import HalfPlane, on_elements
 from gearfe.gears.gearmesh.curve import StiffnessCurve
-from gearfe.gears.gearmesh.load_sweep import sweep_loads
 from gearfe.gears.gearmesh.positions import position_solver
-from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_loads, sweep_stiffness
 from tests.makers.gears import pair as gear_pair
 from tests.makers.solving import solve_positions
 

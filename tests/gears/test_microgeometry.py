@@ -15,9 +15,9 @@ from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gears.contact.laws import Nitsche
 from gearfe.gears.contact.whole_gears.pair import ElasticGear, WholePair
 from gearfe.gears.contact.whole_gears.position import solve_position
-from gearfe.gears.gearmesh.load_map import BACK, LoadMap
-from gearfe.gears.gearmesh.load_sweep import sweep_loads
-from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.gearmesh.curve import BACK
+from gearfe.gears.gearmesh.load_map import LoadMap
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_loads, sweep_stiffness
 from gearfe.gears.geometry import pitch_errors
 from gearfe.gears.geometry.deviation_job import deviations_of, pitch_errors_of
 from gearfe.gears.geometry.face import NOMINAL, ToothDeviations

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from gearfe import InputError, Material, sweep_stiffness
-from gearfe.gears.gearmesh.load_sweep import sweep_loads
 from gearfe.gears.gearmesh.positions import PositionSolver
-from gearfe.gears.gearmesh.sweep import elastic_pair
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_loads
 from gearfe.gears.geometry.gear_data import TipRelief
 from tests.makers.counting import counted
 from tests.makers.gears import pair

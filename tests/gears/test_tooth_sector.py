@@ -9,7 +9,7 @@ from gearfe import sweep_stiffness
 from gearfe.base.errors import InputError
 from gearfe.cli.main import main
 from gearfe.fem.plane import least_jacobian
-from gearfe.gears.gearmesh.load_sweep import sweep_loads
+from gearfe.gears.gearmesh.sweep import sweep_loads
 from gearfe.gears.teeth import tooth_sector
 from gearfe.gears.teeth.tooth_sector import sector_mesh, sector_recipes
 from tests.makers.gears import pair

@@ -10,7 +10,7 @@ import pytest
 
 from gearfe import StiffnessCurve, sweep_stiffness
 from gearfe.cli.main import main
-from gearfe.gears.gearmesh.load_sweep import sweep_loads
+from gearfe.gears.gearmesh.sweep import sweep_loads
 from gearfe.gears.geometry.validity import MOST_OVERLAP
 from tests.makers.gears import pair as gear_pair
 from tests.places import GEOMETRY

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from gearfe.gears.contact.half_plane import HalfPlanePair, half_plane_pair
 from gearfe.gears.contact.position import Contacts
-from gearfe.gears.gearmesh.sweep import elastic_pair, marks_met
+from gearfe.gears.gearmesh.pair_loads import marks_met
+from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.pair import GearPair, TipRelief
 
 from .gears import pair as gear_pair

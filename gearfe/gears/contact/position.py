@@ -117,7 +117,7 @@ class Contacts:
         )
 
     def without_panels(self) -> Contacts:
-        """These without their panels, for many positions in little memory."""
+        """Return the contacts without their panels, for many positions in little memory."""
         panels = ("x", "width", "pressure", "panel_arc")
         return replace(self, **{name: getattr(self, name)[..., :0] for name in panels})
 
@@ -277,6 +277,10 @@ class Positions:
         loads = tuple(taken(one, kept[one.position]) for one in self.loads)
         return replace(self, loads=loads, points=taken(self.points, kept[self.points.position]))
 
+    def without_loads(self) -> Positions:
+        """Return the positions without loads, point pressures and panels, for many positions in little memory."""
+        return replace(self.with_loads(np.zeros(len(self), dtype=bool)), contacts=self.contacts.without_panels())
+
 
 #: Rounding of the gears' angles (rad) below which no twist can be told apart.
 ANGLE_ROUNDING = 2e-15
@@ -314,11 +318,11 @@ def together(parts: Sequence[Positions]) -> Positions:
 BATCH = 128
 
 
-def in_batches(solve: Callable[[IntArray], Positions], size: int) -> Positions:
-    """The positions 0 ... size - 1; `solve` gives those of the numbers that it is asked for."""
-    made = []
-    for start in range(0, max(1, size), BATCH):
-        end = min(start + BATCH, size)
-        made.append(solve(np.arange(start, end)))
+def in_batches(solve: Callable[[IntArray], Positions], size: int, batch: int = BATCH) -> Positions:
+    """Return the positions 0 ... size - 1, of which `solve` gives those numbered, at most `batch` at a time."""
+    solved = []
+    for start in range(0, max(1, size), batch):
+        end = min(start + batch, size)
+        solved.append(solve(np.arange(start, end)))
         count(end, size, "positions")
-    return together(made)
+    return together(solved)

@@ -13,9 +13,10 @@ Tables hold units of their columns' names, to 15 digits: a table read and writte
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -62,6 +63,8 @@ def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -
 
 #: Statuses that stand for a result; every other one marks a failed position, whose numbers are not-a-number.
 SOLVED = ("converged", "no_contact")
+#: Status of a cell whose back flanks would be loaded, too: gears that jam.
+BACK = "back_flanks_bear"
 
 #: What bears besides smooth flanks: nothing; a rounded tip edge; a sharp edge, under which the pressure of linear
 #: elasticity is singular. Then the places of the last two.
@@ -130,7 +133,7 @@ class StiffnessCurve(ShownTable):
         Tooth pairs that carry load; -1 where the position failed.
     peak_pressure, peak_pressure_error
         Largest Hertzian pressure of the tooth pairs that bear on smooth flanks (Pa), and how far the computed contacts
-        are from Hertz's (-), see `gearfe.gears.gearmesh.sweep`; not-a-number where none does.
+        are from Hertz's (-), see `gearfe.gears.gearmesh.pair_loads`; NaN where none does.
     edge_pressure
         The like where an edge bears (Pa), blunted by a hundredth of a module; not-a-number where none bears.
     edge
@@ -207,6 +210,16 @@ class StiffnessCurve(ShownTable):
     def failed(self) -> BoolArray:
         """Positions without a solution."""
         return ~np.isin(self.status, SOLVED)
+
+    @property
+    def statuses(self) -> dict[str, int]:
+        """How many positions have which status."""
+        return dict(Counter(map(str, self.status)))
+
+    def take(self, chosen: slice | IntArray) -> StiffnessCurve:
+        """Return the curve of the positions `chosen`."""
+        each = [name for name, column in COLUMNS.items() if not column.constant]
+        return replace(self, timings={}, **{name: getattr(self, name)[chosen] for name in (*each, "load_share")})
 
     @property
     def typical_error(self) -> float:
@@ -293,13 +306,16 @@ class StiffnessCurve(ShownTable):
         InputError
             When the file is not such a table, says nothing of the mesh cycle, or contradicts itself one mesh cycle on.
         """
-        return cls.from_columns(read_csv(path, "stiffness curve"), path, mesh_cycle=mesh_cycle, base_radius=base_radius)
+        columns = read_csv(path, "stiffness curve")
+        curve = cls.from_columns(columns, path, mesh_cycle=mesh_cycle, base_radius=base_radius)
+        curve.check(str(path))
+        return curve
 
     @classmethod
     def from_columns(
         cls, columns: Mapping[str, Sequence[str]], path: str | Path, **constants: float | None
     ) -> StiffnessCurve:
-        """The curve that a table's columns hold as text; `path` is named in messages, see `from_csv`."""
+        """Return the positions that a table's columns hold as text, at one load or several, unchecked."""
         for needed in ("pinion_angle_deg", "k_mesh_N_per_m"):
             if needed not in columns:
                 raise InputError("stiffness curve", str(path), f"has no column {needed}", "add it")
@@ -321,11 +337,13 @@ class StiffnessCurve(ShownTable):
         )
         shares = [numbers(columns, name, path) for name in columns if name.startswith(SHARE)]
         values["load_share"] = np.stack(shares, axis=1) if shares else np.zeros((len(values["k_mesh"]), 0))
-        curve = cls(**values)
-        curve._check_ratio(str(path))
-        curve._check_columns(str(path))
-        check_repeats(curve.pinion_angle, curve.k_mesh, curve.mesh_cycle, str(path))
-        return curve
+        return cls(**values)
+
+    def check(self, path: str) -> None:
+        """Raise `InputError`, which names `path`, where the columns contradict each other."""
+        self._check_ratio(path)
+        self._check_columns(path)
+        check_repeats(self.pinion_angle, self.k_mesh, self.mesh_cycle, path)
 
     def _check_ratio(self, path: str) -> None:
         """Raise `InputError` where k_torsional and k_mesh do not differ by the factor r_b^2 of the wheel."""

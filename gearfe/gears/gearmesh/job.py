@@ -22,6 +22,7 @@ import numpy as np
 from ...base.cache import cache_key, cached_arrays, source_hash, versions
 from ...base.config import read_toml
 from ...base.errors import InputError, given
+from ...base.progress import Stopwatch
 from ...base.tables.gearbox import NamedMesh
 from ...base.tables.jobs import only_mesh
 from ...base.tables.pair import MaterialTable, StiffnessTable
@@ -33,8 +34,9 @@ from ..geometry.pair import GearPair, pair_of
 from .curve import StiffnessCurve
 
 if TYPE_CHECKING:
-    from ...base.progress import Stopwatch
+    from ...base.tables.loadmap import LoadMapTable
     from ..contact.compliance import MeshingPair
+    from .load_map import LoadMap
 
 #: Packages whose text decides a curve.
 PACKAGES = ("fem", "fem/meshing", "gears/contact", "gears/geometry", "gears/gearmesh", "gears/teeth")
@@ -202,6 +204,24 @@ def read_stiffness_job(path: str | Path, mesh: str | None = None) -> StiffnessJo
         For every mistake in the file, for gears that cannot run together, and a file with several meshes.
     """
     return stiffness_job(only_mesh(read_toml(path), path, mesh), Path(path).parent)
+
+
+def job_map(job: StiffnessJob, table: LoadMapTable, *, keep: Keep | None = None) -> LoadMap:
+    """Return the map of a mesh of a job file: torques and angles of `table`, its model, deviations of its flanks."""
+    from .sweep import sweep_loads
+
+    watch = Stopwatch()
+    load_map = sweep_loads(
+        job.pair,
+        table.torques(),
+        positions=table.positions,
+        mesh_cycles=table.mesh_cycles,
+        root_stress=table.root_stress,
+        back=job.back_deviations,
+        kinematics=job.table.kinematics,
+        elastic=job.elastic(keep, watch),
+    )
+    return replace(load_map, timings={**watch.seconds, **load_map.timings})
 
 
 def cached_curve(pair: GearPair, model: PairModel, **sweep: Any) -> StiffnessCurve:

@@ -1,7 +1,7 @@
 r"""Stiffness, transmission error, load share, pressure and root stress over pinion angle and torque. SI units.
 
-A map holds one stiffness curve for each of its torques, all at the same angles: over one mesh cycle, or where teeth
-differ over the full period, after which every tooth meets the same mate again.
+A stiffness curve is a map with one load, so a map holds the positions of all its torques as one curve. The angles cover
+one mesh cycle, or where teeth differ the full period, after which every tooth meets the same mate again.
 
 The transmission error is the wheel's lag on the line of action, :math:`r_{b2}` (twist - lost motion): unloaded that of
 the rigid flanks, :math:`\min_k t_k(\psi)`, loaded with what the teeth yield. Material out of the driving flanks makes
@@ -11,9 +11,9 @@ the wheel lead, so it counts negative. An order is so many times a turn of the p
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +24,14 @@ from ...base.errors import InputError, given
 from ...base.files import read_csv, write_csv
 from ...base.shown import ShownTable
 from ...base.typing import Array, BoolArray
+from ..contact.position import of_positions
 from ..geometry.deviation_job import GEARS
 from ..geometry.pair import GearPair
 from .curve import StiffnessCurve, as_text, numbers
-from .sweep import PairLoads
+from .pair_loads import PairLoads
 
 #: Column of the torque that a row belongs to.
 TORQUE = "torque_Nm"
-#: Status of a cell whose back flanks would bear: gears that jam carry the torque on both flanks, which this is not for.
-BACK = "back_flanks_bear"
 
 
 @dataclass(frozen=True)
@@ -91,22 +90,22 @@ def root_of(columns: Mapping[str, Sequence[str]], shape: tuple[int, int], path: 
 
 @dataclass(frozen=True, repr=False)
 class LoadMap(ShownTable):
-    """A gear pair's behaviour over torque and angle.
+    """A gear pair's behaviour over torque and angle: one stiffness curve for each torque, at the same angles.
 
     Attributes
     ----------
     torque : ndarray, shape (m,)
         Torques at the wheel's hub, rising (N m).
-    curves
-        The curve of each torque; all have the same angles, shape (n,).
+    cells : StiffnessCurve
+        The m n positions: torque by torque, at n angles each.
     root
         Root stresses, where they were computed.
-    pairs
-        Loaded tooth pairs of each torque; their positions are numbers of the angles. Empty for a map from a file.
+    loads
+        Loaded tooth pairs, whose positions are numbers of cells; None for a map from a file.
     transmission_error_unloaded_back : ndarray, shape (n,), or None
         Unloaded transmission error (m) of the back flanks, > 0 where they lie behind those without deviations.
     back_clearance : ndarray, shape (m, n), or None
-        Normal clearance (m) of the back flanks, unloaded themselves; < 0 where they would bear.
+        Normal clearance (m) of the back flanks, unloaded themselves; < 0 where they would touch.
     mesh_cycles
         Mesh cycles that the angles divide into equal steps; 0 where they do not.
     pair
@@ -116,9 +115,9 @@ class LoadMap(ShownTable):
     """
 
     torque: Array
-    curves: tuple[StiffnessCurve, ...]
+    cells: StiffnessCurve
     root: RootMap | None = None
-    pairs: tuple[PairLoads, ...] = ()
+    loads: PairLoads | None = None
     transmission_error_unloaded_back: Array | None = None
     back_clearance: Array | None = None
     mesh_cycles: int = 0
@@ -126,9 +125,26 @@ class LoadMap(ShownTable):
     timings: Mapping[str, float] = field(default_factory=dict)
 
     @property
+    def shape(self) -> tuple[int, int]:
+        """Number of torques m, and of angles n."""
+        return len(self.torque), len(self.cells) // len(self.torque)
+
+    @cached_property
+    def curves(self) -> tuple[StiffnessCurve, ...]:
+        """The curve of each torque."""
+        m, n = self.shape
+        return tuple(self.cells.take(slice(row * n, (row + 1) * n)) for row in range(m))
+
+    @cached_property
+    def pairs(self) -> tuple[PairLoads, ...]:
+        """Loaded tooth pairs of each torque, whose positions are numbers of the angles; empty for a map from a file."""
+        m, n = self.shape
+        return () if self.loads is None else tuple(of_positions(self.loads, n * k + np.arange(n)) for k in range(m))
+
+    @property
     def pinion_angle(self) -> Array:
         """Pinion angles, shape (n,) (rad)."""
-        return self.curves[0].pinion_angle
+        return self.cells.pinion_angle[: self.shape[1]]
 
     @property
     def status(self) -> NDArray[np.str_]:
@@ -138,26 +154,27 @@ class LoadMap(ShownTable):
     @property
     def failed(self) -> BoolArray:
         """Cells without a solution, shape (m, n)."""
-        return np.stack([curve.failed for curve in self.curves])
+        return self.quantity("failed")
+
+    @property
+    def statuses(self) -> dict[str, int]:
+        """How many cells have which status."""
+        return self.cells.statuses
 
     def quantity(self, name: str) -> Any:
         """A field of `StiffnessCurve` over torque and angle, shape (m, n)."""
-        return np.stack([getattr(curve, name) for curve in self.curves])
+        values = getattr(self.cells, name)
+        return values.reshape(*self.shape, *values.shape[1:])
 
     @property
     def peak_to_peak(self) -> Array:
-        """Peak-to-peak transmission error of each torque, shape (m,) (m); not-a-number where a position failed."""
+        """Peak-to-peak transmission error of each torque, shape (m,) (m); NaN where a position failed."""
         return np.ptp(self.quantity("transmission_error"), axis=1)
 
     @property
     def transmission_error_unloaded(self) -> Array:
         """That of the rigid flanks, shape (n,) (m)."""
-        return self.curves[0].transmission_error_unloaded
-
-    @property
-    def statuses(self) -> dict[str, int]:
-        """How many cells have which status."""
-        return dict(Counter(map(str, self.status.ravel())))
+        return self.cells.transmission_error_unloaded[: self.shape[1]]
 
     @property
     def span(self) -> str:
@@ -199,15 +216,7 @@ class LoadMap(ShownTable):
 
     def columns(self) -> dict[str, list[str]]:
         """Columns of the CSV file as text, one row per cell: torque by torque, angle by angle."""
-        tables = [curve.columns() for curve in self.curves]
-        names = list(dict.fromkeys(name for one in tables for name in one))
-        rows = len(self.pinion_angle)
-        columns: dict[str, list[str]] = {TORQUE: []}
-        columns.update({name: [] for name in names})
-        for torque, one in zip(self.torque, tables, strict=True):
-            columns[TORQUE] += as_text([torque], TORQUE) * rows
-            for name in names:
-                columns[name] += one.get(name, ["0"] * rows)  # a share of a pair that this torque does not know
+        columns = {TORQUE: as_text(np.repeat(self.torque, self.shape[1]), TORQUE), **self.cells.columns()}
         more = {} if self.root is None else root_columns(self.root)
         if self.transmission_error_unloaded_back is not None and self.back_clearance is not None:
             error = np.broadcast_to(self.transmission_error_unloaded_back, self.back_clearance.shape)
@@ -238,12 +247,12 @@ class LoadMap(ShownTable):
         if len(set(counts.tolist())) > 1 or not (np.diff(torque[starts]) > 0).all():
             problem = "is not a table of rising torques with the same number of angles each"
             raise InputError("load map", str(path), problem, "write one with gearfe loadmap")
-        curves = []
-        for start, count in zip(starts, counts, strict=True):
-            part = {name: cells[start : start + count] for name, cells in columns.items()}
-            curves.append(StiffnessCurve.from_columns(part, path))
-        if any(not np.array_equal(c.pinion_angle, curves[0].pinion_angle) for c in curves):
-            raise InputError(
-                "load map", str(path), "has other angles at other torques", "write one with gearfe loadmap"
-            )
-        return cls(torque[starts], tuple(curves), root_of(columns, (len(starts), int(counts[0])), path))
+        cells = StiffnessCurve.from_columns(columns, path)
+        shape = len(starts), int(counts[0])
+        load_map = cls(torque[starts], cells, root_of(columns, shape, path))
+        if (load_map.quantity("pinion_angle") != load_map.pinion_angle).any():
+            problem = "has other angles at other torques"
+            raise InputError("load map", str(path), problem, "write one with gearfe loadmap")
+        for curve in load_map.curves:
+            curve.check(str(path))
+        return load_map

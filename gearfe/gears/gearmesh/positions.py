@@ -179,7 +179,9 @@ def position_solver(elastic: MeshingPair) -> PositionSolver:
     return PositionSolver(elastic, half_plane_pair(elastic), not isinstance(elastic.law, HalfPlane))
 
 
-def at_twists(solver: PositionSolver, angles: Array, twists: Array, *, finite: bool = False) -> Positions:
+def at_twists(
+    solver: PositionSolver, angles: Array, twists: Array, *, kept: IntArray = NONE, finite: bool = False
+) -> Positions:
     """Solve positions at given twists.
 
     Parameters
@@ -188,11 +190,13 @@ def at_twists(solver: PositionSolver, angles: Array, twists: Array, *, finite: b
         The gears.
     angles, twists : ndarray, shape (n,)
         Pinion angles, and twists from the centred position (rad).
+    kept
+        Numbers of the positions with loads; all have them where finite strain counts.
     finite : bool
         Whether the torque has the effect of finite strain.
     """
-    found = solver.solve(angles, twists, np.arange(len(angles)) if finite else NONE)
-    return found.raised(finite_strain_shares(solver.elastic, found)) if finite else found
+    solved = solver.solve(angles, twists, np.arange(len(angles)) if finite else kept)
+    return solved.raised(finite_strain_shares(solver.elastic, solved)) if finite else solved
 
 
 def at_torques(

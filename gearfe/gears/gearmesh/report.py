@@ -1,29 +1,34 @@
-"""What the stiffness command tells: the printed lines and the summary."""
+"""Report of a stiffness curve or a load map: summary, tables, printed lines, warnings."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...base.cache import versions
-from ...base.errors import InputError
+from ...base.errors import InputError, given
 from ...base.shown import percent
+from ...base.tables.loadmap import LoadMapTable
 from ...base.tables.pair import DEFAULT_LAW
 from ...base.typing import Array
 from ..contact.laws import COARSENING
+from ..geometry import pitch_errors
 from ..geometry.derived import derived_geometry, iso_values
 from ..geometry.deviation_job import GEARS
 from ..geometry.modifications import CHECKED, ends_of
 from ..geometry.validity import overlap_warnings
-from .curve import EDGES, StiffnessCurve
+from .curve import BACK, EDGES, StiffnessCurve
 from .job import StiffnessJob
+from .load_map import LoadMap
 from .positions import ORDER
 
+#: Harmonics of the mesh order in the table by torque.
+HARMONICS = 5
 #: Allowable contact stress of case-hardened steel for unlimited life (MPa): ISO 6336-5, material quality MQ.
 ALLOWABLE_MPA = 1500.0
 
@@ -55,8 +60,18 @@ def largest_pressures(curve: StiffnessCurve) -> dict[str, Any]:
     }
 
 
+def _head(job: StiffnessJob, tables: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return what the summaries of curves and maps begin with; `tables`: of the job, beside those of the model."""
+    return {
+        "job": {**job.tables, **(tables or {})},
+        "versions": versions(),
+        "derived_geometry": derived_geometry(job.pair),
+        "warnings": list(job.pair.warnings),
+    }
+
+
 def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, float]) -> dict[str, Any]:
-    """Content of summary.json; stages that follow may still come to the timings."""
+    """Return the content of summary.json; stages that follow may still come to the timings."""
     table, moduli = job.table, [material.youngs_modulus for material in job.materials]
     torque, lost = curve.torque_wheel[~curve.failed], math.degrees(curve.lost_motion)
     twist = error = None
@@ -79,10 +94,7 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
             "relative": curve.relative_error[known],
         }
     return {
-        "job": job.tables,
-        "versions": versions(),
-        "derived_geometry": derived_geometry(job.pair),
-        "warnings": list(job.pair.warnings),
+        **_head(job),
         "iso_6336": iso_values(job.pair, moduli[0], moduli[1]),
         "mesh_stiffness": cycle_statistics(curve, table.interpolation),
         "error_estimate": error,
@@ -93,11 +105,123 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
         },
         "contact_pressure": {**largest_pressures(curve), "usual_steel_MPa": ALLOWABLE_MPA},
         "contact_law": curve.contact_law,
-        "statuses": dict(Counter(map(str, curve.status))),
+        "statuses": curve.statuses,
         "failed_pinion_angles_deg": np.degrees(curve.pinion_angle[curve.failed]),
         "positions_beyond_validity": int(np.count_nonzero(curve.beyond_validity == 1)),
         "timings_s": timings,
     }
+
+
+def map_summary(
+    job: StiffnessJob, table: LoadMapTable, load_map: LoadMap, timings: Mapping[str, float]
+) -> dict[str, Any]:
+    """Return the content of loadmap.json.
+
+    Parameters
+    ----------
+    job : StiffnessJob
+        The gears and the model.
+    table : LoadMapTable
+        The keys of the map.
+    load_map : LoadMap
+        The map.
+    timings : mapping
+        Name -> time that a part of the work took (s).
+    """
+    return {
+        **_head(job, {table.NAME: asdict(table)}),
+        "mesh_cycles": load_map.mesh_cycles,
+        "transmission_error_unloaded_peak_to_peak_um": 1e6 * float(np.ptp(load_map.transmission_error_unloaded)),
+        "by_torque": torque_table(load_map),
+        "root_stress_error_estimate": None if load_map.root is None else _largest(load_map.root.error),
+        **_deviations(job),
+        "statuses": load_map.cells.statuses,
+        "timings_s": dict(timings),
+    }
+
+
+def _deviations(job: StiffnessJob) -> dict[str, Any]:
+    """Pitch deviations of the driving flanks, and the tolerances of the class, where there is one."""
+    if not job.mesh.deviates:
+        return {}
+    class_, made, allowed = job.mesh.tolerance_class, {}, {}
+    for name, own in zip(GEARS, job.deviations, strict=True):
+        gear = getattr(job.pair, name)
+        index = np.array(own.turn) * gear.reference_radius
+        made[name] = {
+            "single_pitch_deviation_um": 1e6 * float(np.abs(pitch_errors.single_of(index)).max()),
+            "cumulative_pitch_deviation_um": 1e6 * float(np.ptp(index)),
+        }
+        if class_ is not None:
+            allowed[name] = pitch_errors.tolerances(gear, class_).rounded_um
+    return {"pitch": made, "tolerances_um": allowed or None}
+
+
+def _largest(values: Array) -> float:
+    return float(np.nanmax(values)) if np.isfinite(values).any() else float("nan")
+
+
+def torque_table(load_map: LoadMap) -> dict[str, list[float]]:
+    """One row per torque: means over the positions, transmission error and its mesh orders, largest stresses."""
+    error = load_map.quantity("transmission_error")
+    table = {
+        "torque_Nm": load_map.torque,
+        "k_mesh_mean_N_per_m": load_map.quantity("k_mesh").mean(axis=1),
+        "k_tangent_mean_N_per_m": load_map.quantity("k_tangent").mean(axis=1),
+        "transmission_error_mean_um": 1e6 * error.mean(axis=1),
+        "transmission_error_peak_to_peak_um": 1e6 * load_map.peak_to_peak,
+    }
+    if load_map.mesh_cycles:
+        order, amplitude = load_map.spectrum()
+        for h in range(1, HARMONICS + 1):
+            if h * load_map.mesh_cycles < len(order):
+                table[f"mesh_order_{h}_um"] = 1e6 * amplitude[:, h * load_map.mesh_cycles]
+    largest = [largest_pressures(curve) for curve in load_map.curves]
+    for name, key in (
+        ("peak_pressure_largest_MPa", "largest_hertzian_MPa"),
+        ("edge_pressure_largest_MPa", "largest_at_edges_MPa"),
+        ("positions_with_rounded_edge", "positions_with_a_rounded_edge_bearing"),
+        ("positions_with_singular_edge", "positions_with_a_singular_edge_bearing"),
+    ):
+        table[name] = np.array([pressures[key] for pressures in largest])
+    if load_map.root is not None:
+        for g, gear in enumerate(GEARS):
+            table[f"root_stress_largest_{gear}_MPa"] = 1e-6 * load_map.root.largest[:, :, g].max(axis=1)
+    table["failed_positions"] = load_map.failed.sum(axis=1)
+    return {name: values.tolist() for name, values in table.items()}
+
+
+def pair_table(load_map: LoadMap) -> dict[str, Array]:
+    """A row for each loaded tooth pair: the pressure along the path of contact."""
+    loads, gears = given(load_map.loads, "loads"), given(load_map.pair, "pair")
+    level, angle = np.divmod(loads.position, load_map.shape[1])
+    return {
+        "torque_Nm": load_map.torque[level],
+        "pinion_angle_deg": np.degrees(load_map.pinion_angle)[angle],
+        "pinion_tooth": loads.pair % gears.pinion.teeth,
+        "wheel_tooth": (-1 - loads.pair) % gears.wheel.teeth,
+        "roll_length_pinion_mm": 1e3 * loads.roll[:, 0],
+        "roll_length_wheel_mm": 1e3 * loads.roll[:, 1],
+        "force_N": loads.force,
+        "load_share": loads.share,
+        "half_width_um": 1e6 * loads.half_width,
+        "pressure_MPa": 1e-6 * loads.pressure,
+        "edge": np.array(EDGES)[loads.edge],
+    }
+
+
+def order_table(load_map: LoadMap) -> dict[str, Array]:
+    """Amplitudes of the transmission error by orders of the pinion's turn."""
+    order, free = load_map.spectrum(unloaded=True)
+    _, loaded = load_map.spectrum()
+    table = {"order": order, "unloaded_um": 1e6 * free}
+    return table | {f"at_{torque:.6g}_Nm_um": 1e6 * row for torque, row in zip(load_map.torque, loaded, strict=True)}
+
+
+def map_tables(load_map: LoadMap) -> dict[str, Mapping[str, Any]]:
+    """All tables of a computed map, the main one first."""
+    torques, pairs, orders = torque_table(load_map), pair_table(load_map), order_table(load_map)
+    return {"loadmap": load_map.columns(), "torques": torques, "pairs": pairs, "orders": orders}
 
 
 def deviation_lines(job: StiffnessJob) -> list[str]:
@@ -114,10 +238,14 @@ def deviation_lines(job: StiffnessJob) -> list[str]:
     return [f"flanks with the deviations of [microgeometry], up to {both}"]
 
 
+def _statuses(curve: StiffnessCurve) -> str:
+    """Return how many positions have which status, in words."""
+    return ", ".join(f"{count} {status}" for status, count in curve.statuses.items())
+
+
 def report_lines(job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, Any]) -> list[str]:
-    """Lines to print; `found` is the `summary`."""
-    statuses = ", ".join(f"{n} {status}" for status, n in found["statuses"].items())
-    lines = [f"{len(curve)} positions: {statuses}"]
+    """Return the lines to print about a curve; `found` is the `summary`."""
+    lines = [f"{len(curve)} positions: {_statuses(curve)}"]
     if curve.contact_law:
         lines.append(f"contact law: {curve.contact_law}")
     lines += deviation_lines(job)
@@ -146,6 +274,33 @@ def report_lines(job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, A
             f"discretisation error, estimated by {against}meshes {COARSENING:g} times coarser (order {ORDER:g} "
             f"assumed): typically {percent(curve.typical_error)}, at worst {percent(curve.worst_error)}"
         )
+    return lines
+
+
+def map_lines(load_map: LoadMap) -> list[str]:
+    """Return the lines to print about a map."""
+    unloaded = 1e6 * float(np.ptp(load_map.transmission_error_unloaded))
+    (m, n), swing = load_map.shape, load_map.peak_to_peak
+    lines = [f"{m} torques x {n} positions over {load_map.span}: {_statuses(load_map.cells)}"]
+    lines.append(f"unloaded transmission error {unloaded:.4g} um peak to peak")
+    for row in sorted({0, m // 2, m - 1}):
+        curve = load_map.curves[row]
+        if curve.failed.any():
+            lines.append(f"at {load_map.torque[row]:.4g} N m: {curve.failed.sum()} of {n} positions have no numbers")
+            continue
+        line = (
+            f"at {load_map.torque[row]:.4g} N m: mean stiffness {1e-6 * curve.k_mesh.mean():.4g} N/um, transmission "
+            f"error {1e6 * curve.transmission_error.mean():.4g} um with {1e6 * swing[row]:.3g} um peak to peak"
+        )
+        if load_map.root is not None:
+            pinion, wheel = 1e-6 * load_map.root.largest[row].max(axis=0)
+            line += f", root stress {pinion:.4g} MPa (pinion), {wheel:.4g} MPa (wheel)"
+        lines += [line, *("  " + pressure for pressure in pressure_lines(curve))]
+    best = int(np.argmin(np.where(np.isfinite(swing), swing, np.inf)))
+    if m > 2 and np.isfinite(swing[best]):
+        lines.append(f"least peak-to-peak error: {1e6 * swing[best]:.3g} um at {load_map.torque[best]:.4g} N m")
+    if load_map.root is not None:
+        lines.append(f"root stress: estimated error at worst {percent(_largest(load_map.root.error))}")
     return lines
 
 
@@ -192,21 +347,46 @@ def cure_of(statuses: NDArray[np.str_]) -> str:
     )
 
 
-def warnings(job: StiffnessJob, curve: StiffnessCurve) -> list[str]:
-    """Sentences about what deserves a look."""
-    said = list(job.pair.warnings)
+def warnings(job: StiffnessJob, result: StiffnessCurve | LoadMap) -> list[str]:
+    """Return sentences about the results of a curve or a map that need attention."""
+    load_map = result if isinstance(result, LoadMap) else None
+    curve = result if isinstance(result, StiffnessCurve) else result.cells
+    sentences = list(job.pair.warnings)
     apart = int(np.count_nonzero(curve.status == "no_contact"))
     if apart:
         sentence = f"{apart} positions have no contact: the twist does not take up backlash and relief there"
         centred = job.table.twist_from == "centred"
         cure = ' (twist_from = "contact" counts it from where the flanks touch)' if centred else ""
-        said.append(sentence + cure)
-    said += overlap_warnings(job.pair, curve.twist, curve.beyond_validity)
-    if curve.failed.any():
-        angles = ", ".join(f"{a:.6g}" for a in np.degrees(curve.pinion_angle[curve.failed])[:8])
-        more = " ..." if curve.failed.sum() > 8 else ""
-        said.append(
-            f"{int(curve.failed.sum())} positions failed and have no numbers, only their status (pinion angle {angles}"
-            f"{more} deg): {cure_of(curve.status[curve.failed])}"
+        sentences.append(sentence + cure)
+    sentences += overlap_warnings(job.pair, curve.twist, curve.beyond_validity)
+    jammed = curve.status == BACK
+    if jammed.any() and load_map is not None:
+        sentences.append(_jam(job, load_map, int(jammed.sum())))
+    failed = np.flatnonzero(curve.failed & ~jammed)
+    if len(failed):
+        where = f"pinion angle {_some(np.degrees(curve.pinion_angle[failed]), '.6g')} deg"
+        if load_map is not None:
+            where = f"torque {_some(load_map.torque[failed // load_map.shape[1]], '.4g')} N m; {where}"
+        sentences.append(
+            f"{len(failed)} positions failed and have no numbers, only their status ({where}): "
+            + cure_of(curve.status[failed])
         )
-    return said
+    return sentences
+
+
+def _some(values: Array, form: str) -> str:
+    """Return the first of some values as text, each once."""
+    distinct = list(dict.fromkeys(f"{value:{form}}" for value in values))
+    return ", ".join(distinct[:8]) + (" ..." if len(distinct) > 8 else "")
+
+
+def _jam(job: StiffnessJob, load_map: LoadMap, count: int) -> str:
+    """Return the sentence about so many cells whose back flanks would be loaded."""
+    clearance = given(load_map.back_clearance, "back_clearance")
+    i, j = np.unravel_index(int(np.nanargmin(clearance)), clearance.shape)
+    where = f"{load_map.torque[i]:.4g} N m and {np.degrees(load_map.pinion_angle[j]):.4g} deg"
+    return (
+        f"{count} positions have no numbers, for the back flanks would bear, too: they overlap by up to "
+        f"{-1e6 * clearance[i, j]:.3g} um (at {where}), more material stands out than "
+        f"{1e6 * job.pair.normal_backlash:.3g} um of backlash leave room for; thin the teeth (tooth_thinning_um)"
+    )

@@ -1,64 +1,57 @@
-r"""Rotation sweep: from a gear pair to its mesh-stiffness curve.
+r"""The sweep of a gear pair over pinion angle and load: a stiffness curve is a map with one load.
 
 Conventions: pinion centre at the origin, wheel at +x; at pinion angle 0 a pinion tooth stands on the line of centres
 and a wheel space faces it; angles are counter-clockwise; wheel angle = -pinion angle z1/z2 + lost motion + twist. The
 lost motion is half the backlash: it brings unmodified driving flanks to touch, and a positive twist presses them
 together.
 
-Pressures are Hertz's on smooth flanks, and apart from it where an edge bears. A tooth pair that carries the force F
-over the width w, on flanks of relative curvature :math:`1/\rho` where they touch, has Hertz's peak pressure (Johnson,
-*Contact Mechanics*, 1985, eq. 4.45)
-
-.. math:: p_H = \sqrt{\frac{F E^*}{\pi\rho w}} = \frac{2F}{\pi b_H w} .
-
-The computed pressure has a half width b of its own, by its second moment (`gears.contact.elements.half_widths`), so
-:math:`|b/b_H - 1|` tells how far from Hertz's the contact is: the discretisation, flanks whose curvature changes along
-the contact, teeth that are no half-planes. On flanks with deviations of micrometres, whose curvature where they touch
-may be that of a wave shorter than the contact, :math:`2F/(\pi b w)` itself stands for the pressure.
-
-Where the contact reaches an edge of a face, the pressure of linear elasticity has no bound (a sharp tip, the kink where
-a linear relief starts, the edge of an undercut), or the radius of a tip round decides it. What stands for it there is
-
-.. math:: p_e = \frac{2F}{\pi w \sqrt{b^2 + \epsilon^2}}, \qquad \epsilon = 0.01\,m,
-
-the peak of a Hertzian contact with the same force and second moment, blunted by a hundredth of a module: a figure to
-compare designs with, which neither the mesh nor a contact of some micrometres decides. It is no stress of the material.
+All cells, angle by load, are solved side by side in `Grid.solve`, at given twists or at the twists that carry given
+torques; angles after which the same teeth meet again are solved once.
 
     >>> curve = sweep_stiffness(pair, twist=math.radians(0.05))   # one mesh cycle in 20 positions
     >>> k, slope = curve.interpolate(math.radians(7.3))           # N/m and N/(m rad)
+    >>> load_map = sweep_loads(pair, [25.0, 50.0, 100.0])         # N m; one mesh cycle in 18 positions
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.errors import InputError
-from ...base.progress import Stopwatch, one_thread
-from ...base.typing import Array, BoolArray, IntArray
+from ...base.progress import Stopwatch, one_thread, stage
+from ...base.typing import Array, IntArray
 from ..contact.compliance import MeshingPair, gear_body
 from ..contact.half_plane_pair import HalfPlanePair
 from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, check_alike, check_torque, law_text, uses_stress
-from ..contact.position import Positions
-from ..geometry.face import NOMINAL
+from ..contact.position import Positions, in_batches, joined, taken
+from ..geometry.face import ToothDeviations
 from ..geometry.pair import GearPair
 from ..geometry.validity import MOST_OVERLAP, overlaps
 from ..teeth.tooth_sector import sector_mesh, sector_recipes
-from .curve import EDGES, ROUNDED, SINGULAR, SOLVED, StiffnessCurve
+from .curve import BACK, SOLVED, StiffnessCurve
+from .load_map import LoadMap
+from .pair_loads import PairLoads, contact_pressures, pair_loads
 from .periodic import distinct_phases
 from .positions import PositionSolver, at_torques, at_twists, checked_contact, curve_error, load_shares, position_solver
+from .root_stress import PairRoots, ToothRoots, pair_roots, root_map
 
-__all__ = ["StiffnessCurve", "elastic_pair", "sweep_stiffness"]
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+__all__ = ["StiffnessCurve", "elastic_pair", "sweep_loads", "sweep_stiffness"]
 
 
-#: Positions in one mesh cycle where no angles are given.
-ANGLES = 20
-#: Blunting length of edges (modules).
-BLUNTING = 0.01
+#: Positions in one mesh cycle where no angles are given: of a curve, and of a map.
+ANGLES, MAP_ANGLES = 20, 18
+#: Positions that are in memory together with their loads and panels.
+TOGETHER = 512
+#: Largest number of cells of a map.
+MOST_CELLS = 200_000
 
 
 def elastic_pair(
@@ -150,61 +143,144 @@ def sweep_stiffness(
     InputError
         For neither or both of twist and torque, or values out of range.
     """
-    load, watch = _checked_load(pair, twist, torque, twist_from), Stopwatch()
-    requested, finite = requested_angles(pair, angles, ANGLES, kinematics)
+    load, finite = _checked_load(pair, twist, torque, twist_from), _finite(kinematics)
+    requested, watch = _requested(pair, angles, ANGLES), Stopwatch()
     if elastic is None:
         elastic = elastic_pair(pair, model, watch=watch, **changes)
     check_alike(elastic.deviations)
-    solved_angles, source = (
-        (requested, np.arange(len(requested))) if solve_all else distinct_phases(requested, pair.mesh_cycle)
-    )
     if torque is not None:
         check_torque(pair, elastic.model, load)
-    solver = position_solver(elastic)
-    with watch.stage("unloaded flanks"):
-        solver.contact_model.first_contacts(solved_angles)
-    with watch.stage("positions"), one_thread():
-        solve = at_twists if torque is None else at_torques
-        solved = solve(solver, solved_angles, np.full(len(solved_angles), load), finite=finite)
-    curve, _ = assembled_curve(solver, requested, source, solved, searched=torque is not None)
+    grid = Grid.over(
+        position_solver(elastic), requested, [load], by_torque=torque is not None, finite=finite, solve_all=solve_all
+    )
+    solved, _ = grid.solve(watch)
+    curve, _ = grid.cells(solved)
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
-            error = curve_error(solver, coarser(elastic), solved, finite=finite)
-        curve = replace(curve, relative_error=error[source])
+            error = curve_error(grid.solver, coarser(elastic), solved, finite=finite)
+        curve = replace(curve, relative_error=error[grid.source])
     return replace(curve, timings=dict(watch.seconds))
 
 
-def requested_angles(pair: GearPair, angles: ArrayLike | None, count: int, kinematics: str) -> tuple[Array, bool]:
-    """Return the pinion angles of a sweep (rad), and whether finite strain counts.
+def sweep_loads(
+    pair: GearPair,
+    torques: ArrayLike,
+    model: PairModel = DEFAULT_MODEL,
+    *,
+    angles: ArrayLike | None = None,
+    positions: int = MAP_ANGLES,
+    mesh_cycles: int | None = None,
+    root_stress: bool = False,
+    back: tuple[ToothDeviations, ToothDeviations] | None = None,
+    kinematics: Literal["small", "finite"] = "finite",
+    elastic: MeshingPair | None = None,
+    **changes: Any,
+) -> LoadMap:
+    """Compute stiffness, transmission error, load share, peak pressure and root stress over angle and torque.
 
     Parameters
     ----------
     pair : GearPair
         The gears.
-    angles : array_like, shape (n,), or None
-        Asked angles (rad).
-    count : int
-        Number of angles over one mesh cycle if none are asked for.
-    kinematics : str
-        ``small`` or ``finite``.
+    torques : array_like, shape (m,)
+        Torques at the wheel's hub (N m), > 0.
+    model, kinematics, elastic, changes
+        See `sweep_stiffness`; teeth may differ (``deviations=(pinion, wheel)``).
+    angles : array_like, shape (n,), optional
+        Pinion angles (rad), instead of `positions`. Those after which all teeth meet again are solved once.
+    positions, mesh_cycles
+        Pinion angles in a mesh cycle, and how many cycles; None: one where the teeth of each gear are alike on both
+        sides, else the full period, the least common multiple of the teeth.
+    root_stress
+        Also the tension at the tooth roots, on separate refined meshes, see `gearfe.gears.gearmesh.root_stress`.
+    back
+        Deviations of the back flanks of pinion and wheel, of the pair seen from the other side as
+        `geometry.deviation_job.deviations_of` and, for displaced teeth, `geometry.pitch_errors.back_turns` give
+        them, to know the room behind the teeth: positions without
+        have the status `gearfe.gears.gearmesh.curve.BACK` and no numbers.
+
+    Returns
+    -------
+    LoadMap
+        With all cells; one that failed has its status and NaN.
 
     Raises
     ------
     InputError
-        For other kinematics, and angles that are not a list of finite numbers.
+        For torques or angles out of range, and tooth pairs that carry nothing on their whole path.
     """
-    if kinematics not in ("small", "finite"):
-        raise InputError("kinematics", kinematics, "must be small or finite")
-    requested = (
-        np.arange(count) * pair.mesh_cycle / count if angles is None else np.atleast_1d(np.asarray(angles, float))
-    )
+    goals, finite, watch = rising_torques(torques), _finite(kinematics), Stopwatch()
+    if elastic is None:
+        elastic = elastic_pair(pair, model, watch=watch, **changes)
+    solver, cycles = position_solver(elastic), 0
+    behind_model = None if back is None else solver.contact_model.deviated(back)
+    period = max(model.mesh_cycles for model in (solver.contact_model, behind_model) if model is not None)
+    if angles is None:
+        cycles = period if mesh_cycles is None else mesh_cycles
+    requested = _requested(pair, angles, positions, cycles)
+    grid = Grid.over(solver, requested, goals, by_torque=True, finite=finite, period=period)
+    if len(goals) * len(grid.angles) > MOST_CELLS:
+        problem = f"makes more than {MOST_CELLS} cells with {len(grid.angles)} angles"
+        raise InputError("torques", len(goals), problem, "use fewer torques or positions, or state mesh_cycles")
+    roots = None
+    if root_stress:
+        with watch.stage("root meshes"), one_thread():
+            roots = pair_roots(elastic)
+    solved, at_roots = grid.solve(watch, roots)
+    clearance = error_behind = None
+    if behind_model is not None:
+        error_behind, clearance = _back_flanks(grid, behind_model, solved)
+        solved = solved.with_status(np.where(clearance < 0.0, BACK, solved.status))
+        error_behind, clearance = error_behind[grid.source], clearance.reshape(grid.shape)[:, grid.source]
+    root = None
+    if at_roots is not None:
+        good = solved.status[at_roots.position] != BACK
+        root = root_map(taken(at_roots, good), grid.shape, grid.source)
+    cells, loads = grid.cells(solved)
+    load_map = LoadMap(goals, cells, root, loads, error_behind, clearance, cycles, pair, dict(watch.seconds))
+    _check_contact(load_map, solver)
+    return load_map
+
+
+def rising_torques(torques: ArrayLike) -> Array:
+    """Return torques at the wheel's hub (N m), each once and rising, shape (m,).
+
+    Raises
+    ------
+    InputError
+        For none, and for one that is not finite or not > 0.
+    """
+    rising = np.unique(np.asarray(torques, dtype=float))
+    if len(rising) == 0 or not (np.isfinite(rising).all() and rising[0] > 0):
+        raise InputError("torques", torques, "must be finite and > 0 N m", "give torques at the wheel's hub")
+    return rising
+
+
+def _requested(pair: GearPair, angles: ArrayLike | None, positions: int, cycles: int = 1) -> Array:
+    """Return the pinion angles asked for (rad), shape (n,), or so many `positions` in each of the mesh `cycles`.
+
+    Raises
+    ------
+    InputError
+        For angles that are no list of finite numbers.
+    """
+    if angles is None:
+        angles = np.arange(positions * cycles) * pair.mesh_cycle / positions
+    requested = np.atleast_1d(np.asarray(angles, float))
     if requested.ndim != 1 or len(requested) == 0 or not np.isfinite(requested).all():
         raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
-    return requested, kinematics == "finite"
+    return requested
+
+
+def _finite(kinematics: str) -> bool:
+    """Return whether finite strain counts; raise `InputError` for other kinematics."""
+    if kinematics not in ("small", "finite"):
+        raise InputError("kinematics", kinematics, "must be small or finite")
+    return kinematics == "finite"
 
 
 def _checked_load(pair: GearPair, twist: float | None, torque: float | None, twist_from: str) -> float:
-    """Twist from the centred position (rad), or torque."""
+    """Return the twist from the centred position (rad), or torque."""
     if twist_from not in ("contact", "centred"):
         raise InputError("twist_from", twist_from, "must be contact or centred")
     lost = pair.contact_twist if twist_from == "contact" else 0.0
@@ -223,171 +299,160 @@ def _checked_load(pair: GearPair, twist: float | None, torque: float | None, twi
     return float(twist) + lost
 
 
-def assembled_curve(
-    solver: PositionSolver, requested: Array, source: IntArray, solved: Positions, *, searched: bool
-) -> tuple[StiffnessCurve, PairLoads]:
-    """Return the curve at all asked angles, and the loaded pairs there.
+@dataclass(frozen=True)
+class Grid:
+    """Cells of a sweep: m loads at n pinion angles, load by load.
 
-    Parameters
+    Attributes
     ----------
     solver : PositionSolver
         The gears.
     requested : ndarray, shape (n,)
-        Asked pinion angles (rad).
+        Pinion angles asked for (rad).
+    angles : ndarray, shape (s,)
+        Pinion angles that are solved (rad).
     source : ndarray of int, shape (n,)
-        Number of the position among those solved for each of the angles.
-    solved : Positions
-        Solved positions.
-    searched
-        Whether the twist is a result, not given.
+        Number of the solved angle of each of those asked for.
+    loads : ndarray, shape (m,)
+        Twists from the centred position (rad), or torques at the wheel (N m).
+    by_torque, finite
+        Whether loads are torques, and whether these have the effect of finite strain.
     """
-    pair, law = solver.pair, solver.elastic.law
-    radius, lost = pair.wheel.base_radius, pair.contact_twist
-    solved = checked_contact(solver, solved).take(source)
-    failed = ~np.isin(solved.status, SOLVED)
-    total = np.where(failed & searched, np.nan, solved.twist)
-    twist, torque = total - lost, solved.torque_wheel
-    deflection = total - solver.contact_model.first_contact_twist(solved.pinion_angle)
-    stiffness = np.divide(torque, deflection, out=np.zeros_like(torque), where=torque != 0.0)  # not-a-number stays
-    cycles = np.round((requested - solved.pinion_angle) / pair.mesh_cycle).astype(np.int64)
-    leading, shares = load_shares(solved)
-    loads = pair_loads(solver, solved)
-    curve = StiffnessCurve(
-        pinion_angle=requested,
-        wheel_angle=pair.wheel_angle_at(requested, total),
-        twist=twist,
-        torque_wheel=torque,
-        torque_pinion=solved.torque_pinion,
-        torque_wheel_reaction=solved.torque_wheel_reaction,
-        k_torsional=stiffness,
-        k_mesh=stiffness / radius**2,
-        k_tangent=solved.tangent / radius**2,
-        transmission_error=twist * radius,
-        transmission_error_unloaded=(solver.contact_model.first_contact_twists(solved.pinion_angle) - lost) * radius,
-        leading_pair=leading - cycles,
-        load_share=shares,
-        teeth_in_contact=np.where(failed, -1, (shares > 0).sum(axis=1)),
-        iterations=solved.iterations,
-        status=solved.status,
-        law=np.full(len(source), law.name),
-        contact_law=law_text(law),
-        beyond_validity=np.where(np.isnan(twist), -1, overlaps(pair, twist) > MOST_OVERLAP),
-        mesh_cycle=pair.mesh_cycle * solver.contact_model.mesh_cycles,
-        base_radius=radius,
-        lost_motion=lost,
-        **contact_pressures(solved, loads),
+
+    solver: PositionSolver
+    requested: Array
+    angles: Array
+    source: IntArray
+    loads: Array
+    by_torque: bool
+    finite: bool
+
+    @classmethod
+    def over(
+        cls,
+        solver: PositionSolver,
+        requested: Array,
+        loads: Sequence[float] | Array,
+        *,
+        by_torque: bool,
+        finite: bool,
+        period: int = 1,
+        solve_all: bool = False,
+    ) -> Grid:
+        """Return the grid over angles and loads, whose angles repeat after `period` mesh cycles unless `solve_all`."""
+        angles, source = requested, np.arange(len(requested))
+        if not solve_all:
+            angles, source = distinct_phases(requested, solver.pair.mesh_cycle * period)
+        return cls(solver, requested, angles, source, np.asarray(loads, dtype=float), by_torque, finite)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Loads and solved angles."""
+        return len(self.loads), len(self.angles)
+
+    def solve(self, watch: Stopwatch, roots: PairRoots | None = None) -> tuple[Positions, ToothRoots | None]:
+        """Solve all cells, without loads and panels in the result; with `roots` also their root stresses."""
+        solver, n = self.solver, len(self.angles)
+        at_load = at_torques if self.by_torque else at_twists
+        at_roots: list[ToothRoots] = []
+
+        def solve(cells: IntArray) -> Positions:
+            kept = np.arange(0 if roots is None else len(cells))
+            with stage("contacts"):
+                solved = at_load(solver, self.angles[cells % n], self.loads[cells // n], kept=kept, finite=self.finite)
+            if roots is not None:
+                of_batch = roots.at(solved)
+                at_roots.append(replace(of_batch, position=cells[0] + of_batch.position))
+            return solved.without_loads()
+
+        with watch.stage("unloaded flanks"):
+            solver.contact_model.first_contacts(self.angles)
+        with watch.stage("positions"), one_thread():
+            solved = in_batches(solve, len(self.loads) * n, TOGETHER)
+        return checked_contact(solver, solved), joined(at_roots) if at_roots else None
+
+    def cells(self, solved: Positions) -> tuple[StiffnessCurve, PairLoads]:
+        """Return the solved cells at all angles asked for, load by load, and their loaded tooth pairs."""
+        solver, pair, law = self.solver, self.solver.pair, self.solver.elastic.law
+        loads, radius, lost = len(self.loads), pair.wheel.base_radius, pair.contact_twist
+        solved = solved.take((len(self.angles) * np.arange(loads)[:, None] + self.source).ravel())
+        requested = np.tile(self.requested, loads)
+        failed = ~np.isin(solved.status, SOLVED)
+        total = np.where(failed & self.by_torque, np.nan, solved.twist)
+        twist, torque = total - lost, solved.torque_wheel
+        deflection = total - solver.contact_model.first_contact_twist(self.angles)
+        stiffness = np.divide(torque, deflection, out=np.zeros_like(torque), where=torque != 0.0)  # NaN stays
+        unloaded = solver.contact_model.first_contact_twists(solved.pinion_angle)
+        cycles = np.round((requested - solved.pinion_angle) / pair.mesh_cycle).astype(np.int64)
+        leading, shares = load_shares(solved)
+        of_pairs = pair_loads(solver, solved)
+        curve = StiffnessCurve(
+            pinion_angle=requested,
+            wheel_angle=pair.wheel_angle_at(requested, total),
+            twist=twist,
+            torque_wheel=torque,
+            torque_pinion=solved.torque_pinion,
+            torque_wheel_reaction=solved.torque_wheel_reaction,
+            k_torsional=stiffness,
+            k_mesh=stiffness / radius**2,
+            k_tangent=solved.tangent / radius**2,
+            transmission_error=twist * radius,
+            transmission_error_unloaded=(unloaded - lost) * radius,
+            leading_pair=leading - cycles,
+            load_share=shares,
+            teeth_in_contact=np.where(failed, -1, (shares > 0).sum(axis=1)),
+            iterations=solved.iterations,
+            status=solved.status,
+            law=np.full(len(requested), law.name),
+            contact_law=law_text(law),
+            beyond_validity=np.where(np.isnan(twist), -1, overlaps(pair, twist) > MOST_OVERLAP),
+            mesh_cycle=pair.mesh_cycle * solver.contact_model.mesh_cycles,
+            base_radius=radius,
+            lost_motion=lost,
+            **contact_pressures(solved, of_pairs),
+        )
+        return curve, replace(of_pairs, pair=of_pairs.pair - cycles[of_pairs.position])
+
+
+def _back_flanks(grid: Grid, behind_model: HalfPlanePair, solved: Positions) -> tuple[Array, Array]:
+    """Return the unloaded transmission error of the back flanks at the solved angles, shape (s,), and their clearance
+    in all cells, shape (m s,) (m).
+
+    Seen from the other side the pinion turns the other way.
+    """
+    pair, radius = grid.solver.pair, grid.solver.pair.wheel.base_radius
+    error_behind = radius * (behind_model.first_contact_twists(-grid.angles) - pair.contact_twist)
+    error = radius * (solved.twist - pair.contact_twist)
+    clearance = pair.normal_backlash + np.tile(error_behind, len(grid.loads)) + error
+    return error_behind, np.where(solved.status == "converged", clearance, np.nan)
+
+
+def _check_contact(load_map: LoadMap, solver: PositionSolver) -> None:
+    """Raise `InputError` where a tooth pair carries nothing on its whole path: at the least torque, if at any."""
+    cycles, period, geometry = load_map.mesh_cycles, solver.contact_model.mesh_cycles, solver.pair
+    if not cycles or period == 1 or load_map.failed[0].any():
+        return
+    whole = cycles % period == 0
+    start, end = (geometry.pinion_angle_at(s) / geometry.mesh_cycle for s in geometry.path_limits(rounded=True))
+    # tooth pair k passes the path k mesh cycles earlier: those whose path lies within the angles
+    expected = set(range(period) if whole else range(math.ceil(end) - cycles, math.floor(start) + 1))
+
+    def number(k: IntArray) -> IntArray:
+        return np.asarray(k % period if whole else k)
+
+    lost = sorted(expected - set(number(load_map.pairs[0].pair).tolist()))
+    if not lost:
+        return
+    curve, met = load_map.curves[0], solver.contact_model.first_contacts(load_map.pinion_angle)
+    rows = np.flatnonzero(number(met.pair) == lost[0])
+    position, twist = met.position[rows], met.twist[rows] - geometry.contact_twist
+    gap = twist - curve.twist[position]  # of rigid flanks; loaded neighbours move a tooth away, too
+    nearest = int(np.argmin(gap))
+    tangent = curve.k_tangent[position[nearest]] * curve.base_radius**2
+    k, least = lost[0], load_map.torque[0] + tangent * max(0.0, gap[nearest])
+    problem = (
+        f"{len(lost)} of {len(expected)} tooth pairs carry nothing on their whole path, among them pinion tooth "
+        f"{k % geometry.pinion.teeth} on wheel tooth {(-1 - k) % geometry.wheel.teeth}: must be > about {least:.3g} N m"
     )
-    return curve, replace(loads, pair=loads.pair - cycles[loads.position])
-
-
-@dataclass(frozen=True)
-class PairLoads:
-    """Tooth pairs that carry load, q of them over all positions, by position.
-
-    Attributes
-    ----------
-    position, pair : ndarray, shape (q,)
-        Number of the position; pair number k: pinion tooth k, wheel tooth -1 - k, counted on round the gears.
-    force : ndarray, shape (q,)
-        On the whole width (N).
-    share : ndarray, shape (q,)
-        Share of the wheel's torque (-).
-    roll : ndarray, shape (q, 2)
-        Roll lengths of the middle of the contact on pinion and wheel (m); not-a-number off the involutes.
-    half_width, pressure, error : ndarray, shape (q,)
-        Half width (m), pressure above (Pa), and how far the contact is from Hertz's (-).
-    edge : ndarray, shape (q,)
-        Which edge bears, the place in `EDGES`.
-    """
-
-    position: IntArray
-    pair: IntArray
-    force: Array
-    share: Array
-    roll: Array
-    half_width: Array
-    pressure: Array
-    error: Array
-    edge: IntArray
-
-
-def pair_loads(solver: PositionSolver, found: Positions) -> PairLoads:
-    """Loaded tooth pairs of positions."""
-    elastic, contacts = solver.elastic, found.contacts
-    first_contact = solver.contact_model.first_contacts(found.pinion_angle)
-    met, pairs = ((np.stack([one.position, one.pair], axis=1) @ [1 << 32, 1]) for one in (first_contact, contacts))
-    k = np.minimum(np.searchsorted(met, pairs), len(met) - 1)
-    known = np.flatnonzero((contacts.torque_wheel > 0) & (met[k] == pairs))
-    k, position, width = k[known], contacts.position[known], contacts.half_width[known]
-    force = contacts.torque_wheel[known] / (first_contact.arm[k, 1] * elastic.width)
-    curvature, flat = first_contact.curvature[k], np.isfinite(first_contact.curvature[k])
-    flank, half = first_contact.flank[k], width[:, None, None]
-    middle = solver.contact_model.arc_at(flank, first_contact.place[k])[:, :, None]
-    reached = marks_met(solver.contact_model, flank, middle - half, middle + half)
-    rounded = solver.contact_model.marks[0] == "round"
-    bears = np.where(reached[:, rounded].any(axis=1), ROUNDED, 0)
-    bears[reached[:, ~rounded].any(axis=1)] = SINGULAR
-    several = np.unique(pairs[known], return_inverse=True, return_counts=True)
-    bears[several[2][several[1]] > 1] = ROUNDED  # not where the rigid flanks touch first, nor with one ellipse
-    bears[~flat] = SINGULAR  # it touches at the corner itself, however narrow the contact
-    hertz = np.sqrt(force / solver.contact_model.inverse_modulus.sum() * np.where(flat, curvature, 0.0) / math.pi)
-    blunted = 2 * force / (math.pi * np.hypot(width, BLUNTING * solver.pair.pinion.module))
-    off = np.abs(width * math.pi * hertz / (2 * force) - 1)
-    if elastic.deviations != NOMINAL:  # waves shorter than the contact say nothing of its pressure; its width does
-        hertz = 2 * force / (math.pi * width)
-    return PairLoads(
-        position=position,
-        pair=contacts.pair[known],
-        force=force * elastic.width,
-        share=contacts.torque_wheel[known] / found.torque_wheel[position],
-        roll=_rolls(solver.contact_model, flank, contacts.arc[known]),
-        half_width=width,
-        pressure=np.where(bears > 0, blunted, hertz),
-        error=off,
-        edge=bears,
-    )
-
-
-def _rolls(contact_model: HalfPlanePair, flank: IntArray, arc: Array) -> Array:
-    """Roll lengths (m) at arcs (m) of the flanks `flank`, all of shape (q, 2); not-a-number off the involutes."""
-    made = np.full(arc.shape, np.nan)
-    for i in np.unique(flank):
-        face, here = contact_model.teeth.faces[i], np.nonzero(flank == i)
-        u = face.parameter_at(arc[here])
-        on = (u >= 0) & (u <= 1)
-        made[tuple(one[on] for one in here)] = face.flank.roll(u[on])
-    return made
-
-
-def marks_met(contact_model: HalfPlanePair, flank: IntArray, low: Array, high: Array) -> BoolArray:
-    """Return which of `HalfPlanePair.marks` lie between two arcs of contacts.
-
-    Parameters
-    ----------
-    contact_model : HalfPlanePair
-        The pair.
-    flank : ndarray of int, shape (m, 2)
-        Flanks of the contacts.
-    low, high : ndarray, shape (m, 2, 1)
-        Arcs (m).
-
-    Returns
-    -------
-    met : ndarray of bool, shape (m, k)
-        For each contact and mark.
-    """
-    _, of, (first, last) = contact_model.marks
-    return np.asarray(((flank[:, :, None] == of) & (low <= last) & (high >= first)).any(axis=1))
-
-
-def contact_pressures(found: Positions, loads: PairLoads) -> dict[str, Any]:
-    """The fields of a `StiffnessCurve` that tell what bears at n positions, from their loaded pairs."""
-    edge, at_edges = np.zeros(len(found), dtype=np.int64), np.full(len(found), np.nan)
-    pressure, error = np.where(found.status == "no_contact", 0.0, np.full((2, len(found)), np.nan))
-    np.maximum.at(edge, loads.position, loads.edge)
-    sharp, smooth = np.flatnonzero(loads.edge > 0), np.flatnonzero(loads.edge == 0)
-    np.fmax.at(at_edges, loads.position[sharp], loads.pressure[sharp])
-    smooth = smooth[np.argsort(loads.pressure[smooth], kind="stable")]  # the largest of a position comes last and stays
-    pressure[loads.position[smooth]], error[loads.position[smooth]] = loads.pressure[smooth], loads.error[smooth]
-    words = np.array(EDGES)[np.where(np.isin(found.status, SOLVED), edge, 0)]
-    return {"peak_pressure": pressure, "peak_pressure_error": error, "edge_pressure": at_edges, "edge": words}
+    cure = "give more torque, or smaller errors of pitch or profile"
+    raise InputError("torques", float(load_map.torque[0]), problem, cure)
