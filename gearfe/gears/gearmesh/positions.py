@@ -1,13 +1,6 @@
 r"""Positions of a sweep at given twists or at given torques, and their discretisation error.
 
-**The twist of a torque** by safeguarded Newton's method on many positions at once. The torque T rises with the twist,
-from nothing where the rigid flanks just touch. With the deflection :math:`\delta` beyond that, :math:`\ln\delta` is
-nearly straight over :math:`\ln T` for line contacts; Newton's step there,
-
-.. math:: \delta^+ = \delta\,(T_0/T)^{T/(\delta\,T')},
-
-is taken with the solver's own tangent T' where it stays between the largest twist that was too little and the smallest
-that was too much; otherwise the interval is halved, or the deflection doubled while nothing has been too much yet.
+**The twist of a torque** is searched for by `.load_search`, on many positions at once.
 
 **Discretisation error of the half-plane law**, from the same positions and twists with coarser gears, whose torque is
 another by :math:`\delta T`. They are solved: the change to first order, from the energy, is cheaper, but misses two
@@ -50,6 +43,7 @@ from ..contact.half_plane import HalfPlanePair, expected_twists, half_plane_pair
 from ..contact.laws import COARSENING, HalfPlane
 from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, in_batches, taken
 from ..geometry.pair import GearPair
+from .load_search import Response, newton_twist, search_load
 
 #: Solutions of a position in search of its torque; random pairs, laws and torques took three at most.
 MAX_SOLUTIONS = 12
@@ -59,17 +53,10 @@ NEARLY = 1e-4
 NOT_REACHED = "torque_not_reached"
 
 
-def _newton_twist(twist: Array, first_contact: Array, torque: Array, tangent: Array, goal: Array) -> Array:
-    """Newton's step above, shape (n,) (rad); not-a-number without a torque."""
-    with np.errstate(all="ignore"):
-        delta = twist - first_contact
-        return np.asarray(first_contact + delta * (goal / torque) ** (torque / (delta * tangent)))
-
-
 def twists_for_torque(
     solve: Callable[[IntArray, Array], Positions], found: Positions, goal: Array, *, first_contact: Array, most: float
 ) -> Positions:
-    """Bring positions nearly (`NEARLY`) to given torques; iterations are those of all solutions.
+    """Return positions that nearly (`NEARLY`) carry given torques; iterations are those of all solutions.
 
     Parameters
     ----------
@@ -84,21 +71,28 @@ def twists_for_torque(
     most
         Largest twist tried (rad).
     """
-    low, high = first_contact.copy(), np.full(len(goal), np.inf)
-    for solutions in range(MAX_SOLUTIONS + 1):
-        twist, torque = found.twist, found.torque_wheel
-        miss, seen = torque - goal, np.nan_to_num(ANGLE_ROUNDING * found.tangent)
-        open_ = np.flatnonzero(np.abs(miss) > np.maximum(NEARLY * goal, seen))  # none that failed
-        if len(open_) == 0 or solutions == MAX_SOLUTIONS:
-            break
-        low, high = np.where(miss < 0, twist, low), np.where(miss > 0, twist, high)
-        step = _newton_twist(twist, first_contact, torque, found.tangent, goal)
-        between = np.where(np.isfinite(high), 0.5 * (low + high), np.clip(2 * twist - first_contact, twist, most))
-        step = np.where((low < step) & (step < high), np.minimum(step, most), between)
-        made = solve(open_, step[open_])
-        found = found.replaced(open_, replace(made, iterations=made.iterations + found.iterations[open_]))
-    status = np.where(np.isin(np.arange(len(goal)), open_), NOT_REACHED, found.status)
-    return found.with_status(status) if len(open_) else found
+    solved = found
+
+    def evaluate(numbers: IntArray, twists: Array) -> Response:
+        nonlocal solved
+        again = solve(numbers, twists)
+        iterations = again.iterations + solved.iterations[numbers]
+        solved = solved.replaced(numbers, replace(again, iterations=iterations))
+        return Response(again.torque_wheel, again.tangent)
+
+    _, _, missed = search_load(
+        evaluate,
+        found.twist,
+        Response(found.torque_wheel, found.tangent),
+        goal,
+        first_contact=first_contact,
+        most=most,
+        near=NEARLY,
+        rounding=ANGLE_ROUNDING,
+        evaluations=MAX_SOLUTIONS,
+    )
+    status = np.where(np.isin(np.arange(len(goal)), missed), NOT_REACHED, solved.status)
+    return solved.with_status(status) if len(missed) else solved
 
 
 NONE: IntArray = np.zeros(0, dtype=np.int64)
@@ -257,7 +251,7 @@ def closed(found: Positions, goal: Array, first_contact: Array) -> Positions:
     factor = np.where(good, goal / np.where(good, found.torque_wheel, 1.0), 1.0)
     moments = {name: getattr(found, name) * factor for name in TORQUES if name != "tangent"}
     moments["torque_wheel"] = np.where(good, goal, found.torque_wheel)
-    twist = _newton_twist(found.twist, first_contact, found.torque_wheel, found.tangent, goal)
+    twist = newton_twist(found.twist, first_contact, Response(found.torque_wheel, found.tangent), goal)
     twist = np.where(good, twist, found.twist)
     by = twist - found.twist
     energy = found.energy + 0.5 * (found.torque_wheel + moments["torque_wheel"]) * by

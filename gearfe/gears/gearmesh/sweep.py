@@ -339,7 +339,23 @@ class Grid:
         period: int = 1,
         solve_all: bool = False,
     ) -> Grid:
-        """Return the grid over angles and loads, whose angles repeat after `period` mesh cycles unless `solve_all`."""
+        """Return the grid over angles and loads.
+
+        Parameters
+        ----------
+        solver : PositionSolver
+            The gears.
+        requested : ndarray, shape (n,)
+            Pinion angles asked for (rad).
+        loads : array_like, shape (m,)
+            Twists from the centred position (rad), or torques at the wheel (N m).
+        by_torque, finite
+            See `Grid`.
+        period
+            Mesh cycles after which angles repeat.
+        solve_all
+            Solve also angles that repeat.
+        """
         angles, source = requested, np.arange(len(requested))
         if not solve_all:
             angles, source = distinct_phases(requested, solver.pair.mesh_cycle * period)

@@ -43,12 +43,14 @@ from numpy.typing import ArrayLike
 from ...base.errors import InputError
 from ...base.typing import Array, BoolArray, IntArray
 from ...multibody.compiled.packed import Packed
+from ..gearmesh.load_search import Response, newton_twist, search_load
 from . import kernel
 
 #: Approach (m) at which flanks touch that do not meet at all.
 NO_CONTACT = 1.0
-#: Newton steps for the approach at a force.
-STEPS = 60
+#: Relative miss of a force from which one step leads to its approach, whose error is of the order of its square;
+#: rounding of an approach (parts of the reach); most evaluations of the law for it.
+NEARLY, ROUNDING, EVALUATIONS = 1e-8, 1e-15, 60
 #: Places in each cell, in parts of its width, at which matrices are looked at.
 SAMPLES = np.linspace(0.0, 1.0, 5)
 
@@ -233,23 +235,33 @@ class MeshLaw:
         angle, force = np.broadcast_arrays(
             np.atleast_1d(np.asarray(angles, dtype=float)), np.asarray(forces, dtype=float)
         )
-        first, most = self.first_contact(angle, shifts), self.most(angle, shifts)
-        low, high = first.copy(), first + self.reach
+        later = np.broadcast_to(np.asarray(shifts, dtype=float), (len(angle), self.slots))
+        approach, most = self.first_contact(angle, later), self.most(angle, later)
         if (force > most).any():
             raise InputError(
                 "force", float(force.max()), f"must be <= {most.min():.6g} N", "make the law for larger torques"
             )
-        delta = first + self.reach * np.maximum(force, 0.0) / most
-        for _ in range(STEPS):
-            made = self(angle, delta, shifts)
-            off = made.force - force
-            low, high = np.where(off < 0.0, delta, low), np.where(off > 0.0, delta, high)
-            new = delta - off / np.maximum(made.tangent, 1e-300)
-            new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
-            if (np.abs(new - delta) <= 1e-15 * self.reach).all():
-                break
-            delta = new
-        return np.where(force > 0.0, delta, first)
+        loaded = np.flatnonzero(force > 0.0)
+        first, goal = approach[loaded], force[loaded]
+
+        def evaluate(numbers: IntArray, approaches: Array) -> Response:
+            forces = self(angle[loaded[numbers]], approaches, later[loaded[numbers]])
+            return Response(forces.force, forces.tangent)
+
+        guess = first + self.reach * goal / most[loaded]
+        delta, response, _ = search_load(
+            evaluate,
+            guess,
+            evaluate(np.arange(len(loaded)), guess),
+            goal,
+            first_contact=first,
+            most=first + self.reach,
+            near=NEARLY,
+            rounding=ROUNDING * self.reach,
+            evaluations=EVALUATIONS,
+        )
+        approach[loaded] = newton_twist(delta, first, response, goal)
+        return approach
 
 
 def indefinite(coupling: Array, widths: Array) -> float:
