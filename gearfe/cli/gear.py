@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,7 +46,42 @@ def run(args: argparse.Namespace) -> int:
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
     _exports(args.export)
     code = each_mesh(args, _run_mesh)
+    if args.mesh is None:
+        _show_gearbox(args)
     return code
+
+
+def _show_gearbox(args: argparse.Namespace) -> None:
+    """Print and draw where the gears, shafts and bearings of the whole gearbox are, of a file that has shafts."""
+    from ..base.config import read_toml
+    from ..base.errors import InputError
+
+    raw = read_toml(args.job)
+    if "shafts" not in raw and "train" not in raw:
+        return
+    from ..base.files import output_folder, whole_set, write_json
+    from ..drivetrain.gearbox.layout import gearbox_layout
+
+    try:
+        layout = gearbox_layout(raw, args.job)
+    except InputError as error:
+        if "pair" not in raw:
+            raise
+        print(f"gearfe: warning: the whole gearbox is not drawn: {error}", file=sys.stderr)
+        return
+    if layout is None:
+        return
+    folder = output_folder(args.out)
+    with whole_set(folder, ("gearbox.png", "gearbox.json")) as made:
+        if not args.no_pictures:
+            from ..figures.gearbox import gearbox_picture
+            from ..figures.style import save
+
+            with stage("drawing the gearbox"):
+                save(gearbox_picture(layout), made / "gearbox.png")
+        write_json(made / "gearbox.json", asdict(layout))
+        names = sorted(path.name for path in made.iterdir())
+    print_results([mesh.line() for mesh in layout.meshes], folder, names, {}, ())
 
 
 def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:

@@ -1,0 +1,69 @@
+"""The drawing of a whole gearbox: what is in it, and that it shows what does not fit."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from gearfe.cli.main import main
+from gearfe.drivetrain.gearbox.layout import GearboxLayout, gearbox_layout
+from gearfe.figures.gearbox import gearbox_picture
+from gearfe.figures.style import RED
+from tests.makers.gearboxes import AXES, GEARS, MESHES, text
+from tests.places import GEOMETRY
+
+
+def layout_of(job: str) -> GearboxLayout:
+    layout = gearbox_layout(tomllib.loads(job), "box.toml")
+    assert layout is not None
+    return layout
+
+
+def texts(layout: GearboxLayout) -> dict[str, str]:
+    """Text -> colour of what is written in the picture."""
+    found = [item for axes in gearbox_picture(layout).axes for item in axes.texts]
+    return {item.get_text(): item.get_color() for item in found}
+
+
+def test_names_places_and_distances() -> None:
+    layout = layout_of(text())
+    assert {gear.name: gear.teeth for gear in layout.gears} == {name: row[0] for name, row in GEARS.items()}
+    for gear in layout.gears:
+        z, module = GEARS[gear.name][:2]
+        assert gear.reference_radius == pytest.approx(0.5e-3 * z * module)
+        assert gear.tip_radius == pytest.approx(1e-3 * module * (0.5 * z + 1.0))  # an addendum of a module
+        assert gear.centre[0] == pytest.approx(1e-3 * AXES[gear.shaft])
+    for mesh in layout.meshes:
+        one, two = (GEARS[name] for name in MESHES[mesh.name])
+        assert mesh.centre_distance == pytest.approx(0.5e-3 * one[1] * (one[0] + two[0]))
+        assert mesh.overlap == pytest.approx(1e-3 * min(one[2], two[2]))
+        assert mesh.fits
+    written = texts(layout)
+    assert {*GEARS, *AXES} <= written.keys()
+    assert "in: a = 55 mm" in written
+    assert RED not in written.values()
+    assert dict(layout.shafts[0].bearings) == {"s1_left": -0.04, "s1_right": 0.04}
+
+
+def test_what_does_not_fit_is_red() -> None:
+    """A shaft in a wrong place, and a gear beside its mate: drawn, not refused."""
+    moved = layout_of(text(shafts__s4__x_mm=204.0))
+    assert texts(moved)["out: a = 70 mm (gears: 69 mm)"] == RED
+    assert "shafts 70 mm apart, but the gears need 69 mm" in moved.meshes[2].line()
+    beside = layout_of(text(gears__wheel_2__y_mm=30.0))
+    assert texts(beside)["wheel_2"] == RED
+    assert "24 mm between them along the axis" in beside.meshes[2].line()
+
+
+def test_the_command_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "box.toml").write_text(text())
+    assert main(["gear", str(tmp_path / "box.toml"), "--out", str(tmp_path / "out")]) == 0
+    assert "mesh through: idler drives wheel_1, shafts 79 mm apart; 12 mm of width" in capsys.readouterr().out
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "gearbox.json",
+        "gearbox.png",
+        *sorted(MESHES),
+    ]
+    assert gearbox_layout(tomllib.loads((GEOMETRY / "microgeometry.toml").read_text()), "pair.toml") is None
