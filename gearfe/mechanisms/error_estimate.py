@@ -30,8 +30,9 @@ LEAST_TOLERANCE = 1e-13
 #: Below this a smaller tolerance leaves the steps of series as they are, so that the longest step alone makes a run
 #: finer: then it is that share of the shortest step, for at most so many times the steps.
 SHARPEST, MOST_STEPS = 1e-12, 6.0
-#: Times the steps of a run that stopped early after which a finer one is given up: it approaches what stopped the run.
-GIVEN_UP = 2.0 * MOST_STEPS
+#: The same of a run that stopped early, most of whose steps are short ones just before its end; times its steps after
+#: which a finer one is given up: it approaches what stopped the run.
+STOPPED_STEPS, GIVEN_UP = 1.5, 3.0
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,8 @@ def finer_run(mechanism: Mechanism, start: Start, run: Trajectory, tolerance: fl
     steps = np.abs(np.diff(ends))
     # a step that both runs take is an error that both make
     usual = float(steps.min() if tolerance < SHARPEST else np.median(steps))
-    longest = max(SHORTER * usual, float(steps.mean()) / MOST_STEPS)  # a run that failed ends with many short ones
+    most = MOST_STEPS if run.status is Status.DONE else STOPPED_STEPS
+    longest = max(SHORTER * usual, float(steps.mean()) / most)
     options: dict[str, Any] = {"method": run.method, "start": start, "longest": longest}
     options["raise_on_failure"] = False
     if run.status is not Status.DONE:

@@ -15,7 +15,7 @@ from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import finer_run
 from gearfe.mechanisms.job import run_mechanism
 from gearfe.mechanisms.loads import ExpressionLoad
-from gearfe.multibody import IntegrationError, integrate
+from gearfe.multibody import IntegrationError, Status, integrate
 from gearfe.multibody.core.inverse import prescribed_motion
 from tests.makers.files import mechanism_file
 from tests.makers.job_texts import MOMENT, ROD
@@ -327,3 +327,17 @@ def test_the_finer_run_of_one_that_stuck_is_not_made_of_its_last_steps(tmp_path:
     finer = finer_run(mechanism, mechanism.start(), made, 1e-9 / 30)
     assert finer is not None
     assert finer.statistics["steps"] < 30 * len(ends)
+
+
+def test_the_estimate_of_a_run_that_grew_takes_few_times_its_steps(tmp_path: Path) -> None:
+    """Most steps of a motion that grows are at its end: a finer run needs 1.5 times as many, and ends there, too."""
+    crank = (GEOMETRY / "elastic_slider_crank.toml").read_text(encoding="utf-8").partition("[joints.motor]")[0]
+    load = MOMENT.replace("rod", "crank").format("0.01 + 50*rate(crank)")
+    mechanism = load_mechanism(mechanism_file(tmp_path, crank + load))
+    run = integrate(mechanism.system, np.linspace(0.0, 0.2, 801), start=mechanism.start(), tolerance=1e-5,
+                    raise_on_failure=False)  # fmt: skip
+    assert run.status is Status.ENDLESS
+    assert "grows beyond" in run.message
+    finer = finer_run(mechanism, mechanism.start(), run, 1e-5 / 30)
+    assert finer is not None
+    assert finer.statistics["steps"] < 2.5 * run.statistics["steps"]
