@@ -31,6 +31,9 @@ MAY_WRITE = (
     "links.png", "plates.csv", "plates.vtkhdf", "plates.png", "sensitivities.csv",
 )  # fmt: skip
 
+#: Strain up to which stress is proportional to it in engineering materials (-).
+LINEAR = 0.02
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -278,6 +281,9 @@ def _flexible(mechanism: Mechanism, results: Results, name: str) -> dict[str, An
     }
     if data.section.edge is not None:
         made["largest_edge_stress_Pa"] = float(link.edge_stress(results.sections[name], name).max())
+        beam = mechanism.file.bodies[name].beam
+        assert beam is not None  # it makes the link flexible
+        made["largest_strain"] = made["largest_edge_stress_Pa"] / (1e9 * beam.youngs_modulus_GPa)
     return made
 
 
@@ -286,7 +292,9 @@ def _of_elements(mechanism: Mechanism, results: Results, name: str) -> dict[str,
     link, q = mechanism.plates[name], results.trajectory.q
     nodes, elements = link.mesh
     plate = link.part.plate
-    peaks = [link.von_mises(stress).max() for stress in results.sections[name]]
+    largest = float(max(link.von_mises(stress).max() for stress in results.sections[name]))
+    table = mechanism.file.bodies[name].plate
+    assert table is not None  # it makes the link flexible
     return {
         "name": name,
         "nodes": nodes,
@@ -295,7 +303,8 @@ def _of_elements(mechanism: Mechanism, results: Results, name: str) -> dict[str,
         "highest_frequency_Hz": float(plate.frequencies[-1]),
         "mass_kg": plate.mass,
         "largest_deflection_m": float(np.abs(link.displacements(q)).max()),
-        "largest_von_mises_Pa": float(max(peaks)),
+        "largest_von_mises_Pa": largest,
+        "largest_strain": largest / (1e9 * table.youngs_modulus_GPa),
     }
 
 
@@ -320,6 +329,9 @@ def _link_line(link: dict[str, Any]) -> str:
     for kind, key in (("edge stress", "largest_edge_stress_Pa"), ("von Mises' stress", "largest_von_mises_Pa")):
         if key in link:
             line += f", {kind} up to {1e-6 * link[key]:.3g} MPa"
+    if link.get("largest_strain", 0.0) > LINEAR:
+        strains = f"{100.0 * link['largest_strain']:.3g} %, linear elasticity holds to about {100.0 * LINEAR:g} %"
+        line += f"; strains up to {strains}: check whether the mechanism locks with this link rigid (flexible = false)"
     return line
 
 

@@ -12,6 +12,7 @@ import pytest
 from gearfe.base.errors import InputError
 from gearfe.cli.main import main
 from gearfe.mechanisms import evaluate, load_mechanism, solve
+from gearfe.mechanisms.job import run_mechanism
 from gearfe.mechanisms.results import reactions
 from gearfe.multibody import integrate
 from tests.makers.files import mechanism_file
@@ -83,6 +84,22 @@ def test_a_cantilever_with_an_end_load_creeps_to_its_static_state(tmp_path: Path
     forces = reactions(mechanism, run)
     assert forces["clamp_y_N"][-1] == pytest.approx(-1.0, rel=1e-3)
     assert forces["clamp_moment_N_m"][-1] == pytest.approx(-1.0, rel=1e-3)
+
+
+def test_strains_beyond_linear_elasticity_are_reported(tmp_path: Path) -> None:
+    """A strip of 2 GPa, 20 mm by 2 mm and 1 m under 1 N: its root would bend by P L e / (E I) = 3.75 %."""
+    thin = CANTILEVER.replace("height_m = 0.02", "height_m = 0.002").replace("end_s = 0.2", "end_s = 0.5")
+    small, large = (
+        run_mechanism(
+            load_mechanism(mechanism_file(tmp_path, thin.replace("step = 1.0", f"step = {load}"))), tmp_path / "out",
+            estimate=False,
+        )
+        for load in ("1e-3", "1.0")
+    )  # fmt: skip
+    assert "linear elasticity" not in small.text
+    assert "linear elasticity holds to about 2 %" in large.text
+    link = large.summary["flexible_links"][0]
+    assert link["largest_strain"] == pytest.approx(link["largest_edge_stress_Pa"] / 2e9)
 
 
 def test_energies_balance_with_damping_and_work(tmp_path: Path) -> None:
