@@ -11,6 +11,10 @@ from .errors import InputError
 CACHE_VARIABLE, LIMIT_VARIABLE = "GEARFE_CACHE", "GEARFE_CACHE_LIMIT_MB"
 #: Numba's own switch: 1 leaves the kernels of mechanisms and trains as Python functions, for debugging.
 NUMBA_VARIABLE = "NUMBA_DISABLE_JIT"
+#: Numba's number of threads, which it refuses with a traceback where it is not > 0.
+THREADS_VARIABLE = "NUMBA_NUM_THREADS"
+#: Digits of a number of threads; the largest machines have some thousand.
+MOST_DIGITS = 5
 #: The switch that this program had before.
 GONE_VARIABLE = "GEARFE_NO_NUMBA"
 #: Largest size of all entries where none is given (bytes), and largest one that can be given (MB).
@@ -78,6 +82,22 @@ def interpreted() -> bool:
     return text == "1"
 
 
+def check_threads() -> None:
+    """Raise `InputError` where numba's number of threads is no whole number > 0; left empty, numba chooses it."""
+    text = os.environ.get(THREADS_VARIABLE, "")
+    if not text.strip():
+        os.environ.pop(THREADS_VARIABLE, None)  # numba takes an empty text for a mistake
+        return
+    digits = text.strip().lstrip("0")
+    if not (digits.isascii() and digits.isdecimal() and len(digits) <= MOST_DIGITS):
+        raise InputError(
+            THREADS_VARIABLE,
+            text,
+            f"must be a whole number > 0 of up to {MOST_DIGITS} digits",
+            "leave it out: numba counts the processors",
+        )
+
+
 def user_folder(variable: str) -> str:
     """Folder that a variable of the system names; empty where it names none by its full path (XDG base directories)."""
     named = os.environ.get(variable, "")
@@ -89,3 +109,4 @@ def check() -> None:
     named_folder()
     limit()
     interpreted()
+    check_threads()

@@ -25,6 +25,10 @@ JOB = str(GEOMETRY / "gear_train.toml")
         ("GEARFE_CACHE_LIMIT_MB", "-1", "must be a number >= 0"),
         ("GEARFE_CACHE_LIMIT_MB", "1e300", "<= 1e+12"),
         ("NUMBA_DISABLE_JIT", "yes", "must be 0 or 1"),
+        ("NUMBA_NUM_THREADS", "0", "must be a whole number > 0"),
+        ("NUMBA_NUM_THREADS", "-2", "must be a whole number > 0"),
+        ("NUMBA_NUM_THREADS", "all", "must be a whole number > 0"),
+        ("NUMBA_NUM_THREADS", "9" * 30, "must be a whole number > 0"),
         ("GEARFE_NO_NUMBA", "1", "was removed"),
     ],
 )
