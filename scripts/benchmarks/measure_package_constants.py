@@ -74,7 +74,7 @@ def laws() -> Answers:
     """The mesh law of a coarse pair: force, torque and tangent over phase and approach."""
     from gearfe.gears.contact.half_plane import half_plane_pair
     from gearfe.gears.contact.laws import HalfPlane
-    from gearfe.gears.meshlaw.make import mesh_law
+    from gearfe.gears.gearmesh.law_make import mesh_law
 
     law = mesh_law(half_plane_pair(coarse_gears(HalfPlane())), 2000.0)
     angle, depth = np.tile(law.cycle * np.linspace(0.0, 1.0, 40), 3), np.repeat([0.7e-6, 5e-6, 20e-6], 40)
@@ -179,7 +179,10 @@ def coarse_gears(law: Any) -> Any:
 PARTS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
     "multibody": (mechanisms, ("packed", "LARGEST", "MOST_STEPS", "FIRST_")),
     "drivetrain.train": (trains, ("program",)),
-    "gears.meshlaw": (laws, ("NANO", "NO_CONTACT", "kernel.FORCE")),
+    "gears.gearmesh.law": (laws, ("NO_CONTACT",)),
+    "gears.gearmesh.law_fit": (laws, ("NANO",)),
+    "gears.gearmesh.law_kernel": (laws, ("law_kernel.FORCE",)),
+    "gears.gearmesh.law_make": (laws, ()),
     "drivetrain.runup": (run_ups, ("swinging", "report")),
     "drivetrain.housing": (housings, ("modal_test", "superelement", "_NEW", "_OLD", "_ALL", "_FOURTH")),
     "fem.reduction": (housings, ("FORMAT",)),
@@ -192,7 +195,7 @@ PARTS: dict[str, tuple[Callable[[], Answers], tuple[str, ...]]] = {
     ),
     "gears.geometry.face": (curves, ()),
     "gears.geometry.first_contact": (curves, ()),
-    "gears.gearmesh": (curves, ("SIDE_BY_SIDE", "report", "MOST_CELLS")),
+    "gears.gearmesh": (curves, ("SIDE_BY_SIDE", "report", "MOST_CELLS", "gearmesh.law")),
     "gears.teeth.tooth_sector": (curves, ("RECIPE",)),
 }
 

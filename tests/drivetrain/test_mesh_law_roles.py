@@ -13,9 +13,9 @@ from gearfe.drivetrain.train import Damping, GearMesh, Load, build_train, simula
 from gearfe.drivetrain.train.states import train_states
 from gearfe.gears.contact.half_plane import half_plane_pair
 from gearfe.gears.contact.laws import law_named
+from gearfe.gears.gearmesh.law import MeshLaw
+from gearfe.gears.gearmesh.law_make import mesh_law
 from gearfe.gears.gearmesh.sweep import elastic_pair
-from gearfe.gears.meshlaw.law import MeshLaw
-from gearfe.gears.meshlaw.make import mesh_law
 from gearfe.multibody import TimeFunction, constant, integrate, smoothed_step
 from tests.makers.mesh_laws import CYCLE, DESIGN, PAIR, STEEL, hertzian_law
 from tests.makers.train_pairs import R1, R2, free_energy, free_pair, pair

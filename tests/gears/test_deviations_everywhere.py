@@ -17,12 +17,12 @@ from gearfe.drivetrain.gearbox.job import job_train, read_train_job
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.train.statics import static_errors
 from gearfe.gears.contact.half_plane import half_plane_pair
+from gearfe.gears.gearmesh.law_make import mesh_law
 from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_loads, sweep_stiffness
 from gearfe.gears.geometry import pitch_errors
 from gearfe.gears.geometry.deviation_job import deviations_of
 from gearfe.gears.geometry.face import NOMINAL
 from gearfe.gears.geometry.modifications import FlankModification, Relief, tooth_deviations
-from gearfe.gears.meshlaw.make import mesh_law
 from gearfe.multibody import constant
 from tests.makers.gears import pair as gear_pair
 from tests.makers.job_texts import BARE_TRAIN, BORES

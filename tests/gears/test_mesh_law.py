@@ -14,13 +14,13 @@ from gearfe.base.errors import InputError
 from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gears.contact.laws import PairModel, law_named
 from gearfe.gears.gearmesh.job import read_stiffness_job
+from gearfe.gears.gearmesh.law import MeshLaw
+from gearfe.gears.gearmesh.law_fit import touch_cubics
+from gearfe.gears.gearmesh.law_make import _nodes as phase_nodes
+from gearfe.gears.gearmesh.law_make import coupling_curve, mesh_law, touch_curve
+from gearfe.gears.gearmesh.law_store import cached_law, load_law, save_law, write_law_csv
 from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.pair import TipRelief
-from gearfe.gears.meshlaw.fit import touch_cubics
-from gearfe.gears.meshlaw.law import MeshLaw
-from gearfe.gears.meshlaw.make import _nodes as phase_nodes
-from gearfe.gears.meshlaw.make import coupling_curve, mesh_law, touch_curve
-from gearfe.gears.meshlaw.store import cached_law, load_law, save_law, write_law_csv
 from tests.makers.gears import pair as gear_pair
 from tests.makers.mesh_laws import DESIGN, PAIR, STEEL
 

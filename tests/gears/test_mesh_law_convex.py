@@ -11,12 +11,12 @@ import pytest
 from gearfe.base.errors import InputError
 from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gears.gearmesh.job import read_stiffness_job
+from gearfe.gears.gearmesh.law import MeshLaw
+from gearfe.gears.gearmesh.law_fit import Couple, PairForces, TouchCurve, fit_law
+from gearfe.gears.gearmesh.law_make import _pair_forces as pair_forces
+from gearfe.gears.gearmesh.law_make import coupling_curve
+from gearfe.gears.gearmesh.law_store import load_law, save_law
 from gearfe.gears.geometry.first_contact import ToothFlanks
-from gearfe.gears.meshlaw.fit import Couple, PairForces, TouchCurve, fit_law
-from gearfe.gears.meshlaw.law import MeshLaw
-from gearfe.gears.meshlaw.make import _pair_forces as pair_forces
-from gearfe.gears.meshlaw.make import coupling_curve
-from gearfe.gears.meshlaw.store import load_law, save_law
 from tests.makers.mesh_laws import couplings, hertzian_law, pair_energies, powers, times
 
 #: 105 teeth on a wheel whose undercut leaves an edge, which meets the pinion's tip (case 66 of the campaign mesh_laws).

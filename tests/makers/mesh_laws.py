@@ -10,8 +10,8 @@ import numpy as np
 
 from gearfe import Gear, GearPair
 from gearfe.fem.plane import Material
-from gearfe.gears.meshlaw.fit import Couple, PairForces, TouchCurve, fit_law
-from gearfe.gears.meshlaw.law import MeshLaw
+from gearfe.gears.gearmesh.law import MeshLaw
+from gearfe.gears.gearmesh.law_fit import Couple, PairForces, TouchCurve, fit_law
 
 CYCLE = 2 * math.pi / 20
 

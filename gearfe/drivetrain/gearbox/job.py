@@ -26,9 +26,9 @@ from ...base.tables.timefunction import TrainFunctionTable
 from ...base.tables.train import POTENTIAL, TrainMeshTable, TrainTable
 from ...base.typing import Array
 from ...gears.gearmesh.curve import StiffnessCurve
+from ...gears.gearmesh.law import MeshLaw
 from ...gears.geometry.deviation_job import pitch_errors_of
 from ...gears.geometry.pair import Gear, gear_of, gear_pair, pair_of
-from ...gears.meshlaw.law import MeshLaw
 from ...multibody import TimeFunction, smoothed_step
 from ..housing.body import bore_points, reduced_housing
 from ..train.checks import check_flanks, check_layout

@@ -16,11 +16,11 @@ from ...base.tables.train import MEAN, POTENTIAL
 from ...gears.contact.laws import HalfPlane, check_alike, check_deviations
 from ...gears.gearmesh.curve import NO_CYCLE, StiffnessCurve
 from ...gears.gearmesh.job import StiffnessJob, cached_curve
+from ...gears.gearmesh.law import MeshLaw
+from ...gears.gearmesh.law_store import cached_law
 from ...gears.geometry.deviation_job import deviations_of
 from ...gears.geometry.face import NOMINAL, ToothDeviations
 from ...gears.geometry.pair import GearPair, gear_pair
-from ...gears.meshlaw.law import MeshLaw
-from ...gears.meshlaw.store import cached_law
 from ..train.gear_train import GearTrain
 from .job import Stiffness, TrainJob, back_flanks, job_train
 

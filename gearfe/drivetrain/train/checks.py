@@ -9,10 +9,10 @@ import numpy as np
 
 from ...base.errors import InputError, unknown_name
 from ...gears.gearmesh.curve import StiffnessCurve
+from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.gear_data import rounding
 from ...gears.geometry.pair import Gear, gear_pair, in_keys
-from ...gears.meshlaw.law import MeshLaw
 from .friction import check_friction
 from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from .statics import check_flanks, check_yields, one_sided

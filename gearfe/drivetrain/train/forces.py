@@ -8,7 +8,7 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
   in the system's stiffness. A flank that may part bears where :math:`u_d > j`. A damper that acts in contact only
   adds :math:`-(c\,H(u_d - j)\,u_d' - c_0 u_d')`, H being Heaviside's step and :math:`c_0` what stands in the system's
   damping;
-- of a *flank with a mesh law* (`gears.meshlaw.law`): :math:`-(F\,\langle 1 + \chi u_d'\rangle - k_0 u_d)` along d, and
+- of a *flank with a mesh law* (`gears.gearmesh.law`): :math:`-(F\,\langle 1 + \chi u_d'\rangle - k_0 u_d)` along d, and
   :math:`-s M` along r, the driver's rotation relative to the line of centres; with *friction* (`train.friction`)
   :math:`-\sum\mu N_k s(v_k/v_0)` across the line of action, and that times :math:`e_k` along the driver's turn
   against the driven gear;
@@ -31,8 +31,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ...base.typing import Array, BoolArray, IntArray
+from ...gears.gearmesh.law import MeshForces, MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant
-from ...gears.meshlaw.law import MeshForces, MeshLaw
 from ...multibody.series.timefunctions import TimeFunction
 from .friction import Sliding, smooth_sign
 

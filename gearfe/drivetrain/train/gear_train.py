@@ -16,9 +16,9 @@ from ...base.shown import Facts
 from ...base.typing import Array
 from ...fem.reduction.modal_body import ModalBody
 from ...gears.gearmesh.curve import StiffnessCurve
+from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.pair import Gear, MeshGeometry
-from ...gears.meshlaw.law import MeshLaw
 from ...multibody.series.timefunctions import TimeFunction
 from .friction import Lubrication
 from .kinematics import Kinematics, kinematics

@@ -12,7 +12,7 @@ presses. The phase :math:`\varphi` follows the driver's actual rotation in its d
 no force. P lies in the middle of the face that both gears share. A rigid mesh is the constraint :math:`\delta = 0`, F
 its multiplier.
 
-A mesh law (`gears.meshlaw`) takes the place of :math:`k\,\delta`. Its phase is the driver's rotation relative to the
+A mesh law (`gears.gearmesh.law`) replaces :math:`k\,\delta`. Its phase is the driver's rotation relative to the
 line of centres, whose turn is :math:`t\cdot(u_2 - u_1)/a` with the displacements of the gears' centres, and its moment
 M acts on that: on the driver, and across the line of centres. The back flanks, where a backlash j is known, have the
 line of action :math:`n_b = -\cos\alpha_w\,t + \sin\alpha_w\,c` and bear behind j. Friction acts across the line of
@@ -34,9 +34,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.typing import Array, IntArray
+from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.pair import GearPair, gear_pair
-from ...gears.meshlaw.law import MeshLaw
 from ...multibody import Element, LinearJoint
 from .elements import LinearForce, RigidShaft
 from .forces import CurveFlank, Flank, LawFlank

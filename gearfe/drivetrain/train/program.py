@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...base.typing import Array, IntArray
+from ...gears.gearmesh.law import stacked_laws
 from ...gears.gearmesh.periodic import PeriodicInterpolant, curve_arrays
-from ...gears.meshlaw.law import stacked_laws
 from ...multibody import SeriesLaw
 from ...multibody.series.timefunctions import time_arrays
 from . import discontinuities, friction, series

@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ...base.typing import Array, IntArray
+from ...gears.gearmesh.law import Laws
 from ...gears.gearmesh.periodic import Curves
-from ...gears.meshlaw.law import Laws
 from ...multibody.series.recurrences import time_series
 from ...multibody.series.timefunctions import Times
 from .friction import product, smoothed_sign

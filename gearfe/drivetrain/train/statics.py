@@ -16,8 +16,8 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.typing import Array, BoolArray
+from ...gears.gearmesh.law import MeshLaw
 from ...gears.geometry.validity import MOST_YIELD
-from ...gears.meshlaw.law import MeshLaw
 from .elements import rotor
 from .gear_train import GearMesh, GearTrain
 from .kinematics import balanced_forces, drive_sense, load_torques

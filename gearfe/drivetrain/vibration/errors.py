@@ -30,7 +30,7 @@ from ...base.typing import Array
 from ...fem.reduction.error import reduction_error
 from ...fem.reduction.modal_body import ModalBody
 from ...gears.gearmesh.curve import StiffnessCurve
-from ...gears.meshlaw.law import MeshLaw
+from ...gears.gearmesh.law import MeshLaw
 from ..train import build_train
 from ..train.gear_train import GearTrain
 from ..train.model import TrainModel, on_body

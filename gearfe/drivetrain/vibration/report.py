@@ -10,7 +10,7 @@ import numpy as np
 from ...base.spectrum import OrderLine, nearest_line, order_lines, peaks
 from ...base.typing import Array
 from ...gears.gearmesh.curve import StiffnessCurve
-from ...gears.meshlaw.law import MeshLaw
+from ...gears.gearmesh.law import MeshLaw
 from ..gearbox.stability import Stability
 from ..train.gear_train import GearTrain
 from ..train.mesh_element import LEAST_REFERENCE, PHASES

@@ -13,8 +13,8 @@ from ...base.typing import Array, IntArray
 from ..contact.half_plane import HalfPlanePair, coupling_compliances, solve_half_plane
 from ..contact.position import Positions, joined
 from ..geometry.first_contact import FirstContacts
-from .fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
 from .law import NO_CONTACT, MeshLaw
+from .law_fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
 
 #: Cells of the phase in a mesh cycle to begin with, and places in each (parts of its width) where contacts are solved.
 CELLS, PLACES = 12, (0.25, 0.75)
@@ -35,7 +35,7 @@ CLOSE, TOUCH_HALVINGS = 1e-4, 8
 TOUCH_PLACES = (0.25, 0.5, 0.75)
 #: How often a cell is halved for its forces.
 HALVINGS = 3
-#: Least reach (m): what contact solutions are off by (`gearfe.gears.meshlaw.fit.NOISE`) is then 1 % of it.
+#: Least reach (m): what contact solutions are off by (`gearfe.gears.gearmesh.law_fit.NOISE`) is then 1 % of it.
 LEAST_REACH = 1e-7
 #: The law's tables go on to where pairs touch at this many times its reach, so that no pair bears at their ends.
 BEYOND = 1.1

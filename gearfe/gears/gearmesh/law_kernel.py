@@ -4,7 +4,7 @@ The pair forces minimise the convex energy :math:`E = \sum_k[\Phi - F_k(\delta -
 :math:`F_k \ge 0`. Projected Newton steps, halved until E falls, converge from any initial forces (D. P. Bertsekas,
 Projected Newton methods for optimization problems with simple constraints, SIAM J. Control Optim. 20, 1982).
 
-With :math:`g_k = t'(\psi_k) + \Lambda_\psi(\psi_k, F_k) + \sum_l C'_{kl}F_l` and J as in `gearfe.gears.meshlaw.law`,
+With :math:`g_k = t'(\psi_k) + \Lambda_\psi(\psi_k, F_k) + \sum_l C'_{kl}F_l` and J as in `gearfe.gears.gearmesh.law`,
 
 .. math::
     \frac{dF_k}{d\delta} = (J^{-1}1)_k,\quad \frac{dF_k}{d\varphi} = -(J^{-1}g)_k,\quad
@@ -40,7 +40,7 @@ ROWS = PART + 6
 
 
 class LawTables(NamedTuple):
-    """A mesh law, see `gearfe.gears.meshlaw.law.MeshLaw`."""
+    """A mesh law, see `gearfe.gears.gearmesh.law.MeshLaw`."""
 
     nodes: Array
     forces: Array

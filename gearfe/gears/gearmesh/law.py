@@ -43,8 +43,8 @@ from numpy.typing import ArrayLike
 from ...base.errors import InputError
 from ...base.typing import Array, BoolArray, IntArray
 from ...multibody.compiled.packed import Packed
-from ..gearmesh.load_search import Response, newton_twist, search_load
-from . import kernel
+from . import law_kernel
+from .load_search import Response, newton_twist, search_load
 
 #: Approach (m) at which flanks touch that do not meet at all.
 NO_CONTACT = 1.0
@@ -220,7 +220,7 @@ class MeshLaw:
         later = np.empty((places.shape[1], self.slots))
         later[...] = shifts
         pairs = np.zeros_like(later) if begin is None else begin
-        out, slopes = kernel.evaluate(_tables(self), places[0], places[1], later, pairs)
+        out, slopes = law_kernel.evaluate(_tables(self), places[0], places[1], later, pairs)
         force, moment, tangent, cross, bend, energy, beyond = out.T
         return MeshForces(force, moment, tangent, cross, bend, energy, beyond > 0.0, pairs, slopes)
 
@@ -286,12 +286,12 @@ def indefinite(coupling: Array, widths: Array) -> float:
 
 
 @lru_cache(maxsize=64)
-def _tables(law: MeshLaw) -> kernel.LawTables | Packed:
+def _tables(law: MeshLaw) -> law_kernel.LawTables | Packed:
     """What the kernel gets of a law."""
     energies = law.energies.swapaxes(3, 4)
     found = (law.nodes, law.forces, law.touch, energies, law.coupling)
     nodes, forces, touch, energies, coupling = (np.ascontiguousarray(x, dtype=float) for x in found)
-    return kernel.packed_tables(kernel.LawTables(nodes, forces, touch, energies, coupling, law.reach))
+    return law_kernel.packed_tables(law_kernel.LawTables(nodes, forces, touch, energies, coupling, law.reach))
 
 
 def _powers(c: Array, z: Array) -> tuple[Array, Array]:

@@ -13,15 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.cache import cached_arrays, source_hash
+from ...base.cache import cached_arrays
 from ...base.errors import InputError
 from ...base.files import write_csv
 from ...base.progress import stage
 from ...base.typing import Array
 from ...output.arrays import load_arrays, save_arrays
 from ..contact.laws import HalfPlane, PairModel
-from ..gearmesh.job import curve_key
 from ..geometry.pair import GearPair
+from .job import curve_key
 from .law import NO_CONTACT, MeshLaw
 
 #: Fields that are arrays, with the number of their axes.
@@ -62,13 +62,13 @@ def load_law(path: str | Path) -> MeshLaw:
     missing = [name for name, axes in ARRAYS.items() if name not in found or found[name].ndim != axes]
     if missing or "numbers" not in found or found["numbers"].shape != (5,):
         problem = "holds no mesh law" + (f": no array {missing[0]!r} of {ARRAYS[missing[0]]} axes" if missing else "")
-        raise InputError("mesh law", str(path), problem, "write it with gearfe.gears.meshlaw.store.save_law")
+        raise InputError("mesh law", str(path), problem, "write it with gearfe.gears.gearmesh.law_store.save_law")
     law = law_of_arrays(found)
     if not all(side.convex for side in law.sides):
         problem = (
             "holds a mesh law whose pair forces are not unique: compliances of pairs rise too little with the force"
         )
-        raise InputError("mesh law", str(path), problem, "make it again with gearfe.gears.meshlaw.make.mesh_law")
+        raise InputError("mesh law", str(path), problem, "make it again with gearfe.gears.gearmesh.law_make.mesh_law")
     return law
 
 
@@ -97,11 +97,10 @@ def cached_law(pair: GearPair, model: PairModel, force: float) -> MeshLaw:
 
     def made() -> dict[str, Array]:
         from ..contact.half_plane import half_plane_pair
-        from ..gearmesh.sweep import elastic_pair
-        from .make import mesh_law
+        from .law_make import mesh_law
+        from .sweep import elastic_pair
 
         with stage("mesh law"):
             return law_arrays(mesh_law(half_plane_pair(elastic_pair(pair, own)), force))
 
-    recipe = [curve_key(pair, own, {"force": force}), source_hash("gears/meshlaw")]
-    return law_of_arrays(cached_arrays("mesh-law", recipe, made))
+    return law_of_arrays(cached_arrays("mesh-law", curve_key(pair, own, {"force": force}), made))
