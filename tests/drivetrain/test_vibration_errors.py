@@ -22,7 +22,7 @@ from gearfe.drivetrain.vibration.spectra import TrainRecord
 from gearfe.gears.gearmesh.curve import StiffnessCurve
 from gearfe.multibody import constant
 from tests.makers.job_texts import SMALL_TRAIN
-from tests.makers.trains import SHIPPED, curve, elastic, train
+from tests.makers.trains import SHIPPED, base_radius, curve, elastic, train
 
 TIMES = 20e-6 * np.arange(301)
 
@@ -150,7 +150,7 @@ def known_curve(error: float) -> StiffnessCurve:
     whole = {f.name: np.ones(count, dtype=int) for f in dataclasses.fields(StiffnessCurve) if f.type == "IntArray"}
     shares = {"load_share": np.ones((count, 1))}
     known = {f.name for f in dataclasses.fields(StiffnessCurve)}
-    made = {**numbers, **words, **whole, **shares, "mesh_cycle": cycle, "base_radius": 0.03}
+    made = {**numbers, **words, **whole, **shares, "mesh_cycle": cycle, "base_radius": base_radius(30)}
     return StiffnessCurve(**{name: value for name, value in made.items() if name in known})
 
 
