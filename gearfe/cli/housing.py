@@ -228,7 +228,7 @@ def _write(folder: Path, body: ModalBody, fields: Any, errors: dict[str, Any], r
 def _draw(folder: Path, body: ModalBody, fields: Any) -> str:
     import numpy as np
 
-    from ..drivetrain.housing.mesh_checks import boundary_faces
+    from ..fem.bodies.mesh_checks import boundary_faces
     from ..figures.housing import draw_bodies, picture_of_bodies
 
     faces = boundary_faces(body.elements)

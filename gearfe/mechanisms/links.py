@@ -197,7 +197,7 @@ def bent_start(links: Mapping[str, FlexibleLink | PlateLink], system: System, ri
             out[:, first : first + 3] = state[:, k : k + 3]
             continue
         c, s = math.cos(angle), math.sin(angle)
-        arms = link.beam.link.stations + 0j if isinstance(link, FlexibleLink) else link.part.plate.body.centres
+        arms = link.beam.link.stations + 0j if isinstance(link, FlexibleLink) else link.part.plate.centres
         arms = arms - complex(*body.centre)
         arm = arms * complex(c, s)
         turn = np.ones(len(arm))

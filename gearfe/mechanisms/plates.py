@@ -17,15 +17,29 @@ from ..base.tables.plate import InterfaceTable, PlateTable
 from ..base.typing import Array, IntArray
 from ..multibody.core.contract import Element
 from ..multibody.planar.bodies import Body
-from ..multibody.planar.floating import Floating, frame_joint
+from ..multibody.planar.floating import Floating, FloatingBody, frame_joint
 from ..multibody.planar.linkage import Linkage
 
 if TYPE_CHECKING:
-    from .plate_reduction import Interface, Plate
+    from ..fem.reduction.plate import Interface, Plate
 
 Point = tuple[float, float]
 #: How far from an interface its nodes and points may lie, in parts of the link's size.
 NEAR = 1e-6
+
+
+def floating_body(plate: Plate, damping: float) -> FloatingBody:
+    """Elastic body of the core from a reduced plate, with a damping time of Kelvin and Voigt (s)."""
+    return FloatingBody(
+        mass=plate.mass_matrix,
+        linear=plate.linear,
+        quadratic=plate.quadratic,
+        centres=plate.centres,
+        shifts=plate.shifts,
+        turns=plate.turns,
+        damping=damping,
+        size=plate.size,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +60,11 @@ class PlatePart:
     pose: tuple[float, float, float]
     speed: tuple[float, float, float]
 
+    @cached_property
+    def body(self) -> FloatingBody:
+        """The part as an elastic body of the core."""
+        return floating_body(self.plate, self.table.damping_s)
+
     @property
     def node_names(self) -> tuple[str, ...]:
         """Names of the bodies at the interfaces: that of the link, then with ``.1``, ``.2`` ..."""
@@ -59,7 +78,7 @@ class PlatePart:
         InputError
             Where it lies on none.
         """
-        near = NEAR * self.plate.body.size
+        near = NEAR * self.plate.size
         for name, interface in zip(self.node_names, self.table.interfaces.values(), strict=True):
             if _distance(interface, np.array([place]))[0] <= near:
                 x, y = interface.centre
@@ -140,7 +159,7 @@ class PlateLink:
         at = q[:, self.nodes[:, 0]] + 1j * q[:, self.nodes[:, 1]]
         if self.part.table.frame == "start" or len(self.nodes) < 2:
             return at[:, 0], np.exp(1j * (q[:, self.nodes[0, 2]]))
-        chord = (at[:, 1] - at[:, 0]) / np.diff(self.part.plate.body.centres[:2])
+        chord = (at[:, 1] - at[:, 0]) / np.diff(self.part.body.centres[:2])
         return at[:, 0], np.exp(1j * np.angle(chord))
 
     def displacements(self, q: Array) -> np.ndarray:
@@ -148,13 +167,13 @@ class PlateLink:
         origin, direction = self._frame(q)
         seen = (self.places(q) - origin[:, None]) / direction[:, None]
         plate = self.part.plate
-        return np.asarray(seen - (plate.points - plate.body.centres[0]))
+        return np.asarray(seen - (plate.points - plate.centres[0]))
 
     def offset(self, q: Array, point: str, label: str) -> np.ndarray:
         """Displacement of a named point in the link's own frame (m), complex, shape (times,)."""
         name, (x, y) = self.at(point, label)
         which = self.part.node_names.index(name)
-        k, body = self.nodes[which], self.part.plate.body
+        k, body = self.nodes[which], self.part.body
         origin, direction = self._frame(q)
         place = q[:, k[0]] + 1j * q[:, k[1]] + np.exp(1j * q[:, k[2]]) * complex(x, y)
         start = body.centres[which] + complex(x, y) - body.centres[0]
@@ -204,7 +223,7 @@ class _Shape:
 @lru_cache(maxsize=16)
 def _reduced(shape: _Shape, written: int) -> Plate:  # noqa: ARG001 - a mesh file that is written anew is another
     from ..fem.plane import Material
-    from .plate_reduction import reduce_plate
+    from ..fem.reduction.plate import reduce_plate
 
     table = shape.table
     with stage("elastic link"):
@@ -215,7 +234,7 @@ def _reduced(shape: _Shape, written: int) -> Plate:  # noqa: ARG001 - a mesh fil
             problem = f"are too many for a mesh with {free} displacements beside its interfaces"
             raise InputError(f"{shape.where}.modes", table.modes, problem, f"take at most {free // 4}, or a finer mesh")
         material = Material(1e9 * table.youngs_modulus_GPa, table.poisson_ratio, density=table.density_kg_per_m3)
-        return reduce_plate(points, triangles, table.thickness_m, material, table.damping_s, interfaces, table.modes)
+        return reduce_plate(points, triangles, table.thickness_m, material, interfaces, table.modes)
 
 
 def _mesh(shape: _Shape) -> tuple[Array, IntArray]:
@@ -256,7 +275,7 @@ def _distance(interface: InterfaceTable, places: Array) -> Array:
 
 def _interfaces(points: Array, table: PlateTable, where: str) -> list[Interface]:
     """Nodes of every interface."""
-    from .plate_reduction import Interface
+    from ..fem.reduction.plate import Interface
 
     near = NEAR * float(np.hypot(*np.ptp(points, axis=0)))
     made: list[Interface] = []
@@ -279,7 +298,7 @@ def plate_links(bodies: dict[str, BodyTable], planar: Linkage, parts: dict[str, 
     """Links with their elastic bodies, which stand in the system after the linkage and the beams, in their order."""
     made, at = {}, planar.size
     for name, part in parts.items():
-        element = Floating(part.plate.body, planar, name, part.pose, part.speed)
+        element = Floating(part.body, planar, name, part.pose, part.speed)
         nodes = np.array([[3 * planar.body_index[n] + k for k in range(3)] for n in part.node_names])
         joint = frame_joint(element, planar, part.node_names)
         own = slice(at, at + element.size)

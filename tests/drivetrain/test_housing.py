@@ -16,7 +16,7 @@ from gearfe.base.tables.housing import HousingTable
 from gearfe.base.tables.jobs import load_job
 from gearfe.drivetrain.housing.body import reduced_housing
 from gearfe.drivetrain.housing.build import bores, housing_from_table, inside_faces
-from gearfe.drivetrain.housing.meshes import Prisms
+from gearfe.fem.bodies.meshes import Prisms
 from gearfe.fem.prisms import volume_ratios
 from tests.makers.full_model import full_model
 from tests.makers.housing_meshes import surface_area

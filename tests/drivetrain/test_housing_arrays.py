@@ -11,8 +11,8 @@ import pytest
 
 from gearfe.base.errors import InputError
 from gearfe.drivetrain.housing.attachments import Attachment, Bore, Plane, interface_matrix
-from gearfe.drivetrain.housing.mesh_checks import boundary_faces
 from gearfe.drivetrain.housing.model import Housing
+from gearfe.fem.bodies.mesh_checks import boundary_faces
 from gearfe.fem.meshing.session import gmsh_session
 from gearfe.fem.plane import Material
 from gearfe.fem.solid import curved_elements, jacobian_determinants

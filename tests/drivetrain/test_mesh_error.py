@@ -11,8 +11,8 @@ import pytest
 from gearfe.base.tables.housing import FeetTable, HousingMeshTable, HousingTable, ShaftAxisTable
 from gearfe.drivetrain.housing.attachments import Attachment
 from gearfe.drivetrain.housing.build import housing_from_table
-from gearfe.drivetrain.housing.mesh_error import energy_lost
 from gearfe.drivetrain.housing.model import Housing, rigid_motions
+from gearfe.fem.bodies.mesh_error import energy_lost
 from gearfe.fem.plane import Material
 from gearfe.fem.reduction.error import accelerances, mesh_error
 from gearfe.fem.reduction.lanczos import lowest_modes

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gearfe.drivetrain.gearbox.radiation import RadiatedPower, instantaneous_power, power_level
-from gearfe.drivetrain.housing.meshes import Tetrahedra
 from gearfe.drivetrain.vibration.spectra import spectra
+from gearfe.fem.bodies.meshes import Tetrahedra
 from tests.makers.housing_meshes import box
 from tests.makers.train_responses import COUNT, STEP, made_up, tone
 

@@ -10,11 +10,11 @@ import pytest
 from gearfe.base.config import build
 from gearfe.base.errors import InputError
 from gearfe.base.tables.housing import HousingTable
-from gearfe.drivetrain.housing.bisection import bisected
 from gearfe.drivetrain.housing.build import housing_from_table
-from gearfe.drivetrain.housing.mesh_checks import boundary_faces, checked_mesh
 from gearfe.drivetrain.housing.model import Housing
 from gearfe.drivetrain.housing.refinement import refined
+from gearfe.fem.bodies.bisection import bisected
+from gearfe.fem.bodies.mesh_checks import boundary_faces, checked_mesh
 from gearfe.fem.plane import Material
 from gearfe.fem.reduction.error import mesh_error
 from gearfe.fem.solid import EDGES, FACES, assemble

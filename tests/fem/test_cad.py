@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
-from gearfe.drivetrain.housing.mesh_checks import checked_mesh
+from gearfe.fem.bodies.mesh_checks import checked_mesh
 from gearfe.fem.meshing import cad
 from gearfe.fem.meshing.cad import ALGORITHMS, mesh_cad_file
 from gearfe.fem.meshing.session import gmsh_session

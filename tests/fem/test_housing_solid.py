@@ -13,9 +13,9 @@ from skfem.assembly import Dofs
 from skfem.helpers import ddot, div, sym_grad
 
 from gearfe.base.errors import InputError
-from gearfe.drivetrain.housing.mesh_checks import boundary_faces
-from gearfe.drivetrain.housing.meshes import Tetrahedra
-from gearfe.drivetrain.housing.surface import nodal_normals, triangle_functions
+from gearfe.fem.bodies.mesh_checks import boundary_faces
+from gearfe.fem.bodies.meshes import Tetrahedra
+from gearfe.fem.bodies.surface import nodal_normals, triangle_functions
 from gearfe.fem.plane import Material
 from gearfe.fem.reduction.lanczos import lowest_modes
 from gearfe.fem.reduction.sparse_solver import factorize

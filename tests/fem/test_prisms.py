@@ -10,10 +10,10 @@ import pytest
 
 from gearfe.base.tables.housing import FeetTable, HousingMeshTable, HousingReductionTable, HousingTable, ShaftAxisTable
 from gearfe.drivetrain.housing.build import housing_from_table, inside_faces
-from gearfe.drivetrain.housing.mesh_checks import boundary_faces
-from gearfe.drivetrain.housing.meshes import Prisms
 from gearfe.drivetrain.housing.model import rigid_motions
-from gearfe.drivetrain.housing.surface import nodal_normals
+from gearfe.fem.bodies.mesh_checks import boundary_faces
+from gearfe.fem.bodies.meshes import Prisms
+from gearfe.fem.bodies.surface import nodal_normals
 from gearfe.fem.meshing.housing_mesh import Extrusion, housing_mesh
 from gearfe.fem.plane import Material
 from gearfe.fem.prisms import LATTICE, ORDER

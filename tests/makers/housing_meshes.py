@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from gearfe.drivetrain.housing.meshes import Tetrahedra
 from gearfe.drivetrain.housing.model import Housing
-from gearfe.drivetrain.housing.surface import triangle_functions
+from gearfe.fem.bodies.meshes import Tetrahedra
+from gearfe.fem.bodies.surface import triangle_functions
 from gearfe.fem.plane import Material
 from gearfe.fem.solid import EDGES, SolidMatrices, maps, shape_functions
 from tests.places import DATA

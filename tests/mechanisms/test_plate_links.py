@@ -20,8 +20,9 @@ from gearfe.base.errors import InputError
 from gearfe.cli.main import main
 from gearfe.fem.meshing.plate_mesh import mesh_outline
 from gearfe.fem.plane import Material
+from gearfe.fem.reduction.plate import Interface, Plate, reduce_plate
 from gearfe.mechanisms import evaluate, load_mechanism
-from gearfe.mechanisms.plate_reduction import Interface, Plate, reduce_plate
+from gearfe.mechanisms.plates import floating_body
 from gearfe.multibody import (
     Body,
     Fixed,
@@ -47,27 +48,25 @@ from tests.makers.files import mechanism_file
 from tests.places import GEOMETRY
 
 
-def bar(
-    height: float, count: int, material: Material, length: float = 1.0, damping: float = 0.0, across: int = 1
-) -> Plate:
+def bar(height: float, count: int, material: Material, length: float = 1.0, across: int = 1) -> Plate:
     """A bar along x whose two ends are interfaces, of unit thickness."""
     h = 0.5 * height
     mesh = mesh_outline([(0.0, -h), (length, -h), (length, h), (0.0, h)], [], height / across)
     ends = [Interface(np.array([x, 0.0]), np.flatnonzero(np.abs(mesh.points[:, 0] - x) < 1e-9)) for x in (0.0, length)]
-    return reduce_plate(*mesh, 1.0, material, damping, ends, count)
+    return reduce_plate(*mesh, 1.0, material, ends, count)
 
 
-def made(plate: Plate, joints=(), forces=(), pose=(0.0, 0.0, 0.0), speed=(0.0, 0.0, 0.0)) -> System:  # type: ignore[no-untyped-def]
-    names = [f"rod{k}" for k in range(len(plate.body.centres))]
+def made(plate: Plate, joints=(), forces=(), pose=(0.0, 0.0, 0.0), speed=(0.0, 0.0, 0.0), damping=0.0) -> System:  # type: ignore[no-untyped-def]
+    names = [f"rod{k}" for k in range(len(plate.centres))]
     turn = np.exp(1j * pose[2])
-    places = [complex(*pose[:2]) + turn * z for z in plate.body.centres]
-    speeds = [complex(*speed[:2]) + 1j * speed[2] * turn * z for z in plate.body.centres]
+    places = [complex(*pose[:2]) + turn * z for z in plate.centres]
+    speeds = [complex(*speed[:2]) + 1j * speed[2] * turn * z for z in plate.centres]
     nodes = [
         Body(n, 0.0, 0.0, position=(z.real, z.imag), angle=pose[2], velocity=(v.real, v.imag), rate=speed[2])
         for n, z, v in zip(names, places, speeds, strict=True)
     ]
     linkage = Linkage(tuple(nodes), tuple(joints), tuple(forces))
-    element = Floating(plate.body, linkage, "rod", pose, speed)
+    element = Floating(floating_body(plate, damping), linkage, "rod", pose, speed)
     return System([linkage, element, frame_joint(element, linkage, names)])
 
 
@@ -200,8 +199,8 @@ def test_a_rigid_motion_leaves_no_strain_and_its_energy_is_that_of_the_rigid_bod
 
 def test_derivatives_of_the_force() -> None:
     """Of the force by differences; of the energy: the force without rates; turning and weight are in both."""
-    plate = bar(0.1, 1, Material(10.0, 0.3, density=1.0), damping=0.3)
-    system = made(plate, forces=[Gravity((1.0, -9.81)), TurningFrame(0.7)])
+    plate = bar(0.1, 1, Material(10.0, 0.3, density=1.0))
+    system = made(plate, forces=[Gravity((1.0, -9.81)), TurningFrame(0.7)], damping=0.3)
     element = element_of(system)
     rng = np.random.default_rng(1)
     q, v = element.start()[0] + 0.1 * rng.standard_normal(element.size), rng.standard_normal(element.size)

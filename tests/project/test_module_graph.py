@@ -24,7 +24,7 @@ HEAVY = {
     ("gearfe.drivetrain.housing.body", "gearfe.drivetrain.housing.superelement"): "sparse matrices",
     ("gearfe.drivetrain.housing.body", "gearfe.fem.meshing.mesh_file"): "readers of meshes",
     ("gearfe.mechanisms.plates", "gearfe.fem.plane"): "finite elements",
-    ("gearfe.mechanisms.plates", "gearfe.mechanisms.plate_reduction"): "finite elements",
+    ("gearfe.mechanisms.plates", "gearfe.fem.reduction.plate"): "finite elements",
     ("gearfe.mechanisms.plates", "gearfe.fem.meshing.plate_mesh"): "the mesher",
     ("gearfe.gears.gearmesh.law_store", "gearfe.gears.contact.half_plane"): "scipy; a law is read from the cache",
     ("gearfe.gears.gearmesh.law_store", "gearfe.gears.gearmesh.law_make"): "scipy; a law is read from the cache",
@@ -33,7 +33,7 @@ HEAVY = {
     ("gearfe.gears.gearmesh.check", "gearfe.gears.contact.whole_gears.pair"): "finite elements of whole gears",
     ("gearfe.gears.gearmesh.check", "gearfe.gears.contact.whole_gears.position"): "finite elements of whole gears",
     ("gearfe.gears.gearmesh.job", "gearfe.gears.gearmesh.sweep"): "scipy; a curve is read from the cache",
-    ("gearfe.drivetrain.gearbox.fields", "gearfe.drivetrain.housing.mesh_checks"): "sparse matrices",
+    ("gearfe.drivetrain.gearbox.fields", "gearfe.fem.bodies.mesh_checks"): "sparse matrices",
 }
 #: Modules that import by name, and what they name: parts of their own package, of packages below, of other programs.
 BY_NAME = {

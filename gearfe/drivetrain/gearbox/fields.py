@@ -240,7 +240,7 @@ def frames(
     arrays: dict[str, NDArray[np.generic]] = {"time": response.time[chosen]}
     factor = 1.0 if exaggeration is None else exaggeration
     if body is not None and body.has_mesh:
-        from ..housing.mesh_checks import boundary_faces
+        from ...fem.bodies.mesh_checks import boundary_faces
 
         faces = boundary_faces(body.elements)
         used, renumbered = np.unique(faces, return_inverse=True)

@@ -10,11 +10,11 @@ from ...base.errors import InputError
 from ...base.progress import stage
 from ...base.tables.housing import HousingReductionTable, HousingTable
 from ...base.tables.jobs import load_job
+from ...fem.bodies.meshes import Prisms
 from ...fem.meshing.housing_mesh import housing_mesh
 from ...fem.plane import Material
 from ...fem.reduction.modal_body import ModalBody
 from .attachments import PLACE_TOLERANCE, Bore
-from .meshes import Prisms
 from .model import Housing
 from .own_mesh import own_housing
 

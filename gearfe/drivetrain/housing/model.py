@@ -14,6 +14,10 @@ from ...base.progress import stage
 from ...base.shown import Facts
 from ...base.tables.housing import POISSON_RATIOS
 from ...base.typing import Array, IntArray
+from ...fem.bodies.mesh_checks import checked_mesh
+from ...fem.bodies.meshes import Outer, Prisms, Tetrahedra
+from ...fem.bodies.surface import Surface, nodal_normals
+from ...fem.bodies.unfolding import Unfolded, unfolded
 from ...fem.plane import Material
 from ...fem.reduction.craig_bampton import Partition, partition, reduce_model
 from ...fem.reduction.modal_body import ModalBody
@@ -28,10 +32,6 @@ from .attachments import (
     plane_nodes,
     rigid_motions,
 )
-from .mesh_checks import checked_mesh
-from .meshes import Outer, Prisms, Tetrahedra
-from .surface import Surface, nodal_normals
-from .unfolding import Unfolded, unfolded
 
 #: Said whenever linear tetrahedra are chosen.
 LINEAR_NOTE = (

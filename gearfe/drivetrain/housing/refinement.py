@@ -9,10 +9,10 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.progress import stage
 from ...base.typing import Array
-from .bisection import Bisected, bisected
-from .meshes import Outer, Tetrahedra
+from ...fem.bodies.bisection import Bisected, bisected
+from ...fem.bodies.meshes import Outer, Tetrahedra
+from ...fem.bodies.unfolding import unfolded
 from .model import Housing
-from .unfolding import unfolded
 
 #: Part of the estimated error whose elements are refined in a round (Doerfler, SIAM J. Numer. Anal. 33, 1996).
 BULK = 0.5

@@ -92,7 +92,7 @@ class ModalBody(Reduction, Shown):
         Mass, static moments and inertia about the origin: kinetic energy of rigid translations and rotations.
     softening : (N, N)
         Estimate of how much too stiff the mesh makes the body, a quadratic form like the stiffness (see
-        `gearfe.drivetrain.housing.mesh_error`); all zero where it was not estimated.
+        `gearfe.fem.bodies.mesh_error`); all zero where it was not estimated.
     held
         Whether a part of the body is fixed to the frame; a free body has six rigid-body modes.
     notes

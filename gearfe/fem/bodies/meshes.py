@@ -1,4 +1,4 @@
-r"""The two kinds of meshes that a housing may have: tetrahedra that anyone brought, extruded elements of a job's own.
+r"""The two kinds of meshes of solid bodies: tetrahedra that anyone brought, and extruded elements.
 
 Both have nodes, cells to show, matrices, an outer surface, and an estimate of the discretisation error.
 """
@@ -13,10 +13,10 @@ import numpy as np
 from scipy import sparse
 
 from ...base.typing import Array, BoolArray, IntArray
-from ...fem.meshing.housing_mesh import REVERSED, Extrusion
-from ...fem.plane import Material
-from ...fem.prisms import ORDER, assemble_prisms, lagrange, triangle_rule
-from ...fem.solid import SolidMatrices, assemble
+from ..meshing.housing_mesh import REVERSED, Extrusion
+from ..plane import Material
+from ..prisms import ORDER, assemble_prisms, lagrange, triangle_rule
+from ..solid import SolidMatrices, assemble
 from .mesh_checks import boundary_faces
 from .mesh_error import energy_lost, energy_lost_by_element
 from .prism_error import prism_energy_lost
@@ -67,7 +67,7 @@ class Tetrahedra:
         Parameters
         ----------
         material, fields, eigenvalues, rigid
-            See `gearfe.drivetrain.housing.mesh_error.energy_lost`.
+            See `gearfe.fem.bodies.mesh_error.energy_lost`.
         """
         return energy_lost(self.nodes, self.cells, material, fields, eigenvalues, rigid)
 
@@ -79,7 +79,7 @@ class Tetrahedra:
         Parameters
         ----------
         material, fields, eigenvalues, rigid
-            See `gearfe.drivetrain.housing.mesh_error.energy_lost_by_element`.
+            See `gearfe.fem.bodies.mesh_error.energy_lost_by_element`.
         """
         return energy_lost_by_element(self.nodes, self.cells, material, fields, eigenvalues, rigid)
 
@@ -145,7 +145,7 @@ class Prisms:
         Parameters
         ----------
         material, fields, eigenvalues, rigid
-            See `gearfe.drivetrain.housing.prism_error.prism_energy_lost`.
+            See `gearfe.fem.bodies.prism_error.prism_energy_lost`.
         """
         return prism_energy_lost(self.extrusion, self.used, material, fields, eigenvalues, rigid)
 

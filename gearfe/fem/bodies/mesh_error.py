@@ -32,8 +32,8 @@ import numpy as np
 from scipy import sparse
 
 from ...base.typing import Array, BoolArray, IntArray
-from ...fem.plane import Material
-from ...fem.solid import EDGES, ElementMatrices, Functions, curved_elements, element_matrices, shape_functions
+from ..plane import Material
+from ..solid import EDGES, ElementMatrices, Functions, curved_elements, element_matrices, shape_functions
 
 #: Error over what the next order's functions take one by one: 1.7 by theory, at most 2.5 measured.
 FACTOR = 3.0

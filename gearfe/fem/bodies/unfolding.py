@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.typing import Array, BoolArray, IntArray
-from ...fem.plane import Material
-from ...fem.reduction.sparse_solver import factorize
-from ...fem.solid import CURVED_DEGREE, EDGES, assemble, curved_elements, jacobian_determinants, maps, shape_functions
+from ..plane import Material
+from ..reduction.sparse_solver import factorize
+from ..solid import CURVED_DEGREE, EDGES, assemble, curved_elements, jacobian_determinants, maps, shape_functions
 from .mesh_checks import boundary_faces
 
 #: Least volume ratio at a quadrature point of an element that was folded, in that of its straight form.

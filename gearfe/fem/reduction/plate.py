@@ -24,9 +24,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from ..base.typing import Array, IntArray
-from ..fem.plane import Material, physical_gradients, triangle_rule, triangle_shapes
-from ..multibody.planar.floating import FloatingBody
+from ...base.typing import Array, IntArray
+from ..plane import Material, physical_gradients, triangle_rule, triangle_shapes
 
 #: Share of its own energy below which a shape counts as made of others; of the largest derivative, for derivatives.
 DEPENDENT, SMALL = 1e-6, 3e-2
@@ -49,10 +48,21 @@ class Interface(NamedTuple):
 class Plate:
     """A reduced plane part and the way back to its mesh.
 
+    With N = (1, Z, phi_1 ... phi_r), Z the points in the frame as complex numbers and phi the modes, the strain in an
+    orthonormal basis of its energy is e = L eta + 1/2 Q(eta, eta) for shares eta of the modes.
+
     Attributes
     ----------
-    body : FloatingBody
-        For the core.
+    mass_matrix : ndarray of complex, shape (r + 2, r + 2)
+        Integrals of conj(N_j) N_k over the mass; kg, kg m, kg m2.
+    linear, quadratic : ndarray, shapes (s, r), (s, r, r)
+        L and Q.
+    centres : ndarray of complex, shape (i,)
+        Interfaces in the frame (m).
+    shifts, turns : ndarray of complex, shape (i, r)
+        Motion there by the modes: a point Z moves by shift (m) + turn (Z - centre), turn = growth + i angle.
+    size : float
+        Largest extent of the part (m); modes are of that size where they are largest.
     points : ndarray of complex, shape (n,)
         Nodes in the frame (m).
     triangles : ndarray, shape (m, 6)
@@ -66,7 +76,13 @@ class Plate:
         Of the modes' own space with the first interface held, linear (Hz).
     """
 
-    body: FloatingBody
+    mass_matrix: np.ndarray = field(repr=False)
+    linear: Array = field(repr=False)
+    quadratic: Array = field(repr=False)
+    centres: np.ndarray = field(repr=False)
+    shifts: np.ndarray = field(repr=False)
+    turns: np.ndarray = field(repr=False)
+    size: float
     points: np.ndarray = field(repr=False)
     triangles: IntArray = field(repr=False)
     modes: np.ndarray = field(repr=False)
@@ -100,8 +116,8 @@ class _Elements(NamedTuple):
 
 
 def reduce_plate(
-    points: Array, triangles: IntArray, thickness: float, material: Material, damping: float,
-    interfaces: list[Interface], count: int,
+    points: Array, triangles: IntArray, thickness: float, material: Material, interfaces: list[Interface],
+    count: int,
 ) -> Plate:  # fmt: skip
     """Condense a plane-stress mesh to its interfaces and a few modes, see the module's docstring.
 
@@ -115,8 +131,6 @@ def reduce_plate(
         Thickness (m).
     material : Material
         Elasticity and density.
-    damping : float
-        Kelvin-Voigt time tau (s).
     interfaces : list of Interface
         Rigid sets of nodes; the frame goes with the first.
     count : int
@@ -173,16 +187,24 @@ def reduce_plate(
     centre = complex(moment / total)
     e, recovery = _strain_basis(elements, shapes)
     r = shapes.shape[1]
-    body = FloatingBody(
-        mass=0.5 * (matrix + matrix.conj().T), linear=e[:, :r], quadratic=_symmetric(e[:, r:], r),
-        centres=np.array([complex(*i.centre) for i in interfaces]),
-        shifts=np.array([_mean(modes, i, Z)[0] for i in interfaces]),
-        turns=np.array([_mean(modes, i, Z)[1] for i in interfaces]), damping=damping, size=size,
-    )  # fmt: skip
+    means = [_mean(modes, interface, Z) for interface in interfaces]
     return Plate(
-        body, Z, triangles, modes, _at_nodes(triangles, recovery, n), total, centre,
-        float(matrix[1, 1].real) - total * abs(centre) ** 2, omega / (2 * np.pi),
-    )  # fmt: skip
+        mass_matrix=0.5 * (matrix + matrix.conj().T),
+        linear=e[:, :r],
+        quadratic=_symmetric(e[:, r:], r),
+        centres=np.array([complex(*interface.centre) for interface in interfaces]),
+        shifts=np.array([shift for shift, _ in means]),
+        turns=np.array([turn for _, turn in means]),
+        size=size,
+        points=Z,
+        triangles=triangles,
+        modes=modes,
+        stresses=_at_nodes(triangles, recovery, n),
+        mass=total,
+        centre=centre,
+        inertia=float(matrix[1, 1].real) - total * abs(centre) ** 2,
+        frequencies=omega / (2 * np.pi),
+    )
 
 
 def _operators(points: Array, triangles: IntArray, thickness: float, material: Material) -> _Elements:

@@ -1,6 +1,6 @@
 r"""How much too stiff extruded elements of order 3 make a body: what those of order 4 would let it do.
 
-The estimate is that of `housing.mesh_error`, :math:`\sum_i r_i^T K_i^{-1} r_i` over the functions s_i that the
+The estimate is that of `fem.bodies.mesh_error`, :math:`\sum_i r_i^T K_i^{-1} r_i` over the functions s_i that the
 next order adds. Hierarchical functions of a prism are products of those of a triangle (of corners, edges and the
 inside: Szabo, Babuska, Finite Element Analysis, 1991, ch. 6) and of a line (ends, then integrals of Legendre's);
 the next order adds those products of which one factor has degree 4. Where stresses are singular the energy of the error
@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.typing import Array, IntArray
-from ...fem.meshing.housing_mesh import Extrusion
-from ...fem.plane import Material
-from ...fem.prisms import ORDER, isotropic_blocks, lagrange, plane_parts, triangle_maps, triangle_rule
+from ..meshing.housing_mesh import Extrusion
+from ..plane import Material
+from ..prisms import ORDER, isotropic_blocks, lagrange, plane_parts, triangle_maps, triangle_rule
 from .mesh_error import add_up, barycentric, difference, energy_taken, product
 
 #: Error over what the next order's functions take one by one.

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ...base.errors import InputError
 from ...base.typing import Array, IntArray
-from ...fem.solid import EDGES, FACES, jacobian_determinants
+from ..solid import EDGES, FACES, jacobian_determinants
 
 #: A midside node further than this part of its edge's length from the edge's middle belongs to another edge.
 _FAR = 0.35

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.typing import Array, BoolArray, IntArray
-from ...fem.solid import EDGES, FACES
+from ..solid import EDGES, FACES
 
 #: Number of the edge between two corners.
 _EDGE = np.zeros((4, 4), dtype=np.int64)
