@@ -4,12 +4,13 @@ Find :math:`u` with :math:`-\nabla\cdot\sigma(u) = 0`,
 :math:`\sigma = \lambda\,\mathrm{tr}(\varepsilon) I + 2\mu\,\varepsilon`,
 :math:`\varepsilon = \tfrac12(\nabla u + \nabla u^T)`, where in plane stress :math:`\lambda` is replaced by
 :math:`2\lambda\mu/(\lambda+2\mu)` (Zienkiewicz, Taylor & Zhu, *The Finite Element Method*, sec. 2.2). The weak form,
-:math:`w\int\sigma(u):\varepsilon(v)`, is assembled by `element_stiffness` in one batch of dense products.
+:math:`w\int\sigma(u):\varepsilon(v)`, is `element_stiffness`: strains and stresses of the shape functions, and their
+product in space and over the quadrature points. Shape functions and quadrature are scikit-fem's.
 
-The same in scikit-fem forms is `gears.contact.whole_gears.bodies.stiffness_form`; `tests/fem/test_plane_forms.py` holds
-stiffness, stresses and finite strain equal to forms. They are batched by hand here because forms are 11 times slower on
-the 4,335 triangles of both sectors of the shipped pair (0.18 s against 0.016 s): 40 positions would take 1.25 times as
-long, and 1.2 times from cold, where the import of scikit-fem alone (0.07 s) costs 6 %.
+The form itself is a batched product of arrays, because a `BilinearForm` takes 6.4 times as long: 0.185 s and 0.029 s of
+processor time for 4,248 triangles in both sectors of a pair (scikit-fem 12.0.2, NumPy 2.4.6). That would be half of the
+0.30 s for 40 positions. Finite strain by scikit-fem's tensor products takes twice as long, 5 % of 40 positions.
+`tests/fem/test_plane_forms.py` compares stiffness, stresses and finite strain with forms.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -95,7 +97,7 @@ class Material:
 
 
 def triangle_shapes(r: Array, s: Array) -> tuple[Array, Array]:
-    """Shape functions of the six-node triangle at reference points (r, s), each of shape (q,).
+    """Shape functions of the six-node triangle at reference points (r, s), each of shape (q,): those of scikit-fem.
 
     Returns
     -------
@@ -103,21 +105,20 @@ def triangle_shapes(r: Array, s: Array) -> tuple[Array, Array]:
     gradients : ndarray, shape (q, 6, 2)
         Derivatives with respect to r and s.
     """
-    t = 1 - r - s
-    values = np.stack([t * (2 * t - 1), r * (2 * r - 1), s * (2 * s - 1), 4 * r * t, 4 * r * s, 4 * s * t], axis=-1)
-    zero = np.zeros_like(r)
-    d_r = np.stack([1 - 4 * t, 4 * r - 1, zero, 4 * (t - r), 4 * s, -4 * s], axis=-1)
-    d_s = np.stack([1 - 4 * t, zero, 4 * s - 1, -4 * r, 4 * r, 4 * (t - s)], axis=-1)
-    return values, np.stack([d_r, d_s], axis=-1)
+    from skfem import ElementTriP2  # 0.07 s, which jobs without elastic gears save
+
+    functions = [ElementTriP2().lbasis(np.stack([r, s]), node) for node in range(6)]
+    values = np.stack([value for value, _ in functions], axis=-1)
+    return values, np.stack([slope.T for _, slope in functions], axis=-2)
 
 
-def triangle_rule() -> tuple[Array, Array, Array]:
-    """Six-point rule, exact to degree 4 (Dunavant 1985): reference points r, s and weights that sum to 1/2."""
-    a, b = 0.445948490915965, 0.091576213509771
-    wa, wb = 0.223381589678011 / 2, 0.109951743655322 / 2
-    r = np.array([a, 1 - 2 * a, a, b, 1 - 2 * b, b])
-    s = np.array([a, a, 1 - 2 * a, b, b, 1 - 2 * b])
-    return r, s, np.array([wa, wa, wa, wb, wb, wb])
+@cache
+def triangle_rule(degree: int = 4) -> tuple[Array, Array, Array]:
+    """Quadrature rule of scikit-fem, exact to a degree: reference points r, s and weights that sum to 1/2."""
+    from skfem.quadrature import get_quadrature_tri
+
+    points, weights = get_quadrature_tri(degree)
+    return points[0], points[1], weights
 
 
 def least_jacobian(points: Array, triangles: Array) -> Array:
@@ -189,17 +190,53 @@ def physical_gradients(coordinates: Array, reference_gradients: Array) -> tuple[
     return np.matmul(reference_gradients, inverse), det
 
 
-def element_stiffness(coordinates: Array, material: Material, plane: Plane, thickness: float) -> Array:
-    """Compute the stiffness matrices of curved six-node triangles.
+def strain_rows(gradients: Array) -> Array:
+    r"""Strains :math:`\varepsilon(v)` (xx, yy, twice xy) for unit displacements of the nodes (1/m).
 
-    k_aibj = int w (lam N_a,i N_b,j + mu N_a,j N_b,i + mu delta_ij N_a,k N_b,k).
+    Parameters
+    ----------
+    gradients : ndarray, shape (m, q, 6, 2)
+        d N_a / d x_i (1/m).
+
+    Returns
+    -------
+    ndarray, shape (m, q, 3, 6, 2)
+    """
+    rows = np.zeros((*gradients.shape[:2], 3, 6, 2))
+    x, y = np.moveaxis(gradients, -1, 0)
+    rows[:, :, 0, :, 0] = rows[:, :, 2, :, 1] = x
+    rows[:, :, 1, :, 1] = rows[:, :, 2, :, 0] = y
+    return rows
+
+
+def elasticity(material: Material, plane: Plane) -> Array:
+    r"""Matrix C of :math:`\sigma = C\,\varepsilon`: stresses xx, yy, xy (Pa) of strains xx, yy, twice xy."""
+    lam, mu = material.lame(plane)
+    return np.array([[lam + 2 * mu, lam, 0.0], [lam, lam + 2 * mu, 0.0], [0.0, 0.0, mu]])
+
+
+def stress_rows(gradients: Array, material: Material, plane: Plane) -> Array:
+    r"""Stresses :math:`\sigma(v)` (xx, yy, xy) for unit displacements of the nodes (Pa/m), shape (m, q, 3, 6, 2).
+
+    Parameters
+    ----------
+    gradients : ndarray, shape (m, q, 6, 2)
+        d N_a / d x_i (1/m).
+    """
+    rows = strain_rows(gradients)
+    stresses = elasticity(material, plane) @ rows.reshape(*rows.shape[:3], 12)
+    return np.asarray(stresses.reshape(rows.shape))
+
+
+def element_stiffness(coordinates: Array, material: Material, plane: Plane, thickness: float) -> Array:
+    r"""Compute the stiffness matrices :math:`w\int\sigma(u):\varepsilon(v)` of curved six-node triangles.
 
     Parameters
     ----------
     coordinates : ndarray, shape (m, 6, 2)
         Node positions (m).
     material : Material
-        Lame's constants lam and mu.
+        Elasticity.
     plane : str
         ``stress`` or ``strain``.
     thickness
@@ -210,18 +247,13 @@ def element_stiffness(coordinates: Array, material: Material, plane: Plane, thic
     ndarray, shape (m, 12, 12)
         N/m; rows are node-major (node 0 x, node 0 y, node 1 x, ...).
     """
-    lam, mu = material.lame(plane)
     r, s, weights = triangle_rule()
     gradients, det = physical_gradients(coordinates, triangle_shapes(r, s)[1])
+    strain = strain_rows(gradients).reshape(*det.shape, 3, 12)
+    stress = elasticity(material, plane) @ strain
+    stress *= (thickness * weights * det)[:, :, None, None]
     m = len(coordinates)
-    grad = gradients.reshape(m, len(r), 12)
-    scaled = grad * (thickness * weights * det)[:, :, None]
-    outer = np.matmul(scaled.transpose(0, 2, 1), grad).reshape(m, 6, 2, 6, 2)  # int N_a,i N_b,j
-    stiffness = lam * outer + mu * outer.transpose(0, 1, 4, 3, 2)
-    laplace = mu * (outer[:, :, 0, :, 0] + outer[:, :, 1, :, 1])
-    stiffness[:, :, 0, :, 0] += laplace
-    stiffness[:, :, 1, :, 1] += laplace
-    return stiffness.reshape(m, 12, 12)
+    return np.matmul(stress.reshape(m, -1, 12).transpose(0, 2, 1), strain.reshape(m, -1, 12))
 
 
 def finite_strain_rates(
@@ -258,9 +290,9 @@ def finite_strain_rates(
     ndarray, shape (c,)
         J per unit of what changes.
     """
-    r, s = np.array([1, 4, 1]) / 6, np.array([1, 1, 4]) / 6  # three points, exact to degree 2
+    r, s, weights = triangle_rule(2)
     gradients, det = physical_gradients(points[triangles], triangle_shapes(r, s)[1])
-    volume = thickness * det / 6
+    volume = thickness * weights * det
     lam, mu = material.lame(plane)
     m, cases = len(triangles), fields.shape[2] // 2
     at = gradients.transpose(0, 1, 3, 2).reshape(m, 6, 6)  # (point, derivative) x node
@@ -285,20 +317,6 @@ def _finite_density(lam: float, mu: float, state: Array, rate: Array) -> Array:
     first = (xx + a * s_xx + b * s_xy) * rate[:, :, 0, 0] + (xy + a * s_xy + b * s_yy) * rate[:, :, 1, 0]
     second = (xy + c * s_xx + d * s_xy) * rate[:, :, 0, 1] + (yy + c * s_xy + d * s_yy) * rate[:, :, 1, 1]
     return np.asarray(first + second)
-
-
-def stress_rows(gradients: Array, material: Material, plane: Plane) -> Array:
-    """Stresses xx, yy, xy for unit displacements of the nodes (Pa/m), shape (m, q, 3, 6, 2).
-
-    Parameters
-    ----------
-    gradients : ndarray, shape (m, q, 6, 2)
-        d N_a / d x_i (1/m).
-    """
-    lam, mu = material.lame(plane)
-    x, y = np.moveaxis(gradients, -1, 0)
-    xx, yy, xy = ((lam + 2 * mu) * x, lam * y), (lam * x, (lam + 2 * mu) * y), (mu * y, mu * x)
-    return np.stack([np.stack(row, axis=-1) for row in (xx, yy, xy)], axis=2)
 
 
 def von_mises(stresses: Array) -> Array:

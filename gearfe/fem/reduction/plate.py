@@ -25,7 +25,7 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from ...base.typing import Array, IntArray
-from ..plane import Material, physical_gradients, triangle_rule, triangle_shapes
+from ..plane import Material, elasticity, physical_gradients, triangle_rule, triangle_shapes
 
 #: Share of its own energy below which a shape counts as made of others; of the largest derivative, for derivatives.
 DEPENDENT, SMALL = 1e-6, 3e-2
@@ -221,9 +221,7 @@ def _operators(points: Array, triangles: IntArray, thickness: float, material: M
     parts = [(gradients[..., j], 4 * at + 2 * c + j, 2 * nodes + c) for c in (0, 1) for j in (0, 1)]
     data, rows, columns = (np.concatenate([part[k].ravel() for part in parts]) for k in range(3))
     H = sparse.csr_matrix((data, (rows, columns)), shape=(4 * m * q, 2 * n))
-    lam, mu = material.lame("stress")
-    law = np.array([[lam + 2 * mu, lam, 0.0], [lam, lam + 2 * mu, 0.0], [0.0, 0.0, mu]])
-    return _Elements(H, N, (thickness * determinant * weights).ravel(), law)
+    return _Elements(H, N, (thickness * determinant * weights).ravel(), elasticity(material, "stress"))
 
 
 def _real(shapes: np.ndarray) -> Array:
