@@ -159,6 +159,12 @@ class TrainMeshTable:
     roughness_um: float | None = quantity(None, above=0.0, doc="mean Ra of both gears' flanks, for that")
     oil_factor: float | None = quantity(None, above=0.0, doc="X_L for that; left out: 1, mineral oil")
     curve: str | None = quantity(None, doc="CSV file with pinion_angle_deg and k_mesh_N_per_m, beside the job file")
+    mesh_table: str | None = quantity(
+        None,
+        doc="CSV file of stiffness and static transmission error over a pitch, beside the job file: "
+        "fraction_of_pitch or driver_angle_deg, k_mesh_N_per_m or k_mesh_N_per_um, and "
+        "transmission_error_unloaded_um, or transmission_error_loaded_um with mesh_force_N or torque_driven_Nm",
+    )
     stiffness_N_per_m: float | None = quantity(None, above=0.0, doc="constant stiffness (N/m)")
     rigid: bool = quantity(False, doc="true: an ideal rigid mesh, a constraint")
 
@@ -175,7 +181,9 @@ class TrainMeshTable:
 
     def check(self, where: str) -> None:
         """At most one source of the stiffness."""
-        given = [k for k in ("curve", "stiffness_N_per_m", "rigid") if getattr(self, k) not in (None, False)]
+        given = [
+            k for k in ("curve", "mesh_table", "stiffness_N_per_m", "rigid") if getattr(self, k) not in (None, False)
+        ]
         if len(given) > 1:
             raise InputError(
                 f"{where}.{given[1]}", getattr(self, given[1]), f"stands beside {given[0]}", "leave one out"
@@ -362,7 +370,7 @@ class TrainTable:
 
     def model_of(self, mesh: TrainMeshTable) -> str:
         """Return the mesh model of a mesh, an empty text for one whose stiffness is given."""
-        if mesh.curve or mesh.stiffness_N_per_m or mesh.rigid:
+        if mesh.curve or mesh.mesh_table or mesh.stiffness_N_per_m or mesh.rigid:
             return ""
         return mesh.mesh_model or self.curves.mesh_model
 

@@ -58,7 +58,7 @@ def _of_mesh(
     pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
     if model and table.mesh_model is None:
         found["mesh_model"] = _value(model, curves)
-    if model == VARIABLE or table.curve:
+    if model == VARIABLE or table.curve or table.mesh_table:
         found["interpolation"] = _value(job.table.curves.interpolation, curves)
     if model:
         for role, gear in zip(("driver", "driven"), named.gears, strict=True):

@@ -27,6 +27,7 @@ from ...base.tables.train import POTENTIAL, TrainMeshTable, TrainTable
 from ...base.typing import Array
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
+from ...gears.gearmesh.mesh_table import MeshTable
 from ...gears.geometry.deviation_job import pitch_errors_of
 from ...gears.geometry.pair import Gear, gear_of, gear_pair, pair_of
 from ...multibody import TimeFunction, smoothed_step
@@ -39,7 +40,7 @@ from .timefunctions import time_function
 if TYPE_CHECKING:
     from ...fem.reduction.modal_body import ModalBody
 
-Stiffness = MeshLaw | StiffnessCurve | float | None
+Stiffness = MeshLaw | StiffnessCurve | MeshTable | float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +146,7 @@ def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
     train = job.rigid_train
     if curves is not None:
         rows = zip(train.meshes, job.table.meshes, curves, strict=True)
-        meshes = tuple(replace(mesh, stiffness=curve, friction=_friction(table)) for mesh, table, curve in rows)
+        meshes = tuple(replace(mesh, **_given(curve), friction=_friction(table)) for mesh, table, curve in rows)
         named = job.gearbox.gears
         gears = tuple(
             replace(gear, pitch_errors=pitch_errors_of(named[gear.name], gear.gear, job.path.parent))
@@ -227,6 +228,13 @@ def _mesh(job: TrainJob, table: TrainMeshTable, named: NamedMesh) -> GearMesh:
         damping_acts=table.damping_acts,
         name=named.name,
     )
+
+
+def _given(curve: Stiffness) -> dict[str, Any]:
+    """Fields of a mesh that its stiffness gives."""
+    if isinstance(curve, MeshTable):
+        return {"stiffness": curve.stiffness, "transmission_error": curve.transmission_error}
+    return {"stiffness": curve}
 
 
 def _friction(table: TrainMeshTable) -> float | Lubrication:

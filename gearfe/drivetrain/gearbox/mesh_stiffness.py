@@ -18,6 +18,7 @@ from ...gears.gearmesh.curve import NO_CYCLE, StiffnessCurve
 from ...gears.gearmesh.job import StiffnessJob, cached_curve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.law_store import cached_law
+from ...gears.gearmesh.mesh_table import read_mesh_table
 from ...gears.geometry.deviation_job import deviations_of
 from ...gears.geometry.face import NOMINAL, ToothDeviations
 from ...gears.geometry.pair import GearPair, gear_pair
@@ -64,6 +65,10 @@ def train_curves(
             found.append(None)
         elif mesh.stiffness_N_per_m is not None:
             found.append(mesh.stiffness_N_per_m)
+        elif mesh.mesh_table is not None:
+            driven = train.gear(made.driven).gear
+            file, method = job.path.parent / mesh.mesh_table, job.table.curves.interpolation
+            found.append(read_mesh_table(file, 2.0 * math.pi / teeth, driven.base_radius, method=method))
         elif mesh.curve is not None:
             found.append(_read_curve(job.path.parent / mesh.curve, teeth))
         elif job.table.model_of(mesh) == POTENTIAL:

@@ -88,7 +88,7 @@ def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Array:
         flank, (along, turn) = train.forces.flanks[numbers[0]], train.forces.freedoms[numbers[0], :2]
         phase = flank.sense * (flank.ratio * (theta @ train.forces.turns[numbers[0]]) + u[:, turn]) + flank.phase
         if isinstance(flank, CurveFlank):
-            u[:, along] = flank.gap + factor * steady / flank.curve(phase).value
+            u[:, along] = flank.touch(phase) + factor * steady / flank.curve(phase).value
         else:
             u[:, along] = flank.gap + flank.law.approach(phase, factor * steady)
     return train.forces(theta, 1.0, u, np.zeros_like(u)).by_place

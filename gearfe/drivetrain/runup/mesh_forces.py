@@ -138,7 +138,7 @@ class MeshForces:
             if begin is None:
                 begin = self._pairs[number, len(phase)] = np.zeros((len(phase), flank.law.slots))
         slip = Slip(speed, du[:, [along, across, spin]], None if rubs is None else rubs.at(speed))
-        return flank.forces(phase, u[:, along] - flank.gap, slip, begin)
+        return flank.forces(phase, u[:, along] - flank.touch(phase), slip, begin)
 
     def __call__(self, theta: Array, speed: float, u: Array, du: Array) -> Pushes:
         """Forces at the freedoms, what the linear part has taken off."""
@@ -153,9 +153,10 @@ class MeshForces:
             if at.momentum is not None and at.per_rate is not None:
                 if momentum is None or momentum_by_place is None:
                     momentum, momentum_by_place = np.zeros_like(u), np.zeros_like(by_place)
-                value[:, d] += at.per_rate * du[:, d]
+                value[:, d] += at.push
                 momentum[:, d] -= at.momentum
                 momentum_by_place[:, d, d] -= at.per_rate
+                momentum_by_place[:, d, r] -= flank.sense * at.momentum_by_phase
                 continue
             if by_rate is None and (at.per_rate is not None or at.drag is not None):
                 by_rate = np.zeros_like(by_place)

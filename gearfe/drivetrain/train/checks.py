@@ -203,9 +203,24 @@ def _check_pitch_errors(label: str, gear: ShaftGear, law: bool) -> None:
             raise InputError("pitch_errors", len(errors), problem, "give as many as the gear has teeth")
 
 
+def _check_error(mesh: GearMesh, teeth: int) -> None:
+    """The transmission error of a mesh covers one pitch of its driver, in finite numbers."""
+    error, pitch = mesh.transmission_error, 2.0 * math.pi / teeth
+    if error is None:
+        return
+    label = f"mesh {mesh.name!r} transmission_error"
+    if mesh.stiffness is None or isinstance(mesh.stiffness, MeshLaw):
+        problem = "stands beside a rigid mesh or a mesh law, which has its own"
+        raise InputError(label, None, problem, "give a stiffness, or leave it out")
+    if abs(error.period - pitch) > SAME * pitch or not np.isfinite(error.cubics).all():
+        problem = f"has a period of {math.degrees(error.period):.9g} deg, a pitch has {math.degrees(pitch):.9g} deg"
+        raise InputError(label, None, problem, "give finite values over one pitch of the driver")
+
+
 def check_curve(mesh: GearMesh, teeth: int, wheel: Gear) -> None:
     """Check that the curve of a mesh covers one cycle of its driver with positive values, and is that of its wheel."""
     label, curve = f"mesh {mesh.name!r} stiffness", mesh.stiffness
+    _check_error(mesh, teeth)
     if mesh.backlash is not None and not (math.isfinite(mesh.backlash) and mesh.backlash >= 0.0):
         problem = "must be finite and >= 0 m: less is a wedged mesh, whose flanks all bear without a load"
         raise InputError(

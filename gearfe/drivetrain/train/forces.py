@@ -66,6 +66,8 @@ class FlankForces(NamedTuple):
     bend: Array | None = None  # N m/rad: of the moment with the phase
     drag: Drag | None = None
     momentum: Array | None = None  # N s: its rate of change is the damper's part of the force, which jumps at the touch
+    momentum_by_phase: Array | float = 0.0  # N s/rad
+    push: Array | float = 0.0  # N: the damper's part of the force
 
 
 class Slip(NamedTuple):
@@ -113,7 +115,7 @@ class MeshFlank(ABC):
         phase : ndarray, shape (n,)
             Phase of the mesh (rad).
         approach : ndarray, shape (n,)
-            Approach beyond the gap (m).
+            Approach beyond the touch (m).
         slip : Slip
             Rates of the motion, and the friction.
         begin : ndarray, shape (n, slots), optional
@@ -122,18 +124,25 @@ class MeshFlank(ABC):
 
     @abstractmethod
     def bears(self, phase: Array, approach: Array) -> BoolArray:
-        """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
+        """Whether its teeth touch at phases (rad) and approaches beyond the touch (m), (n,)."""
+
+    def touch(self, phase: Array) -> Array:  # noqa: ARG002
+        """Approach (m) at which its flanks touch at phases (rad), but for what a law knows itself."""
+        return np.asarray(self.gap)
 
     def phase_and_approach(self, angle: Array, u: Array) -> tuple[Array, Array]:
-        """Phase (rad) and approach beyond the gap (m), u of shape (n, directions)."""
-        return self.sense * (self.ratio * angle + u[:, self.turn]) + self.phase, u[:, self.direction] - self.gap
+        """Phase (rad) and approach beyond the touch (m), u of shape (n, directions)."""
+        phase = self.sense * (self.ratio * angle + u[:, self.turn]) + self.phase
+        return phase, u[:, self.direction] - self.touch(phase)
 
 
 @dataclass(frozen=True, eq=False)
 class CurveFlank(MeshFlank):
-    """Force k(phase) times approach; where `parts`, none before the touch.
+    """Force k(phase) (approach - e(phase)); where `parts`, none before the touch.
 
-    `damping` is c (N s/m) of a damper that acts in contact only: at the touch its force jumps.
+    `damping` is c (N s/m) of a damper that acts in contact only: at the touch its force jumps. `error` is e (m), the
+    unloaded static transmission error, on the nodes of the curve, or None. Dampers act on the rate of approach - e;
+    `always` is c (N s/m) of the one that the system's constant part has along the approach.
     """
 
     sliding: ClassVar[None] = None
@@ -141,6 +150,12 @@ class CurveFlank(MeshFlank):
     parts: bool
     damping: float = 0.0
     mean_damping: float = 0.0
+    error: PeriodicInterpolant | None = None
+    always: float = 0.0
+
+    def touch(self, phase: Array) -> Array:
+        """Approach (m) at which its flanks touch at phases (rad): gap and transmission error."""
+        return np.asarray(self.gap if self.error is None else self.gap + self.error(phase).value)
 
     def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:  # noqa: ARG002
         """Return the forces of a stiffness curve and of its contact damper at n times.
@@ -150,24 +165,29 @@ class CurveFlank(MeshFlank):
         phase : ndarray, shape (n,)
             Phase of the mesh (rad).
         approach : ndarray, shape (n,)
-            Approach beyond the gap (m).
+            Approach beyond the touch (m).
         slip : Slip
-            Rates of the motion; the damper uses that of the approach.
+            Rates of the motion; dampers use those of the approach and of the phase.
         begin : ndarray, optional
             Not used: a curve has no pair forces.
         """
         k, slope = self.curve(phase)
         bears = self.bears(phase, approach)
-        force, tangent, cross = (np.where(bears, x, 0.0) for x in (k * approach, k, slope * approach))
+        late, rise = (0.0, 0.0) if self.error is None else self.error(phase)
+        force, tangent, cross = (np.where(bears, x, 0.0) for x in (k * approach, k, slope * approach - k * rise))
         never = np.zeros(len(phase), dtype=bool)
-        if not self.damping > 0.0:
+        if not (self.damping > 0.0 or (self.error is not None and self.always > 0.0)):
             return FlankForces(force, tangent, cross, ~bears, never)
         c, momentum = np.where(bears, self.damping, 0.0), np.where(bears, self.damping * approach, 0.0)
-        force = force + c * slip.rates[:, 0]
-        return FlankForces(force, tangent, cross, ~bears, never, per_rate=c, momentum=momentum)
+        turning = self.sense * (self.ratio * slip.rate + slip.rates[:, 2])
+        push = c * slip.rates[:, 0] - (c + self.always) * rise * turning
+        return FlankForces(
+            force + push, tangent, cross, ~bears, never, per_rate=c, momentum=momentum - self.always * late,
+            momentum_by_phase=-(c + self.always) * rise, push=push,
+        )  # fmt: skip
 
     def bears(self, phase: Array, approach: Array) -> BoolArray:  # noqa: ARG002
-        """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
+        """Whether its teeth touch at phases (rad) and approaches beyond the touch (m), (n,)."""
         return np.asarray((approach > 0.0) | (not self.parts))
 
 
@@ -178,6 +198,7 @@ class LawFlank(MeshFlank):
     `shifts`, shape (L,), is the approach (m) by which tooth pair k touches later, k taken modulo L: its pitch errors.
     """
 
+    always: ClassVar[float] = 0.0
     law: MeshLaw
     damping: float
     sliding: Sliding | None = None
@@ -185,7 +206,7 @@ class LawFlank(MeshFlank):
     mean_damping: float = 0.0
 
     def bears(self, phase: Array, approach: Array) -> BoolArray:
-        """Whether its teeth touch at phases (rad) and approaches beyond the gap (m), (n,)."""
+        """Whether its teeth touch at phases (rad) and approaches beyond the touch (m), (n,)."""
         return np.asarray(approach > self.law.first_contact(phase, self.shifts_at(phase)))
 
     def shifts_at(self, phase: Array) -> Array:
@@ -202,7 +223,7 @@ class LawFlank(MeshFlank):
         phase : ndarray, shape (n,)
             Phase of the mesh (rad).
         approach : ndarray, shape (n,)
-            Approach beyond the gap (m).
+            Approach beyond the touch (m).
         slip : Slip
             Rates of the motion, and the friction.
         begin : ndarray, shape (n, slots), optional

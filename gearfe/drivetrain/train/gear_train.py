@@ -122,6 +122,9 @@ class GearMesh:
         Coefficient of friction, or what it follows from; for meshes with a law. See `gearfe.drivetrain.train.friction`.
     name
         How results call it; empty: ``driver-driven``.
+    transmission_error
+        Unloaded static transmission error e over the driver's rotation (m over rad), of one pitch: the approach at
+        which the flanks touch, positive where the driven gear stays behind. For meshes with a curve or a constant.
     """
 
     driver: str
@@ -135,6 +138,7 @@ class GearMesh:
     friction: float | Lubrication = 0.0
     damping_acts: str | None = None
     name: str = ""
+    transmission_error: PeriodicInterpolant | None = None
 
     def __post_init__(self) -> None:
         if not self.name:

@@ -12,6 +12,12 @@ presses. The phase :math:`\varphi` follows the driver's actual rotation in its d
 no force. P lies in the middle of the face that both gears share. A rigid mesh is the constraint :math:`\delta = 0`, F
 its multiplier.
 
+A mesh with given data has an unloaded static transmission error e over the phase beside k,
+
+.. math:: F = k(\varphi)\,(\delta - e(\varphi)) + d\,(\dot\delta - \dot e) ,
+
+positive where the driven gear stays behind; on the back flanks, behind the backlash, e counts with the other sign.
+
 A mesh law (`gears.gearmesh.law`) replaces :math:`k\,\delta`. Its phase is the driver's rotation relative to the
 line of centres, whose turn is :math:`t\cdot(u_2 - u_1)/a` with the displacements of the gears' centres, and its moment
 M acts on that: on the driver, and across the line of centres. The back flanks, where a backlash j is known, have the
@@ -35,7 +41,7 @@ import numpy as np
 
 from ...base.typing import Array, IntArray
 from ...gears.gearmesh.law import MeshLaw
-from ...gears.gearmesh.periodic import PeriodicInterpolant
+from ...gears.gearmesh.periodic import PeriodicInterpolant, on_common_nodes
 from ...gears.geometry.pair import GearPair, gear_pair
 from ...multibody import Element, LinearJoint
 from .elements import LinearForce, RigidShaft
@@ -262,7 +268,12 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
             chi = in_contact[0] / reference
             flanks.append(LawFlank(*place, law.sides[side], chi, rubs, shifts[side], mean_damping))
         elif mesh.stiffness is not None:
-            flanks.append(CurveFlank(*place, mesh.interpolant(), backlash is not None, in_contact[0], mean_damping))
+            curve, error = mesh.interpolant(), mesh.transmission_error
+            always = 0.0 if side or mesh.damps_in_contact else mesh.damping + rayleigh
+            if error is not None:  # of the same tooth position on back flanks, whose phase runs backwards
+                curve, error = on_common_nodes(curve, error if sign > 0.0 else error.reversed())
+            parts = backlash is not None
+            flanks.append(CurveFlank(*place, curve, parts, in_contact[0], mean_damping, error, always))
     return MeshLine(
         mesh, pair, i, along.direction, along.point, along.row, tuple(columns) if flanks else (), tuple(flanks),
         rayleigh, reference,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,12 +33,14 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
     rows, pieces = 1 + len(forces.torques) + series.PER_GYRO * len(forces.gyros), 0
     places, shifts, watches = [], [], []
     curves: list[PeriodicInterpolant] = []
+    errors: list[PeriodicInterpolant] = []
     for number, flank in enumerate(forces.flanks):
         watches += _watches(number, flank, rows, slots)
         if isinstance(flank, CurveFlank):
             places.append((len(curves), 0, rows, pieces))
             shifts.append(np.zeros(1))
             curves.append(flank.curve)
+            errors.append(flank.error or replace(flank.curve, cubics=np.zeros_like(flank.curve.cubics)))
             rows, pieces = rows + series.PER_CURVE, pieces + series.PER_FLANK
         else:
             places.append((-1, order.index(id(flank.law)), rows, pieces))
@@ -54,6 +57,7 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
         Places(curve, law, row, piece, np.cumsum([0, *map(len, shifts)]), np.concatenate([np.zeros(0), *shifts])),
         np.array(watches, dtype=np.int64).reshape(-1, 4),
         curve_arrays(curves),
+        curve_arrays(errors).cubics,
         laws,
     )
     return program, rows, pieces

@@ -19,9 +19,10 @@ from ...multibody.series.timefunctions import Times
 from .friction import product, smoothed_sign
 
 #: Rows of a flank: phase from the cell's node with its square and cube, approach, numbers of the cell (four
-#: coefficients, then the phase of its node); of one with a curve then its stiffness; of one with a mesh law 1 + chi
+#: coefficients, then the phase of its node); of one with a curve then its stiffness, the numbers of its transmission
+#: error, the slope of that, and the rate of the phase; of one with a mesh law 1 + chi
 #: delta', J, forces at the end of the step before, sliding for unit e.
-Z, Z2, Z3, DELTA, CELL, STIFFNESS, PER_CURVE = range(7)
+Z, Z2, Z3, DELTA, CELL, STIFFNESS, ERROR, RISES, TURNING, PER_CURVE = range(10)
 DAMPED, JACOBIAN, BEFORE, SPIN, SLOTS = range(STIFFNESS, STIFFNESS + 5)
 #: Rows of a slot: f = F - F_0, F, gap of a pair that does not bear, Lambda's inner polynomials (Horner), coefficients
 #: of t (then F_0), and of the energy; t', inner polynomials of the energy's slope, normal force; of friction e with its
@@ -65,6 +66,7 @@ class Flanks(NamedTuple):
     gap: Array
     damping: Array
     mean_damping: Array
+    always: Array
 
 
 class Slides(NamedTuple):
@@ -101,6 +103,7 @@ class Program(NamedTuple):
     places: Places
     watches: IntArray  # (w, 4): what, flank, row, slot
     curves: Curves
+    errors: Array  # (all nodes, 4) transmission errors over the phase, on the nodes of the curves
     laws: Laws
 
 
@@ -157,9 +160,15 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
             _contact(j, k, rate, u, p, memory, pieces, out)
         else:
             memory[row + STIFFNESS, j] = _cubic(j, row, row + CELL, 0, memory)
+            memory[row + DELTA, j] -= _cubic(j, row, row + ERROR, 0, memory)
+            memory[row + RISES, j] = _cubic_slope(j, row, row + ERROR, 0, memory)
+            turned = p.flanks.ratio[k] * memory[0, j + 1] + u[p.flanks.turn[k], j + 1]
+            memory[row + TURNING, j] = p.flanks.sense[k] * rate * turned
+            late = product(j, row + RISES, row + TURNING, memory)  # rate of the transmission error
+            out[d] += p.flanks.always[k] * late
             if pieces[p.places.piece[k] + 2] >= 0:
                 out[d] -= product(j, row + STIFFNESS, row + DELTA, memory)
-                out[d] -= p.flanks.damping[k] * rate * u[d, j + 1]
+                out[d] -= p.flanks.damping[k] * (rate * u[d, j + 1] - late)
 
 
 def _cubic(j: int, z: int, numbers: int, column: int, memory: Array) -> float:
@@ -305,6 +314,7 @@ def _step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray
             memory[row + CELL, ORIGIN] = p.curves.nodes[first + cell] + pieces[at] * cycle
             for a in range(4):
                 memory[row + CELL, a] = p.curves.cubics[first + cell, a]
+                memory[row + ERROR, a] = p.errors[first + cell, a]
             continue
         law = p.places.law[k]
         cycle = p.laws.nodes[law, p.laws.cells[law]] - p.laws.nodes[law, 0]

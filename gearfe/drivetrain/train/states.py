@@ -100,7 +100,7 @@ def _contact_forces(
         for side in (1.0, -1.0)[: len(line.flanks)]:
             forces = next(flank_forces)
             out[:, i] += side * forces.force
-            apart[:, i] &= forces.force == 0.0
+            apart[:, i] &= forces.apart | (forces.force == 0.0)
             if line.sliding is not None and forces.drag is not None:
                 torque[:, i] += forces.drag.value @ np.array([line.sliding.arm, 1.0])
                 power[:, i] += forces.drag.power

@@ -151,9 +151,10 @@ def _approach(mesh: GearMesh, force: float, phase: Array, shifts: tuple[Array, A
             return None
         return _side(lambda x: acting.approach(x, abs(force), late(x)), phase, force, gap)
     curve = mesh.interpolant()
+    error = 0.0 if mesh.transmission_error is None else np.asarray(mesh.transmission_error(phase).value)
     if gap is None:  # a spring that acts both ways
-        return force / np.asarray(curve(phase).value)
-    return _side(lambda x: abs(force) / np.asarray(curve(x).value), phase, force, gap)
+        return error + force / np.asarray(curve(phase).value)
+    return error + _side(lambda x: abs(force) / np.asarray(curve(x).value), phase, force, gap)
 
 
 def _side(approach: Callable[[Array], Array], phase: Array, force: float, gap: float | None) -> Array:

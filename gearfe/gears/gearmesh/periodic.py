@@ -12,7 +12,7 @@ where both secants have the same sign, and 0 elsewhere: no overshoot between nod
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -74,6 +74,37 @@ class PeriodicInterpolant:
         c, x = self.cubics[cell], place - nodes[cell]
         c0, c1, c2, c3 = (c[..., i] for i in range(4))
         return ValueAndSlope(c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + x * 3.0 * c3))
+
+    def reversed(self) -> PeriodicInterpolant:
+        """The function ``-f(-phase)``."""
+        low, h = self.cubics, np.diff(self.nodes)[:, None] ** np.arange(4)
+        c0, c1, c2, c3 = (low * h).T  # of the part x/h of a cell; from its other end on: 1 - x/h
+        ends = np.stack([c0 + c1 + c2 + c3, -c1 - 2.0 * c2 - 3.0 * c3, c2 + 3.0 * c3, -c3], axis=1) / h
+        return PeriodicInterpolant(self.period, -self.nodes[::-1], -ends[::-1])
+
+    def on_nodes(self, nodes: Array) -> PeriodicInterpolant:
+        """The same function on rising nodes (n + 1,) over a period, which are those of this one and others."""
+        middle = 0.5 * (nodes[:-1] + nodes[1:])
+        turns = np.floor((middle - self.nodes[0]) / self.period) * self.period
+        cell = np.minimum(np.searchsorted(self.nodes[1:], middle - turns, side="right"), len(self.nodes) - 2)
+        c0, c1, c2, c3 = self.cubics[cell].T
+        x = nodes[:-1] - turns - self.nodes[cell]
+        moved = [c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + x * 3.0 * c3), c2 + 3.0 * x * c3, c3]
+        return PeriodicInterpolant(self.period, nodes, np.stack(moved, axis=1))
+
+
+def on_common_nodes(
+    one: PeriodicInterpolant, two: PeriodicInterpolant
+) -> tuple[PeriodicInterpolant, PeriodicInterpolant]:
+    """Two functions of one period on the nodes of both; the first, if it is flat, may have any period."""
+    if not one.cubics[:, 1:].any() and len(one.nodes) == 2:
+        one = replace(one, period=two.period, nodes=two.nodes[0] + np.array([0.0, two.period]))
+    start, period = one.nodes[0], one.period
+    every = start + np.mod(np.concatenate([one.nodes[:-1], two.nodes[:-1]]) - start, period)
+    nodes = np.sort(every)
+    nodes = nodes[np.append(True, np.diff(nodes) > 1e-9 * period)]
+    nodes = np.append(nodes[nodes < start + (1.0 - 1e-9) * period], start + period)
+    return one.on_nodes(nodes), two.on_nodes(nodes)
 
 
 class Curves(NamedTuple):
