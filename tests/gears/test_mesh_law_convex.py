@@ -138,7 +138,7 @@ def test_a_fitted_law_has_unique_pair_forces_whatever_it_is_made_from():
     found = PairForces(psi.ravel(), force.ravel(), np.ones(psi.size), approach.ravel())
     couple = Couple(np.linspace(-0.4, 0.4, 9), np.full(9, 5e-9))
     touch = TouchCurve(angle, 1e-4 * angle**2, 2e-4 * angle)
-    law = fit_law(found, touch, [couple], cells=12, hertz=3e-10, base_radii=(0.02, 0.03), reach=1e-5)
+    law = fit_law(found, touch, [couple], cells=12, hertz=3e-10, base_radii=(0.02, 0.03), reach=1e-5, force=1e3)
     cells = np.arange(12)
     for z in np.linspace(0.0, 1.0, 5)[:, None] * np.diff(law.nodes):
         for pair_force in np.array([0.0, 1.0, 30.0, 300.0, 999.0, 1500.0, 1e5]):

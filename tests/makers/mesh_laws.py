@@ -36,7 +36,7 @@ def hertzian_law(cycle: float = CYCLE, *, relief: float = 0.0, backlash: float =
     found = PairForces(psi.ravel(), force.ravel(), np.ones(psi.size), made.ravel())
     couple = Couple(np.linspace(-0.3, 0.1, 9), 5.4e-9 + 2e-10 * np.linspace(-1, 1, 9) ** 2)
     radii = (0.5 * 20 * 2.5e-3 * math.cos(math.radians(25)), 0.5 * 30 * 2.5e-3 * math.cos(math.radians(25)))
-    law = fit_law(found, touch, [couple], cells=cells, hertz=2.9e-10, base_radii=radii, reach=6e-5)
+    law = fit_law(found, touch, [couple], cells=cells, hertz=2.9e-10, base_radii=radii, reach=6e-5, force=8e3)
     return replace(law, backlash=backlash)
 
 

@@ -30,13 +30,14 @@ NOISE = 1e-9
 #: Least dLambda/dF, in parts of the least Lambda/F of contact solutions: b may be anything where none are near; and in
 #: parts of what makes J = diag(dLambda/dF) + C positive definite.
 LEAST_COMPLIANCE, DEFINITE = 0.7, 1.05
-#: Cells of the pair force end at these parts of the largest: Lambda's cubics err by 1e-4 of it in a cell of ratio 2.2,
-#: and by 1e-3 in those of small forces.
-PARTS = (0.0, 0.002, 0.01, 0.05, 0.2, 0.45, 1.0)
+#: Width of the cells of the pair force, in parts of the geometric mean of their ends: Hermite's cubic of B F ln F errs
+#: by B h^4/(192 F^3) in a cell of width h, which is then 1e-4 of Lambda. End of the first cell, in parts of the asked
+#: mesh force; and the part of it below which an error counts as of that, so that cells may be wider.
+FORCE_CELL, FIRST_CELL, SMALL_FORCE = 0.9, 0.0025, 0.1
 #: Data determine the coefficient of a cubic B-spline if they reach the node beside its middle, where it has this value.
 EDGE = 1.0 / 6.0
-#: Nodes of b over ln F; what is between the contact solutions' forces, more of them do not know.
-FORCE_NODES = 5
+#: Largest distance of nodes of b over ln F: closer ones would lie between the forces of contact solutions.
+FORCE_STEP = 1.6
 NANO = 1e-9
 
 
@@ -94,6 +95,7 @@ def fit_law(
     hertz: float,
     base_radii: tuple[float, float],
     reach: float,
+    force: float,
 ) -> MeshLaw:
     """Fit a law to pair forces, without backlash.
 
@@ -113,17 +115,19 @@ def fit_law(
         Of pinion and wheel (m).
     reach : float
         Approach beyond the first touch (m) up to which the law is known.
+    force : float
+        Mesh force (N) that the law is asked for: errors below a tenth of it count as of that.
     """
     y = np.log(found.force)
-    parts = np.array(PARTS) * found.force.max() * 1.02
+    parts = force_cells(1.02 * float(found.force.max()), force)
     ends = np.log(parts[[1, -1]])
-    knots = np.linspace(float(ends[0]), float(ends[1]), FORCE_NODES)
-    phase, force = _clamped(touch.angle), _clamped(knots)
+    knots = np.linspace(float(ends[0]), float(ends[1]), 1 + math.ceil(np.ptp(ends) / FORCE_STEP))
+    phase, log_force = _clamped(touch.angle), _clamped(knots)
     P = BSpline.design_matrix(found.angle, phase, 3).tocsr()
     tied = _level_beyond(P)
     P = P @ tied
     at = np.clip(y, *ends)
-    Y = [_columns(force, at, order) for order in (0, 1)]
+    Y = [_columns(log_force, at, order) for order in (0, 1)]
     middle, level = float(y.mean()), float(np.average(found.approach / found.force, weights=found.share))
     right = (found.approach / found.force - level + hertz * (y - middle)) / NANO
     A = _rows_kron(P, 2 * Y[0] + Y[1])
@@ -131,7 +135,7 @@ def fit_law(
     weight = sparse.diags_array(exact * np.minimum(1.0, found.share / SHARE))
     n, m = P.shape[1], Y[0].shape[1]
     cycle = touch.angle[cells] - touch.angle[0]
-    (whole, _, bent), (along, sloped, curved) = _grams(phase, cycle), _grams(force, 1.0)
+    (whole, _, bent), (along, sloped, curved) = _grams(phase, cycle), _grams(log_force, 1.0)
     penalty = (
         SMOOTH_PHASE**2 * sparse.kron(tied.T @ bent @ tied, along)
         + sparse.kron(tied.T @ whole @ tied, SMOOTH_FORCE**2 * curved + LEVEL_FORCE**2 * sloped)
@@ -142,7 +146,7 @@ def fit_law(
     b = tied @ b
     # Lambda and its slope at the forces between the cells: splines over the phase
     at = np.log(parts[1:])
-    values, slopes, bends = (_columns(force, at, order).T for order in (0, 1, 2))
+    values, slopes, bends = (_columns(log_force, at, order).T for order in (0, 1, 2))
     line = level - hertz * (at - middle)
     approach = (b @ (2 * values + slopes) + line) * parts[1:]
     slope = b @ (2 * values + 3 * slopes + bends) + line - hertz
@@ -163,6 +167,15 @@ def fit_law(
         backlash=0.0,
         reach=reach,
     )
+
+
+def force_cells(largest: float, force: float) -> Array:
+    """Pair forces (N) at which Lambda's cubics end, from 0 to the largest; `force` is the asked mesh force (N)."""
+    ends = [largest]
+    while ends[-1] > FIRST_CELL * force:
+        wider = max(1.0, 2.0 * SMALL_FORCE * force / ends[-1]) ** 0.25
+        ends.append(ends[-1] * math.exp(-2.0 * math.asinh(0.5 * FORCE_CELL * wider)))
+    return np.array([0.0, *reversed(ends)])
 
 
 def _level_beyond(P: sparse.csr_array) -> sparse.csr_array:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,22 +12,30 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.typing import Array, IntArray
 from ..contact.half_plane import HalfPlanePair, coupling_compliances, solve_half_plane
-from ..contact.position import Positions, joined
+from ..contact.position import Positions, joined, taken
 from ..geometry.first_contact import FirstContacts
 from .law import NO_CONTACT, MeshLaw
 from .law_fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
 
-#: Cells of the phase in a mesh cycle to begin with, and places in each (parts of its width) where contacts are solved.
+#: Initial cells of the phase in a mesh cycle, and places in each (parts of its width) of the solutions it is fitted to.
 CELLS, PLACES = 12, (0.25, 0.75)
-#: Approaches beyond the first touch, in parts of the largest: small ones show how a pair comes into contact.
+#: Their approaches beyond the first touch, in parts of the largest: small ones show how a pair comes into contact.
 DEPTHS = (0.0025, 0.008, 0.025, 0.06, 0.12, 0.2, 0.32, 0.5, 0.75, 1.0)
-#: Places and approaches at which the law is held against contacts: beside the nodes, where kinks are; between `DEPTHS`.
-HELD_PLACES, HELD_DEPTHS = (0.1, 0.9), (0.0015, 0.0045, 0.039, 0.155, 0.4, 0.87)
-#: It is held against contacts also where a further pair touches by these parts of the reach after the first one, found
-#: among so many samples of each cell.
-LATE, CHANGE_SAMPLES = (0.01, 0.1, 0.4, 0.9), 100
-#: Error of force and torque there from which on a cell is halved, in parts of them, or of this part of the largest
-#: where that is more: what contacts on elements of the default sizes err by (0.11 % in the shipped pair).
+#: Contact solutions in each cell that check the law, and rounds of them: in the later ones cells are checked again whose
+#: largest error is more than this part of the tolerance.
+CHECKS, CHECK_ROUNDS, DOUBTFUL = 18, 2, 0.5
+#: Least approach of checks, in parts of that of the asked force; the logarithm of the others falls to it by this power
+#: of an even distribution, as errors at less than a tenth of the asked force count less.
+LEAST_CHECK, DEEP = 0.0015, 1.5
+#: The points i (s, s^2) mod 1, 1/s the root of x^3 = x + 1, fill the unit square of place and approach evenly in any
+#: stretch of the sequence (M. Roberts, The unreasonable effectiveness of quasirandom sequences, 2018): checks of
+#: neighbouring cells differ, so that no error lies between the places and approaches of all of them.
+SPREAD = (0.7548776662466927, 0.5698402909980532)
+#: Further checks of this number at each angle where a further pair touches by these parts of the reach after the first
+#: one, found among so many samples of each cell.
+CHANGE_CHECKS, LATE, CHANGE_SAMPLES = 6, (0.01, 0.1, 0.4, 0.9), 100
+#: Relative error of force and torque in a check from which on its cell is halved: that of contacts on elements of the
+#: default sizes (0.11 % in the shipped pair). Forces below this part of the asked one count as that.
 TOLERANCE, LEAST_FORCE = 1e-3, 0.1
 #: Error of the first-contact curve's cubics (parts of the reach) from which on a cell is halved, a tenth of
 #: `TOLERANCE`, as forces of a tenth of the largest count; and how often: a few cells at the ends of the path need it.
@@ -37,7 +46,7 @@ TOUCH_PLACES = (0.25, 0.5, 0.75)
 HALVINGS = 3
 #: Least reach (m): what contact solutions are off by (`gearfe.gears.gearmesh.law_fit.NOISE`) is then 1 % of it.
 LEAST_REACH = 1e-7
-#: The law's tables go on to where pairs touch at this many times its reach, so that no pair bears at their ends.
+#: The law's tables go on to where pairs touch at this many times its reach, so that no pair is loaded at their ends.
 BEYOND = 1.1
 #: Pinion angles at which the approach is searched for that makes the largest force.
 ANGLES = 6
@@ -47,9 +56,9 @@ NEAR, SAME = 0.4, 0.02
 
 
 def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE) -> MeshLaw:
-    """Law of a pair for mesh forces up to `force` (N), its error from contact solutions that it was not made from.
+    """Fit a law for mesh forces up to `force` (N); its error is from contact solutions that it was not fitted to.
 
-    Cells of the phase where that is more than `tolerance` are halved; the solutions that showed it then count, too.
+    Cells of the phase where that is more than `tolerance` are halved, and fitted to the solutions that showed it, too.
 
     Raises
     ------
@@ -58,22 +67,32 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
     """
     geometry = pair.pair
     radius = geometry.wheel.base_radius
-    reach = max(_reach(pair, force), LEAST_REACH)
+    needed = _reach(pair, force)
+    reach = max(needed, LEAST_REACH)
     nodes, slots = _nodes(pair, reach)
     C = coupling_curve(pair, _phases(nodes, slots), reach)
     known: list[PairForces] = []
+    points = itertools.count(1)
 
-    def solve(angles: Array, depths: Sequence[float]) -> Positions:
-        """Contacts at pinion angles and at parts of the reach; their pair forces become known."""
-        met, first = _first_contacts(pair, angles)
-        twists = first[:, None] + reach * np.array(depths) / radius
-        solved = solve_half_plane(pair, np.repeat(angles, len(depths)), twists.ravel())
-        known.append(_pair_forces(pair, solved, met, C))
+    def solve(angles: Array, depths: Array) -> Positions:
+        """Contacts at pinion angles and parts of the reach; their pair forces are fitted from now on."""
+        different, index = np.unique(angles, return_inverse=True)
+        touches, first = _first_contacts(pair, different)
+        solved = solve_half_plane(pair, angles, first[index] + reach * depths / radius)
+        # pair forces of smaller approaches are those of their errors (`gearfe.gears.meshlaw.fit.NOISE`)
+        fitted = taken(solved.contacts, depths[solved.contacts.position] >= DEPTHS[0])
+        known.append(_pair_forces(pair, replace(solved, contacts=fitted), touches, C))
         return solved
 
+    def check(law: MeshLaw, angles: Array, parts: Array) -> Array:
+        """Relative errors at pinion angles, and at approaches from the least (0) to the reach (1)."""
+        depths = (LEAST_CHECK * needed / reach) ** ((1.0 - parts) ** DEEP)
+        return _errors(law, pair, solve(angles, depths), LEAST_FORCE * force)
+
     begin, width, error = nodes[:-1], np.diff(nodes), 0.0
-    for rest in range(HALVINGS, -1, -1):
-        solve(_places(begin, width, PLACES), DEPTHS)
+    for halvings_left in range(HALVINGS, -1, -1):
+        angles = _places(begin, width, PLACES)
+        solve(np.repeat(angles, len(DEPTHS)), np.tile(np.array(DEPTHS), len(angles)))
         law = fit_law(
             joined(known),
             touch_curve(pair, _phases(nodes, slots)),
@@ -82,24 +101,34 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
             hertz=0.5 * pair.compliance / pair.width,
             base_radii=(geometry.pinion.base_radius, radius),
             reach=reach,
+            force=force,
         )
         order = np.argsort(begin)
-        begin, width = begin[order], width[order]
-        changes = _changes(law)
-        cell = np.searchsorted(begin, changes, side="right") - 1
-        inside = (cell >= 0) & (changes < (begin + width)[cell])
-        held = np.concatenate([_places(begin, width, HELD_PLACES), changes[inside]])
-        cell = np.concatenate([np.repeat(np.arange(len(begin)), len(HELD_PLACES)), cell[inside]])
-        misses = _misses(law, pair, solve(held, HELD_DEPTHS), LEAST_FORCE * force)
-        off = np.zeros(len(begin))
-        np.maximum.at(off, np.repeat(cell, len(HELD_DEPTHS)), misses)
-        coarse = (off > tolerance) & (rest > 0)
-        error = max(error, float(off[~coarse].max(initial=0.0)))
+        begin, width, largest = begin[order], width[order], np.zeros(len(begin))
+        changes = np.repeat(_changes(law), CHANGE_CHECKS)
+        cells = np.searchsorted(begin, changes, side="right") - 1
+        inside = (cells >= 0) & (changes < (begin + width)[cells])
+        _, parts = _spread(points, len(changes))
+        np.maximum.at(largest, cells[inside], check(law, changes[inside], parts[inside]))
+        doubtful = np.ones(len(begin), dtype=bool)
+        for _ in range(CHECK_ROUNDS):
+            cells = np.repeat(np.flatnonzero(doubtful), CHECKS)
+            places, parts = _spread(points, len(cells))
+            np.maximum.at(largest, cells, check(law, begin[cells] + places * width[cells], parts))
+            coarse = (largest > tolerance) & (halvings_left > 0)
+            doubtful = (largest > DOUBTFUL * tolerance) & ~coarse
+        error = max(error, float(largest[~coarse].max(initial=0.0)))
         if not coarse.any():
             break
         begin, width = np.append(begin[coarse], begin[coarse] + 0.5 * width[coarse]), np.tile(0.5 * width[coarse], 2)
         nodes = np.union1d(nodes, begin)
     return replace(law, backlash=geometry.normal_backlash, error=error)
+
+
+def _spread(points: Iterator[int], count: int) -> Array:
+    """The next points of the sequence of `SPREAD`, shape (2, count), from 0 to 1."""
+    numbers = np.fromiter(itertools.islice(points, count), dtype=float, count=count)
+    return np.multiply.outer(SPREAD, numbers) % 1.0
 
 
 def _places(begin: Array, width: Array, parts: Sequence[float] | Array) -> Array:
@@ -123,16 +152,16 @@ def _changes(law: MeshLaw) -> Array:
     return np.unique(np.concatenate(changes))
 
 
-def _misses(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) -> Array:
-    """Error of force, or of the driver's torque, in parts of contact solutions, or of a least force (N)."""
+def _errors(law: MeshLaw, pair: HalfPlanePair, solved: Positions, least: float) -> Array:
+    """Larger relative error of force and driver's torque in contact solutions; forces count as `least` (N) or more."""
     r1, r2 = law.base_radii
-    found = law(solved.pinion_angle, r2 * (solved.twist - pair.pair.contact_twist))
+    forces = law(solved.pinion_angle, r2 * (solved.twist - pair.pair.contact_twist))
     force = solved.torque_wheel / r2
     moment = solved.torque_pinion - r1 * force
-    off = np.maximum(np.abs(found.force - force), np.abs(found.moment - moment) / r1)
-    # a force that was not found is an infinite error: NaN would pass every comparison
-    missed = np.where(np.isnan(found.force), math.inf, off / np.maximum(force, least))
-    return np.where(np.isfinite(force), missed, 0.0)  # some contacts are not solved, as of flanks with short waves
+    error = np.maximum(np.abs(forces.force - force), np.abs(forces.moment - moment) / r1) / np.maximum(force, least)
+    # a force that the law lacks is an infinite error: NaN would pass every comparison
+    error = np.where(np.isnan(forces.force), math.inf, error)
+    return np.where(np.isfinite(force), error, 0.0)  # some contacts are not solved, as of flanks with short waves
 
 
 def _pair_forces(pair: HalfPlanePair, solved: Positions, met: FirstContacts, coupling: Sequence[Couple]) -> PairForces:
