@@ -21,7 +21,7 @@ from .law_fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
 CELLS, PLACES = 12, (0.25, 0.75)
 #: Their approaches beyond the first touch, in parts of the largest: small ones show how a pair comes into contact.
 DEPTHS = (0.0025, 0.008, 0.025, 0.06, 0.12, 0.2, 0.32, 0.5, 0.75, 1.0)
-#: Contact solutions in each cell that check the law, and rounds of them: in the later ones cells are checked again whose
+#: Contact solutions in each cell that check the law, and rounds of them: the later ones check cells again whose
 #: largest error is more than this part of the tolerance.
 CHECKS, CHECK_ROUNDS, DOUBTFUL = 18, 2, 0.5
 #: Least approach of checks, in parts of that of the asked force; the logarithm of the others falls to it by this power
