@@ -17,7 +17,8 @@ import numpy as np
 
 from gearfe.gears.contact.half_plane import half_plane_pair, solve_half_plane
 from gearfe.gears.gearmesh.job import read_stiffness_job
-from gearfe.gears.gearmesh.law_make import LEAST_FORCE, mesh_law
+from gearfe.gears.gearmesh.law_fit import LEAST_FORCE
+from gearfe.gears.gearmesh.law_make import mesh_law
 
 from .campaign import Campaign, Case, Columns
 from .outcome import Check, Finding, Outcome

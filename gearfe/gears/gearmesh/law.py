@@ -14,7 +14,7 @@ pair's complementary energy and C the compliance of the gear bodies that pairs s
     t(\psi_k) + \Lambda(\psi_k, F_k) + \sum_{l \ne k} C_{|k-l|} F_l = \delta,\qquad
     \Lambda = \partial\Phi/\partial F
 
-for the pairs that bear, and the derivatives of W need none of :math:`F_k`:
+for the loaded pairs, and the derivatives of W need none of :math:`F_k`:
 
 .. math::
     F = \frac{\partial W}{\partial\delta} = \sum_k F_k,\qquad
@@ -114,7 +114,7 @@ class MeshLaw:
     reach
         Approach beyond the first contact (m) up to which the law is known.
     error
-        Estimate of the relative error of its forces; not-a-number where there is none.
+        Estimate of the relative error of its forces; NaN where there is none.
     back
         Law of the back flanks, of the pair seen from behind; None: they are the mirror image of the driving ones.
     """

@@ -1,9 +1,9 @@
-r"""A mesh law from pair forces: what each tooth pair yields, by linear least squares.
+r"""Fit a mesh law to forces of tooth pairs by linear least squares.
 
 The pair law is :math:`\Lambda/F = 2b + b_y + a_0 - B\,(y - y_0)` with :math:`y = \ln F`, b a tensor of cubic splines
 over :math:`(\psi, y)`: so :math:`\Phi = F^2 [b + a_0/2 + B/4 - B(y - y_0)/2]` is its energy. :math:`B = 1/(\pi E^* w)`
 is Hertz's line contact, which makes b smooth where a pair comes into contact and where it leaves. Each contact solution
-gives :math:`\Lambda = \delta - t(\psi_k) - \sum_l C F_l` for the pairs that bear in it.
+gives :math:`\Lambda = \delta - t(\psi_k) - \sum_l C F_l` for its loaded pairs.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LEAST_COMPLIANCE, DEFINITE = 0.7, 1.05
 #: Width of the cells of the pair force, in parts of the geometric mean of their ends: Hermite's cubic of B F ln F errs
 #: by B h^4/(192 F^3) in a cell of width h, which is then 1e-4 of Lambda. End of the first cell, in parts of the asked
 #: mesh force; and the part of it below which an error counts as of that, so that cells may be wider.
-FORCE_CELL, FIRST_CELL, SMALL_FORCE = 0.9, 0.0025, 0.1
+FORCE_CELL, FIRST_CELL, LEAST_FORCE = 0.9, 0.0025, 0.1
 #: Data determine the coefficient of a cubic B-spline if they reach the node beside its middle, where it has this value.
 EDGE = 1.0 / 6.0
 #: Largest distance of nodes of b over ln F: closer ones would lie between the forces of contact solutions.
@@ -132,7 +132,9 @@ def fit_law(
     right = (found.approach / found.force - level + hertz * (y - middle)) / NANO
     A = _rows_kron(P, 2 * Y[0] + Y[1])
     exact = found.approach**2 / (found.approach**2 + NOISE**2)
-    weight = sparse.diags_array(exact * np.minimum(1.0, found.share / SHARE))
+    # an error of Lambda/F is one of the force where that is not small
+    small = np.minimum(1.0, found.force / (LEAST_FORCE * force))
+    weight = sparse.diags_array(exact * small * np.minimum(1.0, found.share / SHARE))
     n, m = P.shape[1], Y[0].shape[1]
     cycle = touch.angle[cells] - touch.angle[0]
     (whole, _, bent), (along, sloped, curved) = _grams(phase, cycle), _grams(log_force, 1.0)
@@ -173,7 +175,7 @@ def force_cells(largest: float, force: float) -> Array:
     """Pair forces (N) at which Lambda's cubics end, from 0 to the largest; `force` is the asked mesh force (N)."""
     ends = [largest]
     while ends[-1] > FIRST_CELL * force:
-        wider = max(1.0, 2.0 * SMALL_FORCE * force / ends[-1]) ** 0.25
+        wider = max(1.0, 2.0 * LEAST_FORCE * force / ends[-1]) ** 0.25
         ends.append(ends[-1] * math.exp(-2.0 * math.asinh(0.5 * FORCE_CELL * wider)))
     return np.array([0.0, *reversed(ends)])
 

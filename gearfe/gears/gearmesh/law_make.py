@@ -15,15 +15,15 @@ from ..contact.half_plane import HalfPlanePair, coupling_compliances, solve_half
 from ..contact.position import Positions, joined, taken
 from ..geometry.first_contact import FirstContacts
 from .law import NO_CONTACT, MeshLaw
-from .law_fit import Couple, PairForces, TouchCurve, fit_law, touch_cubics
+from .law_fit import LEAST_FORCE, Couple, PairForces, TouchCurve, fit_law, touch_cubics
 
 #: Initial cells of the phase in a mesh cycle, and places in each (parts of its width) of the solutions it is fitted to.
 CELLS, PLACES = 12, (0.25, 0.75)
 #: Their approaches beyond the first touch, in parts of the largest: small ones show how a pair comes into contact.
 DEPTHS = (0.0025, 0.008, 0.025, 0.06, 0.12, 0.2, 0.32, 0.5, 0.75, 1.0)
 #: Contact solutions in each cell that check the law, and rounds of them: the later ones check cells again whose
-#: largest error is more than this part of the tolerance.
-CHECKS, CHECK_ROUNDS, DOUBTFUL = 18, 2, 0.5
+#: largest error is more than this part of the tolerance. Rounds for all cells of the final law.
+CHECKS, CHECK_ROUNDS, DOUBTFUL, FINAL_ROUNDS = 18, 2, 0.5, 1
 #: Least approach of checks, in parts of that of the asked force; the logarithm of the others falls to it by this power
 #: of an even distribution, as errors at less than a tenth of the asked force count less.
 LEAST_CHECK, DEEP = 0.0015, 1.5
@@ -35,8 +35,8 @@ SPREAD = (0.7548776662466927, 0.5698402909980532)
 #: one, found among so many samples of each cell.
 CHANGE_CHECKS, LATE, CHANGE_SAMPLES = 6, (0.01, 0.1, 0.4, 0.9), 100
 #: Relative error of force and torque in a check from which on its cell is halved: that of contacts on elements of the
-#: default sizes (0.11 % in the shipped pair). Forces below this part of the asked one count as that.
-TOLERANCE, LEAST_FORCE = 1e-3, 0.1
+#: default sizes (0.11 % in the shipped pair).
+TOLERANCE = 1e-3
 #: Error of the first-contact curve's cubics (parts of the reach) from which on a cell is halved, a tenth of
 #: `TOLERANCE`, as forces of a tenth of the largest count; and how often: a few cells at the ends of the path need it.
 CLOSE, TOUCH_HALVINGS = 1e-4, 8
@@ -79,7 +79,7 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
         different, index = np.unique(angles, return_inverse=True)
         touches, first = _first_contacts(pair, different)
         solved = solve_half_plane(pair, angles, first[index] + reach * depths / radius)
-        # pair forces of smaller approaches are those of their errors (`gearfe.gears.meshlaw.fit.NOISE`)
+        # pair forces of smaller approaches are those of their errors (`gearfe.gears.gearmesh.law_fit.NOISE`)
         fitted = taken(solved.contacts, depths[solved.contacts.position] >= DEPTHS[0])
         known.append(_pair_forces(pair, replace(solved, contacts=fitted), touches, C))
         return solved
@@ -88,6 +88,11 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
         """Relative errors at pinion angles, and at approaches from the least (0) to the reach (1)."""
         depths = (LEAST_CHECK * needed / reach) ** ((1.0 - parts) ** DEEP)
         return _errors(law, pair, solve(angles, depths), LEAST_FORCE * force)
+
+    def check_cells(law: MeshLaw, begin: Array, width: Array) -> Array:
+        """Relative errors at `CHECKS` further places of each cell, cell by cell."""
+        places, parts = _spread(points, CHECKS * len(begin))
+        return check(law, np.repeat(begin, CHECKS) + places * np.repeat(width, CHECKS), parts)
 
     begin, width, error = nodes[:-1], np.diff(nodes), 0.0
     for halvings_left in range(HALVINGS, -1, -1):
@@ -112,9 +117,8 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
         np.maximum.at(largest, cells[inside], check(law, changes[inside], parts[inside]))
         doubtful = np.ones(len(begin), dtype=bool)
         for _ in range(CHECK_ROUNDS):
-            cells = np.repeat(np.flatnonzero(doubtful), CHECKS)
-            places, parts = _spread(points, len(cells))
-            np.maximum.at(largest, cells, check(law, begin[cells] + places * width[cells], parts))
+            cells = np.flatnonzero(doubtful)
+            np.maximum.at(largest, np.repeat(cells, CHECKS), check_cells(law, begin[cells], width[cells]))
             coarse = (largest > tolerance) & (halvings_left > 0)
             doubtful = (largest > DOUBTFUL * tolerance) & ~coarse
         error = max(error, float(largest[~coarse].max(initial=0.0)))
@@ -122,6 +126,9 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
             break
         begin, width = np.append(begin[coarse], begin[coarse] + 0.5 * width[coarse]), np.tile(0.5 * width[coarse], 2)
         nodes = np.union1d(nodes, begin)
+    # the checks that accepted a cell are the lucky ones: others see the final law
+    for _ in range(FINAL_ROUNDS):
+        error = max(error, float(check_cells(law, nodes[:-1], np.diff(nodes)).max()))
     return replace(law, backlash=geometry.normal_backlash, error=error)
 
 
