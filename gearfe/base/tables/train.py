@@ -247,6 +247,12 @@ class TrainLoadTable:
     torque_Nm: float | TrainFunctionTable = quantity(  # noqa: RUF009
         doc="torque about +y on the shaft (N m), or a function of time"
     )
+    orders: tuple[tuple[float, float, float], ...] = quantity(
+        (), doc="sines beside it that follow the speed: list of [order, amplitude (N m), phase (deg)]"
+    )
+    mesh: str = quantity(
+        "", doc="mesh of the orders, as driver-driven: order 1 is its mesh frequency; left out: the turns of the shaft"
+    )
     ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from 0 to the torque (ms)")
     ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant torque")
 

@@ -189,6 +189,8 @@ def _rigid_train(job: TrainJob) -> GearTrain:
             x.shaft,
             None if x.attachment is None else str(x.attachment),
             _over_time(job, x.torque_Nm, x.ramp_centre_ms, x.ramp_width_ms, f"train.loads[{i}].torque_Nm"),
+            tuple((order, amplitude, math.radians(phase)) for order, amplitude, phase in x.orders),
+            x.mesh,
         )
         for i, x in enumerate(t.loads)
     )

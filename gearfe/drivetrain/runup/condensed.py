@@ -104,8 +104,11 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     turns = [turns for turns, _ in phases]
     flanks = model.forces.flanks
     reads = [_directions(f) for f in flanks]
-    swinging = [(direction, wave) for direction, function in model.forces.torques for wave in function.sines]
-    used = sorted({*(x for four in reads for x in four if x >= 0), *(direction for direction, _ in swinging)})
+    fixed = len(model.torques) - len(model.orders)
+    per_turn = [0.0] * fixed + [float(cycles) for cycles in model.orders]
+    waves = zip(model.forces.torques, per_turn, strict=True)
+    swinging = [(direction, wave, cycles) for (direction, torque), cycles in waves for wave in torque.sines]
+    used = sorted({*(x for four in reads for x in four if x >= 0), *(direction for direction, *_ in swinging)})
     freedoms = np.array([[used.index(x) if x >= 0 else -1 for x in four] for four in reads])
     to_modes = modal.T.T @ model.directions
     ends = ((d, float(replace(f, sines=())(model.torque_end))) for d, f in model.torques)
@@ -126,7 +129,7 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     orders = np.array([[int(c * t) * (i in at) for t, at in phases] for i, c in enumerate(rolled.cycles)])
     of_flank = np.array([np.where(orders[mesh_of[i]] > 0, [float(t) for t in turns], 0.0) for i in range(len(flanks))])
     whole = np.array([float(t) for t in turns])
-    torques = [SwingingTorque(used.index(direction), *wave, whole) for direction, wave in swinging]
+    torques = [SwingingTorque(used.index(direction), *wave, whole, cycles) for direction, wave, cycles in swinging]
     forces = MeshForces(flanks, freedoms, sense * of_flank, rubbing, torques)
     scale = _scale(model, linear, freedoms, flanks, [torque.freedom for torque in torques])
     limit = DIVERGED * min(line.module for line in model.meshes) / float(scale[freedoms[:, 0]].max())
@@ -189,18 +192,19 @@ def _with_torques(
     model: TrainModel, phases: list[tuple[Fraction, list[int]]], speeds: Sequence[float]
 ) -> list[tuple[Fraction, list[int]]]:
     """Phases whose periods hold whole cycles of the torques that oscillate, at as many of the speeds as can be."""
-    cycles = model.kinematics.cycles
-    for omega in {wave[1] for _, function in model.torques for wave in function.sines}:
-        for speed in speeds:
-            for number, (turns, meshes) in enumerate(phases):
-                part = Fraction(omega / abs(speed) * float(turns)).limit_denominator(LONGEST)
-                longer = turns * part.denominator
-                near = abs(omega / abs(speed) * float(turns) - float(part)) <= WHOLE * float(part)
-                fastest_mesh = longer * max(cycles[i] for i in meshes)
-                most = LONGEST if (1 / longer).denominator == 1 else SHARED
-                if part > 0 and near and fastest_mesh <= most:
-                    phases = [*phases[:number], (longer, meshes), *phases[number + 1 :]]
-                    break
+    cycles, fixed = model.kinematics.cycles, len(model.torques) - len(model.orders)
+    omegas = {wave[1] for _, function in model.torques[:fixed] for wave in function.sines}
+    in_turn = [float(order) for order in model.orders] + [omega / abs(speed) for omega in omegas for speed in speeds]
+    for each in in_turn:
+        for number, (turns, meshes) in enumerate(phases):
+            part = Fraction(each * float(turns)).limit_denominator(LONGEST)
+            longer = turns * part.denominator
+            near = abs(each * float(turns) - float(part)) <= WHOLE * float(part)
+            fastest_mesh = longer * max(cycles[i] for i in meshes)
+            most = LONGEST if (1 / longer).denominator == 1 else SHARED
+            if part > 0 and near and fastest_mesh <= most:
+                phases = [*phases[:number], (longer, meshes), *phases[number + 1 :]]
+                break
     return phases
 
 
@@ -208,7 +212,7 @@ def unmatched(train: CondensedTrain, speed: float) -> str:
     """Why no motion repeats at a speed (rad/s) under torques that oscillate, or nothing."""
     for torque in train.forces.torques:
         if torque.waves(speed) is None:
-            hertz = torque.omega / (2.0 * math.pi)
+            hertz = torque.at_speed(speed) / (2.0 * math.pi)
             meshes = float(train.model.kinematics.cycles[0]) * abs(speed) / (2.0 * math.pi)
             said = f"a torque oscillates with {hertz:.9g} Hz, {hertz / meshes:.9g} times the frequency of mesh 1"
             return (

@@ -66,6 +66,8 @@ class SwingingTorque:
         N m, rad/s, rad.
     turns : (n,)
         Turns of the drive in a period of each phase.
+    per_turn
+        Cycles in a turn of the drive of one that follows the speed, which counts instead of omega; else 0.
     """
 
     freedom: int
@@ -73,10 +75,15 @@ class SwingingTorque:
     omega: float
     phase: float
     turns: Array
+    per_turn: float = 0.0
+
+    def at_speed(self, speed: float) -> float:
+        """Angular frequency (rad/s) at a speed of the drive (rad/s)."""
+        return self.per_turn * abs(speed) if self.per_turn else self.omega
 
     def waves(self, speed: float) -> IntArray | None:
         """Cycles in a period of each phase at a speed of the drive (rad/s), (n,); None where none has whole ones."""
-        cycles = self.omega / abs(speed) * self.turns
+        cycles = self.at_speed(speed) / abs(speed) * self.turns
         whole = np.round(cycles)
         found = np.flatnonzero((np.abs(cycles - whole) <= WHOLE * cycles) & (whole > 0.0))
         return None if not len(found) else np.asarray(whole * (np.arange(len(cycles)) == found[0]), dtype=np.int64)

@@ -125,7 +125,7 @@ def steady_state(
     if reason:
         raise InputError("speed", float(speed), f"has no periodic motion: {reason}", "look at it with gearfe vibration")
     with one_thread():
-        highest = _highest(train, band_hz)
+        highest = _highest(train, band_hz, speed)
         if guess is None:
             made = first_motion(train.system, float(speed), tolerance=tolerance, highest=highest)
         else:
@@ -166,10 +166,11 @@ def run_up(
     train = condense(model, speeds=given.tolist())
     made = _Curves([], [], [])
     lost: list[float] = []
-    options: dict[str, Any] = {"tolerance": tolerance, "highest": _highest(train, band_hz)}
+    options: dict[str, Any] = {"tolerance": tolerance, "highest": _highest(train, band_hz, float(np.abs(given).max()))}
     with one_thread():
         begin = 0
-        if train.forces.torques:  # of a fixed frequency: each speed is by itself
+        unmatched_orders = any(unmatched(train, float(speed)) for speed in given)
+        if unmatched_orders or not all(torque.per_turn for torque in train.forces.torques):  # each speed by itself
             lost += _one_by_one(train, given, made, options)
             begin = len(given)
         while begin < len(given):
@@ -204,9 +205,9 @@ def run_up(
     return RunUp(train, given, states, turning, _bifurcations(states, made.turns), tuple(notes), tolerance, band_hz)
 
 
-def _highest(train: CondensedTrain, band_hz: float) -> float:
+def _highest(train: CondensedTrain, band_hz: float, speed: float) -> float:
     """Angular frequency (rad/s) that harmonics reach at least: that of the band, and twice those of torques."""
-    return max(2.0 * math.pi * band_hz, *(2.0 * torque.omega for torque in train.forces.torques), 0.0)
+    return max(2.0 * math.pi * band_hz, *(2.0 * torque.at_speed(speed) for torque in train.forces.torques), 0.0)
 
 
 def _one_by_one(train: CondensedTrain, speeds: Array, made: _Curves, options: dict[str, Any]) -> list[float]:
@@ -227,7 +228,9 @@ def _one_by_one(train: CondensedTrain, speeds: Array, made: _Curves, options: di
             made.orbits.append((orbit, 0))
     if refused:
         many = f"at {len(refused)} of {len(speeds)} speeds no motion was sought: at {refused[0][0]:.9g} rad/s "
-        made.notes.append(many + refused[0][1] + "; look at it with gearfe vibration")
+        made.notes.append(
+            many + refused[0][1] + "; look at it with gearfe vibration, or write orders, which follow the speed"
+        )
     return lost
 
 

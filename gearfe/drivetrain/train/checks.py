@@ -128,8 +128,30 @@ def _check_ends(train: GearTrain) -> None:
             if part.bore not in shafts[part.shaft].bores:
                 problem = f"attachment {part.bore!r} does not carry shaft {part.shaft!r}"
                 raise InputError(label, part.bore, problem, f"choose one of {', '.join(shafts[part.shaft].bores)}")
+    for load in train.loads:
+        _check_orders(train, load)
     if not train.meshes and len(train.shafts) > 1:
         raise InputError("train.meshes", None, "no gear is driven: the train has no mesh", "add a mesh")
+
+
+def _check_orders(train: GearTrain, load: Load) -> None:
+    """The orders of a load are positive, of a mesh that exists, under a drive of one speed."""
+    label = f"load on {load.shaft!r} orders"
+    if not load.orders:
+        if load.mesh:
+            raise InputError(f"load on {load.shaft!r} mesh", load.mesh, "is of orders", "add orders, or leave it out")
+        return
+    if load.mesh:
+        _known(label, "mesh", load.mesh, [mesh.name for mesh in train.meshes])
+    for order, amplitude, phase in load.orders:
+        if not (0.0 < order < math.inf and math.isfinite(amplitude) and math.isfinite(phase)):
+            problem = "must be [order > 0, amplitude, phase], all finite"
+            raise InputError(label, [order, amplitude, math.degrees(phase)], problem, "correct it")
+    speed = train.driven.speed
+    if speed.breaks or speed.sines:
+        problem = "follow a drive of constant speed only"
+        cure = "leave the ramp of the drive out, or write torque_Nm as an expression of time"
+        raise InputError(label, None, problem, cure)
 
 
 def _check_on_shaft(train: GearTrain, item: ShaftGear) -> None:

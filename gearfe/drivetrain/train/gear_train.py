@@ -207,11 +207,26 @@ class Drive:
 
 @dataclass(frozen=True)
 class Load:
-    """Torque on a shaft (N m), and its reaction on a bore; `bore` None: it reacts outside of the train."""
+    """Torque on a shaft (N m), and its reaction on a bore; `bore` None: it reacts outside of the train.
+
+    Parameters
+    ----------
+    shaft, bore
+        Names.
+    torque
+        Over time.
+    orders
+        Sines ``amplitude sin(order angle + phase)`` beside it: order, amplitude (N m), phase (rad).
+    mesh
+        Mesh of the orders, whose angle grows by 2 pi a pitch from where a driver's tooth stands on the line of centres;
+        empty: the angle is that by which the shaft has turned.
+    """
 
     shaft: str
     bore: str | None
     torque: TimeFunction
+    orders: tuple[tuple[float, float, float], ...] = ()
+    mesh: str = ""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
@@ -20,14 +21,18 @@ from ...base.typing import Array, IntArray
 from ...fem.reduction.modal_body import ModalBody
 from ...multibody import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
 from ...multibody.core.elimination import ModalCoordinates, modal_coordinates
+from ...multibody.series.timefunctions import sine
 from .bearings import BearingLoads, bearing_loads, bore_motion
 from .checks import check_train
 from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge, rotor
 from .forces import Gyro, TrainForces, derivative
-from .gear_train import Drive, GearTrain
+from .gear_train import Drive, GearTrain, Load
 from .kinematics import Kinematics, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
 from .program import train_series
+
+#: Orders of loads are whole multiples of one over a whole number up to this.
+MOST_DENOMINATOR = 1000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +52,10 @@ class TrainModel(Facts):
     meshes
         The record of each mesh.
     torques
-        Pairs (direction in the system, torque over time): loads, and the shafts' inertia under a changing drive.
+        Pairs (direction in the system, torque over time): loads, and the shafts' inertia under a changing drive. Last
+        come the orders of loads.
+    orders
+        Cycles of each of these orders in a turn of the drive.
     forces, directions
         All that is not constant, and its directions, (system size, directions).
     first : (shafts,)
@@ -69,6 +77,7 @@ class TrainModel(Facts):
     housing: ModalBlocks | None
     meshes: tuple[MeshLine, ...]
     torques: tuple[tuple[Array, TimeFunction], ...]
+    orders: tuple[Fraction, ...]
     forces: TrainForces
     directions: Array
     first: IntArray
@@ -177,7 +186,8 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
     size = sum(b.size for b in bodies)
     placed = Shafts(shafts, first, tuple(ratios), size)
     lines = lines or mesh_lines(train, placed)
-    torques = _torques(train, placed, angle)
+    orders = _orders(train, placed)
+    torques = _torques(train, placed, angle) + tuple(order[:2] for order in orders)
     forces, directions = _forces(train, lines, torques, angle, placed)
     series = train_series(forces)
     changing = LocalForce(
@@ -196,6 +206,7 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
         housing=housing,
         meshes=lines,
         torques=torques,
+        orders=tuple(cycles for *_, cycles in orders),
         forces=forces,
         directions=directions,
         first=first,
@@ -214,13 +225,35 @@ def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tup
             direction = np.zeros(size)
             direction[first[i] + 5] = 1.0
             made.append((direction, -ratio * shaft.rotor.polar * change))
-    for load in train.loads:
-        direction = np.zeros(size)
-        direction[first[train.shaft_number(load.shaft)] + 5] = 1.0
-        if train.housing is not None and load.bore is not None:
-            direction[: train.housing.size] -= bore_selector(train, load.bore)[:, 3:] @ train.frame[2]
-        made.append((direction, load.torque))
+    made += [(_acts(train, load, shafts), load.torque) for load in train.loads]
     return tuple(made)
+
+
+def _acts(train: GearTrain, load: Load, shafts: Shafts) -> Array:
+    """Direction in the system of a torque and its reaction."""
+    direction = np.zeros(shafts.size)
+    direction[shafts.first[train.shaft_number(load.shaft)] + 5] = 1.0
+    if train.housing is not None and load.bore is not None:
+        direction[: train.housing.size] -= bore_selector(train, load.bore)[:, 3:] @ train.frame[2]
+    return direction
+
+
+def _orders(train: GearTrain, shafts: Shafts) -> list[tuple[Array, TimeFunction, Fraction]]:
+    """Directions of the orders of loads, their torques over time, and cycles in a turn of the drive."""
+    found, rolled = [], train.kinematics
+    speed = abs(float(train.driven.speed(0.0)))
+    for load in train.loads:
+        direction = _acts(train, load, shafts)
+        for order, amplitude, phase in load.orders:
+            cycles, start = Fraction(order).limit_denominator(MOST_DENOMINATOR), phase
+            if load.mesh:
+                number = next(i for i, mesh in enumerate(train.meshes) if mesh.name == load.mesh)
+                teeth = train.gear(train.meshes[number].driver).gear.teeth
+                cycles, start = cycles * rolled.cycles[number], phase + order * teeth * rolled.phases[number]
+            else:
+                cycles *= abs(rolled.ratios[train.shaft_number(load.shaft)])
+            found.append((direction, sine(amplitude, float(cycles) * speed, start), cycles))
+    return found
 
 
 def _forces(
