@@ -201,9 +201,9 @@ def value_of(node: Node, values: Mapping[Quantity, Any], label: str = "") -> Any
         case "quantity":
             return _plain(values[node.value])
         case "member":
-            return _below(*parts, node.value, label)
+            return _below(parts[0], node.value, label)
         case "item":
-            return _item(*parts, label)
+            return _item(parts[0], parts[1], label)
     if node.kind in _LOGIC:
         return _LOGIC[node.kind](*(np.asarray(part) for part in parts))
     function = _function(node)

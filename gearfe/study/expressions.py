@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError, unknown_name
-from ..base.expressions import Names, Node, compute, parse, quantities, without_value
+from ..base.expressions import Names, Node, Quantity, compute, parse, quantities, without_value
 
 #: Names of outputs: columns of the job's main table, ``table.column`` for the others, ``summary.key.key``.
 COLUMNS = Names(plain=None, what="an output")
@@ -71,7 +71,7 @@ def value_of(output: Output, answer: Answer) -> float:
     for name, _ in sorted(quantities(output.node)):
         if name not in known:
             raise unknown_name(label, name, known)
-    values = {(name, None): value for name, value in known.items()}
+    values: dict[Quantity, Any] = {(name, None): value for name, value in known.items()}
     try:
         result = compute(output.node, values, label)
         number = np.asarray(np.nan if result is None else result, dtype=float)

@@ -389,7 +389,8 @@ class _Written:
         try:
             gear = self._gear(side, shift)
             if gears is not None:
-                GearPair(**{**gears, side: gear}, centre_distance=distance)
+                both = {**gears, side: gear}
+                GearPair(both["pinion"], both["wheel"], centre_distance=distance)
         except InputError:
             return False
         return True

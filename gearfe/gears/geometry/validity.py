@@ -144,8 +144,8 @@ def _check_ratio(pair: MeshGeometry) -> None:
         name = "pinion" if pair.pinion.tip_round >= pair.wheel.tip_round else "wheel"
         gear = getattr(pair, name)
         problem, cure = f"leaves a contact ratio of {rounded:.4g} < 1", "use a smaller tip round"
-        limit = _largest_round(gear, gear.profile.round_roll + (1.0 - rounded) * pair.base_pitch)
-        raise InputError(f"{name}.tip_round", gear.tip_round, problem, cure, limit)
+        largest = _largest_round(gear, gear.profile.round_roll + (1.0 - rounded) * pair.base_pitch)
+        raise InputError(f"{name}.tip_round", gear.tip_round, problem, cure, largest)
     cuts = {name: lost for name, lost in _lost_to_form_points(pair).items() if lost > 0.0}
     name = max(cuts, key=cuts.__getitem__)
     gear = getattr(pair, name)

@@ -103,7 +103,8 @@ def read_shapes(path: Path, field: str) -> Shapes:
         For files that cannot be read, and damaged data sets.
     """
     sets = _data_sets(read_bytes(path, field), path.name, field)
-    length, nodes, modes = 1.0, {}, []
+    length, modes = 1.0, []
+    nodes: dict[int, Array] = {}
     for one in sets:
         try:
             if one.number == 164:
