@@ -125,7 +125,7 @@ def least_jacobian(points: Array, triangles: Array) -> Array:
     r"""Smallest :math:`\det \partial x/\partial \xi` of each triangle, in twice its straight area (-).
 
     It is looked at on a lattice with seven places along each edge. Where it is not positive, the element is inside out
-    there; a triangle without area has not-a-number or infinity.
+    there; a triangle without area has NaN or infinity.
 
     Parameters
     ----------

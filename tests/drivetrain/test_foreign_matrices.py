@@ -160,7 +160,7 @@ def test_lost_and_damaged_rows(form, kind, matrices, tmp_path) -> None:
         ("%%MatrixMarket matrix coordinate real symmetric\n2 2 3\n1 1 1.\n2 2 1.\n", "has 2 entries, .* says 3"),
         (
             "%%MatrixMarket matrix coordinate real symmetric\n2 2 3\n1 1 1.\n2 1 1.\n1 2 1.\n",
-            "mirror image stands twice",
+            "mirror image is given twice",
         ),
         ("%%MatrixMarket matrix coordinate real general\n2 2 1\n3 1 1.\n", r"there is no entry \(3, 1\)"),
         ("%%MatrixMarket matrix array real general\n2 2\n1.\n2.\n3.\n4.\n5.\n6.\n", "has 6 numbers, .* asks for 4"),

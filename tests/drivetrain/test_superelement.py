@@ -150,7 +150,7 @@ def test_units_and_abaqus_matrix_input(unit, force, length, bodies, tmp_path) ->
         ("", {"stiffness": "none.mtx"}, "there is no such file"),
         ("", {"stiffness": "text.mtx"}, "neither Matrix Market nor matrices of Abaqus nor DMIG: line 1 is 'hello'"),
         ("", {"stiffness": "cut.mtx"}, "has 1 numbers, its size line asks for 9"),
-        ("", {"attachments": [{"point_mm": [0, 0, 0], "node": 3}]}, "is not told by Matrix Market files"),
+        ("", {"attachments": [{"point_mm": [0, 0, 0], "node": 3}]}, "Matrix Market files name no nodes"),
     ],
 )
 def test_mistakes(change, keys, told, bodies, tmp_path) -> None:

@@ -429,7 +429,7 @@ def test_fields_beside_their_columns(plain, tmp_path) -> None:
     text = bulk(nodes - [0, 0, 100], tets, system + "+            100.      0.    100.\n", "7")
     mesh = read(tmp_path, text, "a.bdf")
     np.testing.assert_allclose(mesh.nodes[mesh.tets], nodes[tets], atol=1e-9)
-    assert "line 3 of a.bdf: the fields stand beside their columns" in mesh.notes[0]
+    assert "line 3 of a.bdf: the fields are off their columns" in mesh.notes[0]
 
 
 ENTRIES = {

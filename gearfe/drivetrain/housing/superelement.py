@@ -28,7 +28,7 @@ SYMMETRIC, NO_ENERGY, SAME_MASS = 1e-6, 1e-7, 1e-3
 #: Part of the largest square of a period below which a coordinate has no mass.
 MASSLESS = 1e-12
 #: Bounds on the root of rotational over translational stiffness, a length, in parts of the span of the attachments; a
-#: unit of mm in place of m makes a thousand.
+#: unit of mm instead of m makes a thousand.
 LENGTHS = (1 / 300, 100.0)
 #: Numbers that no stiffness or mass has in any unit.
 TINY, HUGE = 1e-30, 1e30
@@ -68,7 +68,7 @@ def superelement(table: SuperelementTable, folder: str | Path) -> ModalBody:
     bound = np.concatenate(rows)
     twice = np.flatnonzero(np.bincount(bound) > 1)
     if len(twice):
-        problem = f"row {int(twice[0]) + 1} belongs to two attachments, or stands twice in one"
+        problem = f"row {int(twice[0]) + 1} belongs to two attachments, or is twice in one"
         raise InputError(f"{field}.attachments", None, problem, "each coordinate is one row")
     order = np.concatenate([bound, np.setdiff1d(np.arange(len(K.values)), bound)])
     # one energy in J: lengths in m, forces in N, angles in rad; internal coordinates may have any unit
@@ -144,7 +144,9 @@ def _rows(one: AttachmentTable, i: int, matrix: Matrix, field: str) -> IntArray:
     where, count = f"{field}.attachments[{i}]", len(matrix.values)
     if one.node is not None:
         if not matrix.labels:
-            raise InputError(f"{where}.node", one.node, "is not told by Matrix Market files", "give rows")
+            raise InputError(
+                f"{where}.node", one.node, "cannot be used: Matrix Market files name no nodes", "give rows"
+            )
         try:
             return np.array([matrix.labels.index((one.node, freedom)) for freedom in range(1, 7)])
         except ValueError:

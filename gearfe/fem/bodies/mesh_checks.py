@@ -51,7 +51,7 @@ def checked_mesh(nodes: object, tets: object) -> CheckedMesh:
         raise InputError("tets", value, f"node numbers must lie in 0..{len(points) - 1}", "they count from 0")
     if not np.all(np.isfinite(points)):
         bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        raise InputError("nodes", bad, "this node has a coordinate that is not a finite number", "mend it")
+        raise InputError("nodes", bad, "this node has a coordinate that is not a finite number", "correct it")
     notes = []
     original, renumbered = np.unique(cells, return_inverse=True)
     cells = renumbered.reshape(cells.shape).astype(np.int64)

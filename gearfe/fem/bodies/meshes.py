@@ -56,7 +56,7 @@ class Tetrahedra:
         return assemble(self.nodes, self.cells, material)
 
     def surface(self, without: list[IntArray], outer: Outer | None = None) -> Surface:
-        """Surface but for faces that lie wholly within one of the sets of nodes, or are not `outer`."""
+        """Surface without faces that lie wholly within one of the sets of nodes, or are not `outer`."""
         faces = boundary_faces(self.cells)
         faces = faces[_chosen(self.nodes, faces, faces[:, :3], without, outer)]
         return Surface(faces, normal_velocity(triangle_functions(faces.shape[1]), self.nodes, faces))
@@ -117,7 +117,7 @@ class Prisms:
         return assemble_prisms(*self.extrusion, material)
 
     def surface(self, without: list[IntArray], outer: Outer | None = None) -> Surface:
-        """Surface but for faces that lie wholly within one of the sets of nodes, or are not `outer`."""
+        """Surface without faces that lie wholly within one of the sets of nodes, or are not `outer`."""
         mesh, levels, ends, sides = self.extrusion, len(self.extrusion.levels), [], []
         none = np.zeros_like(mesh.solid[:1])
         tops = mesh.solid & ~np.concatenate([mesh.solid[1:], none])

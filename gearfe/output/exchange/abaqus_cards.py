@@ -15,7 +15,7 @@ from ...base.errors import InputError
 from .included import Inclusion, Line
 
 _INCLUDE = re.compile(r"\*\s*INCLUDE\s*,", re.IGNORECASE)
-#: Cards whose data may stand in a file of its own; files of other cards, such as loads, do not matter.
+#: Cards whose data may be in a file of its own; files of other cards, such as loads, do not matter.
 FROM_FILES = ("INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")
 _FROM_FILES = re.compile(rf"\*\s*({'|'.join(FROM_FILES)})\s*,", re.IGNORECASE)
 _INPUT = re.compile(r",\s*INPUT\s*=\s*(\"[^\"]*\"|[^,]*)", re.IGNORECASE)

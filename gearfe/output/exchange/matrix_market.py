@@ -1,7 +1,7 @@
 """Matrices in Matrix Market format (Boisvert, Pozo & Remington, NISTIR 5935, 1996).
 
 Read here because SciPy's compiled reader writes beyond its memory where a file of the kind ``array`` holds more numbers
-than its size line says, and adds entries up that stand twice.
+than its size line says, and adds up entries that are given twice.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def read_market(text: str, path: Path, field: str) -> Array:
                 if not (0 <= i < rows and 0 <= j < columns):
                     raise ValueError(f"there is no entry ({row}, {column})")
                 if given[i, j] or (symmetry == "symmetric" and given[j, i]):
-                    raise ValueError(f"the entry ({row}, {column}) or its mirror image stands twice")
+                    raise ValueError(f"the entry ({row}, {column}) or its mirror image is given twice")
                 given[i, j], values[i, j] = True, float(value)
     except InputError:
         raise

@@ -52,7 +52,7 @@ REFUSED = {
 }
 CARDS = ("GRID", "GRDSET", *SYSTEMS, *KINDS, *REFUSED)
 
-#: Columns of a field, and columns by which its content may stand beside it.
+#: Columns of a field, and columns by which its content may be off.
 _WIDTH, _BESIDE = 8, 2
 _BEGIN = re.compile(r"\s*BEGIN(\s|$)", re.IGNORECASE)
 
@@ -90,7 +90,7 @@ def read_bulk_mesh(path: Path, field: str) -> SourceMesh:
             raise
     mesh = _mesh_of(aligned, path, field)
     more = f" and {len(moved) - 1} more lines" if len(moved) > 1 else ""
-    return mesh._replace(notes=(f"{moved[0]}{more}: the fields stand beside their columns; they were put into them",))
+    return mesh._replace(notes=(f"{moved[0]}{more}: the fields are off their columns; they were moved into them",))
 
 
 def _aligned(line: Line) -> Line:

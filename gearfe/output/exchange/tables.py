@@ -46,7 +46,7 @@ def read_csv(path: str | Path) -> dict[str, Array]:
     with Path(path).open(encoding="utf-8-sig", newline="") as stream:
         rows = list(csv.reader(stream))
     if not rows or any(len(row) != len(rows[0]) for row in rows):
-        raise InputError("table", str(path), "must have a header and rows of its length", "write it anew")
+        raise InputError("table", str(path), "must have a header and rows of its length", "write it again")
     columns: dict[str, Array] = {}
     for name, values in zip(
         rows[0], zip(*rows[1:], strict=True) if len(rows) > 1 else [()] * len(rows[0]), strict=True
