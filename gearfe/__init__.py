@@ -13,13 +13,16 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from typing import Any
 
     from .base.errors import InputError
+    from .drivetrain.gearbox.mesh_stiffness import compute_meshes
     from .drivetrain.housing.build import housing_from_job
     from .drivetrain.housing.model import Housing
     from .drivetrain.runup.run_up import run_up, steady_state
-    from .drivetrain.train import GearTrain, TrainModel, TrainResponse, build_train
+    from .drivetrain.train import TrainModel, TrainResponse, build_train
+    from .drivetrain.train.gear_train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
     from .drivetrain.train.simulate import simulate
     from .fem.plane import Material
     from .fem.reduction.modal_body import ModalBody
+    from .gears.contact.laws import PairModel
     from .gears.gearmesh.check import StiffnessCheck, check_positions
     from .gears.gearmesh.curve import StiffnessCurve
     from .gears.gearmesh.load_map import LoadMap
@@ -30,20 +33,29 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
 
 #: Public name -> module that defines it.
 _PUBLIC: dict[str, str] = {
+    "Bearing": "drivetrain.train",
+    "Damping": "drivetrain.train",
+    "Drive": "drivetrain.train",
     "Gear": "gears.geometry",
+    "GearMesh": "drivetrain.train",
     "GearPair": "gears.geometry",
     "Housing": "drivetrain.housing.model",
     "InputError": "base.errors",
+    "Load": "drivetrain.train",
     "LoadMap": "gears.gearmesh.load_map",
     "Material": "fem.plane",
     "ModalBody": "fem.reduction.modal_body",
+    "PairModel": "gears.contact.laws",
     "Search": "study.search",
+    "Shaft": "drivetrain.train",
+    "ShaftGear": "drivetrain.train",
     "StiffnessCheck": "gears.gearmesh.check",
     "StiffnessCurve": "gears.gearmesh.curve",
     "TrainModel": "drivetrain.train",
     "TrainResponse": "drivetrain.train",
     "GearTrain": "drivetrain.train",
     "build_train": "drivetrain.train",
+    "compute_meshes": "drivetrain.gearbox.mesh_stiffness",
     "check_positions": "gears.gearmesh.check",
     "housing_from_job": "drivetrain.housing.build",
     "read_study": "study.job",
@@ -57,15 +69,23 @@ _PUBLIC: dict[str, str] = {
 
 # written out for type checkers; a test holds it against the names above
 __all__ = [
+    "Bearing",
+    "Damping",
+    "Drive",
     "Gear",
+    "GearMesh",
     "GearPair",
     "GearTrain",
     "Housing",
     "InputError",
+    "Load",
     "LoadMap",
     "Material",
     "ModalBody",
+    "PairModel",
     "Search",
+    "Shaft",
+    "ShaftGear",
     "StiffnessCheck",
     "StiffnessCurve",
     "TrainModel",
@@ -73,6 +93,7 @@ __all__ = [
     "__version__",
     "build_train",
     "check_positions",
+    "compute_meshes",
     "housing_from_job",
     "read_study",
     "run_study",

@@ -44,6 +44,8 @@ class Task:
         Name -> expression.
     also
         Parameter -> names of further keys that take its value.
+    mesh
+        Mesh of the job, where it has several.
     """
 
     kind: str
@@ -53,6 +55,7 @@ class Task:
     names: tuple[str, ...]
     outputs: Mapping[str, str]
     also: Mapping[str, Sequence[str]]
+    mesh: str | None = None
 
     def tables(self, values: Sequence[Any]) -> dict[str, Any]:
         """Tables of the job with these values."""
@@ -86,7 +89,7 @@ def evaluate(task: Task, values: Sequence[Any], shared: Shared) -> tuple[dict[st
     InputError
         What the job's command would refuse, and outputs that the job does not give.
     """
-    answer = solve(task.kind, task.tables(values), task.path, shared, estimate=task.estimate)
+    answer = solve(task.kind, task.tables(values), task.path, shared, estimate=task.estimate, mesh=task.mesh)
     return {name: value_of(output, answer) for name, output in task.expressions().items()}, answer
 
 

@@ -26,7 +26,7 @@ from .statistics import StudyResult
 #: A study whose first cases, so many, all have no answer is stopped.
 HOPELESS = 50
 #: Tables of a job that cases share much work in: those that agree in them run one after the other.
-COSTLY = ("pair", "stiffness", "housing")
+COSTLY = ("pair", "gears", "meshes", "materials", "stiffness", "housing")
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def read_study(path: str | Path) -> Study:
     parameters, cases = study_cases(table, path.parent, tables)
     names = tuple(one.name for one in parameters)
     also = {one.name: one.also for one in parameters}
-    task = Task(table.job, base, tables, table.estimate, names, table.outputs, also)
+    task = Task(table.job, base, tables, table.estimate, names, table.outputs, also, table.mesh)
     task.expressions()
     for case in cases[:1]:
         task.tables(case)
@@ -212,7 +212,8 @@ def run_study(
 
 def _order(study: Study) -> Sequence[int]:
     """Numbers of the cases, those that share work one after the other."""
-    costly = [i for i, name in enumerate(study.task.names) if name.split(".")[0] in COSTLY]
+    names = [name.split(".") for name in study.task.names]
+    costly = [i for i, parts in enumerate(names) if parts[0] in COSTLY and "microgeometry" not in parts]
     if not costly:
         return range(len(study.cases))
     return sorted(range(len(study.cases)), key=lambda n: [repr(study.cases[n][i]) for i in costly])

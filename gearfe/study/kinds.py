@@ -45,7 +45,9 @@ class Shared:
         return self._made[name]
 
 
-def solve(kind: str, raw: Raw, path: Path, shared: Shared, *, estimate: bool = False) -> Answer:
+def solve(
+    kind: str, raw: Raw, path: Path, shared: Shared, *, estimate: bool = False, mesh: str | None = None
+) -> Answer:
     """Tables and summary of one case.
 
     Parameters
@@ -60,30 +62,34 @@ def solve(kind: str, raw: Raw, path: Path, shared: Shared, *, estimate: bool = F
         What cases share.
     estimate
         With the error estimates of the job.
+    mesh
+        Name of the mesh, of a job that computes one and has several.
 
     Raises
     ------
     InputError
         What the job's command would refuse.
     """
+    if kind in _OF_MESHES:
+        return _OF_MESHES[kind](raw, path, shared, estimate, mesh)
     return _KINDS[kind](raw, path, shared, estimate)
 
 
-def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool) -> Answer:
+def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool, mesh: str | None) -> Answer:
     from ..gears.gearmesh.report import summary
     from ..gears.gearmesh.sweep import sweep_stiffness
 
-    job = _only_mesh(raw, path)
+    job = _only_mesh(raw, path, mesh)
     sweep, elastic = job.sweep, job.elastic(_kept(job, shared))
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=estimate, **sweep)
     return Answer({"stiffness": curve.columns()}, summary(job, curve, {}), _positions(curve.failed))
 
 
-def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool) -> Answer:
+def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool, mesh: str | None) -> Answer:
     from ..gears.gearmesh.job import job_map
     from ..gears.gearmesh.report import map_summary, map_tables
 
-    job = _only_mesh(raw, path)
+    job = _only_mesh(raw, path, mesh)
     table = job.mesh.loads
     load_map = job_map(job, table, keep=_kept(job, shared))
     return Answer(map_tables(load_map), map_summary(job, table, load_map, {}), _positions(load_map.failed))
@@ -144,11 +150,11 @@ def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
     return Answer(made.tables(), summarise(mechanism, made.start, made.results, tolerance, {}, error), made.problem)
 
 
-def _only_mesh(raw: Raw, path: Path) -> Any:
+def _only_mesh(raw: Raw, path: Path, mesh: str | None) -> Any:
     from ..base.tables.jobs import only_mesh
     from ..gears.gearmesh.job import stiffness_job
 
-    return stiffness_job(only_mesh(raw, path, raw.get("study", {}).get("mesh")), path.parent)
+    return stiffness_job(only_mesh(raw, path, mesh), path.parent)
 
 
 def _kept(job: Any, shared: Shared) -> Keep:
@@ -163,9 +169,11 @@ def _positions(failed: Any) -> str:
     return f"{count} of {np.size(failed)} positions failed" if count else ""
 
 
-_KINDS: dict[str, Callable[[Raw, Path, Shared, bool], Answer]] = {
+_OF_MESHES: dict[str, Callable[[Raw, Path, Shared, bool, str | None], Answer]] = {
     "stiffness": _stiffness,
     "loadmap": _loadmap,
+}
+_KINDS: dict[str, Callable[[Raw, Path, Shared, bool], Answer]] = {
     "vibration": _vibration,
     "runup": _runup,
     "mechanism": _mechanism,

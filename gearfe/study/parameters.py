@@ -14,23 +14,24 @@ import numpy as np
 
 from ..base.config import build, check_size, type_hints
 from ..base.errors import InputError, given, unknown_name
-from ..base.tables.jobs import TABLES, table_class
+from ..base.tables.gearbox import NamedGear
+from ..base.tables.jobs import OF_GEARS, TABLES, gearbox_of, table_class
 from ..base.tables.mechanism import MechanismFile
-from ..base.tables.pair import PairTable
+from ..base.tables.named import NAMED
 from ..base.tables.study import DistributionTable
 from ..base.typing import Array
-from ..gears.geometry.pair import GearPair
+from ..gears.geometry.pair import gear_of
 from ..gears.geometry.pitch_errors import tolerances
 
 _KEYS = {field.name for field in dataclasses.fields(DistributionTable)}
 WHERE = "study.parameters"
 #: Whole numbers are exact as floats up to this size.
 WHOLE = 2.0**53
-_OF_TRAINS = ("pair", "stiffness", "microgeometry", "housing", "train")
+_OF_TRAINS = (*OF_GEARS, "stiffness", "housing", "train")
 #: Kind of job -> the tables that decide it.
 READ = {
-    "stiffness": ("pair", "stiffness", "microgeometry"),
-    "loadmap": ("pair", "stiffness", "microgeometry", "loadmap"),
+    "stiffness": (*OF_GEARS, "stiffness"),
+    "loadmap": (*OF_GEARS, "stiffness", "loadmap"),
     "vibration": (*_OF_TRAINS, "spectrum"),
     "runup": (*_OF_TRAINS, "runup"),
 }
@@ -175,13 +176,20 @@ def _of_class(found: DistributionTable, class_: int, name: str, base: Mapping[st
     """Normal, three deviations to the tolerance f_HaT of the profile slope, and cut off there."""
 
     parts = name.split(".")
-    if parts[-1] != "slope_um" or parts[1] not in ("pinion", "wheel"):
+    named = _gear_named(parts, base) if parts[-1] == "slope_um" else None
+    if named is None:
         cure = "use it for slope_um; pitch errors of a class: pitch_class, and vary pitch_seed"
         raise InputError(f"{WHERE}.{name}.iso_class", class_, "has no tolerance for this key", cure)
-    pair = GearPair.from_table(build(PairTable, base.get("pair", {}), "pair"))
-    allowed = 1e6 * tolerances(getattr(pair, parts[1]), class_).slope
+    allowed = 1e6 * tolerances(gear_of(named), class_).slope
     mean = found.mean or 0.0
     return DistributionTable(mean=mean, deviation=allowed / 3.0, low=mean - allowed, high=mean + allowed)
+
+
+def _gear_named(parts: Sequence[str], base: Mapping[str, Any]) -> NamedGear | None:
+    """The gear that a key of a microgeometry is of: [microgeometry.pinion] or [gears.NAME.microgeometry]."""
+    if parts[0] == "microgeometry" or parts[2:3] == ["microgeometry"]:
+        return gearbox_of(dict(base), "the base job").gears.get(parts[1])
+    return None
 
 
 def _flat(given: Mapping[str, Any], above: str) -> dict[str, Any]:
@@ -224,12 +232,14 @@ def key_hint(kind: str, name: str, base: Mapping[str, Any]) -> Any:
     if kind == "mechanism":
         hint = MechanismFile
     else:
-        if parts[0] in TABLES and parts[0] not in READ[kind]:
+        if parts[0] in (*TABLES, *NAMED) and parts[0] not in READ[kind]:
             problem = f"is no table that a {kind} job reads: it would change nothing"
             raise InputError(where, parts[0], problem, "vary keys of " + ", ".join(READ[kind]))
         if parts[0] not in READ[kind]:
             raise unknown_name(where, parts[0], READ[kind])
         hint, where, rest = table_class(parts[0]), f"{where}.{parts[0]}", parts[1:]
+        if parts[0] in NAMED:
+            hint = dict[str, hint]
         if not rest:
             raise InputError(where, None, "is a table, not a key", "name a key in it")
     there: Any = base if rest is parts else base.get(parts[0])

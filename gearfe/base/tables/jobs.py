@@ -133,6 +133,8 @@ def table_class(name: str) -> type:
 
 #: Tables that say what gears and meshes there are.
 OF_GEARS = ("pair", "microgeometry", *NAMED)
+#: How a command, a study and Python name a mesh.
+NAME_ONE = 'name one: --mesh NAME; in [study] mesh = "NAME"'
 #: Tables of a gear train's job, beside [train].
 OF_TRAINS = (*OF_GEARS, "stiffness", "housing", "spectrum")
 
@@ -209,7 +211,7 @@ def only_mesh(raw: dict[str, Any], path: str | Path, name: str | None = None) ->
     meshes = meshes_of(raw, path, name)
     if len(meshes) > 1:
         names = ", ".join(mesh.name for mesh in meshes)
-        raise InputError("mesh", None, f"is not named, and the file has several: {names}", "name one (--mesh NAME)")
+        raise InputError("mesh", None, f"is not named, and the file has several: {names}", NAME_ONE)
     return meshes[0]
 
 

@@ -76,6 +76,7 @@ class StudyTable:
     base: str | None = quantity(
         None, doc="job file that is varied, beside this one; left out: this file, whose other tables are the job"
     )
+    mesh: str | None = quantity(None, doc="mesh of a stiffness or loadmap job that has several, by its name")
     design: str = quantity(
         "latin_hypercube",
         choices=DESIGNS,
@@ -105,6 +106,9 @@ class StudyTable:
 
     def check(self, where: str) -> None:
         """Rules that join several keys."""
+        if self.mesh is not None and self.job not in ("stiffness", "loadmap"):
+            problem = f"stands beside job = {self.job!r}, which has all meshes"
+            raise InputError(f"{where}.mesh", self.mesh, problem, "leave it out")
         if not self.outputs:
             raise InputError(f"{where}.outputs", None, "is empty", "name at least one output")
         for name in self.outputs:

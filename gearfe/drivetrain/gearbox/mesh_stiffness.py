@@ -13,7 +13,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.progress import stage
 from ...base.tables.train import MEAN, POTENTIAL
-from ...gears.contact.laws import HalfPlane, check_alike, check_deviations
+from ...gears.contact.laws import HalfPlane, PairModel, check_alike, check_deviations
 from ...gears.gearmesh.curve import NO_CYCLE, StiffnessCurve
 from ...gears.gearmesh.job import StiffnessJob, cached_curve
 from ...gears.gearmesh.law import MeshLaw
@@ -22,7 +22,7 @@ from ...gears.gearmesh.mesh_table import read_mesh_table
 from ...gears.geometry.deviation_job import deviations_of
 from ...gears.geometry.face import NOMINAL, ToothDeviations
 from ...gears.geometry.pair import GearPair, gear_pair
-from ..train.gear_train import GearTrain
+from ..train.gear_train import GearMesh, GearTrain
 from .job import Stiffness, TrainJob, back_flanks, job_train
 
 if TYPE_CHECKING:
@@ -78,6 +78,38 @@ def train_curves(
             constant = job.table.model_of(mesh) == MEAN
             found.append(curve.interpolant("k_mesh", method="cubic").mean if constant else curve)
     return tuple(found)
+
+
+def compute_meshes(train: GearTrain) -> GearTrain:
+    """Return a train with the mesh law of each mesh that has a model, for `ROOM` times its force in steady running.
+
+    Meshes of equal gears with equal models share the law of the largest force. Laws are kept on disk.
+
+    Raises
+    ------
+    InputError
+        For gears that cannot run together, a mesh that carries no load in steady running, and forces that are too
+        large for linear elasticity.
+    """
+    steady = np.abs(train.kinematics.steady_forces)
+
+    def contact(mesh: GearMesh) -> tuple[Any, ...]:
+        return train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance, mesh.stiffness
+
+    laws: dict[str, MeshLaw] = {}
+    for mesh in train.meshes:
+        model = mesh.stiffness
+        if isinstance(model, PairModel):
+            most = ROOM * max(
+                f for f, other in zip(steady, train.meshes, strict=True) if contact(other) == contact(mesh)
+            )
+            if not most > 0.0:
+                problem = "carries no torque in steady running, so the range of its mesh law is unknown"
+                raise InputError(f"mesh {mesh.name!r}", None, problem, "add a load to the train")
+            with stage(mesh.name):
+                laws[mesh.name] = cached_law(gear_pair(*contact(mesh)[:3]), model, float(most))
+    meshes = (replace(mesh, stiffness=laws.get(mesh.name, mesh.stiffness)) for mesh in train.meshes)
+    return replace(train, meshes=tuple(meshes))
 
 
 def _read_curve(path: Path, teeth: int) -> StiffnessCurve:

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ...base.errors import InputError, unknown_name
+from ...gears.contact.laws import PairModel
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant
@@ -242,6 +243,8 @@ def _check_error(mesh: GearMesh, teeth: int) -> None:
 def check_curve(mesh: GearMesh, teeth: int, wheel: Gear) -> None:
     """Check that the curve of a mesh covers one cycle of its driver with positive values, and is that of its wheel."""
     label, curve = f"mesh {mesh.name!r} stiffness", mesh.stiffness
+    if isinstance(curve, PairModel):
+        raise InputError(label, None, "is a model that is not computed yet", "call gearfe.compute_meshes(train) first")
     _check_error(mesh, teeth)
     if mesh.backlash is not None and not (math.isfinite(mesh.backlash) and mesh.backlash >= 0.0):
         problem = "must be finite and >= 0 m: less is a wedged mesh, whose flanks all bear without a load"

@@ -15,6 +15,7 @@ from ...base.errors import InputError
 from ...base.shown import Facts
 from ...base.typing import Array
 from ...fem.reduction.modal_body import ModalBody
+from ...gears.contact.laws import PairModel
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant
@@ -100,7 +101,8 @@ class GearMesh:
     driver, driven
         Names of gears.
     stiffness
-        A mesh law, a curve over the driver's rotation, its interpolant (N/m over rad), a constant (N/m), or None for
+        A mesh law, a curve over the driver's rotation, its interpolant (N/m over rad), a constant (N/m), the model from
+        which `gearfe.compute_meshes` computes the law (materials of driver and driven gear, element sizes), or None for
         the ideal rigid mesh: a constraint whose multiplier is the contact force.
     phase
         Angle of the driver (rad), counted in its driving sense, at which it starts; 0: a driver's tooth stands on the
@@ -129,7 +131,7 @@ class GearMesh:
 
     driver: str
     driven: str
-    stiffness: MeshLaw | StiffnessCurve | PeriodicInterpolant | float | None
+    stiffness: MeshLaw | StiffnessCurve | PeriodicInterpolant | PairModel | float | None
     phase: float | None = None
     damping: float = 0.0
     interpolation: str = "cubic"

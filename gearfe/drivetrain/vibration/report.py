@@ -197,7 +197,7 @@ def stiffness_ranges(train: GearTrain) -> dict[str, tuple[float | None, float | 
             tangent = given(angles, given.approach(angles, force)).tangent
             found[mesh.name] = (float(tangent.min()), float(tangent.max()))
         else:
-            values = given.k_mesh if isinstance(given, StiffnessCurve) else given.values
+            values = given.k_mesh if isinstance(given, StiffnessCurve) else mesh.interpolant().values
             found[mesh.name] = (float(np.nanmin(values)), float(np.nanmax(values)))
     return found
 
