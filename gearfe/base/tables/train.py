@@ -251,7 +251,8 @@ class TrainLoadTable:
         (), doc="sines beside it that follow the speed: list of [order, amplitude (N m), phase (deg)]"
     )
     mesh: str = quantity(
-        "", doc="mesh of the orders, as driver-driven: order 1 is its mesh frequency; left out: the turns of the shaft"
+        "",
+        doc="name of the mesh of the orders (or driver-driven): order 1 is its frequency; left out: turns of the shaft",
     )
     ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from 0 to the torque (ms)")
     ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant torque")
