@@ -8,11 +8,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from ...base.errors import InputError, unknown_name
-from ...gears.contact.laws import PairModel
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.gear_data import rounding
+from ...gears.geometry.mesh_geometry import ContactModel
 from ...gears.geometry.pair import Gear, gear_pair, in_keys
 from .friction import check_friction
 from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
@@ -243,7 +243,7 @@ def _check_error(mesh: GearMesh, teeth: int) -> None:
 def check_curve(mesh: GearMesh, teeth: int, wheel: Gear) -> None:
     """Check that the curve of a mesh covers one cycle of its driver with positive values, and is that of its wheel."""
     label, curve = f"mesh {mesh.name!r} stiffness", mesh.stiffness
-    if isinstance(curve, PairModel):
+    if isinstance(curve, ContactModel):
         raise InputError(label, None, "is a model that is not computed yet", "call gearfe.compute_meshes(train) first")
     _check_error(mesh, teeth)
     if mesh.backlash is not None and not (math.isfinite(mesh.backlash) and mesh.backlash >= 0.0):

@@ -15,10 +15,10 @@ from ...base.errors import InputError
 from ...base.shown import Facts
 from ...base.typing import Array
 from ...fem.reduction.modal_body import ModalBody
-from ...gears.contact.laws import PairModel
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant
+from ...gears.geometry.mesh_geometry import ContactModel
 from ...gears.geometry.pair import Gear, MeshGeometry
 from ...multibody.series.timefunctions import TimeFunction
 from .friction import Lubrication
@@ -131,7 +131,7 @@ class GearMesh:
 
     driver: str
     driven: str
-    stiffness: MeshLaw | StiffnessCurve | PeriodicInterpolant | PairModel | float | None
+    stiffness: MeshLaw | StiffnessCurve | PeriodicInterpolant | ContactModel | float | None
     phase: float | None = None
     damping: float = 0.0
     interpolation: str = "cubic"

@@ -41,6 +41,7 @@ from ...base.typing import Array, BoolArray
 from ...fem.plane import Material, Plane
 from ..geometry.derived import mesh_stiffness
 from ..geometry.face import NOMINAL, ToothDeviations
+from ..geometry.mesh_geometry import ContactModel
 from ..geometry.pair import GearPair
 from ..geometry.validity import MOST_YIELD
 
@@ -227,7 +228,7 @@ HALF_PLANE_FLANK, HALF_PLANE_COARSEST = 4.0, 6.0
 
 
 @dataclass(frozen=True)
-class PairModel:
+class PairModel(ContactModel):
     """Model of a pair: what `gearfe.gears.gearmesh.sweep.elastic_pair` makes of its gears.
 
     Parameters

@@ -21,6 +21,10 @@ from .curves import inv, inverse_inv
 from .spur_gear import Gear
 
 
+class ContactModel:
+    """What a pair of gears is computed with: a base of classes that need finite elements, without these."""
+
+
 @dataclass(frozen=True)
 class PathPoint:
     """A point of the path of contact: roll lengths (m) on both gears and the pinion angle (rad) for tooth 0."""
