@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from gearfe.gears.gearmesh.sweep import sweep_stiffness
 from gearfe.gears.geometry.deviation_job import deviations_of
 from gearfe.gears.geometry.pair import GearPair, pair_of
 from tests.makers.gearboxes import GEARS, MESHES, SPEED, TORQUE, pair_text, text
+from tests.places import DOCS
 
 Z = {name: row[0] for name, row in GEARS.items()}
 
@@ -259,3 +261,23 @@ def test_the_gearbox_itself_is_read(path: Path) -> None:
     tables = read_train_tables(path)
     assert list(tables["gearbox"].meshes) == list(MESHES)
     assert set(job_tables(tomllib.loads(text()), "box.toml", ("gears",))) == {"gears"}
+
+
+def test_the_page_has_the_gearbox_of_these_tests(tmp_path: Path) -> None:
+    """Its job is read, and its speeds, torques and distances are those that it states."""
+    page = (DOCS / "gearbox.md").read_text(encoding="utf-8")
+    (job,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "box.toml").write_text(job)
+    train = job_train(read_train_job(tmp_path / "box.toml"), (1e8, 1e8, 1e8))
+    check_train(train)
+    stated = re.search(r"Speeds ([-\d., ]+) rad/s", page)
+    assert stated is not None
+    speeds = [float(word) for word in stated[1].split(", ")]
+    assert [100.0 * float(ratio) for ratio in train.kinematics.ratios] == pytest.approx(speeds, abs=0.005)
+    torques = [
+        abs(float(force)) * train.gear(mesh.driven).gear.base_radius
+        for mesh, force in zip(train.meshes, train.kinematics.steady_forces, strict=True)
+    ]
+    assert torques == pytest.approx([26.57, 35.17, 60.0], abs=0.005)
+    assert "26.57 N m in `in`" in page
+    assert "35.17 N m in `through`" in page
