@@ -13,15 +13,16 @@ import pytest
 
 from gearfe.base.errors import InputError
 from gearfe.base.tables.jobs import job_tables, meshes_of, read_train_tables
+from gearfe.base.tables.text import toml_document
 from gearfe.drivetrain.gearbox.job import job_train, read_train_job
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.train.checks import check_train
-from gearfe.gears.gearmesh.job import read_stiffness_job
+from gearfe.gears.gearmesh.job import read_stiffness_job, stiffness_job
 from gearfe.gears.gearmesh.sweep import sweep_stiffness
 from gearfe.gears.geometry.deviation_job import deviations_of
 from gearfe.gears.geometry.pair import GearPair, pair_of
 from tests.makers.gearboxes import GEARS, MESHES, SPEED, TORQUE, pair_text, text
-from tests.places import DOCS
+from tests.places import DOCS, GEOMETRY
 
 Z = {name: row[0] for name, row in GEARS.items()}
 
@@ -214,6 +215,7 @@ WRONG_BEARINGS: list[tuple[dict[str, Any], str]] = [
     ({"bearings__s1_left__y_mm": 70.0}, r"attachment 's1_left': lies 25 mm beyond the end of shaft 's1'"),
     ({"bearings__s1_left__y_mm": None}, r"bearings\.s1_left\.y_mm: is required: other bearings have one"),
     ({"bearings__s1_left__attachment": "s1_right"}, r"bearings\.s1_right\.attachment = 's1_right': is that of \[bear"),
+    ({"train__housing": "elastic"}, r"bearings\.s1_left\.y_mm = -40.0: stands beside an elastic housing.*attachment"),
     ({"bearings": {}}, r"\[bearings\]: is empty"),
     ({"bearings": None}, r"shafts\.s1\.attachments: no bearing carries the shaft"),
     ({"bearings__7 b": {"shaft": "s1", "y_mm": 0.0}}, r"name in \[bearings\] = '7 b'"),
@@ -281,3 +283,38 @@ def test_the_page_has_the_gearbox_of_these_tests(tmp_path: Path) -> None:
     assert torques == pytest.approx([26.57, 35.17, 60.0], abs=0.005)
     assert "26.57 N m in `in`" in page
     assert "35.17 N m in `through`" in page
+
+
+def by_name(raw: dict[str, Any]) -> dict[str, Any]:
+    """The shipped train, shorthand and lists, with every part by its name."""
+    pair, train = raw.pop("pair"), raw["train"]
+    shared = {key: value for key, value in pair.items() if not isinstance(value, dict)}
+    raw["gears"] = {
+        gear["name"]: {
+            **shared, **pair[gear["gear"]], "material": "steel", "shaft": gear["shaft"], "y_mm": gear["y_mm"]
+        }
+        for gear in train.pop("gears")
+    }  # fmt: skip
+    raw["materials"] = {"steel": pair["material"]}
+    raw["meshes"] = {f"{mesh['driver']}-{mesh['driven']}": mesh for mesh in train.pop("meshes")}
+    shafts = train.pop("shafts")
+    raw["bearings"] = {f"at_{a}": {"shaft": s["name"], "attachment": a} for s in shafts for a in s["attachments"]}
+    raw["shafts"] = {s.pop("name"): {k: v for k, v in s.items() if k != "attachments"} for s in shafts}
+    train["drive"]["attachment"] = "at_1"
+    return raw
+
+
+@pytest.mark.parametrize("variant", ["standard", "tutorial", "operating"])
+def test_the_shipped_train_by_name_is_the_shipped_train(variant: str, tmp_path: Path) -> None:
+    """In its elastic housing: gears, shafts, bores, kinematics, contact models, sweeps."""
+    raw = by_name(tomllib.loads((GEOMETRY / "gear_train.toml").read_text(encoding="utf-8")))
+    (tmp_path / "box.toml").write_text(toml_document(raw))
+    jobs = [read_train_job(path, variant) for path in (GEOMETRY / "gear_train.toml", tmp_path / "box.toml")]
+    one, two = (job.rigid_train for job in jobs)
+    for part in ("shafts", "gears", "meshes", "drive", "loads", "rigid_bores", "bearings", "damping"):
+        assert getattr(one, part) == getattr(two, part), part
+    assert one.kinematics.phases == pytest.approx(two.kinematics.phases, rel=0.0, abs=0.0)
+    assert (one.kinematics.steady_forces == two.kinematics.steady_forces).all()
+    for first, second in zip(jobs[0].meshes, jobs[1].meshes, strict=True):
+        own, other = stiffness_job(first), stiffness_job(second)
+        assert (own.pair, own.model, str(own.sweep)) == (other.pair, other.model, str(other.sweep))

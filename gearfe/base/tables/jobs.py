@@ -263,7 +263,13 @@ def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = No
         if "shafts" not in tables:
             raise InputError("[shafts]", None, "is missing: a train has shafts", "add [shafts.NAME]")
         box = _gearbox(tables)
-        table = named_train(table, tables["meshes"], tables["shafts"], tables.get("bearings", {}))
+        bearings = tables.get("bearings", {})
+        placed = next((name for name, bearing in bearings.items() if bearing.y_mm is not None), None)
+        if table.housing == "elastic" and placed is not None:
+            problem = "stands beside an elastic housing, whose bores have places of their own"
+            cure = 'name the bore (attachment) instead, or write housing = "rigid" in [train]'
+            raise InputError(f"bearings.{placed}.y_mm", bearings[placed].y_mm, problem, cure)
+        table = named_train(table, tables["meshes"], tables["shafts"], bearings)
     else:
         for key in ("shafts", "gears"):
             if not getattr(table, key):
