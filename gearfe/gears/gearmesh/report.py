@@ -234,8 +234,10 @@ def deviation_lines(job: StiffnessJob) -> list[str]:
         most.append(max(0.0 if one is None else float(np.abs(one.at(roll)[0]).max()) for one in own.profiles))
     if not any(most):
         return []
-    both = " and ".join(f"{1e6 * size:.3g} um ({name})" for size, name in zip(most, GEARS, strict=True))
-    return [f"flanks with the deviations of [microgeometry], up to {both}"]
+    both = " and ".join(f"{1e6 * size:.3g} um ({gear.name})" for size, gear in zip(most, job.mesh.gears, strict=True))
+    shorthand = job.mesh.driver.microgeometry_where.startswith("microgeometry")
+    table = "[microgeometry]" if shorthand else "[gears.NAME.microgeometry]"
+    return [f"flanks with the deviations of {table}, up to {both}"]
 
 
 def _statuses(curve: StiffnessCurve) -> str:
