@@ -289,7 +289,8 @@ def test_gear(tmp_path, capsys):
     said = capsys.readouterr().out
     for part in ("contact_ratio", "1.44", "centre_distance_mm", "62.5", "base_diameter_mm"):
         assert part in said
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["gear_pair.json", "gear_pair.png"]
+    files = ["gear_pair.json", "gear_pair.png", "gearbox.json", "gearbox.png"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == files
     geometry = json.loads((tmp_path / "gear_pair.json").read_text())
     assert geometry["pinion"]["base_diameter_mm"] == pytest.approx(50 * math.cos(math.radians(25)))
     assert geometry["path_of_contact"]["C"]["pinion_roll_mm"] == pytest.approx(25 * math.sin(math.radians(25)))
