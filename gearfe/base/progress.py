@@ -121,7 +121,17 @@ class Display:
                 self._clear()
 
     def count(self, done: float, total: float | None, what: str, steps: tuple[int, float] = (0, 0.0)) -> None:
-        """How far the innermost stage is."""
+        """Show how far the innermost stage is.
+
+        Parameters
+        ----------
+        done, total : float
+            What is done, and of how much; None is not known.
+        what : str
+            What is counted.
+        steps : (int, float)
+            Steps made and expected in all.
+        """
         with self._lock:
             if not self._stages:
                 self._stages.append(_Stage(what))

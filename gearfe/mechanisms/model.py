@@ -355,7 +355,8 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
         if isinstance(load, ExpressionLoad):
             load.bind(made)
     zero = np.zeros((1, system.size))
-    of_links = (*OF_SECTION, *OF_LINK) if held else ()
+    has_links = any(body.shape is not None for body in file.bodies.values())  # those taken as rigid say so themselves
+    of_links = (*OF_SECTION, *OF_LINK) if has_links else ()
     known = quantity_names((*PLAIN, *OF_BODY, *OF_POINT, *of_links), tables, "an output")
     for i, output in enumerate(file.outputs):
         if output.name in outputs or output.name == "time_s":
