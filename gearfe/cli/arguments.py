@@ -225,11 +225,13 @@ def each_mesh(
     """
     from ..base.config import read_toml
     from ..base.tables.jobs import meshes_of
+    from ..base.tables.named import check_folders
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load
     meshes = meshes_of(read_toml(args.job), args.job, args.mesh, variant)
     if len(meshes) == 1 and args.mesh is None:
         return run_mesh(args, meshes[0])
+    check_folders([mesh.name for mesh in meshes])
     if len(meshes) > 1:
         from ..gears.geometry.pair import pair_of
 

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from gearfe.base.errors import InputError
+from gearfe.base.tables.named import check_folders
 from gearfe.cli.main import main
 from gearfe.output.exchange.tables import read_csv
 from tests.makers.gearboxes import MESHES, pair_text, text
@@ -58,3 +60,32 @@ def test_a_mistake_in_one_mesh_shows_before_the_first_is_computed(tmp_path: Path
     assert main(["stiffness", str(tmp_path / "box.toml"), "--out", str(tmp_path / "o")]) == 2
     assert "meshes.out.centre_distance_mm = 68.0: " in capsys.readouterr().err
     assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize(
+    ("named", "says"),
+    [
+        (("../../away", "b"), "letters, digits, _ and - only"),
+        (("/away", "b"), "letters, digits, _ and - only"),
+        (("a\\b", "c"), "letters, digits, _ and - only"),
+        (("a" * 60, "b" * 60), "80 characters or less"),
+    ],
+)
+def test_lists_of_a_train_name_no_folder_outside(named: tuple[str, str], says: str, tmp_path: Path, capsys) -> None:
+    """Gears of [[train.gears]] may have any name; results of a mesh lie in the folder that --out names, or nowhere."""
+    source = (GEOMETRY / "gear_train.toml").read_text()
+    for old, new in zip(("gear_3", "gear_4"), named, strict=True):
+        source = source.replace(f'"{old}"', json.dumps(new))
+    (tmp_path / "in" / "deep").mkdir(parents=True)
+    job = tmp_path / "in" / "deep" / "job.toml"
+    job.write_text(source)
+    out = tmp_path / "in" / "deep" / "out"
+    assert main(["gear", str(job), "--out", str(out), "--no-pictures", "--mesh", "-".join(named)]) == 2
+    assert says in capsys.readouterr().err
+    assert sorted(path for path in tmp_path.rglob("*") if path.is_file()) == [job]
+
+
+@pytest.mark.parametrize("names", [("CON", "b"), ("one", "One"), ("groß", "gross")])
+def test_names_that_some_systems_cannot_keep_apart(names: tuple[str, str]) -> None:
+    with pytest.raises(InputError, match=r"device on Windows|upper and lower case"):
+        check_folders(names)

@@ -307,3 +307,11 @@ def test_universal_files_with_damaged_datasets(tmp_path) -> None:
         path.write_bytes(damaged(content, rng))
         with contextlib.suppress(InputError):
             read_modes(path)
+
+
+def test_freedoms_of_a_substructure_that_fill_the_memory(tmp_path) -> None:
+    """5000 nodes with 10000 freedoms each are counted before they are listed."""
+    freedoms = ",".join(str(i) for i in range(1, 10_001))
+    (tmp_path / "a.mtx").write_text(f"*USER ELEMENT, NODES=5000\n{freedoms}\n*MATRIX, TYPE=STIFFNESS\n1.0\n")
+    with pytest.raises(InputError, match="has 50000000 rows"):
+        read_matrix(tmp_path / "a.mtx", "stiffness")

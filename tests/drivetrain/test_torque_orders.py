@@ -11,7 +11,7 @@ import pytest
 from gearfe.base.errors import InputError
 from gearfe.drivetrain.runup.run_up import run_up, steady_state
 from gearfe.drivetrain.train import build_train, simulate
-from gearfe.multibody import constant, sine
+from gearfe.multibody import TimeFunction, constant, sine
 from tests.makers.train_pairs import damped_pair
 from tests.makers.trains import changed
 
@@ -69,7 +69,8 @@ def test_the_steady_motion_under_an_order_is_that_of_a_long_transient() -> None:
 @pytest.mark.parametrize(
     ("orders", "mesh", "says"),
     [
-        (((0.0, 1.0, 0.0),), "", "must be .order > 0"),
+        (((0.0, 1.0, 0.0),), "", "must be .order >= 0.001"),
+        (((4e-4, 1.0, 0.0),), "", "must be .order >= 0.001"),
         (((1.0, math.inf, 0.0),), "", "all finite"),
         (((1.0, 1.0, 0.0),), "other", "other"),
         ((), "other", "is of orders"),
@@ -80,9 +81,23 @@ def test_mistakes(orders, mesh, says) -> None:
         model(orders, mesh)
 
 
-def test_orders_need_one_speed() -> None:
+def test_an_order_between_fractions_has_its_frequency_in_a_transient() -> None:
+    """2.0004 lies nearer to 2 than to any other fraction with a denominator up to 1000."""
+    made = model(((2.0004, 4.0, 0.0),), model().meshes[0].name)
+    _, torque = made.torques[-1]
+    assert torque.sines[0][1] == pytest.approx(2.0004 * TEETH * SPEED, rel=1e-12)
+
+
+CHANGING = {
+    "sine": constant(SPEED) + sine(5.0, 30.0, 0.0),
+    "line": TimeFunction((-math.inf,), (0.0,), ((SPEED, 1000.0),)),  # no breaks, as an expression becomes one piece
+}
+
+
+@pytest.mark.parametrize("speed", CHANGING.values(), ids=CHANGING)
+def test_orders_need_one_speed(speed: TimeFunction) -> None:
     made, *_ = damped_pair("always", torque=TORQUE, speed=SPEED, ratio=0.08)
-    drive = dataclasses.replace(made.drive, speed=constant(SPEED) + sine(5.0, 30.0, 0.0))
+    drive = dataclasses.replace(made.drive, speed=speed)
     load = dataclasses.replace(made.loads[0], orders=((1.0, 1.0, 0.0),))
     with pytest.raises(InputError, match="constant speed only"):
         build_train(changed(made, drive=drive, loads=(load,)))

@@ -220,6 +220,13 @@ def test_includes_that_are_refused(ending, statement, told, tmp_path) -> None:
         read(folder, statement + "\n", f"a.{ending}")
 
 
+def test_includes_a_thousand_deep_are_refused(tmp_path) -> None:
+    for i in range(990):
+        (tmp_path / f"n{i}.inc").write_text(f"*INCLUDE, INPUT=n{i + 1}.inc\n")
+    with pytest.raises(InputError, match="more than 100 files include each other in a row"):
+        read(tmp_path, "*INCLUDE, INPUT=n0.inc\n")
+
+
 CARDS = {
     **dict.fromkeys(
         ("*NGEN", "*NFILL", "*NCOPY, CHANGE NUMBER=100, OLD SET=a, SHIFT", "*ELGEN", "*ELCOPY"), "write all"

@@ -162,6 +162,14 @@ def test_messages_call_joints_and_forces_as_job_files_do() -> None:
     assert [label_of(part, 7) for part in parts] == ["gear g", "coordinate spring 7", "force f"]
 
 
+@pytest.mark.parametrize("fast", [900, 1500, 3000, 20_000])
+def test_one_change_to_steps_a_hundred_times_shorter_stops_no_run(fast: int) -> None:
+    """As where a part moves freely until it touches another one halfway; fewer steps than are allowed do the rest."""
+    times = np.concatenate([np.linspace(0.0, 0.5, fast + 1), np.linspace(0.5, 1.0, 100 * min(fast, 3000) + 1)[1:]])
+    pace = Pace(0.0, 1.0, 400_000)
+    assert not [n for n, t in enumerate(times.tolist()) if pace.hopeless(t, n)]
+
+
 @pytest.mark.parametrize(("needed", "stops"), [(5.0, True), (1.5, False)])
 def test_a_steady_pace_beyond_the_steps_allowed_stops_early(needed: float, stops: bool) -> None:
     """Equal steps tell after some looks that the run needs more than is allowed; one that may pass goes on."""

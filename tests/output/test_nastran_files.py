@@ -89,3 +89,27 @@ def test_files_that_are_none(name: str, tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(given.get(name, b""))
     with pytest.raises(InputError, match=f"{name}.*(cannot be read as OUTPUT[24]|no such file)"):
         read_nastran(tmp_path / name, "housing.superelement.stiffness")
+
+
+def record(*words: int, more: bytes = b"") -> bytes:
+    data = np.array(words, dtype="<i4").tobytes() + more
+    length = np.array(len(data), dtype="<i4").tobytes()
+    return length + data + length
+
+
+HEAD = record(2, 2, 6, 2, more=b"KAA     ")
+ENDLESS = {
+    "a string without words": HEAD + record(1, 0, 1, 1),  # packed: length 0, row 1
+    "a string of negative length": HEAD + record(1, 0, 1, -65535),
+    "a rest of a word": HEAD + record(1, 1, 1, more=b"ab"),
+    "text with a negative length": b"%8d%8d%8d%8dKAA     1P,3E23.16\n%8d%8d%8d\n%8d\n" % (2, 2, 6, 2, 1, 0, 9, -655350),
+    "a format of no numbers": b"%8d%8d%8d%8dKAA     1P,0E23.16\n%8d%8d%8d\n 1.0\n" % (2, 2, 6, 2, 1, 1, 4),
+    "numbers of a terabyte": b"%8d%8d%8d%8dKAA     1P,3E999999999999.16\n%8d%8d%8d\n 1.0\n" % (2, 2, 6, 2, 1, 1, 4),
+}
+
+
+@pytest.mark.parametrize("content", ENDLESS.values(), ids=ENDLESS)
+def test_counts_that_lead_nowhere(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "a.op4").write_bytes(content)
+    with pytest.raises(InputError, match="cannot be read as OUTPUT4"):
+        read_nastran(tmp_path / "a.op4", "housing.superelement.stiffness")

@@ -112,3 +112,13 @@ def test_a_file_that_is_cut_short_is_refused(tmp_path: Path) -> None:
         (tmp_path / "b.uff").write_text(text[:end])
         with pytest.raises(InputError, match="ends within") if text[:end].count("    -1\n") % 2 else nullcontext():
             read_shapes(tmp_path / "b.uff", "f")
+
+
+@pytest.mark.parametrize(
+    ("heads", "size", "says"), [(0, -60, "-60 bytes"), (10**12, 0, "1000000000000 lines"), (-1, 0, "-1 lines")]
+)
+def test_counts_of_binary_functions_that_lead_nowhere(heads: int, size: int, says: str) -> None:
+    """60 bytes back is the mark before the data set itself, read again and again; so many heads fill the memory."""
+    mark, head = "    -1\n", f"{f'   58b 1 2 {heads} {size}':<45}\n"
+    with pytest.raises(InputError, match=says):
+        read_function(f"{mark}    15\n{mark}{mark}{head}{mark}".encode(), 1, "f")

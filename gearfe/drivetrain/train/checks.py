@@ -24,6 +24,8 @@ SAME = 1e-6
 ALIKE = 1e-3
 #: Longest stretch without a sample that a curve may have, as a share of its period.
 WIDEST_GAP = 0.15
+#: Lowest order of a torque: a cycle in a thousand.
+LEAST_ORDER = 1e-3
 
 
 def check_train(train: GearTrain) -> None:
@@ -145,13 +147,12 @@ def _check_orders(train: GearTrain, load: Load) -> None:
     if load.mesh:
         _known(label, "mesh", load.mesh, [mesh.name for mesh in train.meshes])
     for order, amplitude, phase in load.orders:
-        if not (0.0 < order < math.inf and math.isfinite(amplitude) and math.isfinite(phase)):
-            problem = "must be [order > 0, amplitude, phase], all finite"
+        if not (LEAST_ORDER <= order < math.inf and math.isfinite(amplitude) and math.isfinite(phase)):
+            problem = f"must be [order >= {LEAST_ORDER:g}, amplitude, phase], all finite"
             raise InputError(label, [order, amplitude, math.degrees(phase)], problem, "correct it")
-    speed = train.driven.speed
-    if speed.breaks or speed.sines:
+    if not train.driven.speed.steady:
         problem = "follow a drive of constant speed only"
-        cure = "leave the ramp of the drive out, or write torque_Nm as an expression of time"
+        cure = "give the drive a constant speed, or write torque_Nm as an expression of time"
         raise InputError(label, None, problem, cure)
 
 

@@ -31,7 +31,7 @@ from .kinematics import Kinematics, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
 from .program import train_series
 
-#: Orders of loads are whole multiples of one over a whole number up to this.
+#: For periods of steady running, orders of loads are taken as whole multiples of one over a whole number up to this.
 MOST_DENOMINATOR = 1000
 
 
@@ -245,14 +245,14 @@ def _orders(train: GearTrain, shafts: Shafts) -> list[tuple[Array, TimeFunction,
     for load in train.loads:
         direction = _acts(train, load, shafts)
         for order, amplitude, phase in load.orders:
-            cycles, start = Fraction(order).limit_denominator(MOST_DENOMINATOR), phase
             if load.mesh:
                 number = next(i for i, mesh in enumerate(train.meshes) if mesh.name == load.mesh)
                 teeth = train.gear(train.meshes[number].driver).gear.teeth
-                cycles, start = cycles * rolled.cycles[number], phase + order * teeth * rolled.phases[number]
+                per_turn, start = rolled.cycles[number], phase + order * teeth * rolled.phases[number]
             else:
-                cycles *= abs(rolled.ratios[train.shaft_number(load.shaft)])
-            found.append((direction, sine(amplitude, float(cycles) * speed, start), cycles))
+                per_turn, start = abs(rolled.ratios[train.shaft_number(load.shaft)]), phase
+            cycles = Fraction(order).limit_denominator(MOST_DENOMINATOR) * per_turn
+            found.append((direction, sine(amplitude, order * float(per_turn) * speed, start), cycles))
     return found
 
 

@@ -67,9 +67,10 @@ class StepLaw:
 class Pace:
     """The number of steps that a run needs, extrapolated from the steps so far.
 
-    The times in which the number of steps doubles go on as the geometric series of the last three: they double at a
+    The times in which the number of steps doubles go on as the geometric series of the last four: they double at a
     steady pace, stay where a force feeds the motion, grow by 2**(1/p) where the number is as time to the power p. Of
-    the ratios of successive times the largest counts, so that a burst of short steps ends no run.
+    the ratios of successive times the largest counts. One change to shorter steps lowers two of the three, so neither
+    that nor a burst of short steps ends a run.
 
     Parameters
     ----------
@@ -111,7 +112,7 @@ class Pace:
         if steps < FIRST_LOOK:
             return 0.0
         counts, times = zip(*self._marks, strict=True)
-        at = np.interp([steps / 8, steps / 4, steps / 2, steps], counts, times)
+        at = np.interp(steps / 2.0 ** np.arange(4, -1, -1), counts, times)
         took = np.maximum(np.abs(np.diff(at)), 1e-300)
         ratio, left = float((took[1:] / took[:-1]).max()), abs(self.end - t)
         if abs(ratio - 1.0) < 1e-6:

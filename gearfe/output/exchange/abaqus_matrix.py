@@ -114,12 +114,13 @@ def _labels(nodes: list[int], freedoms: list[tuple[int, list[int]]], count: int,
         problem = f"the comment ELEMENT NODES names {len(nodes)} nodes, the *USER ELEMENT has {count}, each once"
         raise InputError(field, path.name, problem, _WHOLE)
     names = nodes or list(range(1, count + 1))
+    ends = [*starts[1:], count + 1]
+    check_rows(sum((last - first) * len(own) for (first, own), last in zip(freedoms, ends, strict=True)), path, field)
     labels = []
-    for (first, own), last in zip(freedoms, [*starts[1:], count + 1], strict=True):
+    for (first, own), last in zip(freedoms, ends, strict=True):
         labels += [(names[place - 1], freedom) for place in range(first, last) for freedom in own]
     if len(set(labels)) != len(labels):
         raise InputError(field, path.name, "its *USER ELEMENT has a freedom of a node twice", _WHOLE)
-    check_rows(len(labels), path, field)
     return labels
 
 

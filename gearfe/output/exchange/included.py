@@ -15,6 +15,8 @@ from ...base.files import LARGEST, read_text
 
 #: Statements of inclusion that are followed; pre-processors write some tens.
 MOST_FILES = 1000
+#: Files that include each other in a row.
+DEEPEST = 100
 
 
 class Line(NamedTuple):
@@ -93,6 +95,9 @@ def _expanded(path: Path, field: str, inclusion: Callable[[str], Inclusion | Non
                 below = _found(found.name, file, root, field, where)
                 if below in above:
                     raise InputError(field, path.name, f"{where}, which includes itself", "remove that line")
+                if len(above) == DEEPEST:
+                    problem = f"{where}: more than {DEEPEST} files include each other in a row"
+                    raise InputError(field, path.name, problem, "write the mesh into one file")
                 yield from expand(below, (*above, below))
 
     yield from expand(path, (path.resolve(),))

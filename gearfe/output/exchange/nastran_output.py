@@ -32,6 +32,8 @@ REAL, DOUBLE = (1, 2), (2, 4)
 PACKED = 65536
 #: Numbers of a matrix beside stiffness and mass, such as the rows for recovery: 2 GB.
 MOST_ENTRIES = 2**28
+#: Numbers in a line, and characters of a number, up to which a format is one: writers use 3 to 5 and 16 to 26.
+WIDEST = 1000
 
 
 def read_nastran(path: Path, field: str) -> Matrices:
@@ -222,6 +224,8 @@ def _binary_column(column: Array, rest: bytes, row: int, words: Words, kind: int
     at = 0
     while at < len(rest):
         if row:
+            if len(rest) % words.size:
+                raise ValueError(f"a column of {len(rest)} bytes")
             head, length, first = 0, len(rest) // words.size, row
         else:
             head, length, first = _head(words.integers(rest[at : at + (1 + two) * words.size]))
@@ -234,6 +238,8 @@ def _binary_column(column: Array, rest: bytes, row: int, words: Words, kind: int
 def _head(numbers: list[int]) -> tuple[int, int, int]:
     """Words of a string's head, of its data, and its first row: two words, or one that packs both."""
     length, row = numbers if len(numbers) == 2 else divmod(numbers[0], PACKED)
+    if length < 1 or row < 1:
+        raise ValueError(f"a string of {length} words from row {row}")
     return len(numbers), length - 1, row
 
 
@@ -248,6 +254,8 @@ def _output4_text(lines: list[str]) -> Matrices:
         columns, rows, _, kind = integers(lines[at], 4)
         name, form = lines[at][32:40].strip().upper(), re.search(r"(\d+)[ED](\d+)", lines[at][40:])
         per_line, width = (int(form[1]), int(form[2])) if form else (5, 16)
+        if not (0 < per_line <= WIDEST and 0 < width <= WIDEST):
+            raise ValueError(f"{per_line} numbers of {width} characters in a line")
         per_number = 2 if kind in DOUBLE else 1
         values = _zeros(abs(rows), columns)
         at += 1

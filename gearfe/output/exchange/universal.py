@@ -26,6 +26,8 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?")
 _REAL, _COMPLEX, _SINGLE = (2, 4), (5, 6), (2, 5)
 #: Analyses whose data are modes: normal ones, complex ones by displacements or by velocities.
 NORMAL, MODES = 2, (2, 3, 7)
+#: Lines of text before the data of a binary function; the format has 11.
+MOST_HEADS = 100
 _MARK = b"-1"
 _DAMAGED = "the file may be cut short or damaged: write it again"
 
@@ -182,6 +184,8 @@ def _data_sets(content: bytes, name: str, field: str) -> list[DataSet]:
                 order, kind, heads, size = (int(word) for word in head[1:5])
                 if order not in (1, 2) or kind != 2:
                     raise ValueError("its numbers are not those of IEEE 754")
+                if not (0 <= heads <= MOST_HEADS and size >= 0):
+                    raise ValueError(f"{heads} lines of text and {size} bytes of data")
             except ValueError as error:
                 raise InputError(field, name or None, f"line {count}: {' '.join(head)!r}: {error}", _DAMAGED) from None
             lines = [(line() or b"").decode("latin-1") for _ in range(heads)]
