@@ -80,7 +80,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - 
 
 
 def answer(arguments: list[str], run: Callable[[list[str]], int]) -> int:
-    """Exit code of `run` with these arguments; mistakes are told in one line."""
+    """Exit code of `run` with these arguments; mistakes are reported in one line."""
     from contextlib import suppress
 
     if isinstance(sys.stdout, io.TextIOWrapper):  # a code page that lacks a letter of a name; stderr does so by itself

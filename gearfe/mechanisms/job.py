@@ -230,6 +230,7 @@ def summarise(
             "constraints": freedoms.constraints,
             "redundant": len(freedoms.redundant),
             "net": freedoms.net,
+            "net_with_rigid_links": _net_of_rigid(mechanism, start),
             "prescribed": sum(row.motion is not None for row in linkage.assembly.rows),
             "undriven_bodies": undriven_bodies(mechanism, trajectory),
             "redundant_constraints": [label[r] for r in freedoms.redundant],
@@ -250,6 +251,13 @@ def summarise(
         },
         "timings": timings,
     }
+
+
+def _net_of_rigid(mechanism: Mechanism, start: Start) -> int:
+    """Net freedoms of the mechanism whose links do not bend: what the joints leave."""
+    if not mechanism.elastic:
+        return start.freedoms.net
+    return mechanism.with_rigid_links().start(start.time).freedoms.net
 
 
 def undriven_bodies(mechanism: Mechanism, trajectory: Trajectory) -> list[str]:
@@ -335,19 +343,23 @@ def _link_line(link: dict[str, Any]) -> str:
     return line
 
 
-def _undriven_line(f: dict[str, Any], *, elastic: bool) -> str:
+def _undriven_line(f: dict[str, Any]) -> str:
     """Freedoms that no joint drives: what a joint too few leaves, what a free motion has, and the shapes of links."""
-    names = f["undriven_bodies"]
+    names, drives, left = f["undriven_bodies"], f["prescribed"], f["net_with_rigid_links"]
     listed = ", ".join(names[:MOST_NAMES]) + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
-    one = f["net"] == 1
-    shapes = ", deformations of flexible links among them" if elastic else ""
-    counted = f"{f['net']} {'freedom is' if one else 'freedoms are'} driven by no joint{shapes}"
-    line = f"{counted}: forces and start velocities move"
-    drives = f["prescribed"]
-    if elastic or not drives:  # flexible links vibrate in mechanisms without a joint too few
-        return f"{line} {listed}"
+    counted = f"{_freedoms(f['net'])} driven by no joint"
+    if left != f["net"]:
+        others = f", {left} of them with rigid links" if left > 0 else ""
+        counted += f", deformations of flexible links among them{others}"
+    line = f"{counted}: forces and start velocities move {listed}"
+    if not drives or left <= 0:
+        return line
     verb = "joint prescribes a motion" if drives == 1 else "joints prescribe motions"
-    return f"{line} {listed}, while {drives} {verb}: check that no joint is missing"
+    return f"{line}, while {drives} {verb}: check that no joint is missing"
+
+
+def _freedoms(count: int) -> str:
+    return "1 freedom is" if count == 1 else f"{count} freedoms are"
 
 
 def _text(summary: dict[str, Any]) -> str:
@@ -355,7 +367,7 @@ def _text(summary: dict[str, Any]) -> str:
     lines = [
         f"{f['bodies']} bodies, {f['coordinates']} coordinates - {f['constraints']} constraints"
         f" + {f['redundant']} redundant = {f['net']} free",
-        *([_undriven_line(f, elastic=bool(summary["flexible_links"]))] if f["net"] > 0 else []),
+        *([_undriven_line(f)] if f["net"] > 0 else []),
         *(f"redundant: {name}" for name in f["redundant_constraints"]),
         *(_link_line(link) for link in summary["flexible_links"]),
         f"{summary['method']}: {summary['status']} at {summary['reached_s']:g} s in {summary['steps']} steps,"

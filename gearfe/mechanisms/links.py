@@ -36,7 +36,7 @@ def section_of(table: BeamTable) -> Section:
 
 def doubts(file: MechanismFile) -> list[str]:
     """Notes on flexible links of no real material, sqrt(E / rho) > `FASTEST_SOUND`: as a rule, E is in another unit."""
-    told = []
+    problems = []
     for name, body in file.bodies.items():
         table = body.beam or body.plate
         if table is None or not body.bends:
@@ -46,8 +46,8 @@ def doubts(file: MechanismFile) -> list[str]:
             key = f"bodies.{name}.{'plate' if body.beam is None else 'beam'}.youngs_modulus_GPa"
             problem = f"makes sound faster ({speed:.2g} m/s) than in any material ({FASTEST_SOUND:.2g} m/s)"
             cure = f"give it in GPa, beside the density of {table.density_kg_per_m3:g} kg/m3 (steel: 210, 7850)"
-            told.append(f"{key} = {table.youngs_modulus_GPa:g}: {problem}; {cure}")
-    return told
+            problems.append(f"{key} = {table.youngs_modulus_GPa:g}: {problem}; {cure}")
+    return problems
 
 
 def link_of(file: MechanismFile, name: str, table: BodyTable) -> BeamLink:

@@ -248,11 +248,15 @@ class Mechanism:
         least = min(((owner == j).sum() for j in found), default=0)
         return [names[j] for j in found if (owner == j).sum() == least]
 
-    def _bent_start(self, time: float) -> Start:
-        """Flexible links start straight, with the velocities of the same mechanism with rigid ones."""
+    def with_rigid_links(self) -> Mechanism:
+        """The same joints between the same bodies, none of which bends, without forces; it need not be free to move."""
         bodies = {n: replace(b, flexible=False) if b.shape is not None else b for n, b in self.file.bodies.items()}
         file = replace(self.file, bodies=bodies, forces={}, outputs=(), figure=FigureTable())
-        rigid = replace(make_mechanism(file, self.path), unbent=True)
+        return replace(make_mechanism(file, self.path), unbent=True)
+
+    def _bent_start(self, time: float) -> Start:
+        """Flexible links start straight, with the velocities of the same mechanism with rigid ones."""
+        rigid = self.with_rigid_links()
         known = rigid.start(time)
         q, v = bent_start(self.elastic, self.system, rigid.linkage, np.stack([known.q, known.v]))
         made = consistent_start(self.system, time, q=q, v=v)

@@ -87,6 +87,20 @@ def test_flexible_links_do_not_suggest_a_missing_joint(tmp_path: Path) -> None:
     raw["run"] |= {"end_s": 1e-4, "step_s": 1e-4}
     raw["run"].pop("picture_s", None)
     outcome = report(raw, tmp_path)
-    assert outcome.summary["freedoms"]["prescribed"] == 1
-    assert "driven by no joint, deformations of flexible links among them" in outcome.text
+    freedoms = outcome.summary["freedoms"]
+    assert (freedoms["prescribed"], freedoms["net_with_rigid_links"]) == (1, 0)
+    assert "driven by no joint, deformations of flexible links among them: forces" in outcome.text
     assert "joint is missing" not in outcome.text
+
+
+@pytest.mark.parametrize(("joint", "left"), [("B", 2), ("guide", 2)])
+def test_a_missing_joint_shows_beside_flexible_links(joint: str, left: int, tmp_path: Path) -> None:
+    """Taken as rigid, rod and slider (3 each) less a hinge of the rod (2), and a guide (2) or a hinge (2): 2 free."""
+    raw = read_toml(GEOMETRY / "elastic_slider_crank.toml")
+    raw["run"] |= {"end_s": 1e-4, "step_s": 1e-4}
+    raw["run"].pop("picture_s", None)
+    raw["joints"].pop(joint)
+    outcome = report(raw, tmp_path)
+    assert outcome.summary["freedoms"]["net_with_rigid_links"] == left
+    assert f"{left} of them with rigid links" in outcome.text
+    assert "while 1 joint prescribes a motion: check that no joint is missing" in outcome.text

@@ -127,7 +127,7 @@ class MeshFlank(ABC):
         """Whether its teeth touch at phases (rad) and approaches beyond the touch (m), (n,)."""
 
     def touch(self, phase: Array) -> Array:  # noqa: ARG002
-        """Approach (m) at which its flanks touch at phases (rad), but for what a law knows itself."""
+        """Approach (m) at which its flanks touch at phases (rad), except for what a law adds itself."""
         return np.asarray(self.gap)
 
     def phase_and_approach(self, angle: Array, u: Array) -> tuple[Array, Array]:

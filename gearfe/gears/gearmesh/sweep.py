@@ -136,7 +136,7 @@ def sweep_stiffness(
     Returns
     -------
     StiffnessCurve
-        With every position asked for; a position that failed has its status and not-a-number.
+        With every position asked for; a position that failed has its status and NaN.
 
     Raises
     ------

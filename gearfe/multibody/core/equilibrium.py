@@ -53,7 +53,7 @@ def equilibrium(system: System, start: Start) -> Equilibrium:
     Raises
     ------
     InputError
-        When there is none, or the start rests where the energy is not least; the residual is told. When joints
+        When there is none, or the start rests where the energy is not least; the residual is in the message. When joints
         prescribe a motion that does not rest at that time.
     """
     check_rests(system, start.time, start.q)
