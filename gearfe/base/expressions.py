@@ -269,18 +269,39 @@ def _syntax(text: str, label: str) -> ast.expr:
     if sum(text.count(sign) for sign in "+-*/(") > OPERATIONS:
         raise InputError(label, None, f"has more than {OPERATIONS} operations", "split it into several outputs")
     try:
-        tree = ast.parse(text.replace("\n", " ").strip(), mode="eval").body
+        tree = ast.parse(_in_line(text), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         problem, cure = str(error).partition(" (")[0], "write numbers, names and functions as in Python"
         words = [word for word in re.findall(r"\w+", text) if keyword.iskeyword(word)]
         if words:
             cure += f"; {words[0]} is one of its keywords and can be no name here"
         raise InputError(label, text, f"is not an expression: {problem}", cure) from None
+    if _depth(tree) > OPERATIONS:
+        raise InputError(label, None, f"is nested more than {OPERATIONS} times", "split it into several outputs")
     for node in ast.walk(tree):
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
-            power = f"{ast.unparse(node.left)} ** {ast.unparse(node.right)}"
+            parts = [(_written(text, part), isinstance(part, ast.BinOp)) for part in (node.left, node.right)]
+            power = " ** ".join(f"({part})" if joined else part for part, joined in parts)
             raise InputError(label, text, "has ^, which is no power in this syntax", f"write {power}")
     return tree
+
+
+def _in_line(text: str) -> str:
+    return " ".join(text.splitlines()).strip()
+
+
+def _written(text: str, tree: ast.AST) -> str:
+    """A piece of Python's tree as the text has it."""
+    return ast.get_source_segment(_in_line(text), tree) or ""
+
+
+def _depth(tree: ast.AST) -> int:
+    """Levels of expressions below each other, counted without recursion."""
+    depth, level = 0, [tree]
+    while level:
+        depth += 1
+        level = [child for node in level for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
+    return depth
 
 
 @dataclass(frozen=True)
@@ -316,7 +337,7 @@ class _Parser:
                 return Node("member", tree.attr, (self.node(tree.value),))
             case ast.Subscript() if columns:
                 return Node("item", parts=(self.node(tree.value), self.node(tree.slice)))
-        raise self.wrong(f"cannot read {ast.unparse(tree)[:40]!r}")
+        raise self.wrong(f"cannot read {_written(self.text, tree)[:40]!r}")
 
     def sign(self, operator: ast.AST) -> str:
         """Sign of an operator, or nothing for one that is not known here."""

@@ -139,11 +139,6 @@ NAME_ONE = 'name one: --mesh NAME; in [study] mesh = "NAME"'
 OF_TRAINS = (*OF_GEARS, "stiffness", "housing", "spectrum")
 
 
-def read_gearbox(path: str | Path, variant: str | None = None) -> Gearbox:
-    """Return the gears and meshes of a job file, for what is computed of single meshes; see `gearbox_of`."""
-    return gearbox_of(read_toml(path), path, variant)
-
-
 def gearbox_of(raw: dict[str, Any], path: str | Path, variant: str | None = None) -> Gearbox:
     """Return the gears and meshes of a parsed job: those of [pair], else those by name, else those of [train].
 

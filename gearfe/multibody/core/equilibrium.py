@@ -53,8 +53,8 @@ def equilibrium(system: System, start: Start) -> Equilibrium:
     Raises
     ------
     InputError
-        When there is none, or the start rests where the energy is not least; the residual is in the message. When joints
-        prescribe a motion that does not rest at that time.
+        When there is none, or the start rests where the energy is not least, with the residual. When joints prescribe a
+        motion that does not rest at that time.
     """
     check_rests(system, start.time, start.q)
     t, active, units = start.time, start.active, system.units
