@@ -21,7 +21,7 @@ from .campbell import draw_campbell, draw_instability, draw_waterfall, signal_of
 from .style import CYCLE, GREY, headed, new_figure, save, tidy
 
 #: Label of the axis of dynamic factors.
-FACTOR = "dynamic factor $K_v$"
+FACTOR = "dynamic factor Kv"
 
 
 @dataclass(frozen=True)

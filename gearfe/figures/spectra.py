@@ -382,7 +382,7 @@ def label_lines(axes: Any, labels: Sequence[tuple[float, float, str]], x: Array,
     tips = axes.transData.transform(np.column_stack([x, y]))
     taken: list[_Box] = []
     for at_x, at_y, text in labels:
-        note = axes.text(at_x, at_y, text, ha="center", va="bottom", **look)
+        note = axes.text(at_x, at_y, text, ha="center", va="bottom", parse_math=False, **look)
         size = note.get_window_extent(renderer)
         note.remove()
         width, height = size.width + 2.0 * ROOM * scale, size.height + 2.0 * ROOM * scale

@@ -58,7 +58,7 @@ def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve,
     for number, ends in enumerate(np.degrees(single_pair_stretches(pair, 0.0, 2 * cycle))):
         axes.axvspan(*ends, color="#f3f4f6", zorder=0, label=None if number else "single-pair contact (rigid)")
     low, high = 1e-6 * np.nanmin(solved, initial=np.inf), 1e-6 * np.nanmax(solved, initial=-np.inf)
-    levels = {r"ISO 6336 $c_\gamma b$": 1e-6 * found["iso_6336"]["c_gamma_times_width_N_per_m"]}
+    levels = {"ISO 6336 cγ b": 1e-6 * found["iso_6336"]["c_gamma_times_width_N_per_m"]}
     if found["mesh_stiffness"] is not None:
         levels = {"mean over the cycle": 1e-6 * found["mesh_stiffness"]["mean_N_per_m"], **levels}
     for (label, level), dashes in zip(levels.items(), ((6, 3), (2, 2)), strict=False):

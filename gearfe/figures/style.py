@@ -38,8 +38,24 @@ def new_figure(width: float, height: float) -> Any:
     return figure
 
 
+def literal(figure: Any) -> None:
+    """Draw all texts as they are written: a $ in a user's name begins no formula. Powers on logarithmic axes stay."""
+    from matplotlib.axis import Axis
+    from matplotlib.text import Text
+    from matplotlib.ticker import LogFormatter
+
+    powers: set[int] = set()
+    for axis in figure.findobj(Axis):
+        if isinstance(axis.get_major_formatter(), LogFormatter):
+            powers |= {id(text) for text in axis.findobj(Text)} - {id(axis.label)}
+    for text in figure.findobj(Text):
+        if id(text) not in powers:
+            text.set_parse_math(False)
+
+
 def save(figure: Any, path: str | Path, *, dpi: int = DPI) -> None:
     """Write a figure whole."""
+    literal(figure)
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=dpi)
 
@@ -104,6 +120,7 @@ def fixed(width: float, height: float) -> Any:
 def save_fixed(figure: Any, path: str | Path) -> None:
     """Write a PNG whole. The canvas is drawn once; `savefig` draws it twice."""
     figure.set_dpi(DPI)
+    literal(figure)
     with whole_file(path) as temporary:
         figure.canvas.print_png(temporary, pil_kwargs={"compress_level": 4})
 

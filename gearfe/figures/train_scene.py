@@ -37,7 +37,7 @@ def draw_scene(path: str | Path, arrays: Mapping[str, Array], title: str, most: 
     path : path
         The picture or film.
     arrays : mapping
-        Surfaces and colours, of `gearfe.drivetrain.vibration.fields.frames`.
+        Surfaces and colours, of `gearfe.drivetrain.gearbox.fields.frames`.
     title : str
         Heading.
     most
