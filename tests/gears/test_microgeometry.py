@@ -244,7 +244,7 @@ def test_a_displaced_tooth_is_no_thicker(gear: str, teeth: int, sign: float) -> 
 
 def test_one_tooth_with_another_back_flank_bears_once_in_a_turn(elastic) -> None:
     """Driving flanks that are alike repeat after one mesh cycle, the room behind the teeth after the full period."""
-    table = build(MicrogeometryTable, {"pinion": {"right": {"pitch_um": [12.0] + [0.0] * 19}}}, "microgeometry")
+    table = uneven(build(MicrogeometryTable, {"pinion": {"right": {"pitch_um": [12.0] + [0.0] * 19}}}, "microgeometry"))
     own, back = (deviations_of(table, PAIR, flank=side) for side in ("left", "right"))
     angles = PAIR.mesh_cycle * np.arange(-8.0, 33.0) / 4.0
     made = loads(elastic, [0.001], own, angles=angles, back=back)
