@@ -14,7 +14,7 @@ class _Counts(progress.Display):
         super().__init__(io.StringIO(), rewritten=False)
         self.seen: list[tuple[float, float | None, str]] = []
 
-    def count(self, done: float, total: float | None, what: str) -> None:
+    def count(self, done: float, total: float | None, what: str, steps: tuple[int, float] = (0, 0.0)) -> None:
         """How far the innermost stage is."""
         self.seen.append((done, total, what))
 
