@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..drivetrain.gearbox.layout import GearboxLayout, PlacedShaft
+from ..drivetrain.gearbox.layout import GearboxLayout, PlacedMesh, PlacedShaft
 from .style import COLOURS, GREY, RED, headed, new_figure
 
 #: Colours of shafts; red is what does not fit.
 _SHAFTS = tuple(colour for colour in COLOURS if colour != RED)
 _AROUND = np.linspace(0.0, 2.0 * np.pi, 361)
+#: Size of names, and width of one of their letters (points).
+_FONT, _LETTER = 8, 4.8
+#: Width of the view along the axes (points), about.
+_PANEL = 340.0
 
 
 def gearbox_picture(layout: GearboxLayout, title: str = "") -> Any:
@@ -34,6 +41,67 @@ def _circle(axes: Any, centre: tuple[float, float], radius: float, **style: Any)
     axes.plot(1e3 * (centre[0] + radius * np.cos(_AROUND)), 1e3 * (centre[1] + radius * np.sin(_AROUND)), **style)
 
 
+@dataclass(frozen=True)
+class _Box:
+    """A text of estimated size (m): its middle, half its width and half its height."""
+
+    x: float
+    z: float
+    width: float
+    height: float
+
+    def distance(self, x: float, z: float) -> float:
+        """Distance of a point from the box (m)."""
+        return math.hypot(max(abs(x - self.x) - self.width, 0.0), max(abs(z - self.z) - self.height, 0.0))
+
+    def covers(self, other: _Box) -> bool:
+        """Whether two texts overlap."""
+        wide, high = self.width + other.width, self.height + other.height
+        return abs(self.x - other.x) < wide and abs(self.z - other.z) < high
+
+
+def _middle(layout: GearboxLayout, mesh: PlacedMesh) -> tuple[float, float]:
+    """Middle of a line of centres: x, z (m)."""
+    one, two = layout.gear(mesh.driver).centre, layout.gear(mesh.driven).centre
+    return 0.5 * (one[0] + two[0]), 0.5 * (one[2] + two[2])
+
+
+def _free_box(
+    layout: GearboxLayout, shaft: PlacedShaft, lines: Sequence[str], point: float, boxes: Sequence[_Box]
+) -> _Box:
+    """Return the place of a shaft's text: above, below, left or right of its gears, where it lies on the fewest others.
+
+    Parameters
+    ----------
+    layout : GearboxLayout
+        The gearbox.
+    shaft : PlacedShaft
+        The shaft.
+    lines : sequence of str
+        Lines of the text.
+    point : float
+        Size of a point of the picture (m).
+    boxes : sequence of _Box
+        The texts that stand already.
+    """
+    width, height = 0.5 * _LETTER * max(map(len, lines)) * point, 0.65 * _FONT * len(lines) * point
+    radii = [gear.tip_radius for gear in layout.gears if gear.shaft == shaft.name]
+    reach, (x, _, z) = max(radii, default=shaft.radius) + 4.0 * point, shaft.centre
+    up, across = reach + height, reach + width
+    others = [gear for gear in layout.gears if gear.shaft != shaft.name]
+
+    middles = [_middle(layout, mesh) for mesh in layout.meshes]  # lines to the distances go down from here
+
+    def covered(box: _Box) -> float:
+        """Depth (m) by which the text lies on gears, and its height for each text or line that it lies on."""
+        on_gears = sum(max(gear.tip_radius - box.distance(gear.centre[0], gear.centre[2]), 0.0) for gear in others)
+        on_lines = sum(abs(box.x - middle) < box.width and box.z - box.height < top for middle, top in middles)
+        return on_gears + 2.0 * box.height * (on_lines + sum(map(box.covers, boxes)))
+
+    places = ((x, z + up), (x, z - up), (x - across, z), (x + across, z))
+    return min((_Box(*place, width, height) for place in places), key=covered)
+
+
 def _along_the_axes(axes: Any, layout: GearboxLayout, colours: dict[str, str]) -> None:
     """View along y: x to the right, z up."""
     for gear in layout.gears:
@@ -41,33 +109,46 @@ def _along_the_axes(axes: Any, layout: GearboxLayout, colours: dict[str, str]) -
         _circle(axes, centre, gear.tip_radius, color=colour, linewidth=1.3)
         _circle(axes, centre, gear.reference_radius, color=colour, linewidth=0.8, linestyle=(0, (7, 2, 1.5, 2)))
         _circle(axes, centre, gear.bore_radius, color=colour, linewidth=0.7)
+    left = min(gear.centre[0] - gear.tip_radius for gear in layout.gears)
+    right = max(gear.centre[0] + gear.tip_radius for gear in layout.gears)
+    low = min(gear.centre[2] - gear.tip_radius for gear in layout.gears)
+    high = max(gear.centre[2] + gear.tip_radius for gear in layout.gears)
+    point = 1.2 * max(right - left, high - low) / _PANEL  # m
+    boxes: list[_Box] = []
     for shaft in layout.shafts:
         x, _, z = shaft.centre
         angle = {"color": colours[shaft.name], "alpha": 0.25}
         axes.fill(1e3 * (x + shaft.radius * np.cos(_AROUND)), 1e3 * (z + shaft.radius * np.sin(_AROUND)), **angle)
-        names = "\n".join(f"{gear.name} ({gear.teeth})" for gear in layout.gears if gear.shaft == shaft.name)
-        top = max((gear.tip_radius for gear in layout.gears if gear.shaft == shaft.name), default=shaft.radius)
-        text = f"{shaft.name}\n{names}"
-        axes.annotate(text, (1e3 * x, 1e3 * (z + top)), xytext=(0, 4), textcoords="offset points", ha="center",
-                      va="bottom", fontsize=8, color=colours[shaft.name])  # fmt: skip
-    low = min(gear.centre[2] - gear.tip_radius for gear in layout.gears)
-    high = max(gear.centre[2] + gear.tip_radius for gear in layout.gears)
-    height = high - low
-    for number, mesh in enumerate(layout.meshes):
+        lines = [shaft.name, *(f"{gear.name} ({gear.teeth})" for gear in layout.gears if gear.shaft == shaft.name)]
+        box = _free_box(layout, shaft, lines, point, boxes)
+        boxes.append(box)
+        axes.text(1e3 * box.x, 1e3 * box.z, "\n".join(lines), ha="center", va="center", fontsize=_FONT,
+                  color=colours[shaft.name])  # fmt: skip
+    low, high = min([low, *(box.z - box.height for box in boxes)]), max([high, *(box.z + box.height for box in boxes)])
+    left, right = (
+        min([left, *(box.x - box.width for box in boxes)]),
+        max([right, *(box.x + box.width for box in boxes)]),
+    )
+    row, ends = 1.6 * _FONT * point, list[float]()  # height of a row of distances (m), right end of the last in each
+    middles = [_middle(layout, mesh)[0] for mesh in layout.meshes]
+    for mesh in (layout.meshes[i] for i in np.argsort(middles, kind="stable")):
         one, two = layout.gear(mesh.driver).centre, layout.gear(mesh.driven).centre
         colour = GREY if mesh.fits else RED
         axes.plot([1e3 * one[0], 1e3 * two[0]], [1e3 * one[2], 1e3 * two[2]], color=colour, linewidth=1.0, marker="+")
         text = f"{mesh.name}: a = {1e3 * mesh.shaft_distance:.6g} mm"
         if not mesh.fits:
             text += f" (gears: {1e3 * mesh.centre_distance:.6g} mm)"
-        middle = (500.0 * (one[0] + two[0]), 500.0 * (one[2] + two[2]))
-        below = (middle[0], 1e3 * (low - (0.04 + 0.06 * (number % 2)) * height))
-        axes.annotate(text, middle, xytext=below, ha="center", va="top", fontsize=8, color=colour,
+        x, z = _middle(layout, mesh)
+        half = 0.5 * _LETTER * (len(text) + 2) * point
+        number = next((i for i, end in enumerate(ends) if end < x - half), len(ends))
+        ends[number : number + 1] = [x + half]
+        left, right = min(left, x - half), max(right, x + half)
+        below = (1e3 * x, 1e3 * (low - (0.5 + number) * row))
+        axes.annotate(text, (1e3 * x, 1e3 * z), xytext=below, ha="center", va="top", fontsize=_FONT, color=colour,
                       arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.5})  # fmt: skip
     axes.set_aspect("equal")
-    axes.margins(0.08)
-    most = max(sum(gear.shaft == shaft.name for gear in layout.gears) for shaft in layout.shafts)
-    axes.set_ylim(1e3 * (low - 0.2 * height), 1e3 * (high + 0.08 * (most + 1) * height))
+    axes.set_xlim(1e3 * (left - row), 1e3 * (right + row))
+    axes.set_ylim(1e3 * (low - (1.5 + len(ends)) * row), 1e3 * (high + row))
     axes.set_xlabel("x (mm)")
     axes.set_ylabel("z (mm)")
 
@@ -75,8 +156,11 @@ def _along_the_axes(axes: Any, layout: GearboxLayout, colours: dict[str, str]) -
 def _from_the_side(axes: Any, layout: GearboxLayout, colours: dict[str, str], across: int) -> None:
     """View across the axes: y to the right, x or z (0 or 2) up."""
     wrong = {name for mesh in layout.meshes if mesh.overlap <= 0.0 for name in (mesh.driver, mesh.driven)}
-    for shaft in layout.shafts:
-        _shaft(axes, shaft, colours[shaft.name], across)
+    places = [1e3 * shaft.centre[across] for shaft in layout.shafts]
+    line = 9.0 * 1.2 * max(np.ptp(places) + 2e3 * max(gear.tip_radius for gear in layout.gears), 1.0) / _PANEL  # mm
+    for number, shaft in enumerate(layout.shafts):
+        lower = sum(abs(place - places[number]) < line for place in places[:number])  # shafts one behind the other
+        _shaft(axes, shaft, colours[shaft.name], across, lower)
     for gear in layout.gears:
         y, at, colour = gear.centre[1], gear.centre[across], RED if gear.name in wrong else colours[gear.shaft]
         corners = _rectangle(y, at, gear.width, gear.tip_radius)
@@ -90,17 +174,24 @@ def _from_the_side(axes: Any, layout: GearboxLayout, colours: dict[str, str], ac
     axes.set_ylabel(f"{'xyz'[across]} (mm)")
 
 
-def _shaft(axes: Any, shaft: PlacedShaft, colour: str, across: int) -> None:
+def _shaft(axes: Any, shaft: PlacedShaft, colour: str, across: int, lower: int) -> None:
+    """A shaft with its bearings; its names stand so many lines lower."""
     y, at = shaft.centre[1], shaft.centre[across]
     axes.plot(*_rectangle(y, at, shaft.length, shaft.radius), color=colour, linewidth=1.0)
     ends = 1e3 * np.array([y - 0.55 * shaft.length, y + 0.55 * shaft.length])
     axes.plot(ends, 2 * [1e3 * at], color=colour, linewidth=0.7, linestyle=(0, (7, 2, 1.5, 2)))
-    axes.annotate(shaft.name, (ends[1], 1e3 * at), xytext=(3, 0), textcoords="offset points", va="center", fontsize=8,
-                  color=colour)  # fmt: skip
+    text = {"textcoords": "offset points", "va": "center", "fontsize": _FONT, "color": colour}
+    axes.annotate(shaft.name, (ends[1], 1e3 * at), xytext=(3, -10 * lower), **text)
     for name, place in shaft.bearings:
         for sign in (-1.0, 1.0):
             axes.plot([1e3 * place], [1e3 * (at + 1.25 * sign * shaft.radius)], marker="s", color=colour, markersize=5)
-        text = {"xytext": (0, -6), "textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7}
+        text = {
+            "xytext": (0, -6 - 9 * lower),
+            "textcoords": "offset points",
+            "ha": "center",
+            "va": "top",
+            "fontsize": 7,
+        }
         axes.annotate(name, (1e3 * place, 1e3 * (at - 1.25 * shaft.radius)), color=colour, **text)
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import tomllib
 from pathlib import Path
 
 import pytest
+from matplotlib.text import Text
 
 from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.layout import GearboxLayout, gearbox_layout
@@ -55,6 +58,31 @@ def test_what_does_not_fit_is_red() -> None:
     beside = layout_of(text(gears__wheel_2__y_mm=30.0))
     assert texts(beside)["wheel_2"] == RED
     assert "24 mm between them along the axis" in beside.meshes[2].line()
+
+
+def test_names_lie_on_nothing_else() -> None:
+    """A branch round a corner, shafts one behind the other: texts overlap neither each other nor circles of others."""
+    places = {"s1": (0.0, 0.0), "s2": (-35.0, 42.426), "s3": (-35.0, -36.574), "s4": (-104.0, -36.574)}
+    layout = layout_of(
+        text(**{f"shafts__{n}__{k}_mm": v for n, at in places.items() for k, v in zip("xz", at, strict=True)})
+    )
+    assert all(mesh.fits for mesh in layout.meshes)
+    figure = gearbox_picture(layout)
+    figure.canvas.draw()
+    for axes in figure.axes:
+        boxes = {item.get_text(): Text.get_window_extent(item) for item in axes.texts}
+        overlapping = [(a, b) for a, b in itertools.combinations(boxes, 2) if boxes[a].overlaps(boxes[b])]
+        gears = {gear.name for gear in layout.gears}
+        assert [pair for pair in overlapping if not gears & set(pair)] == []  # gears in mesh lie on each other
+    along = figure.axes[0]
+    for shaft in layout.shafts:
+        (label,) = (item for item in along.texts if item.get_text().startswith(f"{shaft.name}\n"))
+        (x, z), (right, top) = along.transData.inverted().transform(Text.get_window_extent(label).get_points())
+        for gear in layout.gears:
+            if gear.shaft != shaft.name:
+                middle = 1e3 * gear.centre[0], 1e3 * gear.centre[2]
+                apart = math.hypot(max(x - middle[0], middle[0] - right, 0.0), max(z - middle[1], middle[1] - top, 0.0))
+                assert apart > 1e3 * gear.tip_radius
 
 
 def test_the_command_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
