@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .gears.gearmesh.load_map import LoadMap
     from .gears.gearmesh.sweep import sweep_loads, sweep_stiffness
     from .gears.geometry import Gear, GearPair
+    from .multibody import constant
     from .study.job import read_study, run_study
     from .study.search import Search
 
@@ -57,6 +58,7 @@ _PUBLIC: dict[str, str] = {
     "build_train": "drivetrain.train",
     "compute_meshes": "drivetrain.gearbox.mesh_stiffness",
     "check_positions": "gears.gearmesh.check",
+    "constant": "multibody",
     "housing_from_job": "drivetrain.housing.build",
     "read_study": "study.job",
     "run_study": "study.job",
@@ -94,6 +96,7 @@ __all__ = [
     "build_train",
     "check_positions",
     "compute_meshes",
+    "constant",
     "housing_from_job",
     "read_study",
     "run_study",
