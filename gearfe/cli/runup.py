@@ -86,16 +86,15 @@ def _report_lines(summary: dict[str, Any]) -> list[str]:
     for change in summary["bifurcations"]:
         changes.setdefault(change["kind"], []).append(f"{change['speed_rad_per_s']:.6g}")
     lines += [f"{kind} at {', '.join(speeds)} rad/s" for kind, speeds in changes.items()]
-    for name, factor, open_ in zip(
-        summary["mesh_names"], summary["largest_dynamic_factor"], summary["largest_share_without_contact"], strict=True
-    ):
+    factors, open_shares = summary["largest_dynamic_factor"], summary["largest_share_without_contact"]
+    for i, (name, factor, open_) in enumerate(zip(summary["mesh_names"], factors, open_shares, strict=True)):
         parts = []
         if factor is not None:
             parts.append(f"dynamic factor up to {factor['value']:.3g} at {factor['speed_rad_per_s']:.6g} rad/s")
         if open_ is not None and open_["value"] > 0.0:
             share = open_["value"]
             parts.append(f"apart up to {percent(share, 3)} of the time at {open_['speed_rad_per_s']:.6g} rad/s")
-        lines.append(f"mesh {name}: " + ", ".join(parts or ["no steady force"]))
+        lines.append(f"mesh {i + 1} ({name}): " + ", ".join(parts or ["no steady force"]))
     for peak in summary["peaks"][:6]:
         where = f"{peak['order']} at {peak['frequency_Hz']:.0f} Hz"
         if peak["mode"] is None:

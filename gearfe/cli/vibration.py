@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -167,7 +167,7 @@ def report_lines(response: TrainResponse, train: GearTrain, written: Written, ch
     from ..drivetrain.gearbox.inherited import inherited_lines
 
     summary = written.summary
-    lines = [*_mesh_lines(response, train, summary), *_contact_lines(summary)]
+    lines = [*_mesh_lines(response, train, summary), *_contact_lines(response.mesh_names, summary)]
     lines += inherited_lines(summary.get("inherited", {}))
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)
@@ -214,7 +214,7 @@ def _mesh_lines(response: TrainResponse, train: GearTrain, summary: Mapping[str,
     return lines
 
 
-def _contact_lines(summary: Mapping[str, Any]) -> list[str]:
+def _contact_lines(names: Sequence[str], summary: Mapping[str, Any]) -> list[str]:
     """Of each mesh which flanks bear and when they part; friction."""
     lines, contact, friction = [], summary.get("contact", {}), summary.get("friction", {})
     for i, share in enumerate(contact.get("share_without_contact", ())):
@@ -224,14 +224,13 @@ def _contact_lines(summary: Mapping[str, Any]) -> list[str]:
                 f"no contact in {percent(share, 3)} of the time, contacts lost: {lost}" if lost else "always in contact"
             )
             most = "" if factor is None else f"; largest force {factor:.3g} times the steady one"
-            lines.append(f"mesh {i + 1}: {contact['flanks'][i]}; {parts}{most}")
+            lines.append(f"mesh {i + 1} ({names[i]}): {contact['flanks'][i]}; {parts}{most}")
     for i, coefficient in enumerate(friction.get("coefficients", ())):
         if coefficient > 0.0:
             share = friction["efficiency"][i]
             efficiency = "" if share is None else f", efficiency {percent(share, 4)}"
-            lines.append(
-                f"mesh {i + 1}: friction {coefficient:.4g}, loss {friction['mean_loss_W'][i]:.4g} W{efficiency}"
-            )
+            loss = f"loss {friction['mean_loss_W'][i]:.4g} W{efficiency}"
+            lines.append(f"mesh {i + 1} ({names[i]}): friction {coefficient:.4g}, {loss}")
     return lines
 
 

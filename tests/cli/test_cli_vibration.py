@@ -82,7 +82,7 @@ def test_a_mesh_law_with_friction(job, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["vibration", str(job), "--out", str(out), "--no-estimate"]) == 0
     said = capsys.readouterr().out
-    assert "mesh 1: friction 0.05, loss " in said
+    assert "mesh 1 (pinion-wheel): friction 0.05, loss " in said
     names, values = table(out / "response.csv")
     by_name = dict(zip(names, values.T, strict=True))
     assert (by_name["friction_power_1_W"] >= 0.0).all()
