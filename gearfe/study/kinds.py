@@ -154,7 +154,7 @@ def _only_mesh(raw: Raw, path: Path, mesh: str | None) -> Any:
     from ..base.tables.jobs import only_mesh
     from ..gears.gearmesh.job import stiffness_job
 
-    return stiffness_job(only_mesh(raw, path, mesh), path.parent)
+    return stiffness_job(only_mesh(raw, path, mesh, "study.mesh"), path.parent)
 
 
 def _kept(job: Any, shared: Shared) -> Keep:

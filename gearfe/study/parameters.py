@@ -237,6 +237,9 @@ def key_hint(kind: str, name: str, base: Mapping[str, Any]) -> Any:
             raise InputError(where, parts[0], problem, "vary keys of " + ", ".join(READ[kind]))
         if parts[0] not in READ[kind]:
             raise unknown_name(where, parts[0], READ[kind])
+        if parts[0] in ("pair", *NAMED) and parts[0] not in base:  # a table of one key would be no gear
+            problem = f"is no table of the base job, so {name} has nothing to vary"
+            raise InputError(where, parts[0], problem, "vary keys of " + ", ".join(t for t in READ[kind] if t in base))
         hint, where, rest = table_class(parts[0]), f"{where}.{parts[0]}", parts[1:]
         if parts[0] in NAMED:
             hint = dict[str, hint]

@@ -104,7 +104,9 @@ def _row(field: Any, hint: Any) -> str:
 def _value(hint: Any, known: Any) -> str:
     """Kind of value with its range or choices."""
     if known["choices"]:
-        return ", ".join(f'`"{choice}"`' for choice in known["choices"])
+        choices = ", ".join(f'`"{choice}"`' for choice in known["choices"])
+        kinds = [kind for kind in _kind(hint).split(" or ") if kind != "text"]  # a number, or a list of the choices
+        return "".join(f"{kind} of " if kind.startswith("list") else f"{kind} or " for kind in kinds) + choices
     low, high, above, below = (known[k] for k in ("low", "high", "above", "below"))
     bounds = [f">= {low:g}"] if low is not None else [f"> {above:g}"] if above is not None else []
     bounds += [f"<= {high:g}"] if high is not None else [f"< {below:g}"] if below is not None else []

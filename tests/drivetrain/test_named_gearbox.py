@@ -249,7 +249,39 @@ WRONG_MATERIALS: list[tuple[dict[str, Any], str]] = [
     ({"materials": None}, r"gears\.sun\.material: unknown name 'steel'; known names: none"),
     ({"materials__18Cr Ni": {}}, r"name in \[materials\] = '18Cr Ni': must have"),
 ]
-WRONG = [*WRONG_GEARS, *WRONG_MESHES, *WRONG_SHAFTS, *WRONG_BEARINGS, *WRONG_MATERIALS]
+#: Mistakes that join several tables.
+ORDERS = {"shaft": "s4", "torque_Nm": 60.0, "orders": [[1.0, 2.0, 0.0]]}
+BOTH = {
+    "gears__pinion_2__profile_shift": "from centre distance",
+    "gears__wheel_2__profile_shift": "from centre distance",
+}
+WRONG_TOGETHER: list[tuple[dict[str, Any], str]] = [
+    ({"pair": {"pinion": {"teeth": 20}}}, r"\[pair\]: stands beside \[gears\.NAME\]"),
+    ({"meshes__in__mesh_table": "r.csv", "meshes__in__rigid": True}, r"meshes\.in\.rigid = True: .*beside mesh_table"),
+    (
+        {"meshes__in__mesh_table": "r.csv", "meshes__in__mesh_model": "potential"},
+        r"meshes\.in\.mesh_model = .*mesh_tab",
+    ),
+    (
+        {"train__loads": [{**ORDERS, "mesh": "outt"}]},
+        r"train\.loads\[0\]\.mesh: unknown name 'outt'; did you mean 'out'",
+    ),
+    (
+        {"train__loads": [{**ORDERS, "mesh": "sun-idler"}]},
+        r"loads\[0\]\.mesh: unknown name 'sun-idler'; known names: in, ",
+    ),
+    ({"train__loads": [{**ORDERS, "orders": [], "mesh": "out"}]}, r"train\.loads\[0\]\.mesh = 'out': .*add orders"),
+    ({**BOTH, "meshes__out__centre_distance_mm": 69.0}, r"gears\.pinion_2\.profile_shift .*needs a mesh with centre_"),
+    (
+        {
+            "gears__idler__profile_shift": "from centre distance",
+            "meshes__in__centre_distance_mm": 55.1,
+            "meshes__through__centre_distance_mm": 79.2,
+        },
+        r"gears\.idler\.profile_shift = .*: is 0\.0\d* by mesh 'in', but 0\.1\d* by mesh 'through'; write a number",
+    ),
+]
+WRONG = [*WRONG_TOGETHER, *WRONG_GEARS, *WRONG_MESHES, *WRONG_SHAFTS, *WRONG_BEARINGS, *WRONG_MATERIALS]
 
 
 @pytest.mark.parametrize(("changes", "words"), WRONG, ids=[str(row[0])[:60] for row in WRONG])
@@ -318,3 +350,16 @@ def test_the_shipped_train_by_name_is_the_shipped_train(variant: str, tmp_path: 
     for first, second in zip(jobs[0].meshes, jobs[1].meshes, strict=True):
         own, other = stiffness_job(first), stiffness_job(second)
         assert (own.pair, own.model, str(own.sweep)) == (other.pair, other.model, str(other.sweep))
+
+
+@pytest.mark.parametrize("key", ["mesh_table", "curve"])
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(None, "there is no such file"), ("fraction,k\n0,1\n", "fraction_of_pitch|pinion_angle_deg")],
+)
+def test_mistakes_in_files_of_a_mesh_name_its_key(key: str, content: str | None, words: str, tmp_path: Path) -> None:
+    (tmp_path / "box.toml").write_text(text(**{f"meshes__in__{key}": "in.csv"}))
+    if content is not None:
+        (tmp_path / "in.csv").write_text(content)
+    with pytest.raises(InputError, match=rf"meshes\.in\.{key} = 'in\.csv': .*({words})"):
+        train_curves(read_train_job(tmp_path / "box.toml"))

@@ -58,6 +58,10 @@ def test_a_tolerance_class_is_that_of_the_gear(tmp_path: Path) -> None:
         ("gears.sun = [1]", r"study\.parameters\.gears\.sun: is a table, not a key"),
         ("gears.sun.teeth = { low = 20, high = 19 }", "high|low"),
         ("train.duration_ms = [1.0]", r"is no table that a stiffness job reads"),
+        (
+            "pair.pinion.profile_shift = [0.0, 0.1]",
+            r"study\.parameters = 'pair': is no table of the base job.*vary keys of",
+        ),
     ],
 )
 def test_mistakes(line: str, words: str, tmp_path: Path) -> None:
@@ -68,4 +72,10 @@ def test_mistakes(line: str, words: str, tmp_path: Path) -> None:
 def test_several_meshes_need_a_name(tmp_path: Path) -> None:
     path = study_of(tmp_path, "gears.sun.face_width_mm = [14.0]\n", STUDY.replace('mesh = "out"\n', ""))
     with pytest.raises(InputError, match=r"the file has several: in, through, out; name one: .*mesh = \"NAME\""):
+        run_study(read_study(path), tmp_path / "out", jobs=1)
+
+
+def test_an_unknown_mesh_is_named_by_its_key(tmp_path: Path) -> None:
+    path = study_of(tmp_path, "gears.sun.face_width_mm = [14.0]\n", STUDY.replace('mesh = "out"', 'mesh = "outt"'))
+    with pytest.raises(InputError, match=r"study\.mesh: unknown name 'outt'; did you mean 'out'"):
         run_study(read_study(path), tmp_path / "out", jobs=1)

@@ -19,6 +19,7 @@ from .named import NamedBearingTable, NamedGearTable, NamedMeshTable, NamedShaft
 from .pair import (
     FROM_DISTANCE,
     REQUIRED,
+    ROUNDING_MM,
     SAME,
     GearBodyTable,
     GearTable,
@@ -205,6 +206,13 @@ def shift_by_distance(gear: NamedGear, mate: NamedGear, distance_mm: float, wher
     return teeth * involutes / (2.0 * math.tan(angle)) - float(mate.form["profile_shift"])
 
 
+def _shift_in(mesh: NamedMesh, name: str) -> float:
+    """Profile shift of the gear of that name by the centre distance of a mesh and the mate's number."""
+    gear, mate = (mesh.driver, mesh.driven) if mesh.driver.name == name else (mesh.driven, mesh.driver)
+    where = f"{mesh.centre_distance_where}.centre_distance_mm"
+    return shift_by_distance(gear, mate, mesh.centre_distance_mm or 0.0, where)
+
+
 def _with_shifts(box: Gearbox) -> Gearbox:
     """The gearbox with numbers for profile shifts that follow from a centre distance, mesh by mesh."""
     gears, meshes = dict(box.gears), dict(box.meshes)
@@ -222,12 +230,16 @@ def _with_shifts(box: Gearbox) -> Gearbox:
             where = gears[left[0]].written("profile_shift")
             cure = "add the centre distance, or write a number"
             raise InputError(f"{where}.profile_shift", FROM_DISTANCE, problem, cure)
-        name, mesh = found[0]
+        name = found[0][0]
         left.remove(name)
-        gear, mate = (mesh.driver, mesh.driven) if mesh.driver.name == name else (mesh.driven, mesh.driver)
-        distance = mesh.centre_distance_mm or 0.0
-        shift = shift_by_distance(gear, mate, distance, f"{mesh.centre_distance_where}.centre_distance_mm")
-        gears[name] = replace(gear, form={**gear.form, "profile_shift": shift}, shift_from=mesh.name)
+        shifts = {mesh.name: _shift_in(mesh, name) for other, mesh in found if other == name}
+        (first, shift), gear = next(iter(shifts.items())), gears[name]
+        for second, contrary in shifts.items():
+            if abs(contrary - shift) * gear.form["module_mm"] > ROUNDING_MM:
+                problem = f"is {shift:.6g} by mesh {first!r}, but {contrary:.6g} by mesh {second!r}"
+                cure = "write a number (the larger centre distance then has backlash), or correct one centre distance"
+                raise InputError(f"{gear.written('profile_shift')}.profile_shift", FROM_DISTANCE, problem, cure)
+        gears[name] = replace(gear, form={**gear.form, "profile_shift": shift}, shift_from=first)
         meshes = {
             key: replace(one, driver=gears[one.driver.name], driven=gears[one.driven.name])
             for key, one in meshes.items()

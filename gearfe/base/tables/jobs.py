@@ -83,6 +83,7 @@ def job_tables(
             if {"run", "bodies"} <= raw.keys():
                 raise InputError("job file", str(path), "describes a mechanism", "run it: gearfe mechanism FILE")
             raise unknown_key("", name, table, [*TABLES, *NAMED], field=f"job file {Path(path).name}")
+    _check_shorthand(raw)
     for name in needed:
         if name not in raw:
             cure = f"add a table [{name}] (see gearfe new)"
@@ -96,7 +97,6 @@ def job_tables(
             found = build(table_class(name), table, name, rules=asked)
         if asked:
             made[name] = found
-    _check_shorthand(raw)
     return made
 
 
@@ -165,7 +165,9 @@ def gearbox_of(raw: dict[str, Any], path: str | Path, variant: str | None = None
     return with_loads(box, raw, variant)
 
 
-def meshes_of(raw: dict[str, Any], path: str | Path, name: str | None, variant: str | None = None) -> list[NamedMesh]:
+def meshes_of(
+    raw: dict[str, Any], path: str | Path, name: str | None, variant: str | None = None, field: str = "--mesh"
+) -> list[NamedMesh]:
     """Return the meshes that a command computes: that of `name`, or without a name all of `gearbox_of`.
 
     A file with [pair] and [train] has the mesh of [pair], and by their names those of [train], too.
@@ -180,6 +182,8 @@ def meshes_of(raw: dict[str, Any], path: str | Path, name: str | None, variant: 
         Name of a mesh.
     variant : str, optional
         Variant of [train] whose keys win over [stiffness].
+    field : str
+        What names the mesh, for messages.
 
     Raises
     ------
@@ -192,21 +196,32 @@ def meshes_of(raw: dict[str, Any], path: str | Path, name: str | None, variant: 
     if name not in box.meshes and "pair" in raw and "train" in raw:
         more: Gearbox = train_tables(raw, path, variant or "")["gearbox"]
         box = Gearbox({**more.gears, **box.gears}, {**more.meshes, **box.meshes})
-    return [box.mesh(name)]
+    return [box.mesh(name, field)]
 
 
-def only_mesh(raw: dict[str, Any], path: str | Path, name: str | None = None) -> NamedMesh:
+def only_mesh(raw: dict[str, Any], path: str | Path, name: str | None = None, field: str = "--mesh") -> NamedMesh:
     """Return the mesh of that name of a parsed job, or the only one that it has.
+
+    Parameters
+    ----------
+    raw : dict
+        The parsed job.
+    path : path
+        Its file, named in messages.
+    name : str, optional
+        Name of a mesh.
+    field : str
+        What names the mesh, for messages.
 
     Raises
     ------
     InputError
         For mistakes in the tables, and several meshes without a name.
     """
-    meshes = meshes_of(raw, path, name)
+    meshes = meshes_of(raw, path, name, field=field)
     if len(meshes) > 1:
         names = ", ".join(mesh.name for mesh in meshes)
-        raise InputError("mesh", None, f"is not named, and the file has several: {names}", NAME_ONE)
+        raise InputError(field, None, f"is not given, and the file has several: {names}", NAME_ONE)
     return meshes[0]
 
 
@@ -272,6 +287,9 @@ def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = No
                 raise InputError(f"train.{key}", None, "is required", cure)
         box = train_gearbox(table, tables.get("pair"), tables.get("microgeometry"))
     table.check_models([mesh.where for mesh in box.meshes.values()])
+    for number, load in enumerate(table.loads):
+        if load.mesh and load.mesh not in box.meshes:
+            raise unknown_name(f"train.loads[{number}].mesh", load.mesh, box.meshes)
     tables["gearbox"] = with_loads(box, raw, table.variant)
     tables["stiffness"] = stiffness_of(raw, table.variant)
     if table.housing == "elastic" and "housing" not in tables:

@@ -66,7 +66,7 @@ class ToothFormTable:
     profile_shift: float | str | None = quantity(
         None,
         choices=(FROM_DISTANCE,),
-        doc='profile shift coefficient x (times module), by default 0; for one gear of a pair "from centre distance"',
+        doc='profile shift coefficient x (times module), by default 0; for one gear of a mesh "from centre distance"',
     )
     addendum: float | None = quantity(None, doc="addendum (times module), by default 1", above=0.0)
     dedendum: float | None = quantity(None, doc="dedendum (times module), by default 1.25", above=0.0)

@@ -252,14 +252,18 @@ class TrainLoadTable:
     )
     mesh: str = quantity(
         "",
-        doc="name of the mesh of the orders (or driver-driven): order 1 is its frequency; left out: turns of the shaft",
+        doc="mesh of the orders, by its name (of [[train.meshes]]: driver-driven): order 1 is its frequency; left out: "
+        "turns of the shaft",
     )
     ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from 0 to the torque (ms)")
     ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant torque")
 
     def check(self, where: str) -> None:
-        """A ramp is of a number."""
+        """A ramp is of a number, a mesh of orders."""
         _check_ramp(where, "torque_Nm", self.torque_Nm, self.ramp_width_ms)
+        if self.mesh and not self.orders:
+            problem = "is the mesh of orders, and there are none"
+            raise InputError(f"{where}.mesh", self.mesh, problem, "add orders, or leave it out")
 
 
 def _check_ramp(where: str, key: str, value: float | TrainFunctionTable, width: float | None) -> None:

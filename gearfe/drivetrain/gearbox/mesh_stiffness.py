@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,6 +58,7 @@ def train_curves(
         raise InputError("curve", [str(f) for f in files], problem, "give one for all, or one a mesh")
     train = job_train(job)
     found: list[Stiffness] = []
+    tables = [mesh.where for mesh in job.gearbox.meshes.values()]
     for number, (mesh, made) in enumerate(zip(meshes, train.meshes, strict=True)):
         teeth = train.gear(made.driver).gear.teeth
         if files:
@@ -68,9 +70,11 @@ def train_curves(
         elif mesh.mesh_table is not None:
             driven = train.gear(made.driven).gear
             file, method = job.path.parent / mesh.mesh_table, job.table.curves.interpolation
-            found.append(read_mesh_table(file, 2.0 * math.pi / teeth, driven.base_radius, method=method))
+            with _key_in_messages(f"{tables[number]}.mesh_table", mesh.mesh_table):
+                found.append(read_mesh_table(file, 2.0 * math.pi / teeth, driven.base_radius, method=method))
         elif mesh.curve is not None:
-            found.append(_read_curve(job.path.parent / mesh.curve, teeth))
+            with _key_in_messages(f"{tables[number]}.curve", mesh.curve):
+                found.append(_read_curve(job.path.parent / mesh.curve, teeth))
         elif job.table.model_of(mesh) == POTENTIAL:
             found.append(_computed_law(job, train, number, estimate))
         else:
@@ -110,6 +114,15 @@ def compute_meshes(train: GearTrain) -> GearTrain:
                 laws[mesh.name] = cached_law(gear_pair(*contact(mesh)[:3]), model, float(most))
     meshes = (replace(mesh, stiffness=laws.get(mesh.name, mesh.stiffness)) for mesh in train.meshes)
     return replace(train, meshes=tuple(meshes))
+
+
+@contextmanager
+def _key_in_messages(key: str, file: str) -> Iterator[None]:
+    """Name the key and the file that it gives in errors of that file."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(key, file, error.problem, error.cure) from None
 
 
 def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
