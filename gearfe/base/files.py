@@ -107,9 +107,38 @@ def _encoding_problem(raw: bytes, at: int) -> tuple[str, str]:
     return f"is not UTF-8 but, it seems, {name}: line {line} has {letter!r} as byte {raw[at]:#x}", "save it as UTF-8"
 
 
+def csv_rows(text: str, path: str | Path, field: str) -> list[list[str]]:
+    """Rows of the text of a CSV file, whatever its lines end with.
+
+    Raises
+    ------
+    InputError
+        For a text that is no table.
+    """
+    try:
+        return list(csv.reader(io.StringIO(text, newline="")))
+    except csv.Error as error:
+        raise InputError(
+            field, str(path), f"is no table ({error})", "write rows of cells with commas between"
+        ) from None
+
+
+def csv_records(text: str, path: str | Path, field: str) -> list[dict[str, str]]:
+    """Rows of `csv_rows` below the header as cells by column; missing ones are empty."""
+    header, *body = [row for row in csv_rows(text, path, field) if row] or [[]]
+    return [dict(zip(header, (*row, *[""] * len(header)), strict=False)) for row in body]
+
+
+def _check_header(names: Sequence[str], path: str | Path, field: str) -> None:
+    """Raise `InputError` for two columns of one name."""
+    twice = next((name for i, name in enumerate(names) if name and name in names[:i]), None)
+    if twice is not None:
+        raise InputError(field, str(path), f"has two columns {twice}", "rename one, or leave it out")
+
+
 def _rows(path: str | Path, field: str) -> list[list[str]]:
     """Cells of a CSV file; semicolons or tabs between them, as spreadsheets of some countries write, are an error."""
-    rows = list(csv.reader(io.StringIO(read_text(path, field))))
+    rows = csv_rows(read_text(path, field), path, field)
     if rows and len(rows[0]) == 1 and any(mark in rows[0][0] for mark in ";\t"):
         cure = "write commas between cells and points in numbers"
         raise InputError(field, str(path), "has other marks than commas between its cells", cure)
@@ -128,10 +157,11 @@ def read_csv(path: str | Path, field: str) -> dict[str, list[str]]:
     if len(rows) < 2:
         raise InputError(field, str(path), "has no rows", "give a CSV file with a header line and rows")
     names = [name.strip() for name in rows[0]]
+    _check_header(names, path, field)
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(names):
             problem = f"line {number} has {len(row)} cells, the header {len(names)}"
-            raise InputError(field, str(path), problem, "mend that line")
+            raise InputError(field, str(path), problem, "correct that line")
     return {name: [row[i] for row in rows[1:]] for i, name in enumerate(names)}
 
 
@@ -168,6 +198,7 @@ def read_numbers(
     for name in needed:
         if name not in header:
             raise InputError(field, path.name, f"has no column {name}", "its first line names the columns")
+    _check_header([name for name in header if name in known], path, field)
     body = [row for row in rows[1:] if any(cell.strip() for cell in row)]
     place = {name: i for i, name in enumerate(header) if name in known}
     made = np.empty((len(body), len(place)))
@@ -178,7 +209,7 @@ def read_numbers(
             made[number] = np.nan
         if len(row) != len(header) or not np.isfinite(made[number]).all():
             problem = f"row {number + 1} must have {len(header)} numbers, all finite"
-            raise InputError(field, path.name, problem, "mend that row")
+            raise InputError(field, path.name, problem, "correct that row")
     return dict(zip(place, made.T, strict=True))
 
 

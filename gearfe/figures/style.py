@@ -39,18 +39,25 @@ def new_figure(width: float, height: float) -> Any:
 
 
 def literal(figure: Any) -> None:
-    """Draw all texts as they are written: a $ in a user's name begins no formula. Powers on logarithmic axes stay."""
+    """Draw all texts as they are written: a $ in a user's name begins no formula. Powers on logarithmic axes stay.
+
+    Ticks are those that there are: to ask for them would place those of limits that are not finite.
+    """
     from matplotlib.axis import Axis
     from matplotlib.text import Text
     from matplotlib.ticker import LogFormatter
 
-    powers: set[int] = set()
-    for axis in figure.findobj(Axis):
-        if isinstance(axis.get_major_formatter(), LogFormatter):
-            powers |= {id(text) for text in axis.findobj(Text)} - {id(axis.label)}
-    for text in figure.findobj(Text):
-        if id(text) not in powers:
-            text.set_parse_math(False)
+    left = [figure]
+    while left:
+        artist = left.pop()
+        if isinstance(artist, Text):
+            artist.set_parse_math(False)
+        elif isinstance(artist, Axis):
+            left.append(artist.label)
+            if not isinstance(artist.get_major_formatter(), LogFormatter):
+                left += [artist.offsetText, *artist.majorTicks, *artist.minorTicks]
+        else:
+            left += artist.get_children()
 
 
 def save(figure: Any, path: str | Path, *, dpi: int = DPI) -> None:

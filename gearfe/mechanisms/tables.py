@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.files import read_text
+from ..base.files import csv_records, read_text
 from ..base.tables.mechanism import ValueTableTable
 from ..base.typing import Array
 from ..multibody import TimeFunction
@@ -101,7 +100,7 @@ def read_table(name: str, table: ValueTableTable, folder: Path) -> ValueTable:
     """
     label, source = f"tables.{name}", folder / table.file
     lines = [line for line in read_text(source, f"{label}.file").splitlines() if line.strip() and line[:1] != "#"]
-    rows = list(csv.DictReader(lines))
+    rows = csv_records("\n".join(lines), source, f"{label}.file")
     columns = []
     for key in ("x", "y"):
         column = getattr(table, key)
@@ -112,10 +111,10 @@ def read_table(name: str, table: ValueTableTable, folder: Path) -> ValueTable:
             columns.append(np.array([float(row[column]) for row in rows]))
         except (TypeError, ValueError) as error:
             problem = f"is no column of numbers in {source.name} ({error})"
-            raise InputError(f"{label}.{key}", column, problem, "mend the file") from None
+            raise InputError(f"{label}.{key}", column, problem, "correct the file") from None
     x, y = columns
     if len(x) < 2 or not np.isfinite([x, y]).all():
-        raise InputError(f"{label}.file", str(source), "needs two rows or more, all finite", "mend the file")
+        raise InputError(f"{label}.file", str(source), "needs two rows or more, all finite", "correct the file")
     if not (np.diff(x) > 0.0).all():
         raise InputError(f"{label}.x", table.x, "must rise from row to row", "sort the rows and drop doubles")
     if table.interpolation == "periodic" and not (len(x) > 2 and abs(y[-1] - y[0]) <= 1e-9 * np.ptp(y)):

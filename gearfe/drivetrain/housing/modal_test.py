@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.files import read_text
+from ...base.files import csv_records, read_text
 from ...base.typing import Array, IntArray
 from ...fem.reduction.modal_body import ModalBody
 from ...output.exchange.universal import NORMAL, Mode, read_shapes
@@ -208,10 +208,7 @@ def _of_body(body: ModalBody) -> TestModes:
 
 
 def _of_table(path: Path) -> TestModes:
-    import csv
-    import io
-
-    rows = list(csv.DictReader(io.StringIO(read_text(path, "--compare"))))
+    rows = csv_records(read_text(path, "--compare"), path, "--compare")
     missing = [name for name in COLUMNS if not rows or name not in rows[0]]
     if missing:
         problem = f"lacks the columns {', '.join(missing)}"

@@ -1,0 +1,47 @@
+"""CSV files from strangers: ends of lines, columns given twice, cells without end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gearfe.base.errors import InputError
+from gearfe.base.files import read_csv, read_numbers
+from gearfe.base.tables.mechanism import ValueTableTable
+from gearfe.drivetrain.housing.modal_test import read_modes
+from gearfe.mechanisms.tables import read_table
+
+
+def numbers(path: Path) -> object:
+    return read_numbers(path, "f", ("a", "b"))
+
+
+def cam(path: Path) -> object:
+    return read_table("cam", ValueTableTable(file=path.name, x="a", y="b"), path.parent)
+
+
+READERS: list[Callable[[Path], object]] = [lambda path: read_csv(path, "f"), numbers, cam, read_modes]
+
+
+@pytest.mark.parametrize("read", READERS)
+def test_cells_without_end_are_refused(read: Callable[[Path], object], tmp_path: Path) -> None:
+    """Python's reader of CSV files takes cells up to 131072 characters."""
+    (tmp_path / "a.csv").write_text("a,b\n1,2\n2," + "3" * 200_000 + "\n")
+    with pytest.raises(InputError, match="is no table"):
+        read(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_any_end_of_lines(end: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(end.join(["a,b", "1,2", "3,4", ""]).encode())
+    assert read_csv(tmp_path / "a.csv", "f") == {"a": ["1", "3"], "b": ["2", "4"]}
+    assert read_numbers(tmp_path / "a.csv", "f", ("b",))["b"].tolist() == [2.0, 4.0]
+
+
+@pytest.mark.parametrize("read", READERS[:2])
+def test_columns_given_twice_are_refused(read: Callable[[Path], object], tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("a,b,a\n1,2,3\n")
+    with pytest.raises(InputError, match="two columns a"):
+        read(tmp_path / "a.csv")
