@@ -350,7 +350,7 @@ class _Parser:
             return Node("number", CONSTANTS[name])
         if plain is None or name in plain:
             return Node("quantity", (name, None))
-        raise self.unknown(name)
+        raise self.unknown(name, self.names.quantities)
 
     def call(self, name: str, arguments: Sequence[ast.expr]) -> Node:
         names = self.names
@@ -362,21 +362,20 @@ class _Parser:
         counts = [count for known, count in _CALLS if known == name and (names.columns or (name, count) in FUNCTIONS)]
         counts += [1] if name in names.tables else []
         if not counts:
-            raise self.unknown(name)
+            raise self.unknown(name, [*names.functions, *names.tables, *names.of])
         if len(arguments) not in counts:
             known = " or ".join(map(str, counts))
             raise self.wrong(f"{name} takes {known} argument(s), not {len(arguments)}")
         parts = tuple(self.node(argument) for argument in arguments)
         return Node("table", (name, names.tables[name]), parts) if name in names.tables else Node("call", name, parts)
 
-    def unknown(self, name: str) -> InputError:
-        """Error for a name that does not exist, or not in such an expression."""
+    def unknown(self, name: str, known: Sequence[str]) -> InputError:
+        """Error for a name that does not exist, or not in such an expression; `known` could stand there."""
         names = self.names
         if name in names.others:
             quantities_here = ", ".join((*(names.plain or ()), *names.of))
             problem = f"uses {name}; {names.what} may depend on {quantities_here}"
             return InputError(self.label, self.text, problem, "use one of these")
-        known = [*(names.plain or ()), *names.of, *CONSTANTS, *names.functions, *names.tables]
         return unknown_name(f"{self.label} = {self.text!r}", name, known)
 
     def wrong(self, problem: str) -> InputError:

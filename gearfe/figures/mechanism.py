@@ -20,6 +20,8 @@ from .style import BLUE, COLOURS, ORANGE, fixed, new_figure, save_fixed, tidy
 
 #: Times at which curves are drawn at least: four for each pixel of their width.
 LEAST_TIMES = 2000
+#: Larger values leave a gap: the ticks of an axis that holds them overflow.
+LARGEST_DRAWN = 1e300
 
 
 @stage("pictures")
@@ -154,7 +156,9 @@ def _curves(path: Path, mechanism: Mechanism, results: Results) -> None:
     shown = False
     for axes, name in zip(all_axes[:, 0], names, strict=True):
         period = next(o.wrap for o in mechanism.file.outputs if o.name == name)
-        axes.plot(time, _broken(results.outputs[name], period), lw=1.2, color=BLUE)
+        value = _broken(results.outputs[name], period)
+        drawn = np.where(np.abs(value) < LARGEST_DRAWN, value, np.nan)
+        axes.plot(time, drawn, lw=1.2, color=BLUE)
         column = table.reference_columns.get(name)
         if reference is not None and column is not None:
             value = reference[column] if period is None else np.mod(reference[column], period)
