@@ -47,7 +47,7 @@ def test_the_series_sums_up_to_the_law(kind, s):
     random, t, most = np.random.default_rng(4), 0.21e-3, 30
     u = np.zeros((6, most + 1))
     u[:, :5] = random.normal(size=(6, 5)) * [1e-6, 2e-7, 1e-7, 1e-7, 1e-7]
-    u[3:5, 0] = 3.1e-5, 1.7e-5  # no pair leaves its cell of the force
+    u[3:5, 0] = 3.1e-5, 2.0e-5  # no pair leaves its cell of the force
     parameters, memory, pieces = series_at_start(forces, t, math.copysign(1.0, s), u, s)
     out, orders = np.zeros(6), np.zeros((most, 6))
     for j in range(most):
