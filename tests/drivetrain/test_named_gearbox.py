@@ -148,7 +148,7 @@ WRONG_GEARS: list[tuple[dict[str, Any], str]] = [
     ({"gears__sun__y_mm": 80.0}, r"gear 'sun'.* beyond the end of shaft 's1'"),
     ({"gears__a b": GEAR}, r"name in \[gears\] = 'a b': must have letters, digits"),
     ({"gears__Sun": GEAR}, r"name in \[gears\] = '(Sun|sun)': differs from .* upper and lower case"),
-    ({"gears__teeth": 20}, r"gears\.teeth = 20: stands in \[gears\], .*\[gears\.NAME\]"),
+    ({"gears__teeth": 20}, r"gears\.teeth = 20: is in \[gears\], .*\[gears\.NAME\]"),
     ({"gears": {}}, r"\[gears\]: is empty"),
     ({"gears": None}, r"\[gears\]: is missing"),
     (
@@ -186,7 +186,7 @@ WRONG_MESHES: list[tuple[dict[str, Any], str]] = [
     ({"meshes": {}}, r"\[meshes\]: is empty"),
     ({"meshes": None}, r"\[meshes\]: is missing"),
     ({"meshes__in.out": {"driver": "sun", "driven": "idler"}}, r"name in \[meshes\] = 'in.out': must have letters"),
-    ({"meshes__driver": "sun"}, r"meshes\.driver = 'sun': stands in \[meshes\]"),
+    ({"meshes__driver": "sun"}, r"meshes\.driver = 'sun': is in \[meshes\]"),
 ]
 WRONG_SHAFTS: list[tuple[dict[str, Any], str]] = [
     ({"shafts__s1__x_mm": None}, r"shafts\.s1\.x_mm: is required"),
@@ -244,7 +244,7 @@ WRONG_MATERIALS: list[tuple[dict[str, Any], str]] = [
     ({"materials__steel__density_kg_per_m3": 0.0}, r"materials\.steel\.density_kg_per_m3 = 0.0"),
     ({"materials__steel__rho": 7850.0}, r"materials\.steel: unknown name 'rho'; did you mean 'density_kg_per_m3'"),
     ({"materials__steel__yield_MPa": 500.0}, r"materials\.steel\.yield_MPa = 500.0: materials that yield"),
-    ({"materials__steel": 206.0}, r"materials\.steel = 206.0: stands in \[materials\]"),
+    ({"materials__steel": 206.0}, r"materials\.steel = 206.0: is in \[materials\]"),
     ({"materials": {}}, r"\[materials\]: is empty"),
     ({"materials": None}, r"gears\.sun\.material: unknown name 'steel'; known names: none"),
     ({"materials__18Cr Ni": {}}, r"name in \[materials\] = '18Cr Ni': must have"),

@@ -137,7 +137,10 @@ def test_a_table_of_several_cycles_agrees_with_itself(step) -> None:
     rounded = np.radians(np.round(np.degrees(phase), 3))
     periodic_interpolant(rounded, values, PERIOD)
     order = rng.permutation(len(phase))
-    periodic_interpolant(phase[order] - 3 * PERIOD, values[order], PERIOD)
+    moved = periodic_interpolant(phase[order] - 3 * PERIOD, values[order], PERIOD)
+    places = np.linspace(0.0, PERIOD, 31)
+    whole = periodic_interpolant(phase, values, PERIOD)
+    assert moved(places).value == pytest.approx(whole(places).value, rel=1e-6)
 
 
 @pytest.mark.parametrize("step", [1 / 12, 1 / 36, 0.0713, 0.019])

@@ -28,7 +28,7 @@ def pair(law, *, speed=600.0, torque=None, backlash=None, **changes):  # type: i
 
 
 def free_pair(law, force):  # type: ignore[no-untyped-def]
-    """Both shafts free but for balanced torques, the drive a spring of no consequence."""
+    """Both shafts free except for balanced torques, the drive a spring of no consequence."""
     gear_train = pair(law)
     drive = Drive("s0", "s0+", constant(600.0), stiffness=1e-9)
     loads = (Load("s0", None, constant(force * R1)), Load("s1", None, constant(force * R2)))

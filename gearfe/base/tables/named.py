@@ -125,7 +125,7 @@ def named_tables(kind: str, table: Any, *, rules: bool = True) -> dict[str, Any]
         raise InputError(f"[{kind}]", None, "is empty", f"write at least one [{kind}.NAME], or leave it out")
     for name, entry in table.items():
         if not isinstance(entry, Mapping):
-            problem = f"stands in [{kind}], which has entries with names only"
+            problem = f"is in [{kind}], which has entries with names only"
             raise InputError(f"{kind}.{name}", entry, problem, f"write it below [{kind}.NAME]")
         if not _NAME.fullmatch(name):
             problem = "must have letters, digits, _ and - only, a letter or digit first: it names columns and files"

@@ -228,11 +228,6 @@ class LawFlank(MeshFlank):
             Rates of the motion, and the friction.
         begin : ndarray, shape (n, slots), optional
             Pair forces (N) from which the law's iteration starts, and which it overwrites, see `MeshLaw`.
-
-        Raises
-        ------
-        ArithmeticError
-            If the pair forces do not settle; with `begin` their sum is NaN instead.
         """
         loads = self.law(phase, approach, self.shifts_at(phase), begin)
         push = 1.0 + self.damping * slip.rates[:, 0]

@@ -199,7 +199,7 @@ class Positions:
         rad, the twist from where a wheel space faces the pinion tooth.
     status : ndarray of str, shape (n,)
         ``converged``, ``no_contact`` (the undeformed gears are clear of each other), ``under_resolved`` (elements too
-        coarse for the contact) or ``not_converged``. Torques are 0 without contact, not-a-number when not solved.
+        coarse for the contact) or ``not_converged``. Torques are 0 without contact, NaN when not solved.
     torque_wheel, torque_pinion : ndarray, shape (n,)
         Moments that the hubs need, energy-conjugate: sum of (x - c) x f over the current places (N m).
     torque_wheel_reaction : ndarray, shape (n,)

@@ -49,7 +49,7 @@ def as_text(values: ArrayLike, column: str) -> list[str]:
 
 
 def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -> Array:
-    """Column `name` in SI; not-a-number where a cell is empty, or the file has no such column."""
+    """Column `name` in SI; NaN where a cell is empty, or the file has no such column."""
     made, factor = np.full(len(next(iter(columns.values()))), np.nan), _factor(name)
     for row, cell in enumerate(columns.get(name, ())):
         with suppress(ValueError):
@@ -61,7 +61,7 @@ def numbers(columns: Mapping[str, Sequence[str]], name: str, path: str | Path) -
     return made
 
 
-#: Statuses that stand for a result; every other one marks a failed position, whose numbers are not-a-number.
+#: Statuses that stand for a result; every other one marks a failed position, whose numbers are NaN.
 SOLVED = ("converged", "no_contact")
 #: Status of a cell whose back flanks would be loaded, too: gears that jam.
 BACK = "back_flanks_bear"
@@ -104,7 +104,7 @@ OUTLIER = 2.0
 class StiffnessCurve(ShownTable):
     """Mesh stiffness of a gear pair over the pinion's rotation; all arrays have one entry per position, shape (n,).
 
-    What is not given is unknown: not-a-number, -1 or an empty word; an array of another length is an `InputError`.
+    What is not given is unknown: NaN, -1 or an empty word; an array of another length is an `InputError`.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ class StiffnessCurve(ShownTable):
         Largest Hertzian pressure of the tooth pairs that bear on smooth flanks (Pa), and how far the computed contacts
         are from Hertz's (-), see `gearfe.gears.gearmesh.pair_loads`; NaN where none does.
     edge_pressure
-        The like where an edge bears (Pa), blunted by a hundredth of a module; not-a-number where none bears.
+        The like where an edge bears (Pa), blunted by a hundredth of a module; NaN where none bears.
     edge
         ``none``; ``rounded``: a tip round bears; ``singular``: a sharp edge bears, under which the pressure of linear
         elasticity has no bound. Empty where unknown.
@@ -161,7 +161,7 @@ class StiffnessCurve(ShownTable):
         Seconds by stage; not in the CSV file.
     relative_error
         Estimated discretisation error of k_mesh (-), which covers the true one at about 19 of 20 positions, see
-        `gearfe.gears.gearmesh.positions`; not-a-number where there is none.
+        `gearfe.gears.gearmesh.positions`; NaN where there is none.
     """
 
     pinion_angle: Array = _column("pinion_angle_deg")
@@ -223,13 +223,13 @@ class StiffnessCurve(ShownTable):
 
     @property
     def typical_error(self) -> float:
-        """Median of the estimates (-); not-a-number where there are none."""
+        """Median of the estimates (-); NaN where there are none."""
         known = self.relative_error[np.isfinite(self.relative_error)]
         return float(np.median(known)) if len(known) else math.nan
 
     @property
     def worst_error(self) -> float:
-        """Estimated error of the position that errs most (-): `OUTLIER` times the largest; or not-a-number."""
+        """Estimated error of the position that errs most (-): `OUTLIER` times the largest; or NaN."""
         known = self.relative_error[np.isfinite(self.relative_error)]
         return OUTLIER * float(known.max()) if len(known) else math.nan
 

@@ -42,7 +42,7 @@ class RootMap:
     ----------
     stress : ndarray, shape (m, n, 2, p)
         Largest tension along the loaded side's fillet of the teeth of pairs `leading_pair`, `leading_pair` - 1, ...
-        (Pa); not-a-number where the pair carries nothing.
+        (Pa); NaN where the pair carries nothing.
     diameter : ndarray, shape (m, n, 2)
         Where the largest one of them acts (m).
     error : ndarray, shape (m, n, 2)

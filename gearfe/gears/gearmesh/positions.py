@@ -156,7 +156,7 @@ class PositionSolver:
 
     def elements_per_contact(self, found: Positions) -> Array:
         """Elements that see the contact of positions of `half_plane`, shape (n,): harmonic means, by force, over their
-        tooth pairs; not-a-number without contact.
+        tooth pairs; NaN without contact.
         """
         contacts = found.contacts
         sizes = np.zeros(len(contacts))
