@@ -22,6 +22,8 @@ from gearfe.study.statistics import pareto_set, proportion, spread
 from tests.makers.studies import written
 from tests.places import GEOMETRY
 
+PAIR = {"pair": {"pinion": {"teeth": 20}, "wheel": {"teeth": 40}}}  # tables that the base job of a study has
+
 # ------------------------------------------------------------------------------------------ parameters and designs
 
 
@@ -33,7 +35,7 @@ def test_distributions_have_their_quantiles():
         "pair.pinion.teeth": {"low": 18, "high": 20},
         "stiffness.plane": ["strain", "stress"],
     }
-    even, normal, cut, whole, listed = read_parameters(given, "stiffness", {})
+    even, normal, cut, whole, listed = read_parameters(given, "stiffness", PAIR)
     share = np.array([0.05, 0.3, 0.5, 0.95])
     np.testing.assert_allclose(even.at(share), 0.9 + 0.2 * share)
     np.testing.assert_allclose(normal.at(share), norm(1.25, 0.05).ppf(share))
@@ -59,8 +61,8 @@ def test_slopes_of_a_class_are_within_its_tolerance():
 
 
 def test_names_may_be_tables_within_tables_or_quoted():
-    nested = read_parameters({"pair": {"pinion": {"profile_shift": {"low": 0.0, "high": 0.3}}}}, "stiffness", {})
-    quoted = read_parameters({"pair.pinion.profile_shift": {"low": 0.0, "high": 0.3}}, "stiffness", {})
+    nested = read_parameters({"pair": {"pinion": {"profile_shift": {"low": 0.0, "high": 0.3}}}}, "stiffness", PAIR)
+    quoted = read_parameters({"pair.pinion.profile_shift": {"low": 0.0, "high": 0.3}}, "stiffness", PAIR)
     assert nested == quoted
 
 
@@ -87,7 +89,7 @@ def test_names_may_be_tables_within_tables_or_quoted():
 )
 def test_wrong_parameters_are_named(given, told):
     with pytest.raises(InputError, match=told):
-        read_parameters(given, "vibration" if "train.meshes" in given else "stiffness", {})
+        read_parameters(given, "vibration" if "train.meshes" in given else "stiffness", PAIR)
 
 
 def table(**keys) -> StudyTable:
@@ -99,11 +101,11 @@ def test_designs_are_those_of_their_seed(tmp_path):
     keys = {"pair.addendum": {"low": 0.9, "high": 1.1}, "pair.pinion.teeth": {"low": 18, "high": 40}}
     for design in ("latin_hypercube", "sobol", "saltelli"):
         made = [
-            study_cases(table(design=design, cases=16, seed=seed, parameters=keys), tmp_path, {})[1]
+            study_cases(table(design=design, cases=16, seed=seed, parameters=keys), tmp_path, PAIR)[1]
             for seed in (1, 1, 2)
         ]
         assert made[0] == made[1] != made[2]
-    one = [case[0] for case in study_cases(table(cases=50, parameters=keys), tmp_path, {})[1]]
+    one = [case[0] for case in study_cases(table(cases=50, parameters=keys), tmp_path, PAIR)[1]]
     assert sorted(int((value - 0.9) / 0.2 * 50) for value in one) == list(range(50))  # one in each of 50 equal parts
 
 
@@ -113,17 +115,17 @@ def test_factorial_is_all_combinations(tmp_path):
         "pair.pinion.teeth": {"low": 18, "high": 20},
         "stiffness.plane": ["strain", "stress"],
     }
-    cases = study_cases(table(design="factorial", parameters=keys), tmp_path, {})[1]
+    cases = study_cases(table(design="factorial", parameters=keys), tmp_path, PAIR)[1]
     assert cases == list(itertools.product([0.9, 1.0, 1.1], [18, 19, 20], ["strain", "stress"]))
     with pytest.raises(InputError, match="no levels"):
-        study_cases(table(design="factorial", parameters={"pair.addendum": {"low": 0.9, "high": 1.1}}), tmp_path, {})
+        study_cases(table(design="factorial", parameters={"pair.addendum": {"low": 0.9, "high": 1.1}}), tmp_path, PAIR)
 
 
 def test_rows_come_from_a_table(tmp_path):
     (tmp_path / "rows.csv").write_text(
         "pair.pinion.teeth,pair.addendum,stiffness.plane\n20,1.0,strain\n21,1.1,stress\n"
     )
-    parameters, cases = study_cases(table(design="rows", rows_csv="rows.csv"), tmp_path, {})
+    parameters, cases = study_cases(table(design="rows", rows_csv="rows.csv"), tmp_path, PAIR)
     assert [one.name for one in parameters] == ["pair.pinion.teeth", "pair.addendum", "stiffness.plane"]
     assert cases == [(20, 1.0, "strain"), (21, 1.1, "stress")]
     assert isinstance(cases[0][0], int)
@@ -301,4 +303,4 @@ def test_elementary_effects_of_a_linear_function_are_its_slopes(tmp_path):
 )
 def test_wrong_tables_are_named(keys, told, tmp_path):
     with pytest.raises(InputError, match=told):
-        study_cases(table(**{"parameters": {"pair.addendum": {"low": 0.9, "high": 1.1}}, **keys}), tmp_path, {})
+        study_cases(table(**{"parameters": {"pair.addendum": {"low": 0.9, "high": 1.1}}, **keys}), tmp_path, PAIR)
