@@ -43,7 +43,7 @@ def test_the_series_sums_up_to_the_law(kind, s):
     else:
         flanks = (flank(1.0, kind, 3, 2), flank(-1.0, kind, 4, 2, parts=True, gap=-2e-6))
     angle = speed.integral(0.0, 0.0)
-    forces = TrainForces(6, angle, (Gyro(0, 1.5, 2e-4),), flanks, ((5, torque),))
+    forces = TrainForces(6, angle, (Gyro(0, 2, 1.5, 2e-4),), flanks, ((5, torque),))
     random, t, most = np.random.default_rng(4), 0.21e-3, 30
     u = np.zeros((6, most + 1))
     u[:, :5] = random.normal(size=(6, 5)) * [1e-6, 2e-7, 1e-7, 1e-7, 1e-7]

@@ -78,9 +78,13 @@ def _sized(model: TrainModel, shape: Array) -> Array:
     train, body = model.train, model.train.housing
     most, places = 0.0, [np.array([train.shaft(gear.shaft).point for gear in train.gears])]
     for gear in train.gears:
-        first = model.first[train.shaft_number(gear.shaft)]
-        own = shape[first : first + 6]
-        most = max(most, float(np.linalg.norm(own[:3]) + gear.gear.tip_radius * np.linalg.norm(own[3:])))
+        number = train.shaft_number(gear.shaft)
+        shaft, base = model.shafts[number], np.array(train.shaft(gear.shaft).point)
+        own = shape[model.first[number] : model.first[number] + shaft.size]
+        centre = base + (gear.along - float(base @ train.frame[2])) * train.frame[2]
+        moves = shaft.point_rows(centre, train.frame, gear.along) @ own
+        turns = shaft.turn_rows(gear.along) @ own
+        most = max(most, float(np.linalg.norm(moves) + gear.gear.tip_radius * np.linalg.norm(turns)))
     if body is not None and body.has_mesh:
         most = max(most, float(np.abs(body.reconstruct(shape[None, : body.size])).max()))
         places.append(body.nodes)

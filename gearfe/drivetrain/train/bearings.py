@@ -104,8 +104,9 @@ def _moved(train: GearTrain, shafts: Shafts, bore: str) -> Array:
     selector = None if train.housing is None else np.eye(train.housing.size)[:, train.housing.attachment(bore)]
     local = bore_rows(shafts.bodies[number], train.bore_points[bore], train.frame, selector)
     rows, first = np.zeros((5, shafts.size)), int(shafts.first[number])
-    rows[:, first : first + 6] = local[:, :6]
-    rows[:, : local.shape[1] - 6] += local[:, 6:]
+    own = shafts.bodies[number].size
+    rows[:, first : first + own] = local[:, :own]
+    rows[:, : local.shape[1] - own] += local[:, own:]
     return rows
 
 

@@ -1,8 +1,9 @@
 r"""Elements of a train for the rigid core: shaft, hinge, bearing, constant springs and dampers.
 
-Coordinates of a shaft: displacement of its mass centre along x, y, z (m), small tilts about e1 and e2 (rad), and the
-rest of its spin about the axis a beside rolling with the drive (rad). A housing has the six coordinates of each bore,
-then its internal ones. Forces of second order in the small motions (torque times tilt) are left out.
+First coordinates of a shaft: displacement of its mass centre along x, y, z (m), small tilts about e1 and e2 (rad), and
+the rest of its spin about the axis a beside rolling with the drive (rad), all of its mean motion. What is fixed on a
+shaft moves as the section that carries it (`ShaftBody`). A housing has the six coordinates of each bore, then its
+internal ones. Forces of second order in the small motions (torque times tilt) are left out.
 
 **Mass and inertia** of a shaft with its gears follow from geometry and density. A gear is its exact tooth outline of
 width b outside the shaft (or its bore, where that is wider); with the polygon's :math:`A = \tfrac12\sum c_i`, :math:`J
@@ -16,6 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -88,8 +90,56 @@ def rotor(train: GearTrain, shaft: Shaft) -> Rotor:
     return Rotor(mass, polar, transverse, centre)
 
 
+class Gyration(NamedTuple):
+    """Gyroscopic couple of a shaft: a polar inertia on two tilts, directions of its coordinates.
+
+    A rigid shaft has one; of an elastic one they add up to the moments of all its sections and gears.
+    """
+
+    polar: float  # kg m2
+    tilt: Array  # about e1, (size,)
+    other: Array  # about e2, (size,)
+
+
+class ShaftBody(Element):
+    """A shaft with its gears, rigid or elastic: what a train asks of it.
+
+    Of its coordinates the first six are those of the mean motion: of the mass centre, both tilts, and the spin beside
+    rolling. They are orthogonal to all others with respect to the mass.
+    """
+
+    rotor: Rotor
+    start_rate: float
+
+    def point_rows(self, point: Array, frame: Array, along: float | None = None) -> Array:
+        """Return the displacement of a point along x, y, z beside rolling, per unit coordinate.
+
+        Parameters
+        ----------
+        point : ndarray, shape (3,)
+            In m.
+        frame : ndarray, shape (3, 3)
+            Rows e1, e2, a: directions of the train.
+        along : float, optional
+            Coordinate along the axis (m) of the section that carries the point; left out: that of the point.
+
+        Returns
+        -------
+        rows : ndarray, shape (3, size)
+        """
+        raise NotImplementedError
+
+    def turn_rows(self, along: float) -> Array:
+        """Rotation of the section at a coordinate along the axis (m) about e1, e2, a per unit coordinate, (3, size)."""
+        raise NotImplementedError
+
+    def gyrations(self) -> tuple[Gyration, ...]:
+        """Gyroscopic couples."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True, eq=False)
-class RigidShaft(Element):
+class RigidShaft(ShaftBody):
     """A shaft with its gears: six coordinates, constant diagonal mass.
 
     Parameters
@@ -114,10 +164,19 @@ class RigidShaft(Element):
         """At rest but for the spin."""
         return np.zeros(6), np.array([0.0, 0.0, 0.0, 0.0, 0.0, self.start_rate])
 
-    def point_rows(self, point: Array, frame: Array) -> Array:
-        """Displacement of a point of the shaft, beside rolling: rows x, y, z on its coordinates, shape (3, 6)."""
+    def point_rows(self, point: Array, frame: Array, along: float | None = None) -> Array:  # noqa: ARG002
+        """Displacement of a point along x, y, z beside rolling per unit coordinate, (3, 6); `along` does not matter."""
         arm = point - self.rotor.centre
         return np.hstack([np.eye(3), np.cross(frame, arm).T])
+
+    def turn_rows(self, along: float) -> Array:  # noqa: ARG002
+        """Rotation about e1, e2, a, the same of all sections, (3, 6)."""
+        return np.eye(6)[3:]
+
+    def gyrations(self) -> tuple[Gyration, ...]:
+        """The one of the whole."""
+        unit = np.eye(6)
+        return (Gyration(self.rotor.polar, unit[3], unit[4]),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,12 +193,12 @@ class LinearForce(Element):
         return self.C, self.K
 
 
-def bore_rows(shaft: RigidShaft, point: Array, frame: Array, bore: Array | None) -> Array:
+def bore_rows(shaft: ShaftBody, point: Array, frame: Array, bore: Array | None) -> Array:
     """Return the motion of a shaft relative to a bore: along e1, a, e2 and tilt about e1, e2.
 
     Parameters
     ----------
-    shaft : RigidShaft
+    shaft : ShaftBody
         The shaft.
     point : ndarray, shape (3,)
         Reference point of the bore, on the shaft's axis (m).
@@ -150,16 +209,16 @@ def bore_rows(shaft: RigidShaft, point: Array, frame: Array, bore: Array | None)
 
     Returns
     -------
-    rows : ndarray, shape (5, 6) or (5, 6 + N)
+    rows : ndarray, shape (5, size) or (5, size + N)
         Relative displacements and tilts per unit coordinate of shaft and housing.
     """
     e1, e2, a = frame
     directions = np.array([e1, a, e2])
     moved = shaft.point_rows(point, frame)
     moved[:, 5] = 0.0  # the point is on the axis
-    rows = np.zeros((5, 6))
+    rows = np.zeros((5, shaft.size))
     rows[:3] = directions @ moved
-    rows[3, 3] = rows[4, 4] = 1.0
+    rows[3:] = shaft.turn_rows(float(point @ a))[:2]
     if bore is None:
         return rows
     other = np.zeros((5, 6))
@@ -168,16 +227,16 @@ def bore_rows(shaft: RigidShaft, point: Array, frame: Array, bore: Array | None)
     return np.hstack([rows, -other @ bore.T])
 
 
-def hinge(shaft: RigidShaft, housing: ModalBlocks | None, rows: Array, name: str) -> LinearJoint:
+def hinge(shaft: ShaftBody, housing: ModalBlocks | None, rows: Array, name: str) -> LinearJoint:
     """Return the ideal bearing of a shaft in a bore: five constraints that leave the spin free.
 
     Parameters
     ----------
-    shaft : RigidShaft
+    shaft : ShaftBody
         The shaft.
     housing : ModalBlocks or None
         Body with the bore; None for a rigid housing.
-    rows : ndarray, shape (5, 6) or (5, 6 + N)
+    rows : ndarray, shape (5, size) or (5, size + N)
         Motion of the shaft relative to the bore per unit coordinate, see `bore_rows`.
     name : str
         Name in messages.
@@ -187,7 +246,7 @@ def hinge(shaft: RigidShaft, housing: ModalBlocks | None, rows: Array, name: str
 
 
 def bearing(
-    shaft: RigidShaft, housing: ModalBlocks | None, rows: Array, stiffness: Array, damping: Array, name: str
+    shaft: ShaftBody, housing: ModalBlocks | None, rows: Array, stiffness: Array, damping: Array, name: str
 ) -> LinearForce:
     """Return the springs and dampers of a bearing along the five relative motions of shaft and bore.
 
@@ -195,11 +254,11 @@ def bearing(
 
     Parameters
     ----------
-    shaft : RigidShaft
+    shaft : ShaftBody
         The shaft.
     housing : ModalBlocks or None
         Body with the bore; None for a rigid housing.
-    rows : ndarray, shape (5, 6) or (5, 6 + N)
+    rows : ndarray, shape (5, size) or (5, size + N)
         R: motion of the shaft relative to the bore per unit coordinate, see `bore_rows`.
     stiffness : ndarray, shape (5,)
         Along e1, a, e2 (N/m) and about e1, e2 (N m/rad).

@@ -12,8 +12,8 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
   :math:`-s M` along r, the driver's rotation relative to the line of centres; with *friction* (`train.friction`)
   :math:`-\sum\mu N_k s(v_k/v_0)` across the line of action, and that times :math:`e_k` along the driver's turn
   against the driven gear;
-- *gyroscopic*: :math:`-J_p\Omega\,(u_{d+1}', -u_d')`, :math:`\Omega = g\psi' + u_{d+2}'`, on the tilts d, d + 1 of a
-  shaft with the spin d + 2;
+- *gyroscopic*: :math:`-J_p\Omega\,(u_{d+1}', -u_d')`, :math:`\Omega = g\psi' + u_s'`, on the tilts d, d + 1 of a
+  shaft with the spin s;
 - *torques*: functions of time along a direction.
 
 A mesh has one flank, or two: the back flank has its own approach, along the other line of action, and its law is
@@ -267,9 +267,13 @@ Flank = CurveFlank | LawFlank
 
 @dataclass(frozen=True)
 class Gyro:
-    """Gyroscopic moments on the tilts `direction` and the one after it; `polar` in kg m2."""
+    """Gyroscopic moments on the tilts `direction` and the one after it, of a shaft that turns by the direction `spin`.
+
+    `polar` is in kg m2.
+    """
 
     direction: int
+    spin: int
     ratio: float
     polar: float
 
@@ -321,7 +325,7 @@ class TrainForces:
                 out[:, flank.sliding.spin] -= made.drag.value[:, 1]
         for gyro in self.gyros:
             d = gyro.direction
-            momentum = gyro.polar * (gyro.ratio * rate + du[:, d + 2])
+            momentum = gyro.polar * (gyro.ratio * rate + du[:, gyro.spin])
             out[:, d] -= momentum * du[:, d + 1]
             out[:, d + 1] += momentum * du[:, d]
         for direction, torque in self.torques:

@@ -35,6 +35,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +45,7 @@ from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant, on_common_nodes
 from ...gears.geometry.pair import GearPair, gear_pair
 from ...multibody import Element, LinearJoint
-from .elements import LinearForce, RigidShaft
+from .elements import Gyration, LinearForce, ShaftBody
 from .forces import CurveFlank, Flank, LawFlank
 from .friction import CREEP, NEAR, Lubrication, Sliding
 from .gear_train import GearMesh, GearTrain
@@ -76,6 +77,8 @@ class MeshLine:
         Approach of the driving flanks for unit coordinates of the system.
     columns : tuple of ndarray, shape (system size,)
         Directions that its flanks count: approaches, then of a law the driver's turn, then those of friction.
+    spin : ndarray, shape (system size,)
+        Rotation of the driver about its axis beside rolling.
     flanks
         Driving flanks, and the back flanks behind a backlash; none of a rigid mesh.
     rayleigh
@@ -92,6 +95,7 @@ class MeshLine:
     point: Array
     row: Array
     columns: tuple[Array, ...]
+    spin: Array
     flanks: tuple[Flank, ...]
     rayleigh: float
     reference: float
@@ -207,10 +211,31 @@ class Shafts:
         Number of the system's coordinates.
     """
 
-    bodies: tuple[RigidShaft, ...]
+    bodies: tuple[ShaftBody, ...]
     first: IntArray
     ratios: tuple[float, ...]
     size: int
+
+    def whole(self, number: int, rows: Array) -> Array:
+        """Rows (..., size of a shaft) on the coordinates of a shaft as rows on those of the system, (..., size)."""
+        made = np.zeros((*rows.shape[:-1], self.size))
+        made[..., self.first[number] : self.first[number] + rows.shape[-1]] = rows
+        return made
+
+    @cached_property
+    def gyrations(self) -> tuple[tuple[Gyration, ...], ...]:
+        """Gyroscopic couples of each."""
+        return tuple(body.gyrations() for body in self.bodies)
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Number of directions of each: two tilts a gyroscopic couple, then the spin."""
+        return tuple(2 * len(couples) + 1 for couples in self.gyrations)
+
+    @property
+    def spins(self) -> tuple[int, ...]:
+        """Number of the direction of each one's spin."""
+        return tuple(int(end) - 1 for end in np.cumsum(self.counts))
 
 
 class _Directions(NamedTuple):
@@ -222,11 +247,12 @@ class _Directions(NamedTuple):
     back: Array  # approach of the back flanks
     turn: Array  # the driver's rotation relative to the line of centres
     across: tuple[Array, Array]  # displacement of driver against driven gear at P along a x n and a x n_b
-    spin: Array  # the driver's turn against the driven gear's
+    spin: Array  # the driver's turn
+    spins: Array  # the driver's turn against the driven gear's
 
 
 def mesh_lines(train: GearTrain, shafts: Shafts) -> tuple[MeshLine, ...]:
-    """Records of all meshes of a train, whose directions follow three of each shaft.
+    """Records of all meshes of a train, whose directions follow those of the shafts.
 
     Raises
     ------
@@ -234,7 +260,7 @@ def mesh_lines(train: GearTrain, shafts: Shafts) -> tuple[MeshLine, ...]:
         If friction follows from the lubrication and the gears stand still.
     """
     lines: list[MeshLine] = []
-    first = 3 * len(shafts.bodies)
+    first = sum(shafts.counts)
     for number in range(len(train.meshes)):
         lines.append(_mesh_line(train, number, shafts, first))
         first += len(lines[-1].columns)
@@ -255,12 +281,15 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
     sliding = _sliding(mesh, pair, force, (ratio, shafts.ratios[j]), fastest(train.driven.speed))
     ends = [(1.0, mean, 0.0, in_contact[1])] + ([] if backlash is None else [(-1.0, 0.0, backlash, 0.0)])
     columns, flanks = [along.row, along.back][: len(ends)], list[Flank]()
-    turn = 3 * i + 2
+    turn = shafts.spins[i]
+    if law is None and shafts.bodies[i].size > 6:  # a section of an elastic shaft turns by itself
+        turn = first + len(columns)
+        columns.append(along.spin)
     if law is not None:
         turn = first + len(columns)
         columns.append(along.turn)
         if sliding is not None:
-            columns += [along.across[0], along.spin, along.across[1]][: 1 + len(ends)]
+            columns += [along.across[0], along.spins, along.across[1]][: 1 + len(ends)]
     for side, (sign, stiffness, gap, mean_damping) in enumerate(ends):
         place = (first + side, turn, ratio, sign * sense, sign * rolled.phases[number], stiffness, gap)
         if law is not None:
@@ -275,8 +304,8 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
             parts = backlash is not None
             flanks.append(CurveFlank(*place, curve, parts, in_contact[0], mean_damping, error, always))
     return MeshLine(
-        mesh, pair, i, along.direction, along.point, along.row, tuple(columns) if flanks else (), tuple(flanks),
-        rayleigh, reference,
+        mesh, pair, i, along.direction, along.point, along.row, tuple(columns) if flanks else (), along.spin,
+        tuple(flanks), rayleigh, reference,
     )  # fmt: skip
 
 
@@ -294,7 +323,6 @@ def _stiffness(mesh: GearMesh, force: float) -> tuple[MeshLaw | None, float | No
 
 def _directions(train: GearTrain, mesh: GearMesh, pair: GearPair, sense: float, shafts: Shafts) -> _Directions:
     """Directions of a mesh whose driver pushes in a sense (+1 or -1)."""
-    first, size = shafts.first, shafts.size
     driver, driven = train.gear(mesh.driver), train.gear(mesh.driven)
     i, j = train.shaft_number(driver.shaft), train.shaft_number(driven.shaft)
     a, alpha = train.frame[2], pair.working_pressure_angle
@@ -310,20 +338,17 @@ def _directions(train: GearTrain, mesh: GearMesh, pair: GearPair, sense: float, 
     point = centre + pair.pinion_working_radius * across
 
     def relative(line: Array, on_driver: Array, on_driven: Array) -> Array:
-        row = np.zeros(size)
-        row[first[i] : first[i] + 6] += line @ shafts.bodies[i].point_rows(on_driver, train.frame)
-        row[first[j] : first[j] + 6] -= line @ shafts.bodies[j].point_rows(on_driven, train.frame)
-        return row
+        row = shafts.whole(i, line @ shafts.bodies[i].point_rows(on_driver, train.frame, driver.along))
+        return row - shafts.whole(j, line @ shafts.bodies[j].point_rows(on_driven, train.frame, driven.along))
 
     line = math.cos(alpha) * sense * along + math.sin(alpha) * across
     back = -math.cos(alpha) * sense * along + math.sin(alpha) * across
-    turn = relative(along / distance, centre, centre + arm)
-    turn[first[i] + 5] += 1.0
-    spin = np.zeros(size)
-    spin[first[i] + 5], spin[first[j] + 5] = 1.0, -1.0
+    spin = shafts.whole(i, shafts.bodies[i].turn_rows(driver.along)[2])
+    spins = spin - shafts.whole(j, shafts.bodies[j].turn_rows(driven.along)[2])
+    turn = relative(along / distance, centre, centre + arm) + spin
     slides = relative(np.cross(a, line), point, point), relative(np.cross(a, back), point, point)
     rows = relative(line, point, point), relative(back, point, point)
-    return _Directions(line, point, *rows, turn, slides, spin)
+    return _Directions(line, point, *rows, turn, slides, spin, spins)
 
 
 def _sliding(mesh: GearMesh, pair: GearPair, force: float, ratios: tuple[float, float], speed: float) -> Sliding | None:

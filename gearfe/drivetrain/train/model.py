@@ -24,7 +24,7 @@ from ...multibody.core.elimination import ModalCoordinates, modal_coordinates
 from ...multibody.series.timefunctions import sine
 from .bearings import BearingLoads, bearing_loads, bore_motion
 from .checks import check_train
-from .elements import LinearForce, RigidShaft, bearing, bore_rows, hinge, rotor
+from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, rotor
 from .forces import Gyro, TrainForces, derivative
 from .gear_train import Drive, GearTrain, Load
 from .kinematics import Kinematics, load_end
@@ -60,8 +60,9 @@ class TrainModel(Facts):
         All that is not constant, and its directions, (system size, directions).
     first : (shafts,)
         Number of each shaft's first coordinate in the system.
-    spin_reference : (shafts, system size)
-        Rotation of each shaft relative to the bore it is measured against, beside rolling.
+    spin, spin_reference : (shafts, system size)
+        Rotation of each shaft where it is measured, beside rolling, and relative to the bore that it is measured
+        against.
     axial : (bores, system size)
         Displacement along the axis of each bore's reference point.
     bores
@@ -73,7 +74,7 @@ class TrainModel(Facts):
     modal: ModalCoordinates
     start: Start
     angle: TimeFunction
-    shafts: tuple[RigidShaft, ...]
+    shafts: tuple[ShaftBody, ...]
     housing: ModalBlocks | None
     meshes: tuple[MeshLine, ...]
     torques: tuple[tuple[Array, TimeFunction], ...]
@@ -81,6 +82,7 @@ class TrainModel(Facts):
     forces: TrainForces
     directions: Array
     first: IntArray
+    spin: Array
     spin_reference: Array
     axial: Array
     bores: tuple[str, ...]
@@ -182,8 +184,8 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
         for shaft, g in zip(train.shafts, ratios, strict=True)
     )
     bodies: list[Element] = [*shafts] if housing is None else [housing, *shafts]
-    first = np.array([0 if housing is None else housing.size] + [6] * (len(shafts) - 1)).cumsum()
     size = sum(b.size for b in bodies)
+    first = np.cumsum([0 if housing is None else housing.size, *(body.size for body in shafts)])[:-1]
     placed = Shafts(shafts, first, tuple(ratios), size)
     lines = lines or mesh_lines(train, placed)
     orders = _orders(train, placed)
@@ -194,7 +196,8 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
         tuple(bodies), directions, forces.at_one_time, series, forces.breaks, forces.pieces if forces.jumps else None,
         name="forces of the train",
     )  # fmt: skip
-    elements = [*bodies, *_supports(train, shafts, housing), *(line.element(bodies) for line in lines), changing]
+    spin = np.array([_turning(train, placed, shaft.name) for shaft in train.shafts])
+    elements = [*bodies, *_supports(train, placed, housing), *(line.element(bodies) for line in lines), changing]
     system, modal = _damped(train, elements, bodies)
     return TrainModel(
         train=train,
@@ -210,7 +213,8 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
         forces=forces,
         directions=directions,
         first=first,
-        spin_reference=_spin_reference(train, size, first),
+        spin=spin,
+        spin_reference=_spin_reference(train, spin),
         axial=_axial(train, size),
         bores=_used_bores(train),
     )
@@ -231,8 +235,7 @@ def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tup
 
 def _acts(train: GearTrain, load: Load, shafts: Shafts) -> Array:
     """Direction in the system of a torque and its reaction."""
-    direction = np.zeros(shafts.size)
-    direction[shafts.first[train.shaft_number(load.shaft)] + 5] = 1.0
+    direction = _turning(train, shafts, load.shaft, load.bore)
     if train.housing is not None and load.bore is not None:
         direction[: train.housing.size] -= bore_selector(train, load.bore)[:, 3:] @ train.frame[2]
     return direction
@@ -260,20 +263,22 @@ def _forces(
     train: GearTrain, lines: tuple[MeshLine, ...], torques: tuple[tuple[Array, TimeFunction], ...],
     angle: TimeFunction, shafts: Shafts,
 ) -> tuple[TrainForces, Array]:  # fmt: skip
-    """All that is not constant: three directions a shaft (tilts, spin), up to six a mesh, one a torque."""
-    unit = np.eye(shafts.size)
-    columns = [column for i in shafts.first for column in unit[i + 3 : i + 6]]
-    gyros: tuple[Gyro, ...] = ()
-    if train.damping.gyroscopic:
-        gyros = tuple(
-            Gyro(3 * i, g, s.rotor.polar) for i, (g, s) in enumerate(zip(shafts.ratios, shafts.bodies, strict=True))
-        )
+    """All that is not constant: of each shaft tilts and spin, of each mesh up to six directions, one a torque."""
+    columns: list[Array] = []
+    gyros: list[Gyro] = []
+    for number, (couples, spin) in enumerate(zip(shafts.gyrations, shafts.spins, strict=True)):
+        for couple in couples:
+            gyros.append(Gyro(len(columns), spin, shafts.ratios[number], couple.polar))
+            columns += [shafts.whole(number, couple.tilt), shafts.whole(number, couple.other)]
+        columns.append(np.eye(shafts.size)[shafts.first[number] + 5])
+    if not train.damping.gyroscopic:
+        gyros = []
     columns += [column for line in lines for column in line.columns]
     flanks = tuple(flank for line in lines for flank in line.flanks)
     at = len(columns)
     columns += [direction for direction, _ in torques]
     numbered = tuple((at + i, function) for i, (_, function) in enumerate(torques))
-    made = TrainForces(len(columns), angle, gyros, flanks, numbered)
+    made = TrainForces(len(columns), angle, tuple(gyros), flanks, numbered)
     return made, np.array(columns).T
 
 
@@ -291,11 +296,11 @@ def _housing(train: GearTrain) -> ModalBlocks | None:
     return ModalBlocks(body.mass, damping, body.stiffness, name="housing")
 
 
-def _supports(train: GearTrain, shafts: tuple[RigidShaft, ...], housing: ModalBlocks | None) -> list[Element]:
+def _supports(train: GearTrain, shafts: Shafts, housing: ModalBlocks | None) -> list[Element]:
     """Hinges or bearings of all bores, and the drive."""
     made: list[Element] = []
     bearings = {b.bore: b for b in train.bearings}
-    for shaft, body in zip(train.shafts, shafts, strict=True):
+    for shaft, body in zip(train.shafts, shafts.bodies, strict=True):
         for bore in shaft.bores:
             chosen = None if housing is None else bore_selector(train, bore)
             rows = bore_rows(body, train.bore_points[bore], train.frame, chosen)
@@ -309,10 +314,10 @@ def _supports(train: GearTrain, shafts: tuple[RigidShaft, ...], housing: ModalBl
                 made.append(hinge(body, housing, rows, f"hinge {bore}"))
         if train.damping.alpha > 0.0:
             made.append(
-                LinearForce((body,), train.damping.alpha * body.mass(), np.zeros((6, 6)), f"damping of {body.name}")
+                LinearForce((body,), train.damping.alpha * body.mass(), 0.0 * body.mass(), f"damping of {body.name}")
             )
         if shaft.name == train.driven.shaft:
-            row = np.eye(6)[5:]
+            row = body.turn_rows(_along(train, train.driven.bore))[2:]
             touches: tuple[Element, ...] = (body,)
             if housing is not None:
                 row = np.hstack([row, -(bore_selector(train, train.driven.bore)[:, 3:] @ train.frame[2])[None, :]])
@@ -347,7 +352,7 @@ def _damped(train: GearTrain, elements: list[Element], bodies: list[Element]) ->
     return damped, damped.once("modal coordinates", lambda: in_modes)
 
 
-def _start(train: GearTrain, system: System, shafts: tuple[RigidShaft, ...], first: IntArray) -> Start:
+def _start(train: GearTrain, system: System, shafts: tuple[ShaftBody, ...], first: IntArray) -> Start:
     """At rest beside rolling but for the given initial speeds, which the constraints must allow."""
     start = consistent_start(system, 0.0)
     open_rows = {system.row_names()[i] for i in start.freedoms.redundant}
@@ -377,10 +382,21 @@ def _measured_against(train: GearTrain, name: str) -> str:
     return next((bore for shaft, bore in ends if shaft == name and bore is not None), train.shaft(name).bores[0])
 
 
-def _spin_reference(train: GearTrain, size: int, first: IntArray) -> Array:
-    rows = np.zeros((len(train.shafts), size))
+def _along(train: GearTrain, bore: str) -> float:
+    """Coordinate of a bore along the train's axis (m)."""
+    return float(train.bore_points[bore] @ train.frame[2])
+
+
+def _turning(train: GearTrain, shafts: Shafts, name: str, bore: str | None = None) -> Array:
+    """Rotation of a shaft at a bore, by default the one it is measured against, (system size,)."""
+    number = train.shaft_number(name)
+    along = _along(train, bore or _measured_against(train, name))
+    return shafts.whole(number, shafts.bodies[number].turn_rows(along)[2])
+
+
+def _spin_reference(train: GearTrain, spin: Array) -> Array:
+    rows = spin.copy()
     for i, shaft in enumerate(train.shafts):
-        rows[i, first[i] + 5] = 1.0
         if train.housing is not None:
             bore = bore_selector(train, _measured_against(train, shaft.name))
             rows[i, : len(bore)] -= bore[:, 3:] @ train.frame[2]

@@ -50,6 +50,7 @@ class Gyros(NamedTuple):
     """Gyroscopic moments, see `gearfe.drivetrain.train.forces.Gyro`."""
 
     direction: IntArray
+    spin: IntArray
     ratio: Array
     polar: Array
 
@@ -139,7 +140,8 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
     for i in range(p.gyros.polar.shape[0]):
         d = p.gyros.direction[i]
         row = 1 + p.torques.shape[0] + PER_GYRO * i
-        memory[row + MOMENTUM, j] = p.gyros.polar[i] * rate * (p.gyros.ratio[i] * memory[0, j + 1] + u[d + 2, j + 1])
+        turned = p.gyros.ratio[i] * memory[0, j + 1] + u[p.gyros.spin[i], j + 1]
+        memory[row + MOMENTUM, j] = p.gyros.polar[i] * rate * turned
         memory[row + TILT, j] = rate * u[d, j + 1]
         memory[row + OTHER, j] = rate * u[d + 1, j + 1]
         out[d] -= product(j, row + MOMENTUM, row + OTHER, memory)

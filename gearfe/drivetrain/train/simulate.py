@@ -330,7 +330,6 @@ def response_of(
         Counts of the integration.
     """
     train, t = model.train, moved.time
-    spin = [int(i) + 5 for i in model.first]
     rate, push = (model.angle(t, k)[:, None] * model.ratios for k in (1, 2))
     bodies = 0 if model.housing is None else model.housing.size
     poses, centres = _gear_poses(model, moved)
@@ -351,9 +350,9 @@ def response_of(
         friction_power=moved.friction_power,
         shaft_names=tuple(s.name for s in train.shafts),
         speed=rate + moved.v @ model.spin_reference.T,
-        speed_absolute=rate + moved.v[:, spin],
+        speed_absolute=rate + moved.v @ model.spin.T,
         acceleration=push + moved.a @ model.spin_reference.T,
-        acceleration_absolute=push + moved.a[:, spin],
+        acceleration_absolute=push + moved.a @ model.spin.T,
         attachment_names=model.bores,
         attachment_acceleration=moved.a @ model.axial.T,
         gear_names=tuple(g.name for g in train.gears),
@@ -378,12 +377,12 @@ def _gear_poses(model: TrainModel, moved: TrainStates) -> tuple[Array, Array]:
     poses = np.zeros((len(moved.time), len(train.gears), 6))
     centres = np.zeros((len(train.gears), 3))
     for i, item in enumerate(train.gears):
-        k = train.shaft_number(item.shaft)
+        k, body = train.shaft_number(item.shaft), model.shafts[train.shaft_number(item.shaft)]
         base = np.array(train.shafts[k].point)
         centres[i] = base + (item.along - float(base @ frame[2])) * frame[2]
-        own = moved.q[:, model.first[k] : model.first[k] + 6]
-        turn = own[:, 3:].copy()
-        poses[:, i, :3] = own @ model.shafts[k].point_rows(centres[i], frame).T
+        own = moved.q[:, model.first[k] : model.first[k] + body.size]
+        turn = own @ body.turn_rows(item.along).T
+        poses[:, i, :3] = own @ body.point_rows(centres[i], frame, item.along).T
         turn[:, 2] += model.ratios[k] * model.angle(moved.time)
         poses[:, i, 3:] = turn @ frame
     return poses, centres

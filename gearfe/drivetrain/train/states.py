@@ -74,9 +74,9 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     rows = np.array([line.row for line in model.meshes]).reshape(-1, q.shape[1])
     force, drag, loss, apart = _contact_forces(model, v, flanks, multipliers)
     drivers = [line.driver for line in model.meshes]
-    spin = [int(model.first[i]) + 5 for i in drivers]
-    speed = model.angle(t, 1)[:, None] * model.ratios[drivers] + v[:, spin]
-    arms = rows[np.arange(len(rows)), spin]
+    turning = np.array([line.spin for line in model.meshes]).reshape(-1, q.shape[1])
+    speed = model.angle(t, 1)[:, None] * model.ratios[drivers] + v @ turning.T
+    arms = rows[np.arange(len(rows)), [int(model.first[i]) + 5 for i in drivers]]
     power = speed * (arms * force + drag)
     return TrainStates(t, q, v, a, force, q @ rows.T, apart, push, power, loss, model.bearings(q, v, a, acting))
 
