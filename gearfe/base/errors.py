@@ -18,8 +18,10 @@ LONGEST_WORD, LONGEST_MESSAGE = 200, 2000
 
 #: Words in names of gear jobs that no table knows -> what is out of scope, and what there is instead.
 OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
-    r"heli(x|cal)|^beta(_|$)|skew|herringbone|overlap_ratio|(normal|transverse)_(module|pressure)|^m_?t(_|$)|alpha_?t":
-        ("helical gears", "spur gears only"),
+    r"herringbone|double_helical": ("double helical gears", "spur gears and single helices only"),
+    r"transverse_(module|pressure)|^m_?t(_|$)|alpha_?t":
+        ("data of the transverse section", "spur gears and helical ones by their normal section only"),
+    r"overlap_ratio|contact_ratio": ("results as keys", "gearfe gear prints the ratios of spur and helical gears"),
     r"internal|(^|_)ring(_|$)|annulus": ("internal gears", "external spur gears only"),
     r"planet|carrier|sun(_|$)|epicyclic": ("planetary gears", "spur gears on fixed shafts only"),
     r"bevel|hypoid|cone_(angle|dist)|pitch_cone|miter|spiral|^zerol": ("bevel gears", "spur gears only"),
@@ -190,8 +192,10 @@ SYNONYMS = {
 #: Symbols of gear technology (ISO 21771, ISO 6336) and other names -> keys of gear jobs; units at the end do not count.
 SYMBOLS = {
     **dict.fromkeys(("z", "number_of_teeth", "teeth_number", "teeth_count", "n_teeth"), "teeth"),
-    **dict.fromkeys(("m", "mn", "m_n", "modul", "diametral_pitch", "dp"), "module_mm"),
-    **dict.fromkeys(("alpha", "alpha_n", "alphan", "phi"), "pressure_angle_deg"),
+    **dict.fromkeys(("m", "mn", "m_n", "modul", "normal_module", "diametral_pitch", "dp"), "module_mm"),
+    **dict.fromkeys(("alpha", "alpha_n", "alphan", "phi", "normal_pressure_angle"), "pressure_angle_deg"),
+    **dict.fromkeys(("beta", "helix", "helical", "skew"), "helix_angle_deg"),
+    **dict.fromkeys(("hand", "helix_direction", "hand_of_helix"), "helix_hand"),
     **dict.fromkeys(("b", "width", "facewidth"), "face_width_mm"),
     **dict.fromkeys(("x", "addendum_modification", "shift"), "profile_shift"),
     **dict.fromkeys(("a", "a_w", "aw", "axis_distance", "shaft_distance"), "centre_distance_mm"),

@@ -115,6 +115,8 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
         names = sorted(path.name for path in made.iterdir())
     _show(geometry)
     _show({"iso_6336": iso})
+    if exports and pair.pinion.helical:
+        print("csv and dxf are of the transverse section in the middle of the face width, step and brep of the helix")
     if exports and mesh.deviates:
         print("flanks with the deviations of [microgeometry]: dxf, step and brep all teeth, csv tooth 0")
     print_results((), folder, names, {}, pair.warnings)
@@ -186,12 +188,17 @@ def _with_deviations(
 
 
 def _notes(geometry: dict[str, Any]) -> str:
+    helix = {}
+    if "helix_angle_deg" in geometry:
+        names = ("overlap ratio", "total contact ratio")
+        helix = {name: f"{geometry[name.replace(' ', '_')]:.4g}" for name in names}
     rows = {
         "centre distance": f"{geometry['centre_distance_mm']:.6g} mm",
         "working pressure angle": f"{geometry['working_pressure_angle_deg']:.5g}°",
         "contact ratio": f"{geometry['contact_ratio']:.4g}",
         "  less tip rounds": f"{geometry['contact_ratio_active']:.4g}",
         "  less relief": f"{geometry['contact_ratio_effective']:.4g}",
+        **helix,
         "backlash": f"{geometry['backlash_mm']:.4g} mm",
     }
     return "\n".join(f"{name:<23}{value}" for name, value in rows.items())

@@ -100,8 +100,10 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     if args.animation is not None and not 2 <= args.animation <= 1000:
         raise InputError("--animation", args.animation, "must be >= 2 and <= 1000 frames", "40 are usual")
 
+    from ..base.tables.gearbox import check_spur_mesh
     from ..gears.geometry.pair import pair_of
 
+    check_spur_mesh(mesh, "the contact of the teeth")
     pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
 
     import numpy as np

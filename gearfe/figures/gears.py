@@ -23,6 +23,8 @@ PINION_FILL, WHEEL_FILL = "#dbe7f3", "#f3e6d8"
 def pair_picture(pair: GearPair, pinion_angle: float = 0.0, notes: str = "") -> Any:
     """Meshed pair: the whole gears, and the meshing zone with line of action and path of contact.
 
+    Helical gears also along y, with the helices of their teeth; the other views are of the middle section.
+
     Parameters
     ----------
     pinion_angle
@@ -37,8 +39,8 @@ def pair_picture(pair: GearPair, pinion_angle: float = 0.0, notes: str = "") -> 
         ),
     ]
     line_of_action = np.array([path_place(pair, 0.0), path_place(pair, pair.tangent_length)])
-    figure = new_figure(12.5, 6.4)
-    whole, near = figure.subplots(1, 2, width_ratios=(1.0, 1.0))
+    whole, near, beside = _panels(pair)
+    figure = near.figure
     styles = {
         "pitch": (GREY, (0, (7, 2, 1.5, 2)), 0.9, "working pitch circles"),
         "base": (GREEN, (0, (4, 3)), 0.9, "base circles"),
@@ -88,6 +90,8 @@ def pair_picture(pair: GearPair, pinion_angle: float = 0.0, notes: str = "") -> 
     near.set_ylim(y - half, y + half)
     near.set_title("meshing zone", loc="left", fontsize=11)
     near.legend(fontsize=8, loc="upper right", framealpha=0.95)
+    if beside is not None:
+        _draw_helices(beside, pair, pinion_angle)
     if notes:
         near.text(
             0.015,
@@ -100,6 +104,36 @@ def pair_picture(pair: GearPair, pinion_angle: float = 0.0, notes: str = "") -> 
             bbox={"facecolor": "white", "alpha": 0.9, "edgecolor": "#d1d5db"},
         )
     return figure
+
+
+def _panels(pair: GearPair) -> tuple[Any, Any, Any]:
+    """Axes of the whole gears, of the meshing zone, and of the view of helical gears along y (else None)."""
+    if not pair.pinion.helical:
+        return *new_figure(12.5, 6.4).subplots(1, 2, width_ratios=(1.0, 1.0)), None
+    figure = new_figure(12.5, 7.0)
+    grid = figure.add_gridspec(2, 2, height_ratios=(3.0, 1.0))
+    whole = figure.add_subplot(grid[0, 0])
+    return whole, figure.add_subplot(grid[:, 1]), figure.add_subplot(grid[1, 0], sharex=whole)
+
+
+def _draw_helices(axes: Any, pair: GearPair, pinion_angle: float) -> None:
+    """Both gears seen along +y: the middles of their tips on the tip cylinders, as far as they face the viewer."""
+    wheel_angle = pair.wheel_angle_at(pinion_angle) + pair.wheel_phase
+    placed = ((pair.pinion, pinion_angle, 0.0, BLUE), (pair.wheel, wheel_angle, pair.working_centre_distance, ORANGE))
+    for (gear, angle, x, colour), fill in zip(placed, (PINION_FILL, WHEEL_FILL), strict=True):
+        half, radius = 0.5e3 * gear.face_width, 1e3 * gear.tip_radius
+        corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (radius, half) + (1e3 * x, 0.0)
+        axes.fill(corners[:, 0], corners[:, 1], facecolor=fill, edgecolor=colour, linewidth=1.1)
+        z = np.linspace(-half, half, 41)
+        for tooth in range(gear.teeth):
+            turned = angle + 2 * np.pi * tooth / gear.teeth + 1e-3 * gear.twist_rate * z
+            seen = np.where(np.sin(turned) < 0.0, 1e3 * x + radius * np.cos(turned), np.nan)
+            axes.plot(seen, z, color=colour, linewidth=0.8)
+    helix = f"{math.degrees(pair.pinion.helix_angle):g}°, pinion {pair.pinion.hand}, wheel {pair.wheel.hand}"
+    axes.set_title(f"along y: helix angle {helix}", loc="left", fontsize=11)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x (mm)")
+    axes.set_ylabel("z (mm)")
 
 
 def _circles(pair: GearPair) -> list[tuple[str, float, float]]:

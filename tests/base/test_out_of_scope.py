@@ -36,8 +36,8 @@ def refused(capsys: pytest.CaptureFixture[str], *line: str) -> str:
 @pytest.mark.parametrize(
     ("change", "what"),
     [
-        ("pair.helix_angle_deg=15", "helical gears"),
-        ("pair.beta_deg=15", "helical gears"),
+        ("pair.double_helical=true", "double helical gears"),
+        ("pair.transverse_module_mm=3", "data of the transverse section"),
         ("pair.wheel.internal=true", "internal gears"),
         ("pair.wheel.ring=true", "internal gears"),
         ("train.planets=3", "planetary gears"),
@@ -49,7 +49,7 @@ def refused(capsys: pytest.CaptureFixture[str], *line: str) -> str:
         ("pair.spiral_angle_deg=30", "bevel gears"),
         ("pair.cone_distance_mm=50", "bevel gears"),
         ("pair.shaft_angle_deg=90", "shafts that are not parallel"),
-        ("pair.normal_pressure_angle_deg=20", "helical gears"),
+        ("pair.alpha_t_deg=20", "data of the transverse section"),
         ("pair.coast_side_pressure_angle_deg=25", "asymmetric teeth"),
         ("pair.tooth_form='cycloid'", "teeth of another form"),
         ("pair.pinion.rack=true", "racks"),
@@ -97,6 +97,7 @@ def test_symbols_stand_for_keys_that_exist() -> None:
     ("change", "key"),
     [
         ("pair.pinion.z=20", "teeth"), ("pair.m_n=3", "module_mm"), ("pair.alpha_deg=20", "pressure_angle_deg"),
+        ("pair.beta_deg=15", "helix_angle_deg"), ("pair.normal_pressure_angle_deg=20", "pressure_angle_deg"),
         ("pair.b_mm=20", "face_width_mm"), ("pair.pinion.x1=0.2", "profile_shift"), ("pair.a=96", "centre_distance_mm"),
         ("pair.pinion.d_a_mm=75", "tip_diameter_mm"), ("pair.material.E_MPa=210000", "youngs_modulus_GPa"),
         ("pair.material.nu=0.3", "poisson_ratio"), ("pair.material.rho=7850", "density_kg_per_m3"),

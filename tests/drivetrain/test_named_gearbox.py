@@ -130,7 +130,7 @@ WRONG_GEARS: list[tuple[dict[str, Any], str]] = [
     ({"gears__sun__teeth": None}, r"gears\.sun\.teeth: is required"),
     ({"gears__sun__teeth": 7}, r"gears\.sun\.teeth = 7: must be .*>= 8"),
     ({"gears__sun__tooth": 21}, r"gears\.sun: unknown name 'tooth'; did you mean 'teeth'"),
-    ({"gears__sun__beta_deg": 12.0}, r"gears\.sun\.beta_deg = 12.0: helical gears are not supported"),
+    ({"gears__sun__beta_deg": 12.0}, r"gears\.sun: unknown name 'beta_deg'; did you mean 'helix_angle_deg'"),
     ({"gears__sun__material": "stell"}, r"gears\.sun\.material: unknown name 'stell'; did you mean 'steel'"),
     ({"gears__sun__material": "gold"}, r"gears\.sun\.material: unknown name 'gold'; known names: bronze, iron, steel"),
     ({"gears__sun__material": 206.0}, r"gears\.sun\.material = 206.0: must be a text"),

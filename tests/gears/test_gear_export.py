@@ -75,6 +75,31 @@ def test_solids_have_the_volume_and_the_flanks_of_the_gear(suffix, form, tmp_pat
     assert off.max() < 1e-5  # mm
 
 
+def test_a_helical_solid_has_the_flanks_of_its_turned_sections(tmp_path):
+    made = gear(13, helix_angle=math.radians(20.0), hand="left", tip_round=1e-4)
+    path = tmp_path / "gear.step"
+    write_solid(path, made)
+    roll = np.linspace(made.profile.form_roll, made.profile.round_roll, 9)
+    places = []
+    for share in (-0.5, -0.31, 0.02, 0.43):  # not the places of the sections alone
+        z = 1e3 * made.face_width * share
+        turn = math.radians(20.0)
+        point = 1e3 * made.profile.flank.at(roll) * np.exp(-1j * math.tan(turn) * z / (1e3 * made.reference_radius))
+        places.append(np.column_stack([point.real, point.imag, np.full(len(roll), z)]))
+    places = np.concatenate(places)
+    with gmsh_session() as gmsh:
+        gmsh.model.occ.importShapes(str(path))
+        gmsh.model.occ.synchronize()
+        ((_, solid),) = gmsh.model.getEntities(3)
+        volume = gmsh.model.occ.getMass(3, solid)
+        off = np.full(len(places), np.inf)
+        for _, face in gmsh.model.getEntities(2):
+            found, _ = gmsh.model.getClosestPoint(2, face, places.ravel())
+            off = np.minimum(off, np.abs(found - places.ravel()).reshape(-1, 3).max(axis=1))
+    assert volume == pytest.approx(area(made) * 1e3 * made.face_width, rel=1e-5)
+    assert off.max() < 1e-5  # mm
+
+
 def test_the_command_exports_both_gears(tmp_path, capfd):
     (tmp_path / "pair.toml").write_text(job_file("stiffness"))
     line = ["gear", str(tmp_path / "pair.toml"), "--out", str(tmp_path / "out"), "--export"]

@@ -30,6 +30,7 @@ from .pair import (
     common_module_mm,
     module_mm_of,
     tooth_form,
+    transverse_teeth,
 )
 from .train import (
     TrainBearingTable,
@@ -43,6 +44,10 @@ from .train import (
 DEFAULT = "default"
 #: Keys of a gear's drawing, beside the tooth form.
 DRAWN = ("pitch_diameter_mm", "tip_diameter_mm", "root_diameter_mm", "span_mm", "span_teeth")
+#: Keys of the tooth form that gears in mesh have in common, and what messages call them.
+SHARED = (("module_mm", "modules"), ("pressure_angle_deg", "pressure angles"), ("helix_angle_deg", "helix angles"))
+#: Hand of a gear's mate.
+OPPOSITE = {"right": "left", "left": "right"}
 #: Bore of a gear whose entry in [[train.gears]] gives none, times the pitch diameter.
 BORE = 0.2
 #: Gears of a pair.
@@ -180,7 +185,7 @@ def mesh_name(driver: str, driven: str) -> str:
 def shift_by_distance(gear: NamedGear, mate: NamedGear, distance_mm: float, where: str) -> float:
     """Return the profile shift of a gear that runs with its mate at a centre distance (mm) without backlash.
 
-    inv(alpha_w) = inv(alpha) + 2 (x_1 + x_2) tan(alpha)/(z_1 + z_2), cos(alpha_w) = a_0 cos(alpha)/a.
+    inv(alpha_wt) = inv(alpha_t) + 2 (x_1 + x_2) tan(alpha_n)/(z_1 + z_2), cos(alpha_wt) = a_0 cos(alpha_t)/a.
 
     Parameters
     ----------
@@ -196,14 +201,16 @@ def shift_by_distance(gear: NamedGear, mate: NamedGear, distance_mm: float, wher
     InputError
         For a distance that no pressure angle belongs to.
     """
-    teeth, angle = gear.teeth + mate.teeth, math.radians(gear.form["pressure_angle_deg"])
-    lowest = 0.5 * teeth * gear.form["module_mm"] * math.cos(angle)
+    teeth, normal = gear.teeth + mate.teeth, math.radians(gear.form["pressure_angle_deg"])
+    helix = math.radians(gear.form["helix_angle_deg"])
+    angle = math.atan(math.tan(normal) / math.cos(helix)) if helix else normal
+    lowest = 0.5 * teeth * gear.form["module_mm"] * math.cos(angle) / math.cos(helix)
     if distance_mm <= lowest:
         problem = f"leaves no working pressure angle: must be > {lowest:.9g} mm"
         raise InputError(where, distance_mm, problem, "use a larger centre distance")
     working = math.acos(lowest / distance_mm)
     involutes = (math.tan(working) - working) - (math.tan(angle) - angle)
-    return teeth * involutes / (2.0 * math.tan(angle)) - float(mate.form["profile_shift"])
+    return teeth * involutes / (2.0 * math.tan(normal)) - float(mate.form["profile_shift"])
 
 
 def _shift_in(mesh: NamedMesh, name: str) -> float:
@@ -240,11 +247,60 @@ def _with_shifts(box: Gearbox) -> Gearbox:
                 cure = "write a number (the larger centre distance then has backlash), or correct one centre distance"
                 raise InputError(f"{gear.written('profile_shift')}.profile_shift", FROM_DISTANCE, problem, cure)
         gears[name] = replace(gear, form={**gear.form, "profile_shift": shift}, shift_from=first)
-        meshes = {
-            key: replace(one, driver=gears[one.driver.name], driven=gears[one.driven.name])
-            for key, one in meshes.items()
-        }
+        meshes = {key: _with_gears(mesh, gears) for key, mesh in meshes.items()}
     return Gearbox(gears, meshes)
+
+
+def _with_hands(box: Gearbox) -> Gearbox:
+    """The gearbox with hands of all helices: opposite in each mesh, right for the first driver where none is written.
+
+    Raises
+    ------
+    InputError
+        For the hand of a spur gear, and hands of mates that are not opposite.
+    """
+    hands: dict[str, str] = {}
+    for name, gear in box.gears.items():
+        if not gear.written("helix_hand"):
+            continue
+        hands[name] = gear.form["helix_hand"]
+        if not gear.form["helix_angle_deg"]:
+            cure = "leave it out, or add helix_angle_deg"
+            raise InputError(f"{gear.where}.helix_hand", hands[name], "is of a gear without helix angle", cure)
+    meshes = [mesh for mesh in box.meshes.values() if mesh.driver.form["helix_angle_deg"]]
+    while meshes:
+        known = next((mesh for mesh in meshes if any(gear.name in hands for gear in mesh.gears)), None)
+        if known is None:
+            known = meshes[0]
+            hands[known.driver.name] = "right"
+        meshes.remove(known)
+        one, two = known.gears if known.driver.name in hands else known.gears[::-1]
+        hand = hands.setdefault(two.name, OPPOSITE[hands[one.name]])
+        if hand == hands[one.name]:
+            wrong, right = (two, one) if two.written("helix_hand") else (one, two)
+            problem = f"is that of gear {right.name!r} in mesh {known.name!r}, too: must be {OPPOSITE[hand]}"
+            cure = "the hands of external gears in mesh are opposite: write the other one, or leave it out"
+            raise InputError(f"{wrong.where}.helix_hand", hand, problem, cure)
+    gears = {
+        name: replace(gear, form={**gear.form, "helix_hand": hands.get(name, "right")})
+        for name, gear in box.gears.items()
+    }
+    return Gearbox(gears, {name: _with_gears(mesh, gears) for name, mesh in box.meshes.items()})
+
+
+def _with_gears(mesh: NamedMesh, gears: Mapping[str, NamedGear]) -> NamedMesh:
+    """The mesh with the gears of its names."""
+    return replace(mesh, driver=gears[mesh.driver.name], driven=gears[mesh.driven.name])
+
+
+def check_spur_mesh(mesh: NamedMesh, what: str) -> None:
+    """Raise `InputError` for a mesh of helical gears; `what` names the computation that takes spur gears only."""
+    for gear in mesh.gears:
+        if gear.form["helix_angle_deg"]:
+            key = f"{gear.written('helix_angle_deg')}.helix_angle_deg"
+            problem = f"makes gear {gear.name!r} helical: {what} takes spur gears only"
+            cure = "leave it out, or write 0; gearfe gear takes helical gears"
+            raise InputError(key, gear.form["helix_angle_deg"], problem, cure)
 
 
 # --- [gears.NAME], [meshes.NAME] ------------------------------------------------------------------------------------
@@ -275,9 +331,11 @@ def named_gearbox(
     known = None if shafts is None else list(shafts)
     made = {name: _named_gear(name, table, materials, known) for name, table in gears.items()}
     for mates in _meshing(meshes.values()):
-        common = common_module_mm(gears[name] for name in gears if name in mates)
-        for name in mates & gears.keys():
-            module = module_mm_of(gears[name], gears[name].module_mm, common)
+        tables = {name: gears[name] for name in gears if name in mates}
+        helix_deg = next((table.helix_angle_deg for table in tables.values() if table.helix_angle_deg), 0.0)
+        common = common_module_mm(tables.values(), helix_deg)
+        for name, table in tables.items():
+            module = module_mm_of(table, table.module_mm, common, made[name].form["helix_angle_deg"])
             made[name] = replace(made[name], form={**made[name].form, "module_mm": module})
     found = {name: _named_mesh(name, table, made) for name, table in meshes.items()}
     twins: dict[frozenset[str], str] = {}
@@ -287,7 +345,7 @@ def named_gearbox(
             problem = f"has the gears of [meshes.{twins[both]}], too"
             raise InputError(f"meshes.{name}", None, problem, "two gears have one mesh: leave one out")
         twins[both] = name
-    return _with_shifts(Gearbox(made, found))
+    return _with_shifts(_with_hands(Gearbox(made, found)))
 
 
 def _meshing(meshes: Iterable[NamedMeshTable]) -> list[set[str]]:
@@ -356,13 +414,13 @@ def _named_mesh(name: str, table: NamedMeshTable, gears: Mapping[str, NamedGear]
     if one.shaft and one.shaft == two.shaft:
         problem = f"is on shaft {two.shaft!r} with the driver {one.name!r}"
         raise InputError(f"{where}.driven", two.name, problem, "mesh gears of two shafts")
-    for key, what in (("module_mm", "modules"), ("pressure_angle_deg", "pressure angles")):
+    for key, what in SHARED:
         a, b = one.form[key], two.form[key]
         if abs(a - b) > SAME * abs(a):
             given = "pitch_diameter_mm" if key == "module_mm" and "pitch_diameter_mm" in two.drawn else key
             problem = f"makes {what} of {a:.9g} and {b:.9g} in mesh {name!r}: must be that of gear {one.name!r}"
             value = two.drawn.get(given, b)
-            raise InputError(f"{two.where}.{given}", value, problem, "gears in mesh have one module and pressure angle")
+            raise InputError(f"{two.where}.{given}", value, problem, f"gears in mesh have equal {what}")
     return NamedMesh(name, where, one, two, table.centre_distance_mm, where, table.flank, table.tolerance_class)
 
 
@@ -382,8 +440,11 @@ def _form(
         elif value is not None:
             places[key] = DEFAULT
     if isinstance(table, GearBodyTable):
+        form["helix_hand"] = table.helix_hand
+        if table.helix_hand is None:
+            places["helix_hand"] = DEFAULT
         if table.pitch_diameter_mm is not None:
-            form["module_mm"] = table.pitch_diameter_mm / table.teeth
+            form["module_mm"] = table.pitch_diameter_mm / transverse_teeth(table.teeth, form["helix_angle_deg"])
             places.pop("module_mm", None)
         form["bore_diameter_mm"] = table.bore_diameter_mm
     return form, places
@@ -493,7 +554,7 @@ def pair_gearbox(pair: PairTable, microgeometry: MicrogeometryTable | None = Non
     mesh = NamedMesh(name, "pair", gears[PINION], gears[WHEEL], pair.centre_distance_mm, "pair")
     if microgeometry is not None:
         mesh = replace(mesh, flank=microgeometry.flank, tolerance_class=microgeometry.tolerance_class)
-    return _with_shifts(Gearbox(gears, {name: mesh}))
+    return _with_shifts(_with_hands(Gearbox(gears, {name: mesh})))
 
 
 def _pair_gear(pair: PairTable, side: str, microgeometry: MicrogeometryTable | None) -> NamedGear:
@@ -546,7 +607,7 @@ def train_gearbox(
         if name in meshes:
             raise InputError(where, None, f"has the gears of another mesh, {name!r}", "two gears have one mesh")
         meshes[name] = NamedMesh(name, where, gears[mesh.driver], gears[mesh.driven], distance, distance_where)
-    return Gearbox(gears, meshes)
+    return _with_hands(Gearbox(gears, meshes))
 
 
 def _train_gear(table: TrainGearTable, where: str, pair: PairTable | None, shared: Gearbox | None) -> NamedGear:
@@ -567,8 +628,12 @@ def _train_gear(table: TrainGearTable, where: str, pair: PairTable | None, share
         teeth = table.teeth or 0
         bore = table.bore_diameter_mm
         if bore is None:
-            bore, places["bore_diameter_mm"] = BORE * form["module_mm"] * teeth, DEFAULT
+            diameter = form["module_mm"] * transverse_teeth(teeth, form["helix_angle_deg"])
+            bore, places["bore_diameter_mm"] = BORE * diameter, DEFAULT
         form["bore_diameter_mm"] = bore
+        form["helix_hand"] = table.helix_hand
+        if table.helix_hand is None:
+            places["helix_hand"] = DEFAULT
         material, material_where = (None, DEFAULT) if pair is None else (pair.material, "pair.material")
         density = MaterialTable().density_kg_per_m3 if material is None else material.density_kg_per_m3
         made = NamedGear(

@@ -1,4 +1,4 @@
-"""The tables [pair] and [stiffness]: a pair of spur gears, their materials, and how its mesh stiffness is computed, in
+"""The tables [pair] and [stiffness]: a pair of gears, their materials, and how its mesh stiffness is computed, in
 everyday units; which contact laws there are: their names, and where their classes stand. NumPy is not loaded for them.
 
 Keys of the tooth form may stand in [pair], for both gears, or in [pair.pinion] and [pair.wheel], which then win.
@@ -10,6 +10,7 @@ name; its numbers are the table ``law_parameters``, the option ``--law-parameter
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
@@ -28,7 +29,10 @@ DEFAULTS: dict[str, float] = {
     "tip_relief_amount_um": 0.0,
     "tip_relief_exponent": 1.0,
     "tooth_thinning_um": 0.0,
+    "helix_angle_deg": 0.0,
 }
+#: Hands of a helix.
+HANDS = ("right", "left")
 #: Keys of a gear's drawing -> those of the tooth form that they stand for.
 INSTEAD: dict[str, tuple[str, ...]] = {
     "tip_diameter_mm": ("addendum", "tip_shortening"),
@@ -56,11 +60,17 @@ class MaterialTable:
 
 @dataclass(frozen=True)
 class ToothFormTable:
-    """Keys that both gears may share; coefficients are in units of the module."""
+    """Keys that both gears may share; coefficients are in units of the module, the normal one of helical gears."""
 
-    module_mm: float | None = quantity(None, doc="module (mm), instead of pitch_diameter_mm", above=0.0)
+    module_mm: float | None = quantity(None, doc="normal module (mm), instead of pitch_diameter_mm", above=0.0)
     pressure_angle_deg: float | None = quantity(
-        None, doc="pressure angle at the reference circle (deg)", low=5.0, high=45.0
+        None, doc="normal pressure angle at the reference circle (deg)", low=5.0, high=45.0
+    )
+    helix_angle_deg: float | None = quantity(
+        None,
+        doc="helix angle at the reference circle (deg), without sign (helix_hand); by default 0, a spur gear",
+        low=0.0,
+        high=45.0,
     )
     face_width_mm: float | None = quantity(None, doc="face width (mm)", above=0.0)
     profile_shift: float | str | None = quantity(
@@ -83,7 +93,9 @@ class ToothFormTable:
         None, doc="exponent of the relief: 1 linear (default), 2 parabolic", low=1.0
     )
     tooth_thinning_um: float | None = quantity(
-        None, doc="arc taken off each tooth at the reference circle, for backlash (um), by default 0", low=0.0
+        None,
+        doc="arc taken off each tooth at the reference circle, in the normal section, for backlash (um), by default 0",
+        low=0.0,
     )
 
 
@@ -100,6 +112,9 @@ class GearBodyTable(ToothFormTable):
     """Teeth, bore and drawing of one gear."""
 
     teeth: int = quantity(doc="number of teeth of an external gear", low=8, high=1000)
+    helix_hand: str | None = quantity(
+        None, doc="hand of the helix; left out: opposite to that of the mate, right for the driver", choices=HANDS
+    )
     bore_diameter_mm: float = quantity(doc="diameter of the rigid bore (mm); it decides the stiffness level", above=0.0)
     pitch_diameter_mm: float | None = quantity(None, doc="reference diameter (mm), instead of module_mm", above=0.0)
     tip_diameter_mm: float | None = quantity(
@@ -141,12 +156,13 @@ def check_gear(gear: GearBodyTable, where: str, shared: ToothFormTable | None = 
         raise InputError(
             f"{where}.module_mm", None, "is required", f"give the module (mm){places} or pitch_diameter_mm"
         )
-    if gear.pitch_diameter_mm is not None and module is not None:
-        implied = gear.pitch_diameter_mm / gear.teeth
-        if abs(implied - module) > SAME * module and abs(implied - module) * gear.teeth > ROUNDING_MM:
-            problem = f"contradicts module_mm = {module:g}: {gear.teeth} teeth make it {module * gear.teeth:.9g}"
-            raise InputError(f"{where}.pitch_diameter_mm", gear.pitch_diameter_mm, problem, "leave one out")
     form = tooth_form(*tables)
+    if gear.pitch_diameter_mm is not None and module is not None:
+        teeth = transverse_teeth(gear.teeth, form["helix_angle_deg"])
+        implied = gear.pitch_diameter_mm / teeth
+        if abs(implied - module) > SAME * module and abs(implied - module) * teeth > ROUNDING_MM:
+            problem = f"contradicts module_mm = {module:g}: {gear.teeth} teeth make it {module * teeth:.9g}"
+            raise InputError(f"{where}.pitch_diameter_mm", gear.pitch_diameter_mm, problem, "leave one out")
     for key in REQUIRED:
         if form[key] is None:
             cure = "add it" if shared is None else f"add it to [{shared_where}] or to each gear"
@@ -156,8 +172,13 @@ def check_gear(gear: GearBodyTable, where: str, shared: ToothFormTable | None = 
         raise InputError(f"{where}.tip_relief_length_mm", None, "is required with a tip relief", cure)
 
 
-def module_mm_of(gear: GearBodyTable, written: float | None, common: float | None) -> float:
-    """Return the module of a gear (mm): that of its pitch diameter, or one that differs from it by rounding alone.
+def transverse_teeth(teeth: int, helix_deg: float) -> float:
+    """Reference diameter over normal module, z/cos(beta) (-), at a helix angle (deg)."""
+    return teeth / math.cos(math.radians(helix_deg))
+
+
+def module_mm_of(gear: GearBodyTable, written: float | None, common: float | None, helix_deg: float) -> float:
+    """Return the normal module of a gear (mm): that of its pitch diameter, or one that differs by rounding alone.
 
     Parameters
     ----------
@@ -167,22 +188,30 @@ def module_mm_of(gear: GearBodyTable, written: float | None, common: float | Non
         Module that its tables give (mm).
     common : float, optional
         Module of the gears that mesh with it (mm), see `common_module_mm`.
+    helix_deg : float
+        Its helix angle (deg).
     """
     if gear.pitch_diameter_mm is None:
         return given(written, "module_mm")
-    implied, module = gear.pitch_diameter_mm / gear.teeth, common if written is None else written
+    teeth = transverse_teeth(gear.teeth, helix_deg)
+    implied, module = gear.pitch_diameter_mm / teeth, common if written is None else written
     if module is None or abs(implied - module) <= SAME * module:
         return implied
-    return module if abs(module * gear.teeth - gear.pitch_diameter_mm) <= ROUNDING_MM else implied
+    return module if abs(module * teeth - gear.pitch_diameter_mm) <= ROUNDING_MM else implied
 
 
-def common_module_mm(gears: Iterable[GearBodyTable]) -> float | None:
-    """Return the module (mm) that one of meshing gears gives, or that of the sum of all their pitch diameters."""
+def common_module_mm(gears: Iterable[GearBodyTable], helix_deg: float) -> float | None:
+    """Return the normal module (mm) that one of meshing gears gives, or that of the sum of all their pitch diameters.
+
+    `helix_deg` is their helix angle (deg).
+    """
     gears = list(gears)
     if named := [gear.module_mm for gear in gears if gear.module_mm is not None]:
         return named[0]
     diameters = [gear.pitch_diameter_mm for gear in gears if gear.pitch_diameter_mm is not None]
-    return sum(diameters) / sum(gear.teeth for gear in gears) if len(diameters) == len(gears) else None
+    if len(diameters) < len(gears):
+        return None
+    return sum(diameters) / transverse_teeth(sum(gear.teeth for gear in gears), helix_deg)
 
 
 @dataclass(frozen=True)
@@ -214,7 +243,8 @@ class PairTable(ToothFormTable):
         """Module of the gear `side` (mm), from its own pitch diameter or module, or from the shared module."""
         own: GearTable = getattr(self, side)
         written = own.module_mm if own.module_mm is not None else self.module_mm
-        return module_mm_of(own, written, common_module_mm((self.pinion, self.wheel)))
+        helix_deg = self.tooth_form(side)["helix_angle_deg"]
+        return module_mm_of(own, written, common_module_mm((self.pinion, self.wheel), helix_deg), helix_deg)
 
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that are missing or contradict each other."""

@@ -12,7 +12,7 @@ from typing import ClassVar
 from ..config import Removed, quantity
 from ..errors import InputError, unknown_name
 from .kinds import GONE_METHODS
-from .pair import FROM_DISTANCE, StiffnessTable, ToothFormTable
+from .pair import FROM_DISTANCE, HANDS, StiffnessTable, ToothFormTable
 from .timefunction import TrainFunctionTable
 
 Five = tuple[float, float, float, float, float]
@@ -83,6 +83,9 @@ class TrainGearTable(ToothFormTable):
     y_mm: float = quantity(doc="y of its middle plane (mm)")
     gear: str = quantity("", choices=("pinion", "wheel", ""), doc="pinion or wheel of [pair]; left out: give teeth")
     teeth: int | None = quantity(None, low=8, doc="number of teeth of an external gear, for a gear of its own")
+    helix_hand: str | None = quantity(
+        None, doc="hand of its helix; left out: opposite to that of the mate", choices=HANDS
+    )
     bore_diameter_mm: float | None = quantity(None, above=0.0, doc="bore (mm); left out: 0.2 times the pitch diameter")
     density_kg_per_m3: float | None = quantity(
         None, above=0.0, doc="density (kg/m3); left out: of [pair.material], or steel"
@@ -92,7 +95,7 @@ class TrainGearTable(ToothFormTable):
         """Either a gear of [pair] or one with its own teeth."""
         own = [
             key
-            for key in (*ToothFormTable.__dataclass_fields__, "teeth", "bore_diameter_mm")
+            for key in (*ToothFormTable.__dataclass_fields__, "teeth", "helix_hand", "bore_diameter_mm")
             if getattr(self, key) is not None
         ]
         if self.gear and own:

@@ -72,7 +72,7 @@ def _of_mesh(
     if table.backlash_um is None and not table.rigid:
         if model == POTENTIAL:
             source = "tooth_thinning_um of the gears and the centre distance"
-            found["backlash_um"] = _value(1e6 * max(pair.normal_backlash, 0.0), source)
+            found["backlash_um"] = _value(1e6 * max(pair.base_backlash, 0.0), source)
         else:
             found["backlash_um"] = _value(None, f"{DEFAULT}: a spring that acts both ways")
     if table.damping_acts is None and not table.rigid:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.errors import InputError, given
-from ...base.tables.gearbox import Gearbox, NamedMesh
+from ...base.tables.gearbox import Gearbox, NamedMesh, check_spur_mesh
 from ...base.tables.housing import HousingTable
 from ...base.tables.jobs import read_train_tables
 from ...base.tables.pair import StiffnessTable
@@ -86,6 +86,7 @@ class TrainJob:
         """
         made: dict[str, Gear] = {}
         for mesh in self.meshes:
+            check_spur_mesh(mesh, "a train")
             pair = pair_of(mesh)
             made |= {mesh.driver.name: pair.pinion, mesh.driven.name: pair.given_wheel}
         return made | {name: gear_of(named) for name, named in self.gearbox.gears.items() if name not in made}
@@ -213,7 +214,7 @@ def back_flanks(job: TrainJob, train: GearTrain, number: int) -> bool:
     if job.table.model_of(table) != POTENTIAL:
         return False
     pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
-    return pair.normal_backlash > 0.0
+    return pair.base_backlash > 0.0
 
 
 def _mesh(job: TrainJob, table: TrainMeshTable, named: NamedMesh) -> GearMesh:

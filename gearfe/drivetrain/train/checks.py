@@ -14,6 +14,7 @@ from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.gear_data import rounding
 from ...gears.geometry.mesh_geometry import ContactModel
 from ...gears.geometry.pair import Gear, gear_pair, in_keys
+from ...gears.geometry.validity import check_spur
 from .friction import check_friction
 from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from .statics import check_flanks, check_yields, one_sided
@@ -173,7 +174,9 @@ def _check_mesh(train: GearTrain, mesh: GearMesh) -> None:
     if one.shaft == two.shaft:
         raise InputError(label, None, f"both gears are on shaft {one.shaft!r}", "mesh gears of two shafts")
     try:
-        expected = gear_pair(one.gear, two.gear, mesh.centre_distance).working_centre_distance
+        pair = gear_pair(one.gear, two.gear, mesh.centre_distance)
+        check_spur(pair, "a train")
+        expected = pair.working_centre_distance
     except InputError as error:
         side, _, name = error.field.rpartition(".")
         error = InputError(name, error.value, error.problem, error.cure)

@@ -23,7 +23,7 @@ from ...base.cache import cache_key, cached_arrays, source_hash, versions
 from ...base.config import read_toml
 from ...base.errors import InputError, given
 from ...base.progress import Stopwatch
-from ...base.tables.gearbox import NamedMesh
+from ...base.tables.gearbox import NamedMesh, check_spur_mesh
 from ...base.tables.jobs import only_mesh
 from ...base.tables.pair import MaterialTable, StiffnessTable
 from ...fem.plane import Material
@@ -190,8 +190,9 @@ def stiffness_job(mesh: NamedMesh, folder: Path = Path(), pair: GearPair | None 
     Raises
     ------
     InputError
-        For gears that cannot run together.
+        For gears that cannot run together, and helical ones.
     """
+    check_spur_mesh(mesh, "the contact of the teeth")
     return StiffnessJob(mesh, pair_of(mesh) if pair is None else pair, folder)
 
 

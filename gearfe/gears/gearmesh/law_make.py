@@ -129,7 +129,7 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
     # the checks that accepted a cell are the lucky ones: others see the final law
     for _ in range(FINAL_ROUNDS):
         error = max(error, float(check_cells(law, nodes[:-1], np.diff(nodes)).max()))
-    return replace(law, backlash=geometry.normal_backlash, error=error)
+    return replace(law, backlash=geometry.base_backlash, error=error)
 
 
 def _spread(points: Iterator[int], count: int) -> Array:

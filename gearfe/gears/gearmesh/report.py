@@ -390,5 +390,5 @@ def _jam(job: StiffnessJob, load_map: LoadMap, count: int) -> str:
     return (
         f"{count} positions have no numbers, for the back flanks would bear, too: they overlap by up to "
         f"{-1e6 * clearance[i, j]:.3g} um (at {where}), more material stands out than "
-        f"{1e6 * job.pair.normal_backlash:.3g} um of backlash leave room for; thin the teeth (tooth_thinning_um)"
+        f"{1e6 * job.pair.base_backlash:.3g} um of backlash leave room for; thin the teeth (tooth_thinning_um)"
     )

@@ -31,7 +31,7 @@ from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, check_alike, ch
 from ..contact.position import Positions, in_batches, joined, taken
 from ..geometry.face import ToothDeviations
 from ..geometry.pair import GearPair
-from ..geometry.validity import MOST_OVERLAP, overlaps
+from ..geometry.validity import MOST_OVERLAP, check_spur, overlaps
 from ..teeth.tooth_sector import sector_mesh, sector_recipes
 from .curve import BACK, SOLVED, StiffnessCurve
 from .load_map import LoadMap
@@ -70,6 +70,7 @@ def elastic_pair(
     changes
         Fields of the model to change, such as ``law="nitsche"``; see `PairModel.changed`.
     """
+    check_spur(pair, "the law of plane sections")
     model = model.changed(**changes)
     watch = watch or Stopwatch()
     gears = (pair.pinion, pair.wheel)
@@ -439,7 +440,7 @@ def _back_flanks(grid: Grid, behind_model: HalfPlanePair, solved: Positions) -> 
     pair, radius = grid.solver.pair, grid.solver.pair.wheel.base_radius
     error_behind = radius * (behind_model.first_contact_twists(-grid.angles) - pair.contact_twist)
     error = radius * (solved.twist - pair.contact_twist)
-    clearance = pair.normal_backlash + np.tile(error_behind, len(grid.loads)) + error
+    clearance = pair.base_backlash + np.tile(error_behind, len(grid.loads)) + error
     return error_behind, np.where(solved.status == "converged", clearance, np.nan)
 
 

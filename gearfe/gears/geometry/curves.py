@@ -6,9 +6,12 @@ tau = B - s/r_b, e1 = exp(i tau), e2 = i e1 and B = psi + inv(alpha),
     P(s) = r_b e1 + s e2,    radius = sqrt(r_b^2 + s^2),    polar angle = B - (s/r_b - atan(s/r_b)),    normal = e2.
 
 The root is the envelope of a rack tip rounded with radius rho. Its round's centre lies d below the pitch line; with the
-contact normal n = (sin g, -cos g) through the pitch point (0, r), rack and gear touch at (0, r) + (d/cos g + rho) n
-after the rack has moved by X_m = d tan g - c_x and the gear has rolled by X_m/r (Litvin & Fuentes, *Gear Geometry and
-Applied Theory*, ch. 6: the common normal of a cutter and its envelope passes through the instantaneous centre).
+contact normal n = (sin g, -cos g) through the pitch point (0, r), rack and gear touch at (0, r) + L n with
+L = d/cos g + rho, after the rack has moved by X_m = d tan g - c_x and the gear has rolled by X_m/r (Litvin & Fuentes,
+*Gear Geometry and Applied Theory*, ch. 6: the common normal of a cutter and its envelope passes through the
+instantaneous centre). The transverse section of a helical gear's rack is stretched along the pitch line by
+q = 1/cos(beta): the round is an ellipse, whose point with the normal n lies q^2 rho sin(g)/w beside and rho cos(g)/w
+below its centre, w^2 = 1 + (q^2 - 1) sin^2 g. So L = d/cos g + rho/w and X_m = d tan g - (q^2 - 1) rho sin(g)/w - c_x.
 """
 
 from __future__ import annotations
@@ -92,8 +95,9 @@ class Trochoid:
     """Envelope of the rack's tip round, from the root circle (g = 0) to the normal angle `end` (rad).
 
     `depth` d (m), `radius` rho (m) and `offset` c_x (m) place the round of the rack tooth, whose middle meets the
-    gear's space at polar angle `space_angle` (rad); `reference_radius` r (m). Its speed is rho + L d / (r cos^2 g) with
-    L = d/cos g + rho, and d(R^2)/dg = 2 r sin g times it: the radius R grows all along the curve.
+    gear's space at polar angle `space_angle` (rad); `reference_radius` r (m); `stretch` q is that of the round along
+    the pitch line. Its speed is L + X' (L/r - cos g), rho + L d/(r cos^2 g) for q = 1, and d(R^2)/dg = 2 r sin g times
+    it: the radius R grows all along the curve.
     """
 
     reference_radius: float
@@ -102,10 +106,11 @@ class Trochoid:
     offset: float
     space_angle: float
     end: float
+    stretch: float = 1.0
 
     def at(self, g: Array) -> ComplexArray:
         """Points (m) where the contact normal has the angle g (rad), shape (n,)."""
-        reach = self.depth / np.cos(g) + self.radius
+        reach = self.depth / np.cos(g) + self.radius / self._widened(g)
         return (1j * self.reference_radius - 1j * reach * np.exp(1j * g)) * self._turn(g)
 
     def point(self, t: Array) -> ComplexArray:
@@ -117,12 +122,23 @@ class Trochoid:
 
     def speed(self, t: Array) -> Array:
         g = t * self.end
-        reach = self.depth / np.cos(g) + self.radius
-        return self.end * np.abs(self.radius + reach * self.depth / (self.reference_radius * np.cos(g) ** 2))
+        widened, over = self._widened(g), self.stretch**2 - 1.0
+        reach = self.depth / np.cos(g) + self.radius / widened
+        # what the stretch adds to the radius of curvature of the round, and to the move X' of the rack
+        beside = -over * self.radius * np.cos(g) / widened**3
+        round_ = self.radius / widened - beside * np.cos(g)
+        move = self.depth + beside * np.cos(g) ** 2  # X' cos^2 g
+        return self.end * np.abs(round_ + reach * move / (self.reference_radius * np.cos(g) ** 2))
 
     def _turn(self, g: Array) -> ComplexArray:
-        roll = (self.depth * np.tan(g) - self.offset) / self.reference_radius + self.space_angle - math.pi / 2
-        return np.exp(1j * roll)
+        move = self.depth * np.tan(g) - self.offset
+        if self.stretch != 1.0:
+            move = move - (self.stretch**2 - 1.0) * self.radius * np.sin(g) / self._widened(g)
+        return np.exp(1j * (move / self.reference_radius + self.space_angle - math.pi / 2))
+
+    def _widened(self, g: Array) -> Array:
+        """w at normal angles g (rad), 1 where the round is a circle."""
+        return np.sqrt(1.0 + (self.stretch**2 - 1.0) * np.sin(g) ** 2)
 
 
 @dataclass(frozen=True)

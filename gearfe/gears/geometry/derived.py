@@ -50,6 +50,7 @@ def derived_geometry(pair: GearPair, spans: tuple[int | None, int | None] = (Non
     spans
         Numbers of teeth that span sizes of pinion and wheel are over; None: as many as touch nearest to d + 2 x m.
     """
+    helix = _of_helix(pair) if pair.pinion.helical else {}
     return {
         "gear_ratio": pair.gear_ratio,
         "centre_distance_mm": 1e3 * pair.working_centre_distance,
@@ -61,6 +62,7 @@ def derived_geometry(pair: GearPair, spans: tuple[int | None, int | None] = (Non
         "contact_ratio": pair.contact_ratio,
         "contact_ratio_active": pair.contact_ratio_active,
         "contact_ratio_effective": pair.contact_ratio_effective,
+        **helix,
         "path_length_mm": 1e3 * pair.path_length,
         "mesh_cycle_deg": math.degrees(pair.mesh_cycle),
         "path_of_contact": {
@@ -73,6 +75,31 @@ def derived_geometry(pair: GearPair, spans: tuple[int | None, int | None] = (Non
         },
         "pinion": _of_gear(pair.pinion, pair.pinion_working_radius, spans[0]),
         "wheel": _of_gear(pair.wheel, pair.wheel_working_radius, spans[1]),
+    }
+
+
+def _of_helix(pair: MeshGeometry) -> dict[str, Any]:
+    """What a helix adds to the geometry of a pair."""
+    pinion = pair.pinion
+    return {
+        "overlap_ratio": pair.overlap_ratio,
+        "total_contact_ratio": pair.total_contact_ratio,
+        "helix_angle_deg": math.degrees(pinion.helix_angle),
+        "base_helix_angle_deg": math.degrees(pinion.base_helix_angle),
+        "working_helix_angle_deg": math.degrees(pair.working_helix_angle),
+        "transverse_module_mm": 1e3 * pinion.transverse_module,
+        "transverse_pressure_angle_deg": math.degrees(pinion.transverse_pressure_angle),
+        "common_face_width_mm": 1e3 * pair.common_width,
+    }
+
+
+def _helix_of_gear(gear: Gear, span: float) -> dict[str, Any]:
+    """What a helix adds to the geometry of a gear with a span size (m)."""
+    return {
+        "helix_hand": gear.hand,
+        "lead_mm": 2e3 * math.pi / abs(gear.twist_rate),
+        "virtual_teeth": gear.virtual_teeth,
+        "span_least_face_width_mm": 1e3 * span * math.sin(gear.base_helix_angle),
     }
 
 
@@ -92,6 +119,7 @@ def _of_gear(gear: Gear, working_radius: float, span: int | None) -> dict[str, A
         "profile_shift": gear.profile_shift,
         "span_teeth": spanned,
         "span_mm": 1e3 * gear.span_size(spanned),
+        **(_helix_of_gear(gear, gear.span_size(spanned)) if gear.helical else {}),
         "undercut": gear.undercut,
     }
 
@@ -154,8 +182,8 @@ def single_pair_stretches(pair: GearPair, start: float, end: float) -> list[tupl
 
 
 def flexibility(pinion: Gear, wheel: Gear) -> float:
-    """q', minimum flexibility of a pair of teeth (mm um/N); spur gears, so z_n = z."""
-    z1, z2, x1, x2 = pinion.teeth, wheel.teeth, pinion.profile_shift, wheel.profile_shift
+    """q', minimum flexibility of a pair of teeth (mm um/N), of the virtual teeth z_n."""
+    z1, z2, x1, x2 = pinion.virtual_teeth, wheel.virtual_teeth, pinion.profile_shift, wheel.profile_shift
     return (
         0.04723
         + 0.15551 / z1
@@ -182,7 +210,7 @@ def pair_modulus(pinion: float, wheel: float) -> float:
 def single_stiffness(pair: MeshGeometry, pinion_modulus: float, wheel_modulus: float) -> float:
     """c', maximum stiffness of one tooth pair per face width (N/m^2; 1e9 N/m^2 = 1 N/(mm um)).
 
-    c' = c'_th C_M C_R C_B cos(beta) E/E_steel with C_R = 1 (solid discs), beta = 0 and the mean C_B of both racks.
+    c' = c'_th C_M C_R C_B cos(beta) E/E_steel with C_R = 1 (solid discs) and the mean C_B of both racks.
 
     Parameters
     ----------
@@ -191,7 +219,9 @@ def single_stiffness(pair: MeshGeometry, pinion_modulus: float, wheel_modulus: f
     """
     rack = 0.5 * (rack_factor(pair.pinion) + rack_factor(pair.wheel))
     material = pair_modulus(pinion_modulus, wheel_modulus) / STEEL
-    return _UNIT / flexibility(pair.pinion, pair.wheel) * CORRECTION * rack * material
+    return (
+        _UNIT / flexibility(pair.pinion, pair.wheel) * CORRECTION * rack * material * math.cos(pair.pinion.helix_angle)
+    )
 
 
 def mesh_stiffness(pair: MeshGeometry, pinion_modulus: float, wheel_modulus: float) -> float:
@@ -223,7 +253,7 @@ def dynamic_factor(
     pitch, profile = deviations
     N = np.abs(np.asarray(speeds, dtype=float)) * pair.pinion.teeth / math.sqrt(stiffness / mass)
     ratio, width = pair.contact_ratio, min(pair.pinion.face_width, pair.wheel.face_width)
-    load = force * math.cos(pair.pinion.pressure_angle) / width
+    load = force * math.cos(pair.pinion.transverse_pressure_angle) / width
     single = stiffness / width / (0.75 * ratio + 0.25)
     p, f, k = single * pitch / load, single * profile / load, abs(1.0 - single * relief / load)
     if ratio <= 2.0:

@@ -27,16 +27,16 @@ NIL_ANGLE = 1e-12
 
 
 def largest_rack_tip_radius(gear: GearData) -> float:
-    """Rack tip radius (times module) at which the land of the rack's tip vanishes; beyond it no such rack exists."""
+    """Rack tip radius (times normal module) at which the land of the rack's tip vanishes, and with it such racks."""
     alpha = gear.pressure_angle
     land = math.pi / 4 + 0.5 * gear.tooth_thinning / gear.module - gear.dedendum * math.tan(alpha)
     return land * math.cos(alpha) / (1.0 - math.sin(alpha))
 
 
 def least_shift(gear: GearData) -> float:
-    """Profile shift coefficient from which on the rack does not undercut: h_F/m - z sin^2(alpha)/2 (-)."""
-    sine = math.sin(gear.pressure_angle)
-    return gear.dedendum - gear.rack_tip_radius * (1.0 - sine) - 0.5 * gear.teeth * sine**2
+    """Profile shift coefficient from which on the rack does not undercut: h_F/m_n - r sin^2(alpha_t)/m_n (-)."""
+    height = gear.dedendum - gear.rack_tip_radius * (1.0 - math.sin(gear.pressure_angle))
+    return height - gear.reference_modules * math.sin(gear.transverse_pressure_angle) ** 2
 
 
 def tooth_root(gear: GearData) -> tuple[Trochoid, float, bool]:
@@ -54,15 +54,19 @@ def tooth_root(gear: GearData) -> tuple[Trochoid, float, bool]:
         problem = f"exceeds the land of the rack's tip: at this pressure angle and dedendum it must be <= {limit:g}"
         raise InputError("rack_tip_radius", gear.rack_tip_radius, problem, "use a smaller radius or less dedendum")
     offset = max(0.0, math.pi * m / 4 + 0.5 * gear.tooth_thinning - depth * math.tan(alpha) - rho / math.cos(alpha))
+    # from the rack's normal section to its transverse one
+    stretch, alpha = 1.0 / math.cos(gear.helix_angle), gear.transverse_pressure_angle
+    offset = stretch * offset
     if offset < NIL_ANGLE * r:
         offset = 0.0
     d = depth - gear.profile_shift * m
-    whole = Trochoid(r, d, rho, offset, math.pi / gear.teeth, math.pi / 2 - alpha)
-    form_roll = r * math.sin(alpha) - (d + rho * math.sin(alpha)) / math.sin(alpha)
+    whole = Trochoid(r, d, rho, offset, math.pi / gear.teeth, math.pi / 2 - alpha, stretch)
+    form_height = d + rho * math.sin(gear.pressure_angle)  # where the rack's straight flank ends below the pitch line
+    form_roll = r * math.sin(alpha) - form_height / math.sin(alpha)
     if form_roll >= -NIL_ANGLE * r:
         return whole, max(0.0, form_roll), False
     end, form_roll = _crossing(gear, whole)
-    cut = Trochoid(r, d, rho, offset, math.pi / gear.teeth, end)
+    cut = replace(whole, end=end)
     if cut.point(np.linspace(0.0, 1.0, 257)).imag.min() <= 0.0:
         problem = f"the undercut root cuts the tooth through; there is no undercut from {least_shift(gear):.4g} on"
         raise InputError("profile_shift", gear.profile_shift, problem, "use more profile shift or more teeth")
@@ -281,7 +285,7 @@ def deviated(gear: GearData, nominal: Involute, deviation: Deviation) -> tuple[I
 
 def _addendum_to(gear: GearData, radius: float) -> float:
     """Addendum coefficient with which the tip circle has the given radius (m)."""
-    return radius / gear.module - gear.teeth / 2 - gear.profile_shift + gear.tip_shortening
+    return radius / gear.module - gear.reference_modules - gear.profile_shift + gear.tip_shortening
 
 
 def _tip_arc(gear: GearData, flank: Involute) -> Arc:

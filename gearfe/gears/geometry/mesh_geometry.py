@@ -1,4 +1,4 @@
-"""How two spur gears mesh in the transverse plane (ISO 21771 names).
+"""How two gears mesh in the transverse plane, and how far along their axes (ISO 21771 names).
 
 Convention of a pair: pinion centre at the origin, wheel centre at (a, 0). At pinion angle 0 a pinion tooth (tooth 0) is
 centred on the line of centres and a wheel space faces it. Angles are positive counter-clockwise; the wheel turns by
@@ -37,7 +37,7 @@ class PathPoint:
 
 @dataclass(frozen=True)
 class MeshGeometry:
-    """Two external spur gears in mesh, not yet checked; `GearPair` is the checked one.
+    """Two external gears in mesh, not yet checked; `GearPair` is the checked one.
 
     Parameters
     ----------
@@ -63,24 +63,24 @@ class MeshGeometry:
 
     @cached_property
     def working_pressure_angle(self) -> float:
-        """Working pressure angle alpha_w (rad): a_0 cos(alpha)/a = cos(alpha_w), or from the profile shifts,
-        inv(alpha_w) = inv(alpha) + 2 (x_1 + x_2) tan(alpha)/(z_1 + z_2)."""
-        alpha = self.pinion.pressure_angle
+        """Transverse working pressure angle alpha_wt (rad): a_0 cos(alpha_t)/a = cos(alpha_wt), or from the profile
+        shifts, inv(alpha_wt) = inv(alpha_t) + 2 (x_1 + x_2) tan(alpha_n)/(z_1 + z_2)."""
+        alpha, normal = self.pinion.transverse_pressure_angle, self.pinion.pressure_angle
         if self.centre_distance is not None:
             return math.acos(self.reference_centre_distance * math.cos(alpha) / self.centre_distance)
         shift = self.pinion.profile_shift + self.wheel.profile_shift
         if shift == 0.0:
             return alpha
-        return inverse_inv(inv(alpha) + 2.0 * shift * math.tan(alpha) / (self.pinion.teeth + self.wheel.teeth))
+        return inverse_inv(inv(alpha) + 2.0 * shift * math.tan(normal) / (self.pinion.teeth + self.wheel.teeth))
 
     @cached_property
     def working_centre_distance(self) -> float:
-        """Centre distance a = a_0 cos(alpha)/cos(alpha_w) (m)."""
+        """Centre distance a = a_0 cos(alpha_t)/cos(alpha_wt) (m)."""
         if self.centre_distance is not None:
             return self.centre_distance
-        if self.working_pressure_angle == self.pinion.pressure_angle:
+        if self.working_pressure_angle == self.pinion.transverse_pressure_angle:
             return self.reference_centre_distance
-        ratio = math.cos(self.pinion.pressure_angle) / math.cos(self.working_pressure_angle)
+        ratio = math.cos(self.pinion.transverse_pressure_angle) / math.cos(self.working_pressure_angle)
         return self.reference_centre_distance * ratio
 
     @cached_property
@@ -95,12 +95,13 @@ class MeshGeometry:
 
     @cached_property
     def base_pitch(self) -> float:
-        """Base pitch p_b (m)."""
+        """Transverse base pitch p_bt (m)."""
         return self.pinion.base_pitch
 
     @cached_property
-    def normal_backlash(self) -> float:
-        """Backlash j_bn along the line of action (m): r_b1, r_b2 times the angles that the two teeth leave free."""
+    def base_backlash(self) -> float:
+        """Backlash j_bt along the line of action in the transverse plane (m): r_b1, r_b2 times the angles that the two
+        teeth leave free."""
         half = inv(self.working_pressure_angle)
         pinion, wheel = self.pinion, self.wheel
         tooth1 = 2.0 * pinion.base_radius * (pinion.base_angle - half)
@@ -110,13 +111,18 @@ class MeshGeometry:
 
     @cached_property
     def backlash(self) -> float:
-        """Circumferential backlash j_wt = j_bn/cos(alpha_w) at the working pitch circles (m)."""
-        return self.normal_backlash / math.cos(self.working_pressure_angle)
+        """Circumferential backlash j_wt = j_bt/cos(alpha_wt) at the working pitch circles (m)."""
+        return self.base_backlash / math.cos(self.working_pressure_angle)
+
+    @cached_property
+    def normal_backlash(self) -> float:
+        """Normal backlash j_bn = j_bt cos(beta_b), the least distance of the flanks (m)."""
+        return self.base_backlash * math.cos(self.pinion.base_helix_angle)
 
     @cached_property
     def contact_twist(self) -> float:
-        """Twist of the wheel (rad) at which rigid driving flanks just touch: half the backlash, j_bn/(2 r_b2)."""
-        return 0.5 * self.normal_backlash / self.wheel.base_radius
+        """Twist of the wheel (rad) at which rigid driving flanks just touch: half the backlash, j_bt/(2 r_b2)."""
+        return 0.5 * self.base_backlash / self.wheel.base_radius
 
     @cached_property
     def mesh_cycle(self) -> float:
@@ -201,6 +207,28 @@ class MeshGeometry:
         what an unloaded pair has; under load, contact grows into the relieved part up to `contact_ratio_active`."""
         start, end = self.path_limits(relieved=True)
         return max(0.0, end - start) / self.base_pitch
+
+    @cached_property
+    def common_width(self) -> float:
+        """Width b on which both gears have teeth (m)."""
+        return min(self.pinion.face_width, self.wheel.face_width)
+
+    @cached_property
+    def overlap_ratio(self) -> float:
+        """Overlap ratio eps_beta = b sin(beta)/(pi m_n) (-)."""
+        pinion = self.pinion
+        return self.common_width * math.sin(pinion.helix_angle) / (math.pi * pinion.module)
+
+    @cached_property
+    def total_contact_ratio(self) -> float:
+        """Total contact ratio eps_gamma = eps_alpha + eps_beta (-)."""
+        return self.contact_ratio + self.overlap_ratio
+
+    @cached_property
+    def working_helix_angle(self) -> float:
+        """Helix angle beta_w at the working pitch circles (rad): tan(beta_w) = r_w tan(beta)/r."""
+        pinion = self.pinion
+        return math.atan(math.tan(pinion.helix_angle) * self.pinion_working_radius / pinion.reference_radius)
 
     @cached_property
     def path_length(self) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from ...base.errors import InputError, given
 from ...base.shown import Shown
 from ...base.tables.gearbox import NamedGear, NamedMesh, pair_gearbox, shift_by_distance
-from ...base.tables.pair import FROM_DISTANCE, PairTable
+from ...base.tables.pair import FROM_DISTANCE, PairTable, transverse_teeth
 from .gear_data import TipRelief, nominal_span, rounding
 from .mesh_geometry import MeshGeometry, PathPoint
 from .spur_gear import Gear
@@ -28,7 +28,7 @@ __all__ = ["Gear", "GearPair", "MeshGeometry", "PathPoint", "TipRelief"]
 
 @dataclass(frozen=True, repr=False)
 class GearPair(MeshGeometry, Shown):
-    """Two external spur gears in mesh, checked when made.
+    """Two external spur or helical gears in mesh, checked when made.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class GearPair(MeshGeometry, Shown):
     Raises
     ------
     InputError
-        For gears that cannot mesh, jam, interfere, or have a contact ratio below 1.
+        For gears that cannot mesh, jam, interfere, or have a contact ratio below 1; of helical gears the total one.
     """
 
     notes: tuple[str, ...] = field(default=(), kw_only=True, compare=False)
@@ -55,7 +55,8 @@ class GearPair(MeshGeometry, Shown):
         object.__setattr__(self, "given_wheel", self.wheel)
         notes = list(self.notes)
         if jam > 0.0:
-            thinning = jam / math.cos(self.wheel.pressure_angle)
+            wheel = self.wheel
+            thinning = jam * math.cos(wheel.base_helix_angle) / math.cos(wheel.pressure_angle)
             thinner = replace(self.wheel, tooth_thinning=self.wheel.tooth_thinning + thinning)
             object.__setattr__(self, "wheel", thinner)
             notes.append(
@@ -75,7 +76,13 @@ class GearPair(MeshGeometry, Shown):
             "working pressure angle": f"{math.degrees(self.working_pressure_angle):.5g} deg",
             "contact ratio": f"{self.contact_ratio:.4g}",
             "backlash": f"{1e3 * self.backlash:.4g} mm",
-        }
+        } | self._helix()
+
+    def _helix(self) -> dict[str, str]:
+        if not self.pinion.helical:
+            return {}
+        angle = f"{math.degrees(self.pinion.helix_angle):.5g} deg, pinion {self.pinion.hand}"
+        return {"helix angle": angle, "overlap ratio": f"{self.overlap_ratio:.4g}"}
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -100,6 +107,8 @@ KEYS: dict[str, tuple[str, float]] = {
     "tip_relief.length": ("tip_relief_length_mm", 1e-3),
     "tip_relief.exponent": ("tip_relief_exponent", 1.0),
     "tooth_thinning": ("tooth_thinning_um", 1e-6),
+    "helix_angle": ("helix_angle_deg", math.pi / 180.0),
+    "hand": ("helix_hand", 1.0),
     "centre_distance": ("centre_distance_mm", 1e-3),
 }
 
@@ -136,7 +145,8 @@ def gear_of_form(teeth: int, form: Mapping[str, Any]) -> Gear:
     made = dict(form)
     for name, (key, unit) in KEYS.items():
         if made.get(key) is not None:
-            made[name] = made.pop(key) * unit
+            value = made.pop(key)
+            made[name] = value if isinstance(value, str) else value * unit
     amount, length, exponent = (made.pop(f"tip_relief.{name}", None) for name in ("amount", "length", "exponent"))
     if amount:
         made["tip_relief"] = TipRelief(amount, given(length, "tip_relief_length_mm"), exponent)
@@ -251,7 +261,7 @@ class _Written:
     def _of_drawing(self, side: str, form: Mapping[str, Any]) -> dict[str, float]:
         """Keys of the tooth form that drawing values stand for: tip and root diameters, the span size."""
         teeth, drawn = self.named[side].teeth, self.named[side].drawn
-        module_mm, half, x = form["module_mm"], 0.5 * teeth, form["profile_shift"]
+        module_mm, half, x = form["module_mm"], self._half_teeth(side), form["profile_shift"]
         made: dict[str, float] = {}
         if "tip_diameter_mm" in drawn:
             made |= {"addendum": 0.5 * drawn["tip_diameter_mm"] / module_mm - half - x, "tip_shortening": 0.0}
@@ -259,7 +269,7 @@ class _Written:
             made["dedendum"] = half + x - 0.5 * drawn["root_diameter_mm"] / module_mm
         if "span_mm" in drawn:
             angle, span, over = math.radians(form["pressure_angle_deg"]), drawn["span_mm"], drawn["span_teeth"]
-            most = module_mm * nominal_span(teeth, x, angle, over)
+            most = module_mm * nominal_span(teeth, x, angle, over, self._helix(side))
             if span > most + 1e3 * rounding(1e-3 * module_mm):
                 problem = f"must be <= {most:.6g} mm, the span over {over} teeth without backlash"
                 cure = "use more profile_shift, or another span_teeth"
@@ -284,8 +294,9 @@ class _Written:
         for side in SIDES:
             named = self.named[side]
             module, given_mm = named.form["module_mm"], named.drawn.get("pitch_diameter_mm")
-            if given_mm is not None and abs(given_mm - named.teeth * module) > 1e-9 * given_mm:
-                off = 1e3 * abs(given_mm - named.teeth * module)
+            diameter = 2.0 * self._half_teeth(side) * module
+            if given_mm is not None and abs(given_mm - diameter) > 1e-9 * given_mm:
+                off = 1e3 * abs(given_mm - diameter)
                 notes.append(
                     f"pitch_diameter_mm of {self.called[side]} differs from {named.teeth} teeth of the common module "
                     f"{module:.9g} mm by {off:.3g} um, by rounding: the module is taken"
@@ -294,6 +305,13 @@ class _Written:
 
     def _angle(self, side: str) -> float:
         return math.radians(self.named[side].form["pressure_angle_deg"])
+
+    def _helix(self, side: str) -> float:
+        return math.radians(self.named[side].form["helix_angle_deg"])
+
+    def _half_teeth(self, side: str) -> float:
+        """Reference radius over normal module, z/(2 cos(beta))."""
+        return 0.5 * transverse_teeth(self.named[side].teeth, self.named[side].form["helix_angle_deg"])
 
     def _written(self, side: str, name: str) -> tuple[str, str]:
         """Key that gives an argument of a gear, and its table; an empty text where the user wrote none."""
@@ -330,7 +348,7 @@ class _Written:
                 return shift
         where = where or self.named[side].where
         if key == "pitch_diameter_mm":
-            return in_keys(error, where, key=key, unit=1e-3 / self.named[side].teeth)
+            return in_keys(error, where, key=key, unit=5e-4 / self._half_teeth(side))
         if key == KEYS.get(error.field, (error.field, 1.0))[0]:
             return in_keys(error, where)
         return self._of_key(error, side, key, where)
@@ -342,12 +360,13 @@ class _Written:
         if error.limit is None:
             number = f"{error.value:.6g}" if isinstance(error.value, float) else str(error.value)
             return InputError(f"{where}.{key}", value, f"makes {error.field} {number}: {error.reason}", error.cure)
-        form, teeth, (sign, bound, unit) = named.form, named.teeth, error.limit
+        form, (sign, bound, unit) = named.form, error.limit
         module, x = form["module_mm"], form["profile_shift"]
         if key != "tip_diameter_mm":  # these fall as what they stand for grows
             sign = {"<": ">", ">": "<", ">=": "<=", "<=": ">="}[sign]
         if key == "span_mm":
-            whole = module * nominal_span(teeth, x, self._angle(side), named.drawn["span_teeth"])
+            over = named.drawn["span_teeth"]
+            whole = module * nominal_span(named.teeth, x, self._angle(side), over, self._helix(side))
             limit = whole - 1e3 * bound * (1e-6 if unit == "um" else 1.0) * math.cos(self._angle(side))
         elif key == "tip_shortening":
             limit = form["tip_shortening"] + form["addendum"] - bound
@@ -355,7 +374,9 @@ class _Written:
                 cure = "use less tip_shortening of both gears, or more addendum"
                 return InputError(f"{where}.{key}", value, f"{error.reason}, even with 0 here", cure)
         else:
-            limit = module * (teeth + 2.0 * x + 2.0 * (bound if key == "tip_diameter_mm" else -bound))
+            limit = module * (
+                2.0 * self._half_teeth(side) + 2.0 * x + 2.0 * (bound if key == "tip_diameter_mm" else -bound)
+            )
         unit, cure = " mm" * key.endswith("_mm"), f"use a {'smaller' if '<' in sign else 'larger'} {key}"
         return InputError(f"{where}.{key}", value, f"{error.reason}: must be {sign} {limit:.6g}{unit}", cure)
 
@@ -416,7 +437,7 @@ class _Written:
         def possible(a: float) -> bool:
             return self._possible(side, self._shift(side, a), gears, 1e-3 * a)
 
-        reference = 0.5 * sum(gear.teeth for gear in self.mesh.gears) * named.form["module_mm"]
+        reference = sum(map(self._half_teeth, SIDES)) * named.form["module_mm"]
         near = [d for d in np.linspace(0.99 * reference, 1.05 * reference, 121).tolist() if possible(d)]
         if not near:
             return InputError(f"{named.where}.profile_shift", FROM_DISTANCE, problem, error.cure)

@@ -138,11 +138,11 @@ def sine(teeth: int, amplitude: float, phase: float = 0.0) -> Array:
 
 
 def run_out(gear: Gear, amplitude: float, phase: float = 0.0) -> tuple[Array, Array]:
-    """Index deviations (m) of left and right flanks of teeth cut off the axis by amplitude cos(alpha); see the module.
+    """Index deviations (m) of left and right flanks of teeth cut off the axis by amplitude cos(alpha_t).
 
     `amplitude` (m) is that of the index deviations, amplitude sin(2 pi j/z + phase) on the left flanks.
     """
-    apart = 2.0 * (gear.pressure_angle - gear.half_thickness_angle)
+    apart = 2.0 * (gear.transverse_pressure_angle - gear.half_thickness_angle)
     return sine(gear.teeth, amplitude, phase), -sine(gear.teeth, amplitude, phase + apart)
 
 

@@ -1,7 +1,7 @@
 """What pairs are meant for: what lies beyond is refused, loads beyond it are flagged. `spur_gear` checks single gears.
 
-- *Pair*: gears that run together, with a contact ratio of 1 and more; whether tips enter the material of the mate is
-  answered by rolling the pair.
+- *Pair*: gears that run together, with a contact ratio of 1 and more, of helical gears the total one; whether
+  tips enter the material of the mate is answered by rolling the pair.
 - *Overlap* r_b times twist, by which rigid flanks would overlap along the line of action: up to 0.12 modules. That is
   how far the contact laws were held against each other (0.5 deg of twist of the 20/30 pair, docs/contact_laws.md). Each
   tooth, 2.25 modules high and 1.8 thick at its root, then yields by d = 0.06 modules: as a cantilever it has the strain
@@ -33,6 +33,8 @@ MOST_OVERLAP = 0.12
 MOST_YIELD = 0.25
 #: Penetrations below this many modules are taken for the discretisation of the outlines.
 TOLERANCE = 1e-4
+#: Least transverse contact ratio of a helical pair (-), whatever its overlap ratio: tips must reach each other.
+LEAST_PATH = 0.1
 #: Rotations through the engagement of one tooth at which tips are looked at.
 POSITIONS = 241
 
@@ -46,7 +48,12 @@ def check_seat(pair: MeshGeometry) -> float:
         For gears of different modules or pressure angles, and a centre distance that is impossible or jams the teeth.
     """
     pinion, wheel = pair.pinion, pair.wheel
-    for name, what, unit in (("module", "module", 1e3), ("pressure_angle", "pressure angle", 180.0 / math.pi)):
+    degrees = 180.0 / math.pi
+    for name, what, unit in (
+        ("module", "module", 1e3),
+        ("pressure_angle", "pressure angle", degrees),
+        ("helix_angle", "helix angle", degrees),
+    ):
         value, other = getattr(wheel, name), getattr(pinion, name)
         if abs(value - other) > 1e-9 * abs(other):
             symbol = "mm" if name == "module" else "deg"
@@ -54,7 +61,17 @@ def check_seat(pair: MeshGeometry) -> float:
             problem = f"gears that differ in {what}, {both}, do not mesh"
             limit = ("equal to", unit * other, symbol)
             raise InputError(f"wheel.{name}", value, problem, f"give both the same {what}", limit)
+    if pinion.helical and pinion.hand == wheel.hand:
+        problem = "is the hand of both helices: that of external gears in mesh is opposite"
+        raise InputError("wheel.hand", wheel.hand, problem, "give the other hand to one of them")
     return _check_distance(pair)
+
+
+def check_spur(pair: MeshGeometry, what: str) -> None:
+    """Raise `InputError` for helical gears; `what` names the computation that takes spur gears only."""
+    if pair.pinion.helical:
+        problem = f"is of a helical gear: {what} takes spur gears only"
+        raise InputError("pinion.helix_angle", pair.pinion.helix_angle, problem, "use gears without helix angle")
 
 
 def check_pair(pair: MeshGeometry) -> None:
@@ -75,10 +92,10 @@ def check_pair(pair: MeshGeometry) -> None:
 def _check_distance(pair: MeshGeometry) -> float:
     """Raise `InputError` for an impossible centre distance; return the jam (m) that rounding leaves."""
     pinion, wheel = pair.pinion, pair.wheel
-    alpha, lowest = pinion.pressure_angle, pinion.base_radius + wheel.base_radius
+    alpha, lowest = pinion.transverse_pressure_angle, pinion.base_radius + wheel.base_radius
     if pair.centre_distance is None:
         shift = pinion.profile_shift + wheel.profile_shift
-        least = -0.5 * (pinion.teeth + wheel.teeth) * inv(alpha) / math.tan(alpha)
+        least = -0.5 * (pinion.teeth + wheel.teeth) * inv(alpha) / math.tan(pinion.pressure_angle)
         if shift <= least:
             limit = (">", least - wheel.profile_shift, "")
             problem, cure = (
@@ -91,11 +108,11 @@ def _check_distance(pair: MeshGeometry) -> float:
     if isinstance(a, bool) or not isinstance(a, Real) or not math.isfinite(a) or a <= lowest:
         problem = f"leaves no working pressure angle: must be finite and > {1e3 * lowest:.9g} mm"
         raise InputError("centre_distance", a, problem, "use a larger centre distance, or leave it out")
-    if pair.normal_backlash < 0.0:
+    if pair.base_backlash < 0.0:
         angles = pinion.base_radius * pinion.base_angle + wheel.base_radius * wheel.base_angle - pair.base_pitch / 2
         tight = lowest / math.cos(inverse_inv(angles / lowest))
         if tight - a <= rounding(pinion.module):
-            return -pair.normal_backlash
+            return -pair.base_backlash
         problem = f"jams the teeth (backlash {1e3 * pair.backlash:.6g} mm): must be >= {1e3 * tight:.12g} mm"
         cure = "use a larger centre distance, less profile shift or more tooth thinning, or leave it out"
         raise InputError("centre_distance", a, problem, cure)
@@ -112,23 +129,32 @@ def _tips_ratio(pair: MeshGeometry, *, rounded: bool) -> float:
 
 
 def missing_addendum(pair: MeshGeometry, names: Sequence[str]) -> float:
-    """Return by how much (times module) the addenda of named gears must grow for a contact ratio of 1 between tips."""
+    """Return by how much (times module) the addenda of named gears must grow for the least contact ratio of tips."""
 
     def ratio(more: float) -> float:
         gears = ((getattr(pair, name), more if name in names else 0.0) for name in ("pinion", "wheel"))
         rolls = sum(gear.roll_length(gear.tip_radius + add * gear.module) for gear, add in gears)
-        return (rolls - pair.tangent_length) / pair.base_pitch - 1.0
+        return (rolls - pair.tangent_length) / pair.base_pitch - least
 
+    least = least_ratio(pair)
     return bisect(ratio, 0.0, pair.tangent_length / pair.pinion.module)
 
 
+def least_ratio(pair: MeshGeometry) -> float:
+    """Least transverse contact ratio (-) that hands over from tooth to tooth: 1 less the overlap ratio."""
+    return max(1.0 - pair.overlap_ratio, LEAST_PATH)
+
+
 def _check_ratio(pair: MeshGeometry) -> None:
-    nominal, active = _tips_ratio(pair, rounded=False), pair.contact_ratio_active
-    if nominal < 1.0:
+    nominal, active, least = _tips_ratio(pair, rounded=False), pair.contact_ratio_active, least_ratio(pair)
+    short = f"{least:.4g}"
+    if pair.pinion.helical:
+        short += f" (with an overlap ratio of {pair.overlap_ratio:.4g})"
+    if nominal < least:
         gear: Gear
-        problem, cure = f"gives a contact ratio of {nominal:.4g} < 1", "use less tip_shortening, or more teeth"
-        # the distance of the points of tangency that leaves one base pitch between the tips
-        tangent = pair.tangent_length - (1.0 - nominal) * pair.base_pitch
+        problem, cure = f"gives a contact ratio of {nominal:.4g} < {short}", "use less tip_shortening, or more teeth"
+        # the distance of the points of tangency that leaves the least path between the tips
+        tangent = pair.tangent_length - (least - nominal) * pair.base_pitch
         if pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch and tangent > 0.0:
             most = math.hypot(tangent, pair.pinion.base_radius + pair.wheel.base_radius)
             cure = "use a smaller centre distance"
@@ -137,19 +163,19 @@ def _check_ratio(pair: MeshGeometry) -> None:
         gear = getattr(pair, name)
         limit = (">=", gear.addendum + missing_addendum(pair, (name,)), "")
         raise InputError(f"{name}.addendum", gear.addendum, problem, cure, limit)
-    if active >= 1.0:
+    if active >= least:
         return
     rounded = _tips_ratio(pair, rounded=True)
-    if rounded < 1.0:
+    if rounded < least:
         name = "pinion" if pair.pinion.tip_round >= pair.wheel.tip_round else "wheel"
         gear = getattr(pair, name)
-        problem, cure = f"leaves a contact ratio of {rounded:.4g} < 1", "use a smaller tip round"
-        largest = _largest_round(gear, gear.profile.round_roll + (1.0 - rounded) * pair.base_pitch)
+        problem, cure = f"leaves a contact ratio of {rounded:.4g} < {short}", "use a smaller tip round"
+        largest = _largest_round(gear, gear.profile.round_roll + (least - rounded) * pair.base_pitch)
         raise InputError(f"{name}.tip_round", gear.tip_round, problem, cure, largest)
     cuts = {name: lost for name, lost in _lost_to_form_points(pair).items() if lost > 0.0}
     name = max(cuts, key=cuts.__getitem__)
     gear = getattr(pair, name)
-    problem = f"leaves an undercut root that eats the path of contact: contact ratio {active:.4g}, must be >= 1"
+    problem = f"leaves an undercut root that eats the path of contact: contact ratio {active:.4g}, must be >= {short}"
     cure = f"use more profile shift (no undercut from {least_shift(gear):.4g} on), more teeth or less dedendum"
     raise InputError(f"{name}.profile_shift", gear.profile_shift, problem, cure)
 
@@ -200,7 +226,7 @@ def _allowed_depth(gear: Gear) -> float:
 
 def _tip_depth(pair: MeshGeometry, gear: Gear, mate: Gear) -> float:
     """Largest depth (m) by which tips of a mate enter a gear of the pair."""
-    return tip_penetration(gear, mate, pair.working_centre_distance, 0.5 * pair.normal_backlash / mate.base_radius)
+    return tip_penetration(gear, mate, pair.working_centre_distance, 0.5 * pair.base_backlash / mate.base_radius)
 
 
 def _largest_addendum(pair: MeshGeometry, gear: Gear, mate: Gear) -> tuple[str, float, str] | None:
@@ -341,7 +367,7 @@ def pair_warnings(pair: MeshGeometry) -> list[str]:
             )
         else:
             said.append(f"the {name} is undercut below its active flank; the path of contact is whole")
-    if pair.contact_ratio_effective < 1.0:
+    if pair.contact_ratio_effective < least_ratio(pair):
         said.append(
             f"tip relief leaves a contact ratio of {pair.contact_ratio_effective:.4g} on the unrelieved flanks: "
             "unloaded, the teeth hand over on the relieved part"

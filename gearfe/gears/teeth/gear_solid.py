@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Iterator
@@ -14,20 +15,28 @@ from ..geometry.face import NOMINAL, ToothDeviations
 from ..geometry.outline import Piece, whole_outline
 from ..geometry.pair import Gear
 
+#: Largest turn between sections of a helical solid (rad), and their least number: the faces between them, splines
+#: through the sections, are within 1e-5 mm of the helicoids on gears of 100 mm radius.
+SECTION_TURN, LEAST_SECTIONS = 0.05, 5
+
 
 def write_solid(path: Path, gear: Gear, deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL) -> None:
-    """Write the gear with its bore, extruded over the face width, its middle plane at z = 0, tooth 0 on +x.
+    """Write the gear with its bore over the face width, its middle plane at z = 0, tooth 0 on +x there.
 
-    Left and right flanks have their deviations.
+    Left and right flanks have their deviations. Spur gears are extruded, helical ones led through turned sections.
 
     Arcs are arcs, other pieces cubic splines through 49 points of the exact curve (within 1e-5 mm of it).
     """
     with gmsh_session("gear solid") as gmsh:
         occ = gmsh.model.occ
         width = 1e3 * gear.face_width
-        loop = occ.addCurveLoop(_outline(occ, whole_outline(gear, deviations), -0.5 * width))
-        bore = occ.addCurveLoop([occ.addCircle(0.0, 0.0, -0.5 * width, 0.5e3 * gear.bore_diameter)])
-        occ.extrude([(2, occ.addPlaneSurface([loop, bore]))], 0.0, 0.0, width)
+        teeth = whole_outline(gear, deviations)
+        if gear.helical:
+            _add_helical(occ, gear, teeth)
+        else:
+            loop = occ.addCurveLoop(_outline(occ, teeth, -0.5 * width))
+            bore = occ.addCurveLoop([occ.addCircle(0.0, 0.0, -0.5 * width, 0.5e3 * gear.bore_diameter)])
+            occ.extrude([(2, occ.addPlaneSurface([loop, bore]))], 0.0, 0.0, width)
         occ.synchronize()
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
         with _without_words():
@@ -46,6 +55,21 @@ def _without_words() -> Iterator[None]:
         os.dup2(kept, 1)
         os.close(kept)
         os.close(nowhere)
+
+
+def _add_helical(occ: Any, gear: Gear, teeth: list[list[Piece]]) -> None:
+    """Add the solid of a helical gear: through turned sections, less the bore."""
+    width, rate = 1e3 * gear.face_width, 1e-3 * gear.twist_rate
+    count = max(LEAST_SECTIONS, 1 + math.ceil(abs(rate) * width / SECTION_TURN))
+    wires = []
+    for i in range(count):
+        z = width * (i / (count - 1) - 0.5)
+        curves = _outline(occ, teeth, z)
+        occ.rotate([(1, curve) for curve in curves], 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, rate * z)
+        wires.append(occ.addWire(curves))
+    solid = occ.addThruSections(wires, makeSolid=True, makeRuled=False)
+    bore = occ.addCylinder(0.0, 0.0, -0.5 * width, 0.0, 0.0, width, 0.5e3 * gear.bore_diameter)
+    occ.cut([pair for pair in solid if pair[0] == 3], [(3, bore)])
 
 
 def _outline(occ: Any, teeth: list[list[Piece]], z: float) -> list[int]:
