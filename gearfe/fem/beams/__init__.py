@@ -1,0 +1,16 @@
+"""Elastic shafts as Timoshenko beams of high degree, and their reduction to few coordinates."""
+
+from .reduced import GyroscopicPair, ReducedShaft, full_shaft, reduce_shaft
+from .section import LOADS, BeamShaft, Disc, Section, Station
+
+__all__ = [
+    "LOADS",
+    "BeamShaft",
+    "Disc",
+    "GyroscopicPair",
+    "ReducedShaft",
+    "Section",
+    "Station",
+    "full_shaft",
+    "reduce_shaft",
+]
