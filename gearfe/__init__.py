@@ -13,6 +13,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from typing import Any
 
     from .base.errors import InputError
+    from .drivetrain.bearings import BallBearing, RollerBearing
     from .drivetrain.gearbox.mesh_stiffness import compute_meshes
     from .drivetrain.housing.build import housing_from_job
     from .drivetrain.housing.model import Housing
@@ -34,6 +35,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
 
 #: Public name -> module that defines it.
 _PUBLIC: dict[str, str] = {
+    "BallBearing": "drivetrain.bearings",
     "Bearing": "drivetrain.train",
     "Damping": "drivetrain.train",
     "Drive": "drivetrain.train",
@@ -47,6 +49,7 @@ _PUBLIC: dict[str, str] = {
     "Material": "fem.plane",
     "ModalBody": "fem.reduction.modal_body",
     "PairModel": "gears.contact.laws",
+    "RollerBearing": "drivetrain.bearings",
     "Search": "study.search",
     "Shaft": "drivetrain.train",
     "ShaftGear": "drivetrain.train",
@@ -71,6 +74,7 @@ _PUBLIC: dict[str, str] = {
 
 # written out for type checkers; a test holds it against the names above
 __all__ = [
+    "BallBearing",
     "Bearing",
     "Damping",
     "Drive",
@@ -85,6 +89,7 @@ __all__ = [
     "Material",
     "ModalBody",
     "PairModel",
+    "RollerBearing",
     "Search",
     "Shaft",
     "ShaftGear",

@@ -39,7 +39,6 @@ OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
         ("modifications and loads that vary along the face width", "spur gears only (profiles: [microgeometry])"),
     r"tors\w*_stiff|stiff\w*_tors|bending_stiff|(elastic|flexible|compliant)_shaft|shaft_(stiff|elastic|compl|flex)|"
     r"shear_modulus": ("elastic shafts", "spur gears on rigid shafts only"),
-    r"bearing_(stiff|damp|clear|play)": ("elastic bearings", "spur gears on rigid shafts in a housing only"),
 }  # fmt: skip
 #: Tables of gear jobs.
 GEAR_TABLES = (

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfe.base.config import type_hints
+from gearfe.base.tables.bearing import BearingTable
 from gearfe.base.tables.jobs import TABLES, table_class
 from gearfe.base.tables.mechanism import MechanismFile
 from gearfe.base.tables.named import NAMED
@@ -32,6 +33,7 @@ SHARED: dict[type, str] = {
     GearBodyTable: "Gear",
     TrainMeshTable: "Mesh",
     ShaftTable: "Shaft",
+    BearingTable: "Bearing",
 }
 
 

@@ -56,7 +56,6 @@ def refused(capsys: pytest.CaptureFixture[str], *line: str) -> str:
         ("pair.temperature_C=80", "temperatures"),
         ("pair.material.yield_strength_MPa=400", "materials that yield"),
         ("pair.wheel.rim_thickness_mm=5", "thin rims"),
-        ("train.bearing_stiffness_N_per_m=1e8", "elastic bearings"),
     ],
 )
 def test_well_known_names_are_not_taken_for_slips(change: str, what: str, capsys: pytest.CaptureFixture[str]) -> None:

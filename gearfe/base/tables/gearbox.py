@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from ..errors import InputError, unknown_name
+from .bearing import BearingTable
 from .loadmap import LoadMapTable
 from .microgeometry import GearMicrogeometryTable, MicrogeometryTable
 from .named import NamedBearingTable, NamedGearTable, NamedMeshTable, NamedShaftTable
@@ -504,9 +505,11 @@ def named_train(
         for name, shaft in shafts.items()
     )  # fmt: skip
     springs = tuple(
-        TrainBearingTable(attachment=_bore(name, bearing), stiffness=bearing.stiffness, damping=bearing.damping)
+        TrainBearingTable(
+            attachment=_bore(name, bearing), **{f.name: getattr(bearing, f.name) for f in fields(BearingTable)}
+        )
         for name, bearing in bearings.items()
-        if bearing.stiffness is not None
+        if not bearing.hinge
     )
     places = tuple(
         TrainRigidBoreTable(

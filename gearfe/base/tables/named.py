@@ -14,10 +14,11 @@ from typing import Any
 
 from ..config import build, quantity
 from ..errors import InputError
+from .bearing import BearingTable
 from .loadmap import LoadMapTable
 from .microgeometry import GearMicrogeometryTable
 from .pair import GearBodyTable, MaterialTable, StiffnessTable, check_gear
-from .train import Five, ShaftTable, TrainMeshTable
+from .train import ShaftTable, TrainMeshTable
 
 #: Letters, digits, _ and -: names become parts of column names, and of files and folders.
 _NAME = re.compile(r"[^\W_][\w-]*")
@@ -72,22 +73,17 @@ class NamedShaftTable(ShaftTable):
 
 
 @dataclass(frozen=True)
-class NamedBearingTable:
-    """A bearing between a shaft and a bore of the housing: a hinge, or springs and dampers."""
+class _BearingPlace:
+    """Where a bearing is."""
 
     shaft: str = quantity(doc="name of the shaft that it carries")
     attachment: int | str | None = quantity(None, doc="bore (attachment) of the housing; left out: the bearing's name")
     y_mm: float | None = quantity(None, doc="its place along the shaft (mm), in a rigid housing without [housing]")
-    stiffness: Five | None = quantity(  # noqa: RUF009
-        None, low=0.0, doc="along x, y, z (N/m) and for tilt about x, z (N m/rad); left out: a hinge"
-    )
-    damping: Five = quantity((0.0, 0.0, 0.0, 0.0, 0.0), low=0.0, doc="the same in N s/m and N m s/rad")  # noqa: RUF009
 
-    def check(self, where: str) -> None:
-        """A hinge has no damping."""
-        if self.stiffness is None and any(self.damping):
-            problem = "stands beside no stiffness: a hinge does not yield, so nothing damps it"
-            raise InputError(f"{where}.damping", list(self.damping), problem, "give the stiffness, or leave it out")
+
+@dataclass(frozen=True)
+class NamedBearingTable(BearingTable, _BearingPlace):
+    """A bearing between a shaft and a bore of the housing: a hinge, springs and dampers, or a rolling bearing."""
 
 
 #: Tables of tables -> dataclass of an entry.

@@ -11,11 +11,10 @@ from typing import ClassVar
 
 from ..config import Removed, quantity
 from ..errors import InputError, unknown_name
+from .bearing import BearingTable
 from .kinds import GONE_METHODS
 from .pair import FROM_DISTANCE, HANDS, StiffnessTable, ToothFormTable
 from .timefunction import TrainFunctionTable
-
-Five = tuple[float, float, float, float, float]
 
 #: What a mesh is made of unless its stiffness is given.
 POTENTIAL, VARIABLE, MEAN = MESH_MODELS = ("potential", "variable_stiffness", "mean_stiffness")
@@ -281,12 +280,22 @@ def value_text(value: float | TrainFunctionTable, unit: str) -> str:
 
 
 @dataclass(frozen=True)
-class TrainBearingTable:
-    """Springs between a shaft and a bore instead of a hinge."""
+class _Bore:
+    """The bore of a bearing."""
 
     attachment: int | str = quantity(doc="bore")
-    stiffness: Five = quantity(low=0.0, doc="along x, y, z (N/m) and for tilt about x, z (N m/rad)")  # noqa: RUF009
-    damping: Five = quantity((0.0, 0.0, 0.0, 0.0, 0.0), low=0.0, doc="the same in N s/m and N m s/rad")  # noqa: RUF009
+
+
+@dataclass(frozen=True)
+class TrainBearingTable(BearingTable, _Bore):
+    """Springs between a shaft and a bore instead of a hinge, or a rolling bearing."""
+
+    def check(self, where: str) -> None:
+        """Without a stiffness there would be no entry."""
+        super().check(where)
+        if self.hinge:
+            cure = "give it, or stiffness_matrix, or type; without an entry the bore is a hinge"
+            raise InputError(f"{where}.stiffness", None, "is required", cure)
 
 
 @dataclass(frozen=True)

@@ -133,6 +133,11 @@ class _Rolling:
         """Number of rolling elements of all rows."""
         return self.elements * len(self.rows)
 
+    def _width(self, across: float) -> float:
+        """Length along the axis that rolling elements of a width take with their rows (m)."""
+        offsets = [row.offset for row in self.rows]
+        return across + max(offsets) - min(offsets)
+
 
 def _rows(angle: Array, radius: Array, place: Array) -> tuple[Array, Array]:
     """Displacement along radius and axis of points at (angle, radius, axial place) per unit of u, (n, 5) each."""
@@ -168,6 +173,11 @@ class BallBearing(_Rolling):
         inner = groove_constant(self.diameter, self.inner_osculation, gamma, modulus)
         outer = groove_constant(self.diameter, self.outer_osculation, -gamma, modulus)
         return in_series(inner, outer)
+
+    @property
+    def width(self) -> float:
+        """Length along the axis that the balls take (m)."""
+        return self._width(self.diameter)
 
     @cached_property
     def contacts(self) -> Contacts:
@@ -222,6 +232,11 @@ class RollerBearing(_Rolling):
             return -0.00035 * diameter * np.log(1.0 - (2.0 * t / length) ** 2)
         crowned = np.maximum(0.0, 2.0 * t - (length - 2.5 * diameter)) / (2.5 * diameter)
         return np.asarray(-0.0005 * diameter * np.log(1.0 - crowned**2))
+
+    @property
+    def width(self) -> float:
+        """Length along the axis that the rollers take (m)."""
+        return self._width(self.length * math.cos(self.contact_angle))
 
     @cached_property
     def contacts(self) -> Contacts:

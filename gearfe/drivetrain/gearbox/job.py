@@ -34,7 +34,8 @@ from ...multibody import TimeFunction, smoothed_step
 from ..housing.body import bore_points, reduced_housing
 from ..train.checks import check_flanks, check_layout
 from ..train.friction import Lubrication
-from ..train.gear_train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+from ..train.gear_train import Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+from .rolling import bearing_of
 from .timefunctions import time_function
 
 if TYPE_CHECKING:
@@ -196,7 +197,7 @@ def _rigid_train(job: TrainJob) -> GearTrain:
         for i, x in enumerate(t.loads)
     )
     damping = Damping(t.damping.ratio, t.damping.rayleigh_alpha_per_s, t.damping.rayleigh_beta_s, t.damping.gyroscopic)
-    bearings = tuple(Bearing(str(b.attachment), b.stiffness, b.damping) for b in t.bearings)
+    bearings = tuple(bearing_of(str(b.attachment), b) for b in t.bearings)
     return GearTrain(shafts, gears, meshes, drive, loads, None, _rigid_bores(job), bearings, damping)
 
 

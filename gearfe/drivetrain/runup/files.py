@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from ...base.files import whole_set, write_csv, write_json
 from ...output.arrays import save_arrays
+from ..gearbox import bearing_report
 from ..gearbox.report import attachment_to_draw
 from . import report
 from .critical import CriticalSpeeds, critical_speeds
@@ -21,7 +22,7 @@ from .swinging import mesh_modes, write_modes
 FILES = (
     "runup.csv", "orders.csv", "waterfall.csv", "waterfall.npz", "modes.csv", "critical_speeds.csv", "summary.json",
     "waterfall.png", "campbell.png", "orders.png", "meshes.png",
-    "instability.csv", "instability.png", "mode_gears.vtkhdf", "mode_housing.vtkhdf",
+    "instability.csv", "instability.png", "mode_gears.vtkhdf", "mode_housing.vtkhdf", bearing_report.FILE,
 )  # fmt: skip
 
 
@@ -93,7 +94,10 @@ def write_runup(
         if choice.fields:
             with watch.stage("fields"):
                 write_modes(target, model, mesh_modes(critical.modes, len(model.meshes), STRONG))
-        summary = {**further, **report.summary(run, critical), "warnings": report.warnings(run)}
+        bearings = bearing_report.bearing_summary(model.operating)
+        if bearings:
+            write_csv(target / bearing_report.FILE, bearing_report.bearing_columns(bearings))
+        summary = {**further, "bearings": bearings, **report.summary(run, critical), "warnings": report.warnings(run)}
         summary["timings_s"] = dict(watch.seconds)
         write_json(target / "summary.json", summary)
         names = sorted(path.name for path in target.iterdir())

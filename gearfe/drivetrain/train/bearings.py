@@ -88,17 +88,17 @@ def bearing_loads(
             row = first[f"hinge {bore}"]
             parts[0][:, at] = multipliers[:, row : row + 5] @ to_global
             continue
-        rows = _moved(train, shafts, bore)
-        stiffness, damping = (np.array(x, dtype=float) for x in (springs[bore].stiffness, springs[bore].damping))
-        parts[1][:, at] = rows.T @ (stiffness[:, None] * to_global)
-        parts[2][:, at] = rows.T @ ((damping + train.damping.beta * stiffness)[:, None] * to_global)
+        rows = shaft_motion(train, shafts, bore)
+        stiffness, damping = springs[bore].stiffness_matrix, springs[bore].damping_matrix
+        parts[1][:, at] = rows.T @ (stiffness @ to_global)
+        parts[2][:, at] = rows.T @ ((damping + train.damping.beta * stiffness) @ to_global)
     hinges, places, rates = parts
     return BearingLoads(
         hinges, places - system.stiffness.T @ hinges, rates - system.damping.T @ hinges, -system.mass.T @ hinges
     )
 
 
-def _moved(train: GearTrain, shafts: Shafts, bore: str) -> Array:
+def shaft_motion(train: GearTrain, shafts: Shafts, bore: str) -> Array:
     """Motion of a shaft against its bore for unit coordinates of the system, (5, size); see `bore_rows`."""
     number = next(i for i, shaft in enumerate(train.shafts) if bore in shaft.bores)
     selector = None if train.housing is None else np.eye(train.housing.size)[:, train.housing.attachment(bore)]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
 from ...base.errors import InputError, unknown_name
+from ...base.tables.bearing import check_matrix
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant
@@ -15,6 +18,7 @@ from ...gears.geometry.gear_data import rounding
 from ...gears.geometry.mesh_geometry import ContactModel
 from ...gears.geometry.pair import Gear, gear_pair, in_keys
 from ...gears.geometry.validity import check_spur
+from ..bearings import BallBearing, RollerBearing
 from .friction import check_friction
 from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
 from .statics import check_flanks, check_yields, one_sided
@@ -90,12 +94,33 @@ def _check_shafts(train: GearTrain) -> None:
         if bearing.bore not in taken:
             raise unknown_name("bearing", bearing.bore, taken)
         for key in ("stiffness", "damping"):
-            values = getattr(bearing, key)
-            if len(values) != 5 or not all(math.isfinite(x) and x >= 0.0 for x in values):
-                problem = "must be five numbers >= 0: three translations, two tilts"
-                raise InputError(
-                    f"bearing at {bearing.bore!r} {key}", values, problem, "see the documentation of Bearing"
-                )
+            _check_yields(f"bearing at {bearing.bore!r} {key}", getattr(bearing, key))
+    _check_apart(train)
+
+
+def _check_yields(label: str, values: Any) -> None:
+    """Five numbers >= 0, a symmetric positive semi-definite matrix, or a rolling bearing."""
+    if isinstance(values, BallBearing | RollerBearing):
+        return
+    given = np.array(values, dtype=float)
+    if given.shape not in ((5,), (5, 5)) or not np.isfinite(given).all() or (given.ndim == 1 and (given < 0.0).any()):
+        problem = "must be five numbers >= 0, three translations and two tilts, or five rows of five"
+        raise InputError(label, values, problem, "see the documentation of Bearing")
+    if given.ndim == 2:
+        check_matrix(label, values)
+
+
+def _check_apart(train: GearTrain) -> None:
+    """No two bearings of a shaft in one place."""
+    width = {b.bore: b.stiffness.width for b in train.bearings if isinstance(b.stiffness, BallBearing | RollerBearing)}
+    for shaft in train.shafts:
+        places = sorted((float(train.bore_points[bore] @ train.frame[2]), bore) for bore in shaft.bores)
+        for (low, one), (high, two) in itertools.pairwise(places):
+            needed = 0.5 * (width.get(one, 0.0) + width.get(two, 0.0))
+            if high - low < max(needed, SAME * shaft.length):
+                problem = f"lies {1e3 * (high - low):.6g} mm from bearing {one!r} on shaft {shaft.name!r}: they overlap"
+                cure = f"place them more than {1e3 * needed:.6g} mm apart (y_mm), or use one with two rows"
+                raise InputError(f"bearing {two!r}", None, problem, cure)
 
 
 def _check_bore(train: GearTrain, shaft: Shaft, bore: str, a: np.ndarray) -> None:

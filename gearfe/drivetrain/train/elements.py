@@ -248,9 +248,9 @@ def hinge(shaft: ShaftBody, housing: ModalBlocks | None, rows: Array, name: str)
 def bearing(
     shaft: ShaftBody, housing: ModalBlocks | None, rows: Array, stiffness: Array, damping: Array, name: str
 ) -> LinearForce:
-    """Return the springs and dampers of a bearing along the five relative motions of shaft and bore.
+    """Return the springs and dampers of a bearing on the five relative motions of shaft and bore.
 
-    With the rows R, K = R^T diag(stiffness) R and C = R^T diag(damping) R.
+    With the rows R, K = R^T stiffness R and C = R^T damping R.
 
     Parameters
     ----------
@@ -260,12 +260,12 @@ def bearing(
         Body with the bore; None for a rigid housing.
     rows : ndarray, shape (5, size) or (5, size + N)
         R: motion of the shaft relative to the bore per unit coordinate, see `bore_rows`.
-    stiffness : ndarray, shape (5,)
+    stiffness : ndarray, shape (5, 5)
         Along e1, a, e2 (N/m) and about e1, e2 (N m/rad).
-    damping : ndarray, shape (5,)
+    damping : ndarray, shape (5, 5)
         In the same order (N s/m, N m s/rad).
     name : str
         Name in messages.
     """
     touches: tuple[Element, ...] = (shaft,) if housing is None else (shaft, housing)
-    return LinearForce(touches, rows.T @ (damping[:, None] * rows), rows.T @ (stiffness[:, None] * rows), name)
+    return LinearForce(touches, rows.T @ (damping @ rows), rows.T @ (stiffness @ rows), name)

@@ -21,11 +21,14 @@ from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.mesh_geometry import ContactModel
 from ...gears.geometry.pair import Gear, MeshGeometry
 from ...multibody.series.timefunctions import TimeFunction
+from ..bearings import BallBearing, RollerBearing
 from .friction import Lubrication
 from .kinematics import Kinematics, kinematics
 from .layout import LayoutGear, LayoutMesh, PitchErrors, TrainLayout
 
 Vector = tuple[float, float, float]
+Five = tuple[float, float, float, float, float]
+Matrix = tuple[Five, Five, Five, Five, Five]
 #: When the damper of a mesh acts.
 ALWAYS, IN_CONTACT = "always", "in_contact"
 
@@ -171,21 +174,44 @@ class GearMesh:
 
 @dataclass(frozen=True)
 class Bearing:
-    """Springs and dampers between a shaft and a bore, instead of a hinge.
+    """Springs and dampers between a shaft and a bore instead of a hinge, or a rolling bearing.
+
+    Directions are the first transverse direction e1, the axis, the second transverse direction e2 (N/m, N s/m), and
+    tilts about e1 and e2 (N m/rad, N m s/rad). For shafts along y these are x, y, -z and tilts about x and -z.
 
     Parameters
     ----------
     bore
         Name of the attachment.
-    stiffness, damping : five numbers
-        Diagonal: along the first transverse direction, the axis, the second transverse direction (N/m, N s/m), and for
-        tilt about the first and second transverse direction (N m/rad, N m s/rad). For shafts along y these are x, y, z
-        and tilts about x and z.
+    stiffness : five numbers, five rows of five, or BallBearing or RollerBearing
+        Diagonal, symmetric matrix, or a rolling bearing, whose stiffness is that at the operating point of the train.
+    damping : five numbers, or five rows of five
+        Diagonal, or symmetric matrix.
     """
 
     bore: str
-    stiffness: tuple[float, float, float, float, float]
-    damping: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    stiffness: Five | Matrix | BallBearing | RollerBearing
+    damping: Five | Matrix = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def stiffness_matrix(self) -> Array:
+        """Stiffness of a bearing whose operating point is known, shape (5, 5)."""
+        if isinstance(self.stiffness, BallBearing | RollerBearing):
+            raise InputError(
+                f"bearing at {self.bore!r}", None, "has no stiffness before its load is known", "build_train"
+            )
+        return _matrix(self.stiffness)
+
+    @property
+    def damping_matrix(self) -> Array:
+        """Damping, shape (5, 5)."""
+        return _matrix(self.damping)
+
+
+def _matrix(values: Five | Matrix) -> Array:
+    """A matrix, or that of a diagonal."""
+    given = np.array(values, dtype=float)
+    return np.diag(given) if given.ndim == 1 else given
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ drive of changing speed adds :math:`-J_p g_i\ddot\psi` on every shaft.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -22,13 +22,14 @@ from ...fem.reduction.modal_body import ModalBody
 from ...multibody import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
 from ...multibody.core.elimination import ModalCoordinates, modal_coordinates
 from ...multibody.series.timefunctions import sine
-from .bearings import BearingLoads, bearing_loads, bore_motion
+from .bearings import BearingLoads, bearing_loads, bore_motion, shaft_motion
 from .checks import check_train
 from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, rotor
 from .forces import Gyro, TrainForces, derivative
 from .gear_train import Drive, GearTrain, Load
 from .kinematics import Kinematics, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
+from .operating import OperatingPoint, operating_point, rolling, settled, typical
 from .program import train_series
 
 #: For periods of steady running, orders of loads are taken as whole multiples of one over a whole number up to this.
@@ -67,6 +68,8 @@ class TrainModel(Facts):
         Displacement along the axis of each bore's reference point.
     bores
         Names of the bores that carry shafts, in the housing's order.
+    operating
+        Rolling bearings under the steady torques, whose stiffness there the system has.
     """
 
     train: GearTrain
@@ -86,6 +89,7 @@ class TrainModel(Facts):
     spin_reference: Array
     axial: Array
     bores: tuple[str, ...]
+    operating: OperatingPoint = field(default_factory=OperatingPoint)
 
     def facts(self) -> dict[str, str]:
         """Shafts, meshes, housing, unknowns."""
@@ -134,12 +138,16 @@ class TrainModel(Facts):
         """How gears of meshes were taken whose data fit each other except for rounding, one sentence each."""
         return [f"mesh {line.name}: {note}" for line in self.meshes for note in line.pair.notes]
 
+    @property
+    def placed(self) -> Shafts:
+        """The shafts in the coordinates of the system."""
+        return Shafts(self.shafts, self.first, tuple(self.ratios), self.system.size)
+
     @cached_property
     def bearings(self) -> BearingLoads:
         """Loads on the bores that carry shafts."""
-        shafts = Shafts(self.shafts, self.first, tuple(self.ratios), self.system.size)
         shared = len(self.start.freedoms.redundant) > 0
-        return bearing_loads(self.train, self.system, shafts, self.bores, shared=shared)
+        return bearing_loads(self.train, self.system, self.placed, self.bores, shared=shared)
 
     @cached_property
     def bore_motion(self) -> Array:
@@ -161,12 +169,36 @@ def build_train(train: GearTrain) -> TrainModel:
         For the first thing in the train that does not fit, with the cure.
     """
     check_train(train)
-    return _assembled(train)
+    point = _operating_point(train)
+    return replace(_assembled(settled(train, point)), operating=point)
+
+
+def _operating_point(train: GearTrain) -> OperatingPoint:
+    """Where the rolling bearings are under the steady torques; of a train without any nothing is computed."""
+    bearings = rolling(train)
+    if not bearings:
+        return OperatingPoint()
+    model = _assembled(typical(train))
+    placed = model.placed
+    motions = {name: shaft_motion(model.train, placed, name) for name in bearings}
+    stiffness = model.system.stiffness.copy()
+    for item in model.train.bearings:
+        if item.bore in motions:
+            stiffness -= motions[item.bore].T @ item.stiffness_matrix @ motions[item.bore]
+    for line, force in zip(model.meshes, model.kinematics.steady_forces.tolist(), strict=True):
+        if force < 0.0 and line.backlash is not None:  # the back flanks bear, along their own line of action
+            back = line.columns[1]
+            stiffness += line.mean * (np.outer(back, back) - np.outer(line.row, line.row))
+    end = model.load_end
+    force = np.zeros(placed.size)
+    for load in train.loads:
+        force += _acts(train, load, placed) * float(replace(load.torque, sines=())(end))
+    return operating_point(bearings, motions, stiffness, model.modal.T, force)
 
 
 def on_body(model: TrainModel, body: ModalBody) -> TrainModel:
     """The same train on another body with as many coordinates, such as a softened one: its meshes stay as they are."""
-    return _assembled(replace(model.train, housing=body), model.meshes)
+    return replace(_assembled(replace(model.train, housing=body), model.meshes), operating=model.operating)
 
 
 def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel:
@@ -305,10 +337,8 @@ def _supports(train: GearTrain, shafts: Shafts, housing: ModalBlocks | None) -> 
             chosen = None if housing is None else bore_selector(train, bore)
             rows = bore_rows(body, train.bore_points[bore], train.frame, chosen)
             if bore in bearings:
-                stiffness, damping = (
-                    np.array(x, dtype=float) for x in (bearings[bore].stiffness, bearings[bore].damping)
-                )
-                damping = damping + train.damping.beta * stiffness
+                stiffness = bearings[bore].stiffness_matrix
+                damping = bearings[bore].damping_matrix + train.damping.beta * stiffness
                 made.append(bearing(body, housing, rows, stiffness, damping, f"bearing {bore}"))
             else:
                 made.append(hinge(body, housing, rows, f"hinge {bore}"))

@@ -15,6 +15,7 @@ from ...base.files import whole_set, write_csv, write_json
 from ...base.progress import Stopwatch
 from ...base.spectrum import window_values
 from ...base.typing import Array, IntArray
+from ..gearbox import bearing_report
 from ..gearbox.fields import write_gears, write_housing
 from ..gearbox.report import attachment_to_draw
 from ..train.gear_train import GearTrain
@@ -40,6 +41,7 @@ MAY_WRITE = (
     "fields.png",
     "fields.gif",
     *analysis.FILES,
+    bearing_report.FILE,
 )
 
 
@@ -204,6 +206,8 @@ def write_run(
         if choice.fields and made.outputs:
             with watch.stage("fields"):
                 problems += _fields(target, train, made.kept, times[: made.outputs], choice, draw)
+        if run.summary.get("bearings"):
+            write_csv(target / bearing_report.FILE, bearing_report.bearing_columns(run.summary["bearings"]))
         watch.seconds["total"] = time.perf_counter() - watch.begun
         summary = {**run.summary, "timings_s": dict(watch.seconds)}
         write_json(target / "summary.json", summary)

@@ -9,6 +9,7 @@ from typing import Any
 
 from ...base.cache import versions
 from ...base.record_spectrum import finer, subdivided
+from ..gearbox.bearing_report import bearing_summary
 from ..gearbox.inherited import inherited
 from ..gearbox.job import TrainJob, job_train, train_body
 from ..gearbox.mesh_stiffness import train_curves
@@ -53,7 +54,8 @@ def simulated(job: TrainJob, curves: Sequence[str], *, watch: Any, estimate: boo
 
     every = finer(job.times, highest)[1]
     again = repeater(job, every) if estimate else None
-    return TrainRun(model, job.times, pieces, every, described(job, train), again, band(job))
+    further = described(job, train) | {"bearings": bearing_summary(model.operating)}
+    return TrainRun(model, job.times, pieces, every, further, again, band(job))
 
 
 def band(job: TrainJob) -> float:
