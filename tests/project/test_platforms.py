@@ -120,12 +120,16 @@ for module, names in ((os, ("getuid", "fork", "sched_getaffinity")), (signal, ("
         if hasattr(module, name):
             delattr(module, name)
 from gearfe.cli.main import main
-job, crank, study = sys.argv[1:]
+from tests.multibody.test_kernel_compiling import hits
+job, crank, study, kernels = sys.argv[1:]
 assert main(["new", "stiffness", job]) == 0
 assert main(["stiffness", job, "--coarsen", "4", "--angles", "0", "9", "9", "--no-estimate", "--report"]) == 0
+assert hits()[1] == 5  # compiles a small kernel and keeps it
+os.environ["GEARFE_CACHE"] = kernels  # the large ones are those of other tests
 assert main(["new", "mechanism", crank]) == 0
 assert main(["mechanism", crank, "--until", "0.05", "--format", "mat,h5"]) == 0
 assert main(["study", study, "--out", "aus/study", "--jobs", "1"]) == 0
+del os.environ["GEARFE_CACHE"]
 assert main(["cache"]) == 0
 os.remove("aus/study/study.csv")  # its lock is still there in this process: a second writer
 assert main(["study", study, "--out", "aus/study", "--jobs", "1"]) == 2
@@ -142,13 +146,14 @@ def test_commands_without_what_windows_lacks(tmp_path: Path) -> None:
     settings = {"PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}
     settings |= {"LOCALAPPDATA": str(tmp_path / "AppData"), "PYTHONPATH": str(ROOT)}
     environment = {key: value for key, value in os.environ.items() if key not in ("GEARFE_CACHE", "XDG_CACHE_HOME")}
-    line = [sys.executable, "-c", WINDOWS, "getriebe ψ.toml", "kurbel.toml", "study.toml"]
+    line = [sys.executable, "-c", WINDOWS, "getriebe ψ.toml", "kurbel.toml", "study.toml", os.environ["GEARFE_CACHE"]]
     done = subprocess.run(line, cwd=folder, env={**environment, **settings}, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr.decode("cp1252", "replace")
     assert b"is being written by another study" in done.stderr
     assert b"getriebe \\u" in done.stdout  # the letter that is not there
     assert (folder / "out" / "getriebe ψ" / "stiffness" / "report.html").exists()
-    assert (tmp_path / "AppData" / "gearfe").is_dir()
+    assert list((tmp_path / "AppData" / "gearfe").glob("kernels-*/fill_out-*.o"))
+    assert list((tmp_path / "AppData" / "gearfe").glob("tooth-sector-*.npz"))
     table = (folder / "out" / "getriebe ψ" / "stiffness" / "stiffness.csv").read_bytes()
     assert b"\r" not in table
 

@@ -119,15 +119,48 @@ def test_what_cannot_be_searched_is_told(tmp_path, old, new, told):
         search.evolve(rounds=1)
 
 
+def page_search(folder: Path, rounds: int, monkeypatch: pytest.MonkeyPatch) -> dict:
+    """Names of the page's search, run in so many rounds from a folder with geometry/relief_search.toml."""
+    monkeypatch.chdir(folder)
+    block = next(b for b in re.findall(r"```python\n(.*?)```", PAGE, re.S) if "evolve" in b)
+    assert "rounds=40" in block
+    names: dict = {}
+    exec(compile(block.replace("rounds=40", f"rounds={rounds}"), "page", "exec"), names)
+    return names
+
+
+def relief_job(folder: Path) -> None:
+    """The page's job with half as many positions."""
+    (folder / "geometry").mkdir()
+    job = (GEOMETRY / "relief_search.toml").read_text(encoding="utf-8")
+    (folder / "geometry" / "relief_search.toml").write_text(job.replace("positions = 12", "positions = 6"))
+
+
+def test_the_page_finds_a_closed_optimum(monkeypatch, tmp_path):
+    """The page's lines on a study of milliseconds: its job is searched by the slow test below."""
+    (tmp_path / "geometry").mkdir()
+    (tmp_path / "geometry" / "base.toml").write_text(BASE)
+    (tmp_path / "geometry" / "relief_search.toml").write_text(STUDY)
+    best = page_search(tmp_path, 12, monkeypatch)["best"]
+    assert best.outputs["g"] <= 2.0
+    assert best.outputs["f"] == pytest.approx(0.5, abs=5e-3)
+
+
+def test_the_bound_on_the_root_stress_costs_transmission_error(tmp_path):
+    relief_job(tmp_path)
+    with Search(read_study(tmp_path / "geometry" / "relief_search.toml"), jobs=1) as search:
+        keys = search.study.task.names
+        points = [dict(zip(keys, reliefs, strict=True)) for reliefs in ((10.0, 10.0), (15.0, 16.0))]
+        kept, beyond = search.solve(points)
+    assert kept["root_stress_MPa"] <= 285.0 < beyond["root_stress_MPa"]
+    assert beyond["error_um"] < kept["error_um"]
+
+
+@pytest.mark.slow
 def test_the_page_finds_the_relief_under_a_bound_on_the_root_stress(monkeypatch, tmp_path):
     """Against all points of a grid: better than each that keeps the bound, which costs something."""
-    (tmp_path / "geometry").mkdir()
-    job = (GEOMETRY / "relief_search.toml").read_text(encoding="utf-8")
-    (tmp_path / "geometry" / "relief_search.toml").write_text(job.replace("positions = 12", "positions = 6"))
-    monkeypatch.chdir(tmp_path)
-    block = next(b for b in re.findall(r"```python\n(.*?)```", PAGE, re.S) if "evolve" in b)
-    names: dict = {}
-    exec(compile(block.replace("rounds=40", "rounds=3"), "page", "exec"), names)
+    relief_job(tmp_path)
+    names = page_search(tmp_path, 3, monkeypatch)
     best, search = names["best"], names["search"]
     keys = search.study.task.names
     with Search(search.study, jobs=1) as grid:
