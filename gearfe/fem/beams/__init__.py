@@ -2,6 +2,7 @@
 
 from .reduced import GyroscopicPair, ReducedShaft, full_shaft, reduce_shaft
 from .section import LOADS, BeamShaft, Disc, Section, Station
+from .whirl import Support, whirl_frequencies
 
 __all__ = [
     "LOADS",
@@ -11,6 +12,8 @@ __all__ = [
     "ReducedShaft",
     "Section",
     "Station",
+    "Support",
     "full_shaft",
     "reduce_shaft",
+    "whirl_frequencies",
 ]

@@ -167,7 +167,7 @@ def divide(
                 degrees.append(p)
             if len(nodes) + len(spans) > MOST_ELEMENTS:
                 problem = f"takes more than {MOST_ELEMENTS} elements of shaft {shaft.name!r}"
-                field, value = ("highest_hz", highest_hz) if elements is None else ("elements", elements)
+                field, value = ("highest frequency (Hz)", highest_hz) if elements is None else ("elements", elements)
                 raise InputError(field, value, problem, "give a lower one")
         nodes[-1] = right
     return Division(np.array(nodes), np.array(sections), np.array(degrees))
@@ -175,7 +175,7 @@ def divide(
 
 def _check(highest_hz: float, tolerance: float, elements: int | None, degree: int | None) -> None:
     if not 0.0 < highest_hz < math.inf:
-        raise InputError("highest_hz", highest_hz, "must be > 0 and finite", "give the highest frequency wanted (Hz)")
+        raise InputError("highest frequency (Hz)", highest_hz, "must be > 0 and finite", "give the highest one wanted")
     if not 1e-12 <= tolerance <= 1e-2:
         raise InputError("tolerance", tolerance, "must be from 1e-12 to 1e-2", "give 1e-7")
     if elements is not None and not 1 <= elements <= MOST_ELEMENTS:

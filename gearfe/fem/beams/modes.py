@@ -26,6 +26,9 @@ from scipy import linalg
 from ...base.typing import Array
 from .elements import Family
 
+#: Part of the largest squared period of a shaft below which one is rounding.
+ROUNDING = 1e-15
+
 #: Part of a loaded direction's own compliance below which a residual vector is rounding.
 DEPENDENT = 1e-10
 
@@ -95,12 +98,8 @@ def elastic_vectors(
     inverse = linalg.solve_triangular(factor, half.T, lower=True)
     unit = factor.T @ basis / math.sqrt(alpha)
     inverse -= unit @ unit.T / alpha
-    lowest = (2.0 * math.pi * modes_below_hz) ** -2
-    count = own - rigid.shape[1]
-    if math.isinf(modes_below_hz):
-        values, turned = linalg.eigh(inverse, subset_by_index=(own - count, own - 1))
-    else:
-        values, turned = linalg.eigh(inverse, subset_by_value=(lowest, math.inf))
+    lowest = max((2.0 * math.pi * modes_below_hz) ** -2, ROUNDING * float(np.trace(inverse)))
+    values, turned = linalg.eigh(inverse, subset_by_value=(lowest, math.inf))
     values, turned = values[::-1], turned[:, ::-1]
     modes = linalg.solve_triangular(factor, turned / np.sqrt(values), lower=True, trans="T")
     modes -= basis @ (momentum.T @ modes)

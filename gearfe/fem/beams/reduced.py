@@ -17,6 +17,10 @@ with rotation -theta about e1. With the polar inertia per length and of the disc
 the gyroscopic matrix per unit spin is ``G = sum J_k (a_k b_k^T - b_k a_k^T)``: ``b_k`` holds ``v_k`` at the tilt about
 e2 and the elastic coordinates of the plane of e1; ``a_k`` holds it at the tilt about e1 and, with the other sign, at
 the elastic ones of the plane of e2.
+
+**How many coordinates.** With a residual vector for each load that acts on the shaft, free modes up to 1.5 times the
+highest frequency of interest suffice; more raise the highest frequency of a train, which sets the steps of explicit
+integrators. A station should list the loads that act there and no others. `docs/shafts.md` has the figures.
 """
 
 from __future__ import annotations
@@ -27,6 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.progress import one_thread
 from ...base.typing import Array, BoolArray, IntArray
 from .elements import Division, Family, beam_matrices, divide, hierarchic
 from .modes import ElasticVectors, elastic_vectors
@@ -198,12 +203,13 @@ class ReducedShaft:
         return rows[0] if np.ndim(along) == 0 else rows
 
 
+@one_thread()
 def reduce_shaft(
     shaft: BeamShaft,
     frame: Array,
     modes_below_hz: float,
     *,
-    residuals_below_hz: float | None = None,
+    residuals_below_hz: float = math.inf,
     elements: int | None = None,
     degree: int | None = None,
     tolerance: float = 1e-7,
@@ -218,8 +224,9 @@ def reduce_shaft(
         Rows e1, e2, a: a right-handed frame, the axis last.
     modes_below_hz : float
         Highest frequency of the free modes (Hz).
-    residuals_below_hz : float, optional
-        Highest frequency of the residual vectors (Hz); infinite keeps all: statics at the stations are then exact.
+    residuals_below_hz : float
+        Highest frequency of the residual vectors (Hz). Infinite keeps all: statics at the stations are then exact.
+        `ReducedShaft.compliance_left_out` says what a lower one leaves out.
     elements : int, optional
         Elements that the length would have if all were equal: no element is longer.
     degree : int, optional
@@ -233,10 +240,12 @@ def reduce_shaft(
         Values out of range, see `divide`.
     """
     division = divide(shaft, modes_below_hz, tolerance, elements, degree)
-    limit = math.inf if residuals_below_hz is None else residuals_below_hz
-    return _reduced(shaft, _checked(frame), division, modes_below_hz, limit)
+    if not residuals_below_hz > 0.0:
+        raise InputError("residuals_below_hz", residuals_below_hz, "must be > 0", "leave it out: all are kept")
+    return _reduced(shaft, _checked(frame), division, modes_below_hz, residuals_below_hz)
 
 
+@one_thread()
 def full_shaft(
     shaft: BeamShaft,
     frame: Array,
