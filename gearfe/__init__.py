@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .drivetrain.gearbox.mesh_stiffness import compute_meshes
     from .drivetrain.housing.build import housing_from_job
     from .drivetrain.housing.model import Housing
+    from .drivetrain.modes.whirl import train_modes
     from .drivetrain.runup.run_up import run_up, steady_state
     from .drivetrain.train import TrainModel, TrainResponse, build_train
     from .drivetrain.train.gear_train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
@@ -70,6 +71,7 @@ _PUBLIC: dict[str, str] = {
     "steady_state": "drivetrain.runup.run_up",
     "sweep_loads": "gears.gearmesh.sweep",
     "sweep_stiffness": "gears.gearmesh.sweep",
+    "train_modes": "drivetrain.modes.whirl",
 }
 
 # written out for type checkers; a test holds it against the names above
@@ -110,6 +112,7 @@ __all__ = [
     "steady_state",
     "sweep_loads",
     "sweep_stiffness",
+    "train_modes",
 ]
 
 

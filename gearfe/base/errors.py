@@ -42,7 +42,7 @@ OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
 }  # fmt: skip
 #: Tables of gear jobs.
 GEAR_TABLES = (
-    *("pair", "stiffness", "loadmap", "microgeometry", "train", "runup"),
+    *("pair", "stiffness", "loadmap", "microgeometry", "train", "runup", "modes"),
     *("gears", "meshes", "shafts", "bearings", "materials"),
 )
 

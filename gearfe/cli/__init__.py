@@ -36,6 +36,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "gear train in its housing: contact forces, speeds, vibration, spectrum, radiated power",
         "gearfe vibration gearbox.toml --report --format mat",
     ),
+    "modes": (
+        "gear train over its speed without a run-up: whirl modes, Campbell diagram, critical speeds",
+        "gearfe modes gearbox.toml --speed-stop-rad-per-s 1200 --fields",
+    ),
     "runup": (
         "gear train over its speed: steady states on all branches, waterfall, orders, critical speeds",
         "gearfe runup gearbox.toml --speeds 100",

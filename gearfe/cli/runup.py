@@ -13,7 +13,15 @@ from .arguments import print_results, with_keys
 from .vibration import add_train, title
 
 #: Keys of [runup] that options stand for.
-KEYS = ("speed_start_rad_per_s", "speed_stop_rad_per_s", "speeds", "tolerance", "band_Hz", "multiples")
+KEYS = (
+    "speed_start_rad_per_s",
+    "speed_stop_rad_per_s",
+    "speeds",
+    "tolerance",
+    "band_Hz",
+    "multiples",
+    "shaft_multiples",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,10 +65,8 @@ def run(args: argparse.Namespace) -> int:
         from ..figures.runup import RunUpPictures
 
         draw = RunUpPictures(title(job.table, driven=False))
-    choice, further = (
-        RunUpChoice(table.multiples, args.attachment, args.fields),
-        described(job, table, made.train.model.train),
-    )
+    choice = RunUpChoice(table.multiples, args.attachment, args.fields, table.shaft_multiples)
+    further = described(job, table, made.train.model.train)
     summary, names = write_runup(folder, made, choice, draw=draw, watch=watch, further=further, unstable=unstable)
     print_results(_report_lines(summary), folder, names, watch.seconds, summary["warnings"])
     return 0 if summary["speeds_reached"] == summary["speeds"] else 1

@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-animation", action="store_true", help="leave out the animation of --fields")
 
 
-def add_train(parser: argparse.ArgumentParser, help_: str, table: type, *keys: str) -> None:
+def add_train(parser: argparse.ArgumentParser, help_: str, table: type, *keys: str, attachment: bool = True) -> None:
     """Add the options of a train's job: file, folder, variant, curves, keys of its table, attachment.
 
     Parameters
@@ -56,6 +56,8 @@ def add_train(parser: argparse.ArgumentParser, help_: str, table: type, *keys: s
         Class of the table whose keys are options.
     *keys : str
         These keys.
+    attachment : bool
+        Whether pictures are of an attachment.
     """
     add_job(parser, "job", help_)
     add_folder(parser)
@@ -64,7 +66,9 @@ def add_train(parser: argparse.ArgumentParser, help_: str, table: type, *keys: s
         "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"
     )
     add_keys(parser, table, *keys)
-    parser.add_argument("--attachment", metavar="NAME", help="attachment in the pictures (default: that of the load)")
+    if attachment:
+        help_ = "attachment in the pictures (default: that of the load)"
+        parser.add_argument("--attachment", metavar="NAME", help=help_)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -11,21 +11,34 @@ import numpy as np
 
 from ..base.shown import percent
 from ..base.typing import Array
-from ..drivetrain.runup.critical import CriticalSpeeds
+from ..drivetrain.modes.critical import Campbell
+from ..drivetrain.modes.energies import BENDING, HOUSING
+from ..drivetrain.modes.orders import TrainOrder
+from ..drivetrain.modes.whirl import LABELS, STRONG, WhirlModes
 from ..drivetrain.runup.instability import InstabilityMap
-from ..drivetrain.runup.modes import STRONG
 from ..drivetrain.runup.orders import orders
 from ..drivetrain.runup.report import waterfall
 from ..drivetrain.runup.results import SteadyState
 from ..drivetrain.runup.run_up import RunUp
-from .style import BLUE, COLOURS, GREY, RANGE_DB, RED, REFERENCE, level, new_figure, on_white, save, single
+from .style import BLUE, GREEN, GREY, RANGE_DB, RED, REFERENCE, level, new_figure, on_white, save, single
 
-#: Width and height of an order's name, in parts of the axes.
-ROOM, TALL = 0.045, 0.035
+#: Width of an order's name of so many letters, and its height, in parts of the axes.
+ROOM, LETTERS, TALL = 0.045, 4, 0.035
+#: Height of a picture of orders, in parts of the highest one.
+ABOVE = 1.05
+#: Points of a curve of the Campbell diagram.
+CURVE = 201
+#: Colours of modes by their labels; of orders; of critical speeds that their orders reach.
+MODE_COLOURS = {
+    "forward whirl": BLUE, "backward whirl": RED, "planar whirl": "#0f766e", "mixed whirl": "#8a5a2b",
+    "torsional": GREEN, "axial": "#6d4c9f", "housing": "#b6c2d1",
+}  # fmt: skip
+ORDER = "#6b7280"
+EXCITED: dict[str, Any] = {"markersize": 4.0, "color": "black", "markerfacecolor": "white"}
 
 
 class OrderLine(NamedTuple):
-    """An order of a mesh: its label, and frequency (kHz) for 1 rad/s of the drive."""
+    """An order: its label, frequency (kHz) for 1 rad/s of the drive, and number of its mesh or colour."""
 
     label: str
     slope: float
@@ -52,7 +65,16 @@ def signal_of(run: RunUp, bore: int) -> Signal:
     return Signal(name, "N", 1.0, "level of the force  (dB re 1 N)", lambda s: np.abs(s.lines(s.force[:, 0])))
 
 
-def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str) -> None:
+def bearing_signal(run: RunUp, bore: int) -> Signal:
+    """Force of the shaft on a bore: root of the sum of the squares of its amplitudes along x, y, z."""
+    name = f"Force of the shaft on bearing {run.train.model.bores[bore]}"
+    label = "level of the force  (dB re 1 N)"
+    return Signal(name, "N", 1.0, label, lambda s: np.linalg.norm(np.abs(s.bearing[:, bore, :3]), axis=1))
+
+
+def draw_waterfall(
+    path: Path, run: RunUp, signal: Signal, title: str, *, multiples: int, over_order: bool = False
+) -> None:
     """Draw spectra over the speed of a slow run-up: coloured tracks, the meshes' orders named.
 
     Parameters
@@ -61,101 +83,144 @@ def draw_waterfall(path: Path, run: RunUp, multiples: int, bore: int, title: str
         The picture.
     run : RunUp
         The run-up.
-    multiples : int
-        Highest multiple of the mesh frequencies whose order is named.
-    bore : int
-        Number of the attachment whose acceleration is drawn.
+    signal : Signal
+        What is drawn.
     title : str
         Second line of the heading.
+    multiples : int
+        Highest multiple of the mesh frequencies whose order is named.
+    over_order : bool
+        Whether tracks stand at their orders, up to those that are named, instead of their frequencies.
     """
     from matplotlib.collections import LineCollection
 
     swept = sorted(run.sweep(), key=lambda s: s.speed)
-    made = waterfall(run, swept)
-    frequency = 1e-3 * made["frequency_Hz"]
-    signal, size = signal_of(run, bore), np.full(frequency.shape, np.nan)
+    made, named = waterfall(run, swept), order_lines(run, multiples)
+    speed, inside = np.array([s.speed for s in swept]), np.isfinite(made["frequency_Hz"])
+    if over_order:
+        orders_of = {line.label: 1e3 * 2.0 * math.pi * line.slope for line in named}
+        height, highest = np.where(inside, made["order"], np.nan), ABOVE * max(orders_of.values())
+    else:
+        height, highest = 1e-3 * made["frequency_Hz"], 1e-3 * run.band_hz
+    size = np.full(height.shape, np.nan)
     for row, state in enumerate(swept):
-        found, lines = np.isfinite(frequency[row]), signal.lines(state)
-        size[row, found] = lines[[state.numbers[tuple(k)] for k in made["harmonic"][found].tolist()]]
+        lines = signal.lines(state)
+        size[row, inside[row]] = lines[[state.numbers[tuple(k)] for k in made["harmonic"][inside[row]].tolist()]]
     loud = level(size, signal.reference)
-    speed, highest = np.array([s.speed for s in swept]), 1e-3 * run.band_hz
     figure = new_figure(10.5, 6.4)
     axes = figure.add_subplot()
     axes.set_title(f"{signal.name} in steady running\n{title}", fontsize=11, loc="left")
     top = float(np.nanmax(loud[:, 1:], initial=-240.0))
     segments, values = [], []
-    for k in range(1, frequency.shape[1]):
-        points = np.stack([speed, frequency[:, k]], axis=1)
+    for k in range(1, height.shape[1]):
+        points = np.stack([speed, height[:, k]], axis=1)
         both = np.isfinite(points[:-1, 1]) & np.isfinite(points[1:, 1])
         segments += [points[i : i + 2] for i in np.flatnonzero(both)]
         values += [0.5 * (loud[i, k] + loud[i + 1, k]) for i in np.flatnonzero(both)]
     order = np.argsort(values)  # loud ones on top
     tracks = LineCollection(
         [segments[i] for i in order], array=np.array(values)[order], cmap=on_white("YlOrRd", 0.15, 1.0),
-        linewidths=2.6, capstyle="butt",
+        linewidths=6.0 if over_order else 2.6, capstyle="butt",
     )  # fmt: skip
     tracks.set_clim(top - RANGE_DB, top)
     axes.add_collection(tracks)
     axes.set_xlim(float(speed[0]), float(speed[-1]))
     axes.set_ylim(0.0, highest)
-    _label_orders(axes, order_lines(run, multiples), float(speed[0]), float(speed[-1]), highest, ["black"] * 99)
+    if over_order:
+        axes.set_yticks(list(orders_of.values()), list(orders_of))
+        axes.set_ylabel("order")
+    else:
+        _label_orders(axes, named, float(speed[0]), float(speed[-1]), highest, ["black"] * 99)
+        axes.set_ylabel("frequency  (kHz)")
     axes.set_xlabel("speed of the drive  (rad/s)")
-    axes.set_ylabel("frequency  (kHz)")
     _rpm(axes)
     figure.colorbar(tracks, ax=axes, pad=0.09, label=signal.level)
     save(figure, path)
 
 
-def draw_campbell(path: Path, run: RunUp, critical: CriticalSpeeds, multiples: int, title: str) -> None:
-    """Draw natural frequencies over the speed with the meshes' orders; modes strained in meshes are strong.
+def draw_campbell(path: Path, found: Campbell, title: str) -> None:
+    """Draw the Campbell diagram into a file; `title` is the second line of its heading."""
+    save(campbell_figure(found, title), path)
+
+
+def modes_picture(modes: WhirlModes) -> Any:
+    """The modes over the speed without orders."""
+    highest = float(np.nanmax(modes.frequency)) if modes.frequency.size else 1.0
+    return campbell_figure(Campbell(modes, [], [], 1.05 * highest), "")
+
+
+def campbell_figure(found: Campbell, title: str) -> Any:
+    """Return natural frequencies over the speed, coloured by what the modes are, with the orders that meet them.
 
     Parameters
     ----------
-    path : Path
-        The picture.
-    run : RunUp
-        The run-up.
-    critical : CriticalSpeeds
-        Modes and the speeds at which orders meet them.
-    multiples : int
-        Highest multiple of the mesh frequencies that is drawn.
+    found : Campbell
+        Modes, orders and critical speeds.
     title : str
         Second line of the heading.
     """
-    modes, met = critical.modes, critical.met
-    share = modes.strain[:, : len(run.train.model.meshes)].sum(axis=1)
-    rising, highest = np.argsort(modes.speeds), 1e-3 * run.band_hz
-    speed, frequency, damping = modes.speeds[rising], 1e-3 * modes.frequency[rising], modes.damping_ratio[rising[-1]]
-    crossings = [(c.speed, 1e-3 * c.frequency) for c in met if share[c.mode] >= STRONG]
-    head = f"Natural frequencies of the coupled train and orders of its meshes\n{title}"
-    figure, axes = single(10.5, 6.4, head)
-    low, high = float(speed[0]), float(speed[-1])
+    from matplotlib.lines import Line2D
+
+    modes, last = found.modes, found.modes.fastest
+    figure, axes = single(10.5, 6.8, f"Natural frequencies of the coupled train and orders\n{title}")
+    low, high = float(modes.speeds.min()), float(modes.speeds.max())
+    speed = np.linspace(low, high, CURVE)
+    frequency = 1e-3 * np.array([modes.at(x) for x in speed]).reshape(CURVE, -1)
+    highest = 1e-3 * found.band_hz
+    strained = modes.mesh_strain[last].sum(axis=1)
+    used: dict[str, str] = {}
+    ends = frequency[-1]
     taken: list[float] = []
-    for mode in range(frequency.shape[1]):
-        strong = share[mode] >= STRONG
-        axes.plot(speed, frequency[:, mode], color=BLUE if strong else "#b6c2d1", linewidth=1.6 if strong else 0.7)
-        if frequency[-1, mode] <= highest:
-            taken.append(max(float(frequency[-1, mode]), taken[-1] + 0.028 * highest if taken else 0.0))
-            part = int(modes.strain[mode].argmax())
-            most = f"{100.0 * modes.strain[mode, part]:.0f} % in {modes.strain_in[part]}"
-            where = f"{100.0 * share[mode]:.0f} % in meshes" if strong else most
+    for mode in np.argsort(np.where(np.isnan(ends), np.inf, ends)).tolist():
+        kind, direction = modes.kinds[last][mode], modes.direction[last][mode]
+        name = f"{direction} whirl" if kind == BENDING else LABELS[kind]
+        colour = MODE_COLOURS.get(name, GREY)
+        used[name] = colour
+        weak = kind == HOUSING and strained[mode] < STRONG
+        axes.plot(speed, frequency[:, mode], color=colour, linewidth=0.7 if weak else 1.7, zorder=2.0 if weak else 3.0)
+        if ends[mode] <= highest:
+            taken.append(max(float(ends[mode]), taken[-1] + 0.028 * highest if taken else 0.0))
+            damping = percent(float(modes.damping_ratio[last, mode]))
             axes.annotate(
-                f"{mode + 1}: {where}, {percent(damping[mode])} damping", (high, float(frequency[-1, mode])),
-                (high + 0.03 * (high - low), taken[-1]), fontsize=7.5, color=BLUE if strong else GREY, va="center",
+                f"{mode + 1}: {modes.labels[last][mode]}, {damping} damping", (high, float(ends[mode])),
+                (high + 0.03 * (high - low), taken[-1]), fontsize=7.5, color=GREY if weak else colour, va="center",
                 annotation_clip=False,
                 arrowprops={"arrowstyle": "-", "color": "#b6c2d1", "linewidth": 0.5, "relpos": (0.0, 0.5)},
             )  # fmt: skip
-    for line in order_lines(run, multiples):
-        axes.plot([low, high], [line.slope * low, line.slope * high], color=COLOURS[1 + line.mesh], linewidth=1.0)
-    _label_orders(axes, order_lines(run, multiples), low, high, highest, COLOURS[1:])
-    if crossings:
-        axes.plot(*np.array(crossings).T, "o", color=RED, markersize=4.0, markerfacecolor="white", zorder=5)
+    lines = [_order_line(order) for order in found.orders]
+    for line in lines:
+        dashes = (None, None) if line.mesh == 0 else (4, 2)
+        axes.plot(
+            [low, high], [line.slope * abs(low), line.slope * abs(high)], color=ORDER, linewidth=0.8, dashes=dashes
+        )
+    _label_orders(axes, lines, low, high, highest, [ORDER, ORDER])
+    for reached, style in ((False, {"markersize": 1.8, "color": "#9ca3af"}), (True, EXCITED)):
+        points = [(c.speed, 1e-3 * c.frequency) for c in found.met if found.excited(c) is reached]
+        if points:
+            axes.plot(*np.array(points).T, "o", zorder=5, **style)
     axes.set_xlim(low, high)
     axes.set_ylim(0.0, highest)
     axes.set_xlabel("speed of the drive  (rad/s)")
     axes.set_ylabel("frequency  (kHz)")
     _rpm(axes)
-    save(figure, path)
+    handles = [Line2D([], [], color=colour, linewidth=1.7, label=name) for name, colour in used.items()]
+    handles += (
+        []
+        if not lines
+        else [
+            Line2D([], [], color=ORDER, linewidth=0.8, label="mesh order"),
+            Line2D([], [], color=ORDER, linewidth=0.8, dashes=(4, 2), label="shaft order"),
+            Line2D([], [], linestyle="", marker="o", label="critical speed that its order reaches", **EXCITED),
+        ]
+    )
+    figure.legend(handles=handles, loc="outside lower left", ncols=4, fontsize=8, frameon=False)
+    return figure
+
+
+def _order_line(order: TrainOrder) -> OrderLine:
+    """The line of an order with a short name: ``2×m1`` of meshes, ``1×output`` of shafts."""
+    short = order.names[0].replace(" x mesh ", "×m").replace(" x shaft ", "×")
+    return OrderLine(short, 1e-3 * order.order / (2.0 * math.pi), 0 if order.meshes else 1)
 
 
 def draw_instability(path: Path, made: InstabilityMap, title: str) -> None:
@@ -193,15 +258,18 @@ def _label_orders(
     stand left of the picture, is left out.
     """
     taken = low  # no label leaves the picture
-    before, back = math.inf, 0.0
+    before, back, width = math.inf, 0.0, 0.0
     for line in sorted(lines, key=lambda line: -line.slope):
         end, above = min(high, highest / line.slope), line.slope * high > highest
-        if end <= low or (above and end < taken + ROOM * (high - low)):
+        room = ROOM * max(1.0, len(line.label) / LETTERS)
+        if end <= low or (above and end < taken + room * (high - low)):
             continue
         taken = end if above else taken
         if not above:
-            back = back + ROOM if before - line.slope * high < TALL * highest else 0.0
-            before = line.slope * high
+            back = back + width if before - line.slope * high < TALL * highest else 0.0
+            before, width = line.slope * high, room
+            if back + room > 1.0:
+                continue
         y = 0.985 * highest if above else line.slope * (high - (0.01 + back) * (high - low))
         axes.annotate(
             line.label, (y / line.slope, y), (-4, 0) if above else (0, 3), textcoords="offset points",

@@ -121,4 +121,5 @@ PICTURES = {
     "StudyResult": "study:study_picture",
     "TrainResponse": "results:response_plot",
     "Trajectory": "results:trajectory_plot",
+    "WhirlModes": "campbell:modes_picture",
 }

@@ -17,7 +17,7 @@ from ..drivetrain.runup.instability import InstabilityMap
 from ..drivetrain.runup.orders import orders
 from ..drivetrain.runup.report import iso_dynamic_factors
 from ..drivetrain.runup.run_up import RunUp
-from .campbell import draw_campbell, draw_instability, draw_waterfall, signal_of
+from .campbell import bearing_signal, draw_campbell, draw_instability, draw_waterfall, signal_of
 from .style import CYCLE, GREY, headed, new_figure, save, tidy
 
 #: Label of the axis of dynamic factors.
@@ -32,8 +32,10 @@ class RunUpPictures:
 
     def __call__(self, folder: Path, run: RunUp, critical: CriticalSpeeds, multiples: int, bore: int) -> None:
         """Draw into a folder; `bore` is the number of the attachment."""
-        draw_waterfall(folder / "waterfall.png", run, multiples, bore, self.title)
-        draw_campbell(folder / "campbell.png", run, critical, multiples, self.title)
+        draw_waterfall(folder / "waterfall.png", run, signal_of(run, bore), self.title, multiples=multiples)
+        forces = bearing_signal(run, bore)
+        draw_waterfall(folder / "bearing_forces.png", run, forces, self.title, multiples=multiples, over_order=True)
+        draw_campbell(folder / "campbell.png", critical.campbell, self.title)
         _draw_orders(folder / "orders.png", run, multiples, bore, self.title)
         save(forces_picture(run, self.title), folder / "meshes.png")
 

@@ -125,12 +125,25 @@ def _runup(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
 
     table, job = job_tables(raw, path, ("runup",))["runup"], train_job(path, train_tables(raw, path))
     run, unstable = solved(job, table, watch=Stopwatch())
-    critical = critical_speeds(run, table.multiples)
+    critical = critical_speeds(run, table.multiples, table.shaft_multiples)
     notes = report.warnings(run)
     made = {**described(job, table, run.train.model.train), **report.summary(run, critical), "warnings": notes}
     whole = made["speeds_reached"] == made["speeds"]
     rows = report.tables(run, critical, table.multiples, unstable)
     return Answer(rows, made, "" if whole else "; ".join(notes) or "not all speeds were reached")
+
+
+def _modes(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
+    from ..base.tables.jobs import train_tables
+    from ..base.tables.modes import ModesTable
+    from ..drivetrain.gearbox.job import train_job
+    from ..drivetrain.modes import report
+    from ..drivetrain.modes.job import described, solved
+
+    tables, job = job_tables(raw, path, (), ("modes", "runup")), train_job(path, train_tables(raw, path))
+    table = tables.get("modes", ModesTable())
+    result = solved(job, table, tables.get("runup"), watch=Stopwatch())
+    return Answer(report.tables(result.campbell), {**described(job, table, result), **report.summary(result)}, "")
 
 
 def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
@@ -176,5 +189,6 @@ _OF_MESHES: dict[str, Callable[[Raw, Path, Shared, bool, str | None], Answer]] =
 _KINDS: dict[str, Callable[[Raw, Path, Shared, bool], Answer]] = {
     "vibration": _vibration,
     "runup": _runup,
+    "modes": _modes,
     "mechanism": _mechanism,
 }

@@ -34,6 +34,7 @@ READ = {
     "loadmap": (*OF_GEARS, "stiffness", "loadmap"),
     "vibration": (*_OF_TRAINS, "spectrum"),
     "runup": (*_OF_TRAINS, "runup"),
+    "modes": (*_OF_TRAINS, "runup", "modes"),
 }
 
 

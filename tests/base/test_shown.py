@@ -11,7 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfe import Search, build_train, housing_from_job, read_study, run_study, run_up, simulate, sweep_loads
+from gearfe import (
+    Search,
+    build_train,
+    housing_from_job,
+    read_study,
+    run_study,
+    run_up,
+    simulate,
+    sweep_loads,
+    train_modes,
+)
 from gearfe.base.errors import MissingLibraryError
 from gearfe.base.shown import Shown, as_numbers, percent
 from gearfe.base.spectrum import amplitude_spectrum
@@ -49,6 +59,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         simulate(model, np.linspace(0.0, 1e-4, 5)),
         steady.housing,
         run_up(model, [500.0, 510.0, 520.0], tolerance=1e-2),
+        train_modes(model, [0.0, 400.0]),
         integrate(crank.system, np.linspace(0.0, 0.01, 3)),
         run_study(read_study(written(trial, cases=8)), trial / "out", jobs=1),
         amplitude_spectrum(np.column_stack([tone, 2.0 * tone]), 1e-3),

@@ -40,6 +40,7 @@ housing box.toml --json
 vibration gearbox.toml --set train.housing=rigid --set train.duration_ms=1.0
 vibration box.toml --set train.duration_ms=0.5 --set housing.reduction.least_modes=6 \
 --set train.curves.mesh_model=mean_stiffness
+modes runup.toml --set train.housing=rigid --speeds 3
 runup runup.toml --set train.housing=rigid --set runup.speeds=3 --set runup.speed_stop_rad_per_s=320
 study study.toml --set study.cases=2
 cache

@@ -40,6 +40,7 @@ LINES = {
     "mechanism": [["slider_crank.toml", "--until", "0.02"]],
     "housing": [["box.toml", *BOX, "--modes", "2"]],
     "vibration": [["box.toml", *BOX, "--set", "train.duration_ms=0.7", "--fields", "--no-estimate", "--no-floquet"]],
+    "modes": [["box.toml", *BOX, "--fields", "1", "--speed-stop-rad-per-s", "300"]],
     "runup": [["box.toml", *BOX, "--set", "runup={speed_start_rad_per_s=200,speed_stop_rad_per_s=210,speeds=2}"]],
     "study": [["study.toml", "--jobs", "2"], ["search.toml", "--jobs", "2"]],
     "new": [["vibration", "new.toml"]],

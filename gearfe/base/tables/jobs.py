@@ -31,6 +31,7 @@ TABLES: dict[str, str] = {
     "microgeometry": "gearfe.base.tables.microgeometry:MicrogeometryTable",
     "housing": "gearfe.base.tables.housing:HousingTable",
     "train": "gearfe.base.tables.train:TrainTable",
+    "modes": "gearfe.base.tables.modes:ModesTable",
     "runup": "gearfe.base.tables.runup:RunUpTable",
     "spectrum": "gearfe.base.tables.spectrum:SpectrumTable",
     "study": "gearfe.base.tables.study:StudyTable",

@@ -24,6 +24,9 @@ class RunUpTable:
         None, above=0.0, doc="highest frequency of interest (Hz); left out: that of [housing.reduction], or 5000"
     )
     multiples: int = quantity(5, low=1, high=50, doc="multiples of each mesh frequency that are cut out as orders")
+    shaft_multiples: int = quantity(
+        2, low=0, high=50, doc="multiples of the turns of each shaft in the Campbell diagram and the critical speeds"
+    )
 
     instability_loads: tuple[float, ...] = quantity(
         (), above=0.0, doc="factors on all loads for a map of parametric instability without damping; empty: none"

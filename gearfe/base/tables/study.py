@@ -9,7 +9,7 @@ from ..config import quantity
 from ..errors import InputError, unknown_name
 
 #: Kinds of job that a study can vary.
-KINDS = ("stiffness", "loadmap", "vibration", "runup", "mechanism")
+KINDS = ("stiffness", "loadmap", "vibration", "runup", "modes", "mechanism")
 DESIGNS = ("factorial", "latin_hypercube", "sobol", "saltelli", "morris", "rows", "search")
 
 

@@ -10,11 +10,10 @@ import numpy as np
 
 from ...base.typing import Array
 from ..gearbox.radiation import power_level
+from ..modes.critical import RPM
 from ..train.response import XYZ
 from .condensed import CondensedTrain
 from .results import SteadyState
-
-RPM = 30.0 / math.pi
 
 
 def runup_columns(train: CondensedTrain, states: Sequence[SteadyState], band_hz: float) -> dict[str, Any]:

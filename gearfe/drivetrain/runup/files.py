@@ -11,17 +11,16 @@ from ...base.files import whole_set, write_csv, write_json
 from ...output.arrays import save_arrays
 from ..gearbox import bearing_report
 from ..gearbox.report import attachment_to_draw
+from ..modes.swinging import mesh_modes, write_modes
 from . import report
 from .critical import CriticalSpeeds, critical_speeds
 from .instability import InstabilityMap
-from .modes import STRONG
 from .run_up import RunUp
-from .swinging import mesh_modes, write_modes
 
 #: All that a run can write.
 FILES = (
     "runup.csv", "orders.csv", "waterfall.csv", "waterfall.npz", "modes.csv", "critical_speeds.csv", "summary.json",
-    "waterfall.png", "campbell.png", "orders.png", "meshes.png",
+    "waterfall.png", "bearing_forces.png", "campbell.png", "orders.png", "meshes.png",
     "instability.csv", "instability.png", "mode_gears.vtkhdf", "mode_housing.vtkhdf", bearing_report.FILE,
 )  # fmt: skip
 
@@ -39,12 +38,13 @@ class Pictures(Protocol):
 @dataclass(frozen=True)
 class RunUpChoice:
     """Outputs of a run-up: highest multiple of the mesh frequencies, attachment whose acceleration is drawn, whether
-    the modes with much strain in the meshes are written as fields.
+    the modes with much strain in the meshes are written as fields, highest multiple of the shafts' turns.
     """
 
     multiples: int
     attachment: str | None = None
     fields: bool = False
+    shaft_multiples: int = 2
 
 
 def write_runup(
@@ -80,7 +80,7 @@ def write_runup(
     multiples, model = choice.multiples, run.train.model
     bore = model.bores.index(attachment_to_draw(model.bores, choice.attachment, model.train))
     with watch.stage("modes"):
-        critical = critical_speeds(run, multiples)
+        critical = critical_speeds(run, multiples, choice.shaft_multiples)
     with whole_set(folder, may_write=FILES) as target:
         with watch.stage("tables"):
             for name, columns in report.tables(run, critical, multiples, unstable).items():
@@ -93,7 +93,8 @@ def write_runup(
                     draw.instability(target / "instability.png", unstable)
         if choice.fields:
             with watch.stage("fields"):
-                write_modes(target, model, mesh_modes(critical.modes, len(model.meshes), STRONG))
+                modes = critical.campbell.modes
+                write_modes(target, model, modes, mesh_modes(modes), float(run.speeds[-1]))
         bearings = bearing_report.bearing_summary(model.operating)
         if bearings:
             write_csv(target / bearing_report.FILE, bearing_report.bearing_columns(bearings))

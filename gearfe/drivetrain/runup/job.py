@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from ...base.tables.runup import RunUpTable
 from ..gearbox.inherited import inherited
 from ..gearbox.job import TrainJob, job_train, train_body
 from ..gearbox.mesh_stiffness import train_curves
+from ..modes.job import at_speed, band_of
 from ..train import build_train
 from ..train.gear_train import GearTrain
 from .instability import InstabilityMap, instability_map
@@ -49,7 +50,7 @@ def solved(
         body = train_body(job)
     with watch.stage("model"):
         model = build_train(job_train(job, stiffness, body))
-    band = table.band_Hz or (5000.0 if job.housing is None else job.housing.reduction.band_Hz)
+    band = table.band_Hz or band_of(job)
     with watch.stage("steady states"), stage("steady states"):
         options: dict[str, Any] = {"tolerance": table.tolerance, "band_hz": band, "stability": table.stability}
         run = run_up(model, speeds, **options)
@@ -62,14 +63,6 @@ def solved(
         with watch.stage("instability"), stage("instability"):
             unstable = instability_map(run.train, speeds, table.instability_loads)
     return run, unstable
-
-
-def at_speed(job: TrainJob, speed: float) -> TrainJob:
-    """The job with a constant speed of its drive (rad/s), whose sense decides which flanks drive."""
-    if job.table.drive is None:
-        return job
-    drive = replace(job.table.drive, speed_rad_per_s=speed, ramp_width_ms=None)
-    return replace(job, table=replace(job.table, drive=drive))
 
 
 def described(job: TrainJob, table: RunUpTable, train: GearTrain) -> dict[str, Any]:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..train.response import XYZ
 from .run_up import RunUp
+
+#: Multiples of mesh frequencies in combinations that have names, in all.
+COMBINED = 5
+#: Orders nearer to each other, relatively, are one.
+ROUND_OFF = 1e-9
 
 
 class OrderCut(NamedTuple):
@@ -29,6 +34,41 @@ def multiples_of(run: RunUp, mesh: int, multiples: int) -> list[OrderCut]:
         OrderCut(tuple((a * waves).tolist()), a * cycles, (f"{a} x mesh {mesh + 1}",), mesh, a)
         for a in range(1, multiples + 1)
     ]
+
+
+def named_orders(run: RunUp) -> Callable[[tuple[int, ...]], OrderCut]:
+    """Return what gives a line of the motions its order and its names, by its numbers k.
+
+    Names are multiples of the mesh frequencies or combinations of them, else orders of loads and multiples of the turns
+    of shafts; a line that is none of these is named by its order.
+    """
+    model, system = run.train.model, run.train.system
+    combined = {cut.waves: cut for cut in orders(run, COMBINED)}
+    loads = [(order, load) for load in model.train.loads for order, *_ in load.orders]
+    of_loads = [
+        (float(cycles), f"{order:g} x load on {load.shaft}")
+        for (order, load), cycles in zip(loads, model.orders, strict=True)
+    ]
+
+    def named(waves: tuple[int, ...]) -> OrderCut:
+        order = float(np.sum(np.array(waves) / np.array(system.turns)))
+        times = sorted(
+            (a, mesh) for mesh, once in enumerate(system.orders)
+            if (a := max(waves) // max(once)) and tuple(a * k for k in once) == waves
+        )  # fmt: skip
+        if times:
+            (multiple, first), *_ = times
+            return OrderCut(waves, order, tuple(f"{a} x mesh {mesh + 1}" for a, mesh in times), first, multiple)
+        if waves in combined:
+            return combined[waves]
+        names = [name for cycles, name in of_loads if abs(cycles - order) <= ROUND_OFF * order]
+        for ratio, shaft in zip(model.kinematics.ratios, model.train.shafts, strict=True):
+            turns = order / abs(float(ratio))
+            if abs(turns - round(turns)) <= ROUND_OFF * turns:
+                names.append(f"{round(turns)} x shaft {shaft.name}")
+        return OrderCut(waves, order, tuple(names) or (f"order {order:.6g}",), None)
+
+    return named
 
 
 def orders(run: RunUp, multiples: int) -> list[OrderCut]:

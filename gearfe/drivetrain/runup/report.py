@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ...base.typing import Array, IntArray
+from ...base.typing import Array
 from ...gears.geometry.derived import dynamic_factor
+from ..modes.report import mode_entries
+from ..modes.report import tables as mode_tables
+from ..train.response import XYZ
 from . import torus
-from .columns import RPM, dynamic_factors
+from .columns import dynamic_factors
 from .critical import CriticalSpeeds, peaks_of
 from .instability import InstabilityMap
-from .modes import CoupledModes
 from .orders import order_columns
 from .results import SteadyState
 from .run_up import RunUp
@@ -39,8 +41,7 @@ def tables(
         "runup": run.columns(),
         "orders": order_columns(run, multiples),
         "waterfall": waterfall_columns(run),
-        "modes": mode_columns(critical.modes),
-        "critical_speeds": critical_columns(critical),
+        **mode_tables(critical.campbell),
     }
     return columns if unstable is None else {**columns, "instability": instability_columns(unstable)}
 
@@ -67,15 +68,18 @@ def waterfall(run: RunUp, states: Sequence[SteadyState] | None = None) -> dict[s
     """Arrays of waterfall.npz: lines of all steady states up to the band by rising order; not-a-number beyond it.
 
     ``speed_rad_per_s`` and ``branch`` (states,), ``frequency_Hz`` (states, lines), ``order`` (lines,), ``harmonic``
-    (lines, phases): multiples of the frequency of each phase, ``acceleration_m_per_s2`` (states, lines, attachments).
+    (lines, phases): multiples of the frequency of each phase, ``acceleration_m_per_s2`` (states, lines, attachments),
+    ``bearing_force_N`` (states, lines, bores, 3): along x, y, z.
     """
     states = run.states if states is None else states
     count = max((len(s.frequency) for s in states), default=0)
     frequency = np.full((len(states), count), np.nan)
     moved = np.full((len(states), count, len(run.train.model.bores)), np.nan)
+    forces = np.full((*moved.shape, 3), np.nan)
     for row, s in enumerate(states):
         inside = np.flatnonzero(s.frequency <= run.band_hz)
         frequency[row, inside], moved[row, inside] = s.frequency[inside], np.abs(s.acceleration[inside])
+        forces[row, inside] = np.abs(s.bearing[inside, :, :3])
     waves = torus.harmonics(run.train.system.periods, max(count - 1, 0)).waves[:count]
     order = (waves / np.array(run.train.system.turns)).sum(axis=1)
     kept = np.flatnonzero(np.isfinite(frequency).any(axis=0))
@@ -87,6 +91,7 @@ def waterfall(run: RunUp, states: Sequence[SteadyState] | None = None) -> dict[s
         "harmonic": waves[kept],
         "frequency_Hz": frequency[:, kept],
         "acceleration_m_per_s2": moved[:, kept],
+        "bearing_force_N": forces[:, kept],
     }
 
 
@@ -104,27 +109,10 @@ def waterfall_columns(run: RunUp) -> dict[str, Any]:
         columns |= {f"times_phase_{p + 1}": k[line] for p, k in enumerate(made["harmonic"].T)}
     for j, name in enumerate(run.train.model.bores):
         columns[f"acceleration_{name}_m_per_s2"] = made["acceleration_m_per_s2"][state, line, j]
+    for j, name in enumerate(run.train.model.bores):
+        for k, x in enumerate(XYZ):
+            columns[f"bearing_force_{name}_{x}_N"] = made["bearing_force_N"][state, line, j, k]
     return columns
-
-
-def mode_columns(modes: CoupledModes) -> dict[str, Any]:
-    """Columns of modes.csv: each mode at each speed."""
-    count, speeds = modes.frequency.shape[1], len(modes.speeds)
-    number = np.repeat(np.arange(count), speeds)
-    columns: dict[str, Any] = {
-        "mode": number + 1,
-        "speed_rad_per_s": np.tile(modes.speeds, count),
-        "frequency_Hz": modes.frequency.T.ravel(),
-        "damping_ratio": modes.damping_ratio.T.ravel(),
-    }
-    return columns | share_columns(modes, number)
-
-
-def share_columns(modes: CoupledModes, rows: IntArray) -> dict[str, Array]:
-    """Shares of the strain and of the kinetic energy of some modes."""
-    strain = {part.replace(" ", "_"): modes.strain[rows, j] for j, part in enumerate(modes.strain_in)}
-    kinetic = {part: modes.kinetic[rows, j] for j, part in enumerate(("shafts", "housing"))}
-    return {f"strain_share_{n}": x for n, x in strain.items()} | {f"kinetic_share_{n}": x for n, x in kinetic.items()}
 
 
 def instability_columns(made: InstabilityMap) -> dict[str, Any]:
@@ -139,27 +127,8 @@ def instability_columns(made: InstabilityMap) -> dict[str, Any]:
     }
 
 
-def critical_columns(critical: CriticalSpeeds) -> dict[str, Any]:
-    """Columns of critical_speeds.csv: where a mesh order meets a mode, with the mode's shares of energy."""
-    modes, met = critical.modes, critical.met
-    mode = np.array([c.mode for c in met], dtype=int)
-    columns: dict[str, Any] = {
-        "speed_rad_per_s": np.array([c.speed for c in met]),
-        "speed_rpm": RPM * np.array([c.speed for c in met]),
-        "frequency_Hz": np.array([c.frequency for c in met]),
-        "mode": mode + 1,
-        "mesh": np.array([c.cut.mesh for c in met], dtype=int) + 1,
-        "multiple": np.array([c.cut.multiple for c in met], dtype=int),
-        "damping_ratio": modes.damping_ratio[0][mode],
-    }
-    columns |= share_columns(modes, mode)
-    columns["name"] = [modes.names[c.mode] for c in met]
-    return columns
-
-
 def summary(run: RunUp, critical: CriticalSpeeds) -> dict[str, Any]:
     """What summary.json says of the run-up."""
-    modes = critical.modes
     states, model = run.states, run.train.model
     reached = {s.speed for s in states} & set(run.speeds.tolist())
     factors = [dynamic_factors(run.train, run.states, i) for i in range(len(model.meshes))]
@@ -187,10 +156,7 @@ def summary(run: RunUp, critical: CriticalSpeeds) -> dict[str, Any]:
         "largest_dynamic_factor": [most(f) for f in factors],
         "largest_share_without_contact": [most(x) for x in open_],
         "peaks": peaks_of(run, critical),
-        "modes": [
-            {"name": n, "frequency_Hz": float(f), "damping_ratio": float(z)}
-            for n, f, z in zip(modes.names, modes.frequency[0], modes.damping_ratio[0], strict=True)
-        ],
+        "modes": mode_entries(critical.campbell.modes),
         "notes": list(run.notes),
     }
 
