@@ -176,12 +176,12 @@ def flank_compliance(gear: Gear, body: GearBody) -> FlankCompliance:
         return known
     face, inverse_modulus, module = face_of(gear), body.contact_compliance, gear.module
     corner, wedge = corner_of(face)
-    stations, bumps, nodal = _stations(body.flank, float(face.arc[0]), module)
+    stations, bumps, nodal = stations_of(body.flank, float(face.arc[0]), module)
     loads = np.kron(nodal, np.eye(2))
     sides = loads @ body.interface
     far_field = {step: sides @ body.coupling[step % body.teeth] @ sides.T for step in range(-REACH, REACH + 1)}
     made = FlankCompliance(face, inverse_modulus, corner, wedge, stations, bumps, far_field)
-    far_field[0] = far_field[0] + loads @ body.own @ loads.T + inverse_modulus / body.width * _local(made)
+    far_field[0] = far_field[0] + loads @ body.own @ loads.T + inverse_modulus / body.width * local_bracket(made)
     body.compliances[gear] = made
     return made
 
@@ -202,7 +202,7 @@ def corner_of(face: Face) -> tuple[complex, Array]:
     return point, one * along_middle + two * (np.eye(2) - along_middle)
 
 
-def _stations(flank: Flank, start: float, module: float) -> tuple[Array, Array, Array]:
+def stations_of(flank: Flank, start: float, module: float) -> tuple[Array, Array, Array]:
     """Arc lengths of the stations on the flank, half widths of their bumps, and their nodal loads, shape (k, n)."""
     ends, sizes = flank.ends.tolist(), flank.sizes.tolist()
 
@@ -243,7 +243,7 @@ def bumps(flank: Flank, s: Array, a: Array) -> Array:
     return nodal
 
 
-def _local(flank: FlankCompliance) -> Array:
+def local_bracket(flank: FlankCompliance) -> Array:
     """Means of the bracket between the bumps of all stations, shape (2k, 2k) (-)."""
     s, a = flank.stations, flank.bumps
     x = s[:, None] + a[:, None] * ELLIPSE_X

@@ -152,19 +152,28 @@ HELD_STEPS, TOLERANCE = 3, 1e-6
 AHEAD, LEAST_AHEAD = 1e-3, 1e-10
 
 
-def solve_half_plane(contact_model: HalfPlanePair, pinion_angles: ArrayLike, twists: ArrayLike) -> Positions:
+def solve_half_plane(
+    contact_model: HalfPlanePair,
+    pinion_angles: ArrayLike,
+    twists: ArrayLike,
+    first_contacts: FirstContacts | None = None,
+) -> Positions:
     """Solve the contact of a gear pair at several positions.
 
     Parameters
     ----------
+    contact_model : HalfPlanePair
+        The gears.
     pinion_angles : array_like, shape (n,)
         rad.
     twists : array_like, shape (n,) or ()
         Twist of the wheel (rad), from where a wheel space faces the pinion tooth.
+    first_contacts : FirstContacts, optional
+        First contacts of the tooth pairs that may carry; of all pairs without it.
     """
     angles = np.array(pinion_angles, dtype=float, ndmin=1)
     twist = np.array(np.broadcast_to(np.asarray(twists, dtype=float), angles.shape))
-    met = contact_model.first_contacts(angles)
+    met = contact_model.first_contacts(angles) if first_contacts is None else first_contacts
     met = taken(met, met.twist < twist[met.position])
     return in_batches(
         lambda part: _batch(contact_model, angles[part], twist[part], of_positions(met, part)), len(angles)

@@ -21,7 +21,8 @@ from ...base.typing import Array, ComplexArray, IntArray
 from ...fem.meshing.session import gmsh_session
 from ...fem.plane import least_jacobian, second_order
 from ..geometry.curves import coordinates
-from ..geometry.pair import Gear, GearPair
+from ..geometry.mesh_geometry import MeshGeometry
+from ..geometry.spur_gear import Gear
 
 #: Raised whenever the recipe's meaning changes, so that stored meshes are not mistaken for new ones.
 RECIPE_NUMBER = 3
@@ -342,7 +343,7 @@ RIM_SHARE = 0.5
 
 
 def sector_recipes(
-    pair: GearPair, *, coarsen: float = 1.0, flank_coarsen: float = 1.0
+    pair: MeshGeometry, *, coarsen: float = 1.0, flank_coarsen: float = 1.0
 ) -> tuple[SectorRecipe, SectorRecipe]:
     """Recipes for pinion and wheel.
 

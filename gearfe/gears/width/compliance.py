@@ -1,0 +1,270 @@
+r"""What loads on the flanks of a gear with a face width do to its flanks.
+
+A load on a flank is a force f per width in the transverse section at z. A helix that is displaced by w along z shows a
+section turned by :math:`-\kappa w`, so that contact is that of plane sections and f acts in space as
+
+.. math:: (f,\; -\kappa\, x \times f),
+
+and displacements are measured by the same vector. Over the width loads are sums of Legendre functions :math:`P_a`,
+orthonormal on the common width of both gears, along the flank of the elliptic bumps of
+`gearfe.gears.contact.flank_compliance`. Between the stations i, j of two teeth k steps apart
+
+.. math::
+    H_k(i a; j b) = b_i^T C^{FE}_{k,ab}\, b_j + \delta_{k0}\,\delta_{ab}\,\frac{1}{E'\cos\beta_b}
+    \Big\langle \tfrac2\pi\ln\frac{|s-t|}{l} I + W \ln\frac{y+y}{l} \Big\rangle_{ij} ,
+
+where :math:`\cos\beta_b` makes the half-plane that of the normal section. In the plane the length l cancels. Here it is
+that of a half-space under a line load that varies as the first function that is left out, with the wave number
+:math:`q = \pi n/b`: its surface moves by :math:`\tfrac{2}{\pi E'} K_0(q r)`, which near the load is
+:math:`-\tfrac{2}{\pi E'} \ln(r/l)` with :math:`l = 2 e^{-\gamma}/q` (K. L. Johnson, Contact Mechanics, 1985, eq. 3.19,
+integrated along the line).
+
+The finite elements are those of one tooth sector (`gearfe.fem.extruded`), factorised down to its two cut sides; cyclic
+symmetry makes the gear, as in `gearfe.gears.contact.compliance`. Loads go forward through the fronts, so no node of the
+flank is retained: with Y the loads at the eliminated unknowns, F those at the sides and :math:`K_n` the stiffness of
+the harmonic n,
+
+.. math:: C_k = \delta_{k0}\, Y^T Y + \frac1z \sum_n e^{2\pi i n k/z}\, F_n^* K_n^{-1} F_n .
+
+Spur gears that are symmetric about the middle of the common width part into two systems of half the size.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from ...base.progress import Stopwatch, one_thread
+from ...base.typing import Array
+from ...fem.extruded import AxialFunctions, condense_extruded, lobatto_functions, section_integrals
+from ...fem.multifrontal import unknowns_of
+from ..contact.flank import flank_of
+from ..contact.flank_compliance import FlankCompliance, Shapes, corner_of, local_bracket, shapes_of, stations_of
+from ..geometry.face import face_of
+from ..teeth.tooth_sector import SectorMesh, sector_mesh, sector_recipes
+from .mesh import WideMesh
+
+#: Length beyond the common width (modules) up to which it is no element of its own.
+NO_ELEMENT = 0.1
+#: Polynomial order of the finite elements beyond that of the load.
+HIGHER = 2
+#: Polynomial order of the elements beyond the common width, and one more for each so many modules, up to that on it.
+BEYOND_ORDER, BEYOND_MODULES = 3, 1.0
+#: Mesh cycles beyond both ends of the path of contact within which tips may bear.
+TIPS = 0.7
+
+
+@dataclass(frozen=True)
+class WideFlank:
+    """The working flank of one gear over its width: H between its stations.
+
+    Attributes
+    ----------
+    local
+        Flank, half-plane and wedge; its far field is that of loads that are even over the width (m/N).
+    influence : ndarray, shape (steps, k, 2, n, k, 2, n)
+        H_0, H_1, ...: station, axis of the tooth and function of both places (m/N); H_-k is the transpose of H_k.
+    length
+        l in the logarithms (m).
+    """
+
+    local: FlankCompliance
+    influence: Array
+    length: float
+
+
+@dataclass(frozen=True)
+class WideCompliance:
+    """Two elastic gears in mesh, as their contact sees them; `wide_compliance` makes it."""
+
+    mesh: WideMesh
+    sides: tuple[WideFlank, WideFlank]
+
+    @property
+    def steps(self) -> int:
+        """Largest distance, in teeth, of two tooth pairs whose coupling is known."""
+        return len(self.sides[0].influence) - 1
+
+    @cached_property
+    def shapes(self) -> Shapes:
+        """Shape functions of the stations of both flanks."""
+        return shapes_of([side.local.stations for side in self.sides])
+
+    @property
+    def length(self) -> float:
+        """l in the logarithms (m)."""
+        return self.sides[0].length
+
+
+def wide_compliance(mesh: WideMesh, *, whole: bool = True, watch: Stopwatch | None = None) -> WideCompliance:
+    """Mesh the sections of both gears and condense their teeth over the width to the flanks.
+
+    Parameters
+    ----------
+    mesh : WideMesh
+        The gears.
+    whole
+        ``False``: one sector of each gear with its cut sides held, as models of one tooth have it.
+    watch
+        Takes the time of the stages.
+    """
+    watch = watch or Stopwatch()
+    with watch.stage("meshes"):
+        recipes = sector_recipes(mesh.sections, coarsen=mesh.coarsen, flank_coarsen=mesh.flank_coarsen)
+        meshes = [sector_mesh(gear, recipe) for gear, recipe in zip(mesh.gears, recipes, strict=True)]
+    with watch.stage("condensation"), one_thread():
+        pinion, wheel = (_wide_flank(mesh, gear, meshes[gear], whole) for gear in (0, 1))
+    return WideCompliance(mesh, (pinion, wheel))
+
+
+def legendre(z: Array, zone: tuple[float, float], count: int) -> Array:
+    """Legendre functions at z (m), orthonormal on the zone and zero beyond, shape (..., count) (1/sqrt(m))."""
+    low, high = zone
+    x = (2 * z - low - high) / (high - low)
+    values = np.polynomial.legendre.legvander(x, count - 1) * np.sqrt((2 * np.arange(count) + 1) / (high - low))
+    return np.asarray(values * (np.abs(x) <= 1 + 1e-9)[..., None])
+
+
+def _steps(mesh: WideMesh) -> int:
+    """Largest distance of two tooth pairs that can touch at the same time, in teeth."""
+    path = mesh.sections.path
+    length = (path["E"].pinion_angle - path["A"].pinion_angle) / mesh.sections.mesh_cycle
+    return math.ceil(length + 2 * TIPS + mesh.overlap_ratio)
+
+
+def _axial_functions(mesh: WideMesh, face: tuple[float, float]) -> AxialFunctions:
+    """Functions along the face of a gear: one element on the common width, others beyond its ends."""
+    low, high = mesh.zone
+    if mesh.count == 1:
+        return lobatto_functions(face, [0], mesh.zone)
+    order = mesh.count - 1 + HIGHER
+    ends, orders = [low, high], [order]
+    for beyond, at in ((low - face[0], 0), (face[1] - high, len(orders))):
+        if beyond <= NO_ELEMENT * mesh.module:
+            ends[0 if at == 0 else -1] = face[0 if at == 0 else 1]
+            continue
+        more = BEYOND_ORDER + math.ceil(beyond / (BEYOND_MODULES * mesh.module))
+        orders.insert(0 if at == 0 else len(orders), min(order, more))
+        ends.insert(0 if at == 0 else len(ends), face[0 if at == 0 else 1])
+    return lobatto_functions(ends, orders, mesh.zone)
+
+
+def _systems(mesh: WideMesh, gear: int) -> Iterator[tuple[tuple[AxialFunctions, AxialFunctions | None], slice]]:
+    """Functions of v and w of the systems that part, each with the Legendre functions of its loads."""
+    functions = _axial_functions(mesh, mesh.faces[gear])
+    if mesh.count == 1:
+        yield (functions, None), slice(0, 1)
+        return
+    (low, high), (first, last) = mesh.zone, mesh.faces[gear]
+    if mesh.base_helix_angle == 0.0 and math.isclose(low - first, last - high, abs_tol=1e-9 * mesh.width):
+        even, odd = functions.by_parity()
+        yield (even, odd), slice(0, None, 2)
+        yield (odd, even), slice(1, None, 2)
+        return
+    yield (functions, functions), slice(0, None)
+
+
+def _wide_flank(mesh: WideMesh, gear: int, sector: SectorMesh, whole: bool) -> WideFlank:
+    section, material, turn = mesh.gears[gear], mesh.materials[gear], mesh.turns[gear]
+    integrals = section_integrals(sector.points, sector.triangles, material, turn)
+    flank, n, steps = flank_of(sector, 4), mesh.count, _steps(mesh)
+    face = face_of(section)
+    stations, bumps, nodal = stations_of(flank, float(face.arc[0]), section.module)
+    bore = np.unique(sector.boundaries["bore"])
+    sides = np.concatenate([sector.cut_right[:-1], sector.cut_left[:-1]])  # the last node of a cut lies on the bore
+    k = len(stations)
+    influence = np.zeros((steps + 1, k, 2, n, k, 2, n))
+    for functions, chosen in _systems(mesh, gear):
+        factor = condense_extruded(
+            sector.points,
+            sector.triangles,
+            integrals,
+            functions,
+            retained=sides if whole else sides[:0],
+            fixed=bore if whole else np.union1d(bore, sides),
+        )
+        plane, axial = functions
+        over = [None if one is None else _over_width(mesh, one)[chosen] for one in functions]
+        x, y = sector.points[flank.nodes].T
+        count = plane.count
+        loads = np.zeros((len(flank.nodes), 2 * count + (0 if axial is None else axial.count), k, 2, len(over[0])))
+        for axis in (0, 1):
+            loads[:, axis * count : (axis + 1) * count, :, axis] = np.einsum("in,bp->npib", nodal, over[0])
+            if over[1] is not None and turn:
+                arm = turn * (y, -x)[axis]
+                loads[:, 2 * count :, :, axis] = np.einsum("in,n,bp->npib", nodal, arm, over[1])
+        unknowns = unknowns_of(flank.nodes, loads.shape[1])
+        eliminated, at_sides = factor.reduced_loads(unknowns, loads.reshape(len(unknowns), -1))
+        of_steps = np.zeros((steps + 1, eliminated.shape[1], eliminated.shape[1]))
+        if whole:
+            of_steps = _cyclic(factor.schur, at_sides, (2 * count, loads.shape[1]), section.teeth, steps)
+        of_steps[0] += eliminated.T @ eliminated
+        shape = k, 2, len(over[0])
+        influence[:, :, :, chosen, :, :, chosen] = of_steps.reshape(-1, *shape, *shape)
+    inverse = material.contact_compliance("strain") / math.cos(mesh.base_helix_angle)
+    corner, wedge = corner_of(face)
+    length = 2 * math.exp(-np.euler_gamma) * mesh.width / (math.pi * n)
+    bare = FlankCompliance(face, inverse, corner, wedge, stations, bumps, {})
+    every = np.kron(np.ones((k, k)), 2 / math.pi * np.eye(2) + wedge)
+    bracket = inverse * (local_bracket(bare) - math.log(length) * every)
+    for a in range(n):
+        influence[0, :, :, a, :, :, a] += bracket.reshape(k, 2, k, 2)
+    even = influence[0, :, :, 0, :, :, 0].reshape(2 * k, 2 * k) + inverse * math.log(length) * every
+    local = FlankCompliance(face, inverse, corner, wedge, stations, bumps, {0: even / mesh.width})
+    return WideFlank(local, influence, length)
+
+
+def _over_width(mesh: WideMesh, functions: AxialFunctions) -> Array:
+    """Integrals of the Legendre functions of the load times those of the displacement, shape (n, count) (sqrt(m))."""
+    inside = (functions.points >= mesh.zone[0]) & (functions.points <= mesh.zone[1])
+    values = legendre(functions.points, mesh.zone, mesh.count) * (functions.weights * inside)[:, None]
+    return np.asarray(values.T @ functions.values)
+
+
+def _cyclic(stiffness: Array, loads: Array, widths: tuple[int, int], teeth: int, steps: int) -> Array:
+    """Displacements along the loads of the flank so many steps on, of the whole gear with loads at cut sides alone.
+
+    Parameters
+    ----------
+    stiffness : ndarray, shape (2 h, 2 h)
+        Of one sector's sides, the right one first (N/m).
+    loads : ndarray, shape (2 h, c)
+        Loads there (N).
+    widths : pair of int
+        Unknowns of a node that turn with the tooth, and all.
+    teeth, steps : int
+        Number of teeth, and largest step.
+
+    Returns
+    -------
+    ndarray, shape (steps + 1, c, c)
+    """
+    half, columns, (plane, width) = len(stiffness) // 2, loads.shape[1], widths
+    angle = 2 * math.pi / teeth
+    c, s = math.cos(angle), math.sin(angle)
+    turn = np.eye(width)
+    turn[:plane, :plane] = np.kron([[c, -s], [s, c]], np.eye(plane // 2))
+
+    def turned(y: Array) -> Array:
+        """R^T y, node by node."""
+        return np.asarray(np.matmul(turn.T, y.reshape(-1, width, y.shape[1])).reshape(y.shape))
+
+    rr, rl, ll = stiffness[:half, :half], stiffness[:half, half:], stiffness[half:, half:]
+    to_next, beside = turned(rl.T).T, rr + turned(turned(ll).T).T
+    right, left = loads[:half], turned(loads[half:])
+    found = np.zeros((steps + 1, columns, columns))
+    for n in range(teeth // 2 + 1):
+        phase = np.exp(1j * n * angle)
+        root = cholesky(beside + phase * to_next + np.conj(phase) * to_next.T, check_finite=False)
+        reduced = solve_triangular(root, right + np.conj(phase) * left, trans="C", check_finite=False)
+        product = reduced.conj().T @ reduced
+        twice = 1 if n == 0 or 2 * n == teeth else 2
+        for k in range(steps + 1):
+            share = twice * np.exp(1j * n * k * angle) / teeth
+            found[k] += share.real * product.real - share.imag * product.imag
+    return found

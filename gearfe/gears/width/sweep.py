@@ -1,0 +1,297 @@
+r"""The sweep of gears with face widths over pinion angle and load, and what follows from the load over the flanks.
+
+**Load factors** of the computed load, in the sense of ISO 6336-1. The line load at a point is the force per width in
+the transverse section, :math:`f = M/r`. With the load per width of all tooth pairs averaged over the angles,
+:math:`\bar f(z)`,
+
+.. math:: K_{H\beta} = \max_z \bar f / \mathrm{mean}_z \bar f, \qquad
+          K_{H\beta} K_{H\alpha} = \max f / f_0,
+
+where :math:`f_0` is the largest line load, over the angles, of the same torque spread evenly over the lines of contact
+within the path of contact.
+
+**Forces in space.** A force f per width on the wheel's section has the axial part :math:`-\kappa_2\,x\times f`, so the
+axial force on the wheel is :math:`\kappa_2` times the torque. Moments are about the gears' centres at z = 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...base.errors import InputError
+from ...base.progress import Stopwatch, one_thread
+from ...base.typing import Array, IntArray
+from .compliance import legendre
+from .lines import ContactLines, Solution, solve_position
+
+#: Pinion angles of a mesh cycle where none are given; places along the width of the mean load.
+ANGLES, ALONG = 24, 65
+#: Kinds of status of a position.
+CONVERGED, NOT_CONVERGED, NO_CONTACT = "converged", "not_converged", "no_contact"
+
+
+@dataclass(frozen=True)
+class LinePoints:
+    """Loaded points of all positions, p of them, by position, tooth pair and z.
+
+    Attributes
+    ----------
+    load, position : ndarray, shape (p,)
+        Numbers of the load and of the angle.
+    pair : ndarray, shape (p,)
+        Tooth pair k: pinion tooth k, wheel tooth -1 - k.
+    z, weight : ndarray, shape (p,)
+        Axial coordinate, and the length along z that the point has of its line (m).
+    roll : ndarray, shape (p, 2)
+        Roll lengths on pinion and wheel (m).
+    line_load : ndarray, shape (p,)
+        Force per width in the transverse section (N/m).
+    """
+
+    load: IntArray
+    position: IntArray
+    pair: IntArray
+    z: Array
+    weight: Array
+    roll: Array
+    line_load: Array
+
+
+@dataclass(frozen=True)
+class WidthSweep:
+    """Contact of gears with face widths over m loads and n pinion angles.
+
+    A position that failed has its status, and NaN.
+
+    Attributes
+    ----------
+    angle : ndarray, shape (n,)
+        Pinion angles (rad).
+    status : ndarray of str, shape (m, n)
+        ``converged``, ``not_converged`` or ``no_contact``.
+    torque : ndarray, shape (m, n)
+        At the wheel (N m).
+    twist, transmission_error : ndarray, shape (m, n)
+        Twist of the wheel from where unmodified flanks touch (rad), and times its base radius (m).
+    tangent : ndarray, shape (m, n, 3, 3)
+        Torque and moments of the tilts by twist, tilt in the plane of action and tilt across it (N m/rad).
+    force : ndarray, shape (m, n, 3)
+        On the wheel: transverse parts in global axes, and axial (N).
+    moment : ndarray, shape (m, n, 2, 3)
+        Of the contact on pinion and wheel about their centres at z = 0, global axes (N m).
+    peak_line_load : ndarray, shape (m, n)
+        Largest line load (N/m).
+    peak_z, peak_pair, peak_roll : ndarray, shapes (m, n), (m, n), (m, n, 2)
+        Where it is: axial coordinate (m), tooth pair (-1 without load), roll lengths (m).
+    k_h_beta, k_h_alpha : ndarray, shape (m,)
+        Face load factor and transverse load factor of the computed load (-).
+    points : LinePoints
+        Load over the flanks.
+    timings
+        Seconds by stage.
+    """
+
+    angle: Array
+    status: NDArray[np.str_]
+    torque: Array
+    twist: Array
+    transmission_error: Array
+    tangent: Array
+    force: Array
+    moment: Array
+    peak_line_load: Array
+    peak_z: Array
+    peak_pair: IntArray
+    peak_roll: Array
+    k_h_beta: Array
+    k_h_alpha: Array
+    points: LinePoints
+    timings: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def axial_force(self) -> Array:
+        """Axial force on the wheel (N), shape (m, n)."""
+        return np.asarray(self.force[..., 2])
+
+    @property
+    def stiffness(self) -> Array:
+        """Tangent stiffness dT/dtwist (N m/rad), shape (m, n)."""
+        return np.asarray(self.tangent[..., 0, 0])
+
+
+def sweep_width(
+    lines: ContactLines,
+    torques: ArrayLike | None = None,
+    *,
+    twists: ArrayLike | None = None,
+    angles: ArrayLike | None = None,
+    positions: int = ANGLES,
+    watch: Stopwatch | None = None,
+) -> WidthSweep:
+    """Solve the contact over pinion angles at several torques, or at several twists.
+
+    Parameters
+    ----------
+    lines : ContactLines
+        The gears, see `gearfe.gears.width.lines.contact_lines`.
+    torques : array_like, shape (m,)
+        At the wheel's hub (N m), > 0.
+    twists : array_like, shape (m,)
+        Of the wheel from where unmodified flanks touch (rad), instead of `torques`.
+    angles : array_like, shape (n,)
+        Pinion angles (rad); without them so many `positions` in a mesh cycle.
+    watch
+        Takes the time of the stages.
+
+    Raises
+    ------
+    InputError
+        For neither or both of torques and twists, values out of range, and teeth that differ without angles.
+    """
+    loads, by_torque = _loads(torques, twists)
+    at = _angles(lines, angles, positions)
+    watch = watch or Stopwatch()
+    with watch.stage("positions"), one_thread():
+        solved = [_solved(lines, at, load, by_torque) for load in loads]
+    return _assembled(lines, at, solved, dict(watch.seconds))
+
+
+def _loads(torques: ArrayLike | None, twists: ArrayLike | None) -> tuple[list[float], bool]:
+    if (torques is None) == (twists is None):
+        raise InputError("torques, twists", None, "exactly one of them must be given", "leave the other out")
+    name, given = ("torques", torques) if twists is None else ("twists", twists)
+    loads = np.atleast_1d(np.asarray(given, dtype=float))
+    unit = "N m" if twists is None else "rad"
+    if loads.ndim != 1 or len(loads) == 0 or not (np.isfinite(loads).all() and (twists is not None or loads.min() > 0)):
+        raise InputError(name, given, f"must be finite{' and > 0' if twists is None else ''} ({unit})", "correct them")
+    return loads.tolist(), twists is None
+
+
+def _angles(lines: ContactLines, angles: ArrayLike | None, positions: int) -> Array:
+    if angles is None:
+        if positions < 1:
+            raise InputError("positions", positions, "must be >= 1", "24 are usual")
+        if not all(own.alike for own in lines.flanks.profiles):
+            problem = "must be given where teeth differ: one mesh cycle is not enough"
+            raise InputError("angles", None, problem, "give the pinion angles of the cycles of interest")
+        return np.arange(positions) * lines.compliance.mesh.sections.mesh_cycle / positions
+    at = np.atleast_1d(np.asarray(angles, dtype=float))
+    if at.ndim != 1 or len(at) == 0 or not np.isfinite(at).all():
+        raise InputError("angles", angles, "must be a list of finite angles (rad)", "give at least one angle")
+    return at
+
+
+def _solved(lines: ContactLines, angles: Array, load: float, by_torque: bool) -> list[Solution]:
+    """Positions at one load; each starts from the twist of the one before."""
+    solved, guess = [], 0.0
+    for angle in angles.tolist():
+        load_is = {"torque": load, "guess": guess} if by_torque else {"twist": load}
+        solution = solve_position(lines, angle, **load_is)
+        if solution.converged:
+            guess = solution.twist
+        solved.append(solution)
+    return solved
+
+
+def _assembled(
+    lines: ContactLines, angles: Array, solved: Sequence[Sequence[Solution]], timings: dict[str, float]
+) -> WidthSweep:
+    mesh = lines.compliance.mesh
+    shape = len(solved), len(angles)
+    status = np.full(shape, CONVERGED, dtype="<U13")
+    torque, twist, peak, peak_z = (np.full(shape, np.nan) for _ in range(4))
+    tangent, force, moment = (np.full((*shape, *more), np.nan) for more in ((3, 3), (3,), (2, 3)))
+    peak_pair, peak_roll = np.full(shape, -1), np.full((*shape, 2), np.nan)
+    records = []
+    for cell in np.ndindex(shape):
+        solution = solved[cell[0]][cell[1]]
+        points = solution.points
+        loaded = np.flatnonzero(solution.moment > 0)
+        if not solution.converged:
+            status[cell] = NOT_CONVERGED if math.isfinite(solution.twist) else NO_CONTACT
+            continue
+        if len(loaded) == 0:
+            status[cell] = NO_CONTACT
+        torque[cell], twist[cell], tangent[cell] = solution.moment.sum(), solution.twist, solution.tangent
+        force[cell], moment[cell] = _resultants(lines, solution)
+        line_load = solution.moment / (points.weight * points.rows.arm)
+        peak[cell] = line_load.max(initial=0.0)
+        if len(loaded):
+            most = int(np.argmax(line_load))
+            peak_z[cell], peak_pair[cell] = points.z[most], points.pair[most]
+            peak_roll[cell] = points.rows.roll[most]
+        record = [np.full(len(loaded), cell[0]), np.full(len(loaded), cell[1]), points.pair[loaded], points.z[loaded]]
+        record += [points.weight[loaded], points.rows.roll[loaded], line_load[loaded]]
+        records.append(record)
+    empty = [np.zeros(0, dtype=np.int64)] * 3 + [np.zeros(0)] * 2 + [np.zeros((0, 2)), np.zeros(0)]
+    points_ = LinePoints(*(np.concatenate(arrays) for arrays in zip(*(records or [empty]), strict=True)))
+    factors = [_load_factors(lines, angles, row) for row in solved]
+    return WidthSweep(
+        angle=angles,
+        status=status,
+        torque=torque,
+        twist=twist,
+        transmission_error=twist * mesh.sections.wheel.base_radius,
+        tangent=tangent,
+        force=force,
+        moment=moment,
+        peak_line_load=peak,
+        peak_z=peak_z,
+        peak_pair=peak_pair,
+        peak_roll=peak_roll,
+        k_h_beta=np.array([beta for beta, _ in factors]),
+        k_h_alpha=np.array([alpha for _, alpha in factors]),
+        points=points_,
+        timings=timings,
+    )
+
+
+def _resultants(lines: ContactLines, solution: Solution) -> tuple[Array, Array]:
+    """Force on the wheel (N), shape (3,), and moments on both gears (N m), shape (2, 3)."""
+    mesh, points = lines.compliance.mesh, solution.points
+    rows, z = points.rows, points.z
+    size = solution.moment / rows.arm
+    transverse = size * rows.normal
+    force = np.stack([transverse.real, transverse.imag, mesh.turns[1] * solution.moment], axis=1)
+    moments = []
+    for sign, centre in ((-1.0, 0.0), (1.0, mesh.sections.working_centre_distance)):
+        place = np.stack([rows.point.real - centre, rows.point.imag, z], axis=1)
+        moments.append(sign * np.cross(place, force).sum(axis=0))
+    return force.sum(axis=0), np.array(moments)
+
+
+def _load_factors(lines: ContactLines, angles: Array, solved: Sequence[Solution]) -> tuple[float, float]:
+    """K_Hbeta and K_Halpha over the converged positions of a load; NaN without any."""
+    mesh = lines.compliance.mesh
+    good = [(angle, one) for angle, one in zip(angles.tolist(), solved, strict=True) if one.converged]
+    if not any(one.moment.sum() > 0 for _, one in good):
+        return math.nan, math.nan
+    along = np.linspace(*mesh.zone, ALONG)
+    functions = legendre(along, mesh.zone, mesh.count)
+    mean, most, even = np.zeros(ALONG), 0.0, 0.0
+    for angle, one in good:
+        force = one.moment / one.points.rows.arm
+        mean += functions @ (legendre(one.points.z, mesh.zone, mesh.count).T @ force) / len(good)
+        most = max(most, float((force / one.points.weight).max(initial=0.0)))
+        length = _line_length(lines, angle)
+        if length > 0:
+            even = max(even, float(force.sum()) / length)
+    face = float(mean.max() / np.trapezoid(mean, along) * mesh.width)
+    return face, most / even / face if even > 0 else math.nan
+
+
+def _line_length(lines: ContactLines, angle: float) -> float:
+    """Length along z of all lines within the path of contact at a pinion angle (m)."""
+    mesh, (first, last) = lines.compliance.mesh, lines.law.path
+    cycle, turn = mesh.sections.mesh_cycle, mesh.turns[0]
+    ends = sorted(angle + turn * z for z in mesh.zone)
+    numbers = np.arange(math.ceil((first - ends[1]) / cycle), math.floor((last - ends[0]) / cycle) + 1)
+    if turn == 0.0:
+        return mesh.width * len(numbers)
+    low, high = np.maximum(ends[0] + numbers * cycle, first), np.minimum(ends[1] + numbers * cycle, last)
+    return float(np.maximum(high - low, 0.0).sum() / abs(turn))

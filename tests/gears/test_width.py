@@ -1,0 +1,254 @@
+"""Gears with face widths: plane limit, identities, 3D contact of another program, helical pairs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearfe.base.errors import InputError
+from gearfe.gears.contact.half_plane_pair import half_plane_pair
+from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.geometry.face import NOMINAL, ToothDeviations
+from gearfe.gears.width import (
+    EndRelief,
+    LeadModification,
+    Misalignment,
+    WideFlanks,
+    WideMesh,
+    contact_lines,
+    sweep_width,
+    wide_compliance,
+)
+from gearfe.gears.width.lines import own_twists, solve_position
+from tests.makers.half_plane_pairs import PAIRS
+from tests.makers.wide_gears import SPUR, helical_lines, helical_mesh, spur_lines
+
+CROWNED = WideFlanks(leads=(LeadModification(crowning=10e-6), LeadModification()))
+TILTED = WideFlanks(misalignment=Misalignment.over_width(20e-6, 10e-3))
+
+
+def test_influence_of_one_function_is_that_of_plane_strain():
+    compliance = wide_compliance(WideMesh(SPUR, functions=1, coarsen=1.0, flank_coarsen=4.0))
+    plane = half_plane_pair(elastic_pair(SPUR)).sides
+    for side, known in zip(compliance.sides, plane, strict=True):
+        size = 2 * len(known.stations)
+        for step in (1, 2):
+            expected = SPUR.pinion.face_width * known.far_field[step]
+            assert np.abs(side.influence[step].reshape(size, size) - expected).max() < 1e-10 * np.abs(expected).max()
+        expected = known.far_field[0]
+        assert np.abs(side.local.far_field[0] - expected).max() < 1e-10 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_one_function_carries_the_torque_of_the_plane_law(name):
+    """On the path of contact within 0.02 %; where tips bear besides, a neighbour's load displaces them: 0.08 %."""
+    pair = PAIRS[name]
+    lines = contact_lines(wide_compliance(WideMesh(pair, functions=1, coarsen=1.0, flank_coarsen=4.0)))
+    angles = (np.arange(24) + 0.5) * pair.mesh_cycle / 24
+    plane = sweep_stiffness(pair, torque=100.0, angles=angles, kinematics="small")
+    found = sweep_width(lines, [100.0], angles=angles)
+    off = np.abs(found.twist[0] / plane.twist - 1)
+    assert np.median(off) < 1e-4
+    assert off.max() < 8e-4
+    assert np.quantile(off, 0.7) < 2e-4
+
+
+def test_influence_is_symmetric_and_positive():
+    for side in helical_lines().compliance.sides:
+        size = math.prod(side.influence.shape[1:4])
+        own = side.influence[0].reshape(size, size)
+        assert np.abs(own - own.T).max() < 1e-10 * np.abs(own).max()
+
+
+def test_parity_splits_spur_gears_into_the_same_influence():
+    mesh = WideMesh(SPUR, functions=4, coarsen=3.0)
+    split = wide_compliance(mesh)
+    whole = wide_compliance(replace(mesh, base_helix_angle=1e-12))
+    for one, other in zip(split.sides, whole.sides, strict=True):
+        assert np.abs(one.influence - other.influence).max() < 1e-8 * np.abs(other.influence).max()
+
+
+@pytest.mark.parametrize("flanks", [WideFlanks(), TILTED, CROWNED], ids=["plain", "tilted", "crowned"])
+def test_more_functions_hardly_change_spur_gears(flanks):
+    """Even load: 0.02 % of the transmission error; uneven: 0.1 %."""
+    twists = [solve_position(spur_lines(functions=n).with_flanks(flanks), 0.02, torque=100.0).twist for n in (7, 9)]
+    assert abs(twists[0] / twists[1] - 1) < (2e-4 if flanks == WideFlanks() else 1e-3)
+
+
+#: Prototype's page "The face width", section 3: CalculiX 2.20, surface to surface, one sector of each gear with the
+#: cuts held, pitch point, flank elements 0.045 mm: ends of the layers from the middle, or from the loaded end (mm), and
+#: their loads (N/mm); torque at the twist (rad) that was given.
+CALCULIX = {
+    "plain": (WideFlanks(), 3.6928e-4, [0, 1.35, 2.65, 3.65, 4.35, 4.75, 5],
+              [296.8, 293.1, 299.0, 298.5, 290.5, 261.7], 100.04),
+    "crowned": (CROWNED, 4.6320e-4, [0, 1.35, 2.65, 3.65, 4.35, 4.75, 5],
+                [432.9, 370.2, 269.8, 156.5, 67.7, 12.0], 100.31),
+    "tilted": (TILTED, 6.5853e-4 - 10e-6 / SPUR.wheel.base_radius, [5, 4.6, 3.7, 2, 0, -2, -3.7, -4.6, -5],
+               [579.7, 559.4, 465.1, 351.1, 230.1, 120.0, 50.8, 13.5], 100.10),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CALCULIX)
+def test_load_over_the_width_is_that_of_a_3d_contact_of_calculix(case):
+    flanks, twist, ends, expected, torque = CALCULIX[case]
+    lines = spur_lines(whole=False, density=4.5).with_flanks(flanks)
+    solution = solve_position(lines, SPUR.path["C"].pinion_angle, twist=twist)
+    assert solution.converged
+    assert solution.moment.sum() == pytest.approx(torque, rel=5e-3)
+    points = solution.points
+    load = 1e-3 * solution.moment / (points.weight * points.rows.arm)
+    for low, high, known in zip(ends[:-1], ends[1:], expected, strict=True):
+        at = 1e-3 * np.linspace(low, high, 400)
+        mean = np.interp(at, points.z, load).mean()
+        last = max(abs(low), abs(high)) > 4.7
+        assert abs(mean - known) < (0.04 if last else 0.02) * max(expected)
+
+
+@pytest.mark.parametrize("flanks", [WideFlanks(), TILTED], ids=["plain", "tilted"])
+def test_hand_mirrored_with_z_is_the_same(flanks):
+    mirrored = replace(flanks, misalignment=Misalignment(-flanks.misalignment.in_plane))
+    angles = np.array([0.0, 0.1])
+    one = sweep_width(helical_lines().with_flanks(flanks), [100.0], angles=angles)
+    other = sweep_width(helical_lines(-1.0).with_flanks(mirrored), [100.0], angles=angles)
+    assert np.allclose(one.twist, other.twist, rtol=1e-9, atol=0)
+    assert np.allclose(one.axial_force, -other.axial_force, rtol=1e-9, atol=0)
+
+
+def test_exchanged_gears_are_the_same():
+    """Where tips bear, torques do not have the ratio of the teeth and the rolling angles differ by the twist: 0.1 %."""
+    lines, other = helical_lines(), helical_lines(swapped=True)
+    sections = lines.compliance.mesh.sections
+    ratio = sections.gear_ratio
+    angles = np.array([0.02, 0.11, 0.2])
+    one = sweep_width(lines, [100.0], angles=angles)
+    two = sweep_width(other, [100.0 / ratio], angles=math.pi / sections.wheel.teeth - angles / ratio)
+    assert np.allclose(one.transmission_error, two.transmission_error, rtol=1e-3, atol=0)
+    assert np.allclose(one.axial_force, -two.axial_force, rtol=1e-9, atol=0)
+
+
+def energy(lines, solution):
+    """Elastic energy (J) of a position."""
+    points, moment = solution.points, solution.moment
+    x, w = np.polynomial.legendre.leggauss(24)
+    x, w = 0.5 * (x + 1), 0.5 * w
+    per_width = moment / points.weight
+    complementary = sum(b * own_twists(lines.law, points, a * per_width)[0] for a, b in zip(x, w, strict=True))
+    own = own_twists(lines.law, points, per_width)[0] - complementary
+    return float(own @ moment + 0.5 * moment @ points.influence @ moment)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.07, 0.19])
+def test_torque_is_the_derivative_of_the_energy(angle):
+    lines = replace(helical_lines().with_flanks(CROWNED), density=4.0)  # points are placed anew at each twist
+    base = solve_position(lines, angle, torque=100.0)
+    step = 0.01 * base.twist
+    before, after = (solve_position(lines, angle, twist=base.twist + way * step) for way in (-1, 1))
+    slope = (energy(lines, after) - energy(lines, before)) / (2 * step)
+    assert slope == pytest.approx(100.0, rel=5e-4)
+    assert base.tangent[0, 0] == pytest.approx((after.moment.sum() - before.moment.sum()) / (2 * step), rel=5e-3)
+
+
+def test_tangent_of_the_tilts_is_the_derivative_of_the_torque():
+    lines, angle = helical_lines(), 0.1
+    base = solve_position(lines, angle, torque=100.0)
+    step = 1e-6
+    torques = [
+        solve_position(
+            lines.with_flanks(WideFlanks(misalignment=Misalignment(*(way * step * np.eye(2)[axis])))),
+            angle, twist=base.twist,
+        ).moment.sum()
+        for axis in (0, 1) for way in (-1, 1)
+    ]  # fmt: skip
+    found = np.diff(np.reshape(torques, (2, 2)), axis=1)[:, 0] / (2 * step)
+    assert found == pytest.approx(base.tangent[0, 1:], rel=0.02, abs=1e-3 * abs(base.tangent[0, 0]))
+    assert np.allclose(base.tangent, base.tangent.T)
+
+
+def test_axial_force_follows_from_the_helix():
+    """F_a = 2 T tan(beta)/d on the wheel; a right-handed driver that turns counter-clockwise is pushed back."""
+    found = sweep_width(helical_lines(), [100.0], angles=[0.0])
+    wheel = helical_mesh().sections.wheel
+    expected = 100.0 * math.tan(math.radians(15.0)) / wheel.reference_radius
+    assert abs(found.axial_force[0, 0]) == pytest.approx(expected, rel=1e-9)
+    assert found.moment[0, 0, 1, 2] == pytest.approx(-100.0, rel=1e-6)
+
+
+def test_narrow_gear_on_a_wide_mate_bears_on_the_common_width():
+    mesh = WideMesh(SPUR, widths=(10e-3, 14e-3), centres=(0.0, 1e-3), functions=5, coarsen=3.0)
+    assert mesh.zone == pytest.approx((-5e-3, 5e-3))
+    wide = sweep_width(contact_lines(wide_compliance(mesh)), [100.0], angles=[0.0])
+    equal = sweep_width(
+        contact_lines(wide_compliance(replace(mesh, widths=(10e-3, 10e-3), centres=(0.0, 0.0)))), [100.0], angles=[0.0]
+    )
+    assert 10 / 14 < wide.twist[0, 0] / equal.twist[0, 0] < 1.0
+
+
+def test_pitch_error_of_one_tooth_moves_its_line():
+    error = 5e-6 / SPUR.pinion.base_radius
+    turns = tuple(error if k == 0 else 0.0 for k in range(20))
+    flanks = WideFlanks(profiles=(ToothDeviations(turn=turns), NOMINAL[1]))
+    lines = spur_lines().with_flanks(flanks)
+    middle = 0.5 * (SPUR.path["B"].pinion_angle + SPUR.path["D"].pinion_angle)
+    found = sweep_width(lines, [100.0], angles=[middle, middle + SPUR.mesh_cycle])
+    shift = (found.transmission_error[0, 1] - found.transmission_error[0, 0]) * 1e6
+    assert shift == pytest.approx(5.0, abs=0.05)
+    with pytest.raises(InputError, match="angles"):
+        sweep_width(lines, [100.0])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_flanks_converge_with_closed_gaps(seed):
+    random = np.random.default_rng(4500 + seed)
+    lead = LeadModification(
+        crowning=random.uniform(-5e-6, 30e-6),
+        relief_low=EndRelief(random.uniform(0, 30e-6), random.uniform(1e-3, 4e-3)),
+        relief_high=EndRelief(random.uniform(0, 30e-6), random.uniform(1e-3, 4e-3), 2.0),
+    )
+    flanks = WideFlanks(leads=(lead, LeadModification()), misalignment=Misalignment.over_width(
+        random.uniform(-60e-6, 60e-6), 20e-3))  # fmt: skip
+    lines = helical_lines().with_flanks(flanks)
+    torque, angle = 10 ** random.uniform(0, 2.7), random.uniform(0, 0.27)
+    solution = solve_position(lines, angle, torque=torque)
+    assert solution.converged
+    assert solution.moment.sum() == pytest.approx(torque, rel=1e-8)
+    points = solution.points
+    own = own_twists(lines.law, points, solution.moment / points.weight)[0]
+    gap = (points.touch + own + points.influence @ solution.moment - solution.twist) * points.rows.arm
+    assert np.abs(gap[solution.moment > 0]).max() < 1e-9
+    assert gap.min() > -1e-9
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"base_helix_angle": 1.0}, "base_helix_angle"),
+        ({"widths": (0.0, 1e-2)}, "widths"),
+        ({"centres": (0.0, 1.0)}, "centres"),
+        ({"functions": 0}, "functions"),
+        ({"widths": (1.0, 1.0)}, "widths"),
+    ],
+)
+def test_mistakes_in_a_mesh_are_reported(change, field):
+    with pytest.raises(InputError) as error:
+        WideMesh(SPUR, **change)
+    assert error.value.field == field
+
+
+def test_mistakes_in_loads_are_reported():
+    lines = spur_lines()
+    for arguments in (
+        {},
+        {"torques": [1.0], "twists": [1.0]},
+        {"torques": [-1.0]},
+        {"torques": [1.0], "angles": [math.nan]},
+    ):
+        with pytest.raises(InputError):
+            sweep_width(lines, **arguments)
+
+
+def test_gears_that_do_not_reach_each_other_have_no_contact():
+    found = sweep_width(spur_lines(), twists=[-1e-3], angles=[0.0])
+    assert found.status[0, 0] == "no_contact"

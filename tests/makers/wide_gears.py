@@ -1,0 +1,40 @@
+"""Gears with face widths that several tests use."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+from gearfe import Gear
+from gearfe.gears.geometry.mesh_geometry import MeshGeometry
+from gearfe.gears.width import ContactLines, WideMesh, contact_lines, wide_compliance
+
+from .gears import pair as gear_pair
+
+#: The spur pair of the comparisons with CalculiX: 20/30 teeth of 2.5 mm, 25 degrees, 10 mm wide.
+SPUR = gear_pair(tip_round=1e-4)
+
+
+def helical_mesh(hand: float = 1.0, *, teeth: tuple[int, int] = (23, 47), swapped: bool = False) -> WideMesh:
+    """Helical gears of normal module 2 mm, 15 degrees, 20 mm wide, on coarse sections."""
+    beta, module, width = math.radians(15.0), 2e-3, 20e-3
+    c = math.cos(beta)
+    form = {"addendum": c, "dedendum": 1.25 * c, "rack_tip_radius": 0.3 * c, "tip_round": 5e-5}
+    angle = math.atan(math.tan(math.radians(20.0)) / c)
+    pinion, wheel = (
+        Gear(z, module / c, angle, width, bore, **form) for z, bore in zip(teeth, (16e-3, 32e-3), strict=True)
+    )
+    base = hand * math.atan(math.tan(beta) * math.cos(angle))
+    sections = MeshGeometry(wheel, pinion) if swapped else MeshGeometry(pinion, wheel)
+    return WideMesh(sections, -base if swapped else base, functions=6, coarsen=3.0)
+
+
+@lru_cache(maxsize=8)
+def helical_lines(hand: float = 1.0, *, swapped: bool = False) -> ContactLines:
+    return contact_lines(wide_compliance(helical_mesh(hand, swapped=swapped)))
+
+
+@lru_cache(maxsize=8)
+def spur_lines(*, whole: bool = True, functions: int | None = None, density: float = 1.5) -> ContactLines:
+    compliance = wide_compliance(WideMesh(SPUR, functions=functions), whole=whole)
+    return contact_lines(compliance, density=density)
