@@ -543,6 +543,45 @@ def named_train(
     return replace(made, drive=drive, loads=tuple(map(at_bore, made.loads)))
 
 
+def with_materials(table: TrainTable, materials: Mapping[str, MaterialTable], where: str) -> TrainTable:
+    """Return [train] with the materials of its shafts and their sections, where these name one.
+
+    Parameters
+    ----------
+    table : TrainTable
+        [train].
+    materials : mapping
+        The materials by name.
+    where : str
+        Pattern of a shaft's name in messages, with its number and its name.
+
+    Raises
+    ------
+    InputError
+        For a material that does not exist.
+    """
+
+    def known(part: Any, place: str) -> Any:
+        if not isinstance(part.material, str):
+            return part
+        if not materials:
+            problem = "names a material, and this file has none"
+            cure = (
+                "write its constants, material = { youngs_modulus_GPa = 200.0 }, or add [materials.NAME] beside [gears]"
+            )
+            raise InputError(f"{place}.material", part.material, problem, cure)
+        if part.material not in materials:
+            raise unknown_name(f"{place}.material", part.material, materials)
+        return replace(part, material=materials[part.material])
+
+    shafts = []
+    for number, shaft in enumerate(table.shafts):
+        place = where.format(number=number, name=shaft.name)
+        sections = tuple(known(part, f"{place}.sections[{i}]") for i, part in enumerate(shaft.sections))
+        shafts.append(replace(known(shaft, place), sections=sections))
+    return replace(table, shafts=tuple(shafts))
+
+
 def _bore(name: str, bearing: NamedBearingTable) -> str:
     return name if bearing.attachment is None else str(bearing.attachment)
 

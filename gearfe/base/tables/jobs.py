@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..config import build, read_toml
 from ..errors import InputError, unknown_key, unknown_name
-from .gearbox import Gearbox, NamedMesh, named_gearbox, named_train, pair_gearbox, train_gearbox
+from .gearbox import Gearbox, NamedMesh, named_gearbox, named_train, pair_gearbox, train_gearbox, with_materials
 from .loadmap import TORQUES, LoadMapTable
 from .named import NAMED, named_tables
 from .pair import LOADS, StiffnessTable
@@ -281,11 +281,13 @@ def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = No
             cure = 'name the bore (attachment) instead, or write housing = "rigid" in [train]'
             raise InputError(f"bearings.{placed}.y_mm", bearings[placed].y_mm, problem, cure)
         table = named_train(table, tables["meshes"], tables["shafts"], bearings)
+        table = with_materials(table, tables.get("materials", {}), "shafts.{name}")
     else:
         for key in ("shafts", "gears"):
             if not getattr(table, key):
                 cure = f"add [[train.{key}]], or [{key}.NAME] for gears by name (docs/gearbox.md)"
                 raise InputError(f"train.{key}", None, "is required", cure)
+        table = with_materials(table, {}, "train.shafts[{number}]")
         box = train_gearbox(table, tables.get("pair"), tables.get("microgeometry"))
     table.check_models([mesh.where for mesh in box.meshes.values()])
     for number, load in enumerate(table.loads):

@@ -13,9 +13,11 @@ from ..config import Removed, quantity
 from ..errors import InputError, unknown_name
 from .bearing import BearingTable
 from .kinds import GONE_METHODS
-from .pair import FROM_DISTANCE, HANDS, StiffnessTable, ToothFormTable
+from .pair import FROM_DISTANCE, HANDS, MaterialTable, StiffnessTable, ToothFormTable
 from .timefunction import TrainFunctionTable
 
+#: Lengths that count as equal (relative).
+SAME_LENGTH = 1e-6
 #: What a mesh is made of unless its stiffness is given.
 POTENTIAL, VARIABLE, MEAN = MESH_MODELS = ("potential", "variable_stiffness", "mean_stiffness")
 #: Former name of a mesh model -> its name.
@@ -45,15 +47,74 @@ class _Named:
 
 
 @dataclass(frozen=True)
+class ShaftSectionTable:
+    """A piece of an elastic shaft: a cylinder, hollow or not, or a cone where the diameters of its ends differ."""
+
+    length_mm: float = quantity(above=0.0, doc="length (mm); the first section begins at the end of lowest y")
+    outer_diameter_mm: float | None = quantity(None, above=0.0, doc="outer diameter (mm)")
+    outer_diameter_start_mm: float | None = quantity(
+        None, above=0.0, doc="of a cone: outer diameter at its end of lower y (mm), instead"
+    )
+    outer_diameter_end_mm: float | None = quantity(None, above=0.0, doc="and at its end of higher y (mm)")
+    inner_diameter_mm: float | None = quantity(None, low=0.0, doc="bore (mm); left out: 0, a solid section")
+    inner_diameter_start_mm: float | None = quantity(
+        None, low=0.0, doc="of a conical bore: its diameter at the end of lower y (mm), instead"
+    )
+    inner_diameter_end_mm: float | None = quantity(None, low=0.0, doc="and at the end of higher y (mm)")
+    material: str | MaterialTable | None = quantity(  # noqa: RUF009
+        None, doc="its material, as that of the shaft; left out: that of the shaft"
+    )
+
+    @property
+    def outer_mm(self) -> tuple[float, float]:
+        """Outer diameters at both ends (mm)."""
+        return self._ends("outer_diameter")
+
+    @property
+    def inner_mm(self) -> tuple[float, float]:
+        """Inner diameters at both ends (mm)."""
+        return self._ends("inner_diameter")
+
+    def _ends(self, name: str) -> tuple[float, float]:
+        uniform, start, end = (getattr(self, f"{name}{part}_mm") for part in ("", "_start", "_end"))
+        return (start or 0.0, end or 0.0) if uniform is None else (uniform, uniform)
+
+    def check(self, where: str) -> None:
+        """One diameter, or one at each end; a bore inside of the section."""
+        for name in ("outer_diameter", "inner_diameter"):
+            uniform, start, end = (getattr(self, f"{name}{part}_mm") for part in ("", "_start", "_end"))
+            if uniform is not None and (start is not None or end is not None):
+                key, value = (f"{name}_start_mm", start) if start is not None else (f"{name}_end_mm", end)
+                raise InputError(f"{where}.{key}", value, f"stands beside {name}_mm", "leave one out")
+            if (start is None) != (end is None):
+                lacking, given = ("start", "end") if start is None else ("end", "start")
+                problem = f"is required beside {name}_{given}_mm"
+                raise InputError(f"{where}.{name}_{lacking}_mm", None, problem, f"add it, or write {name}_mm alone")
+        if self.outer_diameter_mm is None and self.outer_diameter_start_mm is None:
+            raise InputError(f"{where}.outer_diameter_mm", None, "is required", "add it (outer diameter, mm)")
+        for part, inner, outer in zip(("_start", "_end"), self.inner_mm, self.outer_mm, strict=True):
+            if inner >= outer:
+                key = "inner_diameter_mm" if self.inner_diameter_mm is not None else f"inner_diameter{part}_mm"
+                problem = f"must be less than the outer diameter there, {outer:g} mm"
+                raise InputError(f"{where}.{key}", inner, problem, "give a smaller bore, or a thicker section")
+
+
+@dataclass(frozen=True)
 class ShaftTable:
-    """A round shaft along y."""
+    """A round shaft along y: rigid, or elastic where it has sections."""
 
     x_mm: float = quantity(doc="x of the axis (mm)")
     z_mm: float = quantity(0.0, doc="z of the axis (mm)")
     y_mm: float = quantity(0.0, doc="y of the middle of the shaft (mm)")
-    length_mm: float = quantity(above=0.0, doc="length (mm)")
-    radius_mm: float = quantity(above=0.0, doc="radius (mm)")
-    density_kg_per_m3: float = quantity(7850.0, above=0.0, doc="density (kg/m3)")
+    length_mm: float | None = quantity(
+        None, above=0.0, doc="length (mm), required without sections; with them the sum of theirs"
+    )
+    radius_mm: float | None = quantity(
+        None, above=0.0, doc="radius (mm), required without sections; with them the largest of theirs"
+    )
+    density_kg_per_m3: float | None = quantity(
+        None, above=0.0, doc="density (kg/m3); left out: that of the material, or of steel, 7850"
+    )
     initial_speed_rad_per_s: float | None = quantity(
         None, doc="spin at the start (rad/s); left out: rolling with the drive"
     )
@@ -64,6 +125,62 @@ class ShaftTable:
     transverse_inertia_kg_m2: float | None = quantity(
         None, above=0.0, doc="inertia about a transverse line through the mass centre, with gears; left out: computed"
     )
+    material: str | MaterialTable | None = quantity(  # noqa: RUF009
+        None, doc="name of a material of [materials.NAME], or a table of its constants; left out: steel"
+    )
+    sections: tuple[ShaftSectionTable, ...] = quantity(
+        (), doc="pieces of an elastic shaft, one after the other along +y; left out: the shaft is rigid"
+    )
+    highest_frequency_Hz: float | None = quantity(
+        None, above=0.0, doc="of an elastic shaft: its own modes are kept up to here (Hz); left out: 10000"
+    )
+    elements: int | None = quantity(
+        None, low=1, high=500, doc="of an elastic shaft: beam elements; left out: as that frequency needs"
+    )
+    damping_ratio: float = quantity(
+        0.0, low=0.0, below=1.0, doc="of an elastic shaft: damping ratio of its own modes, beside [train.damping]"
+    )
+
+    @property
+    def whole_length_mm(self) -> float:
+        """Length (mm), that of the sections where it has some."""
+        return self.length_mm or sum(section.length_mm for section in self.sections)
+
+    @property
+    def largest_radius_mm(self) -> float:
+        """Radius (mm), the largest of the sections where it has some."""
+        return self.radius_mm or max(0.5 * max(section.outer_mm) for section in self.sections)
+
+    def check(self, where: str) -> None:
+        """Without sections length and radius are required; with them all follows from them."""
+        if self.material is not None and self.density_kg_per_m3 is not None:
+            problem = "stands beside material, which has a density"
+            raise InputError(f"{where}.density_kg_per_m3", self.density_kg_per_m3, problem, "leave one out")
+        if not self.sections:
+            for key, what in (("length_mm", "length (mm)"), ("radius_mm", "radius (mm)")):
+                if getattr(self, key) is None:
+                    raise InputError(f"{where}.{key}", None, "is required", f"add it ({what})")
+            for key in ("highest_frequency_Hz", "elements", "damping_ratio"):
+                if getattr(self, key):
+                    problem = "is of an elastic shaft, and this one has no sections: it is rigid"
+                    raise InputError(f"{where}.{key}", getattr(self, key), problem, "add sections, or leave it out")
+            return
+        length = sum(section.length_mm for section in self.sections)
+        radius = max(0.5 * max(section.outer_mm) for section in self.sections)
+        for key, value, what in (
+            ("length_mm", length, "sum of their lengths"),
+            ("radius_mm", radius, "largest radius"),
+        ):
+            given = getattr(self, key)
+            if given is not None and abs(given - value) > SAME_LENGTH * value:
+                problem = f"contradicts the sections: the {what} is {value:.9g} mm"
+                raise InputError(f"{where}.{key}", given, problem, "leave it out, or change a section")
+        for key in ("mass_kg", "polar_inertia_kg_m2", "transverse_inertia_kg_m2"):
+            if getattr(self, key) is not None:
+                problem = "stands beside sections, from which it follows with the gears"
+                raise InputError(
+                    f"{where}.{key}", getattr(self, key), problem, "leave it out, or leave the sections out"
+                )
 
 
 @dataclass(frozen=True)
@@ -225,6 +342,9 @@ class TrainDriveTable:
 
     shaft: str = quantity(doc="shaft that is driven")
     attachment: int | str = quantity(doc="bore against which its rotation is prescribed")
+    y_mm: float | None = quantity(
+        None, doc="place on an elastic shaft where it is driven (mm); left out: that of the bore"
+    )
     speed_rad_per_s: float | TrainFunctionTable = quantity(  # noqa: RUF009
         doc="speed about +y (rad/s), or a function of time"
     )
@@ -246,6 +366,9 @@ class TrainLoadTable:
 
     shaft: str = quantity(doc="shaft that is loaded")
     attachment: int | str | None = quantity(None, doc="bore on which the torque reacts; left out: outside of the train")
+    y_mm: float | None = quantity(
+        None, doc="place on an elastic shaft where the torque acts (mm); left out: that of the bore"
+    )
     torque_Nm: float | TrainFunctionTable = quantity(  # noqa: RUF009
         doc="torque about +y on the shaft (N m), or a function of time"
     )

@@ -20,10 +20,10 @@ from ...base.errors import InputError, given
 from ...base.tables.gearbox import Gearbox, NamedMesh, check_spur_mesh
 from ...base.tables.housing import HousingTable
 from ...base.tables.jobs import read_train_tables
-from ...base.tables.pair import StiffnessTable
+from ...base.tables.pair import MaterialTable, StiffnessTable
 from ...base.tables.spectrum import SpectrumTable
 from ...base.tables.timefunction import TrainFunctionTable
-from ...base.tables.train import POTENTIAL, TrainMeshTable, TrainTable
+from ...base.tables.train import POTENTIAL, ShaftSectionTable, TrainMeshTable, TrainShaftTable, TrainTable
 from ...base.typing import Array
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
@@ -39,6 +39,7 @@ from .rolling import bearing_of
 from .timefunctions import time_function
 
 if TYPE_CHECKING:
+    from ...fem.beams import Section
     from ...fem.reduction.modal_body import ModalBody
 
 Stiffness = MeshLaw | StiffnessCurve | MeshTable | float | None
@@ -160,21 +161,7 @@ def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
 
 def _rigid_train(job: TrainJob) -> GearTrain:
     t = job.table
-    shafts = tuple(
-        Shaft(
-            s.name,
-            (1e-3 * s.x_mm, 1e-3 * s.y_mm, 1e-3 * s.z_mm),
-            1e-3 * s.length_mm,
-            1e-3 * s.radius_mm,
-            tuple(str(a) for a in s.attachments),
-            s.density_kg_per_m3,
-            s.initial_speed_rad_per_s,
-            s.mass_kg,
-            s.polar_inertia_kg_m2,
-            s.transverse_inertia_kg_m2,
-        )
-        for s in t.shafts
-    )
+    shafts = tuple(_shaft(s) for s in t.shafts)
     gears = tuple(
         ShaftGear(name, g.shaft, 1e-3 * g.y_mm, job.gears[name], g.density_kg_per_m3)
         for name, g in job.gearbox.gears.items()
@@ -185,7 +172,7 @@ def _rigid_train(job: TrainJob) -> GearTrain:
         ramp = (t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
         speed = _over_time(job, t.drive.speed_rad_per_s, *ramp, "train.drive.speed_rad_per_s")
         coupling = (t.drive.stiffness_Nm_per_rad, t.drive.damping_Nm_s_per_rad)
-        drive = Drive(t.drive.shaft, str(t.drive.attachment), speed, *coupling)
+        drive = Drive(t.drive.shaft, str(t.drive.attachment), speed, *coupling, _metres(t.drive.y_mm))
     loads = tuple(
         Load(
             x.shaft,
@@ -193,12 +180,55 @@ def _rigid_train(job: TrainJob) -> GearTrain:
             _over_time(job, x.torque_Nm, x.ramp_centre_ms, x.ramp_width_ms, f"train.loads[{i}].torque_Nm"),
             tuple((order, amplitude, math.radians(phase)) for order, amplitude, phase in x.orders),
             x.mesh,
+            _metres(x.y_mm),
         )
         for i, x in enumerate(t.loads)
     )
     damping = Damping(t.damping.ratio, t.damping.rayleigh_alpha_per_s, t.damping.rayleigh_beta_s, t.damping.gyroscopic)
     bearings = tuple(bearing_of(str(b.attachment), b) for b in t.bearings)
     return GearTrain(shafts, gears, meshes, drive, loads, None, _rigid_bores(job), bearings, damping)
+
+
+def _metres(length_mm: float | None) -> float | None:
+    return None if length_mm is None else 1e-3 * length_mm
+
+
+def _shaft(table: TrainShaftTable) -> Shaft:
+    material = MaterialTable() if table.material is None else table.material
+    assert isinstance(material, MaterialTable)
+    density = material.density_kg_per_m3 if table.density_kg_per_m3 is None else table.density_kg_per_m3
+    elastic: dict[str, Any] = {}
+    if table.sections:
+        steel = replace(material, density_kg_per_m3=density)
+        elastic = {"sections": tuple(_section(section, steel) for section in table.sections)}
+        elastic |= {"elements": table.elements, "damping_ratio": table.damping_ratio}
+        if table.highest_frequency_Hz is not None:
+            elastic["highest_hz"] = table.highest_frequency_Hz
+    return Shaft(
+        table.name,
+        (1e-3 * table.x_mm, 1e-3 * table.y_mm, 1e-3 * table.z_mm),
+        1e-3 * table.whole_length_mm,
+        1e-3 * table.largest_radius_mm,
+        tuple(str(a) for a in table.attachments),
+        density,
+        table.initial_speed_rad_per_s,
+        table.mass_kg,
+        table.polar_inertia_kg_m2,
+        table.transverse_inertia_kg_m2,
+        **elastic,
+    )
+
+
+def _section(table: ShaftSectionTable, shaft: MaterialTable) -> Section:
+    from ...fem.beams import Section
+
+    material = shaft if table.material is None else table.material
+    assert isinstance(material, MaterialTable)
+    outer, inner = (tuple(1e-3 * diameter for diameter in ends) for ends in (table.outer_mm, table.inner_mm))
+    return Section(
+        1e-3 * table.length_mm, *outer, *inner, young=1e9 * material.youngs_modulus_GPa, poisson=material.poisson_ratio,
+        density=material.density_kg_per_m3,
+    )  # fmt: skip
 
 
 def _check_rigid(job: TrainJob, train: GearTrain) -> None:

@@ -123,8 +123,8 @@ def gearbox_layout(raw: dict[str, Any], path: str | Path) -> GearboxLayout | Non
         PlacedShaft(
             s.name,
             (1e-3 * s.x_mm, 1e-3 * s.y_mm, 1e-3 * s.z_mm),
-            1e-3 * s.length_mm,
-            1e-3 * s.radius_mm,
+            1e-3 * s.whole_length_mm,
+            1e-3 * s.largest_radius_mm,
             tuple((str(a), bores[str(a)]) for a in s.attachments if str(a) in bores),
         )
         for s in table.shafts

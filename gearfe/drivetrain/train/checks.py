@@ -81,6 +81,8 @@ def _check_shafts(train: GearTrain) -> None:
             value = getattr(shaft, key)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"{label} {key}", value, "must be finite and > 0", "give it in SI units")
+        if shaft.sections:
+            _check_sections(shaft)
         if not shaft.bores:
             raise InputError(f"{label} bores", None, "no bore holds the shaft", "name the attachments that carry it")
         for bore in shaft.bores:
@@ -130,15 +132,87 @@ def _check_bore(train: GearTrain, shaft: Shaft, bore: str, a: np.ndarray) -> Non
         problem = f"lies {1e3 * off:.6g} mm off the axis of shaft {shaft.name!r}"
         cure = "name the bores on that axis, or move the shaft (x_mm, z_mm): it runs along y"
         raise InputError(f"attachment {bore!r}", None, problem, f"{cure} (housing.mesh.axes turns a mesh)")
-    beyond = abs(float(arm @ a)) - 0.5 * shaft.length
+    along = float(arm @ a)
+    beyond = abs(along) - 0.5 * shaft.length
     if beyond > SAME * shaft.length:
-        problem = f"lies {1e3 * beyond:.6g} mm beyond the end of shaft {shaft.name!r}"
-        raise InputError(f"attachment {bore!r}", None, problem, "lengthen the shaft (length_mm), or move it (y_mm)")
+        problem = f"lies {1e3 * beyond:.6g} mm beyond the end of shaft {shaft.name!r}{_reach(train, shaft)}"
+        longer = "lengthen the shaft (length_mm)" if not shaft.sections else "add or lengthen a section of the shaft"
+        raise InputError(f"attachment {bore!r}", None, problem, f"{longer}, or move it (y_mm)")
+    if shaft.sections:
+        _check_beside(train, shaft, bore, along)
     if train.housing is not None:
         own = train.housing.attachment_axes[train.housing.attachment_names.index(bore)]
         if abs(abs(float(own @ a)) - 1.0) > SAME:
             problem = "its bore is not parallel to the train's axis"
             raise InputError(f"attachment {bore!r}", list(map(float, own)), problem, "all shafts must be parallel")
+
+
+def _check_sections(shaft: Shaft) -> None:
+    """Sections that can exist, length and radius that are theirs, nothing given that follows from them."""
+    label = f"shaft {shaft.name!r}"
+    for number, section in enumerate(shaft.sections, start=1):
+        problem = section.fault()
+        if problem is not None:
+            key, *rest = problem
+            raise InputError(f"{label} section {number} {key}", *rest)
+    length = sum(section.length for section in shaft.sections)
+    radius = max(0.5 * max(section.outer_start, section.outer_end) for section in shaft.sections)
+    for key, value in (("length", length), ("radius", radius)):
+        if abs(getattr(shaft, key) - value) > SAME * value:
+            problem = f"contradicts the sections, of which follow {value:.9g} m"
+            raise InputError(f"{label} {key}", getattr(shaft, key), problem, "give that of the sections")
+    for key in ("mass", "polar_inertia", "transverse_inertia"):
+        if getattr(shaft, key) is not None:
+            problem = "stands beside sections, from which it follows with the gears"
+            raise InputError(f"{label} {key}", getattr(shaft, key), problem, "leave one out")
+    if not (math.isfinite(shaft.damping_ratio) and 0.0 <= shaft.damping_ratio < 1.0):
+        problem = "must be >= 0 and < 1"
+        raise InputError(f"{label} damping ratio", shaft.damping_ratio, problem, "0.01 is 1 % of critical damping")
+    if not (math.isfinite(shaft.highest_hz) and shaft.highest_hz > 0.0):
+        problem = "must be finite and > 0 Hz"
+        raise InputError(f"{label} highest frequency", shaft.highest_hz, problem, "give the highest one of interest")
+
+
+def _check_beside(train: GearTrain, shaft: Shaft, bore: str, along: float) -> None:
+    """On an elastic shaft no two bearings are at one place, and none within a gear."""
+    middle = float(np.array(shaft.point) @ train.frame[2])
+    for other in shaft.bores[: shaft.bores.index(bore)]:
+        apart = abs(float((train.bore_points[other] - train.bore_points[bore]) @ train.frame[2]))
+        if apart <= SAME * shaft.length:
+            problem = f"is at the same place of shaft {shaft.name!r} as attachment {other!r}"
+            raise InputError(f"attachment {bore!r}", None, problem, "move one along the shaft, or leave it out")
+    for gear in train.gears:
+        reach = 0.5 * gear.gear.face_width
+        if gear.shaft == shaft.name and abs(gear.along - middle - along) < reach * (1.0 - SAME):
+            low, high = 1e3 * (gear.along - reach), 1e3 * (gear.along + reach)
+            problem = (
+                f"is at y = {1e3 * (middle + along):.6g} mm, within gear {gear.name!r} from {low:.6g} to {high:.6g} mm"
+            )
+            raise InputError(f"attachment {bore!r}", None, problem, "move the bearing or the gear along the shaft")
+
+
+def _reach(train: GearTrain, shaft: Shaft) -> str:
+    """Where the sections of a shaft reach, for messages; empty for a rigid one."""
+    if not shaft.sections:
+        return ""
+    middle = float(np.array(shaft.point) @ train.frame[2])
+    low, high = 1e3 * (middle - 0.5 * shaft.length), 1e3 * (middle + 0.5 * shaft.length)
+    return f", whose sections reach from {low:.6g} to {high:.6g} mm"
+
+
+def _check_place(train: GearTrain, label: str, end: Drive | Load) -> None:
+    """A drive or a load acts on its shaft, and at a place of it that is known where the shaft is elastic."""
+    shaft = train.shaft(end.shaft)
+    if end.along is None:
+        if shaft.sections and end.bore is None:
+            problem = f"is open: shaft {shaft.name!r} is elastic, and no attachment says where the torque acts"
+            raise InputError(f"{label} place", None, problem, "give y_mm, the place along the shaft")
+        return
+    middle = float(np.array(shaft.point) @ train.frame[2])
+    low, high = middle - 0.5 * shaft.length, middle + 0.5 * shaft.length
+    if not (math.isfinite(end.along) and low - SAME * shaft.length <= end.along <= high + SAME * shaft.length):
+        problem = f"must be on shaft {shaft.name!r}, from {1e3 * low:.6g} to {1e3 * high:.6g} mm"
+        raise InputError(f"{label} y_mm", 1e3 * end.along, problem, "move it, or lengthen the shaft")
 
 
 def _check_ends(train: GearTrain) -> None:
@@ -157,6 +231,7 @@ def _check_ends(train: GearTrain) -> None:
             if part.bore not in shafts[part.shaft].bores:
                 problem = f"attachment {part.bore!r} does not carry shaft {part.shaft!r}"
                 raise InputError(label, part.bore, problem, f"choose one of {', '.join(shafts[part.shaft].bores)}")
+        _check_place(train, label, part)
     for load in train.loads:
         _check_orders(train, load)
     if not train.meshes and len(train.shafts) > 1:
@@ -187,8 +262,10 @@ def _check_on_shaft(train: GearTrain, item: ShaftGear) -> None:
     middle = float(np.array(shaft.point) @ train.frame[2])
     reach = abs(item.along - middle) + 0.5 * item.gear.face_width
     if reach > 0.5 * shaft.length * (1 + SAME):
-        problem = f"reaches {1e3 * (reach - 0.5 * shaft.length):.6g} mm beyond the end of shaft {shaft.name!r}"
-        raise InputError(f"gear {item.name!r}", None, problem, "move the gear, or lengthen the shaft")
+        beyond = 1e3 * (reach - 0.5 * shaft.length)
+        problem = f"reaches {beyond:.6g} mm beyond the end of shaft {shaft.name!r}{_reach(train, shaft)}"
+        longer = "lengthen the shaft" if not shaft.sections else "add or lengthen a section of the shaft"
+        raise InputError(f"gear {item.name!r}", None, problem, f"move the gear, or {longer}")
 
 
 def _check_mesh(train: GearTrain, mesh: GearMesh) -> None:
@@ -350,11 +427,12 @@ def _check_room(train: GearTrain) -> None:
                 problem = f"overlaps gear {two.name!r} over {1e3 * overlap(one, two):.6g} mm along the axis"
                 raise InputError(f"gear {one.name!r}", None, problem, "move one along its shaft, or let them mesh")
         for shaft in train.shafts:
-            middle = float(np.array(shaft.point) @ train.frame[2])
-            beside = abs(one.along - middle) - 0.5 * (shaft.length + one.gear.face_width) >= 0.0
+            along, half = one.along - float(np.array(shaft.point) @ train.frame[2]), 0.5 * one.gear.face_width
+            beside = abs(along) - 0.5 * (shaft.length + one.gear.face_width) >= 0.0
             if shaft.name == one.shaft or beside:
                 continue
-            room = shaft_distance(train, one.shaft, shaft.name) - shaft.radius
+            radius = shaft.radius_within(along - half, along + half)
+            room = shaft_distance(train, one.shaft, shaft.name) - radius
             if one.gear.tip_radius > room:
                 problem = f"its tip cuts {1e3 * (one.gear.tip_radius - room):.4g} mm into shaft {shaft.name!r}"
                 raise InputError(f"gear {one.name!r}", None, problem, "thinner shaft, smaller gear, or a shorter shaft")

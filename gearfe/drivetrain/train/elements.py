@@ -26,7 +26,7 @@ from ...base.typing import Array
 from ...gears.geometry.derived import gear_outline
 from ...gears.geometry.pair import Gear
 from ...multibody import Element, LinearJoint, ModalBlocks
-from .gear_train import GearTrain, Shaft
+from .gear_train import GearTrain, Shaft, ShaftGear
 
 #: Points on each piece of a tooth's outline: area good to 1e-7.
 POINTS = 200
@@ -52,6 +52,61 @@ class Rotor:
     centre: Array
 
 
+class Masses(NamedTuple):
+    """Mass properties of a part of a shaft."""
+
+    mass: float  # kg
+    polar: float  # kg m2, about the axis
+    transverse: float  # kg m2, about any transverse line through its mass centre
+    along: float  # m, its mass centre along the axis
+
+
+def section_masses(shaft: Shaft, middle: float) -> list[Masses]:
+    """Sections of a shaft whose middle is at a coordinate along the axis (m): hollow cylinders and cones."""
+    nodes, weights = np.polynomial.legendre.leggauss(3)  # exact up to the fourth powers of the radii
+    masses = []
+    for (low, high, *_), section in zip(shaft.outline, shaft.sections, strict=True):
+        part, length = 0.5 * (1.0 + nodes), high - low
+        ends = ((section.outer_start, section.outer_end), (section.inner_start, section.inner_end))
+        outer, inner = (0.5 * (start + part * (end - start)) for start, end in ends)
+        slices = 0.5 * length * weights * section.density * math.pi * (outer**2 - inner**2)
+        mass, polar = float(slices.sum()), float(0.5 * slices @ (outer**2 + inner**2))
+        centre = float(slices @ part) / mass
+        transverse = 0.5 * polar + float(slices @ (length * (part - centre)) ** 2)
+        masses.append(Masses(mass, polar, transverse, middle + low + centre * length))
+    return masses
+
+
+def gear_masses(item: ShaftGear, shaft: Shaft, middle: float) -> Masses:
+    """Gear outside of its shaft, or outside of its bore where that is wider.
+
+    Parameters
+    ----------
+    item : ShaftGear
+        The gear.
+    shaft : Shaft
+        Its shaft.
+    middle : float
+        Coordinate of the middle of the shaft along the axis (m).
+
+    Raises
+    ------
+    InputError
+        If the shaft reaches the teeth.
+    """
+    gear, width = item.gear, item.gear.face_width
+    radius = shaft.radius_within(item.along - middle - 0.5 * width, item.along - middle + 0.5 * width)
+    if radius >= gear.root_radius:
+        problem = f"radius {1e3 * radius:g} mm reaches the teeth of gear {item.name!r}"
+        cure = f"must be < {1e3 * gear.root_radius:.6g} mm, its root radius"
+        raise InputError(f"shaft {shaft.name!r}", None, problem, cure)
+    inner = max(radius, 0.5 * gear.bore_diameter)
+    area, second = outline_moments(gear)
+    mass = item.density * width * (area - math.pi * inner**2)
+    polar = item.density * width * (second - 0.5 * math.pi * inner**4)
+    return Masses(mass, polar, 0.5 * polar + mass * width**2 / 12.0, item.along)
+
+
 @lru_cache(maxsize=64)
 def outline_moments(gear: Gear) -> tuple[float, float]:
     """Area (m2) and polar second moment (m4) inside a gear's tooth outline."""
@@ -65,20 +120,12 @@ def outline_moments(gear: Gear) -> tuple[float, float]:
 def rotor(train: GearTrain, shaft: Shaft) -> Rotor:
     """Mass properties of a shaft with the gears on it."""
     point, axis = np.array(shaft.point, dtype=float), train.frame[2]
+    middle = float(point @ axis)
     m = shaft.density * math.pi * shaft.radius**2 * shaft.length
-    parts = [(m, 0.5 * m * shaft.radius**2, m * (3 * shaft.radius**2 + shaft.length**2) / 12.0, float(point @ axis))]
-    for item in (g for g in train.gears if g.shaft == shaft.name):
-        gear = item.gear
-        if shaft.radius >= gear.root_radius:
-            problem = f"radius {1e3 * shaft.radius:g} mm reaches the teeth of gear {item.name!r}"
-            cure = f"must be < {1e3 * gear.root_radius:.6g} mm, its root radius"
-            raise InputError(f"shaft {shaft.name!r}", None, problem, cure)
-        inner = max(shaft.radius, 0.5 * gear.bore_diameter)
-        area, second = outline_moments(gear)
-        width = gear.face_width
-        mass = item.density * width * (area - math.pi * inner**2)
-        polar = item.density * width * (second - 0.5 * math.pi * inner**4)
-        parts.append((mass, polar, 0.5 * polar + mass * width**2 / 12.0, item.along))
+    parts = [Masses(m, 0.5 * m * shaft.radius**2, m * (3 * shaft.radius**2 + shaft.length**2) / 12.0, middle)]
+    if shaft.sections:
+        parts = section_masses(shaft, middle)
+    parts += [gear_masses(item, shaft, middle) for item in train.gears if item.shaft == shaft.name]
     table = np.array(parts)
     total = table[:, 0].sum()
     along = float(table[:, 0] @ table[:, 3] / total)

@@ -5,9 +5,11 @@ All shafts are parallel to one unit vector `axis`; angles, speeds and torques co
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,16 +28,21 @@ from .friction import Lubrication
 from .kinematics import Kinematics, kinematics
 from .layout import LayoutGear, LayoutMesh, PitchErrors, TrainLayout
 
+if TYPE_CHECKING:
+    from ...fem.beams import Section
+
 Vector = tuple[float, float, float]
 Five = tuple[float, float, float, float, float]
 Matrix = tuple[Five, Five, Five, Five, Five]
+#: Frequency (Hz) up to which own modes of elastic shafts are kept unless it is given.
+HIGHEST_HZ = 10e3
 #: When the damper of a mesh acts.
 ALWAYS, IN_CONTACT = "always", "in_contact"
 
 
 @dataclass(frozen=True)
 class Shaft:
-    """A rigid round shaft; its gears become part of it.
+    """A round shaft, rigid or elastic; its gears become part of it.
 
     Parameters
     ----------
@@ -44,7 +51,7 @@ class Shaft:
     point
         Middle of the shaft (m).
     length, radius
-        Of the cylinder (m).
+        Of the cylinder (m); of a shaft with sections the sum of their lengths and the largest radius.
     bores
         Names of the attachments (bores) that carry it; two hinges are usual.
     density
@@ -53,7 +60,16 @@ class Shaft:
         Spin at the start (rad/s); None: rolling with the drive.
     mass, polar_inertia, transverse_inertia
         Of shaft and gears together (kg, kg m2 about the mass centre), where they are known better than from the
-        geometry.
+        geometry; of a rigid shaft.
+    sections
+        `gearfe.fem.beams.Section` of an elastic shaft, one after the other along the axis; empty: rigid. They have the
+        densities.
+    highest_hz
+        Own modes of an elastic shaft are kept up to this frequency (Hz).
+    elements
+        Number of beam elements; None: as many as that frequency needs.
+    damping_ratio
+        Of the own modes of an elastic shaft.
     """
 
     name: str
@@ -66,6 +82,30 @@ class Shaft:
     mass: float | None = None
     polar_inertia: float | None = None
     transverse_inertia: float | None = None
+    sections: tuple[Section, ...] = ()
+    highest_hz: float = HIGHEST_HZ
+    elements: int | None = None
+    damping_ratio: float = 0.0
+
+    @property
+    def outline(self) -> tuple[tuple[float, float, float, float], ...]:
+        """Its pieces: ends along the axis from its middle, and the outer radii there (m)."""
+        if not self.sections:
+            return ((-0.5 * self.length, 0.5 * self.length, self.radius, self.radius),)
+        ends = list(itertools.accumulate((s.length for s in self.sections), initial=-0.5 * self.length))
+        return tuple(
+            (low, high, 0.5 * s.outer_start, 0.5 * s.outer_end)
+            for low, high, s in zip(ends[:-1], ends[1:], self.sections, strict=True)
+        )
+
+    def radius_within(self, low: float, high: float) -> float:
+        """Largest outer radius (m) between two places along the axis, from its middle; 0 where they lie beside it."""
+        most = 0.0
+        for start, end, first, last in self.outline:
+            inside = np.clip([low, high], start, end)
+            if inside[1] > inside[0] or (low == high and start <= low <= end):
+                most = max(most, *(first + (last - first) * (inside - start) / (end - start)))
+        return float(most)
 
 
 @dataclass(frozen=True)
@@ -224,6 +264,8 @@ class Drive:
         Relative speed (rad/s); the rotation is its integral from time 0.
     stiffness, damping
         Of an elastic coupling between the prescribed rotation and the shaft (N m/rad, N m s/rad); None: rigid.
+    along
+        Coordinate along the train's axis (m) of the section of the shaft that it drives; None: that of the bore.
     """
 
     shaft: str
@@ -231,6 +273,7 @@ class Drive:
     speed: TimeFunction
     stiffness: float | None = None
     damping: float = 0.0
+    along: float | None = None
 
 
 @dataclass(frozen=True)
@@ -248,6 +291,8 @@ class Load:
     mesh
         Mesh of the orders, whose angle grows by 2 pi a pitch from where a driver's tooth stands on the line of centres;
         empty: the angle is that by which the shaft has turned.
+    along
+        Coordinate along the train's axis (m) of the section of the shaft on which it acts; None: that of the bore.
     """
 
     shaft: str
@@ -255,6 +300,7 @@ class Load:
     torque: TimeFunction
     orders: tuple[tuple[float, float, float], ...] = ()
     mesh: str = ""
+    along: float | None = None
 
 
 @dataclass(frozen=True)
@@ -386,6 +432,21 @@ class GearTrain(Facts):
         e1 = e1 - (e1 @ a) * a
         e1 = e1 / np.linalg.norm(e1)
         return np.array([e1, np.cross(a, e1), a])
+
+    def shaft_ends(self, name: str) -> list[tuple[str, Drive | Load]]:
+        """Drive and loads of a shaft, with their names in messages."""
+        ends: list[tuple[str, Drive | Load]] = [] if self.drive is None else [("drive", self.drive)]
+        ends += [(f"load {number}", load) for number, load in enumerate(self.loads, start=1)]
+        return [(label, end) for label, end in ends if end.shaft == name]
+
+    def place(self, end: Drive | Load) -> float:
+        """Coordinate along the axis (m) at which a drive or a load acts on its shaft.
+
+        Where it is not given it is that of its bore, or without one of the shaft's first bore.
+        """
+        if end.along is not None:
+            return end.along
+        return float(self.bore_points[end.bore or self.shaft(end.shaft).bores[0]] @ self.frame[2])
 
     def shaft_number(self, name: str) -> int:
         """Number of the shaft of that name."""

@@ -26,7 +26,7 @@ from .bearings import BearingLoads, bearing_loads, bore_motion, shaft_motion
 from .checks import check_train
 from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, rotor
 from .forces import Gyro, TrainForces, derivative
-from .gear_train import Drive, GearTrain, Load
+from .gear_train import Drive, GearTrain, Load, Shaft
 from .kinematics import Kinematics, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
 from .operating import OperatingPoint, operating_point, rolling, settled, typical
@@ -208,11 +208,7 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
     ratios = [float(r) for r in train.kinematics.ratios]
     begin = float(train.driven.speed(0.0))
     shafts = tuple(
-        RigidShaft(
-            rotor(train, shaft),
-            0.0 if shaft.initial_speed is None else shaft.initial_speed - g * begin,
-            name=f"shaft {shaft.name}",
-        )
+        _shaft(train, shaft, 0.0 if shaft.initial_speed is None else shaft.initial_speed - g * begin)
         for shaft, g in zip(train.shafts, ratios, strict=True)
     )
     bodies: list[Element] = [*shafts] if housing is None else [housing, *shafts]
@@ -252,6 +248,15 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
     )
 
 
+def _shaft(train: GearTrain, shaft: Shaft, start_rate: float) -> ShaftBody:
+    """A shaft as a body: elastic if it has sections."""
+    if not shaft.sections:
+        return RigidShaft(rotor(train, shaft), start_rate, name=f"shaft {shaft.name}")
+    from .elastic_shaft import elastic_shaft  # beams load for elastic shafts only
+
+    return elastic_shaft(train, shaft, start_rate)
+
+
 def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tuple[Array, TimeFunction], ...]:
     """Directions in the system with torques over time: loads, and the shafts' inertia when the drive changes speed."""
     made, first, size = [], shafts.first, shafts.size
@@ -267,7 +272,7 @@ def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tup
 
 def _acts(train: GearTrain, load: Load, shafts: Shafts) -> Array:
     """Direction in the system of a torque and its reaction."""
-    direction = _turning(train, shafts, load.shaft, load.bore)
+    direction = _turning(train, shafts, load.shaft, train.place(load))
     if train.housing is not None and load.bore is not None:
         direction[: train.housing.size] -= bore_selector(train, load.bore)[:, 3:] @ train.frame[2]
     return direction
@@ -347,7 +352,7 @@ def _supports(train: GearTrain, shafts: Shafts, housing: ModalBlocks | None) -> 
                 LinearForce((body,), train.damping.alpha * body.mass(), 0.0 * body.mass(), f"damping of {body.name}")
             )
         if shaft.name == train.driven.shaft:
-            row = body.turn_rows(_along(train, train.driven.bore))[2:]
+            row = body.turn_rows(train.place(train.driven))[2:]
             touches: tuple[Element, ...] = (body,)
             if housing is not None:
                 row = np.hstack([row, -(bore_selector(train, train.driven.bore)[:, 3:] @ train.frame[2])[None, :]])
@@ -406,29 +411,28 @@ def _used_bores(train: GearTrain) -> tuple[str, ...]:
     return tuple(name for name in train.bore_points if name in used)
 
 
-def _measured_against(train: GearTrain, name: str) -> str:
-    """Bore against which a shaft's rotation is measured: the drive's, the load's, or its first."""
-    ends = [(train.driven.shaft, train.driven.bore), *((x.shaft, x.bore) for x in train.loads)]
-    return next((bore for shaft, bore in ends if shaft == name and bore is not None), train.shaft(name).bores[0])
+def _measured_against(train: GearTrain, name: str) -> tuple[str, float]:
+    """Bore against which a shaft's rotation is measured, and the coordinate (m) of the section that is measured.
+
+    They are those of the drive, of a load, or of its first bore.
+    """
+    ends = [(end.bore, train.place(end)) for _, end in train.shaft_ends(name) if end.bore is not None]
+    first = train.shaft(name).bores[0]
+    return next(iter(ends), (first, float(train.bore_points[first] @ train.frame[2])))
 
 
-def _along(train: GearTrain, bore: str) -> float:
-    """Coordinate of a bore along the train's axis (m)."""
-    return float(train.bore_points[bore] @ train.frame[2])
-
-
-def _turning(train: GearTrain, shafts: Shafts, name: str, bore: str | None = None) -> Array:
-    """Rotation of a shaft at a bore, by default the one it is measured against, (system size,)."""
+def _turning(train: GearTrain, shafts: Shafts, name: str, along: float | None = None) -> Array:
+    """Rotation of the section of a shaft at a place (m), by default the one that is measured, (system size,)."""
     number = train.shaft_number(name)
-    along = _along(train, bore or _measured_against(train, name))
-    return shafts.whole(number, shafts.bodies[number].turn_rows(along)[2])
+    place = _measured_against(train, name)[1] if along is None else along
+    return shafts.whole(number, shafts.bodies[number].turn_rows(place)[2])
 
 
 def _spin_reference(train: GearTrain, spin: Array) -> Array:
     rows = spin.copy()
     for i, shaft in enumerate(train.shafts):
         if train.housing is not None:
-            bore = bore_selector(train, _measured_against(train, shaft.name))
+            bore = bore_selector(train, _measured_against(train, shaft.name)[0])
             rows[i, : len(bore)] -= bore[:, 3:] @ train.frame[2]
     return rows
 

@@ -1,0 +1,221 @@
+r"""Misalignment of the gears in mesh under the steady torques: what shafts, bearings and housing yield.
+
+With the mean stiffness of the meshes the train at rest solves :math:`K q = f`, f the torques that it carries in the
+end, on the flanks that statics press. Gears are rigid discs: their tilts :math:`\theta_1` of the driver and
+:math:`\theta_2` of the driven gear are those of the sections at the middles of their faces. With the axis a and n the
+direction of the force on the driven gear,
+
+.. math::
+    \gamma = (\theta_1 - \theta_2)\cdot(a\times n), \qquad \gamma_\perp = (\theta_1 - \theta_2)\cdot n
+
+are the tilt in the plane of action, > 0 where it closes the gap towards larger y, and the one across it, > 0 where the
+driven gear moves to the left of n towards larger y. Over the common face width b, :math:`f_{sh} = b\,\gamma` is the
+misalignment by deformation of ISO 6336-1; that of ISO counts its amount.
+
+Of a gear's motion the part of the *housing* is that of the straight line through the bores of its shaft, the part of
+the *bearings* that of the line through the displacements of the shaft against the bores, the part of the *shafts* what
+is left: bending. On a shaft in one bore the lines have the tilts there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...base.typing import Array
+from .checks import overlap
+from .model import TrainModel, bore_selector
+
+#: Squares of frequencies, and loads of modes without any, below this part of the largest are round-off.
+ROUND_OFF = 1e-10
+#: What yields, in the order of the parts of a misalignment.
+PARTS = ("shafts", "bearings", "housing")
+
+
+@dataclass(frozen=True)
+class MeshMisalignment:
+    """Misalignment of two gears in mesh, all of it and its parts by shafts, bearings and housing.
+
+    Attributes
+    ----------
+    mesh, driver, driven
+        Names.
+    force
+        Along the line of action (N), < 0 on the back flanks.
+    width
+        Common face width b (m).
+    in_plane, across
+        Tilts in the plane of action and across it (rad).
+    apart
+        How far the gears' centres move apart along the line of action (m): a part of the transmission error.
+    in_plane_parts, across_parts, apart_parts : three numbers
+        Of them, by shafts, bearings and housing.
+    driver_tilt, driven_tilt : two numbers
+        Tilts of the gears about e1 and e2, x and z of a job file (rad).
+    """
+
+    mesh: str
+    driver: str
+    driven: str
+    force: float
+    width: float
+    in_plane: float
+    across: float
+    apart: float
+    in_plane_parts: tuple[float, ...]
+    across_parts: tuple[float, ...]
+    apart_parts: tuple[float, ...]
+    driver_tilt: tuple[float, ...]
+    driven_tilt: tuple[float, ...]
+
+    @property
+    def f_sh(self) -> float:
+        """Misalignment in the plane of action over the common face width (m), ISO 6336-1."""
+        return self.in_plane * self.width
+
+
+def misalignments(model: TrainModel) -> tuple[MeshMisalignment, ...]:
+    """Misalignment of each mesh under the steady torques; none where a part of the train moves freely under them."""
+    q = static_state(model)
+    if q is None:
+        return ()
+    a = model.train.frame[2]
+    made = []
+    for line, force in zip(model.meshes, model.kinematics.steady_forces.tolist(), strict=True):
+        one, two = model.train.gear(line.given.driver), model.train.gear(line.given.driven)
+        n = line.direction
+        if force < 0.0:  # the back flanks, whose line of action is the mirror image at the line of centres
+            arm = np.array(model.train.shaft(two.shaft).point) - np.array(model.train.shaft(one.shaft).point)
+            along = np.cross(a, arm) / np.linalg.norm(np.cross(a, arm))
+            n = n - 2.0 * (n @ along) * along
+        width = overlap(one, two)
+        moves = [gear_motion(model, q, gear.name) for gear in (one, two)]
+        between = moves[0] - moves[1]  # (parts, 6)
+        in_plane, across, apart = between[:, 3:] @ np.cross(a, n), between[:, 3:] @ n, -between[:, :3] @ n
+        tilts = [tuple(move[:, 3:].sum(axis=0) @ model.train.frame[:2].T) for move in moves]
+        wholes = (float(part.sum()) for part in (in_plane, across, apart))
+        parts = (tuple(map(float, part)) for part in (in_plane, across, apart))
+        made.append(MeshMisalignment(line.name, one.name, two.name, force, width, *wholes, *parts, *tilts))
+    return tuple(made)
+
+
+def misalignment_columns(found: tuple[MeshMisalignment, ...]) -> dict[str, Any]:
+    """Columns of misalignment.csv, a row for each mesh."""
+    columns: dict[str, Any] = {
+        "mesh": [one.mesh for one in found],
+        "mesh_force_N": np.array([one.force for one in found]),
+        "common_face_width_mm": np.array([1e3 * one.width for one in found]),
+        "f_sh_um": np.array([1e6 * one.f_sh for one in found]),
+    }
+    columns |= {
+        f"f_sh_{part}_um": np.array([1e6 * one.width * one.in_plane_parts[k] for one in found])
+        for k, part in enumerate(PARTS)
+    }
+    columns["across_um"] = np.array([1e6 * one.width * one.across for one in found])
+    columns |= {
+        f"across_{part}_um": np.array([1e6 * one.width * one.across_parts[k] for one in found])
+        for k, part in enumerate(PARTS)
+    }
+    columns["tilt_in_plane_urad"] = np.array([1e6 * one.in_plane for one in found])
+    columns["tilt_across_urad"] = np.array([1e6 * one.across for one in found])
+    columns["apart_um"] = np.array([1e6 * one.apart for one in found])
+    columns |= {
+        f"apart_{part}_um": np.array([1e6 * one.apart_parts[k] for one in found]) for k, part in enumerate(PARTS)
+    }
+    for side in ("driver", "driven"):
+        for k, axis in enumerate(("e1", "e2")):
+            tilts = np.array([getattr(one, f"{side}_tilt")[k] for one in found])
+            columns[f"tilt_{side}_{axis}_urad"] = 1e6 * tilts
+    return columns
+
+
+def misalignment_summary(found: tuple[MeshMisalignment, ...]) -> dict[str, Any]:
+    """Entries of the summary, by mesh."""
+    return {
+        one.mesh: {
+            "mesh_force_N": one.force,
+            "common_face_width_mm": 1e3 * one.width,
+            "f_sh_um": 1e6 * one.f_sh,
+            **{f"f_sh_{p}_um": 1e6 * one.width * x for p, x in zip(PARTS, one.in_plane_parts, strict=True)},
+            "across_um": 1e6 * one.width * one.across,
+            "apart_um": 1e6 * one.apart,
+        }
+        for one in found
+    }
+
+
+def misalignment_line(one: MeshMisalignment) -> str:
+    """One line of the report."""
+    parts = ", ".join(f"{part} {1e6 * one.width * x:.3g}" for part, x in zip(PARTS, one.in_plane_parts, strict=True))
+    return (
+        f"mesh {one.mesh}: misalignment f_sh = {1e6 * one.f_sh:.3g} um over {1e3 * one.width:.4g} mm ({parts}), across "
+        f"the plane of action {1e6 * one.width * one.across:.3g} um"
+    )
+
+
+def static_state(model: TrainModel) -> Array | None:
+    """Coordinates of the system (size,) at rest under the steady torques; None where these move it freely."""
+    modal = model.modal
+    push = modal.constant.copy()
+    for direction, torque in model.torques:
+        push += modal.T.T @ direction * float(replace(torque, sines=())(model.torque_end))
+    K = np.diag(modal.eigenvalues)
+    for line, force in zip(model.meshes, model.kinematics.steady_forces.tolist(), strict=True):
+        if force < 0.0 and len(line.flanks) == 2:  # the spring of the driving flanks acts along the other line
+            driving, back = (modal.T.T @ row for row in line.columns[:2])
+            K += line.mean * (np.outer(back, back) - np.outer(driving, driving))
+    squares, shapes = np.linalg.eigh(K)
+    pushed = shapes.T @ push
+    free = squares <= ROUND_OFF * max(float(squares.max(initial=0.0)), 1e-300)
+    if np.abs(pushed[free]).max(initial=0.0) > ROUND_OFF * float(np.abs(pushed).max(initial=0.0)):
+        return None
+    y = shapes[:, ~free] @ (pushed[~free] / squares[~free])
+    return np.asarray(modal.origin + modal.T @ y)
+
+
+def gear_motion(model: TrainModel, q: Array, name: str) -> Array:
+    """Displacement and rotation of a gear along x, y, z by its shaft, its bearings and the housing, (3, 6).
+
+    Parameters
+    ----------
+    model : TrainModel
+        The train.
+    q : ndarray, shape (size,)
+        Coordinates of the system.
+    name : str
+        Name of the gear.
+    """
+    train, frame = model.train, model.train.frame
+    gear = train.gear(name)
+    number = train.shaft_number(gear.shaft)
+    shaft, body = train.shafts[number], model.shafts[number]
+    own = q[model.first[number] : model.first[number] + body.size]
+    base = np.array(shaft.point, dtype=float)
+
+    def section(along: float) -> Array:
+        point = base + (along - float(base @ frame[2])) * frame[2]
+        turn = frame.T @ (body.turn_rows(along) @ own)
+        return np.concatenate([body.point_rows(point, frame, along) @ own, turn])
+
+    places = np.array([float(train.bore_points[bore] @ frame[2]) for bore in shaft.bores])
+    at_bores = np.array([section(place) for place in places])
+    bores = np.zeros_like(at_bores)
+    if train.housing is not None:
+        bores = np.array([bore_selector(train, bore).T @ q[: train.housing.size] for bore in shaft.bores])
+    whole = section(gear.along)
+    by_housing = _line(places, bores, gear.along, frame)
+    by_bearings = _line(places, at_bores - bores, gear.along, frame)
+    return np.array([whole - by_housing - by_bearings, by_bearings, by_housing])
+
+
+def _line(places: Array, moves: Array, along: float, frame: Array) -> Array:
+    """Motion at `along` of the straight line that follows displacements (and of one place rotations) best, (6,)."""
+    axis = frame[2]
+    if np.ptp(places) > 0.0:
+        slope, start = np.polyfit(places - along, moves[:, :3], 1)
+        return np.concatenate([start, np.cross(axis, slope - (slope @ axis) * axis)])
+    mean = moves.mean(axis=0)
+    tilt = mean[3:] - (mean[3:] @ axis) * axis
+    return np.concatenate([mean[:3] + np.cross(tilt, axis) * (along - places[0]), tilt])

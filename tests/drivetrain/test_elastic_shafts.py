@@ -1,0 +1,302 @@
+"""Elastic shafts in a train, and the misalignment of gears that bend them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.runup.run_up import run_up
+from gearfe.drivetrain.train import (
+    Bearing,
+    Damping,
+    Drive,
+    GearTrain,
+    Load,
+    Shaft,
+    ShaftGear,
+    TrainModel,
+    build_train,
+    elastic_shaft,
+    simulate,
+)
+from gearfe.drivetrain.train.elements import rotor
+from gearfe.drivetrain.train.misalignment import misalignments, static_state
+from gearfe.fem.beams import Section, full_shaft
+from gearfe.multibody import constant
+from tests.makers.trains import ALPHA, SHIPPED, base_radius, curve, elastic, gear, loaded, train
+
+YOUNG, POISSON, DENSITY = 200e9, 0.3, 7850.0
+SHEAR = YOUNG / (2.0 * (1.0 + POISSON))
+
+
+def section(length: float = 0.09, diameter: float = 0.02, young: float = YOUNG, bore: float = 0.0) -> Section:
+    return Section(length, diameter, diameter, bore, bore, young=young, poisson=POISSON, density=DENSITY)
+
+
+def with_sections(gear_train: GearTrain, *sections: Section, **changes: Any) -> GearTrain:
+    """All shafts of a train made of the sections."""
+    length = sum(part.length for part in sections)
+    radius = max(0.5 * max(part.outer_start, part.outer_end) for part in sections)
+    changes |= {"length": length, "radius": radius, "sections": sections}
+    return dataclasses.replace(
+        gear_train, shafts=tuple(dataclasses.replace(shaft, **changes) for shaft in gear_train.shafts)
+    )
+
+
+def on_bearings(gear_train: GearTrain, *, radial: float, axial: float = 1e8) -> GearTrain:
+    """Bearings that leave the tilts free in all bores."""
+    bores = [bore for shaft in gear_train.shafts for bore in shaft.bores]
+    springs = tuple(Bearing(bore, (radial, axial, radial, 0.0, 0.0)) for bore in bores)
+    return dataclasses.replace(gear_train, bearings=springs)
+
+
+def first_frequencies(model: TrainModel, count: int) -> Any:
+    return model.coupled_frequencies_hz[:count]
+
+
+def test_frequencies_are_those_of_the_unreduced_beams(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two stages in an elastic frame, steel shafts of 20 mm: the first 15 to 1e-4 of all coordinates of the beams."""
+    bent = with_sections(elastic(train(SHIPPED), uneven=0.2, skew=0.5), section())
+    reduced = build_train(bent)
+    elastic_shaft.reduced_shaft.cache_clear()
+    monkeypatch.setattr(
+        elastic_shaft,
+        "reduce_shaft",
+        lambda shaft, frame, _, elements: full_shaft(shaft, frame, 40e3, elements=elements),
+    )
+    whole = build_train(bent)
+    elastic_shaft.reduced_shaft.cache_clear()
+    assert whole.system.size > 2 * reduced.system.size
+    assert first_frequencies(reduced, 15) == pytest.approx(first_frequencies(whole, 15), rel=1e-4)
+    stiff = build_train(elastic(train(SHIPPED), uneven=0.2, skew=0.5))
+    assert (first_frequencies(reduced, 15) < first_frequencies(stiff, 15)).all()
+
+
+def test_stiff_sections_make_the_rigid_shaft() -> None:
+    """With a thousand times the modulus: frequencies to 1e-3 and contact forces to 1e-2 of those of rigid shafts."""
+    rigid = loaded([(20, 30)], 1e8)
+    stiff = with_sections(rigid, section(young=1e3 * YOUNG), highest_hz=1e5)
+    models = [build_train(each) for each in (rigid, stiff)]
+    assert first_frequencies(models[1], 12) == pytest.approx(first_frequencies(models[0], 12), rel=1e-3)
+    times = np.linspace(0.0, 2e-3, 101)
+    forces = [simulate(model, times, tolerance=1e-8).contact_force for model in models]
+    assert np.abs(forces[0] - forces[1]).max() < 1e-2 * np.abs(forces[0]).max()
+
+
+def test_mass_of_stepped_hollow_and_conical_sections() -> None:
+    """Frustum of a cone by its closed formulas; the rotor's properties are those of the beams' mass matrix."""
+    length, one, two = 0.05, 0.012, 0.02
+    cone = Section(length, 2 * one, 2 * two, young=YOUNG, poisson=POISSON, density=DENSITY)
+    pieces = (section(0.03, 0.024, bore=0.008), cone, section(0.02, 0.03))
+    single = with_sections(train([(20, 30)]), *pieces)
+    alone = dataclasses.replace(single, gears=(), meshes=())
+    shaft = dataclasses.replace(single.shafts[0], sections=(cone,), length=length, radius=two)
+    found = rotor(dataclasses.replace(alone, shafts=(shaft,)), shaft)
+    volume = math.pi * length / 3.0 * (one**2 + one * two + two**2)
+    assert found.mass == pytest.approx(DENSITY * volume, rel=1e-12)
+    polar = math.pi * DENSITY * length / 10.0 * (two**5 - one**5) / (two - one)
+    assert found.polar == pytest.approx(polar, rel=1e-12)
+    body, whole = build_train(single).shafts[0], rotor(single, single.shafts[0])
+    assert body.rotor.mass == pytest.approx(whole.mass, rel=1e-12)
+    assert body.rotor.polar == pytest.approx(whole.polar, rel=1e-12)
+    assert body.rotor.transverse == pytest.approx(whole.transverse, rel=1e-9)
+    assert body.rotor.centre == pytest.approx(whole.centre, abs=1e-12)
+    assert np.diag(body.mass())[:6] == pytest.approx([whole.mass] * 3 + [whole.transverse] * 2 + [whole.polar])
+
+
+PLACE, HALF = 0.012, 0.033  # of the gears, and of the bores on both sides of the middle
+
+
+def bent_slope(force: float, diameter: float) -> tuple[float, float]:
+    """Deflection and slope under a load at PLACE of a simply supported Timoshenko beam between the bores.
+
+    Roark, Formulas for Stress and Strain, table 8.1, with the shear of each span added (Cowper's factor).
+    """
+    a, b, span = HALF + PLACE, HALF - PLACE, 2.0 * HALF
+    bending, area = YOUNG * math.pi / 64.0 * diameter**4, math.pi / 4.0 * diameter**2
+    kappa = 6.0 * (1.0 + POISSON) / (7.0 + 6.0 * POISSON)
+    deflection = force * a**2 * b**2 / (3.0 * bending * span) + force * a * b / (kappa * SHEAR * area * span)
+    return deflection, force * a * b * (b - a) / (3.0 * bending * span)
+
+
+@pytest.mark.parametrize("speed", [600.0, -600.0])
+@pytest.mark.parametrize("stiffness", [2e8, None])
+def test_misalignment_of_shafts_on_bearings(stiffness: float | None, speed: float) -> None:
+    """Both shafts bend between their bearings, which yield: closed formulas of beams and springs, in each part."""
+    diameter, radial, torque = 0.02, 5e7, 60.0
+    given = with_sections(train([(20, 30)], stiffness=stiffness, ys=[PLACE]), section(diameter=diameter))
+    given = on_bearings(given, radial=radial)
+    load = Load("s1", "s1+", constant(math.copysign(torque, speed)))
+    given = dataclasses.replace(given, loads=(load,), drive=Drive("s0", "s0+", constant(speed)))
+    (found,) = misalignments(build_train(given))
+    force = torque / base_radius(30)
+    assert found.force == pytest.approx(force, rel=1e-9)
+    deflection, slope = bent_slope(force, diameter)
+    # each shaft is pushed away from the other along the line of action, the driver against n
+    near, far = force * (HALF + PLACE) / (2 * HALF) / radial, force * (HALF - PLACE) / (2 * HALF) / radial
+    tilt, middle = (near - far) / (2 * HALF), far + (near - far) * (HALF + PLACE) / (2 * HALF)
+    assert found.width == pytest.approx(0.01)
+    assert found.in_plane_parts == pytest.approx((-2.0 * slope, -2.0 * tilt, 0.0), rel=2e-4, abs=1e-9)
+    assert found.apart_parts == pytest.approx((2.0 * deflection, 2.0 * middle, 0.0), rel=2e-4, abs=1e-12)
+    assert found.f_sh == pytest.approx(-2e-2 * (slope + tilt), rel=2e-4)
+    assert found.across == pytest.approx(0.0, abs=1e-3 * abs(found.in_plane))
+
+
+def test_misalignment_of_rigid_shafts_is_that_of_bearings_and_housing() -> None:
+    rigid = on_bearings(elastic(train(SHIPPED), uneven=0.2, skew=0.5), radial=5e7)
+    for found in misalignments(build_train(rigid)):
+        scale = abs(found.in_plane) + abs(found.across)
+        assert found.in_plane_parts[0] == pytest.approx(0.0, abs=1e-9 * scale)
+        assert found.in_plane_parts[1] != 0.0
+        assert found.in_plane_parts[2] != 0.0
+        assert sum(found.in_plane_parts) == pytest.approx(found.in_plane)
+
+
+def test_misalignment_of_a_train_in_a_rigid_housing_is_zero() -> None:
+    for found in misalignments(build_train(train(SHIPPED))):
+        assert (found.f_sh, found.across, found.apart) == pytest.approx((0.0, 0.0, 0.0), abs=1e-15)
+
+
+def test_misalignment_is_the_mean_of_the_transient() -> None:
+    """Constant stiffness, damped, at rest beside rolling in the end: tilts of the gears' poses without gyroscopics."""
+    damping = Damping(ratio=0.3, gyroscopic=False)
+    given = with_sections(loaded([(20, 30)], 1e8), section())
+    model = build_train(dataclasses.replace(given, damping=damping))
+    found = misalignments(model)[0]
+    response = simulate(model, np.linspace(0.0, 0.1, 11), tolerance=1e-9)
+    frame = model.train.frame
+    tilts = response.gear_pose[-1, :, 3:] @ frame[:2].T
+    assert tilts[0] == pytest.approx(found.driver_tilt, rel=1e-3)
+    assert tilts[1] == pytest.approx(found.driven_tilt, rel=1e-3)
+
+
+def test_torsion_between_drive_and_gear() -> None:
+    """The drive at one end winds the shaft up: T L/(G J) between the bore and the gear's section."""
+    torque = 60.0
+    given = with_sections(train([(20, 30)], stiffness=2e8, ys=[PLACE]), section())
+    load = Load("s1", "s1-", constant(torque), along=0.04)
+    given = dataclasses.replace(given, loads=(load,), drive=Drive("s0", "s0-", constant(600.0), along=-0.045))
+    model = build_train(given)
+    q = static_state(model)
+    assert q is not None
+    polar = math.pi / 32.0 * 0.02**4
+    for number, (end, gear_torque) in enumerate([(-0.045, torque * 2.0 / 3.0), (0.04, torque)]):
+        body, first = model.shafts[number], model.first[number]
+        turned = [body.turn_rows(along)[2] @ q[first : first + body.size] for along in (PLACE, end)]
+        expected = gear_torque * abs(PLACE - end) / (SHEAR * polar)
+        assert abs(turned[0] - turned[1]) == pytest.approx(expected, rel=1e-6)
+    assert model.spin_reference[0] @ q == pytest.approx(0.0, abs=1e-15)  # the drive prescribes that section
+
+
+def test_both_integrators_agree() -> None:
+    """Taylor series and collocation, with a curve whose phase follows the section of the driver."""
+    given = with_sections(loaded([(20, 30)], curve, ratio=0.02, backlash=5e-6), section())
+    given = dataclasses.replace(given, damping=dataclasses.replace(given.damping, beta=1e-6, ratio=0.0))
+    model = build_train(given)
+    times = np.linspace(0.0, 1e-4, 26)
+    made = [simulate(model, times, tolerance=1e-6, method=method) for method in ("taylor", "implicit")]
+    for name in ("contact_force", "speed", "gear_pose"):
+        one, two = (getattr(response, name) for response in made)
+        assert np.abs(one - two).max() < 1e-4 * np.abs(two).max(), name
+
+
+def test_the_run_up_meets_the_transient() -> None:
+    given = with_sections(loaded([(20, 30)], lambda teeth: curve(teeth, swing=0.15), ratio=0.05), section())
+    model = build_train(given)
+    run = run_up(model, np.array([600.0]), tolerance=1e-6, band_hz=5000.0)
+    force = simulate(model, np.linspace(0.0, 0.06, 24001), tolerance=1e-8).contact_force[-2400:, 0]
+    columns = run.columns()
+    assert columns["peak_to_peak_force_1_N"][0] == pytest.approx(np.ptp(force), rel=2e-3)
+
+
+def test_whirl_of_a_disc_between_bearings() -> None:
+    """Couples that are kept make the gyroscopic moments: a rigid disc's J_p against all of the beams'."""
+    model = build_train(with_sections(loaded([(20, 30)], 1e8), section()))
+    for body in model.shafts:
+        assert isinstance(body, elastic_shaft.ElasticShaft)
+        whole = body.reduced.gyroscopic_matrix()
+        kept = sum(
+            couple.polar * (np.outer(couple.tilt, couple.other) - np.outer(couple.other, couple.tilt))
+            for couple in body.gyrations()
+        )
+        scale = np.sqrt(body.reduced.stiffness_diagonal + (2e4 * math.pi) ** 2 * body.reduced.mass_diagonal)
+        part = np.abs((whole - kept) / np.outer(scale, scale)).max()
+        assert part < 1.1 * elastic_shaft.LEAST_GYRATION * np.abs(whole / np.outer(scale, scale)).max()
+        assert len(body.gyrations()) < len(body.reduced.gyroscopic)
+
+
+def test_rigid_trains_load_no_beams() -> None:
+    code = (
+        "import sys; from tests.makers.trains import train; from gearfe.drivetrain.train import build_train; "
+        "build_train(train([(20, 30)])); assert not [m for m in sys.modules if 'beams' in m or 'elastic_shaft' in m]"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
+def bent(**changes: Any) -> GearTrain:
+    return with_sections(train([(20, 30)]), section(), **changes)
+
+
+def shaft(gear_train: GearTrain, **changes: Any) -> GearTrain:
+    """The train with the keys of its first shaft changed."""
+    first, *others = gear_train.shafts
+    return dataclasses.replace(gear_train, shafts=(dataclasses.replace(first, **changes), *others))
+
+
+MISTAKES: dict[str, tuple[GearTrain, str, str]] = {
+    "length": (shaft(bent(), length=0.1), "shaft 's0' length", "0.09 m"),
+    "radius": (shaft(bent(), radius=0.02), "shaft 's0' radius", "0.01 m"),
+    "mass": (shaft(bent(), mass=1.0), "shaft 's0' mass", "leave one out"),
+    "damping": (shaft(bent(), damping_ratio=1.0), "shaft 's0' damping ratio", "< 1"),
+    "negative": (shaft(bent(), sections=(section(diameter=-0.02),)), "section 1 outer_start", "> 0"),
+    "bore": (shaft(bent(), sections=(section(bore=0.03),)), "section 1 inner_start", "smaller bore"),
+    "root": (
+        shaft(bent(), sections=(section(0.045), section(0.045, 0.044)), radius=0.022),
+        "shaft 's0'",
+        "root radius",
+    ),
+    "gear off": (
+        shaft(bent(), sections=(section(0.02),), length=0.02, bores=("s0+",)),
+        "attachment 's0+'",
+        "from -10 to 10 mm",
+    ),
+    "gear on bearing": (
+        dataclasses.replace(bent(), gears=(ShaftGear("d0", "s0", 0.031, gear(20)), bent().gears[1])),
+        "attachment 's0+'",
+        "within gear 'd0' from 26 to 36 mm",
+    ),
+    "place": (
+        dataclasses.replace(bent(), loads=(Load("s1", None, constant(1.0)),)),
+        "load on 's1' place",
+        "y_mm",
+    ),
+    "off": (
+        dataclasses.replace(bent(), loads=(Load("s1", "s1+", constant(1.0), along=0.1),)),
+        "load on 's1' y_mm",
+        "from -45 to 45 mm",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_mistakes_are_named(name: str) -> None:
+    given, field, text = MISTAKES[name]
+    with pytest.raises(InputError) as error:
+        build_train(given)
+    assert field in error.value.field, str(error.value)
+    assert text in str(error.value)
+    assert error.value.cure
+
+
+def test_two_bearings_at_one_place() -> None:
+    given = bent()
+    bores = {**given.rigid_bores, "s0-": given.rigid_bores["s0+"]}
+    with pytest.raises(InputError, match="at the same place"):
+        build_train(dataclasses.replace(given, rigid_bores=bores))
