@@ -19,7 +19,6 @@ from gearfe.drivetrain.train import (
     Drive,
     GearTrain,
     Load,
-    Shaft,
     ShaftGear,
     TrainModel,
     build_train,
@@ -30,7 +29,7 @@ from gearfe.drivetrain.train.elements import rotor
 from gearfe.drivetrain.train.misalignment import misalignments, static_state
 from gearfe.fem.beams import Section, full_shaft
 from gearfe.multibody import constant
-from tests.makers.trains import ALPHA, SHIPPED, base_radius, curve, elastic, gear, loaded, train
+from tests.makers.trains import SHIPPED, base_radius, curve, elastic, gear, loaded, train
 
 YOUNG, POISSON, DENSITY = 200e9, 0.3, 7850.0
 SHEAR = YOUNG / (2.0 * (1.0 + POISSON))

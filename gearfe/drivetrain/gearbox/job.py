@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from ...fem.beams import Section
     from ...fem.reduction.modal_body import ModalBody
 
+#: Radii that differ by no more are equal (relative).
+ROUNDING = 1e-6
 Stiffness = MeshLaw | StiffnessCurve | MeshTable | float | None
 
 
@@ -224,17 +226,55 @@ def _section(table: ShaftSectionTable, shaft: MaterialTable) -> Section:
 
     material = shaft if table.material is None else table.material
     assert isinstance(material, MaterialTable)
-    outer, inner = (tuple(1e-3 * diameter for diameter in ends) for ends in (table.outer_mm, table.inner_mm))
+    (outer_start, outer_end), (inner_start, inner_end) = table.outer_mm, table.inner_mm
     return Section(
-        1e-3 * table.length_mm, *outer, *inner, young=1e9 * material.youngs_modulus_GPa, poisson=material.poisson_ratio,
-        density=material.density_kg_per_m3,
+        1e-3 * table.length_mm, 1e-3 * outer_start, 1e-3 * outer_end, 1e-3 * inner_start, 1e-3 * inner_end,
+        young=1e9 * material.youngs_modulus_GPa, poisson=material.poisson_ratio, density=material.density_kg_per_m3,
     )  # fmt: skip
 
 
 def _check_rigid(job: TrainJob, train: GearTrain) -> None:
     meshes = tuple(replace(mesh, backlash=None, damping=0.0, damping_acts=None) for mesh in train.meshes)
     check_layout(replace(train, meshes=meshes))
+    _check_bores(job, train)
     check_flanks(train, np.array([not back_flanks(job, train, i) for i in range(len(meshes))], dtype=bool))
+
+
+def _check_bores(job: TrainJob, train: GearTrain) -> None:
+    """Raise `InputError` for a section that is wider than the bore of [housing] that it is in."""
+    if job.housing is None or job.table.rigid_bores:
+        return
+    spaces = bore_spaces(job.housing)
+    for shaft in (shaft for shaft in train.shafts if shaft.sections):
+        for bore in (bore for bore in shaft.bores if bore in spaces):
+            radius, low, high = spaces[bore]
+            widest = shaft.radius_within(low - shaft.point[1], high - shaft.point[1])
+            if widest > radius * (1.0 + ROUNDING):
+                problem = (
+                    f"is wider than attachment {bore!r} from y = {1e3 * low:.6g} to {1e3 * high:.6g} mm: must be <= "
+                    f"{2e3 * radius:.6g} mm there"
+                )
+                cure = "give the section a smaller diameter, or [housing] a wider bore (bore_radius_mm)"
+                raise InputError(f"shaft {shaft.name!r} outer_diameter_mm", 2e3 * widest, problem, cure)
+
+
+def bore_spaces(table: HousingTable) -> dict[str, tuple[float, float, float]]:
+    """Name -> radius and ends along y (m) of the bores whose radii a [housing] table has."""
+    if table.reduced:
+        return {}
+    if table.mesh.file is None:
+        ranges = [(shaft.bore_radius_mm, *ends) for shaft in table.shafts for ends in table.bore_ranges(shaft)]
+        return {
+            str(number): (1e-3 * radius, 1e-3 * low, 1e-3 * high)
+            for number, (radius, low, high) in enumerate(ranges, 1)
+        }
+    spaces = {}
+    for number, bore in enumerate(table.bores, start=1):
+        if bore.radius_mm is not None and bore.point_mm is not None:
+            ends = (0.0, 0.0) if bore.range_mm is None else bore.range_mm
+            low, high = sorted(bore.point_mm[1] + math.copysign(end, end * bore.direction[1]) for end in ends)
+            spaces[bore.name or str(number)] = 1e-3 * bore.radius_mm, 1e-3 * low, 1e-3 * high
+    return spaces
 
 
 def back_flanks(job: TrainJob, train: GearTrain, number: int) -> bool:

@@ -151,15 +151,15 @@ def _check_sections(shaft: Shaft) -> None:
     """Sections that can exist, length and radius that are theirs, nothing given that follows from them."""
     label = f"shaft {shaft.name!r}"
     for number, section in enumerate(shaft.sections, start=1):
-        problem = section.fault()
-        if problem is not None:
-            key, *rest = problem
-            raise InputError(f"{label} section {number} {key}", *rest)
+        fault = section.fault()
+        if fault is not None:
+            key, value, problem, cure = fault
+            raise InputError(f"{label} section {number} {key}", value, problem, cure)
     length = sum(section.length for section in shaft.sections)
     radius = max(0.5 * max(section.outer_start, section.outer_end) for section in shaft.sections)
-    for key, value in (("length", length), ("radius", radius)):
-        if abs(getattr(shaft, key) - value) > SAME * value:
-            problem = f"contradicts the sections, of which follow {value:.9g} m"
+    for key, needed in (("length", length), ("radius", radius)):
+        if abs(getattr(shaft, key) - needed) > SAME * needed:
+            problem = f"contradicts the sections, from which follow {needed:.9g} m"
             raise InputError(f"{label} {key}", getattr(shaft, key), problem, "give that of the sections")
     for key in ("mass", "polar_inertia", "transverse_inertia"):
         if getattr(shaft, key) is not None:

@@ -81,24 +81,39 @@ def misalignments(model: TrainModel) -> tuple[MeshMisalignment, ...]:
     q = static_state(model)
     if q is None:
         return ()
-    a = model.train.frame[2]
-    made = []
-    for line, force in zip(model.meshes, model.kinematics.steady_forces.tolist(), strict=True):
-        one, two = model.train.gear(line.given.driver), model.train.gear(line.given.driven)
-        n = line.direction
-        if force < 0.0:  # the back flanks, whose line of action is the mirror image at the line of centres
-            arm = np.array(model.train.shaft(two.shaft).point) - np.array(model.train.shaft(one.shaft).point)
-            along = np.cross(a, arm) / np.linalg.norm(np.cross(a, arm))
-            n = n - 2.0 * (n @ along) * along
-        width = overlap(one, two)
-        moves = [gear_motion(model, q, gear.name) for gear in (one, two)]
-        between = moves[0] - moves[1]  # (parts, 6)
-        in_plane, across, apart = between[:, 3:] @ np.cross(a, n), between[:, 3:] @ n, -between[:, :3] @ n
-        tilts = [tuple(move[:, 3:].sum(axis=0) @ model.train.frame[:2].T) for move in moves]
-        wholes = (float(part.sum()) for part in (in_plane, across, apart))
-        parts = (tuple(map(float, part)) for part in (in_plane, across, apart))
-        made.append(MeshMisalignment(line.name, one.name, two.name, force, width, *wholes, *parts, *tilts))
-    return tuple(made)
+    return tuple(
+        _misalignment(model, q, number, force) for number, force in enumerate(model.kinematics.steady_forces.tolist())
+    )
+
+
+def _misalignment(model: TrainModel, q: Array, number: int, force: float) -> MeshMisalignment:
+    """Misalignment of one mesh with its force (N) in the state q."""
+    train, line = model.train, model.meshes[number]
+    driver, driven = train.gear(line.given.driver), train.gear(line.given.driven)
+    a, n = train.frame[2], line.direction
+    if force < 0.0:  # the back flanks, whose line of action is the mirror image at the line of centres
+        along = np.cross(a, np.array(train.shaft(driven.shaft).point) - np.array(train.shaft(driver.shaft).point))
+        along = along / np.linalg.norm(along)
+        n = n - 2.0 * (n @ along) * along
+    moves = [gear_motion(model, q, gear.name) for gear in (driver, driven)]
+    between = moves[0] - moves[1]  # (parts, 6)
+    in_plane, across, apart = between[:, 3:] @ np.cross(a, n), between[:, 3:] @ n, -between[:, :3] @ n
+    tilts = [move[:, 3:].sum(axis=0) @ train.frame[:2].T for move in moves]
+    return MeshMisalignment(
+        mesh=line.name,
+        driver=driver.name,
+        driven=driven.name,
+        force=force,
+        width=overlap(driver, driven),
+        in_plane=float(in_plane.sum()),
+        across=float(across.sum()),
+        apart=float(apart.sum()),
+        in_plane_parts=tuple(in_plane.tolist()),
+        across_parts=tuple(across.tolist()),
+        apart_parts=tuple(apart.tolist()),
+        driver_tilt=tuple(tilts[0].tolist()),
+        driven_tilt=tuple(tilts[1].tolist()),
+    )
 
 
 def misalignment_columns(found: tuple[MeshMisalignment, ...]) -> dict[str, Any]:
