@@ -83,12 +83,14 @@ def _report_lines(summary: dict[str, Any]) -> list[str]:
     """Lines for the terminal."""
     from ..drivetrain.gearbox.bearing_report import bearing_lines
     from ..drivetrain.gearbox.inherited import inherited_lines
+    from ..drivetrain.gearbox.shaft_report import shaft_lines
 
     lines = [
         f"{summary['speeds_reached']} of {summary['speeds']} speeds, {summary['steady_states']} steady states; largest "
         f"error estimate {summary['largest_error_estimate']:.2g} of the approach under the steady force"
     ]
-    lines += inherited_lines(summary.get("inherited", {})) + bearing_lines(summary.get("bearings", {}))
+    lines += [*inherited_lines(summary.get("inherited", {})), *shaft_lines(summary)]
+    lines += bearing_lines(summary.get("bearings", {}))
     changes: dict[str, list[str]] = {}
     for change in summary["bifurcations"]:
         changes.setdefault(change["kind"], []).append(f"{change['speed_rad_per_s']:.6g}")

@@ -177,7 +177,9 @@ def _from_the_side(axes: Any, layout: GearboxLayout, colours: dict[str, str], ac
 def _shaft(axes: Any, shaft: PlacedShaft, colour: str, across: int, lower: int) -> None:
     """A shaft with its bearings; its names stand so many lines lower."""
     y, at = shaft.centre[1], shaft.centre[across]
-    axes.plot(*_rectangle(y, at, shaft.length, shaft.radius), color=colour, linewidth=1.0)
+    for low, high, first, last in shaft.outline:
+        along = 1e3 * (y + np.array([low, high, high, low, low]))
+        axes.plot(along, 1e3 * (at + np.array([-first, -last, last, first, -first])), color=colour, linewidth=1.0)
     ends = 1e3 * np.array([y - 0.55 * shaft.length, y + 0.55 * shaft.length])
     axes.plot(ends, 2 * [1e3 * at], color=colour, linewidth=0.7, linestyle=(0, (7, 2, 1.5, 2)))
     text = {"textcoords": "offset points", "va": "center", "fontsize": _FONT, "color": colour}

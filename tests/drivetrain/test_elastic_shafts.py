@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
+from gearfe.drivetrain.gearbox.fields import moved, solids
 from gearfe.drivetrain.runup.run_up import run_up
 from gearfe.drivetrain.train import (
     Bearing,
@@ -174,6 +175,32 @@ def test_misalignment_is_the_mean_of_the_transient() -> None:
     tilts = response.gear_pose[-1, :, 3:] @ frame[:2].T
     assert tilts[0] == pytest.approx(found.driver_tilt, rel=1e-3)
     assert tilts[1] == pytest.approx(found.driven_tilt, rel=1e-3)
+
+
+def test_surfaces_of_shafts_bend_with_them() -> None:
+    """Rings at the middles of the gears move as the gears do; between, the line of centres is bent."""
+    model = build_train(with_sections(loaded([(20, 30)], 1e8), section()))
+    response = simulate(model, np.linspace(0.0, 5e-4, 6), tolerance=1e-6)
+    sections, frame, step = response.sections, model.train.frame, 5
+    assert sections is not None
+    parts = [part for part in solids(model.train, response) if part.section is not None]
+    assert [part.gear for part in parts] == [0, 1]
+    for number, part in enumerate(parts):
+        body, first = model.shafts[number], model.first[number]
+        points = moved(part, response, frame, step)
+        q = np.zeros(model.system.size)
+        q[sections.columns] = response.section_coordinates[step]
+        own = q[first : first + body.size]
+        for ring in np.unique(part.section):
+            inside, centre = part.section == ring, sections.centres[ring]
+            along = float(centre @ frame[2])
+            middle = points[inside].mean(axis=0)
+            assert middle == pytest.approx(centre + body.point_rows(centre, frame, along) @ own, abs=1e-12)
+            turned = model.ratios[number] * response.drive_angle[step] + float(body.turn_rows(along)[2] @ own)
+            before, after = part.points[inside][0] - centre, points[inside][0] - middle
+            if np.linalg.norm(before) > 1e-3:
+                angle = math.atan2(frame[2] @ np.cross(before, after), before @ after)
+                assert math.remainder(angle - turned, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_torsion_between_drive_and_gear() -> None:

@@ -95,3 +95,26 @@ def test_the_command_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         *sorted(MESHES),
     ]
     assert gearbox_layout(tomllib.loads((GEOMETRY / "microgeometry.toml").read_text()), "pair.toml") is None
+
+
+def test_sections_of_an_elastic_shaft_are_drawn() -> None:
+    """A step and a cone between the ends of the shaft, as the sections of the job file say."""
+    raw = tomllib.loads(text())
+    table = raw["shafts"]["s1"]
+    del table["length_mm"], table["radius_mm"]
+    table["sections"] = [
+        {"length_mm": 60.0, "outer_diameter_mm": 20.0},
+        {"length_mm": 40.0, "outer_diameter_start_mm": 16.0, "outer_diameter_end_mm": 10.0},
+    ]
+    layout = gearbox_layout(raw, "box.toml")
+    assert layout is not None
+    shaft = next(shaft for shaft in layout.shafts if shaft.name == "s1")
+    assert (shaft.length, shaft.radius) == pytest.approx((0.1, 0.01))
+    assert shaft.outline[0] == pytest.approx((-0.05, 0.01, 0.01, 0.01))
+    assert shaft.outline[1] == pytest.approx((0.01, 0.05, 0.008, 0.005))
+    side = gearbox_picture(layout).axes[1]
+    ends = {
+        (round(float(x), 6), round(float(y), 6)) for line in side.lines for x, y in zip(*line.get_data(), strict=True)
+    }
+    middle, across = 1e3 * shaft.centre[1], {1e3 * shaft.centre[0], 1e3 * shaft.centre[2]}
+    assert any({(middle + 10.0, at + 8.0), (middle + 50.0, at + 5.0)} <= ends for at in across)

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.errors import InputError
+from ...base.errors import InputError, given
 from ...base.progress import count
 from ...base.typing import Array, IntArray
 from ...fem.reduction.modal_body import ModalBody
@@ -35,22 +35,25 @@ _SHOWN = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """Surface of a body that moves with a gear.
+    """Surface of a body that moves with a gear, or with the cross-sections of an elastic shaft.
 
     Attributes
     ----------
     gear
-        Number of the gear whose motion it follows.
+        Number of the gear whose motion it follows, or of the first one on its shaft.
     points : (n, 3)
         At the start of the run (m).
     quads : (f, 4)
     triangles : (t, 3)
+    section : (n,) or None
+        Of an elastic shaft the number of the cross-section that each point belongs to.
     """
 
     gear: int
     points: Array
     quads: IntArray
     triangles: IntArray
+    section: IntArray | None = None
 
 
 def gear_surface(gear: Gear, angle: float, *, per_segment: int = 3) -> tuple[Array, IntArray]:
@@ -74,17 +77,22 @@ def gear_surface(gear: Gear, angle: float, *, per_segment: int = 3) -> tuple[Arr
     return np.concatenate(rings), np.concatenate(quads)
 
 
-def cylinder_surface(radius: float, low: float, high: float) -> tuple[Array, IntArray, IntArray]:
-    """Cylinder about the third axis: points, quadrilaterals, triangles of the ends."""
-    angle = 2.0 * np.pi * np.arange(_ROUND) / _ROUND
-    circle = radius * np.column_stack([np.cos(angle), np.sin(angle)])
-    ends = [np.column_stack([circle, np.full(_ROUND, z)]) for z in (low, high)]
-    points = np.concatenate([*ends, [[0.0, 0.0, low], [0.0, 0.0, high]]])
-    here, after = np.arange(_ROUND), np.roll(np.arange(_ROUND), -1)
-    quads = np.column_stack([here, after, _ROUND + after, _ROUND + here])
-    bottom = np.column_stack([np.full(_ROUND, 2 * _ROUND), after, here])
-    top = np.column_stack([np.full(_ROUND, 2 * _ROUND + 1), _ROUND + here, _ROUND + after])
-    return points, quads, np.concatenate([bottom, top])
+def turned_surface(radii: Array, places: Array) -> tuple[Array, IntArray, IntArray]:
+    """Surface of a turned part about the third axis with radii at rising places along it, closed at its ends.
+
+    Points stand ring by ring, then come the middles of both ends; with them quadrilaterals, and triangles of the ends.
+    """
+    angle, rings = 2.0 * np.pi * np.arange(_ROUND) / _ROUND, len(radii)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    points = [np.column_stack([radius * circle, np.full(_ROUND, z)]) for radius, z in zip(radii, places, strict=True)]
+    ends = [[0.0, 0.0, places[0]], [0.0, 0.0, places[-1]]]
+    start, after = np.arange(_ROUND), np.roll(np.arange(_ROUND), -1)
+    belt = np.column_stack([start, after, _ROUND + after, _ROUND + start])
+    quads = np.concatenate([belt + _ROUND * ring for ring in range(rings - 1)])
+    last = _ROUND * (rings - 1)
+    bottom = np.column_stack([np.full(_ROUND, last + _ROUND), after, start])
+    top = np.column_stack([np.full(_ROUND, last + _ROUND + 1), last + start, last + after])
+    return np.concatenate([*points, ends]), quads, np.concatenate([bottom, top])
 
 
 def solids(train: GearTrain, response: TrainResponse, *, per_segment: int = 2) -> tuple[Solid, ...]:
@@ -100,7 +108,7 @@ def solids(train: GearTrain, response: TrainResponse, *, per_segment: int = 2) -
         found.append(Solid(number, response.gear_centres[number] + points @ frame, quads, none))
         if gear.shaft not in carried:
             carried.add(gear.shaft)
-            found.append(_shaft(train, gear, number))
+            found.append(_shaft(train, gear, number, response))
     return tuple(found)
 
 
@@ -127,11 +135,30 @@ def moved(solid: Solid, response: TrainResponse, frame: Array, step: int, exagge
     points : ndarray, shape (n, 3)
         In m.
     """
+    if solid.section is not None:
+        return _moved_sections(solid.points, solid.section, response, frame, step, exaggeration)
     pose, centre = response.gear_pose[step, solid.gear], response.gear_centres[solid.gear]
     angle = float(pose[3:] @ frame[2])
     tilt = exaggeration * (pose[3:] - angle * frame[2])
     turned = _turned(solid.points - centre, frame[2], angle)
     return np.asarray(centre + exaggeration * pose[:3] + turned + np.cross(tilt, turned))
+
+
+def _moved_sections(
+    points: Array, section: IntArray, response: TrainResponse, frame: Array, step: int, exaggeration: float
+) -> Array:
+    """Points (n, 3) of an elastic shaft at an output step: each moves with its cross-section, `section` (n,)."""
+    sections, coordinates = given(response.sections, "sections"), given(response.section_coordinates, "coordinates")
+    poses, axis, at_step = sections.rows @ coordinates[step], frame[2], np.empty_like(points)
+    for number in np.unique(section):
+        mine, centre, pose = section == number, sections.centres[number], poses[number]
+        spin = float(pose[3:] @ axis)
+        turned = _turned(
+            points[mine] - centre, axis, float(sections.ratios[number] * response.drive_angle[step]) + spin
+        )
+        tilt = exaggeration * (pose[3:] - spin * axis)
+        at_step[mine] = centre + exaggeration * pose[:3] + turned + np.cross(tilt, turned)
+    return at_step
 
 
 def _rolled(solid: Solid, train: GearTrain, response: TrainResponse, step: int) -> Array:
@@ -280,10 +307,17 @@ def _coordinates(response: TrainResponse) -> tuple[Array, Array]:
     return response.modal, response.modal_acceleration
 
 
-def _shaft(train: GearTrain, gear: ShaftGear, number: int) -> Solid:
-    shaft = train.shaft(gear.shaft)
-    points, quads, triangles = cylinder_surface(shaft.radius, -0.5 * shaft.length, 0.5 * shaft.length)
-    return Solid(number, np.array(shaft.point) + points @ train.frame, quads, triangles)
+def _shaft(train: GearTrain, gear: ShaftGear, number: int, response: TrainResponse) -> Solid:
+    shaft, sections = train.shaft(gear.shaft), response.sections
+    if not shaft.sections or sections is None:
+        half = 0.5 * shaft.length
+        points, quads, triangles = turned_surface(np.full(2, shaft.radius), np.array([-half, half]))
+        return Solid(number, np.array(shaft.point) + points @ train.frame, quads, triangles)
+    mine = np.flatnonzero(sections.shaft == train.shaft_number(gear.shaft))
+    places = (sections.centres[mine] - np.array(shaft.point)) @ train.frame[2]
+    points, quads, triangles = turned_surface(sections.radii[mine], places)
+    belongs = np.concatenate([np.repeat(mine, _ROUND), mine[[0, -1]]])
+    return Solid(number, np.array(shaft.point) + points @ train.frame, quads, triangles, belongs)
 
 
 def _rounded(factor: float) -> float:

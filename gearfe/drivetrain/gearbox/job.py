@@ -163,7 +163,7 @@ def job_train(job: TrainJob, curves: Sequence[Stiffness] | None = None, body: Mo
 
 def _rigid_train(job: TrainJob) -> GearTrain:
     t = job.table
-    shafts = tuple(_shaft(s) for s in t.shafts)
+    shafts = tuple(shaft_of(s) for s in t.shafts)
     gears = tuple(
         ShaftGear(name, g.shaft, 1e-3 * g.y_mm, job.gears[name], g.density_kg_per_m3)
         for name, g in job.gearbox.gears.items()
@@ -195,7 +195,8 @@ def _metres(length_mm: float | None) -> float | None:
     return None if length_mm is None else 1e-3 * length_mm
 
 
-def _shaft(table: TrainShaftTable) -> Shaft:
+def shaft_of(table: TrainShaftTable) -> Shaft:
+    """Shaft of a table whose materials are known."""
     material = MaterialTable() if table.material is None else table.material
     assert isinstance(material, MaterialTable)
     density = material.density_kg_per_m3 if table.density_kg_per_m3 is None else table.density_kg_per_m3

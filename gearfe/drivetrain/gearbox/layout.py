@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...base.tables.gearbox import Gearbox, named_train
+from ...base.tables.gearbox import Gearbox, named_train, with_materials
 from ...base.tables.jobs import OF_GEARS, gearbox_of, job_tables, train_tables
 from ...base.tables.train import TrainTable
 from ...gears.geometry.pair import gear_of, pair_of
-from .job import bore_places
+from .job import bore_places, shaft_of
 
 #: Distances that differ by no more agree (m).
 CLOSE = 1e-6
@@ -36,13 +36,17 @@ class PlacedGear:
 
 @dataclass(frozen=True)
 class PlacedShaft:
-    """A shaft: name, its middle (x, y, z), length, radius, and y of its bearings by name; m."""
+    """A shaft: name, its middle (x, y, z), length, radius, y of its bearings by name, and its outline; m.
+
+    The outline has for each piece the ends along the axis from the middle, and the outer radii there.
+    """
 
     name: str
     centre: tuple[float, float, float]
     length: float
     radius: float
     bearings: tuple[tuple[str, float], ...]
+    outline: tuple[tuple[float, float, float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,7 @@ def gearbox_layout(raw: dict[str, Any], path: str | Path) -> GearboxLayout | Non
         tables = job_tables(raw, path, ("gears", "meshes", "shafts"), (*OF_GEARS, "housing"))
         box = gearbox_of(raw, path)
         table = named_train(TrainTable(), tables["meshes"], tables["shafts"], tables.get("bearings", {}))
+        table = with_materials(table, tables.get("materials", {}), "shafts.{name}")
     else:
         return None
     bores = {str(bore.attachment): 1e-3 * bore.y_mm for bore in table.rigid_bores}
@@ -126,6 +131,7 @@ def gearbox_layout(raw: dict[str, Any], path: str | Path) -> GearboxLayout | Non
             1e-3 * s.whole_length_mm,
             1e-3 * s.largest_radius_mm,
             tuple((str(a), bores[str(a)]) for a in s.attachments if str(a) in bores),
+            shaft_of(s).outline,
         )
         for s in table.shafts
     )

@@ -11,6 +11,7 @@ from ...base.files import whole_set, write_csv, write_json
 from ...output.arrays import save_arrays
 from ..gearbox import bearing_report
 from ..gearbox.report import attachment_to_draw
+from ..gearbox.shaft_report import misalignment_columns, shaft_entries, yielding
 from ..modes.swinging import mesh_modes, write_modes
 from . import report
 from .critical import CriticalSpeeds, critical_speeds
@@ -20,6 +21,7 @@ from .run_up import RunUp
 #: All that a run can write.
 FILES = (
     "runup.csv", "orders.csv", "waterfall.csv", "waterfall.npz", "modes.csv", "critical_speeds.csv", "summary.json",
+    "misalignment.csv",
     "waterfall.png", "bearing_forces.png", "campbell.png", "orders.png", "meshes.png",
     "instability.csv", "instability.png", "mode_gears.vtkhdf", "mode_housing.vtkhdf", bearing_report.FILE,
 )  # fmt: skip
@@ -85,6 +87,8 @@ def write_runup(
         with watch.stage("tables"):
             for name, columns in report.tables(run, critical, multiples, unstable).items():
                 write_csv(target / f"{name}.csv", columns)
+            if tilted := yielding(model):
+                write_csv(target / "misalignment.csv", misalignment_columns(tilted))
             save_arrays(target / "waterfall.npz", report.waterfall(run))
         if draw is not None:
             with watch.stage("pictures"):
@@ -98,7 +102,8 @@ def write_runup(
         bearings = bearing_report.bearing_summary(model.operating)
         if bearings:
             write_csv(target / bearing_report.FILE, bearing_report.bearing_columns(bearings))
-        summary = {**further, "bearings": bearings, **report.summary(run, critical), "warnings": report.warnings(run)}
+        results = {"bearings": bearings, **shaft_entries(model), **report.summary(run, critical)}
+        summary = {**further, **results, "warnings": report.warnings(run)}
         summary["timings_s"] = dict(watch.seconds)
         write_json(target / "summary.json", summary)
         names = sorted(path.name for path in target.iterdir())

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -113,6 +114,19 @@ class ElasticShaft(ShaftBody):
             Gyration(float(size) ** 2, *couple)
             for size, *couple in zip(sizes[kept], over @ first, over @ second, strict=True)
         )
+
+    def elastic_facts(self) -> dict[str, Any]:
+        """Entries of the summary: coordinates, elements, own modes without bearings, and their errors."""
+        reduced = self.reduced
+        modes = ~reduced.residual
+        return {
+            "coordinates": reduced.size,
+            "elements": reduced.elements,
+            "highest_frequency_Hz": self.highest_hz,
+            "own_frequencies_Hz": reduced.frequencies_hz[modes],
+            "largest_frequency_error": float(reduced.frequency_errors[modes].max(initial=0.0)),
+            "gyroscopic_couples": len(self.gyrations()),
+        }
 
 
 def elastic_shaft(train: GearTrain, shaft: Shaft, start_rate: float) -> ElasticShaft:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -183,6 +183,10 @@ class ShaftBody(Element):
     def gyrations(self) -> tuple[Gyration, ...]:
         """Gyroscopic couples."""
         raise NotImplementedError
+
+    def elastic_facts(self) -> dict[str, Any]:
+        """Entries of the summary about an elastic shaft; none for a rigid one."""
+        return {}
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,6 @@ is left: bending. On a shaft in one bore the lines have the tilts there.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -113,60 +112,6 @@ def _misalignment(model: TrainModel, q: Array, number: int, force: float) -> Mes
         apart_parts=tuple(apart.tolist()),
         driver_tilt=tuple(tilts[0].tolist()),
         driven_tilt=tuple(tilts[1].tolist()),
-    )
-
-
-def misalignment_columns(found: tuple[MeshMisalignment, ...]) -> dict[str, Any]:
-    """Columns of misalignment.csv, a row for each mesh."""
-    columns: dict[str, Any] = {
-        "mesh": [one.mesh for one in found],
-        "mesh_force_N": np.array([one.force for one in found]),
-        "common_face_width_mm": np.array([1e3 * one.width for one in found]),
-        "f_sh_um": np.array([1e6 * one.f_sh for one in found]),
-    }
-    columns |= {
-        f"f_sh_{part}_um": np.array([1e6 * one.width * one.in_plane_parts[k] for one in found])
-        for k, part in enumerate(PARTS)
-    }
-    columns["across_um"] = np.array([1e6 * one.width * one.across for one in found])
-    columns |= {
-        f"across_{part}_um": np.array([1e6 * one.width * one.across_parts[k] for one in found])
-        for k, part in enumerate(PARTS)
-    }
-    columns["tilt_in_plane_urad"] = np.array([1e6 * one.in_plane for one in found])
-    columns["tilt_across_urad"] = np.array([1e6 * one.across for one in found])
-    columns["apart_um"] = np.array([1e6 * one.apart for one in found])
-    columns |= {
-        f"apart_{part}_um": np.array([1e6 * one.apart_parts[k] for one in found]) for k, part in enumerate(PARTS)
-    }
-    for side in ("driver", "driven"):
-        for k, axis in enumerate(("e1", "e2")):
-            tilts = np.array([getattr(one, f"{side}_tilt")[k] for one in found])
-            columns[f"tilt_{side}_{axis}_urad"] = 1e6 * tilts
-    return columns
-
-
-def misalignment_summary(found: tuple[MeshMisalignment, ...]) -> dict[str, Any]:
-    """Entries of the summary, by mesh."""
-    return {
-        one.mesh: {
-            "mesh_force_N": one.force,
-            "common_face_width_mm": 1e3 * one.width,
-            "f_sh_um": 1e6 * one.f_sh,
-            **{f"f_sh_{p}_um": 1e6 * one.width * x for p, x in zip(PARTS, one.in_plane_parts, strict=True)},
-            "across_um": 1e6 * one.width * one.across,
-            "apart_um": 1e6 * one.apart,
-        }
-        for one in found
-    }
-
-
-def misalignment_line(one: MeshMisalignment) -> str:
-    """One line of the report."""
-    parts = ", ".join(f"{part} {1e6 * one.width * x:.3g}" for part, x in zip(PARTS, one.in_plane_parts, strict=True))
-    return (
-        f"mesh {one.mesh}: misalignment f_sh = {1e6 * one.f_sh:.3g} um over {1e3 * one.width:.4g} mm ({parts}), across "
-        f"the plane of action {1e6 * one.width * one.across:.3g} um"
     )
 
 

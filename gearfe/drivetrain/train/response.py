@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...base.shown import ShownTable
 from ...base.typing import Array, BoolArray, IntArray
+
+if TYPE_CHECKING:
+    from .shaft_sections import ShaftSections
 
 #: What has a row for each output time.
 SAMPLED = (
@@ -27,6 +30,7 @@ SAMPLED = (
     "acceleration_absolute",
     "attachment_acceleration",
     "gear_pose",
+    "section_coordinates",
     "modal",
     "modal_velocity",
     "modal_acceleration",
@@ -79,6 +83,10 @@ class TrainResponse(ShownTable):
         train is the whole angle turned since the start, the others are small.
     gear_centres : (g, 3)
         Where the gears' centres are at rest (m).
+    section_coordinates : (n, c) or None
+        Coordinates of the elastic shafts; None without any.
+    sections : ShaftSections or None
+        Their cross-sections, with the motion for these coordinates.
     modal, modal_velocity, modal_acceleration : (n, N) or None
         Coordinates of the reduced housing and their rates; None for a rigid housing.
     mesh_frequencies_Hz : (m,)
@@ -148,6 +156,8 @@ class TrainResponse(ShownTable):
     rotation: Array | None = None
     bearing_load: Array | None = None
     bore_acceleration: Array | None = None
+    section_coordinates: Array | None = None
+    sections: ShaftSections | None = None
 
     AXES = ("time_s",)
 

@@ -21,6 +21,7 @@ from ...multibody.integrators.integrate import chosen_method
 from .model import TrainModel
 from .parting import Parting, apart_in_steps, beyond_law, parted
 from .response import TrainResponse, joined
+from .shaft_sections import shaft_sections
 from .states import TrainStates, train_states
 from .statics import ROUND_OFF
 
@@ -335,6 +336,7 @@ def response_of(
     poses, centres = _gear_poses(model, moved)
     speed, common = abs(model.steady_speed), train.kinematics.common_turns
     steady = train.drive.speed.ends if train.drive else False
+    sections = shaft_sections(model)
     return TrainResponse(
         time=t,
         drive_angle=model.angle(t),
@@ -358,6 +360,8 @@ def response_of(
         gear_names=tuple(g.name for g in train.gears),
         gear_pose=poses,
         gear_centres=centres,
+        section_coordinates=None if sections is None else moved.q[:, sections.columns],
+        sections=sections,
         modal=moved.q[:, :bodies] if bodies else None,
         modal_velocity=moved.v[:, :bodies] if bodies else None,
         modal_acceleration=moved.a[:, :bodies] if bodies else None,

@@ -18,6 +18,7 @@ from ...base.typing import Array, IntArray
 from ..gearbox import bearing_report
 from ..gearbox.fields import write_gears, write_housing
 from ..gearbox.report import attachment_to_draw
+from ..gearbox.shaft_report import misalignment_columns, shaft_entries, yielding
 from ..train.gear_train import GearTrain
 from ..train.model import TrainModel
 from ..train.response import TrainResponse
@@ -32,6 +33,7 @@ FRAMES, FIELD_STEPS = 50, 101
 #: Files that depend on the options: what is left of them from an earlier run is removed.
 MAY_WRITE = (
     "spectrum.csv",
+    "misalignment.csv",
     "response.png",
     "spectrum.png",
     "radiated_power.png",
@@ -190,9 +192,11 @@ def write_run(
             with watch.stage("error estimates"):
                 repeated = passes.repeated(choice, str(response.statistics["method"]))
                 run = Run(with_errors(run, planned.model, repeated, band_hz=planned.band_hz), spectra)
-        if spectra is not None:
-            with watch.stage("tables"):
+        with watch.stage("tables"):
+            if spectra is not None:
                 write_csv(target / "spectrum.csv", spectra.columns())
+            if tilted := yielding(planned.model):
+                write_csv(target / "misalignment.csv", misalignment_columns(tilted))
         attachment = attachment_to_draw(made.curves.attachment_names, choice.attachment, train)
         if draw is not None and spectra is not None:
             with watch.stage("pictures"):
@@ -209,7 +213,7 @@ def write_run(
         if run.summary.get("bearings"):
             write_csv(target / bearing_report.FILE, bearing_report.bearing_columns(run.summary["bearings"]))
         watch.seconds["total"] = time.perf_counter() - watch.begun
-        summary = {**run.summary, "timings_s": dict(watch.seconds)}
+        summary = {**run.summary, **shaft_entries(planned.model), "timings_s": dict(watch.seconds)}
         write_json(target / "summary.json", summary)
         names = tuple(sorted(path.name for path in target.iterdir()))
     return Written(names, response, spectra, tuple(problems), summary)
