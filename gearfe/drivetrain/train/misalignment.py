@@ -116,7 +116,12 @@ def _misalignment(model: TrainModel, q: Array, number: int, force: float) -> Mes
 
 
 def static_state(model: TrainModel) -> Array | None:
-    """Coordinates of the system (size,) at rest under the steady torques; None where these move it freely."""
+    """Coordinates of the system (size,) at rest under the steady torques; None where these move it freely.
+
+    With rolling bearings they are those of the operating point: their stiffness there does not hold from no load on.
+    """
+    if model.operating.bearings:
+        return model.operating.coordinates
     modal = model.modal
     push = modal.constant.copy()
     for direction, torque in model.torques:

@@ -43,12 +43,15 @@ class OperatingPoint:
         Newton steps that it took.
     residual
         Unbalanced load in parts of the loads.
+    coordinates : ndarray, shape (n,)
+        Coordinates of the system there.
     """
 
     bearings: Mapping[str, BearingState] = field(default_factory=dict)
     geometry: Mapping[str, BallBearing | RollerBearing] = field(default_factory=dict)
     steps: int = 0
     residual: float = 0.0
+    coordinates: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def warnings(self) -> list[str]:
@@ -148,7 +151,7 @@ def operating_point(
     if not found.converged:
         problem = f"have no equilibrium after {found.steps} steps: {found.residual:.3g} of the load is unbalanced"
         raise InputError("bearings", None, problem, "see that the bearings of every shaft hold it in all directions")
-    return OperatingPoint(states, dict(bearings), found.steps, found.residual)
+    return OperatingPoint(states, dict(bearings), found.steps, found.residual, allowed @ y)
 
 
 def _pressed(bearing: BallBearing | RollerBearing) -> Array:
