@@ -38,7 +38,8 @@ OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
     r"crown|barrel|lead_(mod|corr|dev|slope)|misalign|face_load|end_relief|flank_line|parallelism|slope_deviation":
         ("modifications and loads that vary along the face width", "spur gears only (profiles: [microgeometry])"),
     r"tors\w*_stiff|stiff\w*_tors|bending_stiff|(elastic|flexible|compliant)_shaft|shaft_(stiff|elastic|compl|flex)|"
-    r"shear_modulus": ("elastic shafts", "spur gears on rigid shafts only"),
+    r"shear_modulus":
+        ("stiffnesses of elastic shafts", "they follow from the sections and the material of a shaft with spur gears"),
 }  # fmt: skip
 #: Tables of gear jobs.
 GEAR_TABLES = (

@@ -60,7 +60,7 @@ def misalignment_columns(tilted: tuple[MeshMisalignment, ...]) -> dict[str, Any]
     columns["tilt_across_urad"] = 1e6 * np.array([x.across for x in tilted])
     for gear in ("driver", "driven"):
         tilts = 1e6 * np.array([getattr(x, f"{gear}_tilt") for x in tilted])
-        columns |= {f"tilt_{gear}_about_{axis}_urad": tilts[:, k] for k, axis in enumerate(("e1", "e2"))}
+        columns |= {f"tilt_{gear}_about_{axis}_urad": tilts[:, k] for k, axis in enumerate("xyz")}
     return columns
 
 

@@ -96,6 +96,11 @@ class ElasticShaft(ShaftBody):
         """Rotation of the section at a coordinate along the axis (m) about e1, e2, a, (3, size)."""
         return self.reduced.rows(along)[3:]
 
+    def section_rows(self, along: Array, frame: Array) -> Array:
+        """Motion of sections along x, y, z, (k, 6, size); see `ShaftBody`."""
+        rows = self.reduced.rows(along)
+        return np.concatenate([rows[:, :3], frame.T @ rows[:, 3:]], axis=1)
+
     def gyrations(self) -> tuple[Gyration, ...]:
         r"""Gyroscopic couples that matter, the largest first.
 

@@ -180,6 +180,22 @@ class ShaftBody(Element):
         """Rotation of the section at a coordinate along the axis (m) about e1, e2, a per unit coordinate, (3, size)."""
         raise NotImplementedError
 
+    def section_rows(self, along: Array, frame: Array) -> Array:
+        """Return the motion of sections beside rolling: displacement and rotation along x, y, z, per unit coordinate.
+
+        Parameters
+        ----------
+        along : ndarray, shape (k,)
+            Coordinates along the axis (m).
+        frame : ndarray, shape (3, 3)
+            Rows e1, e2, a: directions of the train.
+
+        Returns
+        -------
+        rows : ndarray, shape (k, 6, size)
+        """
+        raise NotImplementedError
+
     def gyrations(self) -> tuple[Gyration, ...]:
         """Gyroscopic couples."""
         raise NotImplementedError
@@ -223,6 +239,12 @@ class RigidShaft(ShaftBody):
     def turn_rows(self, along: float) -> Array:  # noqa: ARG002
         """Rotation about e1, e2, a, the same of all sections, (3, 6)."""
         return np.eye(6)[3:]
+
+    def section_rows(self, along: Array, frame: Array) -> Array:
+        """Motion of sections along x, y, z, (k, 6, 6); see `ShaftBody`."""
+        points = self.rotor.centre + (along - self.rotor.centre @ frame[2])[:, None] * frame[2]
+        turns = np.hstack([np.zeros((3, 3)), frame.T])
+        return np.array([np.vstack([self.point_rows(point, frame), turns]) for point in points])
 
     def gyrations(self) -> tuple[Gyration, ...]:
         """The one of the whole."""

@@ -51,8 +51,8 @@ class MeshMisalignment:
         How far the gears' centres move apart along the line of action (m): a part of the transmission error.
     in_plane_parts, across_parts, apart_parts : three numbers
         Of them, by shafts, bearings and housing.
-    driver_tilt, driven_tilt : two numbers
-        Tilts of the gears about e1 and e2, x and z of a job file (rad).
+    driver_tilt, driven_tilt : three numbers
+        Tilts of the gears about x, y and z (rad), without their rotation about the axis.
     """
 
     mesh: str
@@ -97,7 +97,8 @@ def _misalignment(model: TrainModel, q: Array, number: int, force: float) -> Mes
     moves = [gear_motion(model, q, gear.name) for gear in (driver, driven)]
     between = moves[0] - moves[1]  # (parts, 6)
     in_plane, across, apart = between[:, 3:] @ np.cross(a, n), between[:, 3:] @ n, -between[:, :3] @ n
-    tilts = [move[:, 3:].sum(axis=0) @ train.frame[:2].T for move in moves]
+    turns = [move[:, 3:].sum(axis=0) for move in moves]
+    tilts = [turn - (turn @ a) * a for turn in turns]
     return MeshMisalignment(
         mesh=line.name,
         driver=driver.name,

@@ -31,6 +31,7 @@ from .kinematics import Kinematics, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
 from .operating import OperatingPoint, operating_point, rolling, settled, typical
 from .program import train_series
+from .shaft_sections import ShaftSections, shaft_sections
 
 #: For periods of steady running, orders of loads are taken as whole multiples of one over a whole number up to this.
 MOST_DENOMINATOR = 1000
@@ -148,6 +149,11 @@ class TrainModel(Facts):
         """Loads on the bores that carry shafts."""
         shared = len(self.start.freedoms.redundant) > 0
         return bearing_loads(self.train, self.system, self.placed, self.bores, shared=shared)
+
+    @cached_property
+    def sections(self) -> ShaftSections | None:
+        """Cross-sections of the elastic shafts; None without any."""
+        return shaft_sections(self.train, self.placed)
 
     @cached_property
     def bore_motion(self) -> Array:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.typing import Array, IntArray
-from .model import TrainModel
+from .gear_train import GearTrain
+from .mesh_element import Shafts
 
 #: Cross-sections along a shaft that are shown, about so many beside the ends of its sections.
 SHOWN = 24
@@ -41,27 +42,24 @@ class ShaftSections:
     rows: Array
 
 
-def shaft_sections(model: TrainModel) -> ShaftSections | None:
-    """Cross-sections of the elastic shafts of a train; None without any."""
-    frame = model.train.frame
-    bodies = [(i, shaft) for i, shaft in enumerate(model.train.shafts) if shaft.sections]
-    if not bodies:
+def shaft_sections(train: GearTrain, placed: Shafts) -> ShaftSections | None:
+    """Cross-sections of the elastic shafts of a train, whose bodies are placed in the system; None without any."""
+    axis = train.frame[2]
+    elastic = [number for number, shaft in enumerate(train.shafts) if shaft.sections]
+    if not elastic:
         return None
-    ends = [(int(model.first[i]), int(model.first[i]) + model.shafts[i].size) for i, _ in bodies]
-    columns = np.concatenate([np.arange(*end) for end in ends])
+    columns = np.concatenate([placed.first[i] + np.arange(placed.bodies[i].size) for i in elastic])
     number, centres, radii, rows = list[int](), list[Array](), list[float](), list[Array]()
-    for i, shaft in bodies:
-        body, middle = model.shafts[i], np.array(shaft.point, dtype=float)
+    for i in elastic:
+        shaft, middle = train.shafts[i], np.array(train.shafts[i].point, dtype=float)
+        places, begin = [], len(centres)
         for low, high, first, last in shaft.outline:
-            for part in np.linspace(0.0, 1.0, 1 + max(1, round(SHOWN * (high - low) / shaft.length))):
-                centre = middle + (low + part * (high - low)) * frame[2]
-                along = float(centre @ frame[2])
-                own = np.vstack([body.point_rows(centre, frame, along), frame.T @ body.turn_rows(along)])
-                whole = np.zeros((6, model.system.size))
-                whole[:, model.first[i] : model.first[i] + body.size] = own
-                number.append(i)
-                centres.append(centre)
-                radii.append(first + part * (last - first))
-                rows.append(whole[:, columns])
-    ratios = model.ratios[number]
-    return ShaftSections(np.array(number), np.array(centres), np.array(radii), ratios, columns, np.array(rows))
+            parts = np.linspace(0.0, 1.0, 1 + max(1, round(SHOWN * (high - low) / shaft.length)))
+            places += [low + part * (high - low) for part in parts]
+            radii += [first + part * (last - first) for part in parts]
+        centres += [middle + place * axis for place in places]
+        number += [i] * len(places)
+        along = np.array(centres[begin:]) @ axis
+        rows.append(placed.whole(i, placed.bodies[i].section_rows(along, train.frame))[..., columns])
+    ratios = np.array(placed.ratios)[number]
+    return ShaftSections(np.array(number), np.array(centres), np.array(radii), ratios, columns, np.concatenate(rows))

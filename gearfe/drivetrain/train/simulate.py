@@ -21,7 +21,6 @@ from ...multibody.integrators.integrate import chosen_method
 from .model import TrainModel
 from .parting import Parting, apart_in_steps, beyond_law, parted
 from .response import TrainResponse, joined
-from .shaft_sections import shaft_sections
 from .states import TrainStates, train_states
 from .statics import ROUND_OFF
 
@@ -336,7 +335,7 @@ def response_of(
     poses, centres = _gear_poses(model, moved)
     speed, common = abs(model.steady_speed), train.kinematics.common_turns
     steady = train.drive.speed.ends if train.drive else False
-    sections = shaft_sections(model)
+    sections = model.sections
     return TrainResponse(
         time=t,
         drive_angle=model.angle(t),
