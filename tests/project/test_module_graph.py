@@ -23,6 +23,8 @@ HEAVY = {
     ): "sparse matrices; a reduced body is read from the cache",
     ("gearfe.drivetrain.housing.body", "gearfe.drivetrain.housing.superelement"): "sparse matrices",
     ("gearfe.drivetrain.housing.body", "gearfe.fem.meshing.mesh_file"): "readers of meshes",
+    ("gearfe.drivetrain.gearbox.job", "gearfe.fem.beams"): "beams; for elastic shafts only",
+    ("gearfe.drivetrain.train.model", "gearfe.drivetrain.train.elastic_shaft"): "beams; for elastic shafts only",
     ("gearfe.mechanisms.plates", "gearfe.fem.plane"): "finite elements",
     ("gearfe.mechanisms.plates", "gearfe.fem.reduction.plate"): "finite elements",
     ("gearfe.mechanisms.plates", "gearfe.fem.meshing.plate_mesh"): "the mesher",
