@@ -8,6 +8,7 @@ opens `shown`, so a library call stays silent. The first two seconds of a run st
 
 from __future__ import annotations
 
+import math
 import shutil
 import sys
 import threading
@@ -22,6 +23,8 @@ SILENT, LOOK, SETTLED = 2.0, 0.2, 1.0
 #: A time left is shown where the rates of all that is counted and of its later half differ by this factor at most; how
 #: much longer than the one before a stretch is whose end is remembered.
 STEADY, STRETCH = 1.5, 1.2
+#: Times left of more days than this are not given as a number.
+MOST_DAYS = 100.0
 #: Seconds after which a stage that still goes on is shown again where lines stay; doubled each time.
 AGAIN = 60.0
 
@@ -55,6 +58,8 @@ class _Stage:
         made = self.done - self.first
         rates = [made / (now - self.counted)]
         halves = [mark for mark in self.marks if mark[1] - self.first <= 0.5 * made and mark[0] < now]
+        if halves and halves[-1][1] == self.first:
+            return 0.0  # one stretch alone does not show whether the next ones take as long
         if halves:
             when, done = halves[-1]
             rates.append((self.done - done) / (now - when))
@@ -68,18 +73,19 @@ class _Stage:
         made = self.done - self.first
         if self.total is None:
             parts = [f"{self.done} {self.what}"]
-            parts += [f"{made / elapsed:.3g}/s"] if elapsed >= SETTLED and made > 0.0 else []
+            parts += [f"{written_out(made / elapsed)}/s"] if elapsed >= SETTLED and made > 0.0 else []
             return f"{self.name}: {', '.join(parts)}"
         share = min(1.0, self.done / self.total)
         whole = isinstance(self.total, int)
         what = self.what if self.what and self.what != self.name else ""
-        far = f"{self.done} of {self.total}" if whole else f"{100.0 * share:.0f} %"
+        # rounded down: 100 % is the end alone
+        far = f"{self.done} of {self.total}" if whole else f"{math.floor(100.0 * share + 1e-9)} %"
         parts = [f"{what} {far}".strip()]
         if elapsed >= SETTLED and made > 0.0 and share < 1.0:
-            parts += [f"{made / elapsed:.3g}/s"] if whole else []
+            parts += [f"{written_out(made / elapsed)}/s"] if whole else []
             steps, expected = self.steps
             if expected > steps > 0:
-                parts.append(f"{steps} of about {expected:.1g} steps")
+                parts.append(f"{steps} of about {written_out(expected, 2)} steps")
                 parts.append(f"about {duration((expected - steps) * elapsed / steps)} left")
             elif (rate := self._steady(now)) > 0.0:
                 parts.append(f"{duration((self.total - self.done) / rate)} left")
@@ -201,8 +207,18 @@ def duration(seconds: float) -> str:
     """Time for people."""
     if seconds < 100.0:
         return f"{seconds:.0f} s"
+    days = seconds / 86400.0
+    if not days <= MOST_DAYS:
+        return f"more than {MOST_DAYS:.0f} days"
     minutes, rest = divmod(round(seconds), 60)
+    if minutes >= 48 * 60:
+        return f"{days:.0f} days"
     return f"{minutes} min {rest:02d} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def written_out(number: float, digits: int = 3) -> str:
+    """A number > 0 with so many digits, written out (1230, 0.0952) from 1e-4 to 1e15."""
+    return f"{float(f'{number:.{digits}g}'):.15g}"
 
 
 _displays: list[Display] = []

@@ -14,6 +14,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.files import output_folder, whole_set, write_csv, write_json
 from ..base.progress import stage
+from ..base.shown import percent
 from ..multibody import Start, Trajectory, integrate
 from ..multibody.core.inverse import prescribed_motion
 from ..multibody.core.mass_regularisation import free_motions
@@ -338,7 +339,7 @@ def _link_line(link: dict[str, Any]) -> str:
         if key in link:
             line += f", {kind} up to {1e-6 * link[key]:.3g} MPa"
     if link.get("largest_strain", 0.0) > LINEAR:
-        strains = f"{100.0 * link['largest_strain']:.3g} %, linear elasticity holds to about {100.0 * LINEAR:g} %"
+        strains = f"{percent(link['largest_strain'], 3)}, linear elasticity holds to about {100.0 * LINEAR:g} %"
         line += f"; strains up to {strains}: check whether the mechanism locks with this link rigid (flexible = false)"
     return line
 

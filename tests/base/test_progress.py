@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import threading
 import time
 
@@ -57,8 +58,9 @@ def test_a_stage_apart_is_told_inside_of_a_count_and_is_none_of_its_time(monkeyp
     display = Display(stream := io.StringIO(), rewritten=False, silent=0.0, each=True)
     display.enter("integrating")
     display.count(0, 100, "implicit")
-    clock[0] += 20.0
-    display.count(20, 100, "implicit")
+    for done in (10, 20):
+        clock[0] += 10.0
+        display.count(done, 100, "implicit")
     display.enter("compiling the kernels", apart=True)
     clock[0] += 30.0
     display.leave()
@@ -107,12 +109,29 @@ def test_rate_and_remaining_time():
     assert _Stage("positions", 30, 120, "positions", 10.0).text(20.0) == "positions: 30 of 120, 3/s, 30 s left"
     assert _Stage("integrating", 0.25, 1.0, "ms", 0.0).text(100.0) == "integrating: ms 25 %, 5 min 00 s left"
     unsteady = _Stage("integrating", 0.25, 1.0, "", 0.0, steps=(1000, 5000.0))  # steps take equal times
-    assert unsteady.text(10.0) == "integrating: 25 %, 1000 of about 5e+03 steps, about 40 s left"
+    assert unsteady.text(10.0) == "integrating: 25 %, 1000 of about 5000 steps, about 40 s left"
     gone_on = _Stage("cases", 930, 1000, "cases", 10.0, 900.0)  # 900 stood there before
     assert gone_on.text(20.0) == "cases: 930 of 1000, 3/s, 23 s left"
     assert _Stage("meshing").text(50.0) == "meshing"
     assert _Stage("a", 5, 5, "", 0.0).text(9.0) == "a: 5 of 5"
     assert _Stage("search", 30, None, "points", 10.0).text(20.0) == "search: 30 points, 3/s"
+    assert _Stage("positions", 15000, 60000, "positions", 10.0).text(20.0).endswith("60000, 1500/s, 30 s left")
+    assert _Stage("search", 12300, None, "points", 10.0).text(20.0) == "search: 12300 points, 1230/s"
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.29, "29 %"), (0.996, "99 %"), (1.0 - 1e-7, "99 %"), (1.0, "100 %")])
+def test_a_hundred_per_cent_is_the_end_alone(share, told):
+    assert _Stage("integrating", share, 1.0, "", 10.0).text(10.5) == f"integrating: {told}"
+
+
+def test_one_stretch_alone_gives_no_time_left():
+    """The first of ten cases took 5 s; whether the second does is known when it is done."""
+    at = _Stage("cases", 0, 10, "cases", 100.0)
+    told = []
+    for at.done in range(3):
+        at.mark(100.0 + 5.0 * at.done)
+        told.append(at.text(100.0 + 5.0 * at.done))
+    assert told[1:] == ["cases: 1 of 10, 0.2/s", "cases: 2 of 10, 0.2/s, 40 s left"]
 
 
 @pytest.mark.parametrize(
@@ -134,7 +153,18 @@ def test_a_time_left_is_shown_where_the_rate_is_steady_alone(later, told):
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"), [(3.4, "3 s"), (99.0, "99 s"), (150.0, "2 min 30 s"), (7300.0, "2 h 01 min")]
+    ("seconds", "text"),
+    [
+        (3.4, "3 s"),
+        (99.0, "99 s"),
+        (150.0, "2 min 30 s"),
+        (7300.0, "2 h 01 min"),
+        (3599.6, "1 h 00 min"),
+        (3e5, "3 days"),
+        (1e15, "more than 100 days"),
+        (math.inf, "more than 100 days"),
+        (math.nan, "more than 100 days"),
+    ],
 )
 def test_durations(seconds, text):
     assert progress.duration(seconds) == text

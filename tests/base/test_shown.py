@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from gearfe.mechanisms import load_mechanism
 from gearfe.multibody import constant, integrate
 from tests.makers import gears, trains
 from tests.makers.studies import written
-from tests.places import GEOMETRY, MESHES
+from tests.places import GEOMETRY, MESHES, ROOT
 
 
 @pytest.fixture(scope="module")
@@ -141,3 +142,14 @@ def test_a_missing_library_is_named_with_its_line(results: dict[str, Any], monke
 )  # fmt: skip
 def test_percentages_have_no_powers_of_ten_that_people_write_out(share: float, text: str) -> None:
     assert percent(share) == text
+
+
+def test_every_computed_percentage_is_written_by_percent() -> None:
+    """Rounded to digits by a format of its own, 120 % is 1.2e+02 %."""
+    own = re.compile(r"\.\dg\} ?%")
+    found = [
+        path.name
+        for path in sorted((ROOT / "gearfe").rglob("*.py"))
+        if path.name != "shown.py" and own.search(path.read_text(encoding="utf-8"))
+    ]
+    assert found == []

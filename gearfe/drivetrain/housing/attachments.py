@@ -15,6 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from ...base.errors import InputError
+from ...base.shown import percent
 from ...base.typing import Array, BoolArray, IntArray
 
 Vector = tuple[float, float, float]
@@ -189,7 +190,7 @@ def cylinder_notes(field: str, name: str, offset: Array, axis: Array, *, of_radi
     notes = []
     if most - least > OUT_OF_ROUND * of_radius:
         problem = (
-            f"{between}: out of round by {100.0 * (most - least) / of_radius:.2g} % of the radius, more than "
+            f"{between}: out of round by {percent((most - least) / of_radius)} of the radius, more than "
             f"{100.0 * OUT_OF_ROUND:g} %"
         )
         cure = (

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.progress import stage
-from ...base.shown import Facts
+from ...base.shown import Facts, percent
 from ...base.tables.housing import POISSON_RATIOS
 from ...base.typing import Array, IntArray
 from ...fem.bodies.mesh_checks import checked_mesh
@@ -251,7 +251,7 @@ class Housing(Facts):
         if abs(share) > MOST_ADDED:
             problem = (
                 f"curved edges folded {shape.folded} elements, and straightening them changes the mass by "
-                f"{100.0 * share:+.2g} %, more than {100.0 * MOST_ADDED:g} %"
+                f"{percent(share)}, more than {100.0 * MOST_ADDED:g} %"
             )
             cure = (
                 "mesh the curved walls with smaller elements, let the mesher keep them from folding (gmsh: "
@@ -260,7 +260,7 @@ class Housing(Facts):
             raise InputError("housing.mesh", None, problem, cure)
         return (
             f"{note}, and {shape.moved} midside nodes of the surface by up to {1e3 * shape.farthest:.2g} mm: the mass "
-            f"changes by {added:+.2g} kg ({100.0 * share:+.2g} %), which no error estimate covers",
+            f"changes by {added:+.2g} kg ({percent(share)}), which no error estimate covers",
         )
 
     def reduce(
