@@ -26,7 +26,7 @@ from .pairs import Table, borne_torque, log_uniform, rounded, running_pair
 from .toml_text import toml_text
 
 #: Random places of the contact solutions that the law is held against, and of the law by itself.
-TRUTHS, PLACES = 80, 2000
+TRUTHS, PLACES = 300, 2000
 #: Torques at the driven gear, as shares of what the material bears.
 TORQUES = (1e-4, 1.0)
 #: Largest error (of the force, or of a tenth of the largest one that the law is asked for) over the stated one.

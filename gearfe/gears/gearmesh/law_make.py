@@ -12,7 +12,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.typing import Array, IntArray
 from ..contact.half_plane import HalfPlanePair, coupling_compliances, solve_half_plane
-from ..contact.position import Positions, joined, taken
+from ..contact.position import Positions, joined, taken, together
 from ..geometry.first_contact import FirstContacts
 from .law import NO_CONTACT, MeshLaw
 from .law_fit import LEAST_FORCE, Couple, PairForces, TouchCurve, fit_law, touch_cubics
@@ -21,9 +21,9 @@ from .law_fit import LEAST_FORCE, Couple, PairForces, TouchCurve, fit_law, touch
 CELLS, PLACES = 12, (0.25, 0.75)
 #: Their approaches beyond the first touch, in parts of the largest: small ones show how a pair comes into contact.
 DEPTHS = (0.0025, 0.008, 0.025, 0.06, 0.12, 0.2, 0.32, 0.5, 0.75, 1.0)
-#: Contact solutions in each cell that check the law, and rounds of them: the later ones check cells again whose
-#: largest error is more than this part of the tolerance. Rounds for all cells of the final law.
-CHECKS, CHECK_ROUNDS, DOUBTFUL, FINAL_ROUNDS = 18, 2, 0.5, 1
+#: Contact solutions in each new cell that check the law. In each cell of the final law: evenly spread ones, and those
+#: of so many samples where the last fit, to checks of the former law, changes the force most: errors are large there.
+CHECKS, FINAL_CHECKS, GUIDED_CHECKS, SAMPLES = 18, 6, 4, 100
 #: Least approach of checks, in parts of that of the asked force; the logarithm of the others falls to it by this power
 #: of an even distribution, as errors at less than a tenth of the asked force count less.
 LEAST_CHECK, DEEP = 0.0015, 1.5
@@ -72,6 +72,7 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
     nodes, slots = _nodes(pair, reach)
     C = coupling_curve(pair, _phases(nodes, slots), reach)
     known: list[PairForces] = []
+    solutions: list[Positions] = []
     points = itertools.count(1)
 
     def solve(angles: Array, depths: Array) -> Positions:
@@ -82,23 +83,29 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
         # pair forces of smaller approaches are those of their errors (`gearfe.gears.gearmesh.law_fit.NOISE`)
         fitted = taken(solved.contacts, depths[solved.contacts.position] >= DEPTHS[0])
         known.append(_pair_forces(pair, replace(solved, contacts=fitted), touches, C))
+        solutions.append(solved.without_loads())
         return solved
 
-    def check(law: MeshLaw, angles: Array, parts: Array) -> Array:
-        """Relative errors at pinion angles, and at approaches from the least (0) to the reach (1)."""
-        depths = (LEAST_CHECK * needed / reach) ** ((1.0 - parts) ** DEEP)
-        return _errors(law, pair, solve(angles, depths), LEAST_FORCE * force)
+    def largest_errors(law: MeshLaw, solved: Positions) -> Array:
+        """Largest relative error in contact solutions, cell by cell."""
+        largest = np.zeros(len(law.nodes) - 1)
+        np.maximum.at(largest, law.locate(solved.pinion_angle)[1], _errors(law, pair, solved, LEAST_FORCE * force))
+        return largest
 
-    def check_cells(law: MeshLaw, begin: Array, width: Array) -> Array:
-        """Relative errors at `CHECKS` further places of each cell, cell by cell."""
-        places, parts = _spread(points, CHECKS * len(begin))
-        return check(law, np.repeat(begin, CHECKS) + places * np.repeat(width, CHECKS), parts)
+    def depths_of(parts: Array) -> Array:
+        """Approaches of checks (parts of the reach), from the least (0) to the needed one (1)."""
+        depths: Array = (LEAST_CHECK * needed / reach) ** ((1.0 - parts) ** DEEP)
+        return depths
 
-    begin, width, error = nodes[:-1], np.diff(nodes), 0.0
-    for halvings_left in range(HALVINGS, -1, -1):
-        angles = _places(begin, width, PLACES)
-        solve(np.repeat(angles, len(DEPTHS)), np.tile(np.array(DEPTHS), len(angles)))
-        law = fit_law(
+    def spread(law: MeshLaw, number: IntArray) -> tuple[Array, Array]:
+        """Pinion angles (rad) and approaches (parts of the reach) of so many checks of each cell, cell by cell."""
+        cell = np.repeat(np.arange(len(number)), number)
+        places, parts = _spread(points, len(cell))
+        return law.nodes[cell] + places * np.diff(law.nodes)[cell], depths_of(parts)
+
+    def fit() -> MeshLaw:
+        """The law of all contacts so far."""
+        return fit_law(
             joined(known),
             touch_curve(pair, _phases(nodes, slots)),
             C,
@@ -108,28 +115,58 @@ def mesh_law(pair: HalfPlanePair, force: float, *, tolerance: float = TOLERANCE)
             reach=reach,
             force=force,
         )
-        order = np.argsort(begin)
-        begin, width, largest = begin[order], width[order], np.zeros(len(begin))
+
+    def final_checks(law: MeshLaw, former: MeshLaw) -> tuple[Array, Array]:
+        """Places as of `spread` in all cells, among them those where the force changes most from a former law."""
+        every = np.ones(len(law.nodes) - 1, dtype=np.int64)
+        evenly, samples = spread(law, FINAL_CHECKS * every), spread(law, SAMPLES * every)
+        guided = _largest_changes(law, former, *samples, LEAST_FORCE * force)
+        angles, depths = (np.append(even, sampled[guided]) for even, sampled in zip(evenly, samples, strict=True))
+        return angles, depths
+
+    begin, width = nodes[:-1], np.diff(nodes)
+    for halvings_left in range(HALVINGS, -1, -1):
+        angles = _places(begin, width, PLACES)
+        solve(np.repeat(angles, len(DEPTHS)), np.tile(np.array(DEPTHS), len(angles)))
+        law = fit()
+        new = np.isin(nodes[:-1], begin)
+        angles, depths = spread(law, CHECKS * new)
         changes = np.repeat(_changes(law), CHANGE_CHECKS)
-        cells = np.searchsorted(begin, changes, side="right") - 1
-        inside = (cells >= 0) & (changes < (begin + width)[cells])
+        changes = changes[new[law.locate(changes)[1]]]
         _, parts = _spread(points, len(changes))
-        np.maximum.at(largest, cells[inside], check(law, changes[inside], parts[inside]))
-        doubtful = np.ones(len(begin), dtype=bool)
-        for _ in range(CHECK_ROUNDS):
-            cells = np.flatnonzero(doubtful)
-            np.maximum.at(largest, np.repeat(cells, CHECKS), check_cells(law, begin[cells], width[cells]))
-            coarse = (largest > tolerance) & (halvings_left > 0)
-            doubtful = (largest > DOUBTFUL * tolerance) & ~coarse
-        error = max(error, float(largest[~coarse].max(initial=0.0)))
-        if not coarse.any():
+        solved = solve(np.append(angles, changes), np.append(depths, depths_of(parts)))
+        errors = largest_errors(law, solved)
+        if halvings_left == 0 or errors.max() <= tolerance:
+            # checks that accept a cell are the lucky ones: others see the law that is fitted to all of these, too
+            former, law = law, fit()
+            solved = solve(*final_checks(law, former))
+            errors = np.maximum(largest_errors(former, together(solutions[:-1])), largest_errors(law, solved))
+        coarse = np.flatnonzero(errors > tolerance)
+        if halvings_left == 0 or not len(coarse):
             break
-        begin, width = np.append(begin[coarse], begin[coarse] + 0.5 * width[coarse]), np.tile(0.5 * width[coarse], 2)
+        width = np.tile(0.5 * np.diff(nodes)[coarse], 2)
+        begin = np.append(nodes[coarse], nodes[coarse] + width[: len(coarse)])
         nodes = np.union1d(nodes, begin)
-    # the checks that accepted a cell are the lucky ones: others see the final law
-    for _ in range(FINAL_ROUNDS):
-        error = max(error, float(check_cells(law, nodes[:-1], np.diff(nodes)).max()))
-    return replace(law, backlash=geometry.base_backlash, error=error)
+    return replace(law, backlash=geometry.base_backlash, error=float(errors.max()))
+
+
+def _largest_changes(law: MeshLaw, former: MeshLaw, angles: Array, depths: Array, least: float) -> IntArray:
+    """Numbers of `GUIDED_CHECKS` of `SAMPLES` samples in each cell where two laws' forces differ most.
+
+    Parameters
+    ----------
+    law, former : MeshLaw
+        With the same cells.
+    angles, depths : ndarray, shape (cells SAMPLES,)
+        Pinion angles (rad) and approaches beyond the first touch (parts of the reach), cell by cell.
+    least : float
+        Forces count as this (N) or more.
+    """
+    approaches = law.first_contact(angles) + law.reach * depths
+    force = law(angles, approaches).force
+    change = np.abs(former(angles, approaches).force - force) / np.maximum(force, least)
+    order = np.argsort(change.reshape(-1, SAMPLES), axis=1)[:, -GUIDED_CHECKS:]
+    return np.asarray((order + SAMPLES * np.arange(len(order))[:, None]).ravel())
 
 
 def _spread(points: Iterator[int], count: int) -> Array:
@@ -197,7 +234,7 @@ def touch_curve(pair: HalfPlanePair, phases: Array) -> TouchCurve:
     """t and its slope at pinion angles of a pair's own tooth (rad), from where the rigid driving flanks touch."""
     geometry = pair.pair
     radius = geometry.wheel.base_radius
-    met = pair.teeth.first_contacts(phases)
+    met = pair.first_contacts(phases)
     own = np.flatnonzero(met.pair == 0)
     value, slope = np.full(len(phases), NO_CONTACT), np.zeros(len(phases))
     at = met.position[own]
@@ -235,7 +272,7 @@ def coupling_curve(pair: HalfPlanePair, phases: Array, reach: float) -> list[Cou
 
 def _first_contacts(pair: HalfPlanePair, angles: Array) -> tuple[FirstContacts, Array]:
     """All touches at pinion angles, and the first twist at each (rad)."""
-    met = pair.teeth.first_contacts(angles)
+    met = pair.first_contacts(angles)
     first = np.full(len(angles), np.inf)
     np.minimum.at(first, met.position, met.twist)
     return met, first
