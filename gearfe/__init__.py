@@ -20,7 +20,18 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .drivetrain.modes.whirl import train_modes
     from .drivetrain.runup.run_up import run_up, steady_state
     from .drivetrain.train import TrainModel, TrainResponse, build_train
-    from .drivetrain.train.gear_train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+    from .drivetrain.train.gear_train import (
+        Bearing,
+        Coupling,
+        Damping,
+        Drive,
+        GearMesh,
+        GearTrain,
+        Load,
+        Machine,
+        Shaft,
+        ShaftGear,
+    )
     from .drivetrain.train.simulate import simulate
     from .fem.plane import Material
     from .fem.reduction.modal_body import ModalBody
@@ -38,6 +49,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
 _PUBLIC: dict[str, str] = {
     "BallBearing": "drivetrain.bearings",
     "Bearing": "drivetrain.train",
+    "Coupling": "drivetrain.train",
     "Damping": "drivetrain.train",
     "Drive": "drivetrain.train",
     "Gear": "gears.geometry",
@@ -46,6 +58,7 @@ _PUBLIC: dict[str, str] = {
     "Housing": "drivetrain.housing.model",
     "InputError": "base.errors",
     "Load": "drivetrain.train",
+    "Machine": "drivetrain.train",
     "LoadMap": "gears.gearmesh.load_map",
     "Material": "fem.plane",
     "ModalBody": "fem.reduction.modal_body",
@@ -78,6 +91,7 @@ _PUBLIC: dict[str, str] = {
 __all__ = [
     "BallBearing",
     "Bearing",
+    "Coupling",
     "Damping",
     "Drive",
     "Gear",
@@ -88,6 +102,7 @@ __all__ = [
     "InputError",
     "Load",
     "LoadMap",
+    "Machine",
     "Material",
     "ModalBody",
     "PairModel",

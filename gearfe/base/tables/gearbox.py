@@ -14,6 +14,7 @@ from typing import Any
 
 from ..errors import InputError, unknown_name
 from .bearing import BearingTable
+from .driveline import CouplingTable, MachineTable, TrainCouplingTable, TrainMachineTable
 from .loadmap import LoadMapTable
 from .microgeometry import GearMicrogeometryTable, MicrogeometryTable
 from .named import NamedBearingTable, NamedGearTable, NamedMeshTable, NamedShaftTable
@@ -460,14 +461,16 @@ def named_train(
     meshes: Mapping[str, NamedMeshTable],
     shafts: Mapping[str, NamedShaftTable],
     bearings: Mapping[str, NamedBearingTable],
+    machines: Mapping[str, MachineTable] | None = None,
+    couplings: Mapping[str, CouplingTable] | None = None,
 ) -> TrainTable:
-    """Return [train] with the shafts, meshes and bearings of their own tables.
+    """Return [train] with the shafts, meshes, bearings, machines and couplings of their own tables.
 
     Parameters
     ----------
     table : TrainTable
         [train], without lists of these.
-    meshes, shafts, bearings
+    meshes, shafts, bearings, machines, couplings
         The tables by name.
 
     Raises
@@ -475,7 +478,7 @@ def named_train(
     InputError
         For lists of [train] that stand beside these tables, and for names that do not exist.
     """
-    for key in ("shafts", "gears", "meshes", "bearings"):
+    for key in ("shafts", "gears", "meshes", "bearings", "machines", "couplings"):
         if getattr(table, key):
             problem = f"stands beside [{'shafts' if key == 'gears' else key}.NAME]"
             raise InputError(f"[[train.{key}]]", None, problem, f"write all {key} as [{key}.NAME], or all as lists")
@@ -524,7 +527,12 @@ def named_train(
     if places and len(places) < len(bearings):
         lacking = next(name for name, b in bearings.items() if b.y_mm is None)
         raise InputError(f"bearings.{lacking}.y_mm", None, "is required: other bearings have one", "give all, or none")
-    made = replace(table, shafts=rows, meshes=tuple(meshes.values()), bearings=springs)
+    made = replace(
+        table, shafts=rows, meshes=tuple(meshes.values()), bearings=springs,
+        machines=_named_rows(TrainMachineTable, machines or {}),
+        couplings=_named_rows(TrainCouplingTable, couplings or {}),
+    )  # fmt: skip
+    made.check_driveline("machines.{name}", "couplings.{name}")
     made = replace(made, rigid_bores=places or table.rigid_bores)
     ends: list[tuple[str, Any]] = [] if made.drive is None else [("train.drive", made.drive)]
     ends += [(f"train.loads[{i}]", load) for i, load in enumerate(made.loads)]
@@ -580,6 +588,13 @@ def with_materials(table: TrainTable, materials: Mapping[str, MaterialTable], wh
         sections = tuple(known(part, f"{place}.sections[{i}]") for i, part in enumerate(shaft.sections))
         shafts.append(replace(known(shaft, place), sections=sections))
     return replace(table, shafts=tuple(shafts))
+
+
+def _named_rows(row: type, tables: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Entries of a list from tables by name."""
+    return tuple(
+        row(name=name, **{f.name: getattr(table, f.name) for f in fields(table)}) for name, table in tables.items()
+    )
 
 
 def _bore(name: str, bearing: NamedBearingTable) -> str:

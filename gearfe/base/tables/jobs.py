@@ -117,6 +117,8 @@ def _check_shorthand(raw: Mapping[str, Any]) -> None:
         ("gears", "meshes"),
         ("materials", "gears"),
         ("bearings", "shafts"),
+        ("machines", "shafts"),
+        ("couplings", "shafts"),
         ("shafts", "gears"),
     )
     for kind, needs in pairs:
@@ -280,7 +282,8 @@ def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = No
             problem = "stands beside an elastic housing, whose bores have places of their own"
             cure = 'name the bore (attachment) instead, or write housing = "rigid" in [train]'
             raise InputError(f"bearings.{placed}.y_mm", bearings[placed].y_mm, problem, cure)
-        table = named_train(table, tables["meshes"], tables["shafts"], bearings)
+        parts = {kind: tables.get(kind, {}) for kind in ("machines", "couplings")}
+        table = named_train(table, tables["meshes"], tables["shafts"], bearings, **parts)
         table = with_materials(table, tables.get("materials", {}), "shafts.{name}")
     else:
         for key in ("shafts", "gears"):

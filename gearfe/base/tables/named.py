@@ -1,4 +1,4 @@
-"""Tables of gears, meshes, shafts and bearings by name: [gears.NAME], [meshes.NAME], [shafts.NAME], [bearings.NAME].
+"""Tables by name: [gears.NAME], [meshes.NAME], [shafts.NAME], [bearings.NAME], [machines.NAME], [couplings.NAME].
 
 The tables of a pair ([pair], [microgeometry]) and the lists of a train ([[train.gears]], ...) are shorthand for these.
 `gearfe.base.tables.gearbox` makes one form of either.
@@ -15,6 +15,7 @@ from typing import Any
 from ..config import build, quantity
 from ..errors import InputError
 from .bearing import BearingTable
+from .driveline import CouplingTable, MachineTable
 from .loadmap import LoadMapTable
 from .microgeometry import GearMicrogeometryTable
 from .pair import GearBodyTable, MaterialTable, StiffnessTable, check_gear
@@ -92,6 +93,8 @@ NAMED: dict[str, type] = {
     "meshes": NamedMeshTable,
     "shafts": NamedShaftTable,
     "bearings": NamedBearingTable,
+    "machines": MachineTable,
+    "couplings": CouplingTable,
     "materials": MaterialTable,
 }
 

@@ -12,6 +12,7 @@ from typing import ClassVar
 from ..config import Removed, quantity
 from ..errors import InputError, unknown_name
 from .bearing import BearingTable
+from .driveline import TrainCouplingTable, TrainMachineTable
 from .kinds import GONE_METHODS
 from .pair import FROM_DISTANCE, HANDS, MaterialTable, StiffnessTable, ToothFormTable
 from .timefunction import TrainFunctionTable
@@ -338,15 +339,25 @@ class TrainMeshTable:
 
 @dataclass(frozen=True)
 class TrainDriveTable:
-    """Rotation of a shaft relative to one of its bores, prescribed."""
+    """Rotation of a shaft relative to one of its bores, prescribed, or a torque on it."""
 
     shaft: str = quantity(doc="shaft that is driven")
-    attachment: int | str = quantity(doc="bore against which its rotation is prescribed")
+    attachment: int | str | None = quantity(
+        None,
+        doc="bore against which its rotation is prescribed, or on which the torque reacts; left out: the ground",
+    )
     y_mm: float | None = quantity(
         None, doc="place on an elastic shaft where it is driven (mm); left out: that of the bore"
     )
+    machine: str = quantity("", doc="machine of that shaft which is driven; left out: the shaft itself")
     speed_rad_per_s: float | TrainFunctionTable = quantity(  # noqa: RUF009
-        doc="speed about +y (rad/s), or a function of time"
+        doc="speed about +y (rad/s), or a function of time; beside torque_Nm the nominal one, which may be missed"
+    )
+    torque_Nm: float | TrainFunctionTable | None = quantity(  # noqa: RUF009
+        None, doc="torque about +y (N m), or a function of time; left out: the speed is prescribed"
+    )
+    torque_slope_Nm_s_per_rad: float = quantity(
+        0.0, low=0.0, doc="by how much that torque falls with the speed beyond speed_rad_per_s (N m s/rad)"
     )
     ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from rest to the speed (ms)")
     ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant speed")
@@ -356,8 +367,19 @@ class TrainDriveTable:
     damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of that coupling (N m s/rad)")
 
     def check(self, where: str) -> None:
-        """A ramp is of a number."""
+        """A ramp is of a number; a torque leaves the speed free."""
         _check_ramp(where, "speed_rad_per_s", self.speed_rad_per_s, self.ramp_width_ms)
+        if self.torque_Nm is None and self.torque_slope_Nm_s_per_rad:
+            problem = "is of a torque, and none is given"
+            key = "torque_slope_Nm_s_per_rad"
+            raise InputError(
+                f"{where}.{key}", self.torque_slope_Nm_s_per_rad, problem, "add torque_Nm, or leave it out"
+            )
+        for key in ("stiffness_Nm_per_rad", "damping_Nm_s_per_rad"):
+            if self.torque_Nm is not None and getattr(self, key):
+                problem = "stands beside torque_Nm: nothing prescribes the rotation behind the coupling"
+                cure = "use a machine with a spring ([machines.NAME]), or leave one out"
+                raise InputError(f"{where}.{key}", getattr(self, key), problem, cure)
 
 
 @dataclass(frozen=True)
@@ -365,9 +387,13 @@ class TrainLoadTable:
     """Torque on a shaft and its reaction on a bore."""
 
     shaft: str = quantity(doc="shaft that is loaded")
+    machine: str = quantity("", doc="machine of that shaft on which the torque acts; left out: the shaft itself")
     attachment: int | str | None = quantity(None, doc="bore on which the torque reacts; left out: outside of the train")
     y_mm: float | None = quantity(
         None, doc="place on an elastic shaft where the torque acts (mm); left out: that of the bore"
+    )
+    torque_slope_Nm_s_per_rad: float = quantity(
+        0.0, low=0.0, doc="by how much the torque falls with the speed beyond the nominal one (N m s/rad)"
     )
     torque_Nm: float | TrainFunctionTable = quantity(  # noqa: RUF009
         doc="torque about +y on the shaft (N m), or a function of time"
@@ -497,6 +523,8 @@ class TrainTable:
     loads: tuple[TrainLoadTable, ...] = quantity((), doc="[[train.loads]]")
     bearings: tuple[TrainBearingTable, ...] = quantity((), doc="[[train.bearings]]; or [bearings.NAME]")
     rigid_bores: tuple[TrainRigidBoreTable, ...] = quantity((), doc="[[train.rigid_bores]]")
+    machines: tuple[TrainMachineTable, ...] = quantity((), doc="[[train.machines]]; or [machines.NAME]")
+    couplings: tuple[TrainCouplingTable, ...] = quantity((), doc="[[train.couplings]]; or [couplings.NAME]")
     curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.curves]")  # noqa: RUF009
     damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.damping]")  # noqa: RUF009
     variant: str = quantity("", doc="variant that is simulated when none is asked for; left out: [train] as it stands")
@@ -513,6 +541,31 @@ class TrainTable:
             self.chosen(self.variant)
         if self.shafts or self.gears or self.meshes:
             self._check_names(where)
+            self.check_driveline(f"{where}.machines[{{number}}]", f"{where}.couplings[{{number}}]")
+
+    def check_driveline(self, machine_where: str, coupling_where: str) -> None:
+        """Raise `InputError` for shafts and machines that do not exist, and names that are used twice.
+
+        `machine_where` and `coupling_where` are patterns of the names of their tables in messages.
+        """
+        shafts = [shaft.name for shaft in self.shafts]
+        machines = [(row.name, machine_where, "shaft", (row.shaft,)) for row in self.machines]
+        couplings = [(row.name, coupling_where, "shafts", row.shafts) for row in self.couplings]
+        for rows in (machines, couplings):
+            for number, (name, pattern, key, used) in enumerate(rows):
+                place = pattern.format(number=number, name=name)
+                if name in [row[0] for row in rows[:number]]:
+                    raise InputError(f"{place}.name", name, "is used twice", "give each its own name")
+                for shaft in used:
+                    if shaft not in shafts:
+                        raise unknown_name(f"{place}.{key}", shaft, shafts)
+        ends: list[tuple[str, TrainDriveTable | TrainLoadTable]] = []
+        ends += [] if self.drive is None else [("train.drive", self.drive)]
+        ends += [(f"train.loads[{number}]", load) for number, load in enumerate(self.loads)]
+        for place, end in ends:
+            names = [machine.name for machine in self.machines if machine.shaft == end.shaft]
+            if end.machine and end.machine not in names:
+                raise unknown_name(f"{place}.machine", end.machine, names)
 
     def model_of(self, mesh: TrainMeshTable) -> str:
         """Return the mesh model of a mesh, an empty text for one whose stiffness is given."""

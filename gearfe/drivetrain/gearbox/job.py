@@ -34,7 +34,17 @@ from ...multibody import TimeFunction, smoothed_step
 from ..housing.body import bore_points, reduced_housing
 from ..train.checks import check_flanks, check_layout
 from ..train.friction import Lubrication
-from ..train.gear_train import Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+from ..train.gear_train import (
+    Coupling,
+    Damping,
+    Drive,
+    GearMesh,
+    GearTrain,
+    Load,
+    Machine,
+    Shaft,
+    ShaftGear,
+)
 from .rolling import bearing_of
 from .timefunctions import time_function
 
@@ -173,8 +183,22 @@ def _rigid_train(job: TrainJob) -> GearTrain:
     if t.drive is not None:
         ramp = (t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
         speed = _over_time(job, t.drive.speed_rad_per_s, *ramp, "train.drive.speed_rad_per_s")
+        torque = None
+        if t.drive.torque_Nm is not None:
+            torque = _over_time(job, t.drive.torque_Nm, 0.0, None, "train.drive.torque_Nm")
+        bore = None if t.drive.attachment is None else str(t.drive.attachment)
         coupling = (t.drive.stiffness_Nm_per_rad, t.drive.damping_Nm_s_per_rad)
-        drive = Drive(t.drive.shaft, str(t.drive.attachment), speed, *coupling, _metres(t.drive.y_mm))
+        slope = t.drive.torque_slope_Nm_s_per_rad
+        drive = Drive(
+            t.drive.shaft,
+            bore,
+            speed,
+            *coupling,
+            _metres(t.drive.y_mm),
+            machine=t.drive.machine,
+            torque=torque,
+            slope=slope,
+        )
     loads = tuple(
         Load(
             x.shaft,
@@ -183,12 +207,26 @@ def _rigid_train(job: TrainJob) -> GearTrain:
             tuple((order, amplitude, math.radians(phase)) for order, amplitude, phase in x.orders),
             x.mesh,
             _metres(x.y_mm),
+            x.machine,
+            x.torque_slope_Nm_s_per_rad,
         )
         for i, x in enumerate(t.loads)
     )
     damping = Damping(t.damping.ratio, t.damping.rayleigh_alpha_per_s, t.damping.rayleigh_beta_s, t.damping.gyroscopic)
     bearings = tuple(bearing_of(str(b.attachment), b) for b in t.bearings)
-    return GearTrain(shafts, gears, meshes, drive, loads, None, _rigid_bores(job), bearings, damping)
+    return GearTrain(
+        shafts, gears, meshes, drive, loads, None, _rigid_bores(job), bearings, damping,
+        machines=tuple(
+            Machine(
+                m.name, m.shaft, m.inertia_kg_m2, m.stiffness_Nm_per_rad, m.damping_Nm_s_per_rad,
+                m.initial_speed_rad_per_s, _metres(m.y_mm),
+            )
+            for m in t.machines
+        ),
+        couplings=tuple(
+            Coupling(c.name, c.shafts, c.stiffness_Nm_per_rad, c.damping_Nm_s_per_rad) for c in t.couplings
+        ),
+    )  # fmt: skip
 
 
 def _metres(length_mm: float | None) -> float | None:

@@ -7,13 +7,14 @@ direction along x and the second one along -z.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from ...base.tables.bearing import INNER_OSCULATION, OUTER_OSCULATION, BearingTable, Matrix
 from ...base.typing import Array
 from ..bearings import BallBearing, RollerBearing, Row
-from ..train.gear_train import Bearing, Five
+from ..train.gear_train import Bearing, as_matrix
 
 #: Signs from x, y, z, tilts about x and z to the directions of a train, and back.
 SIGNS = np.array([1.0, 1.0, -1.0, 1.0, -1.0])
@@ -30,7 +31,7 @@ def bearing_of(bore: str, table: BearingTable) -> Bearing:
     return Bearing(bore, in_frame(table.stiffness_matrix), damping)
 
 
-def in_frame(matrix: Matrix | Array) -> tuple[Five, ...]:
+def in_frame(matrix: Matrix | Array) -> Matrix:
     """Return a symmetric matrix of x, y, z in the directions of a train, without the round-off of its digits."""
     values = np.array(matrix, dtype=float) * np.outer(SIGNS, SIGNS)
     size = np.sqrt(np.diag(values))
@@ -38,14 +39,13 @@ def in_frame(matrix: Matrix | Array) -> tuple[Five, ...]:
     eigenvalues, modes = np.linalg.eigh(0.5 * (values + values.T) / np.outer(size, size))
     if eigenvalues[0] < 0.0:
         values = (modes * np.maximum(eigenvalues, 0.0)) @ modes.T * np.outer(size, size)
-    a, b, c, d, e = (tuple(map(float, row)) for row in 0.5 * (values + values.T))
-    return a, b, c, d, e  # type: ignore[return-value]
+    return as_matrix(0.5 * (values + values.T))
 
 
 def rolling_bearing(table: BearingTable) -> BallBearing | RollerBearing:
     """Return the rolling bearing of a table with a type."""
     diameter, angle = 1e-3 * (table.element_diameter_mm or 0.0), math.radians(table.contact_angle_deg or 0.0)
-    shared = {
+    shared: dict[str, Any] = {
         "elements": table.elements or 0,
         "diameter": diameter,
         "pitch_diameter": 1e-3 * (table.pitch_diameter_mm or 0.0),
@@ -56,7 +56,7 @@ def rolling_bearing(table: BearingTable) -> BallBearing | RollerBearing:
         "first_element": -math.radians(table.first_element_deg or 0.0),
     }
     if table.roller_length_mm is not None:
-        more = {} if table.roller_profile is None else {"profile": table.roller_profile}
+        more: dict[str, Any] = {} if table.roller_profile is None else {"profile": table.roller_profile}
         ribs = table.axial_stiffness_N_per_m or 0.0
         return RollerBearing(**shared, length=1e-3 * table.roller_length_mm, axial_stiffness=ribs, **more)
     inner = INNER_OSCULATION if table.inner_osculation is None else table.inner_osculation

@@ -4,7 +4,8 @@ A mode :math:`y(t) = \mathrm{Re}(\hat y e^{\lambda t})` has the mean energies :m
 y}` and :math:`\tfrac14\hat y^H K_p\hat y` in each part p of the train:
 
 - *bending* of a shaft: motion across the axis and tilts; strain of its bending and of its bearings across the axis;
-- *torsion* of a shaft: its spin; strain of its twist, of the drive's coupling and of couplings;
+- *torsion* of a shaft: its spin and that of its machines; strain of its twist, of the drive's coupling, of machines'
+  springs, and of couplings whose first shaft it is;
 - *axial* motion of a shaft: motion along the axis; strain along it and of its bearings along it;
 - *housing*; each *mesh*.
 
@@ -142,6 +143,10 @@ def train_forms(model: TrainModel, sense: float) -> TrainForms:
             kinetic.append(Form(3 * number + KINDS.index(kind), chosen @ rows, chosen @ mass @ rows))
         first, second, weights = _across(body, train.frame)
         orbits.append(Orbit(first @ rows, second @ rows, weights, sense * float(np.sign(model.ratios[number]))))
+    for machine, row in zip(train.machines, model.driveline.machines, strict=True):
+        rows = row[None, :] @ T
+        torsion = 3 * train.shaft_number(machine.shaft) + KINDS.index(TORSION)
+        kinetic.append(Form(torsion, rows, machine.inertia * rows))
     if model.housing is not None:
         rows = T[: model.housing.size]
         kinetic.append(Form(parts.index(Part(HOUSING)), rows, model.housing.mass() @ rows))

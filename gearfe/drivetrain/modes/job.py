@@ -82,10 +82,15 @@ def band_of(job: TrainJob) -> float:
 
 
 def at_speed(job: TrainJob, speed: float) -> TrainJob:
-    """The job with a constant speed of its drive (rad/s), whose sense decides which flanks drive."""
+    """The job with a constant speed of its drive (rad/s), whose sense decides which flanks drive.
+
+    A drive by torque becomes one by speed: modes and steady states are those at a speed.
+    """
     if job.table.drive is None:
         return job
-    drive = replace(job.table.drive, speed_rad_per_s=speed, ramp_width_ms=None)
+    drive = replace(
+        job.table.drive, speed_rad_per_s=speed, ramp_width_ms=None, torque_Nm=None, torque_slope_Nm_s_per_rad=0.0
+    )
     return replace(job, table=replace(job.table, drive=drive))
 
 

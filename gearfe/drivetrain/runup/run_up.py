@@ -298,6 +298,9 @@ def _bifurcations(states: Sequence[SteadyState], turns: Sequence[Bifurcation]) -
 
 
 def _checked(model: TrainModel, speeds: ArrayLike | Sequence[float]) -> Array:
+    if model.train.driven.torque is not None:
+        problem = "is by torque, and steady states are those at a speed"
+        raise InputError("drive", None, problem, "leave the torque out: the drive's speed is then prescribed")
     given = np.atleast_1d(np.asarray(speeds, dtype=float))
     sizes = np.abs(given)
     if not len(given) or not np.isfinite(given).all() or (sizes == 0.0).any() or np.ptp(np.sign(given)) > 0.0:

@@ -36,6 +36,7 @@ def why_not(model: TrainModel) -> str:
     """Why a train has no multipliers, or nothing."""
     drive = model.train.driven
     reasons = (
+        (drive.torque is not None, "the drive is by torque, so no speed is held; `gearfe runup` prescribes it"),
         (not drive.speed.ends or model.steady_speed == 0.0, "the drive has no steady speed"),
         (
             not all(load.torque.ends for load in model.train.loads),

@@ -5,18 +5,20 @@ The path of a job: `drivetrain.gearbox.job` reads the tables and makes a `GearTr
 `TrainResponse`.
 """
 
-from .gear_train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+from .gear_train import Bearing, Coupling, Damping, Drive, GearMesh, GearTrain, Load, Machine, Shaft, ShaftGear
 from .model import TrainModel, build_train
 from .response import TrainResponse
 from .simulate import simulate
 
 __all__ = [
     "Bearing",
+    "Coupling",
     "Damping",
     "Drive",
     "GearMesh",
     "GearTrain",
     "Load",
+    "Machine",
     "Shaft",
     "ShaftGear",
     "TrainModel",

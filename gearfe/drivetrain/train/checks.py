@@ -20,7 +20,7 @@ from ...gears.geometry.pair import Gear, gear_pair, in_keys
 from ...gears.geometry.validity import check_spur
 from ..bearings import BallBearing, RollerBearing
 from .friction import check_friction
-from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Machine, Shaft, ShaftGear
 from .statics import check_flanks, check_yields, one_sided
 
 #: Agreement of lengths and angles that count as equal (relative).
@@ -204,7 +204,7 @@ def _check_place(train: GearTrain, label: str, end: Drive | Load) -> None:
     """A drive or a load acts on its shaft, and at a place of it that is known where the shaft is elastic."""
     shaft = train.shaft(end.shaft)
     if end.along is None:
-        if shaft.sections and end.bore is None:
+        if shaft.sections and end.bore is None and not end.machine:
             problem = f"is open: shaft {shaft.name!r} is elastic, and no attachment says where the torque acts"
             raise InputError(f"{label} place", None, problem, "give y_mm, the place along the shaft")
         return
@@ -216,6 +216,7 @@ def _check_place(train: GearTrain, label: str, end: Drive | Load) -> None:
 
 
 def _check_ends(train: GearTrain) -> None:
+    _check_driveline(train)
     drive = train.driven
     if drive.stiffness is not None and not (math.isfinite(drive.stiffness) and drive.stiffness > 0.0):
         raise InputError("drive stiffness", drive.stiffness, "must be finite and > 0 N m/rad", "None for a rigid drive")
@@ -232,10 +233,75 @@ def _check_ends(train: GearTrain) -> None:
                 problem = f"attachment {part.bore!r} does not carry shaft {part.shaft!r}"
                 raise InputError(label, part.bore, problem, f"choose one of {', '.join(shafts[part.shaft].bores)}")
         _check_place(train, label, part)
+        _check_machine(train, label, part)
     for load in train.loads:
         _check_orders(train, load)
     if not train.meshes and len(train.shafts) > 1:
         raise InputError("train.meshes", None, "no gear is driven: the train has no mesh", "add a mesh")
+
+
+def _check_machine(train: GearTrain, label: str, end: Drive | Load) -> None:
+    """The machine of a drive or a load is of its shaft; a torque that grows with the speed is no load."""
+    names = [machine.name for machine in train.machines if machine.shaft == end.shaft]
+    if end.machine and end.machine not in names:
+        raise unknown_name(f"{label} machine", end.machine, names)
+    if not (math.isfinite(end.slope) and end.slope >= 0.0):
+        problem = "must be finite and >= 0 N m s/rad: a torque that grows with the speed runs away"
+        raise InputError(f"{label} slope", end.slope, problem, "write by how much the torque falls with the speed")
+
+
+def _check_machine_place(train: GearTrain, machine: Machine) -> None:
+    """A machine is at a place of its shaft, which is known where the shaft is elastic."""
+    shaft, label = train.shaft(machine.shaft), f"machine {machine.name!r} y_mm"
+    if machine.along is None:
+        if shaft.sections:
+            problem = f"is required: shaft {shaft.name!r} is elastic"
+            raise InputError(label, None, problem, "give the place along the shaft")
+        return
+    low, high = train.shaft_end(shaft.name, -1.0), train.shaft_end(shaft.name, 1.0)
+    if not (math.isfinite(machine.along) and low - SAME * shaft.length <= machine.along <= high + SAME * shaft.length):
+        problem = f"must be on shaft {shaft.name!r}, from {1e3 * low:.6g} to {1e3 * high:.6g} mm"
+        raise InputError(label, 1e3 * machine.along, problem, "move it, or lengthen the shaft")
+
+
+def _check_driveline(train: GearTrain) -> None:
+    """Machines and couplings have names, shafts, finite values; coupled shafts lie on one axis."""
+    shafts = [shaft.name for shaft in train.shafts]
+    for kind, items in (("machine", train.machines), ("coupling", train.couplings)):
+        names = [item.name for item in items]
+        for item in items:
+            label = f"{kind} {item.name!r}"
+            if names.count(item.name) > 1:
+                raise InputError(label, None, "is named twice", "give each its own name")
+            for key in ("inertia", "stiffness", "damping"):
+                value = getattr(item, key, 1.0)
+                if not (math.isfinite(value) and (value > 0.0 or (key == "damping" and value == 0.0))):
+                    limit = ">= 0" if key == "damping" else "> 0"
+                    raise InputError(f"{label} {key}", value, f"must be finite and {limit}", "give it in SI units")
+            for name in (item.shaft,) if isinstance(item, Machine) else item.shafts:
+                _known(label, "shaft", name, shafts)
+    for machine in train.machines:
+        _check_machine_place(train, machine)
+    for coupling in train.couplings:
+        one, two = (train.shaft(name) for name in coupling.shafts)
+        label, apart = f"coupling {coupling.name!r}", shaft_distance(train, one.name, two.name)
+        if one.name == two.name:
+            raise InputError(label, one.name, "names one shaft twice", "a coupling joins two shafts")
+        if apart > SAME * max(one.length, two.length):
+            problem = f"shafts {one.name!r} and {two.name!r} are {1e3 * apart:.6g} mm apart: must lie on one axis"
+            raise InputError(label, None, problem, "move one (x_mm, z_mm), or let gears connect them")
+    drive = train.driven
+    if drive.torque is None:
+        if drive.slope > 0.0:
+            problem = "is of a drive by torque, and this one has a prescribed speed"
+            raise InputError("drive slope", drive.slope, problem, "give the torque, or leave it out")
+        return
+    if drive.stiffness is not None:
+        problem = "stands beside a torque: nothing prescribes the rotation behind the coupling"
+        raise InputError("drive stiffness", drive.stiffness, problem, "use a machine with a spring, or leave one out")
+    if train.damping.alpha > 0.0:
+        problem = "would brake the rotation itself of a train that is driven by a torque"
+        raise InputError("damping alpha", train.damping.alpha, problem, "use beta or ratio, or prescribe the speed")
 
 
 def _check_orders(train: GearTrain, load: Load) -> None:
@@ -251,6 +317,9 @@ def _check_orders(train: GearTrain, load: Load) -> None:
         if not (LEAST_ORDER <= order < math.inf and math.isfinite(amplitude) and math.isfinite(phase)):
             problem = f"must be [order >= {LEAST_ORDER:g}, amplitude, phase], all finite"
             raise InputError(label, [order, amplitude, math.degrees(phase)], problem, "correct it")
+    if train.driven.torque is not None:
+        problem = "follow a prescribed speed, and the drive is by torque"
+        raise InputError(label, None, problem, "write torque_Nm as an expression of time, or prescribe the speed")
     if not train.driven.speed.steady:
         problem = "follow a drive of constant speed only"
         cure = "give the drive a constant speed, or write torque_Nm as an expression of time"

@@ -248,6 +248,18 @@ class Bearing:
         return _matrix(self.damping)
 
 
+def as_matrix(values: Array) -> Matrix:
+    """Return a (5, 5) array as rows of a `Bearing`."""
+    a, b, c, d, e = (_five(row) for row in values)
+    return a, b, c, d, e
+
+
+def _five(values: Array) -> Five:
+    """Return five numbers of an array."""
+    a, b, c, d, e = map(float, values)
+    return a, b, c, d, e
+
+
 def _matrix(values: Five | Matrix) -> Array:
     """A matrix, or that of a diagonal."""
     given = np.array(values, dtype=float)
@@ -255,25 +267,82 @@ def _matrix(values: Five | Matrix) -> Array:
 
 
 @dataclass(frozen=True)
-class Drive:
-    """Rotation of a shaft relative to one of its bores as a function of time.
+class Machine:
+    """A motor or a driven machine: an inertia on a torsional spring at a shaft.
 
     Parameters
     ----------
+    name, shaft
+        Its name, and the shaft that it is coupled to.
+    inertia
+        About the axis (kg m2).
+    stiffness, damping
+        Of the spring between machine and shaft (N m/rad, N m s/rad).
+    initial_speed
+        At the start (rad/s); None: rolling with the drive.
+    along
+        Coordinate along the train's axis (m) of the section of an elastic shaft that it turns; None: the middle.
+    """
+
+    name: str
+    shaft: str
+    inertia: float
+    stiffness: float
+    damping: float = 0.0
+    initial_speed: float | None = None
+    along: float | None = None
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A torsional spring between two shafts on one axis, which turn alike.
+
+    Parameters
+    ----------
+    name, shafts
+        Its name, and the names of the shafts.
+    stiffness, damping
+        N m/rad, N m s/rad.
+    """
+
+    name: str
+    shafts: tuple[str, str]
+    stiffness: float
+    damping: float = 0.0
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Rotation of a shaft relative to one of its bores as a function of time, or a torque on it.
+
+    Parameters
+    ----------
+    shaft, bore
+        Names; `bore` None: against the ground.
     speed
-        Relative speed (rad/s); the rotation is its integral from time 0.
+        Relative speed (rad/s); the rotation is its integral from time 0. With a torque the nominal speed, about which
+        the train moves freely.
     stiffness, damping
         Of an elastic coupling between the prescribed rotation and the shaft (N m/rad, N m s/rad); None: rigid.
     along
         Coordinate along the train's axis (m) of the section of the shaft that it drives; None: that of the bore.
+    machine
+        Name of a machine of the shaft that turns so, or that the torque acts on; empty: the shaft itself.
+    torque
+        Over time (N m), instead of a prescribed rotation.
+    slope
+        By how much the torque falls with the speed beyond the nominal one (N m s/rad).
     """
 
     shaft: str
-    bore: str
+    bore: str | None
     speed: TimeFunction
     stiffness: float | None = None
     damping: float = 0.0
     along: float | None = None
+    machine: str = ""
+    torque: TimeFunction | None = None
+    slope: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -293,6 +362,10 @@ class Load:
         empty: the angle is that by which the shaft has turned.
     along
         Coordinate along the train's axis (m) of the section of the shaft on which it acts; None: that of the bore.
+    machine
+        Name of a machine of the shaft on which it acts; empty: the shaft itself.
+    slope
+        By how much the torque falls with the speed beyond rolling with the drive's (N m s/rad).
     """
 
     shaft: str
@@ -301,6 +374,8 @@ class Load:
     orders: tuple[tuple[float, float, float], ...] = ()
     mesh: str = ""
     along: float | None = None
+    machine: str = ""
+    slope: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -343,6 +418,8 @@ class GearTrain(Facts):
         Of the coupled system.
     axis
         Direction of all shafts.
+    machines, couplings
+        Inertias at the shafts, and torsional springs between shafts on one axis.
     """
 
     shafts: tuple[Shaft, ...]
@@ -355,6 +432,8 @@ class GearTrain(Facts):
     bearings: tuple[Bearing, ...] = ()
     damping: Damping = Damping()
     axis: Vector = (0.0, 1.0, 0.0)
+    machines: tuple[Machine, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
 
     def facts(self) -> dict[str, str]:
         """Shafts, gears, meshes, drive, loads, housing."""
@@ -364,7 +443,7 @@ class GearTrain(Facts):
             "shafts": ", ".join(shaft.name for shaft in self.shafts),
             "gears": ", ".join(f"{one.name} on {one.shaft}" for one in self.gears) or "none",
             "meshes": ", ".join(one.name for one in self.meshes) or "none",
-            "drive": "none" if drive is None else f"{drive.shaft}, against bore {drive.bore}",
+            "drive": "none" if drive is None else f"{drive.shaft}, against {drive.bore or 'the ground'}",
             "loads": ", ".join(one.shaft for one in self.loads) or "none",
             "housing": rigid if housing is None else f"elastic, {len(housing.attachment_names)} bores",
         }
@@ -392,7 +471,10 @@ class GearTrain(Facts):
         loads = tuple((self.shaft_number(load.shaft), load.torque) for load in self.loads)
         meshes = tuple(self._layout_mesh(mesh, gears[mesh.driver], gears[mesh.driven]) for mesh in self.meshes)
         names, driven = tuple(shaft.name for shaft in self.shafts), self.shaft_number(self.driven.shaft)
-        return TrainLayout(names, driven, self.driven.speed, tuple(gears.values()), meshes, loads)
+        coupled = tuple(
+            (self.shaft_number(one), self.shaft_number(two)) for one, two in (c.shafts for c in self.couplings)
+        )
+        return TrainLayout(names, driven, self.driven.speed, tuple(gears.values()), meshes, loads, coupled)
 
     def _layout_gear(self, item: ShaftGear) -> LayoutGear:
         gear, errors = item.gear, _tuples(item.pitch_errors)
@@ -447,6 +529,19 @@ class GearTrain(Facts):
         if end.along is not None:
             return end.along
         return float(self.bore_points[end.bore or self.shaft(end.shaft).bores[0]] @ self.frame[2])
+
+    def machine_number(self, name: str) -> int:
+        """Number of the machine of that name."""
+        return next(i for i, machine in enumerate(self.machines) if machine.name == name)
+
+    def inertia_of_machines(self, shaft: str) -> float:
+        """Inertia of all machines of a shaft (kg m2)."""
+        return sum(machine.inertia for machine in self.machines if machine.shaft == shaft)
+
+    def shaft_end(self, name: str, towards: float) -> float:
+        """Coordinate along the axis (m) of the end of a shaft on one side (+ or -); of its middle for 0."""
+        shaft = self.shaft(name)
+        return float(np.dot(shaft.point, self.frame[2])) + float(np.sign(towards)) * 0.5 * shaft.length
 
     def shaft_number(self, name: str) -> int:
         """Number of the shaft of that name."""

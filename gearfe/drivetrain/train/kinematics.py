@@ -19,7 +19,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.typing import Array
 from ...multibody.series.timefunctions import TimeFunction
-from .layout import TrainLayout
+from .layout import LayoutMesh, TrainLayout
 from .phases import pair_shifts, tooth_places
 
 #: A common period of more cycles of the fastest mesh than this is of no practical use.
@@ -98,24 +98,27 @@ def rolling(layout: TrainLayout) -> tuple[Fraction, ...]:
         For shafts that neither drive nor mesh hold, and for loops of gears whose ratios contradict each other.
     """
     known = {layout.driven: Fraction(1)}
+    joins = [(f"mesh {m.name!r}", m.driver.shaft, m.driven.shaft, _ratio(m)) for m in layout.meshes]
+    joins += [(f"coupling of {layout.shafts[i]!r}", i, j, Fraction(1)) for i, j in layout.couplings]
     for _ in layout.shafts:
-        for mesh in layout.meshes:
-            driver, driven = mesh.driver.shaft, mesh.driven.shaft
-            ratio = Fraction(-mesh.driver.teeth, mesh.driven.teeth)
+        for label, driver, driven, ratio in joins:
             for first, second, factor in ((driver, driven, ratio), (driven, driver, 1 / ratio)):
                 if first not in known:
                     continue
                 speed = known[first] * factor
                 if known.setdefault(second, speed) != speed:
                     problem = f"closes a loop that cannot turn: shaft {layout.shafts[second]!r} would need two speeds"
-                    raise InputError(
-                        f"mesh {mesh.name!r}", None, problem, "take a gear out of the loop, or change its teeth"
-                    )
+                    raise InputError(label, None, problem, "take a gear out of the loop, or change its teeth")
     for number, name in enumerate(layout.shafts):
         if number not in known:
             problem = "is held by nothing: neither the drive nor a mesh connects it to the train"
-            raise InputError(f"shaft {name!r}", None, problem, "add a mesh between its gears and the train's")
+            cure = "add a mesh between its gears and the train's, or a coupling to a shaft on its axis"
+            raise InputError(f"shaft {name!r}", None, problem, cure)
     return tuple(known[number] for number in range(len(layout.shafts)))
+
+
+def _ratio(mesh: LayoutMesh) -> Fraction:
+    return Fraction(-mesh.driver.teeth, mesh.driven.teeth)
 
 
 def mesh_phases(cycles: Sequence[Fraction], most: int) -> list[tuple[Fraction, list[int]]]:
@@ -186,12 +189,15 @@ def load_torques(layout: TrainLayout, times: Sequence[float] | Array) -> Array:
 
 def balanced_forces(layout: TrainLayout, senses: Sequence[float], torques: Array) -> Array:
     """Mesh forces (N), shape (meshes, n), that balance the torques (N m) on the shafts, shape (shafts, n)."""
-    arms = np.zeros((len(layout.shafts), len(layout.meshes)))
+    count = len(layout.meshes)
+    arms = np.zeros((len(layout.shafts), count + len(layout.couplings)))
     for column, (mesh, sense) in enumerate(zip(layout.meshes, senses, strict=True)):
         for gear in (mesh.driver, mesh.driven):
             arms[gear.shaft, column] += sense * gear.base_radius
+    for column, (one, two) in enumerate(layout.couplings, start=count):
+        arms[one, column], arms[two, column] = 0.01, -0.01  # as of a force at an arm of 10 mm
     free = [shaft for shaft in range(len(layout.shafts)) if shaft != layout.driven]
-    return np.asarray(np.linalg.lstsq(arms[free], torques[free], rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(arms[free], torques[free], rcond=None)[0][:count])
 
 
 def drive_sense(speed: TimeFunction) -> float:

@@ -83,6 +83,8 @@ class TrainLayout:
         Of the train, in its order.
     loads
         Pairs (number of a shaft, torque over time in N m).
+    couplings
+        Pairs of numbers of shafts on one axis that turn alike.
     """
 
     shafts: tuple[str, ...]
@@ -91,3 +93,4 @@ class TrainLayout:
     gears: tuple[LayoutGear, ...]
     meshes: tuple[LayoutMesh, ...]
     loads: tuple[tuple[int, TimeFunction], ...]
+    couplings: tuple[tuple[int, int], ...] = ()

@@ -24,17 +24,20 @@ from ...multibody.core.elimination import ModalCoordinates, modal_coordinates
 from ...multibody.series.timefunctions import sine
 from .bearings import BearingLoads, bearing_loads, bore_motion, shaft_motion
 from .checks import check_train
+from .driveline import Driveline, MachineRotor, driveline, machine_rotors
 from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, rotor
 from .forces import Gyro, TrainForces, derivative
 from .gear_train import Drive, GearTrain, Load, Shaft
 from .kinematics import Kinematics, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
-from .operating import OperatingPoint, operating_point, rolling, settled, typical
+from .operating import OperatingPoint, operating_point, rolling_bearings, settled, typical
 from .program import train_series
 from .shaft_sections import ShaftSections, shaft_sections
 
 #: For periods of steady running, orders of loads are taken as whole multiples of one over a whole number up to this.
 MOST_DENOMINATOR = 1000
+#: Eigenvalues below this part of the largest one are those of free rotation, and round-off.
+FREE = 1e-11
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,6 +72,10 @@ class TrainModel(Facts):
         Displacement along the axis of each bore's reference point.
     bores
         Names of the bores that carry shafts, in the housing's order.
+    driveline
+        Machines, and the springs between them, shafts and shafts.
+    drive_row : (system size,)
+        Rotation that the drive prescribes or acts on, beside rolling.
     operating
         Rolling bearings under the steady torques, whose stiffness there the system has.
     """
@@ -90,6 +97,8 @@ class TrainModel(Facts):
     spin_reference: Array
     axial: Array
     bores: tuple[str, ...]
+    driveline: Driveline
+    drive_row: Array
     operating: OperatingPoint = field(default_factory=OperatingPoint)
 
     def facts(self) -> dict[str, str]:
@@ -181,10 +190,10 @@ def build_train(train: GearTrain) -> TrainModel:
 
 def _operating_point(train: GearTrain) -> OperatingPoint:
     """Where the rolling bearings are under the steady torques; of a train without any nothing is computed."""
-    bearings = rolling(train)
+    bearings = rolling_bearings(train)
     if not bearings:
         return OperatingPoint()
-    model = _assembled(typical(train))
+    model = _assembled(typical(replace(train, drive=replace(train.driven, torque=None, slope=0.0))))
     placed = model.placed
     motions = {name: shaft_motion(model.train, placed, name) for name in bearings}
     stiffness = model.system.stiffness.copy()
@@ -217,7 +226,8 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
         _shaft(train, shaft, 0.0 if shaft.initial_speed is None else shaft.initial_speed - g * begin)
         for shaft, g in zip(train.shafts, ratios, strict=True)
     )
-    bodies: list[Element] = [*shafts] if housing is None else [housing, *shafts]
+    rotors = machine_rotors(train, begin)
+    bodies: list[Element] = [*shafts, *rotors] if housing is None else [housing, *shafts, *rotors]
     size = sum(b.size for b in bodies)
     first = np.cumsum([0 if housing is None else housing.size, *(body.size for body in shafts)])[:-1]
     placed = Shafts(shafts, first, tuple(ratios), size)
@@ -231,13 +241,17 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
         name="forces of the train",
     )  # fmt: skip
     spin = np.array([_turning(train, placed, shaft.name) for shaft in train.shafts])
-    elements = [*bodies, *_supports(train, placed, housing), *(line.element(bodies) for line in lines), changing]
+    springs = driveline(train, placed)
+    elements = [
+        *bodies, *_supports(train, placed, housing, rotors), *(line.element(bodies) for line in lines),
+        *springs.elements(train, placed, rotors, train.damping), *_slopes(train, placed, bodies), changing,
+    ]  # fmt: skip
     system, modal = _damped(train, elements, bodies)
     return TrainModel(
         train=train,
         system=system,
         modal=modal,
-        start=_start(train, system, shafts, first),
+        start=_start(train, system, shafts, rotors, first),
         angle=angle,
         shafts=shafts,
         housing=housing,
@@ -249,6 +263,8 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
         first=first,
         spin=spin,
         spin_reference=_spin_reference(train, spin),
+        driveline=springs,
+        drive_row=_acts(train, train.driven, placed),
         axial=_axial(train, size),
         bores=_used_bores(train),
     )
@@ -272,16 +288,44 @@ def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tup
             direction = np.zeros(size)
             direction[first[i] + 5] = 1.0
             made.append((direction, -ratio * shaft.rotor.polar * change))
+    if made:
+        made += [
+            (direction, -shafts.ratios[train.shaft_number(machine.shaft)] * machine.inertia * change)
+            for direction, machine in zip(_machines(train, size), train.machines, strict=True)
+        ]
+    if train.driven.torque is not None:
+        made.append((_acts(train, train.driven, shafts), train.driven.torque))
     made += [(_acts(train, load, shafts), load.torque) for load in train.loads]
     return tuple(made)
 
 
-def _acts(train: GearTrain, load: Load, shafts: Shafts) -> Array:
-    """Direction in the system of a torque and its reaction."""
-    direction = _turning(train, shafts, load.shaft, train.place(load))
-    if train.housing is not None and load.bore is not None:
-        direction[: train.housing.size] -= bore_selector(train, load.bore)[:, 3:] @ train.frame[2]
+def _machines(train: GearTrain, size: int) -> Array:
+    """Directions of the machines, whose coordinates are the last ones, (machines, size)."""
+    return np.eye(size)[size - len(train.machines) :]
+
+
+def _acts(train: GearTrain, end: Drive | Load, shafts: Shafts) -> Array:
+    """Direction in the system of a torque, or of a prescribed rotation, and its reaction."""
+    if end.machine:
+        direction = _machines(train, shafts.size)[train.machine_number(end.machine)].copy()
+    else:
+        direction = _turning(train, shafts, end.shaft, train.place(end))
+    if train.housing is not None and end.bore is not None:
+        direction[: train.housing.size] -= bore_selector(train, end.bore)[:, 3:] @ train.frame[2]
     return direction
+
+
+def _slopes(train: GearTrain, shafts: Shafts, bodies: list[Element]) -> list[Element]:
+    """Dampers: torques that fall with the speed."""
+    made: list[Element] = []
+    ends: list[Drive | Load] = [train.driven, *train.loads]
+    for number, end in enumerate(ends):
+        if end.slope > 0.0:
+            row = _acts(train, end, shafts)
+            square = np.outer(row, row)
+            name = f"slope of load {number}" if number else "slope of the drive"
+            made.append(LinearForce(tuple(bodies), end.slope * square, 0.0 * square, name))
+    return made
 
 
 def _orders(train: GearTrain, shafts: Shafts) -> list[tuple[Array, TimeFunction, Fraction]]:
@@ -339,7 +383,9 @@ def _housing(train: GearTrain) -> ModalBlocks | None:
     return ModalBlocks(body.mass, damping, body.stiffness, name="housing")
 
 
-def _supports(train: GearTrain, shafts: Shafts, housing: ModalBlocks | None) -> list[Element]:
+def _supports(
+    train: GearTrain, shafts: Shafts, housing: ModalBlocks | None, rotors: tuple[MachineRotor, ...]
+) -> list[Element]:
     """Hinges or bearings of all bores, and the drive."""
     made: list[Element] = []
     bearings = {b.bore: b for b in train.bearings}
@@ -357,13 +403,17 @@ def _supports(train: GearTrain, shafts: Shafts, housing: ModalBlocks | None) -> 
             made.append(
                 LinearForce((body,), train.damping.alpha * body.mass(), 0.0 * body.mass(), f"damping of {body.name}")
             )
-        if shaft.name == train.driven.shaft:
-            row = body.turn_rows(train.place(train.driven))[2:]
-            touches: tuple[Element, ...] = (body,)
-            if housing is not None:
-                row = np.hstack([row, -(bore_selector(train, train.driven.bore)[:, 3:] @ train.frame[2])[None, :]])
-                touches = (body, housing)
-            made.append(_drive(train.driven, touches, row))
+        drive = train.driven
+        if shaft.name == drive.shaft and drive.torque is None:
+            turns: Element = body
+            row = body.turn_rows(train.place(drive))[2:]
+            if drive.machine:
+                turns, row = rotors[train.machine_number(drive.machine)], np.ones((1, 1))
+            touches: tuple[Element, ...] = (turns,)
+            if housing is not None and drive.bore is not None:
+                row = np.hstack([row, -(bore_selector(train, drive.bore)[:, 3:] @ train.frame[2])[None, :]])
+                touches = (turns, housing)
+            made.append(_drive(drive, touches, row))
     return made
 
 
@@ -384,7 +434,8 @@ def _damped(train: GearTrain, elements: list[Element], bodies: list[Element]) ->
         return system, modal
     count = len(modal.eigenvalues)
     per_mode = np.append(ratios, np.full(max(0, count - len(ratios)), ratios[-1]))[:count]
-    factors = 2.0 * per_mode * np.sqrt(np.maximum(modal.eigenvalues, 0.0))
+    values = np.where(modal.eigenvalues > FREE * modal.eigenvalues.max(initial=0.0), modal.eigenvalues, 0.0)
+    factors = 2.0 * per_mode * np.sqrt(values)
     back = modal.T.T @ system.mass
     whole = LinearForce(tuple(bodies), back.T @ (factors[:, None] * back), np.zeros_like(system.mass), "modal damping")
     damped = System([*elements, whole])
@@ -393,7 +444,9 @@ def _damped(train: GearTrain, elements: list[Element], bodies: list[Element]) ->
     return damped, damped.once("modal coordinates", lambda: in_modes)
 
 
-def _start(train: GearTrain, system: System, shafts: tuple[ShaftBody, ...], first: IntArray) -> Start:
+def _start(
+    train: GearTrain, system: System, shafts: tuple[ShaftBody, ...], rotors: tuple[MachineRotor, ...], first: IntArray
+) -> Start:
     """At rest beside rolling but for the given initial speeds, which the constraints must allow."""
     start = consistent_start(system, 0.0)
     open_rows = {system.row_names()[i] for i in start.freedoms.redundant}
@@ -403,12 +456,20 @@ def _start(train: GearTrain, system: System, shafts: tuple[ShaftBody, ...], firs
                 "leaves the forces open: rigid meshes close a loop in a rigid housing, and statics do not share it"
             )
             raise InputError(f"mesh {mesh.name!r} rigid", True, problem, "give the meshes of the loop a stiffness")
-    for shaft, body, i in zip(train.shafts, shafts, first, strict=True):
-        off = float(start.v[i + 5]) - body.start_rate
-        if shaft.initial_speed is not None and abs(off) > 1e-6 * max(1.0, abs(shaft.initial_speed)):
-            problem = f"contradicts the drive and the rigid parts, which make it {shaft.initial_speed + off:.9g} rad/s"
+    size = len(start.v)
+    spins = [
+        (f"shaft {shaft.name!r}", shaft.initial_speed, float(start.v[i + 5]) - body.start_rate)
+        for shaft, body, i in zip(train.shafts, shafts, first, strict=True)
+    ]
+    spins += [
+        (f"machine {machine.name!r}", machine.initial_speed, float(start.v[i]) - rotor.start_rate)
+        for machine, rotor, i in zip(train.machines, rotors, range(size - len(rotors), size), strict=True)
+    ]
+    for label, given, off in spins:
+        if given is not None and abs(off) > 1e-6 * max(1.0, abs(given)):
+            problem = f"contradicts the drive and the rigid parts, which make it {given + off:.9g} rad/s"
             cure = "leave it out, or give the drive or the mesh an elastic coupling"
-            raise InputError(f"shaft {shaft.name!r} initial speed", shaft.initial_speed, problem, cure)
+            raise InputError(f"{label} initial speed", given, problem, cure)
     return start
 
 

@@ -21,7 +21,7 @@ from ...base.errors import InputError
 from ...base.typing import Array
 from ..bearings import BallBearing, BearingState, RollerBearing, deflected
 from ..bearings.minimum import least_energy
-from .gear_train import GearTrain
+from .gear_train import GearTrain, as_matrix
 
 #: Approach of a rolling element over its diameter at which the stiffness is taken that makes coordinates comparable.
 TYPICAL = 1e-3
@@ -67,7 +67,7 @@ class OperatingPoint:
 def typical(train: GearTrain) -> GearTrain:
     """The train with its rolling bearings replaced by the stiffness of an axially and radially pressed one."""
     bearings = tuple(
-        replace(item, stiffness=_matrix(_pressed(item.stiffness)))
+        replace(item, stiffness=as_matrix(_pressed(item.stiffness)))
         if isinstance(item.stiffness, BallBearing | RollerBearing)
         else item
         for item in train.bearings
@@ -78,13 +78,13 @@ def typical(train: GearTrain) -> GearTrain:
 def settled(train: GearTrain, point: OperatingPoint) -> GearTrain:
     """The train with the stiffness that its rolling bearings have at an operating point."""
     bearings = tuple(
-        replace(item, stiffness=_matrix(point.bearings[item.bore].stiffness)) if item.bore in point.bearings else item
+        replace(item, stiffness=as_matrix(point.bearings[item.bore].stiffness)) if item.bore in point.bearings else item
         for item in train.bearings
     )
     return replace(train, bearings=bearings)
 
 
-def rolling(train: GearTrain) -> dict[str, BallBearing | RollerBearing]:
+def rolling_bearings(train: GearTrain) -> dict[str, BallBearing | RollerBearing]:
     """Bore -> rolling bearing."""
     return {b.bore: b.stiffness for b in train.bearings if isinstance(b.stiffness, BallBearing | RollerBearing)}
 
@@ -158,7 +158,3 @@ def _pressed(bearing: BallBearing | RollerBearing) -> Array:
     """Stiffness of a bearing whose elements are all pressed alike."""
     free = replace(bearing, clearance=-2.0 * TYPICAL * bearing.diameter, preload=TYPICAL * bearing.diameter)
     return deflected(free, np.zeros(5)).stiffness
-
-
-def _matrix(values: Array) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(map(float, row)) for row in values)

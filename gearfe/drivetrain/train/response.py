@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,6 +38,8 @@ SAMPLED = (
     "rotation",
     "bearing_load",
     "bore_acceleration",
+    "machine_speed",
+    "spring_torque",
 )
 #: Directions of forces and motions in names of columns.
 XYZ = ("x", "y", "z")
@@ -119,6 +122,12 @@ class TrainResponse(ShownTable):
     bore_acceleration : (n, b, 6)
         Acceleration of each bore's reference point (m/s2) and angular acceleration (rad/s2), along x, y, z; 0 in a
         rigid housing.
+    machine_speed : (n, machines)
+        Speed of each machine (rad/s).
+    spring_torque : (n, machines and couplings)
+        Torque of a machine's spring on its shaft, or of a coupling on its second shaft (N m).
+    machine_names, coupling_names
+        Of the train.
     """
 
     time: Array
@@ -158,6 +167,10 @@ class TrainResponse(ShownTable):
     bore_acceleration: Array | None = None
     section_coordinates: Array | None = None
     sections: ShaftSections | None = None
+    machine_speed: Array | None = None
+    spring_torque: Array | None = None
+    machine_names: tuple[str, ...] = ()
+    coupling_names: tuple[str, ...] = ()
 
     AXES = ("time_s",)
 
@@ -193,6 +206,11 @@ class TrainResponse(ShownTable):
         made["drive_torque_Nm"] = self.drive_torque
         if self.rotation is not None:
             made |= {f"rotation_{name}_deg": np.degrees(self.rotation[:, i]) for i, name in shafts}
+        if self.machine_speed is not None and self.spring_torque is not None:
+            speeds = enumerate(self.machine_names)
+            made |= {f"machine_{name}_speed_rad_per_s": self.machine_speed[:, i] for i, name in speeds}
+            springs = (f"machine_{name}" for name in self.machine_names), (f"coupling_{n}" for n in self.coupling_names)
+            made |= {f"{name}_torque_Nm": self.spring_torque[:, i] for i, name in enumerate(chain(*springs))}
         return made
 
     def bearing_forces(self) -> dict[str, Array]:

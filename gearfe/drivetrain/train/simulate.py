@@ -372,7 +372,17 @@ def response_of(
         time_reached=reached,
         load_end_s=model.load_end,
         statistics=statistics,
+        machine_speed=_machine_speeds(model, moved),
+        spring_torque=model.driveline.torques(moved.q, moved.v),
+        machine_names=tuple(m.name for m in train.machines),
+        coupling_names=tuple(c.name for c in train.couplings),
     )
+
+
+def _machine_speeds(model: TrainModel, moved: TrainStates) -> Array:
+    """Speed of each machine (rad/s), (n, machines)."""
+    ratios = [model.ratios[model.train.shaft_number(machine.shaft)] for machine in model.train.machines]
+    return model.angle(moved.time, 1)[:, None] * np.array(ratios) + moved.v @ model.driveline.machines.T
 
 
 def _gear_poses(model: TrainModel, moved: TrainStates) -> tuple[Array, Array]:

@@ -65,11 +65,12 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     if by_modes:
         a = (modal.constant - y * modal.eigenvalues - dy @ modal.damping.T + acting @ modal.T) @ modal.T.T
     multipliers = _joint_multipliers(model, q, v, a, acting)
-    drive = model.train.driven
-    if drive.stiffness is None:
+    drive, row = model.train.driven, model.drive_row
+    if drive.torque is not None:
+        push = drive.torque(t) - drive.slope * (v @ row)
+    elif drive.stiffness is None:
         push = -multipliers["drive"]
     else:
-        row = model.spin_reference[model.train.shaft_number(drive.shaft)]
         push = -drive.stiffness * (q @ row) - drive.damping * (v @ row)
     rows = np.array([line.row for line in model.meshes]).reshape(-1, q.shape[1])
     force, drag, loss, apart = _contact_forces(model, v, flanks, multipliers)

@@ -68,7 +68,7 @@ def _times(train: GearTrain) -> Array:
 def _inertia(train: GearTrain, times: Array) -> Array:
     """Torque of inertia of each shaft as it rolls with the drive (N m), shape (shafts, times)."""
     push = replace(train.driven.speed, sines=())(times, 1)
-    polar = [rotor(train, shaft).polar for shaft in train.shafts]
+    polar = [rotor(train, shaft).polar + train.inertia_of_machines(shaft.name) for shaft in train.shafts]
     return -np.outer(np.multiply(polar, [float(r) for r in train.kinematics.ratios]), push)
 
 
