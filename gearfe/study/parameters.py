@@ -177,9 +177,9 @@ def _of_class(found: DistributionTable, class_: int, name: str, base: Mapping[st
     """Normal, three deviations to the tolerance f_HaT of the profile slope, and cut off there."""
 
     parts = name.split(".")
-    named = _gear_named(parts, base) if parts[-1] == "slope_um" else None
+    named = _gear_named(parts, base) if parts[-1] == "profile_slope_um" else None
     if named is None:
-        cure = "use it for slope_um; pitch errors of a class: pitch_class, and vary pitch_seed"
+        cure = "use it for profile_slope_um; pitch errors of a class: pitch_class, and vary pitch_seed"
         raise InputError(f"{WHERE}.{name}.iso_class", class_, "has no tolerance for this key", cure)
     allowed = 1e6 * tolerances(gear_of(named), class_).slope
     mean = found.mean or 0.0

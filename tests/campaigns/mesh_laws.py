@@ -47,9 +47,9 @@ def draw(random: np.random.Generator, number: int) -> Case:
         if random.random() < 0.3:
             own |= _relief(random, "root", module)
         if random.random() < 0.3:
-            own["crowning_um"] = rounded(log_uniform(random, 0.5, 8.0) * math.sqrt(module), 3)
+            own["profile_crowning_um"] = rounded(log_uniform(random, 0.5, 8.0) * math.sqrt(module), 3)
         if random.random() < 0.2:
-            own["slope_um"] = rounded(random.normal(0.0, 3.0) * math.sqrt(module), 3)
+            own["profile_slope_um"] = rounded(random.normal(0.0, 3.0) * math.sqrt(module), 3)
         table[side] = own
     torque = rounded(borne_torque(pair) * log_uniform(random, *TORQUES))
     tables = {"pair": pair, "microgeometry": {"torques_Nm": [torque], **table}}

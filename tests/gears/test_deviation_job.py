@@ -75,6 +75,9 @@ def test_a_k_chart_and_a_relief_are_the_same() -> None:
         ),
         ({"tip_relief_um": 5.0, "tip_relief_length_mm": 2.0, "tip_relief_start_mm": 9.0}, "stands beside"),
         ({"tip_relief_um": 5.0, "tip_relief_end_mm": 14.0, "tip_relief_end_diameter_mm": 54.0}, "stands beside"),
+        ({"crowning_um": 3.0}, r"pinion.crowning_um = 3.0: has another name.*; write profile_crowning_um"),
+        ({"slope_um": 3.0}, r"pinion.slope_um = 3.0: has another name.*; write profile_slope_um"),
+        ({"left": {"slope_um": 3.0}}, r"pinion.left.slope_um = 3.0: .*write profile_slope_um"),
         ({"points": [[6.0, 0.0], [9.0, 1.0]]}, r"points: covers 6 to 9 mm.*must cover"),
         ({"points": [[9.0, 0.0], [9.0, 1.0]]}, "rising"),
         ({"pitch_um": [1.0, 2.0]}, r"pinion.pitch_um = \[1.0, 2.0\]: must have one entry for each.* 20 teeth, has 2"),
@@ -84,9 +87,12 @@ def test_a_k_chart_and_a_relief_are_the_same() -> None:
         ({"pitch_um": [1.0], "pitch_class": 5}, "stands beside pitch_um"),
         ({"pitch_class": 12}, "<= 11"),
         ({"measured_csv": "none.csv"}, "there is no such file"),
-        ({"crowning_um": 300.0, "slope_um": 2.0}, r"pinion.crowning_um = 300.0: .*deviate by 30[01].* um.*0.05 module"),
         (
-            {"tip_relief_um": 1800.0, "tip_relief_length_mm": 3.0, "crowning_um": 4.0},
+            {"profile_crowning_um": 300.0, "profile_slope_um": 2.0},
+            r"pinion.profile_crowning_um = 300.0: .*by 30[01].* um.*0.05 module",
+        ),
+        (
+            {"tip_relief_um": 1800.0, "tip_relief_length_mm": 3.0, "profile_crowning_um": 4.0},
             r"pinion.tip_relief_um = 1800.0: makes the flank too steep: a slope of 0.6\d*, must be <= 0.2",
         ),
         (
@@ -138,7 +144,7 @@ tip_relief_um = 10.0
 tip_relief_length_mm = 3.0
 run_out_um = 3.0
 [microgeometry.wheel.left]
-crowning_um = 2.0
+profile_crowning_um = 2.0
 """
 
 

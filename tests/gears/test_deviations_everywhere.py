@@ -50,10 +50,10 @@ positions = 6
 [microgeometry.pinion]
 tip_relief_um = 12.0
 tip_relief_length_mm = 3.0
-slope_um = 4.0
+profile_slope_um = 4.0
 waviness = [{ amplitude_um = 1.0, waves = 40 }]
 [microgeometry.wheel]
-crowning_um = 5.0
+profile_crowning_um = 5.0
 root_relief_um = 6.0
 root_relief_length_mm = 2.0
 root_relief_shape = "parabolic"

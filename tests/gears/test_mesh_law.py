@@ -223,7 +223,8 @@ def test_a_lightly_loaded_relieved_pair() -> None:
         assert (off / np.maximum(true, 0.1 * force)).max() < 5e-3
 
 
-#: A light load on a pair whose slopes (`slope_um`) move the kinks of its reliefs off the nodes of the path of contact.
+#: A light load on a pair whose slopes (`profile_slope_um`) move the kinks of its reliefs off the nodes of the path of
+#: contact.
 LIGHT = """
 [pair]
 module_mm = 1.73
@@ -245,8 +246,8 @@ tip_relief_exponent = 2.0
 
 [microgeometry]
 torques_Nm = [0.000759]
-pinion = {slope_um = 0.186}
-wheel = {slope_um = -1.51, tip_relief_um = 5.32, tip_relief_length_mm = 1.19, tip_relief_shape = "arc"}
+pinion = {profile_slope_um = 0.186}
+wheel = {profile_slope_um = -1.51, tip_relief_um = 5.32, tip_relief_length_mm = 1.19, tip_relief_shape = "arc"}
 """
 
 

@@ -33,7 +33,7 @@ wheel = {teeth = 29, bore_diameter_mm = 4.275, profile_shift = -0.307}
 
 [microgeometry]
 torques_Nm = [1.84]
-pinion = {slope_um = 1.66}
+pinion = {profile_slope_um = 1.66}
 """
 
 

@@ -28,8 +28,8 @@ tip_relief_exponent = 1.5}
 
 [microgeometry]
 torques_Nm = [7.071]
-pinion = {slope_um = -2.87}
-wheel = {crowning_um = 3.58}
+pinion = {profile_slope_um = -2.87}
+wheel = {profile_crowning_um = 3.58}
 """
 
 #: Case 21: 0.015 N/mm, of which an overlap of 2 nm is enough.
@@ -48,8 +48,8 @@ tip_relief_amount_um = 6.24, tip_relief_length_mm = 0.0881, tip_relief_exponent 
 
 [microgeometry]
 torques_Nm = [0.0004225]
-pinion = {slope_um = 0.384}
-wheel = {crowning_um = 0.806}
+pinion = {profile_slope_um = 0.384}
+wheel = {profile_crowning_um = 0.806}
 """
 
 #: Case 155: kinks of linear reliefs pass through the contact in a small part of the mesh cycle.

@@ -50,12 +50,15 @@ def test_slopes_of_a_class_are_within_its_tolerance():
     wheel = {"teeth": 40, "pitch_diameter_mm": 120.0, "bore_diameter_mm": 20.0}
     pinion = {"teeth": 20, "pitch_diameter_mm": 60.0, "bore_diameter_mm": 20.0}
     base = {"pair": {"pressure_angle_deg": 20.0, "face_width_mm": 10.0, "pinion": pinion, "wheel": wheel}}
-    given = {"microgeometry.wheel.left.slope_um": {"iso_class": 6, "mean": 2.0}}
+    given = {"microgeometry.wheel.left.profile_slope_um": {"iso_class": 6, "mean": 2.0}}
     (slope,) = read_parameters(given, "loadmap", base)
     allowed = (0.12 + 1.2 + 4.0) * math.sqrt(2.0)
     share = np.array([1e-9, 0.3, 0.5, 1.0 - 1e-9])
     np.testing.assert_allclose(slope.at(share), truncnorm(-3.0, 3.0, 2.0, allowed / 3.0).ppf(share), atol=1e-6)
-    for key, told in (("microgeometry.wheel.crowning_um", "no tolerance"), ("pair.pinion.teeth", "no tolerance")):
+    for key, told in (
+        ("microgeometry.wheel.profile_crowning_um", "no tolerance"),
+        ("pair.pinion.teeth", "no tolerance"),
+    ):
         with pytest.raises(InputError, match=told):
             read_parameters({key: {"iso_class": 6}}, "loadmap", base)
 

@@ -43,7 +43,7 @@ positions = 6
 job = "loadmap"
 design = "factorial"
 [study.parameters]
-microgeometry.pinion.crowning_um = [0.0, 4.0]
+microgeometry.pinion.profile_crowning_um = [0.0, 4.0]
 pair.pinion.profile_shift = [0.0, 0.1]
 [study.outputs]
 peak_to_peak_um = "torques.transmission_error_peak_to_peak_um[torques.torque_Nm == 60]"

@@ -206,7 +206,7 @@ def test_a_case_that_is_written_elsewhere_finds_its_files(tmp_path):
     (tmp_path / "pitch.csv").write_text("tooth,pitch_um\n" + "".join(f"{n},{n % 3}\n" for n in range(1, 21)))
     (tmp_path / "study.toml").write_text(
         '[study]\njob = "loadmap"\nbase = "pair.toml"\n[study.parameters]\n'
-        'microgeometry.wheel.slope_um = [1.0, 2.0]\n[study.outputs]\nx = "1"\n'
+        'microgeometry.wheel.profile_slope_um = [1.0, 2.0]\n[study.outputs]\nx = "1"\n'
     )
     (tmp_path / "far" / "away").mkdir(parents=True)
     case = tmp_path / "far" / "away" / "one.toml"

@@ -41,8 +41,8 @@ def test_keys_of_gears_and_meshes_vary(tmp_path: Path) -> None:
 
 
 def test_a_tolerance_class_is_that_of_the_gear(tmp_path: Path) -> None:
-    line = "gears.wheel_2.microgeometry.slope_um = { iso_class = 6 }\n"
-    changes = {"gears__wheel_2__microgeometry": {"slope_um": 0.0}}
+    line = "gears.wheel_2.microgeometry.profile_slope_um = { iso_class = 6 }\n"
+    changes = {"gears__wheel_2__microgeometry": {"profile_slope_um": 0.0}}
     (parameter,) = read_study(study_of(tmp_path, line, STUDY.replace("factorial", "sobol"), **changes)).parameters
     (tmp_path / "one.toml").write_text(text())
     gear = read_stiffness_job(tmp_path / "one.toml", "out").pair.wheel

@@ -190,7 +190,7 @@ def test_gears_and_their_microgeometry(tmp_path):
     (tmp_path / "study.toml").write_text(
         job + '[study]\njob = "stiffness"\ndesign = "factorial"\n'
         "[study.parameters]\npair.pinion.profile_shift = [0.0, 0.1]\n"
-        "microgeometry.pinion.crowning_um = [0.0, 4.0]\n"
+        "microgeometry.pinion.profile_crowning_um = [0.0, 4.0]\n"
         '[study.outputs]\nk = "mean(k_mesh_N_per_m)"\n'
     )
     study = read_study(tmp_path / "study.toml")

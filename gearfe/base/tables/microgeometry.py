@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, fields
+from typing import ClassVar
 
 from ..config import quantity
 from ..errors import InputError
@@ -29,6 +30,12 @@ class WavinessTable:
 class FlankTable:
     """Deviations of the flanks of a gear along their normals, over the roll length; > 0 is more material."""
 
+    #: Keys that were: what became of them, and what to write instead.
+    REMOVED: ClassVar[dict[str, tuple[str, str]]] = {
+        f"{key}_um": ("has another name: crowning and slope of the profile, not of the helix", f"write profile_{key}_um")
+        for key in ("crowning", "slope")
+    }
+
     tip_relief_um: float | None = quantity(None, doc="tip relief (um), at the tip circle", low=0.0)
     tip_relief_length_mm: float | None = quantity(None, doc="roll length of it from the tip circle (mm)", above=0.0)
     tip_relief_start_mm: float | None = quantity(None, doc="or the roll length where it starts (mm)", above=0.0)
@@ -47,8 +54,10 @@ class FlankTable:
     )
     root_relief_end_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
     root_relief_shape: str = quantity("linear", doc="linear, arc or parabolic", choices=SHAPES)
-    crowning_um: float = quantity(0.0, doc="profile crowning (um), the ends lie that much back")
-    slope_um: float = quantity(0.0, doc="profile slope (um), from form to tip circle, > 0: more material at the tip")
+    profile_crowning_um: float = quantity(0.0, doc="profile crowning (um), the ends lie that much back")
+    profile_slope_um: float = quantity(
+        0.0, doc="profile slope (um), from form to tip circle, > 0: more material at the tip"
+    )
     waviness: tuple[WavinessTable, ...] = quantity((), doc="waves")
     points: tuple[tuple[float, float], ...] = quantity(
         (), doc="K-chart: [roll length (mm), deviation (um)] and straight lines between"
