@@ -35,8 +35,9 @@ OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
     r"yield|plastic|creep|hardening|damage|fatigue|wear":
         ("materials that yield, creep or wear", "spur gears of linear elastic material only"),
     r"(web|rim|hub|spoke)_": ("webs and thin rims", "spur gears with a solid body on a rigid bore only"),
-    r"crown|barrel|lead_(mod|corr|dev|slope)|misalign|face_load|end_relief|flank_line|parallelism|slope_deviation":
-        ("modifications and loads that vary along the face width", "spur gears only (profiles: [microgeometry])"),
+    r"^crown|^lead_|barrel|face_load|flank_line|parallelism|slope_deviation":
+        ("modifications along the face width by this name", "those of spur gears and helical gears are "
+         "helix_crowning_um, helix_slope_um, end_relief_low_um in [microgeometry], and misalignment_um in [pair]"),
     r"tors\w*_stiff|stiff\w*_tors|bending_stiff|(elastic|flexible|compliant)_shaft|shaft_(stiff|elastic|compl|flex)|"
     r"shear_modulus":
         ("stiffnesses of elastic shafts", "they follow from the sections and the material of a shaft with spur gears"),

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.progress import stage
+from ..base.tables.microgeometry import ALONG_WIDTH
 from .arguments import add_folder, add_job, add_mesh, check_option, each_mesh, print_results
 
 if TYPE_CHECKING:
-    from ..base.tables.gearbox import NamedMesh
+    from ..base.tables.gearbox import NamedGear, NamedMesh
     from ..gears.geometry.face import ToothDeviations
     from ..gears.geometry.pair import Gear, GearPair
 
@@ -117,10 +118,18 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     _show({"iso_6336": iso})
     if exports and pair.pinion.helical:
         print("csv and dxf are of the transverse section in the middle of the face width, step and brep of the helix")
+    if exports and mesh.deviates and any(_along_width(gear) for gear in mesh.gears):
+        print("modifications along the face width are in none of the files")
     if exports and mesh.deviates:
         print("flanks with the deviations of [microgeometry]: dxf, step and brep all teeth, csv tooth 0")
     print_results((), folder, names, {}, pair.warnings)
     return 0
+
+
+def _along_width(gear: NamedGear) -> bool:
+    """Whether a gear has modifications along the face width, on either side of its teeth."""
+    sides = () if gear.microgeometry is None else (gear.microgeometry.flank(side) for side in ("left", "right"))
+    return any(getattr(flank, key) for flank in sides for key in ALONG_WIDTH)
 
 
 def _exports(text: str) -> list[str]:

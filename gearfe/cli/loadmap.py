@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 MODEL = ("law", "plane", "kinematics", "coarsen")
 LOADS = ("positions", "mesh_cycles", "root_stress")
 #: Files that a run can leave.
-FILES = ("loadmap*.csv", "loadmap*.png", "loadmap.json")
+FILES = ("loadmap*.csv", "loadmap*.png", "loadmap_flank.vtkhdf", "loadmap.json")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,6 +65,10 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     from ..gears.geometry.pair import pair_of
 
     pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
+    if mesh.along_width():
+        from .along_width import run_along_width
+
+        return run_along_width(args, mesh, pair, started, table)
 
     from ..base.files import output_folder, whole_set, write_csvs, write_json
     from ..base.progress import Stopwatch

@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the file and name its groups."""
     from ..base.config import read_toml
-    from ..base.tables.gearbox import check_spur_mesh
+    from ..base.tables.gearbox import check_alike_along
     from ..base.tables.jobs import only_mesh
 
     out = Path(args.out) if args.out else Path("out") / Path(args.job).stem / "mesh"
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..gears.geometry.pair import pair_of
 
-    check_spur_mesh(mesh, "a mesh of finite elements")
+    check_alike_along(mesh, "a mesh of finite elements", places=False)
     pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
 
     from ..base.files import output_folder

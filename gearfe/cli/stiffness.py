@@ -100,11 +100,13 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     if args.animation is not None and not 2 <= args.animation <= 1000:
         raise InputError("--animation", args.animation, "must be >= 2 and <= 1000 frames", "40 are usual")
 
-    from ..base.tables.gearbox import check_spur_mesh
     from ..gears.geometry.pair import pair_of
 
-    check_spur_mesh(mesh, "the contact of the teeth")
     pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
+    if mesh.along_width():
+        from .along_width import run_along_width
+
+        return run_along_width(args, mesh, pair, started)
 
     import numpy as np
 
@@ -142,7 +144,7 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
         with watch.stage("check"):
             check = check_positions(curve, job.pair, args.check, job.model, kinematics=sweep["kinematics"])
     found = summary(job, curve, watch.seconds)
-    may_write = ("stiffness.png", "stiffness_check.csv", "fields.vtkhdf", "stress_*deg.png", "pressure.*")
+    may_write = ("stiffness*.png", "stiffness_*.csv", "*.vtkhdf", "stress_*deg.png", "pressure.*")
     with whole_set(folder, may_write) as made:
         with watch.stage("table"):
             curve.to_csv(made / "stiffness.csv")

@@ -80,6 +80,8 @@ def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool, mesh: str |
     from ..gears.gearmesh.sweep import sweep_stiffness
 
     job = _only_mesh(raw, path, mesh)
+    if job.mesh.along_width():
+        return _along_width(job, shared, None, estimate=estimate)
     sweep, elastic = job.sweep, job.elastic(_kept(job, shared))
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=estimate, **sweep)
     return Answer({"stiffness": curve.columns()}, summary(job, curve, {}), _positions(curve.failed))
@@ -91,8 +93,32 @@ def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool, mesh: str | 
 
     job = _only_mesh(raw, path, mesh)
     table = job.mesh.loads
+    if job.mesh.along_width():
+        return _along_width(job, shared, table)
     load_map = job_map(job, table, keep=_kept(job, shared))
     return Answer(map_tables(load_map), map_summary(job, table, load_map, {}), _positions(load_map.failed))
+
+
+def _along_width(job: Any, shared: Shared, table: Any, *, estimate: bool = False) -> Answer:
+    """A mesh whose load varies along the face width: [stiffness], or the torques of a load map's table."""
+    from ..gears.gearmesh import width_job
+    from ..gears.gearmesh.width_report import load_columns, sweep_columns, width_summary
+
+    if table is None:
+        width_job.check_stiffness_job(job)
+    else:
+        width_job.check_map_job(job, table)
+    gears = [(gear.teeth, gear.form, gear.drawn, gear.y_mm) for gear in job.mesh.gears]
+    sizes = job.materials, job.table.coarsen, job.table.flank_coarsen, job.mesh.flank
+    lines = width_job.job_lines(job, keep=partial(shared.get, repr((gears, job.mesh.centre_distance_mm, sizes))))
+    if table is None:
+        name, sweep = "stiffness", width_job.stiffness_sweep(job, lines)
+    else:
+        name, sweep = "loadmap", width_job.map_sweep(job, lines, table)
+    mesh = lines.compliance.mesh
+    errors = width_job.estimated_errors(job, lines, sweep, Stopwatch()) if estimate else None
+    rows = {name: sweep_columns(job, mesh, sweep), "load": load_columns(job, sweep)}
+    return Answer(rows, width_summary(job, mesh, sweep, {}, errors=errors), _positions(sweep.status != "converged"))
 
 
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:

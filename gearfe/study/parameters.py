@@ -21,7 +21,7 @@ from ..base.tables.named import NAMED
 from ..base.tables.study import DistributionTable
 from ..base.typing import Array
 from ..gears.geometry.pair import gear_of
-from ..gears.geometry.pitch_errors import tolerances
+from ..gears.geometry.pitch_errors import helix_slope_tolerance, tolerances
 
 _KEYS = {field.name for field in dataclasses.fields(DistributionTable)}
 WHERE = "study.parameters"
@@ -174,14 +174,17 @@ def _check_sizes(value: Any, label: str) -> None:
 
 
 def _of_class(found: DistributionTable, class_: int, name: str, base: Mapping[str, Any]) -> DistributionTable:
-    """Normal, three deviations to the tolerance f_HaT of the profile slope, and cut off there."""
+    """Normal, three deviations to the tolerance of the profile or helix slope, f_HaT or f_HbT, and cut off there."""
 
     parts = name.split(".")
-    named = _gear_named(parts, base) if parts[-1] == "profile_slope_um" else None
+    slopes = ("profile_slope_um", "helix_slope_um")
+    named = _gear_named(parts, base) if parts[-1] in slopes else None
     if named is None:
-        cure = "use it for profile_slope_um; pitch errors of a class: pitch_class, and vary pitch_seed"
+        cure = f"use it for {' and '.join(slopes)}; pitch errors of a class: pitch_class, and vary pitch_seed"
         raise InputError(f"{WHERE}.{name}.iso_class", class_, "has no tolerance for this key", cure)
-    allowed = 1e6 * tolerances(gear_of(named), class_).slope
+    gear = gear_of(named)
+    of_helix = parts[-1] == "helix_slope_um"
+    allowed = 1e6 * (helix_slope_tolerance(gear, class_) if of_helix else tolerances(gear, class_).slope)
     mean = found.mean or 0.0
     return DistributionTable(mean=mean, deviation=allowed / 3.0, low=mean - allowed, high=mean + allowed)
 

@@ -143,7 +143,7 @@ WRONG_GEARS: list[tuple[dict[str, Any], str]] = [
     ({"gears__sun__tip_diameter_mm": 80.0}, r"gears\.sun\.tip_diameter_mm = 80.0: .*must be < "),
     ({"gears__sun__shaft": "s5"}, r"gears\.sun\.shaft: unknown name 's5'; known names: s1, s2, s3, s4"),
     ({"gears__sun__shaft": ["s1", "s2"]}, r"gears\.sun\.shaft = \['s1', 's2'\]: must be a text.*the one shaft"),
-    ({"gears__sun__shaft": None}, r"gears\.sun\.shaft: is required beside y_mm"),
+    ({"gears__sun__shaft": None}, r"gears\.sun\.shaft: is required: the gear is on no shaft"),
     ({"gears__sun__shaft": None, "gears__sun__y_mm": None}, r"gears\.sun\.shaft: is required: the gear is on no shaft"),
     ({"gears__sun__y_mm": 80.0}, r"gear 'sun'.* beyond the end of shaft 's1'"),
     ({"gears__a b": GEAR}, r"name in \[gears\] = 'a b': must have letters, digits"),

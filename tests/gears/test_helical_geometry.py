@@ -356,9 +356,6 @@ def test_helices_in_the_picture_lean_with_their_hands() -> None:
 
 #: Command and the words of its refusal of a helical mesh.
 REFUSING = [
-    (["stiffness"], "the contact of the teeth"),
-    (["stiffness", "--check", "1"], "the contact of the teeth"),
-    (["loadmap", "--torques-Nm", "100"], "the contact of the teeth"),
     (["mesh", "--sector"], "a mesh of finite elements"),
     (["mesh", "--deck"], "a mesh of finite elements"),
 ]
@@ -372,7 +369,10 @@ def test_what_takes_no_helical_gears_says_so(
     job.write_text(JOB)
     assert main([line[0], str(job), *line[1:]]) == 2
     message = capsys.readouterr().err
-    assert f"pair.helix_angle_deg = 15.0: makes gear 'pinion' helical: {what} takes spur gears only" in message
+    assert (
+        f"pair.helix_angle_deg = 15.0: makes the load vary along the face width: {what} takes spur gears alike"
+        in message
+    )
 
 
 @pytest.mark.parametrize("command", ["vibration", "runup"])
@@ -385,7 +385,7 @@ def test_trains_take_no_helical_gears(command: str, tmp_path: Path, capsys: pyte
     job.write_text(text)
     assert main([command, str(job)]) == 2
     message = capsys.readouterr().err
-    assert re.search(r"gears\.\w+\.helix_angle_deg = 5\.0: makes gear '\w+' helical: a train takes spur gears", message)
+    assert re.search(r"gears\.\w+\.helix_angle_deg = 5\.0: makes the load vary .*: a train takes spur gears", message)
 
 
 def test_functions_take_no_helical_gears() -> None:
@@ -394,3 +394,12 @@ def test_functions_take_no_helical_gears() -> None:
         elastic_pair(pair)
     with pytest.raises(InputError, match=r"the check on whole gears takes spur"):
         whole_pair(pair, PairModel())
+
+
+def test_places_along_the_axes_leave_a_common_width() -> None:
+    pair = pair_of_table(pinion__y_mm=4.0, wheel__y_mm=-3.0)
+    assert 1e3 * pair.common_width == pytest.approx(23.0 - 7.0, rel=1e-12)
+    assert pair.overlap_ratio == pytest.approx(16 * math.sin(15 * DEGREE) / (3.5 * math.pi), rel=1e-12)
+    assert pair_of_table(wheel__y_mm=1.0, wheel__face_width_mm=30.0).common_width == pytest.approx(23e-3, rel=1e-12)
+    with pytest.raises(InputError, match=r"pair\.wheel\.y_mm = 23\.5: leaves no common face width"):
+        pair_of_table(wheel__y_mm=23.5)

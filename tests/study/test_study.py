@@ -55,6 +55,10 @@ def test_slopes_of_a_class_are_within_its_tolerance():
     allowed = (0.12 + 1.2 + 4.0) * math.sqrt(2.0)
     share = np.array([1e-9, 0.3, 0.5, 1.0 - 1e-9])
     np.testing.assert_allclose(slope.at(share), truncnorm(-3.0, 3.0, 2.0, allowed / 3.0).ppf(share), atol=1e-6)
+    helix = {"microgeometry.wheel.helix_slope_um": {"iso_class": 6}}
+    (slope,) = read_parameters(helix, "loadmap", base)  # f_HbT, face width 10 mm
+    allowed = (0.05 * math.sqrt(120.0) + 0.35 * math.sqrt(10.0) + 4.0) * math.sqrt(2.0)
+    np.testing.assert_allclose(slope.at(share), truncnorm(-3.0, 3.0, 0.0, allowed / 3.0).ppf(share), atol=1e-6)
     for key, told in (
         ("microgeometry.wheel.profile_crowning_um", "no tolerance"),
         ("pair.pinion.teeth", "no tolerance"),

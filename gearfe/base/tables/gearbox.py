@@ -16,7 +16,7 @@ from ..errors import InputError, unknown_name
 from .bearing import BearingTable
 from .driveline import CouplingTable, MachineTable, TrainCouplingTable, TrainMachineTable
 from .loadmap import LoadMapTable
-from .microgeometry import GearMicrogeometryTable, MicrogeometryTable
+from .microgeometry import ALONG_WIDTH, FlankTable, GearMicrogeometryTable, MicrogeometryTable
 from .named import NamedBearingTable, NamedGearTable, NamedMeshTable, NamedShaftTable
 from .pair import (
     FROM_DISTANCE,
@@ -48,6 +48,8 @@ DEFAULT = "default"
 DRAWN = ("pitch_diameter_mm", "tip_diameter_mm", "root_diameter_mm", "span_mm", "span_teeth")
 #: Keys of the tooth form that gears in mesh have in common, and what messages call them.
 SHARED = (("module_mm", "modules"), ("pressure_angle_deg", "pressure angles"), ("helix_angle_deg", "helix angles"))
+#: Keys of a mesh that tilt its axes.
+TILTS = ("misalignment_um", "misalignment_across_um")
 #: Hand of a gear's mate.
 OPPOSITE = {"right": "left", "left": "right"}
 #: Bore of a gear whose entry in [[train.gears]] gives none, times the pitch diameter.
@@ -135,6 +137,8 @@ class NamedMesh:
         [stiffness], with the keys that this mesh and the variant have instead.
     loads
         [loadmap] alike.
+    misalignment_um, misalignment_across_um
+        Tilts of the axes over the common face width, in and across the plane of action.
     """
 
     name: str
@@ -147,6 +151,8 @@ class NamedMesh:
     tolerance_class: int | None = None
     stiffness: StiffnessTable = field(default_factory=StiffnessTable)
     loads: LoadMapTable = field(default_factory=LoadMapTable)
+    misalignment_um: float = 0.0
+    misalignment_across_um: float = 0.0
 
     @property
     def gears(self) -> tuple[NamedGear, NamedGear]:
@@ -157,6 +163,36 @@ class NamedMesh:
     def deviates(self) -> bool:
         """Whether the file says anything of deviations of the flanks."""
         return any(gear.microgeometry is not None for gear in self.gears)
+
+    @property
+    def tilts_where(self) -> str:
+        """Table of its misalignment, for messages; a mesh of [[train.meshes]] has that of [pair]."""
+        return "pair" if self.where.startswith("train.") else self.where
+
+    def along_width(self, sides: Iterable[str] = (), *, places: bool = True) -> tuple[str, Any] | None:
+        """Return the first key, and its value, by which the load varies along the face width; None: it does not.
+
+        Parameters
+        ----------
+        sides
+            Flanks whose modifications count, ``left`` and ``right``; none: the driving ones.
+        places
+            Whether different places of the gears along the axis count.
+        """
+        for gear in self.gears:
+            if gear.form["helix_angle_deg"]:
+                return f"{gear.written('helix_angle_deg')}.helix_angle_deg", gear.form["helix_angle_deg"]
+        for gear in self.gears if self.deviates else ():
+            for side in tuple(sides) or (self.flank,):
+                flank = FlankTable() if gear.microgeometry is None else gear.microgeometry.flank(side)
+                if key := next((key for key in ALONG_WIDTH if getattr(flank, key)), None):
+                    return f"{gear.microgeometry_where}.{key}", getattr(flank, key)
+        for key in TILTS:
+            if getattr(self, key):
+                return f"{self.tilts_where}.{key}", getattr(self, key)
+        if places and self.driven.y_mm != self.driver.y_mm:
+            return f"{self.driven.where}.y_mm", self.driven.y_mm
+        return None
 
 
 @dataclass(frozen=True)
@@ -295,14 +331,24 @@ def _with_gears(mesh: NamedMesh, gears: Mapping[str, NamedGear]) -> NamedMesh:
     return replace(mesh, driver=gears[mesh.driver.name], driven=gears[mesh.driven.name])
 
 
-def check_spur_mesh(mesh: NamedMesh, what: str) -> None:
-    """Raise `InputError` for a mesh of helical gears; `what` names the computation that takes spur gears only."""
-    for gear in mesh.gears:
-        if gear.form["helix_angle_deg"]:
-            key = f"{gear.written('helix_angle_deg')}.helix_angle_deg"
-            problem = f"makes gear {gear.name!r} helical: {what} takes spur gears only"
-            cure = "leave it out, or write 0; gearfe gear takes helical gears"
-            raise InputError(key, gear.form["helix_angle_deg"], problem, cure)
+def check_alike_along(mesh: NamedMesh, what: str, *, sides: Iterable[str] = (), places: bool = True) -> None:
+    """Raise `InputError` for a mesh whose load varies along the face width; see `NamedMesh.along_width`.
+
+    Parameters
+    ----------
+    mesh : NamedMesh
+        The mesh.
+    what : str
+        What takes only gears that are alike along the face width, for the message.
+    sides, places
+        What counts.
+    """
+    found = mesh.along_width(sides, places=places)
+    if found is not None:
+        key, value = found
+        problem = f"makes the load vary along the face width: {what} takes spur gears alike along it only"
+        cure = "leave it out; gearfe stiffness and gearfe loadmap take it"
+        raise InputError(key, None if isinstance(value, tuple) else value, problem, cure)
 
 
 # --- [gears.NAME], [meshes.NAME] ------------------------------------------------------------------------------------
@@ -423,7 +469,9 @@ def _named_mesh(name: str, table: NamedMeshTable, gears: Mapping[str, NamedGear]
             problem = f"makes {what} of {a:.9g} and {b:.9g} in mesh {name!r}: must be that of gear {one.name!r}"
             value = two.drawn.get(given, b)
             raise InputError(f"{two.where}.{given}", value, problem, f"gears in mesh have equal {what}")
-    return NamedMesh(name, where, one, two, table.centre_distance_mm, where, table.flank, table.tolerance_class)
+    tilts = {key: getattr(table, key) for key in TILTS}
+    distance = table.centre_distance_mm
+    return NamedMesh(name, where, one, two, distance, where, table.flank, table.tolerance_class, **tilts)
 
 
 def _form(
@@ -608,7 +656,8 @@ def pair_gearbox(pair: PairTable, microgeometry: MicrogeometryTable | None = Non
     """Return the two gears of [pair], pinion and wheel, and their mesh."""
     gears = {side: _pair_gear(pair, side, microgeometry) for side in (PINION, WHEEL)}
     name = mesh_name(PINION, WHEEL)
-    mesh = NamedMesh(name, "pair", gears[PINION], gears[WHEEL], pair.centre_distance_mm, "pair")
+    tilts = {key: getattr(pair, key) for key in TILTS}
+    mesh = NamedMesh(name, "pair", gears[PINION], gears[WHEEL], pair.centre_distance_mm, "pair", **tilts)
     if microgeometry is not None:
         mesh = replace(mesh, flank=microgeometry.flank, tolerance_class=microgeometry.tolerance_class)
     return _with_shifts(_with_hands(Gearbox(gears, {name: mesh})))
@@ -635,6 +684,7 @@ def _pair_gear(pair: PairTable, side: str, microgeometry: MicrogeometryTable | N
         places,
         uneven,
         f"microgeometry.{side}",
+        y_mm=table.y_mm,
     )
 
 
@@ -661,9 +711,11 @@ def train_gearbox(
         of_pair = {sides[mesh.driver], sides[mesh.driven]} == {PINION, WHEEL}
         if distance is None and of_pair and pair is not None and pair.centre_distance_mm is not None:
             distance, distance_where = pair.centre_distance_mm, "pair"
+        tilts = {key: getattr(pair, key) if of_pair else 0.0 for key in TILTS}
         if name in meshes:
             raise InputError(where, None, f"has the gears of another mesh, {name!r}", "two gears have one mesh")
-        meshes[name] = NamedMesh(name, where, gears[mesh.driver], gears[mesh.driven], distance, distance_where)
+        one, two = gears[mesh.driver], gears[mesh.driven]
+        meshes[name] = NamedMesh(name, where, one, two, distance, distance_where, **tilts)
     return _with_hands(Gearbox(gears, meshes))
 
 

@@ -11,6 +11,15 @@ from ..errors import InputError
 from .loadmap import LoadMapTable
 
 SHAPES = ("linear", "arc", "parabolic")
+#: Ends of the face width, at the smaller and at the larger y, and corners of a flank.
+ENDS_OF_WIDTH = ("low", "high")
+CORNERS = ("tip_low", "tip_high", "root_low", "root_high")
+#: Keys of modifications that vary along the face width.
+ALONG_WIDTH = (
+    *("helix_crowning_um", "helix_slope_um", "bias_um"),
+    *(f"end_relief_{end}_um" for end in ENDS_OF_WIDTH),
+    "triangular_reliefs",
+)
 #: Keys of which at most one says where a relief starts.
 STARTS = ("length_mm", "start_mm", "start_diameter_mm")
 #: Keys of which at most one says where it has its amount.
@@ -27,12 +36,25 @@ class WavinessTable:
 
 
 @dataclass(frozen=True)
+class TriangularReliefTable:
+    """Material taken off a corner of the flanks, down to nothing on the line between two edges."""
+
+    corner: str = quantity(doc="tip_low, tip_high, root_low or root_high (y)", choices=CORNERS)
+    amount_um: float = quantity(doc="relief in the corner (um)", low=0.0)
+    width_mm: float = quantity(doc="its length along the face width (mm)", above=0.0)
+    roll_length_mm: float = quantity(doc="its length along the profile, as roll length (mm)", above=0.0)
+
+
+@dataclass(frozen=True)
 class FlankTable:
-    """Deviations of the flanks of a gear along their normals, over the roll length; > 0 is more material."""
+    """Deviations of the flanks of a gear in the transverse section, along their normals; > 0 is more material."""
 
     #: Keys that were: what became of them, and what to write instead.
     REMOVED: ClassVar[dict[str, tuple[str, str]]] = {
-        f"{key}_um": ("has another name: crowning and slope of the profile, not of the helix", f"write profile_{key}_um")
+        f"{key}_um": (
+            f"has another name beside helix_{key}_um, the one along the face width",
+            f"write profile_{key}_um",
+        )
         for key in ("crowning", "slope")
     }
 
@@ -58,6 +80,19 @@ class FlankTable:
     profile_slope_um: float = quantity(
         0.0, doc="profile slope (um), from form to tip circle, > 0: more material at the tip"
     )
+    helix_crowning_um: float = quantity(0.0, doc="helix crowning C_beta (um), the ends of the width lie that much back")
+    helix_slope_um: float = quantity(
+        0.0, doc="helix slope f_Hbeta (um), over the face width, > 0: more material at the larger y"
+    )
+    bias_um: float = quantity(
+        0.0, doc="twist of the flank (um): helix slope at the tip circle less that at the form circle"
+    )
+    end_relief_low_um: float | None = quantity(None, doc="end relief (um), at the end of smaller y", low=0.0)
+    end_relief_low_length_mm: float | None = quantity(None, doc="length of it along the width (mm)", above=0.0)
+    end_relief_high_um: float | None = quantity(None, doc="end relief (um), at the end of larger y", low=0.0)
+    end_relief_high_length_mm: float | None = quantity(None, doc="length of it along the width (mm)", above=0.0)
+    end_relief_shape: str = quantity("linear", doc="linear or parabolic, of both ends", choices=("linear", "parabolic"))
+    triangular_reliefs: tuple[TriangularReliefTable, ...] = quantity((), doc="reliefs of corners")
     waviness: tuple[WavinessTable, ...] = quantity((), doc="waves")
     points: tuple[tuple[float, float], ...] = quantity(
         (), doc="K-chart: [roll length (mm), deviation (um)] and straight lines between"
@@ -82,6 +117,10 @@ class FlankTable:
             if len(given) > 1:
                 value = getattr(self, given[1])
                 raise InputError(f"{where}.{given[1]}", value, f"stands beside {given[0]}", "leave one of them out")
+        for amount, length in ((f"end_relief_{end}_um", f"end_relief_{end}_length_mm") for end in ENDS_OF_WIDTH):
+            if (getattr(self, amount) is None) != (getattr(self, length) is None):
+                lacking, there = (amount, length) if getattr(self, amount) is None else (length, amount)
+                raise InputError(f"{where}.{lacking}", None, f"is required beside {there}", "add it, or leave out both")
         pitch = [key for key in ("pitch_um", "single_pitch_um", "pitch_csv", "pitch_class") if getattr(self, key)]
         if len(pitch) > 1:
             value = getattr(self, pitch[1])

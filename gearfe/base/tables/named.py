@@ -40,14 +40,13 @@ class NamedGearTable(GearBodyTable):
         None, doc="deviations of its flanks"
     )
     shaft: str | None = quantity(None, doc="name of the one shaft that carries it")
-    y_mm: float | None = quantity(None, doc="y of its middle plane (mm)")
+    y_mm: float | None = quantity(None, doc="y of its middle plane (mm), along the axes; on no shaft, by default 0")
 
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that are missing or contradict each other."""
         check_gear(self, where)
-        if (self.shaft is None) != (self.y_mm is None):
-            lacking, there = ("shaft", "y_mm") if self.shaft is None else ("y_mm", "shaft")
-            raise InputError(f"{where}.{lacking}", None, f"is required beside {there}", "add it, or leave out both")
+        if self.shaft is not None and self.y_mm is None:
+            raise InputError(f"{where}.y_mm", None, "is required beside shaft", "add it, or leave out both")
 
 
 @dataclass(frozen=True)
@@ -57,6 +56,12 @@ class NamedMeshTable(TrainMeshTable):
     flank: str = quantity("left", doc="the driving flanks of both gears: left or right", choices=("left", "right"))
     tolerance_class: int | None = quantity(
         None, doc="class of ISO 1328-1 whose profile tolerances the picture of the flanks shows", low=1, high=11
+    )
+    misalignment_um: float = quantity(
+        0.0, doc="tilt of the axes in the plane of action (um over the common face width), > 0: closes larger y"
+    )
+    misalignment_across_um: float = quantity(
+        0.0, doc="tilt of the axes across the plane of action (um over the common face width)"
     )
     stiffness: StiffnessTable | None = quantity(  # noqa: RUF009
         None, doc="keys of this mesh that win over those of [stiffness]: load, positions, contact law, sizes"

@@ -218,6 +218,7 @@ def common_module_mm(gears: Iterable[GearBodyTable], helix_deg: float) -> float 
 class GearTable(GearBodyTable):
     """One gear of [pair]."""
 
+    y_mm: float = quantity(0.0, doc="y of its middle plane (mm), along the axes, towards the viewer of the section")
     material: MaterialTable | None = quantity(None, doc="material of this gear, if not the shared one")  # noqa: RUF009
 
 
@@ -232,6 +233,12 @@ class PairTable(ToothFormTable):
     wheel: GearTable = quantity(doc="the driven gear")  # noqa: RUF009
     centre_distance_mm: float | None = quantity(
         None, doc="centre distance (mm); without it, from the profile shifts without backlash", above=0.0
+    )
+    misalignment_um: float = quantity(
+        0.0, doc="tilt of the axes in the plane of action (um over the common face width), > 0: closes larger y"
+    )
+    misalignment_across_um: float = quantity(
+        0.0, doc="tilt of the axes across the plane of action (um over the common face width)"
     )
     material: MaterialTable = quantity(MaterialTable, doc="material of both gears")  # noqa: RUF009
 

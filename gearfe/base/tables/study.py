@@ -25,7 +25,8 @@ class DistributionTable:
         None,
         low=1,
         high=11,
-        doc="for profile_slope_um: normal about mean, cut off at the tolerance of this class of ISO 1328-1",
+        doc="for profile_slope_um and helix_slope_um: normal about mean, cut off at the tolerance of this class of ISO "
+        "1328-1",
     )
     count: int | None = quantity(None, low=2, high=100_000, doc="even steps from low to high for a factorial design")
     tolerance: float = quantity(0.0, low=0.0, doc="+- of manufacture: a search tells the outputs at its ends")

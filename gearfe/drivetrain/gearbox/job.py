@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.errors import InputError, given
-from ...base.tables.gearbox import Gearbox, NamedMesh, check_spur_mesh
+from ...base.tables.gearbox import Gearbox, NamedMesh, check_alike_along
 from ...base.tables.housing import HousingTable
 from ...base.tables.jobs import read_train_tables
 from ...base.tables.pair import MaterialTable, StiffnessTable
@@ -100,7 +100,7 @@ class TrainJob:
         """
         made: dict[str, Gear] = {}
         for mesh in self.meshes:
-            check_spur_mesh(mesh, "a train")
+            check_alike_along(mesh, "a train", sides=("left", "right"), places=False)
             pair = pair_of(mesh)
             made |= {mesh.driver.name: pair.pinion, mesh.driven.name: pair.given_wheel}
         return made | {name: gear_of(named) for name, named in self.gearbox.gears.items() if name not in made}

@@ -23,7 +23,7 @@ from ...base.cache import cache_key, cached_arrays, source_hash, versions
 from ...base.config import read_toml
 from ...base.errors import InputError, given
 from ...base.progress import Stopwatch
-from ...base.tables.gearbox import NamedMesh, check_spur_mesh
+from ...base.tables.gearbox import NamedMesh, check_alike_along
 from ...base.tables.jobs import only_mesh
 from ...base.tables.pair import MaterialTable, StiffnessTable
 from ...fem.plane import Material
@@ -111,7 +111,14 @@ class StiffnessJob:
 
     @property
     def model(self) -> PairModel:
-        """What `gearfe.gears.gearmesh.sweep.elastic_pair` makes of the gears."""
+        """What `gearfe.gears.gearmesh.sweep.elastic_pair` makes of the gears.
+
+        Raises
+        ------
+        InputError
+            For gears whose load varies along the face width, which `gears.gearmesh.width_job` computes.
+        """
+        check_alike_along(self.mesh, "the law of plane sections", places=False)
         t = self.table
         for gear, material in zip(self.mesh.gears, self.materials, strict=True):
             check_poisson(material.poisson_ratio, t.plane, f"{gear.material_where}.poisson_ratio")
@@ -140,16 +147,8 @@ class StiffnessJob:
             When the job has neither a twist nor a torque, and for teeth that differ.
         """
         check_alike(self.deviations)
+        self.check_load()
         t = self.table
-        if t.twist_deg is None and t.torque_Nm is None:
-            cure = "add twist_deg or torque_Nm to [stiffness], or give --twist-deg or --torque-Nm"
-            raise InputError("stiffness.twist_deg", None, "no load: neither twist_deg nor torque_Nm is given", cure)
-        if t.twist_deg is not None:
-            lost = math.degrees(self.pair.contact_twist) if t.twist_from == "contact" else 0.0
-            most = 180.0 / self.pair.wheel.teeth - lost
-            if not t.twist_deg < most:
-                problem = f"must be < {most:.6g} deg, half a pitch of the wheel"
-                raise InputError("stiffness.twist_deg", t.twist_deg, problem, "0.01 to 0.5 deg is usual")
         if t.torque_Nm is not None:
             check_torque(self.pair, self.model, t.torque_Nm, "stiffness.torque_Nm")
         return {
@@ -160,6 +159,19 @@ class StiffnessJob:
             "twist_from": t.twist_from,
             "solve_all": t.solve_all,
         }
+
+    def check_load(self) -> None:
+        """Raise `InputError` when the job has neither a twist nor a torque, or a twist that leaves the tooth."""
+        t = self.table
+        if t.twist_deg is None and t.torque_Nm is None:
+            cure = "add twist_deg or torque_Nm to [stiffness], or give --twist-deg or --torque-Nm"
+            raise InputError("stiffness.twist_deg", None, "no load: neither twist_deg nor torque_Nm is given", cure)
+        if t.twist_deg is not None:
+            lost = math.degrees(self.pair.contact_twist) if t.twist_from == "contact" else 0.0
+            most = 180.0 / self.pair.wheel.teeth - lost
+            if not t.twist_deg < most:
+                problem = f"must be < {most:.6g} deg, half a pitch of the wheel"
+                raise InputError("stiffness.twist_deg", t.twist_deg, problem, "0.01 to 0.5 deg is usual")
 
 
 def material_of(table: MaterialTable) -> Material:
@@ -190,9 +202,8 @@ def stiffness_job(mesh: NamedMesh, folder: Path = Path(), pair: GearPair | None 
     Raises
     ------
     InputError
-        For gears that cannot run together, and helical ones.
+        For gears that cannot run together.
     """
-    check_spur_mesh(mesh, "the contact of the teeth")
     return StiffnessJob(mesh, pair_of(mesh) if pair is None else pair, folder)
 
 

@@ -13,7 +13,7 @@ SI units and radians.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -45,11 +45,14 @@ class MeshGeometry:
         The gears; the pinion drives.
     centre_distance
         Centre distance a (m); None: without backlash for the unthinned teeth, from the profile shifts.
+    axial_offset
+        Middle of the wheel's face width less that of the pinion's, along the axes (m).
     """
 
     pinion: Gear
     wheel: Gear
     centre_distance: float | None = None
+    axial_offset: float = field(default=0.0, kw_only=True)
 
     @cached_property
     def gear_ratio(self) -> float:
@@ -211,7 +214,8 @@ class MeshGeometry:
     @cached_property
     def common_width(self) -> float:
         """Width b on which both gears have teeth (m)."""
-        return min(self.pinion.face_width, self.wheel.face_width)
+        one, two = self.pinion.face_width, self.wheel.face_width
+        return min(one, two, 0.5 * (one + two) - abs(self.axial_offset))
 
     @cached_property
     def overlap_ratio(self) -> float:

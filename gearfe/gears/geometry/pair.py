@@ -34,6 +34,8 @@ class GearPair(MeshGeometry, Shown):
     ----------
     pinion, wheel
         The gears; the pinion drives.
+    axial_offset
+        Middle of the wheel's face width less that of the pinion's, along the axes (m).
     centre_distance
         Centre distance a (m); None: without backlash for the unthinned teeth, from the profile shifts. Where it jams
         the teeth by no more than rounding (`gear_data.rounding`), the wheel's teeth are made so much thinner.
@@ -51,7 +53,8 @@ class GearPair(MeshGeometry, Shown):
     given_wheel: Gear = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
-        jam = check_seat(MeshGeometry(self.pinion, self.wheel, self.centre_distance))
+        offset = self.axial_offset
+        jam = check_seat(MeshGeometry(self.pinion, self.wheel, self.centre_distance, axial_offset=offset))
         object.__setattr__(self, "given_wheel", self.wheel)
         notes = list(self.notes)
         if jam > 0.0:
@@ -113,7 +116,13 @@ KEYS: dict[str, tuple[str, float]] = {
 }
 
 
-def gear_pair(pinion: Gear, wheel: Gear, centre_distance: float | None = None, notes: tuple[str, ...] = ()) -> GearPair:
+def gear_pair(
+    pinion: Gear,
+    wheel: Gear,
+    centre_distance: float | None = None,
+    notes: tuple[str, ...] = (),
+    axial_offset: float = 0.0,
+) -> GearPair:
     """Return a checked pair; equal gears at an equal centre distance with equal notes share one.
 
     Parameters
@@ -124,6 +133,8 @@ def gear_pair(pinion: Gear, wheel: Gear, centre_distance: float | None = None, n
         In m; without it, without backlash.
     notes : tuple of str
         How given data were taken that fit each other except for rounding.
+    axial_offset : float
+        Middle of the wheel's face width less that of the pinion's, along the axes (m).
 
     Raises
     ------
@@ -132,12 +143,14 @@ def gear_pair(pinion: Gear, wheel: Gear, centre_distance: float | None = None, n
     """
     if centre_distance is not None and not isinstance(centre_distance, Real):
         return GearPair(pinion, wheel, centre_distance)  # which refuses it
-    return _shared_pair(pinion, wheel, centre_distance, notes)
+    return _shared_pair(pinion, wheel, centre_distance, notes, axial_offset)
 
 
 @lru_cache(maxsize=256)
-def _shared_pair(pinion: Gear, wheel: Gear, centre_distance: float | None, notes: tuple[str, ...]) -> GearPair:
-    return GearPair(pinion, wheel, centre_distance, notes=notes)
+def _shared_pair(
+    pinion: Gear, wheel: Gear, centre_distance: float | None, notes: tuple[str, ...], axial_offset: float
+) -> GearPair:
+    return GearPair(pinion, wheel, centre_distance, notes=notes, axial_offset=axial_offset)
 
 
 def gear_of_form(teeth: int, form: Mapping[str, Any]) -> Gear:
@@ -197,7 +210,7 @@ def pair_of(mesh: NamedMesh) -> GearPair:
     written = _Written(mesh)
     gears = {side: written.gear(side) for side in SIDES}
     try:
-        return gear_pair(gears["pinion"], gears["wheel"], written.distance, tuple(written.notes()))
+        return gear_pair(gears["pinion"], gears["wheel"], written.distance, tuple(written.notes()), written.offset)
     except InputError as error:
         side, _, name = error.field.rpartition(".") if error.field.startswith(SIDES) else ("", "", "")
         raise written.error(error, side, name or error.field, gears) from None
@@ -336,7 +349,9 @@ class _Written:
         """
         error = InputError(name, error.value, error.reason, error.cure, error.limit)
         if not side:
-            return in_keys(error, self.mesh.centre_distance_where)
+            gear = self.mesh.driven
+            of_place = InputError(f"{gear.where}.y_mm", gear.y_mm, error.reason, error.cure)
+            return of_place if name == "axial_offset" else in_keys(error, self.mesh.centre_distance_where)
         if side == self.derived and (gears is None or name == "profile_shift"):
             return self._of_distance(error, side, gears)
         if gears is not None and error.limit is not None:
@@ -399,6 +414,12 @@ class _Written:
             sign, bound = ">", gears[mate].dedendum + gears[side].addendum - bound
             name, side, cure = "dedendum", mate, "use more dedendum"
         return side, InputError(name, getattr(gears[side], name), reason, cure, (sign, bound, unit))
+
+    @property
+    def offset(self) -> float:
+        """Place of the driven gear along the axes less that of the driver (m); of spur gears it decides no geometry."""
+        one, two = self.mesh.gears
+        return 1e-3 * (two.y_mm - one.y_mm) if one.form["helix_angle_deg"] else 0.0
 
     @property
     def distance(self) -> float | None:

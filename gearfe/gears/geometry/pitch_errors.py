@@ -31,7 +31,9 @@ Tolerances in um (ISO 1328-1:2013, 5.3, formulae 5 to 9), for the diameter d and
     f_{f\alpha T} = (0.55\,m + 5)\,\sqrt2^{\,A-5}, \quad
     F_{\alpha T} = \sqrt{f_{H\alpha T}^2 + f_{f\alpha T}^2} .
 
-They hold for 5 to 1000 teeth, d from 5 to 15,000 mm and m from 0.5 to 70 mm, and are not extrapolated (5.2.1).
+and of the helix, for the face width b in mm,
+:math:`f_{H\beta T} = (0.05\sqrt d + 0.35\sqrt b + 4)\,\sqrt2^{\,A-5}`. They hold for 5 to 1000 teeth, d from 5 to
+15,000 mm, m from 0.5 to 70 mm, b from 4 to 1200 mm, and are not extrapolated (5.2.1).
 """
 
 from __future__ import annotations
@@ -54,6 +56,8 @@ Value = TypeVar("Value")
 CLASSES = (1, 11)
 #: Teeth, diameters (mm) and modules (mm) that it is for.
 SCOPE = ((5, 1000), (5.0, 15_000.0), (0.5, 70.0))
+#: Face widths (mm) that its tolerances of the helix are for.
+WIDTHS = (4.0, 1200.0)
 #: Sum of single pitch deviations (m) that is rounding of a list in um.
 CLOSED = 1e-6
 
@@ -113,6 +117,22 @@ def tolerances(gear: Gear, class_: int) -> PitchTolerances:
         slope=(0.001 * d + 0.4 * m + 4) * step,
         form=(0.55 * m + 5) * step,
     )
+
+
+def helix_slope_tolerance(gear: Gear, class_: int) -> float:
+    """Tolerance f_HbetaT (m) of the helix slope of a gear in a class of ISO 1328-1.
+
+    Raises
+    ------
+    InputError
+        For a class or a gear that the standard does not have.
+    """
+    tolerances(gear, class_)  # refuses what it does not have
+    d, b = 1e3 * gear.pitch_diameter, 1e3 * gear.face_width
+    if not WIDTHS[0] * (1 - 1e-12) <= b <= WIDTHS[1] * (1 + 1e-12):
+        problem = f"must be {WIDTHS[0]:g} to {WIDTHS[1]:g} for a class of ISO 1328-1: its formulas are not extrapolated"
+        raise InputError("face_width_mm", b, problem, "give the deviation itself")
+    return 1e-6 * math.sqrt(2.0) ** (class_ - 5) * (0.05 * math.sqrt(d) + 0.35 * math.sqrt(b) + 4)
 
 
 def from_single(single: ArrayLike) -> Array:

@@ -64,6 +64,10 @@ def check_seat(pair: MeshGeometry) -> float:
     if pinion.helical and pinion.hand == wheel.hand:
         problem = "is the hand of both helices: that of external gears in mesh is opposite"
         raise InputError("wheel.hand", wheel.hand, problem, "give the other hand to one of them")
+    if not pair.common_width > 0.0:
+        most = 0.5e3 * (pinion.face_width + wheel.face_width)
+        problem = f"leaves no common face width: the middles must be less than {most:.6g} mm apart"
+        raise InputError("axial_offset", pair.axial_offset, problem, "move the gears towards each other")
     return _check_distance(pair)
 
 

@@ -35,14 +35,14 @@ class WideMesh:
     Parameters
     ----------
     sections
-        Transverse sections as spur gears: transverse module and pressure angle, heights in units of that module. A
-        transverse contact ratio below 1 is allowed.
+        The gears, of which the transverse sections count: helical ones, or their sections as spur gears. A transverse
+        contact ratio below 1 is allowed.
     base_helix_angle
-        beta_b (rad) of the pinion, > 0 for a right-handed one; the wheel has the other hand. 0: spur gears.
+        beta_b (rad) of the pinion, > 0 for a right-handed one; the wheel has the other hand. None: that of the gears.
     widths
-        Face widths of pinion and wheel (m); None: those of the sections.
+        Face widths of pinion and wheel (m); None: those of the gears.
     centres
-        Axial positions of their middles (m).
+        Axial positions of their middles (m); None: the pinion at 0, the wheel as far from it as the gears are.
     materials
         Of pinion and wheel.
     functions
@@ -58,15 +58,24 @@ class WideMesh:
     """
 
     sections: MeshGeometry
-    base_helix_angle: float = 0.0
+    base_helix_angle: float = None  # type: ignore[assignment] # a number from `__post_init__` on
     widths: tuple[float, float] | None = None
-    centres: tuple[float, float] = (0.0, 0.0)
+    centres: tuple[float, float] = None  # type: ignore[assignment] # as above
     materials: tuple[Material, Material] = (STEEL, STEEL)
     functions: int | None = None
     coarsen: float = 2.0
     flank_coarsen: float = 3.0
 
     def __post_init__(self) -> None:
+        pinion = self.sections.pinion
+        angle = -pinion.base_helix_angle if pinion.hand == "left" else pinion.base_helix_angle
+        if self.base_helix_angle is None:
+            object.__setattr__(self, "base_helix_angle", angle)
+        elif pinion.helical and abs(self.base_helix_angle - angle) > 1e-9:
+            problem = f"is not that of the gears, {angle:.6g} rad"
+            raise InputError("base_helix_angle", self.base_helix_angle, problem, "leave it out")
+        if self.centres is None:
+            object.__setattr__(self, "centres", (0.0, self.sections.axial_offset))
         if not abs(self.base_helix_angle) <= MOST_HELIX:
             problem = f"must be >= -{MOST_HELIX:.4g} and <= {MOST_HELIX:.4g} rad"
             raise InputError("base_helix_angle", self.base_helix_angle, problem, "use a smaller helix angle")

@@ -1,0 +1,108 @@
+"""What `gearfe stiffness` and `gearfe loadmap` do for gears whose load varies along the face width."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..base.errors import InputError
+from ..base.progress import Stopwatch
+from .arguments import print_results
+
+if TYPE_CHECKING:
+    from ..base.tables.gearbox import NamedMesh
+    from ..base.tables.loadmap import LoadMapTable
+    from ..gears.geometry.pair import GearPair
+
+#: Options of `gearfe stiffness` that are for loads alike along the face width.
+PLANE_OPTIONS = ("check", "fields", "animation", "range")
+
+
+def run_along_width(
+    args: argparse.Namespace,
+    mesh: NamedMesh,
+    pair: GearPair,
+    started: float,
+    loads: LoadMapTable | None = None,
+) -> int:
+    """Compute a mesh whose load varies along the face width and write its files; 1 when a position failed.
+
+    Parameters
+    ----------
+    args : Namespace
+        Parsed command line.
+    mesh, pair
+        The mesh, and its gears.
+    started
+        `time.perf_counter` when the command began (s).
+    loads
+        Torques and positions of a load map; without them, those of [stiffness].
+
+    Raises
+    ------
+    InputError
+        For options and keys that are for loads alike along the face width.
+    """
+    cause = mesh.along_width()
+    for name in PLANE_OPTIONS:
+        if getattr(args, name, None) is not None:
+            problem = f"is for loads alike along the face width, which {cause[0] if cause else 'the mesh'} makes vary"
+            raise InputError(f"--{name}", getattr(args, name) or None, problem, "leave it out")
+
+    from ..base.files import output_folder, whole_set, write_csvs, write_json
+    from ..gears.gearmesh import width_job
+    from ..gears.gearmesh.job import stiffness_job
+    from ..gears.gearmesh.width_report import (
+        flank_loads,
+        load_columns,
+        pattern_columns,
+        sweep_columns,
+        width_lines,
+        width_summary,
+        width_warnings,
+        write_flank,
+    )
+
+    watch = Stopwatch({"program start": time.perf_counter() - started})
+    job = stiffness_job(mesh, Path(args.job).parent, pair)
+    if loads is None:
+        width_job.check_stiffness_job(job)
+    else:
+        width_job.check_map_job(job, loads)
+    folder = output_folder(args.out)
+    lines = width_job.job_lines(job, watch=watch)
+    if loads is None:
+        sweep = width_job.stiffness_sweep(job, lines, watch)
+    else:
+        sweep = width_job.map_sweep(job, lines, loads, watch)
+    wide, name = lines.compliance.mesh, "stiffness" if loads is None else "loadmap"
+    flanks = flank_loads(job, wide, sweep)
+    tables = {} if loads is None else {loads.NAME: asdict(loads)}
+    errors = None
+    if loads is None and not args.no_estimate and (sweep.status == "converged").any():
+        errors = width_job.estimated_errors(job, lines, sweep, watch)
+    found = width_summary(job, wide, sweep, watch.seconds, errors=errors, **tables)
+    may_write = (f"{name}*.png", f"{name}*.csv", f"{name}*.vtkhdf")
+    if loads is None:
+        may_write += ("fields.vtkhdf", "stress_*deg.png", "pressure.*")
+    with whole_set(folder, may_write) as made:
+        with watch.stage("tables"):
+            main, load = sweep_columns(job, wide, sweep), load_columns(job, sweep)
+            write_csvs(made, {name: main, "load": load, "pattern": pattern_columns(flanks)})
+            write_flank(made / f"{name}_flank.vtkhdf", job, flanks[-1])
+        if not args.no_pictures:
+            from ..figures.flank_load import flank_load_picture
+            from ..figures.style import save
+
+            with watch.stage("picture"):
+                title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, load along the face width"
+                picture = flank_load_picture(flanks, sweep, pair.wheel.base_radius, pair.path_limits(), title)
+                save(picture, made / f"{name}_load.png")
+        watch.seconds["total"] = time.perf_counter() - started
+        write_json(made / ("summary.json" if loads is None else "loadmap.json"), found)
+        names = sorted(path.name for path in made.iterdir())
+    print_results(width_lines(found), folder, names, watch.seconds, width_warnings(job, wide, sweep))
+    return 1 if (sweep.status != "converged").any() else 0

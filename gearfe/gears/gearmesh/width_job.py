@@ -1,0 +1,334 @@
+r"""From a mesh of a job file to the arguments of `gearfe.gears.width`: gears whose load varies along the face width.
+
+Job files count y along the axes, towards the viewer who sees the left flanks drive. Where the right ones drive, the
+pair is seen from the other side, whose axial coordinate z is -y: ends and slopes change places, hands do not.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.progress import Stopwatch
+from ...base.tables.gearbox import TILTS
+from ...base.tables.microgeometry import ALONG_WIDTH, FlankTable
+from ...base.tables.pair import StiffnessTable
+from ...base.typing import Array, IntArray
+from ..contact.laws import COARSENING, PairModel, check_poisson, check_torque
+from ..geometry.deviation_job import FlankOf, deviations_of
+from ..geometry.face import NOMINAL
+from ..geometry.modifications import ends_of
+from ..geometry.pair import Gear
+from ..width import (
+    ContactLines,
+    EndRelief,
+    LeadModification,
+    Misalignment,
+    WideFlanks,
+    WideMesh,
+    WidthSweep,
+    contact_lines,
+    sweep_width,
+    wide_compliance,
+)
+from .job import Keep, StiffnessJob
+from .positions import ORDER
+
+if TYPE_CHECKING:
+    from ...base.tables.loadmap import LoadMapTable
+
+#: Element sizes of `gearfe.gears.width` in those of plane sections; coarsen and flank_coarsen multiply them.
+SECTION_COARSEN, FLANK_COARSEN = 2.0, 3.0
+#: Largest gap (modules) of modifications along the width and of tilts. The flanks are displaced to first order, and
+#: laws of contact hold for overlaps of 0.12 modules.
+MOST_GAP = 0.1
+#: Exponents of the shapes of an end relief.
+EXPONENTS = {"linear": 1.0, "parabolic": 2.0}
+#: Keys of [stiffness] that the load along the width has no use for, so that they have their defaults.
+PLANE_KEYS = (
+    *("law", "law_parameters", "plane", "points_per_edge", "nitsche_gamma0", "penalty_stiffness_N_per_mm3"),
+    *("twist_from", "solve_all", "interpolation"),
+)
+
+
+@dataclass(frozen=True)
+class FlankTopography:
+    """What lead modifications do not hold: bias, and reliefs of corners.
+
+    Parameters
+    ----------
+    rolls
+        Roll lengths of form and tip circle (m).
+    face
+        First and last z of the gear (m).
+    bias
+        Helix slope at the tip circle less that at the form circle, over the face width (m), towards larger z.
+    corners
+        Amount, length along z and along the roll (m), and whether it is at the tip, and at the end of larger z.
+    """
+
+    rolls: tuple[float, float]
+    face: tuple[float, float]
+    bias: float
+    corners: tuple[tuple[float, float, float, bool, bool], ...]
+
+    def __call__(self, roll: Array, z: Array, tooth: IntArray) -> Array:  # noqa: ARG002 - alike on all teeth
+        """Material (m, > 0: more) at roll lengths (m) and axial coordinates (m)."""
+        (form, tip), (low, high) = self.rolls, self.face
+        along = (z - 0.5 * (low + high)) / (high - low)
+        added = self.bias * along * (roll - 0.5 * (form + tip)) / (tip - form)
+        for amount, length, height, at_tip, at_high in self.corners:
+            from_end, from_edge = high - z if at_high else z - low, tip - roll if at_tip else roll - form
+            added = added - amount * np.clip(1.0 - from_end / length - from_edge / height, 0.0, 1.0)
+        return np.asarray(added)
+
+
+def axial_sense(job: StiffnessJob) -> float:
+    """z of the solver over y of the job file: -1 where the right flanks drive."""
+    return -1.0 if job.mesh.flank == "right" else 1.0
+
+
+def check_width_job(job: StiffnessJob) -> None:
+    """Raise `InputError` for keys of [stiffness] that a load along the face width does not take."""
+    check_width_table(job.table, job.mesh.along_width())
+    for gear, material in zip(job.mesh.gears, job.materials, strict=True):
+        check_poisson(material.poisson_ratio, "strain", f"{gear.material_where}.poisson_ratio")
+
+
+def check_width_table(table: StiffnessTable, cause: tuple[str, Any] | None) -> None:
+    """Raise `InputError` for keys with values that a load along the face width does not take.
+
+    Parameters
+    ----------
+    table : StiffnessTable
+        [stiffness].
+    cause
+        Key and value that let the load vary along the face width, for the message.
+    """
+    default = StiffnessTable()
+    for key in PLANE_KEYS:
+        value = getattr(table, key)
+        if value != getattr(default, key):
+            problem = f"is for loads alike along the face width, which {cause[0] if cause else 'this one'} makes vary"
+            raise InputError(f"stiffness.{key}", value, problem, "leave it out: teeth are in three dimensions here")
+
+
+def wide_mesh(job: StiffnessJob) -> WideMesh:
+    """Return the gears of a job with their face widths, places and hands.
+
+    Raises
+    ------
+    InputError
+        For gears that have no common width.
+    """
+    sense = axial_sense(job)
+    places = [1e-3 * sense * gear.y_mm for gear in job.mesh.gears]
+    try:
+        return WideMesh(
+            job.pair,
+            centres=(places[0], places[1]),
+            materials=job.materials,
+            coarsen=SECTION_COARSEN * job.table.coarsen,
+            flank_coarsen=FLANK_COARSEN * job.table.flank_coarsen,
+        )
+    except InputError as error:
+        if error.field == "centres":
+            gear = job.mesh.driven
+            raise InputError(f"{gear.where}.y_mm", gear.y_mm, error.problem, error.cure) from None
+        if error.field == "widths":
+            gear = min(job.mesh.gears, key=lambda gear: gear.form["face_width_mm"])
+            where, width = gear.written("face_width_mm"), gear.form["face_width_mm"]
+            raise InputError(f"{where}.face_width_mm", width, error.problem, "use a narrower gear") from None
+        raise
+
+
+def wide_flanks(job: StiffnessJob, mesh: WideMesh) -> WideFlanks:
+    """Return the driving flanks with their modifications, and the tilt of the axes."""
+    sense, profiles = axial_sense(job), NOMINAL
+    leads = [LeadModification(), LeadModification()]
+    topographies: list[FlankTopography | None] = [None, None]
+    if job.mesh.deviates:
+        profiles = deviations_of(job.mesh, job.pair, job.folder)
+        for g, face in enumerate(mesh.faces):
+            flank = FlankOf(job.mesh, job.pair, g, job.mesh.flank, job.folder)
+            leads[g] = lead_modification(flank.own, sense)
+            topographies[g] = _topography(flank.own, flank.gear, face, sense)
+            _check_size(flank, leads[g], topographies[g], face)
+    for key in TILTS:
+        if abs(1e-6 * getattr(job.mesh, key)) > MOST_GAP * job.pair.pinion.module:
+            where = job.mesh.tilts_where
+            raise InputError(f"{where}.{key}", getattr(job.mesh, key), _too_large(job.pair.pinion), "is it in um?")
+    over = 1e-6 * sense / mesh.width
+    tilt = Misalignment(over * job.mesh.misalignment_um, over * job.mesh.misalignment_across_um)
+    return WideFlanks(profiles, (leads[0], leads[1]), (topographies[0], topographies[1]), tilt)
+
+
+def _check_size(
+    flank: FlankOf, lead: LeadModification, topography: FlankTopography | None, face: tuple[float, float]
+) -> None:
+    """Raise `InputError` for modifications along the width that are no microgeometry, of the largest of their keys."""
+    roll, z = (grid.ravel() for grid in np.meshgrid(ends_of(flank.gear), np.linspace(*face, 33)))
+    added = lead.material(z, face)
+    if topography is not None:
+        added = added + topography(roll, z, np.zeros(len(z), dtype=np.int64))
+    if np.abs(added).max() <= MOST_GAP * flank.gear.module:
+        return
+    table = flank.own
+    amounts = {key: getattr(table, key) or 0.0 for key in ALONG_WIDTH if key != "triangular_reliefs"}
+    amounts |= {
+        f"triangular_reliefs[{i}].amount_um": relief.amount_um for i, relief in enumerate(table.triangular_reliefs)
+    }
+    key = max(amounts, key=lambda name: abs(amounts[name]))
+    raise InputError(f"{flank.where}.{key}", amounts[key], _too_large(flank.gear), "use less modification")
+
+
+def _too_large(gear: Gear) -> str:
+    most = 1e6 * MOST_GAP * gear.module
+    return f"leaves the range of microgeometry: gaps along the width must be <= {most:.4g} um, {MOST_GAP:g} module"
+
+
+def lead_modification(table: FlankTable, sense: float) -> LeadModification:
+    """Return the lead modification of a flank's table; `sense`: z over y."""
+    exponent = EXPONENTS[table.end_relief_shape]
+    reliefs = []
+    for end in ("low", "high"):
+        amount, length = getattr(table, f"end_relief_{end}_um"), getattr(table, f"end_relief_{end}_length_mm")
+        reliefs.append(EndRelief(1e-6 * amount, 1e-3 * length, exponent) if amount else None)
+    low, high = reliefs if sense > 0.0 else reliefs[::-1]
+    return LeadModification(1e-6 * table.helix_crowning_um, 1e-6 * sense * table.helix_slope_um, low, high)
+
+
+def _topography(table: FlankTable, gear: Gear, face: tuple[float, float], sense: float) -> FlankTopography | None:
+    if not table.bias_um and not any(relief.amount_um for relief in table.triangular_reliefs):
+        return None
+    corners = tuple(
+        (
+            1e-6 * relief.amount_um,
+            1e-3 * relief.width_mm,
+            1e-3 * relief.roll_length_mm,
+            relief.corner.startswith("tip"),
+            relief.corner.endswith("high") == (sense > 0.0),
+        )
+        for relief in table.triangular_reliefs
+    )
+    return FlankTopography(ends_of(gear), face, 1e-6 * sense * table.bias_um, corners)
+
+
+def job_lines(job: StiffnessJob, *, keep: Keep | None = None, watch: Stopwatch | None = None) -> ContactLines:
+    """Return the lines of contact of a job; the elastic gears are kept, which flanks and loads do not change.
+
+    Parameters
+    ----------
+    job : StiffnessJob
+        The gears and the model.
+    keep
+        Gives what a function makes, or what was made under that name before.
+    watch
+        Takes the time of the stages.
+    """
+    mesh = wide_mesh(job)
+    flanks = wide_flanks(job, mesh)
+    watch = watch or Stopwatch()
+
+    def make() -> Any:
+        return wide_compliance(mesh, watch=watch)
+
+    compliance = make() if keep is None else keep("wide", make)
+    with watch.stage("lines of contact"):
+        return contact_lines(compliance, flanks)
+
+
+def stiffness_sweep(job: StiffnessJob, lines: ContactLines, watch: Stopwatch | None = None) -> WidthSweep:
+    """Return the sweep of [stiffness]: one torque, or one twist, over its angles."""
+    t, angles = job.table, np.radians(job.table.angles_deg(math.degrees(job.pair.mesh_cycle)))
+    load: dict[str, Any] = {"torques": t.torque_Nm} if t.twist_deg is None else {"twists": math.radians(t.twist_deg)}
+    return sweep_width(lines, **load, angles=angles, watch=watch)
+
+
+def estimated_errors(job: StiffnessJob, lines: ContactLines, sweep: WidthSweep, watch: Stopwatch) -> dict[str, float]:
+    """Return relative errors of the headline numbers of [stiffness], by two more functions and by coarser sections.
+
+    Differences of sections `COARSENING` times coarser count over what the order of convergence makes of them.
+
+    Parameters
+    ----------
+    job : StiffnessJob
+        The gears and the model.
+    lines : ContactLines
+        Their lines of contact.
+    sweep : WidthSweep
+        The results.
+    watch
+        Takes the time.
+    """
+    mesh, flanks = lines.compliance.mesh, lines.flanks
+    numbers, found = headline_numbers(sweep), dict.fromkeys(headline_numbers(sweep), 0.0)
+    variants = (
+        (replace(mesh, functions=mesh.count + 2), 1.0),
+        (replace(mesh, functions=mesh.count, coarsen=COARSENING * mesh.coarsen), COARSENING**ORDER - 1.0),
+    )
+    for variant, share in variants:
+        with watch.stage("error estimate"):
+            other = headline_numbers(stiffness_sweep(job, contact_lines(wide_compliance(variant), flanks)))
+        for name, value in numbers.items():
+            found[name] += abs(other[name] - value) / share / abs(value) if value else math.nan
+    return found
+
+
+def headline_numbers(sweep: WidthSweep) -> dict[str, float]:
+    """Return the headline numbers of the first load of a sweep, in SI units."""
+    error = sweep.transmission_error[0]
+    return {
+        "transmission_error_mean": float(np.nanmean(error)),
+        "transmission_error_peak_to_peak": float(np.nanmax(error) - np.nanmin(error)),
+        "k_tangent_mean": float(np.nanmean(sweep.stiffness[0])),
+        "largest_line_load": float(np.nanmax(sweep.peak_line_load[0])),
+        "K_H_beta": float(sweep.k_h_beta[0]),
+        "K_H_alpha": float(sweep.k_h_alpha[0]),
+    }
+
+
+def check_stiffness_job(job: StiffnessJob) -> None:
+    """Raise `InputError` for what [stiffness] says of the load, and keys that a load along the width does not take."""
+    job.check_load()
+    check_width_job(job)
+    if job.table.torque_Nm is not None:
+        check_torque(job.pair, PairModel(job.materials), job.table.torque_Nm, "stiffness.torque_Nm")
+
+
+def check_map_job(job: StiffnessJob, table: LoadMapTable) -> None:
+    """Raise `InputError` for torques out of range, and keys that a load along the width does not take."""
+    check_width_job(job)
+    for torque in table.torques():
+        check_torque(job.pair, PairModel(job.materials), torque, f"{table.NAME}.torques_Nm")
+    if table.root_stress:
+        key, _ = job.mesh.along_width() or ("the mesh", None)
+        problem = f"is for loads alike along the face width, which {key} makes vary"
+        raise InputError(f"{table.NAME}.root_stress", True, problem, "leave it out")
+    if table.mesh_cycles is None and not all(flank.alike for flank in deviations_of(job.mesh, job.pair, job.folder)):
+        problem = "is required where teeth differ and the load varies along the face width"
+        raise InputError(f"{table.NAME}.mesh_cycles", None, problem, "give the mesh cycles to compute")
+
+
+def map_sweep(
+    job: StiffnessJob, lines: ContactLines, table: LoadMapTable, watch: Stopwatch | None = None
+) -> WidthSweep:
+    """Return the sweep of [loadmap]: its torques over its mesh cycles.
+
+    Parameters
+    ----------
+    job : StiffnessJob
+        The gears and the model.
+    lines : ContactLines
+        Their lines of contact.
+    table : LoadMapTable
+        Torques and positions.
+    watch
+        Takes the time of the stages.
+    """
+    angles = np.arange(table.positions * (table.mesh_cycles or 1)) * job.pair.mesh_cycle / table.positions
+    return sweep_width(lines, table.torques(), angles=angles, watch=watch)
