@@ -39,6 +39,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fields", action="store_true", help="write housing and gears over time (VTKHDF), a picture and an animation"
     )
+    parser.add_argument(
+        "--deflection-Hz", nargs="+", type=float, metavar="F", default=(), dest="deflections",
+        help="operating deflection shapes: how gears and housing move at the lines of the spectrum nearest to these "
+        "frequencies (VTKHDF series)",
+    )  # fmt: skip
     parser.add_argument("--picture-ms", type=float, metavar="T", help="time of the fields' picture (ms; default: 4.55)")
     parser.add_argument("--no-animation", action="store_true", help="leave out the animation of --fields")
 
@@ -105,6 +110,7 @@ def run(args: argparse.Namespace) -> int:
             window=job.spectrum.window,
             spectrum_start=job.spectrum.start or 0.0,
             spectrum_length=job.spectrum.duration,
+            deflections=tuple(args.deflections),
         )
         bores = tuple(str(a) for s in job.table.shafts for a in s.attachments)
         check_choice(choice, job.times, bores)
@@ -197,6 +203,9 @@ def report_lines(response: TrainResponse, train: GearTrain, written: Written, ch
         lines.append(f"Floquet multipliers: {floquet['note']}")
     for name, value in response.estimates.items():
         lines.append(f"error estimate, {name}: " + (f"{value:.2g}" if math.isfinite(value) else "unknown"))
+    for shape in summary.get("deflections", ()):
+        line = f"deflection shape at {shape['frequency_Hz']:.6g} Hz, the line nearest to {shape['asked_Hz']:.6g} Hz"
+        lines.append(f"{line}, enlarged {shape['enlarged_by']:.4g} times")
     return lines if written.spectra is None else [*lines, *_spectrum_lines(response, train, written, choice)]
 
 

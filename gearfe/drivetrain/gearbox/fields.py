@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...base.errors import InputError, given
 from ...base.progress import count
-from ...base.typing import Array, IntArray
+from ...base.typing import Array, ComplexArray, IntArray
 from ...fem.reduction.modal_body import ModalBody
 from ...gears.geometry.derived import gear_outline
 from ...gears.geometry.spur_gear import Gear
@@ -245,6 +245,29 @@ def write_housing(
                     point_data=data,
                 )
             count(first + len(some), len(chosen), "fields")
+
+
+def shown_factor(train: GearTrain, pose: ComplexArray, modal: ComplexArray | None) -> float:
+    """Factor by which a vibration can be seen: its largest displacement is `_SHOWN` of the train's size.
+
+    Parameters
+    ----------
+    train : GearTrain
+        The train.
+    pose : ndarray of complex, shape (gears, 6)
+        Amplitudes of each gear's displacement (m) and rotation (rad).
+    modal : ndarray of complex, shape (N,), optional
+        Amplitudes of the housing's coordinates.
+    """
+    body, places = train.housing, [np.array([train.shaft(gear.shaft).point for gear in train.gears])]
+    tips = np.array([gear.gear.tip_radius for gear in train.gears])
+    moves, turns = np.linalg.norm(pose[:, :3], axis=1), np.linalg.norm(pose[:, 3:], axis=1)
+    most = float((moves + tips * turns).max())
+    if body is not None and body.has_mesh and modal is not None:
+        most = max(most, float(np.hypot(*body.reconstruct(np.array([modal.real, modal.imag]))).max()))
+        places.append(body.nodes)
+    size = float(np.ptp(np.concatenate(places), axis=0).max()) + 2.0 * float(tips.max())
+    return _SHOWN * size / most if most > 0.0 else 1.0
 
 
 def frames(

@@ -31,7 +31,6 @@ import numpy as np
 
 from ...base.typing import Array, ComplexArray
 from ..train.bearings import shaft_motion
-from ..train.elements import ShaftBody
 from ..train.mesh_element import Shafts
 from ..train.model import TrainModel
 
@@ -137,12 +136,12 @@ def train_forms(model: TrainModel, sense: float) -> TrainForms:
     parts += [Part(MESH, line.name) for line in model.meshes]
     kinetic, orbits = [], []
     for number, body in enumerate(model.shafts):
-        rows = T[model.first[number] : model.first[number] + body.size]
-        mass = body.mass()
-        for kind, chosen in zip(KINDS, _kinds(body, train.frame), strict=True):
-            kinetic.append(Form(3 * number + KINDS.index(kind), chosen @ rows, chosen @ mass @ rows))
-        first, second, weights = _across(body, train.frame)
-        orbits.append(Orbit(first @ rows, second @ rows, weights, sense * float(np.sign(model.ratios[number]))))
+        rows, mass = T[model.first[number] : model.first[number] + body.size], body.mass()
+        its = _coordinates(model, number)
+        for kind, chosen in enumerate(its.kinds):
+            kinetic.append(Form(3 * number + kind, chosen @ rows, chosen @ mass @ rows))
+        turning = sense * float(np.sign(model.ratios[number]))
+        orbits.append(Orbit(its.first @ rows, its.second @ rows, its.mass, turning))
     for machine, row in zip(train.machines, model.driveline.machines, strict=True):
         rows = row[None, :] @ T
         torsion = 3 * train.shaft_number(machine.shaft) + KINDS.index(TORSION)
@@ -169,8 +168,8 @@ def _strain(model: TrainModel, parts: list[Part], number: int) -> list[Form]:
     touched = [i for i, body in enumerate(model.shafts) if body is element or body in element.touches]
     shaft = touched[0] if touched else 0
     if element in model.shafts:
-        chosen = zip(KINDS, _kinds(model.shafts[shaft], model.train.frame), strict=True)
-        return [Form(3 * shaft + KINDS.index(k), pick @ rows, pick @ blocks[1] @ rows) for k, pick in chosen]
+        chosen = enumerate(_coordinates(model, shaft).kinds)
+        return [Form(3 * shaft + kind, pick @ rows, pick @ blocks[1] @ rows) for kind, pick in chosen]
     if kind == "bearing":
         shafts = Shafts(model.shafts, model.first, tuple(model.ratios), model.system.size)
         moved = shaft_motion(model.train, shafts, name) @ model.modal.T
@@ -184,17 +183,59 @@ def _strain(model: TrainModel, parts: list[Part], number: int) -> list[Form]:
     return [Form(3 * shaft + KINDS.index(TORSION), rows, blocks[1] @ rows)]
 
 
-def _kinds(body: ShaftBody, frame: Array) -> tuple[Array, Array, Array]:
-    """Projections of a shaft's coordinates, (size, size) each, on those of bending, torsion and axial motion."""
-    axial, torsion = np.zeros((body.size, body.size)), np.zeros((body.size, body.size))
-    axial[:3, :3] = np.outer(frame[2], frame[2])
-    torsion[5, 5] = 1.0
-    return np.eye(body.size) - axial - torsion, torsion, axial
+class _Coordinates(NamedTuple):
+    """What the coordinates of a shaft are."""
+
+    kinds: tuple[Array, ...]  # projections (size, size) on those of bending, torsion and axial motion
+    first: Array  # (k, size) places along e1
+    second: Array  # (k, size) along e2, those that the places along e1 come to by a quarter of a turn
+    mass: Array  # (k,)
 
 
-def _across(body: ShaftBody, frame: Array) -> tuple[Array, Array, Array]:
-    """Rows on a shaft's coordinates along e1 and along e2, (k, size) each, and their masses (k,)."""
+def _coordinates(model: TrainModel, number: int) -> _Coordinates:
+    """Kinds of a shaft's coordinates, and the places that go round in its bending.
+
+    Those of the mean motion are known. Each elastic one, of unit mass, is of one kind, which its motion at gears and
+    bores shows; bending comes in pairs of equal shapes along e1 and e2.
+    """
+    body, frame = model.shafts[number], model.train.frame
+    bends, turns, shifts = (np.zeros((body.size, body.size)) for _ in KINDS)
+    shifts[:3, :3] = np.outer(frame[2], frame[2])
+    bends[:3, :3] = np.eye(3) - shifts[:3, :3]
+    bends[3, 3] = bends[4, 4] = turns[5, 5] = 1.0
     first, second = np.zeros((2, body.size)), np.zeros((2, body.size))
     first[0, :3], second[0, :3] = frame[0], frame[1]
     first[1, 3] = second[1, 4] = 1.0
-    return first, second, np.array([body.rotor.mass, body.rotor.transverse])
+    mass = [body.rotor.mass, body.rotor.transverse]
+    if body.size == 6:
+        return _Coordinates((bends, turns, shifts), first, second, np.array(mass))
+    along1, along2, twist, shift = _section_motion(model, number)
+    sizes = np.array([np.linalg.norm(x, axis=0) for x in (along1, along2, twist, shift)])
+    planes: tuple[list[int], list[int]] = ([], [])
+    for j, kind in enumerate(sizes[:, 6:].argmax(axis=0).tolist(), start=6):
+        (bends, bends, turns, shifts)[kind][j, j] = 1.0
+        if kind < 2:
+            planes[kind].append(j)
+    unit, rows, others = np.eye(body.size), [first], [second]
+    for one, two in zip(*planes, strict=True):
+        rows.append(unit[[one]])
+        others.append(float(np.sign(along1[:, one] @ along2[:, two])) * unit[[two]])
+        mass.append(1.0)
+    return _Coordinates((bends, turns, shifts), np.vstack(rows), np.vstack(others), np.array(mass))
+
+
+def _section_motion(model: TrainModel, number: int) -> tuple[Array, Array, Array, Array]:
+    """Motion of a shaft's gears and bores per unit coordinate, rotations times its length: bending along e1 and along
+    e2, (2 places, size) each, twist and shift along the axis, (places, size) each.
+    """
+    train, body, shaft = model.train, model.shafts[number], model.train.shafts[number]
+    frame, base = train.frame, np.array(shaft.point)
+    places = [gear.along for gear in train.gears if gear.shaft == shaft.name]
+    places += [float(train.bore_points[bore] @ frame[2]) for bore in shaft.bores]
+    moved, turned = [], []
+    for along in places:
+        moved.append(frame @ body.point_rows(base + (along - float(base @ frame[2])) * frame[2], frame, along))
+        turned.append(shaft.length * body.turn_rows(along))
+    u, r = np.array(moved), np.array(turned)
+    # a quarter of a turn about the axis takes e1 to e2, and a rotation about e2 to one against e1
+    return np.vstack([u[:, 0], r[:, 1]]), np.vstack([u[:, 1], -r[:, 0]]), r[:, 2], u[:, 2]

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.typing import ComplexArray
 from ...multibody import constant
-from ..gearbox.fields import write_gears, write_housing
+from ..gearbox.fields import shown_factor, write_gears, write_housing
 from ..train.model import TrainModel
 from ..train.response import TrainResponse
 from ..train.simulate import response_of
@@ -21,8 +21,6 @@ from .whirl import STRONG, WhirlModes
 
 #: Pictures of one period.
 FRAMES = 16
-#: Largest displacement, in parts of the size of the train.
-SHOWN = 0.02
 
 
 def mesh_modes(modes: WhirlModes, least: float = STRONG) -> list[int]:
@@ -55,7 +53,7 @@ def swinging(
     -------
     TrainResponse
         Its `time` is the number of the mode, from 1, and the part of the period. The size of a mode is arbitrary: the
-        largest displacement of a housing's node or a gear's tip is `SHOWN` of the train's size.
+        largest displacement of a housing's node or a gear's tip can be seen.
     """
     row, part = nearest(modes, speed), np.arange(frames) / frames
     time = np.concatenate([mode + 1 + part for mode in numbers])
@@ -84,20 +82,14 @@ def write_modes(folder: Path, model: TrainModel, modes: WhirlModes, numbers: Seq
 
 def _sized(model: TrainModel, shape: ComplexArray) -> ComplexArray:
     """A shape whose largest displacement can be seen, real where it is largest."""
-    train, body = model.train, model.train.housing
-    most, places = 0.0, [np.array([train.shaft(gear.shaft).point for gear in train.gears])]
-    for gear in train.gears:
+    train, pose = model.train, np.zeros((len(model.train.gears), 6), dtype=complex)
+    for row, gear in zip(pose, train.gears, strict=True):
         number = train.shaft_number(gear.shaft)
         shaft, base = model.shafts[number], np.array(train.shaft(gear.shaft).point)
         own = shape[model.first[number] : model.first[number] + shaft.size]
         centre = base + (gear.along - float(base @ train.frame[2])) * train.frame[2]
-        moves = shaft.point_rows(centre, train.frame, gear.along) @ own
-        turns = shaft.turn_rows(gear.along) @ own
-        most = max(most, float(np.linalg.norm(moves) + gear.gear.tip_radius * np.linalg.norm(turns)))
-    if body is not None and body.has_mesh:
-        parts = body.reconstruct(np.array([shape.real, shape.imag])[:, : body.size])
-        most = max(most, float(np.hypot(*parts).max()))
-        places.append(body.nodes)
-    size = float(np.ptp(np.concatenate(places), axis=0).max()) + 2.0 * max(g.gear.tip_radius for g in train.gears)
+        row[:3] = shaft.point_rows(centre, train.frame, gear.along) @ own
+        row[3:] = shaft.turn_rows(gear.along) @ own
+    modal = None if train.housing is None else shape[: train.housing.size]
     largest = shape[np.abs(shape).argmax()]
-    return np.asarray(shape * (SHOWN * size / most) * (np.abs(largest) / largest))
+    return np.asarray(shape * shown_factor(train, pose, modal) * (np.abs(largest) / largest))

@@ -13,7 +13,7 @@ import numpy as np
 from ...base.errors import InputError, given, unknown_name
 from ...base.files import whole_set, write_csv, write_json
 from ...base.progress import Stopwatch
-from ...base.spectrum import window_values
+from ...base.spectrum import uniform_step, window_values
 from ...base.typing import Array, IntArray
 from ..gearbox import bearing_report
 from ..gearbox.fields import write_gears, write_housing
@@ -22,7 +22,7 @@ from ..gearbox.shaft_report import misalignment_columns, shaft_entries, yielding
 from ..train.gear_train import GearTrain
 from ..train.model import TrainModel
 from ..train.response import TrainResponse
-from . import analysis
+from . import analysis, deflection
 from .errors import Run, with_errors
 from .follow import Followed, TrainRun, follow
 from .report import train_summary
@@ -61,6 +61,8 @@ class OutputChoice:
         Time of the picture of the fields (s); None: 4.55 ms, or the end of a shorter run.
     window, spectrum_start, spectrum_length
         Record of the spectrum, see `gearfe.drivetrain.vibration.spectra.TrainRecord` (s).
+    deflections
+        Frequencies (Hz) of operating deflection shapes, each of which takes the nearest line.
     """
 
     fields: bool = False
@@ -70,6 +72,7 @@ class OutputChoice:
     window: str = "none"
     spectrum_start: float = 0.0
     spectrum_length: float | None = None
+    deflections: tuple[float, ...] = ()
 
 
 class Pictures(Protocol):
@@ -143,7 +146,8 @@ def check_choice(choice: OutputChoice, times: np.ndarray, attachments: tuple[str
     InputError
         Unknown window or attachment, a record or a picture's time outside of the run.
     """
-    record(times, choice.spectrum_start, choice.spectrum_length)
+    _, count = record(times, choice.spectrum_start, choice.spectrum_length)
+    deflection.nearest_lines(choice.deflections, count, uniform_step(times))
     window_values(choice.window, 2)
     if choice.attachment is not None and choice.attachment not in attachments:
         raise unknown_name("--attachment", choice.attachment, attachments)
@@ -212,6 +216,13 @@ def write_run(
                 problems += _fields(target, train, made.kept, times[: made.outputs], choice, draw)
         if run.summary.get("bearings"):
             write_csv(target / bearing_report.FILE, bearing_report.bearing_columns(run.summary["bearings"]))
+        if choice.deflections and not made.deflections:
+            problems.append("deflection shapes are left out: the run ended early")
+        if made.deflections:
+            with watch.stage("deflection shapes"):
+                deflection.write_deflections(target, train, made.response, made.deflections)
+            shapes = deflection.deflection_entries(train, made.deflections)
+            run = Run({**run.summary, "deflections": shapes}, spectra)
         watch.seconds["total"] = time.perf_counter() - watch.begun
         summary = {**run.summary, **shaft_entries(planned.model), "timings_s": dict(watch.seconds)}
         write_json(target / "summary.json", summary)
@@ -276,8 +287,17 @@ class _Passes:
             record = self._record(times, choice)
             return follow(
                 run, times, self.planned.every, table=self.table, bearings=self.table.with_name("bearings.csv"),
-                radiation=self._radiation, record=record, keep=keep,
+                radiation=self._radiation, record=record, keep=keep, deflection=self._deflection(times, choice),
             )  # fmt: skip
+
+    def _deflection(self, times: Array, choice: OutputChoice) -> deflection.DeflectionRecord | None:
+        """What makes operating deflection shapes; None where none are asked for, or the run ended early."""
+        if not choice.deflections or len(times) < len(self.planned.times):
+            return None
+        return deflection.DeflectionRecord(
+            self.planned.model.train, times, self.planned.every, choice.deflections, window=choice.window,
+            start=choice.spectrum_start, length=choice.spectrum_length,
+        )  # fmt: skip
 
     def _record(self, times: Array, choice: OutputChoice) -> TrainRecord | None:
         """What makes the spectra; None for too short a run."""

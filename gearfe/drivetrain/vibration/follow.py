@@ -16,6 +16,7 @@ from ...base.typing import Array, IntArray
 from ..gearbox.stability import NOT_COMPUTED, Stability
 from ..train.model import TrainModel
 from ..train.response import TrainResponse, joined
+from .deflection import Deflection, DeflectionRecord
 from .spectra import TrainRecord, TrainSpectra, response_columns
 
 #: Parts of the curves in a picture: more than it has columns of pixels.
@@ -81,6 +82,8 @@ class Followed:
         The response at the output times that are kept.
     spectra
         None where the run was too short.
+    deflections
+        Operating deflection shapes that were asked for.
     """
 
     response: TrainResponse
@@ -97,6 +100,7 @@ class Followed:
     curves: TrainResponse
     kept: TrainResponse
     spectra: TrainSpectra | None
+    deflections: tuple[Deflection, ...] = ()
 
 
 def follow(
@@ -109,6 +113,7 @@ def follow(
     radiation: Array | None = None,
     record: TrainRecord | None = None,
     keep: IntArray | None = None,
+    deflection: DeflectionRecord | None = None,
 ) -> Followed:
     """Follow a run to its end; each piece is dropped when the next one comes.
 
@@ -130,6 +135,8 @@ def follow(
         Makes the spectra.
     keep
         Numbers of output times whose response is kept, rising.
+    deflection
+        Makes operating deflection shapes.
 
     Raises
     ------
@@ -153,6 +160,8 @@ def follow(
                 loads.write(piece.every(every, -passed % every).bearing_columns())
             if record is not None and count:
                 record.add(piece)
+            if deflection is not None and count:
+                deflection.add(piece)
             envelope.add(passed, _drawn(piece))
             mean.add(piece.time, np.hstack([piece.contact_force, piece.mesh_power, piece.friction_power]))
             extremes.add(piece)
@@ -177,6 +186,7 @@ def follow(
         _curves(piece, envelope.values()),
         joined(kept),
         record.spectra() if record is not None and record.complete else None,
+        deflection.deflections() if deflection is not None else (),
     )
 
 
