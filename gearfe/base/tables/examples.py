@@ -204,9 +204,11 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
             "train": TRAIN,
             "housing": HOUSING,
             "spectrum": {},
+            "modes": {},
             "runup": RUNUP,
         },
-        "Over its speed: gearfe runup FILE. Shafts run along y; speeds and torques count positive about +y. ",
+        "Over its speed: gearfe runup FILE, gearfe modes FILE. Shafts run along y; speeds and torques count positive "
+        "about +y. ",
     ),
     "runup": (
         "steady states of a gear train over its speed: waterfall, orders, critical speeds",
@@ -220,11 +222,12 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
             "stiffness": {"kinematics": "small"},
             "loadmap": {"torques_Nm": [50.0, 100.0]},
             "train": GEARBOX_TRAIN,
+            "modes": {},
             "runup": {"speed_start_rad_per_s": 50.0, "speed_stop_rad_per_s": 400.0, "speeds": 50},
         },
         "Look at it first: gearfe gear FILE. Its meshes alone: gearfe stiffness FILE, gearfe loadmap FILE (--mesh "
-        "NAME: one of them). Over its speed: gearfe runup FILE. Shafts run along y; speeds and torques count positive "
-        "about +y. ",
+        "NAME: one of them). Over its speed: gearfe runup FILE, gearfe modes FILE. Shafts run along y; speeds and "
+        "torques count positive about +y. ",
     ),
     "housing": (
         "an elastic housing: frequencies, modes, reduced body",

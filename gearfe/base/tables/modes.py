@@ -22,7 +22,9 @@ class ModesTable:
     )
     speeds: int = quantity(25, low=2, high=10_000, doc="how many speeds, even between these")
     band_Hz: float | None = quantity(
-        None, above=0.0, doc="modes below this frequency (Hz); left out: that of [housing.reduction], or 5000"
+        None,
+        above=0.0,
+        doc="modes below this frequency (Hz); left out: that of [runup] or [housing.reduction], or 5000",
     )
     multiples: int = quantity(5, low=0, high=50, doc="multiples of each mesh frequency among the orders")
     shaft_multiples: int = quantity(2, low=0, high=50, doc="multiples of the turns of each shaft among the orders")
