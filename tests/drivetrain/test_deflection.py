@@ -15,6 +15,7 @@ from gearfe.cli.main import main
 from gearfe.drivetrain.runup.run_up import steady_state
 from gearfe.drivetrain.train import build_train, simulate
 from gearfe.drivetrain.vibration.deflection import DeflectionRecord, enlargement, nearest_lines, write_deflections
+from gearfe.fem.beams import Section
 from tests.makers.job_texts import BARE_TRAIN, BORES
 from tests.makers.trains import loaded, smooth
 
@@ -87,6 +88,25 @@ def test_windows_keep_the_height_of_a_line() -> None:
         (shape,) = made.deflections()
         assert shape.frequency == pytest.approx(1000.0)
         assert shape.pose[0, 0] == pytest.approx(3e-6 * np.exp(0.3j), rel=1e-9)
+
+
+def test_the_bending_of_elastic_shafts_is_in_the_shape(tmp_path: Path) -> None:
+    pytest.importorskip("h5py")
+    steel = Section(0.09, 0.02, 0.02, young=200e9, poisson=0.3, density=7850.0)
+    rigid = loaded([(20, 30)], 1e8, speed=SPEED)
+    bent = tuple(dataclasses.replace(shaft, sections=(steel,)) for shaft in rigid.shafts)
+    model = build_train(dataclasses.replace(rigid, shafts=bent))
+    times = np.linspace(0.0, 0.002, 41)
+    run = simulate(model, times)
+    amplitude = np.linspace(1e-7, 2e-6, run.section_coordinates.shape[1])
+    wave = np.cos(2.0 * math.pi * 1000.0 * times - 0.7)
+    made = DeflectionRecord(model.train, times, 1, [1000.0])
+    made.add(dataclasses.replace(run, section_coordinates=wave[:, None] * amplitude))
+    (shape,) = made.deflections()
+    assert shape.sections == pytest.approx(amplitude * np.exp(-0.7j), rel=1e-9)
+    assert len(shape.modal) == model.train.housing.size
+    write_deflections(tmp_path, model.train, run, [shape])
+    assert (tmp_path / "deflection_gears.vtkhdf").exists()
 
 
 @pytest.mark.parametrize("frequency", [0.0, -5.0, 24.0, 10_100.0, math.nan, math.inf])

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
+from gearfe.drivetrain.modes import energies
 from gearfe.drivetrain.modes.critical import campbell, crossings
 from gearfe.drivetrain.modes.orders import train_orders
-from gearfe.drivetrain.modes.swinging import swinging
+from gearfe.drivetrain.modes.swinging import swinging, write_modes
 from gearfe.drivetrain.modes.whirl import WhirlModes, train_modes
 from gearfe.drivetrain.train import Bearing, Damping, Drive, GearTrain, Load, Shaft, ShaftGear, TrainModel, build_train
+from gearfe.fem.beams import Section
 from gearfe.multibody import constant
 from tests.makers.trains import base_radius, elastic, gear, smooth, train
 
@@ -259,3 +262,55 @@ def test_fields_of_a_whirl_mode_go_round() -> None:
     x, y = (made.gear_pose[:, gear, :3] @ frame[k] + made.gear_pose[:, gear, 3:] @ frame[k] * 0.01 for k in (0, 1))
     area = 0.5 * float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
     assert sense * area > 0.0
+
+
+def bent_train() -> TrainModel:
+    """Two elastic shafts of 20 mm on soft isotropic bearings."""
+    steel = Section(0.09, 0.02, 0.02, young=200e9, poisson=0.3, density=7850.0)
+    made = train([(20, 30)])
+    shafts = tuple(dataclasses.replace(shaft, sections=(steel,)) for shaft in made.shafts)
+    bearings = tuple(Bearing(bore, (1e8, 1e8, 1e8, 0.0, 0.0)) for bore in made.rigid_bores)
+    return build_train(dataclasses.replace(made, shafts=shafts, bearings=bearings))
+
+
+def test_coordinates_of_elastic_shafts_are_of_the_kinds_that_the_reduction_gives() -> None:
+    model = bent_train()
+    for number, body in enumerate(model.shafts):
+        its = energies._coordinates(model, number)
+        kinds = [energies.KINDS[int(np.argmax([kind[j, j] for kind in its.kinds]))] for j in range(6, body.size)]
+        assert kinds == [kind.split()[0] for kind in body.reduced.kinds]
+        assert (sum(its.kinds) == np.eye(body.size)).all()
+        pairs = [(list(a).index(1.0), list(b).index(1.0)) for a, b in zip(its.first[2:], its.second[2:], strict=True)]
+        assert [b - a for a, b in pairs] == [1] * (body.reduced.kinds.count("bending e1"))
+
+
+def test_elastic_shafts_whirl_forward_faster_and_backward_slower() -> None:
+    """Bending, twist and the bearings share the energy; gyroscopic moments raise forward whirl and lower backward."""
+    modes = train_modes(bent_train(), [0.0, 1000.0, 2000.0, 3000.0], 2e4)
+    assert modes.shares.sum(axis=2) == pytest.approx(1.0)
+    assert modes.strain.sum(axis=2)[0] == pytest.approx(0.5, abs=1e-6)
+    rises = modes.frequency[-1] - modes.frequency[0]
+    whirling = {"forward": [], "backward": []}
+    for n, direction in enumerate(modes.direction[-1]):
+        if direction in whirling and abs(modes.whirl[-1, n]).max() > 0.9:
+            whirling[direction].append(rises[n])
+    assert len(whirling["forward"]) >= 4
+    assert min(whirling["forward"]) > 0.0
+    assert max(whirling["backward"]) < 0.0
+    twist = int(np.argmax(modes.share("torsion")[-1]))
+    assert modes.labels[-1][twist].startswith("torsional")
+
+
+def test_fields_of_modes_bend_the_shafts(tmp_path: Path) -> None:
+    """The lines of the sections are those of the mode's shape, enlarged."""
+    h5py = pytest.importorskip("h5py")
+    model = bent_train()
+    modes = train_modes(model, [0.0, 3000.0], 6e3)
+    number = next(n for n, label in enumerate(modes.labels[-1]) if "whirl" in label)
+    made = swinging(model, modes, [number], 3000.0, 4)
+    moved = made.sections.rows @ made.section_coordinates[0]
+    assert np.ptp(moved[:, :3], axis=0).max() > 1e-4
+    write_modes(tmp_path, model, modes, [number], 3000.0)
+    with h5py.File(tmp_path / "mode_gears.vtkhdf") as file:
+        moves = np.linalg.norm(file["VTKHDF"]["PointData"]["displacement_m"][:], axis=1)
+    assert moves.max() > 1e-3

@@ -44,12 +44,15 @@ class Deflection:
         Complex amplitudes of each gear's displacement (m) and rotation beside rolling (rad), along x, y, z.
     modal : (N,) or None
         Of the housing's coordinates; None for a rigid one.
+    sections : (c,) or None
+        Of the coordinates of elastic shafts; None without any.
     """
 
     asked: float
     frequency: float
     pose: ComplexArray
     modal: ComplexArray | None
+    sections: ComplexArray | None = None
 
 
 class DeflectionRecord:
@@ -85,7 +88,7 @@ class DeflectionRecord:
         self._hertz = self._lines / (count * uniform_step(times))
         self._arrived = 0
         self._sum: ComplexArray | None = None
-        self._size = 0
+        self._widths: tuple[int, ...] = ()
 
     def add(self, piece: TrainResponse) -> None:
         """Take the samples that follow those taken before."""
@@ -95,9 +98,10 @@ class DeflectionRecord:
         if not inside.any():
             return
         chosen, place = piece.at(np.flatnonzero(inside)), number[inside] / self._count
-        values = _motion(self._train, chosen)
+        parts = _motion(self._train, chosen)
+        values = np.hstack([part for part in parts if part is not None])
         weights = window_at(self._window, place) * np.exp(-2j * math.pi * np.outer(self._lines, place))
-        self._size = values.shape[1]
+        self._widths = tuple(0 if part is None else part.shape[1] for part in parts)
         self._sum = weights @ values + (0.0 if self._sum is None else self._sum)
 
     def deflections(self) -> tuple[Deflection, ...]:
@@ -105,10 +109,11 @@ class DeflectionRecord:
         if self._sum is None or self._arrived < self._first + self._count:
             return ()
         amplitudes = self._sum * (2.0 / (self._count * WINDOWS[self._window][0]))
-        gears = 6 * len(self._train.gears)
+        ends = np.cumsum(self._widths)[:-1]
         return tuple(
-            Deflection(asked, float(hertz), row[:gears].reshape(-1, 6), row[gears:] if self._size > gears else None)
+            Deflection(asked, float(hertz), pose.reshape(-1, 6), *(part if len(part) else None for part in parts))
             for asked, hertz, row in zip(self._asked, self._hertz, amplitudes, strict=True)
+            for pose, *parts in [np.split(row, ends)]
         )
 
 
@@ -152,6 +157,9 @@ def write_deflections(folder: Path, train: GearTrain, response: TrainResponse, f
     both = list(zip(found, factors, strict=True))
     pose = np.concatenate([(turn * factor * shape.pose.ravel()).real for shape, factor in both])
     moved: dict[str, Any] = {"gear_pose": pose.reshape(len(time), -1, 6)}
+    if found[0].sections is not None:
+        bent = [turn * factor * shape.sections for shape, factor in both if shape.sections is not None]
+        moved["section_coordinates"] = np.concatenate([x.real for x in bent])
     if found[0].modal is not None:
         modal = [turn * factor * shape.modal for shape, factor in both if shape.modal is not None]
         rates = [2.0 * math.pi * shape.frequency for shape in found]
@@ -177,13 +185,10 @@ def deflection_entries(train: GearTrain, found: Sequence[Deflection]) -> list[di
     ]
 
 
-def _motion(train: GearTrain, response: TrainResponse) -> Array:
-    """(n, 6 gears + N) motion of the gears beside rolling, then coordinates of the housing."""
+def _motion(train: GearTrain, response: TrainResponse) -> tuple[Array, Array | None, Array | None]:
+    """Motion of the gears beside rolling (n, 6 gears), coordinates of the housing and of elastic shafts (n, ...)."""
     pose = response.gear_pose.copy()
     for number, gear in enumerate(train.gears):
         ratio = float(train.kinematics.ratios[train.shaft_number(gear.shaft)])
         pose[:, number, 3:] -= np.outer(ratio * response.drive_angle, train.frame[2])
-    parts = [pose.reshape(len(pose), -1)]
-    if response.modal is not None:
-        parts.append(response.modal)
-    return np.hstack(parts)
+    return pose.reshape(len(pose), -1), response.modal, response.section_coordinates
