@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from typing import Any
 
@@ -72,7 +73,8 @@ def _report_lines(summary: dict[str, Any]) -> list[str]:
     lines += inherited_lines(summary.get("inherited", {}))
     for mode in summary["modes"]:
         low, high = mode["frequency_Hz"], mode["frequency_at_the_fastest_speed_Hz"]
-        hertz = f"{low:.5g} Hz" if f"{low:.5g}" == f"{high:.5g}" else f"{low:.5g} to {high:.5g} Hz"
+        ends = list(dict.fromkeys(f"{x:.5g} Hz" if math.isfinite(x) else "overdamped" for x in (low, high)))
+        hertz = " to ".join(ends)
         lines.append(f"{mode['name']}: {hertz}, {100.0 * mode['damping_ratio']:.3g} % damping")
     reached = [c for c in summary["critical_speeds"] if c["excited"]]
     for c in reached[:PRINTED]:

@@ -66,6 +66,14 @@ def test_the_range_and_the_band_of_a_run_up_serve(job: Path, tmp_path: Path) -> 
     assert frequencies.min() <= 4000.0
 
 
+def test_a_band_without_modes_is_an_answer(job: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["modes", str(job), "--out", str(out), "--band-Hz", "1", "--fields"]) == 0
+    assert "0 modes" in capsys.readouterr().out
+    assert csv_rows(out / "modes.csv") == csv_rows(out / "critical_speeds.csv") == []
+    assert (out / "campbell.png").exists()
+
+
 def test_modes_in_a_study(job: Path, tmp_path: Path) -> None:
     text = job.read_text() + (
         '[modes]\nspeeds = 3\nspeed_stop_rad_per_s = -800.0\n[study]\njob = "modes"\ndesign = "factorial"\n'

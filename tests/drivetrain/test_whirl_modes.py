@@ -236,6 +236,29 @@ def test_free_rotation_is_no_mode_of_the_table() -> None:
     assert modes.frequency.min() > 10.0
 
 
+def test_a_mode_that_damping_keeps_from_swinging_is_labelled_so() -> None:
+    """Bearings whose dampers hold the tilts at rest: C > 2 sqrt(J_t K); gyroscopic moments let one swing at speed."""
+    K = 2.0 * ARM**2 * RADIAL
+    damper = 1.05 * math.sqrt(TRANSVERSE * K) / ARM**2
+    soft = [(k.bore, k.stiffness) for k in rotor().train.bearings]
+    bearings = tuple(Bearing(name, stiffness, (damper, 0.0, damper, 0.0, 0.0)) for name, stiffness in soft)
+    model = build_train(dataclasses.replace(rotor().train, bearings=bearings))
+    modes = train_modes(model, np.linspace(0.0, 4000.0, 9), 1e4)
+    exact = []
+    for speed in modes.speeds:  # J_t r'' + (C - i J_p W) r' + K r = 0 with r = r1 + i r2
+        roots = np.roots([TRANSVERSE, 2.0 * ARM**2 * damper - 1j * POLAR * speed, K])
+        exact.append(np.abs(roots[np.abs(roots.imag) > 1e-3]))
+    assert len(exact[0]) == 0
+    assert len(exact[-1]) == 2
+    for row, known in enumerate(exact):
+        labels = [label for label in modes.labels[row] if "whirl" in label]
+        for square in known:
+            assert np.nanmin(np.abs(modes.frequency[row] - square / TWO_PI)) < 1e-6 * square
+        assert all(label == "overdamped" for label, f in zip(modes.labels[row], modes.frequency[row], strict=True)
+                   if not np.isfinite(f))  # fmt: skip
+        assert len(labels) >= len(known)
+
+
 @pytest.mark.parametrize(
     ("speeds", "words"),
     [([-1.0, 1.0], "change sign"), ([0.0, 2.0, 1.0], "do not rise"), ([-5.0, -9.0], "turns against"), ([], "none")],

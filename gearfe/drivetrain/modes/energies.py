@@ -125,7 +125,7 @@ class TrainForms:
             turned = -2.0 * orbit.sense * (mass * round_).sum(axis=0)
             senses.append(np.divide(turned, weight, out=np.zeros_like(weight), where=weight > SMALL))
             weights.append(weight)
-        return np.array(senses).reshape(len(senses), -1).T, np.array(weights).reshape(len(weights), -1).T
+        return np.array(senses).T, np.array(weights).T
 
 
 def train_forms(model: TrainModel, sense: float) -> TrainForms:

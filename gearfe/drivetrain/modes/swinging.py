@@ -25,10 +25,10 @@ FRAMES = 16
 
 def mesh_modes(modes: WhirlModes, least: float = STRONG) -> list[int]:
     """Numbers, from 0, of modes with at least a part of their strain energy in the meshes at the fastest speed; the
-    first of the largest where none has.
+    largest of all where none has.
     """
     share = modes.mesh_strain[modes.fastest].sum(axis=1)
-    return np.flatnonzero(share >= least).tolist() or [int(share.argmax())]
+    return np.flatnonzero(share >= least).tolist() or np.argsort(-share)[:1].tolist()
 
 
 def swinging(

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ...base.errors import InputError
 from ...base.shown import ShownTable
-from ...base.typing import Array, ComplexArray
+from ...base.typing import Array, ComplexArray, IntArray
 from ..train.kinematics import drive_sense
 from ..train.model import TrainModel
 from .energies import BENDING, HOUSING, KINDS, MESH, Part, train_forms
@@ -30,6 +30,8 @@ STRONG = 0.03
 SHOWN = 4
 #: Directions of whirl.
 FORWARD, BACKWARD, PLANE, MIXED, NONE = "forward", "backward", "planar", "mixed", "none"
+#: Label of a mode at a speed at which it does not swing.
+OVERDAMPED = "overdamped"
 #: Names of the kinds of motion in labels.
 LABELS = {BENDING: "whirl", "torsion": "torsional", "axial": "axial", HOUSING: "housing"}
 
@@ -136,6 +138,8 @@ class WhirlModes(ShownTable):
         return tuple(made)
 
     def _label(self, row: int, mode: int) -> str:
+        if not np.isfinite(self.frequency[row, mode]):
+            return OVERDAMPED
         kind, direction = self.kinds[row][mode], self.direction[row][mode]
         label = LABELS[kind]
         if kind == BENDING:
@@ -191,9 +195,16 @@ class WhirlModes(ShownTable):
 
     def below(self, highest_hz: float) -> WhirlModes:
         """Those that come below a frequency at some of the speeds."""
-        kept = np.flatnonzero((np.where(np.isnan(self.frequency), np.inf, self.frequency) <= highest_hz).any(axis=0))
+        return self.taking(self.inside(highest_hz))
+
+    def inside(self, highest_hz: float) -> IntArray:
+        """Numbers, from 0, of the modes that come below a frequency at some of the speeds."""
+        return np.flatnonzero((np.where(np.isnan(self.frequency), np.inf, self.frequency) <= highest_hz).any(axis=0))
+
+    def taking(self, numbers: IntArray) -> WhirlModes:
+        """Modes of these numbers, from 0, in this order."""
         fields = ("frequency", "damping_ratio", "slope", "kinetic", "strain", "whirl", "whirl_weight", "shapes")
-        return replace(self, **{name: getattr(self, name)[:, kept] for name in fields})
+        return replace(self, **{name: getattr(self, name)[:, numbers] for name in fields})
 
 
 def train_modes(model: TrainModel, speeds: ArrayLike, highest_hz: float = 5000.0) -> WhirlModes:
@@ -236,11 +247,11 @@ def train_modes(model: TrainModel, speeds: ArrayLike, highest_hz: float = 5000.0
         damping_ratio=-tracks.values.real / size,
         slope=slope / (2.0 * math.pi),
         parts=forms.parts,
-        kinetic=np.array(kinetic).reshape(len(given), count, -1),
-        strain=np.array(strain).reshape(len(given), count, -1),
-        whirl=np.array(whirl).reshape(len(given), count, -1),
-        whirl_weight=np.array(weight).reshape(len(given), count, -1),
-        shapes=np.array(shapes).reshape(len(given), count, -1),
+        kinetic=np.array(kinetic).reshape(len(given), count, len(forms.parts)),
+        strain=np.array(strain).reshape(len(given), count, len(forms.parts)),
+        whirl=np.array(whirl).reshape(len(given), count, len(forms.orbits)),
+        whirl_weight=np.array(weight).reshape(len(given), count, len(forms.orbits)),
+        shapes=np.array(shapes).reshape(len(given), count, model.system.size),
         shafts=tuple(shaft.name for shaft in model.train.shafts),
         free=turning.free,
     )

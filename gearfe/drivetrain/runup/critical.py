@@ -68,6 +68,8 @@ def critical_speeds(run: RunUp, multiples: int, shaft_multiples: int = 2) -> Cri
     speeds = np.linspace(run.speeds[0], run.speeds[-1], SPEEDS) if len(run.speeds) > 1 else run.speeds
     highest = (1.0 + NEAR) * max(run.band_hz, *(float(state.frequency.max()) for state in run.states))
     every = train_modes(model, speeds, highest)
+    inside = every.inside(run.band_hz)  # first, so that a mode has one number
+    every = every.taking(np.concatenate([inside, np.setdiff1d(np.arange(every.frequency.shape[1]), inside)]))
     orders = train_orders(model, multiples, shaft_multiples)
     return CriticalSpeeds(campbell(every, orders, run.band_hz), every)
 
@@ -136,7 +138,7 @@ def _cause(
     row = nearest(modes, state.speed)
     frequencies = modes.at(state.speed)
     there = float(modes.frequency[row, mode] if frequencies is None else frequencies[mode])
-    beyond = float(np.nanmin(modes.frequency[:, mode])) > critical.campbell.band_hz
+    beyond = mode >= critical.campbell.modes.frequency.shape[1]
     return found | {
         "mode": modes.names[mode] + (", above band_Hz" if beyond else ""),
         "mode_frequency_Hz": there,

@@ -95,10 +95,10 @@ def write_runup(
                 draw(target, run, critical, multiples, bore)
                 if unstable is not None:
                     draw.instability(target / "instability.png", unstable)
-        if choice.fields:
+        modes = critical.campbell.modes
+        if choice.fields and (chosen := mesh_modes(modes)):
             with watch.stage("fields"):
-                modes = critical.campbell.modes
-                write_modes(target, model, modes, mesh_modes(modes), float(run.speeds[-1]))
+                write_modes(target, model, modes, chosen, float(run.speeds[-1]))
         bearings = bearing_report.bearing_summary(model.operating)
         if bearings:
             write_csv(target / bearing_report.FILE, bearing_report.bearing_columns(bearings))
