@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from gearfe.base.config import build, quantity
+from gearfe.base.errors import InputError
 from gearfe.base.tables.examples import JOBS, RUN_BY, job_file
 from gearfe.base.tables.jobs import TABLES, load_job, read_train_tables, table_class
 from gearfe.base.tables.mechanism import BodyTable, MechanismFile, RunTable, read_mechanism_file
@@ -52,6 +53,16 @@ def test_every_optional_key_can_be_switched_on(tmp_path, source):
         assert tomllib.loads("\n".join(changed)) != tomllib.loads(text) or not chosen, chosen
         assert read("\n".join(changed), tmp_path) == plain, [lines[number] for number in chosen]
     assert len(commented) >= 3 or isinstance(source, Path)
+
+
+def test_a_gearbox_takes_the_tables_at_its_end(tmp_path):
+    """Without their ## machines are read; the coupling asks for the shaft that it names."""
+    text = re.sub(r"^## ?", "", job_file("gearbox"), flags=re.MULTILINE)
+    (tmp_path / "job.toml").write_text(text.split("[couplings.")[0])
+    assert read_train_tables(tmp_path / "job.toml")["train"].machines[0].name == "motor"
+    (tmp_path / "job.toml").write_text(text)
+    with pytest.raises(InputError, match=r"couplings\.clutch\.shafts: unknown name 'a shaft on its axis'"):
+        read_train_tables(tmp_path / "job.toml")
 
 
 @pytest.mark.parametrize("kind", JOBS)

@@ -144,6 +144,18 @@ GEARBOX_TRAIN: dict[str, Any] = {
     "damping": {"rayleigh_beta_s": 2e-6},
 }  # fmt: skip
 
+#: Tables that stand commented at the end of a gearbox.
+DRIVELINE: dict[str, dict[str, dict[str, Any]]] = {
+    "machines": {
+        "motor": {
+            "shaft": "input", "inertia_kg_m2": 0.004, "stiffness_Nm_per_rad": 25e3, "damping_Nm_s_per_rad": 1.5,
+        },
+    },
+    "couplings": {
+        "clutch": {"shafts": ["input", "a shaft on its axis"], "stiffness_Nm_per_rad": 3e4},
+    },
+}  # fmt: skip
+
 MECHANISM: dict[str, Any] = {
     "title": "Crank and rod",
     "run": {"end_s": 10.0, "step_s": 0.005, "tolerance": 1e-9},
@@ -256,7 +268,15 @@ def job_file(kind: str) -> str:
             _text(name, example, seen)
             for name, example in tables.items()
         )
+        + (_commented(seen) if kind == "gearbox" else "")
     )
+
+
+def _commented(seen: set[type]) -> str:
+    """Tables of machines and couplings behind ##: a single # stands before keys of the tables above."""
+    text = "\n".join(_text(name, example, seen) for name, example in DRIVELINE.items())
+    lines = [f"## {line}".rstrip() for line in text.splitlines()]
+    return "\n# Tables that you may add; take the ## off (docs/bearings.md).\n" + "\n".join(lines) + "\n"
 
 
 def _text(name: str, example: Mapping[str, Any], seen: set[type]) -> str:
