@@ -33,6 +33,8 @@ from gearfe.drivetrain.train import (
     build_train,
     simulate,
 )  # fmt: skip
+from gearfe.drivetrain.train.misalignment import static_state
+from gearfe.fem.beams import Section
 from gearfe.multibody import TimeFunction, constant
 from tests.makers.gearboxes import tables
 from tests.makers.mesh_laws import hertzian_law
@@ -228,6 +230,28 @@ def test_rolling_bearings_of_a_train_by_torque_are_those_of_the_load() -> None:
     for name in names:
         one, two = (build_train(x).operating.bearings[name].stiffness for x in (made, free))
         np.testing.assert_allclose(two, one, rtol=1e-6, atol=1e-6 * np.abs(one).max())
+
+
+def test_a_machine_twists_the_elastic_shaft_up_to_its_place() -> None:
+    """From its gear, an elastic shaft twists by T l/(G I_p) up to the machine that is loaded."""
+    made = train([(20, 30)])
+    section = Section(0.09, 0.02, 0.02, 0.0, 0.0, young=206e9, poisson=0.3, density=7850.0)
+    output = dataclasses.replace(made.shafts[1], sections=(section,))
+    saw = dataclasses.replace(BRAKE, along=-0.045)
+    loads = (dataclasses.replace(made.loads[0], torque=constant(TORQUE), machine="brake"),)
+    made = changed(made, shafts=(made.shafts[0], output), machines=(saw,), loads=loads)
+    model = build_train(made)
+    q, place = sampled(static_state(model)), made.gears[1].along
+    gear = q[model.first[1] : model.first[1] + model.shafts[1].size] @ model.shafts[1].turn_rows(place)[2]
+    turned = q @ model.driveline.machines[0] - gear
+    shear = 206e9 / 2.6
+    polar = math.pi * 0.02**4 / 32.0
+    twist = TORQUE * (place + 0.045) / (shear * polar) + TORQUE / BRAKE.stiffness
+    assert turned == pytest.approx(twist, rel=1e-6)
+    with pytest.raises(InputError, match=r"machine 'brake' y_mm: is required: shaft 's1' is elastic"):
+        build_train(changed(made, machines=(BRAKE,)))
+    with pytest.raises(InputError, match=r"machine 'brake' y_mm = 80.0: must be on shaft 's1', from -45 to 45 mm"):
+        build_train(changed(made, machines=(dataclasses.replace(BRAKE, along=0.08),)))
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [

@@ -118,25 +118,23 @@ def machine_rotors(train: GearTrain, begin: float) -> tuple[MachineRotor, ...]:
 def driveline(train: GearTrain, shafts: Shafts) -> Driveline:
     """Return the machines and springs of a train; the machines' coordinates are the last of the system."""
     machines = np.eye(shafts.size)[shafts.size - len(train.machines) :]
-    twists = [
-        row - _turn(shafts, train.shaft_number(machine.shaft), _place(train, machine))
-        for row, machine in zip(machines, train.machines, strict=True)
-    ]
-    for coupling in train.couplings:
-        one, two = (train.shaft_number(name) for name in coupling.shafts)
-        middle = [float(np.dot(train.shafts[i].point, train.frame[2])) for i in (one, two)]
-        ends = (
-            train.shaft_end(name, other - own)
-            for name, own, other in zip(coupling.shafts, middle, reversed(middle), strict=True)
-        )
-        twists.append(_turn(shafts, one, next(ends)) - _turn(shafts, two, next(ends)))
     springs: tuple[Machine | Coupling, ...] = (*train.machines, *train.couplings)
-    return Driveline(machines, springs, np.array(twists).reshape(-1, shafts.size))
+    twists = np.zeros((len(springs), shafts.size))
+    twists[: len(machines)] = machines
+    for number, spring in enumerate(springs):
+        signs = (-1.0,) if isinstance(spring, Machine) else (1.0, -1.0)
+        for sign, (name, along) in zip(signs, spring_places(train, spring), strict=True):
+            twists[number] += sign * _turn(shafts, train.shaft_number(name), along)
+    return Driveline(machines, springs, twists)
 
 
-def _place(train: GearTrain, machine: Machine) -> float:
-    """Coordinate along the axis (m) at which a machine turns its shaft."""
-    return train.shaft_end(machine.shaft, 0.0) if machine.along is None else machine.along
+def spring_places(train: GearTrain, spring: Machine | Coupling) -> list[tuple[str, float]]:
+    """Shafts that a spring turns, and the coordinates along the axis (m) of their sections there."""
+    if isinstance(spring, Machine):
+        return [(spring.shaft, train.shaft_end(spring.shaft, 0.0) if spring.along is None else spring.along)]
+    one, two = spring.shafts
+    towards = train.shaft_end(two, 0.0) - train.shaft_end(one, 0.0)
+    return [(one, train.shaft_end(one, towards)), (two, train.shaft_end(two, -towards))]
 
 
 def _turn(shafts: Shafts, number: int, along: float) -> Array:

@@ -21,6 +21,7 @@ import numpy as np
 
 from ...base.typing import Array
 from ...fem.beams import BeamShaft, Disc, ReducedShaft, Station, reduce_shaft
+from .driveline import spring_places
 from .elements import Gyration, Rotor, ShaftBody, gear_masses
 from .gear_train import GearTrain, Shaft
 
@@ -167,7 +168,12 @@ def beam_shaft(train: GearTrain, shaft: Shaft) -> BeamShaft:
         along = float(train.bore_points[bore] @ train.frame[2])
         stations.append(Station(along, f"attachment {bore}", ("radial", "tilt", "axial")))
     for name, end in train.shaft_ends(shaft.name):
-        stations.append(Station(train.place(end), name, ("torsion",)))
+        if not end.machine:
+            stations.append(Station(train.place(end), name, ("torsion",)))
+    for spring in (*train.machines, *train.couplings):
+        for name, along in spring_places(train, spring):
+            if name == shaft.name:
+                stations.append(Station(along, f"spring of {spring.name}", ("torsion",)))
     return BeamShaft(middle - 0.5 * shaft.length, shaft.sections, tuple(discs), tuple(stations), f"shaft {shaft.name}")
 
 
