@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from ...base.errors import MissingLibraryError
 from ...base.isolation import load
 from ...base.typing import Array
@@ -33,7 +35,10 @@ def write_dxf(path: Path, outlines: Mapping[str, Array], circles: Mapping[str, f
     space = document.modelspace()
     for layer, points in outlines.items():
         document.layers.add(layer)
-        space.add_lwpolyline(points.tolist(), close=True, dxfattribs={"layer": layer})
+        line = space.add_lwpolyline([], close=True, dxfattribs={"layer": layer})
+        rows = np.zeros((len(points), 5))  # x, y, widths at start and end, bulge
+        rows[:, :2] = points
+        line.lwpoints.extend(rows.tolist())  # all at once: its own way copies all points for each of them
     for layer, radius in circles.items():
         document.layers.add(layer)
         space.add_circle((0.0, 0.0), radius, dxfattribs={"layer": layer})
