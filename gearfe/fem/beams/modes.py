@@ -26,8 +26,8 @@ from scipy import linalg
 from ...base.typing import Array
 from .elements import Family
 
-#: Part of the largest squared period of a shaft below which one is rounding.
-ROUNDING = 1e-15
+#: Part of the largest squared period of a shaft below which one is rounding: that of some hundred unknowns.
+ROUNDING = 1e-12
 
 #: Part of a loaded direction's own compliance below which a residual vector is rounding.
 DEPENDENT = 1e-10
@@ -100,7 +100,8 @@ def elastic_vectors(
     inverse -= unit @ unit.T / alpha
     lowest = max((2.0 * math.pi * modes_below_hz) ** -2, ROUNDING * float(np.trace(inverse)))
     values, turned = linalg.eigh(inverse, subset_by_value=(lowest, math.inf))
-    values, turned = values[::-1], turned[:, ::-1]
+    count = min(len(values), own - rigid.shape[1])
+    values, turned = values[::-1][:count], turned[:, ::-1][:, :count]
     modes = linalg.solve_triangular(factor, turned / np.sqrt(values), lower=True, trans="T")
     modes -= basis @ (momentum.T @ modes)
     squares = 1.0 / values
