@@ -101,6 +101,10 @@ def run_along_width(
                 title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, load along the face width"
                 picture = flank_load_picture(flanks, sweep, pair.wheel.base_radius, pair.path_limits(), title)
                 save(picture, made / f"{name}_load.png")
+                if mesh.deviates and loads is not None:
+                    from ..figures.flanks import flank_picture
+
+                    save(flank_picture(mesh, pair, job.folder), made / "loadmap_flanks.png", dpi=110)
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / ("summary.json" if loads is None else "loadmap.json"), found)
         names = sorted(path.name for path in made.iterdir())

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..base.tables.gearbox import NamedMesh
+from ..base.tables.microgeometry import ALONG_WIDTH
 from ..base.typing import Array
 from ..gears.geometry import pitch_errors
 from ..gears.geometry.deviation_job import FlankOf, flank_deviations
+from ..gears.geometry.modifications import ends_of
 from ..gears.geometry.pair import GearPair
 from .style import BLUE, GREY, ORANGE, headed, new_figure, some_of, tidy
 
@@ -33,6 +35,9 @@ class _Chart:
         Half the width of the tolerance (um), where there is one.
     pitch
         Index deviations (um), where teeth differ.
+    width
+        Places along the axes (mm), and the deviations there of the modifications along the width (um), at the form and
+        at the tip circle; None without.
     """
 
     title: str
@@ -41,6 +46,7 @@ class _Chart:
     lines: list[Array]
     band: Array | None
     pitch: Array | None
+    width: tuple[Array, Array, Array] | None
 
 
 def _chart(mesh: NamedMesh, pair: GearPair, g: int, side: str, folder: Path) -> _Chart:
@@ -60,15 +66,30 @@ def _chart(mesh: NamedMesh, pair: GearPair, g: int, side: str, folder: Path) -> 
         lines=[np.zeros(len(roll)) if one is None else 1e6 * one.at(roll)[0] for one in own.profiles],
         band=band,
         pitch=index if len(index) > 1 else None,
+        width=_along_width(one, 1e-3 * mesh.gears[g].y_mm),
     )
 
 
+def _along_width(one: FlankOf, centre: float) -> tuple[Array, Array, Array] | None:
+    """Places along the axes (mm) and deviations there (um) at form and tip circle, its middle at y (m)."""
+    if not any(getattr(one.own, key) for key in ALONG_WIDTH):
+        return None
+    from ..gears.gearmesh.width_job import material_along  # which loads finite elements
+
+    face = centre - 0.5 * one.gear.face_width, centre + 0.5 * one.gear.face_width
+    y = np.linspace(*face, 201)
+    form, tip = (1e6 * material_along(one, face, np.full(len(y), roll), y) for roll in ends_of(one.gear))
+    return 1e3 * y, form, tip
+
+
 def flank_picture(mesh: NamedMesh, pair: GearPair, folder: Path) -> Any:
-    """K-charts: deviation over roll length of both flanks of both gears, and their index deviations."""
+    """K-charts: deviation over roll length of both flanks of both gears, along the width, and index deviations."""
     charts = [_chart(mesh, pair, g, side, folder) for g in (0, 1) for side in ("left", "right")]
     pitch = any(chart.pitch is not None for chart in charts)
-    figure = new_figure(11.0, 7.6 if pitch else 5.0)
-    grid = figure.subplots(2 if pitch else 1, len(charts), squeeze=False, height_ratios=(2.2, 1) if pitch else None)
+    width = any(chart.width is not None for chart in charts)
+    rows = 1 + width + pitch
+    figure = new_figure(11.0, 5.0 + 2.6 * (rows - 1))
+    grid = figure.subplots(rows, len(charts), squeeze=False, height_ratios=(2.2, *(1,) * (rows - 1)))
     for column, chart in enumerate(charts):
         axes = grid[0][column]
         tidy(axes)
@@ -85,8 +106,10 @@ def flank_picture(mesh: NamedMesh, pair: GearPair, folder: Path) -> Any:
         axes.set_xlabel("deviation (µm), + material", fontsize=9)
         if column == 0:
             axes.set_ylabel("roll length (mm)", fontsize=9)
+        if width:
+            _draw_width(grid[1][column], chart, first=column == 0)
         if pitch:
-            below = grid[1][column]
+            below = grid[-1][column]
             tidy(below)
             if chart.pitch is None:
                 below.set_visible(False)
@@ -100,3 +123,19 @@ def flank_picture(mesh: NamedMesh, pair: GearPair, folder: Path) -> Any:
     title = "Deviations of the flanks; dashed: ends of the path of contact" + grey
     headed(figure, title)
     return figure
+
+
+def _draw_width(axes: Any, chart: _Chart, *, first: bool) -> None:
+    """Deviations along the face width, at form and tip circle where they differ."""
+    tidy(axes)
+    if chart.width is None:
+        axes.set_visible(False)
+        return
+    y, form, tip = chart.width
+    axes.plot(y, tip, color=BLUE, linewidth=1.3, label="tip")
+    if np.abs(tip - form).max() > 0.0:
+        axes.plot(y, form, color=ORANGE, linewidth=1.3, label="form circle")
+        axes.legend(fontsize=7, frameon=False)
+    axes.set_xlabel("y along the axes (mm)", fontsize=9)
+    if first:
+        axes.set_ylabel("deviation (µm)", fontsize=9)

@@ -19,7 +19,7 @@ from gearfe.cli.main import main
 from gearfe.gears.gearmesh import width_job
 from gearfe.gears.gearmesh.job import StiffnessJob, stiffness_job
 from gearfe.gears.gearmesh.width_job import job_lines, stiffness_sweep, wide_flanks, wide_mesh
-from gearfe.gears.gearmesh.width_report import load_columns, sweep_columns, width_summary
+from gearfe.gears.gearmesh.width_report import FlankLoad, load_columns, sweep_columns, width_summary, write_flank
 from gearfe.gears.width import WideMesh
 from gearfe.output.exchange.tables import read_csv
 from gearfe.study.kinds import Shared, solve
@@ -327,3 +327,40 @@ def test_wide_meshes_take_helix_and_places_of_the_gears() -> None:
     assert mesh.overlap_ratio == pytest.approx(gears.overlap_ratio, rel=1e-12)
     with pytest.raises(InputError, match=r"base_helix_angle = 0\.1: is not that of the gears"):
         WideMesh(gears, 0.1)
+
+
+def test_the_picture_of_the_flanks_shows_modifications_along_the_width() -> None:
+    from gearfe.figures.flanks import flank_picture
+
+    one = job({"torques_Nm": [60.0], "pinion": {"bias_um": 8.0, "right": {"helix_slope_um": 4.0}}})
+    axes = flank_picture(one.mesh, one.pair, Path()).axes
+    assert len(axes) == 8  # four charts over roll length, four along the width
+    left, right = ([line.get_ydata() for line in axes[4 + i].lines] for i in (0, 1))
+    assert [(line[0], line[-1]) for line in left] == [pytest.approx((-2.0, 2.0)), pytest.approx((2.0, -2.0))]
+    assert [(line[0], line[-1]) for line in right] == [pytest.approx((-4.0, 4.0)), pytest.approx((0.0, 0.0))]
+    assert not axes[6].get_visible()
+    assert len(flank_picture(job({"torques_Nm": [60.0]}).mesh, one.pair, Path()).axes) == 4
+
+
+@pytest.mark.parametrize("flank", ["left", "right"])
+def test_the_pattern_lies_on_the_flank_in_space(flank: str, tmp_path: Path) -> None:
+    """Radii are those of the roll lengths, and points of one radius turn by tan(beta)/r along y on either side."""
+    h5py = pytest.importorskip("h5py")
+    one = job({"torques_Nm": [60.0], "flank": flank}, helix_angle_deg=12.0)
+    pinion = one.pair.pinion
+    roll, y = np.linspace(6e-3, 9e-3, 4), np.linspace(-5e-3, 5e-3, 3)
+    load = np.arange(12.0).reshape(4, 3)
+    load[0, 0] = np.nan
+    write_flank(tmp_path / "flank.vtkhdf", one, FlankLoad(60.0, roll, y, load, np.zeros(3)))
+    with h5py.File(tmp_path / "flank.vtkhdf") as file:
+        points = np.array(file["VTKHDF/Points"]).reshape(4, 3, 3)
+        found = np.array(file["VTKHDF/PointData/line_load_N_per_mm"]).reshape(4, 3)
+    assert found[0, 0] == 0.0
+    assert found[1:] == pytest.approx(1e-3 * load[1:])
+    radius, angle = np.hypot(points[..., 0], points[..., 1]), np.arctan2(points[..., 1], points[..., 0])
+    assert radius == pytest.approx(np.repeat(np.hypot(pinion.base_radius, roll)[:, None], 3, axis=1), rel=1e-6)
+    assert points[..., 2] == pytest.approx(np.repeat(y[None], 4, axis=0), rel=1e-6)
+    rate = np.diff(angle, axis=1) / np.diff(y)
+    assert rate == pytest.approx(np.full((4, 2), math.tan(math.radians(12.0)) / pinion.reference_radius), rel=1e-4)
+    side = 1.0 if flank == "left" else -1.0
+    assert (side * angle[:, 1] > 0.0).all()

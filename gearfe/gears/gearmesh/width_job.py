@@ -157,7 +157,7 @@ def wide_flanks(job: StiffnessJob, mesh: WideMesh) -> WideFlanks:
             flank = FlankOf(job.mesh, job.pair, g, job.mesh.flank, job.folder)
             leads[g] = lead_modification(flank.own, sense)
             topographies[g] = _topography(flank.own, flank.gear, face, sense)
-            _check_size(flank, leads[g], topographies[g], face)
+            _check_size(flank, (sense * face[0], sense * face[1]))
     for key in TILTS:
         if abs(1e-6 * getattr(job.mesh, key)) > MOST_GAP * job.pair.pinion.module:
             where = job.mesh.tilts_where
@@ -167,15 +167,27 @@ def wide_flanks(job: StiffnessJob, mesh: WideMesh) -> WideFlanks:
     return WideFlanks(profiles, (leads[0], leads[1]), (topographies[0], topographies[1]), tilt)
 
 
-def _check_size(
-    flank: FlankOf, lead: LeadModification, topography: FlankTopography | None, face: tuple[float, float]
-) -> None:
+def material_along(flank: FlankOf, face: tuple[float, float], roll: Array, y: Array) -> Array:
+    """Return the material (m) of a flank's modifications along the width.
+
+    Parameters
+    ----------
+    flank : FlankOf
+        The flank of the job file.
+    face : pair of float
+        First and last y of the gear (m).
+    roll, y : ndarray
+        Roll lengths and places along the axes (m), of one shape.
+    """
+    added = lead_modification(flank.own, 1.0).material(y, face)
+    topography = _topography(flank.own, flank.gear, face, 1.0)
+    return added if topography is None else added + topography(roll, y, np.zeros(y.shape, dtype=np.int64))
+
+
+def _check_size(flank: FlankOf, face: tuple[float, float]) -> None:
     """Raise `InputError` for modifications along the width that are no microgeometry, of the largest of their keys."""
-    roll, z = (grid.ravel() for grid in np.meshgrid(ends_of(flank.gear), np.linspace(*face, 33)))
-    added = lead.material(z, face)
-    if topography is not None:
-        added = added + topography(roll, z, np.zeros(len(z), dtype=np.int64))
-    if np.abs(added).max() <= MOST_GAP * flank.gear.module:
+    roll, y = (grid.ravel() for grid in np.meshgrid(ends_of(flank.gear), np.linspace(*sorted(face), 33)))
+    if np.abs(material_along(flank, (min(face), max(face)), roll, y)).max() <= MOST_GAP * flank.gear.module:
         return
     table = flank.own
     amounts = {key: getattr(table, key) or 0.0 for key in ALONG_WIDTH if key != "triangular_reliefs"}
