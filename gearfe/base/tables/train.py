@@ -344,14 +344,14 @@ class TrainDriveTable:
     shaft: str = quantity(doc="shaft that is driven")
     attachment: int | str | None = quantity(
         None,
-        doc="bore against which its rotation is prescribed, or on which the torque reacts; left out: the ground",
+        doc="bore that it turns against and reacts on; left out: the ground",
     )
     y_mm: float | None = quantity(
         None, doc="place on an elastic shaft where it is driven (mm); left out: that of the bore"
     )
     machine: str = quantity("", doc="machine of that shaft which is driven; left out: the shaft itself")
     speed_rad_per_s: float | TrainFunctionTable = quantity(  # noqa: RUF009
-        doc="speed about +y (rad/s), or a function of time; beside torque_Nm the nominal one, which may be missed"
+        doc="about +y (rad/s), or a function of time; beside torque_Nm the nominal one"
     )
     torque_Nm: float | TrainFunctionTable | None = quantity(  # noqa: RUF009
         None, doc="torque about +y (N m), or a function of time; left out: the speed is prescribed"
