@@ -1,11 +1,16 @@
 r"""Operating deflection shapes: how gears and housing move together at one line of the spectrum of a transient.
 
-For N samples :math:`x_n` of a record with the window w and its mean :math:`\bar w`, line k has the complex amplitude
+For N samples of a record at the step h with the window w, whose mean is :math:`\bar w`, line k of the accelerations
+has the complex amplitude
 
-.. math:: \hat x_k = \frac{2}{N\bar w}\sum_{n=0}^{N-1} w_n x_n e^{-2\pi i k n / N} ,
+.. math::
+    \hat a_k = \frac{2}{N\bar w}\sum_{n=0}^{N-1} w_n\,\frac{x_{n+1} - 2x_n + x_{n-1}}{h^2}\,e^{-2\pi i k n / N} ,
+    \qquad \hat x_k = -\Big(\frac{h}{2\sin(\pi k/N)}\Big)^2\hat a_k .
 
-that of the spectrum, here of the housing's coordinates and of the gears' motion beside rolling. All samples of the run
-count, so nothing from above the spectrum is folded in.
+The motion follows from its accelerations, as in a measurement: what loads deflect on the way is a thousand times the
+vibration, and would leak into all lines of a record that does not repeat. x are the housing's coordinates, those of
+elastic shafts, and the gears' motion beside rolling. All samples of the run count, so nothing from above the spectrum
+is folded in.
 """
 
 from __future__ import annotations
@@ -86,29 +91,40 @@ class DeflectionRecord:
         self._first, self._count = first * every, count * every
         self._lines = nearest_lines(frequencies, count, uniform_step(times))
         self._hertz = self._lines / (count * uniform_step(times))
+        self._step = uniform_step(times) / every
         self._arrived = 0
+        self._before = np.zeros((0, 0))  # the last two samples
         self._sum: ComplexArray | None = None
         self._widths: tuple[int, ...] = ()
 
     def add(self, piece: TrainResponse) -> None:
         """Take the samples that follow those taken before."""
-        number = self._arrived - self._first + np.arange(len(piece.time))
-        self._arrived += len(piece.time)
-        inside = (number >= 0) & (number < self._count)
-        if not inside.any():
+        if not len(piece.time):
             return
-        chosen, place = piece.at(np.flatnonzero(inside)), number[inside] / self._count
-        parts = _motion(self._train, chosen)
+        parts = _motion(self._train, piece)
         values = np.hstack([part for part in parts if part is not None])
-        weights = window_at(self._window, place) * np.exp(-2j * math.pi * np.outer(self._lines, place))
         self._widths = tuple(0 if part is None else part.shape[1] for part in parts)
-        self._sum = weights @ values + (0.0 if self._sum is None else self._sum)
+        if self._arrived:
+            values = np.vstack([self._before, values])
+        number = self._arrived - len(self._before) - self._first + np.arange(len(values))
+        self._arrived += len(piece.time)
+        self._before = values[-2:]
+        if len(values) < 3:
+            return
+        change, middle = (values[2:] - 2.0 * values[1:-1] + values[:-2]) / self._step**2, number[1:-1]
+        if number[0] == 0 and self._first == 0:  # nothing comes before the first sample of the run
+            change, middle = np.vstack([change[:1], change]), number[:-1]
+        inside = (middle >= 0) & (middle < self._count)
+        place = middle[inside] / self._count
+        weights = window_at(self._window, place) * np.exp(-2j * math.pi * np.outer(self._lines, place))
+        self._sum = weights @ change[inside] + (0.0 if self._sum is None else self._sum)
 
     def deflections(self) -> tuple[Deflection, ...]:
         """The shapes, when all samples have arrived; none where the run ended before that."""
-        if self._sum is None or self._arrived < self._first + self._count:
+        if self._sum is None or self._arrived <= self._first + self._count:
             return ()
-        amplitudes = self._sum * (2.0 / (self._count * WINDOWS[self._window][0]))
+        per_change = -((0.5 * self._step / np.sin(math.pi * self._lines / self._count)) ** 2)
+        amplitudes = self._sum * (2.0 / (self._count * WINDOWS[self._window][0])) * per_change[:, None]
         ends = np.cumsum(self._widths)[:-1]
         return tuple(
             Deflection(asked, float(hertz), pose.reshape(-1, 6), *(part if len(part) else None for part in parts))
