@@ -33,7 +33,7 @@ from gearfe.drivetrain.train import (
     build_train,
     simulate,
 )  # fmt: skip
-from gearfe.drivetrain.train.misalignment import static_state
+from gearfe.drivetrain.train.misalignment import misalignments, static_state
 from gearfe.fem.beams import Section
 from gearfe.multibody import TimeFunction, constant
 from tests.makers.gearboxes import tables
@@ -230,6 +230,18 @@ def test_rolling_bearings_of_a_train_by_torque_are_those_of_the_load() -> None:
     for name in names:
         one, two = (build_train(x).operating.bearings[name].stiffness for x in (made, free))
         np.testing.assert_allclose(two, one, rtol=1e-6, atol=1e-6 * np.abs(one).max())
+
+
+def test_gears_of_a_train_by_torque_tilt_as_those_of_one_by_speed() -> None:
+    made = chain()
+    names = [bore for shaft in made.shafts for bore in shaft.bores]
+    springs = tuple(Bearing(name, (1e8 + 1e7 * i, 1e8, 2e8, 1e4, 1e4)) for i, name in enumerate(names))
+    made = changed(made, bearings=springs)
+    free = changed(made, drive=dataclasses.replace(made.driven, torque=constant(33.0)))
+    (one,), (two,) = (misalignments(build_train(x)) for x in (made, free))
+    assert abs(one.in_plane) > 1e-6
+    assert two.in_plane == pytest.approx(one.in_plane, rel=1e-6)
+    assert two.across == pytest.approx(one.across, rel=1e-6)
 
 
 def test_a_machine_twists_the_elastic_shaft_up_to_its_place() -> None:

@@ -23,7 +23,7 @@ from ...base.typing import Array
 from ...fem.beams import BeamShaft, Disc, ReducedShaft, Station, reduce_shaft
 from .driveline import spring_places
 from .elements import Gyration, Rotor, ShaftBody, gear_masses
-from .gear_train import GearTrain, Shaft
+from .gear_train import Coupling, GearTrain, Machine, Shaft
 
 #: Gyroscopic couples below this part of the largest are left out. Whirl frequencies of a train with shafts of 20 mm
 #: then change by 4e-8 at 600 rad/s and by 1e-6 at 3000 rad/s; gyroscopic moments change them by 1e-4 and 2e-3.
@@ -170,7 +170,8 @@ def beam_shaft(train: GearTrain, shaft: Shaft) -> BeamShaft:
     for name, end in train.shaft_ends(shaft.name):
         if not end.machine:
             stations.append(Station(train.place(end), name, ("torsion",)))
-    for spring in (*train.machines, *train.couplings):
+    springs: list[Machine | Coupling] = [*train.machines, *train.couplings]
+    for spring in springs:
         for name, along in spring_places(train, spring):
             if name == shaft.name:
                 stations.append(Station(along, f"spring of {spring.name}", ("torsion",)))

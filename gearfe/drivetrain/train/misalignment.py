@@ -132,6 +132,9 @@ def static_state(model: TrainModel) -> Array | None:
         if force < 0.0 and len(line.flanks) == 2:  # the spring of the driving flanks acts along the other line
             driving, back = (modal.T.T @ row for row in line.columns[:2])
             K += line.mean * (np.outer(back, back) - np.outer(driving, driving))
+    if model.train.driven.torque is not None:  # held where it is driven, whatever the torque there
+        row = modal.T.T @ model.drive_row
+        K += float(modal.eigenvalues.max(initial=0.0)) / float(row @ row) * np.outer(row, row)
     squares, shapes = np.linalg.eigh(K)
     pushed = shapes.T @ push
     free = squares <= ROUND_OFF * max(float(squares.max(initial=0.0)), 1e-300)
