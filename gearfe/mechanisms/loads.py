@@ -64,11 +64,16 @@ class Formula:
             return math.nan
         return value if math.isfinite(value) else math.nan
 
+    @property
+    def described(self) -> str:
+        """Place in the file, and the expression, for messages."""
+        return f"{self.label} = {self.text!r}"
+
     def missing(self, t: float, known: Mapping[tuple[str, str | None], Any]) -> str:
         """Return why it has no value at a time (s) for known quantities, or an empty string."""
         if math.isfinite(self.at(known)):
             return ""
-        return f"{self.label} = {self.text!r} at {t:.6g} s: {without_value(self.node, known)}"
+        return f"{self.described} at {t:.6g} s: {without_value(self.node, known)}"
 
 
 def divides(node: Node) -> bool:
@@ -126,7 +131,7 @@ class ExpressionLoad(Formula, StateFunction):
     def pole(self, t: float, value: float) -> str:
         """Expression, time and value."""
         why = " (a division by zero)" if divides(self.node) else ""
-        return f"{self.label} = {self.text!r} at {t:.6g} s: grows beyond {value:.0e}{why}"
+        return f"{self.described} at {t:.6g} s: grows beyond {value:.0e}{why}"
 
     def write(self, bodies: BodyVariables) -> int:
         """Its register on a tape."""

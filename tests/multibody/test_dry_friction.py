@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from scipy.optimize import brentq
 from gearfe.base.typing import Array
 from gearfe.mechanisms import load_mechanism
 from gearfe.multibody import Body, Gravity, Hinge, Linkage, Moment, Status, System, Trajectory, integrate, polynomial
+from gearfe.multibody.core.stopped import short_steps
+from gearfe.multibody.core.trajectory import IntegrationError
 from gearfe.multibody.planar.linkage import BodyVariables, StateFunction
 from tests.places import GEOMETRY
 
@@ -210,3 +213,44 @@ def test_friction_on_elastic_mechanisms_comes_to_its_limit(tmp_path: Path, job: 
         motions.append(rubbed(folder, text, tolerance, body=body, moment=0.6, width=width).q)
     for width, motion in zip(widths[:2], motions[:2], strict=True):
         assert np.abs(motion - motions[2]).max() < 2.0 * tolerance + 0.2 * width
+
+
+@pytest.mark.parametrize("width", [1e-14, 1e-16, 1e-18, 1e-20, 1e-22])
+@pytest.mark.parametrize("widths_away", [0.1, 0.5, -5.0, 1e3])
+def test_friction_that_reverses_faster_than_time_resolves_is_named(
+    tmp_path: Path, width: float, widths_away: float
+) -> None:
+    """The moment M turns a node of the inertia I through the width w in the time I w/M: the decay where it sticks."""
+    moment, step = 40.0, 3e-16
+    (tmp_path / "arm.toml").write_text(ARM + FRICTION.format(body="arm", moment=moment, width=width), encoding="utf-8")
+    mechanism = load_mechanism(tmp_path / "arm.toml")
+    system, start = mechanism.system, mechanism.start()
+    root = system.coordinate_names().index("arm_angle_rad")
+    v, a = np.zeros((2, system.size))
+    inertia = system.mass[root, root]
+    v[root], a[root] = widths_away * width, -math.copysign(moment / inertia, widths_away)
+    cause = short_steps(system, start, 0.1, (start.q, v, a), step, 0.3)
+    assert cause.startswith(f"forces.friction.moment_N_m = '-40.0*tanh(rate(arm)/{width})' on arm ")
+    named = re.search(r" within (\S+) s; let it build up over (\S+) times the range of speeds", cause)
+    assert named is not None
+    takes, wider = float(named[1]), float(named[2])
+    assert 0.5 < takes / (inertia * width / moment) < 8.0
+    assert 10.0 * step < wider * takes < 1e5 * step
+
+
+@pytest.mark.parametrize(
+    ("text", "body", "moment", "width"),
+    [("arm", "arm", 40.0, 1e-12), ("arm", "arm", 40.0, 1e-22), ("elastic_slider_crank", "rod", 0.6, 1e-14),
+     ("elastic_slider_crank", "rod", 0.6, 1e-18), ("elastic_slider_crank", "rod", 0.6, 1e-22)],
+)  # fmt: skip
+def test_a_run_that_stops_for_friction_says_how_to_change_it(
+    tmp_path: Path, text: str, body: str, moment: float, width: float
+) -> None:
+    job = ARM if text == "arm" else (GEOMETRY / f"{text}.toml").read_text(encoding="utf-8")
+    with pytest.raises(IntegrationError) as stopped:
+        rubbed(tmp_path, job, body=body, moment=moment, width=width)
+    cause = str(stopped.value)
+    assert f"forces.friction.moment_N_m = '-{moment}*tanh(rate({body})/{width})' on {body} " in cause
+    wider = re.search(r"let it build up over (\S+) times the range of speeds", cause)
+    assert wider is not None
+    assert rubbed(tmp_path, job, body=body, moment=moment, width=float(wider[1]) * width).status is Status.DONE

@@ -25,6 +25,7 @@ from gearfe.multibody import (
 from gearfe.multibody.core.inverse import prescribed_motion
 from gearfe.multibody.core.start import consistent_start
 from gearfe.multibody.core.steps import ENDLESS, Pace, Status
+from gearfe.multibody.core.stopped import _steepest
 from gearfe.multibody.planar.assembly import label_of
 from gearfe.multibody.planar.couplings import GearRatio
 
@@ -177,3 +178,19 @@ def test_a_steady_pace_beyond_the_steps_allowed_stops_early(needed: float, stops
     seen = [n for n in range(64, 500_000, 64) if pace.hopeless(n / (needed * 1e6), n)]
     assert bool(seen) is stops
     assert not stops or seen[0] < 20_000
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-6, 1e-10])
+@pytest.mark.parametrize("place", [-7.0, 0.0, 0.3])
+def test_the_steep_part_of_a_load_is_found(width: float, place: float) -> None:
+    """tanh makes 96 % of its change within two widths on either side, 76 % within one."""
+    low, high = _steepest(lambda x: math.tanh((x - place) / width), -10.0, 10.0)
+    assert low < place < high
+    assert 1.0 * width < high - low < 6.0 * width
+
+
+def test_a_jump_is_found_to_rounding_and_a_line_is_left_whole() -> None:
+    low, high = _steepest(lambda x: 1.0 if x > 0.3 else -1.0, 0.0, 1.0)
+    assert low <= 0.3 <= high
+    assert high - low < 1e-15
+    assert _steepest(lambda x: 2.0 * x, -1.0, 4.0) == (-1.0, 4.0)

@@ -56,7 +56,8 @@ local
     that are angles), ``planar_bodies`` (names of bodies with the coordinates x, y, angle, in order), ``gap_text``.
     Absent: numbers.
 19. ``load_problem``, ``load_pole``, ``pole_between``: which force has no value, or grows beyond all bounds, at given
-    states. Integrators ask after a step has failed. Absent: empty strings.
+    states. Integrators ask after a step has failed. Absent: empty strings. ``load_values``: names and values of loads
+    that depend on the state; the cause of a stopped run is sought among them. Absent: no loads.
 
 An element has no state of its own that changes during a run: integrators call it at trial points in any order.
 """
@@ -141,6 +142,10 @@ class Element:
     def pole_between(self, before: tuple[float, Array, Array], after: tuple[float, Array, Array]) -> str:  # noqa: ARG002
         """Which of its forces has a pole between two states (t, q, v), or an empty string."""
         return ""
+
+    def load_values(self, t: float, q: Array, v: Array) -> list[tuple[str, float]]:  # noqa: ARG002
+        """Loads that depend on the state, named with the bodies that they act on, and their values (N, N m)."""
+        return []
 
 
 @dataclass(frozen=True, eq=False)

@@ -198,6 +198,10 @@ class System:
                 return pole
         return ""
 
+    def load_values(self, t: float, q: Array, v: Array) -> list[tuple[str, float]]:
+        """Return the loads that depend on the state, with the bodies that they act on, and their values (N, N m)."""
+        return [load for element, index in self.forces for load in element.load_values(t, q[index], v[index])]
+
     @cached_property
     def pieced(self) -> bool:
         """Whether forces may have kinks."""

@@ -19,7 +19,7 @@ from ..core.elimination import is_linear, modal_coordinates
 from ..core.mass_regularisation import loose_link
 from ..core.modes import fastest_rate, rates
 from ..core.start import Start, consistent_start
-from ..core.steps import Pace, Status
+from ..core.steps import ROUNDING, Pace, Status
 from ..core.stopped import locked, short_steps
 from ..core.system import System
 from ..core.trajectory import IntegrationError, Trajectory
@@ -123,22 +123,33 @@ def integrate(
     kept = output_times if status is Status.DONE else output_times[sign * output_times <= reached]
     if status is Status.DONE and not _dropped_rows_hold(system, start, dense, tolerance):
         status = Status.REDUNDANT_NOT_MET
-    if status in UNFINISHED and len(dense.times) > 1:
-        last = dense.times[-6:]  # the very last ones may be beyond all numbers
-        end, (q, v, a) = float(last[-1]), (dense(last[-1:], k)[0] for k in range(3))
-        ahead = float(output_times[-1]) - start.time
-        if problem := statistics.get("load_problem") or load_problem_ahead(system, end, (q, v, a), ahead):
-            statistics = {**statistics, "load_problem": problem}
-        elif link := loose_link(system, last, dense(last, 0), dense(last, 1), start.active, start.added_mass):
-            statistics = {**statistics, "loose_link": link}
-        elif why := locked(system, end, q, start.active):
-            statistics = {**statistics, "locked": why}
-        elif cause := short_steps(system, start, end, q, v, float(np.abs(np.diff(last)).mean())):
-            statistics = {**statistics, "short_steps": cause}
+    if status in UNFINISHED:
+        cause = _cause(system, start, dense, float(output_times[-1]), statistics.get("load_problem", ""))
+        statistics = {**statistics, **cause}
     made = Trajectory(system, start, kept, status, chosen, statistics, dense)
     if raise_on_failure and made.status is not Status.DONE:
         raise IntegrationError(made, made.message, made.reached, float(output_times[-1]))
     return made
+
+
+def _cause(system: System, start: Start, dense: Dense, goal: float, load_problem: str) -> dict[str, str]:
+    """Why a run stopped before its goal (s): one entry for the statistics, or none where no cause is known."""
+    span, last = goal - start.time, dense.times[-6:]  # the very last ones may be beyond all numbers
+    if len(last) > 1:
+        end, step = float(last[-1]), float(np.abs(np.diff(last)).mean())
+        (q, v, a), states = (dense(last[-1:], k)[0] for k in range(3)), (dense(last, 0), dense(last, 1))
+    else:  # no step was completed
+        end, q, v = start.time, start.q, start.v
+        step, states = ROUNDING * max(abs(end), abs(span)), (q[None], v[None])
+        a = system.acceleration(end, q, v, start.active, start.added_mass)[0]
+    if problem := load_problem or load_problem_ahead(system, end, (q, v, a), span):
+        return {"load_problem": problem}
+    if link := loose_link(system, last, *states, start.active, start.added_mass):
+        return {"loose_link": link}
+    if why := locked(system, end, q, start.active):
+        return {"locked": why}
+    why = short_steps(system, start, end, (q, v, a), step, abs(span))
+    return {"short_steps": why} if why else {}
 
 
 def _dropped_rows_hold(system: System, start: Start, dense: Dense, tolerance: float) -> bool:

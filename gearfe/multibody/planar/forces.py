@@ -38,6 +38,11 @@ class StateFunction(ABC):
     def value(self, t: float, q: Array, v: Array) -> float:
         """f at a state, for messages."""
 
+    @property
+    def described(self) -> str:
+        """The load in messages."""
+        return "a load"
+
     def problem(self, t: float, q: Array, v: Array) -> str:
         """Return why it has no value at a state, or an empty string."""
         return "" if math.isfinite(self.value(t, q, v)) else f"a load has no value at {t:.6g} s"
@@ -57,6 +62,11 @@ class SpanFunction(ABC):
     @abstractmethod
     def value(self, t: float, length: float, rate: float) -> float:
         """T (N), positive where it pulls, for messages."""
+
+    @property
+    def described(self) -> str:
+        """The tension in messages."""
+        return "a tension"
 
     def problem(self, t: float, length: float, rate: float) -> str:
         """Return why it has no value, or an empty string."""

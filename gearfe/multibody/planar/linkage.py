@@ -6,6 +6,7 @@ quadratic and vectors have affine components; the tension T along a span D pulls
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
 from typing import NamedTuple
 
@@ -262,6 +263,26 @@ class Linkage(TapeElement):
         sizes = [(abs(load.value(t, q, v)), load) for _, load in self.assembly.state_loads]
         size, largest = max(sizes, key=lambda pair: pair[0], default=(0.0, None))
         return "" if largest is None or not size > POLE else largest.pole(t, size)
+
+    def load_values(self, t: float, q: Array, v: Array) -> list[tuple[str, float]]:
+        """Return loads and laws of springs with the bodies that they act on, and their values (N, N m)."""
+        along, springs = self.assembly.along, self.assembly.springs
+        values = [
+            (self._on(load.described, along[k].form.bodies), load.value(t, q, v))
+            for k, load in self.assembly.state_loads
+        ]
+        if self.assembly.tension_laws:
+            lengths, rates = self._lengths(self.values.registers(t, q, v))
+            values += [
+                (self._on(law.described, springs[k][1].vector.ends), law.value(t, float(lengths[k]), float(rates[k])))
+                for k, law in self.assembly.tension_laws
+            ]
+        return values
+
+    def _on(self, load: str, numbers: Iterable[int]) -> str:
+        """A load and the names of the bodies with these numbers, that of the ground left out."""
+        names = [self.bodies[number].name for number in numbers if number < len(self.bodies)]
+        return f"{load} on {' and '.join(names)}"
 
     def pole_between(self, before: tuple[float, Array, Array], after: tuple[float, Array, Array]) -> str:
         """Return which load leaves a smooth piece at a pole between two states (t, q, v), or an empty string."""
