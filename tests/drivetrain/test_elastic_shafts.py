@@ -13,6 +13,7 @@ import pytest
 
 from gearfe.base.errors import InputError
 from gearfe.drivetrain.gearbox.fields import moved, solids
+from gearfe.drivetrain.modes.whirl import train_modes
 from gearfe.drivetrain.runup.run_up import run_up
 from gearfe.drivetrain.train import (
     Bearing,
@@ -20,6 +21,7 @@ from gearfe.drivetrain.train import (
     Drive,
     GearTrain,
     Load,
+    Shaft,
     ShaftGear,
     TrainModel,
     build_train,
@@ -27,8 +29,10 @@ from gearfe.drivetrain.train import (
     simulate,
 )
 from gearfe.drivetrain.train.elements import rotor
+from gearfe.drivetrain.train.gear_train import HIGHEST_HZ
 from gearfe.drivetrain.train.misalignment import misalignments, static_state
 from gearfe.fem.beams import Section, full_shaft
+from gearfe.fem.beams.whirl import Support, whirl_frequencies
 from gearfe.multibody import constant
 from tests.makers.trains import SHIPPED, base_radius, curve, elastic, gear, loaded, train
 
@@ -241,20 +245,35 @@ def test_the_run_up_meets_the_transient() -> None:
     assert columns["peak_to_peak_force_1_N"][0] == pytest.approx(np.ptp(force), rel=2e-3)
 
 
-def test_whirl_of_a_disc_between_bearings() -> None:
-    """Couples that are kept make the gyroscopic moments: a rigid disc's J_p against all of the beams'."""
-    model = build_train(with_sections(loaded([(20, 30)], 1e8), section()))
-    for body in model.shafts:
-        assert isinstance(body, elastic_shaft.ElasticShaft)
-        whole = body.reduced.gyroscopic_matrix()
-        kept = sum(
-            couple.polar * (np.outer(couple.tilt, couple.other) - np.outer(couple.other, couple.tilt))
-            for couple in body.gyrations()
-        )
-        scale = np.sqrt(body.reduced.stiffness_diagonal + (2e4 * math.pi) ** 2 * body.reduced.mass_diagonal)
-        part = np.abs((whole - kept) / np.outer(scale, scale)).max()
-        assert part < 1.1 * elastic_shaft.LEAST_GYRATION * np.abs(whole / np.outer(scale, scale)).max()
-        assert len(body.gyrations()) < len(body.reduced.gyroscopic)
+@pytest.mark.parametrize(("highest_hz", "digits"), [(40e3, 1e-6), (HIGHEST_HZ, 1e-5)])
+def test_whirl_of_an_overhung_gear_at_five_speeds(highest_hz: float, digits: float) -> None:
+    """A train of one shaft against the beams on springs with all coordinates: frequencies, senses and energies."""
+    radial, wide, ends = 5e7, gear(60, 0.02), (-0.05, 0.03)
+    sections = (section(0.12, 0.024), section(0.08, 0.02))
+    shaft = Shaft("rotor", (0.0, 0.0, 0.0), 0.2, 0.012, ("one", "two"), sections=sections, highest_hz=highest_hz)
+    single = GearTrain(
+        (shaft,), (ShaftGear("disc", "rotor", 0.085, wide),), (), Drive("rotor", "one", constant(100.0)),
+        rigid_bores={name: (0.0, y, 0.0) for name, y in zip(shaft.bores, ends, strict=True)},
+    )  # fmt: skip
+    model = build_train(on_bearings(single, radial=radial))
+    speeds = np.array([0.0, 250.0, 500.0, 1000.0, 2000.0])
+    modes = train_modes(model, speeds, 6000.0)
+    bending = np.flatnonzero(modes.share("bending")[0] > 0.5)
+    supports = [Support(y, radial) for y in ends]
+    expected = whirl_frequencies(
+        elastic_shaft.beam_shaft(model.train, shaft), supports, speeds, 6500.0, tolerance=1e-11
+    )
+    for row, frequencies in enumerate(expected):
+        found = modes.frequency[row, bending] * (np.sign(modes.whirl[row, bending, 0]) if speeds[row] else 1.0)
+        order = np.argsort(np.abs(found))
+        near = frequencies[: len(bending)] if speeds[row] else np.abs(frequencies[: len(bending)])
+        assert np.sort(np.abs(found)) == pytest.approx(np.sort(np.abs(near)), rel=digits)
+        if speeds[row]:
+            assert (np.sign(found[order]) == np.sign(near)).all()
+            assert np.abs(modes.whirl[row, bending, 0]) == pytest.approx(1.0, abs=1e-3)
+    others = np.setdiff1d(np.arange(modes.frequency.shape[1]), bending)
+    assert (modes.share("axial")[0, others] + modes.share("torsion")[0, others]) == pytest.approx(1.0, abs=1e-6)
+    assert modes.shares.sum(axis=2) == pytest.approx(1.0)
 
 
 def test_rigid_trains_load_no_beams() -> None:
@@ -269,26 +288,26 @@ def bent(**changes: Any) -> GearTrain:
     return with_sections(train([(20, 30)]), section(), **changes)
 
 
-def shaft(gear_train: GearTrain, **changes: Any) -> GearTrain:
+def first_changed(gear_train: GearTrain, **changes: Any) -> GearTrain:
     """The train with the keys of its first shaft changed."""
     first, *others = gear_train.shafts
     return dataclasses.replace(gear_train, shafts=(dataclasses.replace(first, **changes), *others))
 
 
 MISTAKES: dict[str, tuple[GearTrain, str, str]] = {
-    "length": (shaft(bent(), length=0.1), "shaft 's0' length", "0.09 m"),
-    "radius": (shaft(bent(), radius=0.02), "shaft 's0' radius", "0.01 m"),
-    "mass": (shaft(bent(), mass=1.0), "shaft 's0' mass", "leave one out"),
-    "damping": (shaft(bent(), damping_ratio=1.0), "shaft 's0' damping ratio", "< 1"),
-    "negative": (shaft(bent(), sections=(section(diameter=-0.02),)), "section 1 outer_start", "> 0"),
-    "bore": (shaft(bent(), sections=(section(bore=0.03),)), "section 1 inner_start", "smaller bore"),
+    "length": (first_changed(bent(), length=0.1), "shaft 's0' length", "0.09 m"),
+    "radius": (first_changed(bent(), radius=0.02), "shaft 's0' radius", "0.01 m"),
+    "mass": (first_changed(bent(), mass=1.0), "shaft 's0' mass", "leave one out"),
+    "damping": (first_changed(bent(), damping_ratio=1.0), "shaft 's0' damping ratio", "< 1"),
+    "negative": (first_changed(bent(), sections=(section(diameter=-0.02),)), "section 1 outer_start", "> 0"),
+    "bore": (first_changed(bent(), sections=(section(bore=0.03),)), "section 1 inner_start", "smaller bore"),
     "root": (
-        shaft(bent(), sections=(section(0.045), section(0.045, 0.044)), radius=0.022),
+        first_changed(bent(), sections=(section(0.045), section(0.045, 0.044)), radius=0.022),
         "shaft 's0'",
         "root radius",
     ),
     "gear off": (
-        shaft(bent(), sections=(section(0.02),), length=0.02, bores=("s0+",)),
+        first_changed(bent(), sections=(section(0.02),), length=0.02, bores=("s0+",)),
         "attachment 's0+'",
         "from -10 to 10 mm",
     ),

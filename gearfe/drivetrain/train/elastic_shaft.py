@@ -25,9 +25,10 @@ from .driveline import spring_places
 from .elements import Gyration, Rotor, ShaftBody, gear_masses
 from .gear_train import Coupling, GearTrain, Machine, Shaft
 
-#: Gyroscopic couples below this part of the largest are left out. Whirl frequencies of a train with shafts of 20 mm
-#: then change by 4e-8 at 600 rad/s and by 1e-6 at 3000 rad/s; gyroscopic moments change them by 1e-4 and 2e-3.
-LEAST_GYRATION = 1e-2
+#: Gyroscopic couples below this part of the largest are left out, as they count at this part of the highest frequency.
+#: Whirl frequencies of a train with shafts of 20 mm then change by 2e-8 at 600 rad/s and by 5e-7 at 3000 rad/s, and
+#: those of a rotor with an overhung gear by 5e-7 at 500 rad/s and by 4e-6 at 4000 rad/s.
+LEAST_GYRATION, COUNTED_AT = 1e-4, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,14 +106,16 @@ class ElasticShaft(ShaftBody):
     def gyrations(self) -> tuple[Gyration, ...]:
         r"""Gyroscopic couples that matter, the largest first.
 
-        Moments :math:`\Omega\omega\,\Gamma` count against the dynamic stiffness :math:`\omega_i^2 + \omega_h^2` (times
-        the mass) of each coordinate, :math:`\omega_h` the highest frequency: residual coordinates, stiff as they are,
-        turn by next to nothing. In these units couples below `LEAST_GYRATION` of the largest are left out.
+        Moments :math:`\Omega\omega\,\Gamma` count against the dynamic stiffness :math:`\omega_i^2 + \omega_c^2` (times
+        the mass) of each coordinate, :math:`\omega_c` a tenth of the highest frequency: residual coordinates, stiff as
+        they are, turn by next to nothing. In these units couples below `LEAST_GYRATION` of the largest are left out.
         """
         reduced, pairs = self.reduced, self.reduced.gyroscopic
         root = np.sqrt([[pair.inertia] for pair in pairs])
         first, second = (root * np.array([getattr(pair, name) for pair in pairs]) for name in ("first", "second"))
-        stiffness = reduced.stiffness_diagonal + (2.0 * math.pi * self.highest_hz) ** 2 * reduced.mass_diagonal
+        stiffness = (
+            reduced.stiffness_diagonal + (2.0 * math.pi * COUNTED_AT * self.highest_hz) ** 2 * reduced.mass_diagonal
+        )
         mixed, sizes, _ = np.linalg.svd(second / np.sqrt(stiffness), full_matrices=False)
         kept = sizes**2 >= LEAST_GYRATION * sizes[0] ** 2
         over = mixed.T[kept] / sizes[kept, None]
