@@ -19,19 +19,8 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .drivetrain.housing.model import Housing
     from .drivetrain.modes.whirl import train_modes
     from .drivetrain.runup.run_up import run_up, steady_state
-    from .drivetrain.train import TrainModel, TrainResponse, build_train
-    from .drivetrain.train.gear_train import (
-        Bearing,
-        Coupling,
-        Damping,
-        Drive,
-        GearMesh,
-        GearTrain,
-        Load,
-        Machine,
-        Shaft,
-        ShaftGear,
-    )
+    from .drivetrain.train import Coupling, Machine, TrainModel, TrainResponse, build_train
+    from .drivetrain.train.gear_train import Bearing, Damping, Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
     from .drivetrain.train.simulate import simulate
     from .fem.plane import Material
     from .fem.reduction.modal_body import ModalBody

@@ -24,7 +24,17 @@ from tests.places import DOCS, GEOMETRY, ROOT
 
 PAGES = sorted([*DOCS.rglob("*.md"), ROOT / "README.md"])
 #: Pages whose Python runs, block by block.
-RUN = ("beams.md", "campbell.md", "check.md", "exchange.md", "fields.md", "housing.md", "howto.md", "loadmap.md")
+RUN = (
+    "beams.md",
+    "bearings.md",
+    "campbell.md",
+    "check.md",
+    "exchange.md",
+    "fields.md",
+    "housing.md",
+    "howto.md",
+    "loadmap.md",
+)
 RUN += ("mesh_law.md", "mechanisms.md", "microgeometry.md", "runup.md", "start.md")
 #: What pages and the jobs that they name do in a minute: fewer cases, rounds and positions here.
 SHORTER = {
