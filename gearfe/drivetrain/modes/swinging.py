@@ -72,7 +72,15 @@ def swinging(
 
 
 def write_modes(folder: Path, model: TrainModel, modes: WhirlModes, numbers: Sequence[int], speed: float) -> None:
-    """Write ``mode_gears.vtkhdf`` and, of an elastic housing, ``mode_housing.vtkhdf``; see `swinging`."""
+    """Write ``mode_gears.vtkhdf`` and, of an elastic housing, ``mode_housing.vtkhdf``.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the files.
+    model, modes, numbers, speed
+        See `swinging`.
+    """
     made = swinging(model, modes, numbers, speed)
     steps = np.arange(len(made.time))
     write_gears(folder / "mode_gears.vtkhdf", model.train, made, steps)
