@@ -31,7 +31,7 @@ from gearfe.drivetrain.train import (
 from gearfe.drivetrain.train.elements import rotor
 from gearfe.drivetrain.train.gear_train import HIGHEST_HZ
 from gearfe.drivetrain.train.misalignment import misalignments, static_state
-from gearfe.fem.beams import Section, full_shaft
+from gearfe.fem.beams import LOADS, Section, full_shaft
 from gearfe.fem.beams.whirl import Support, whirl_frequencies
 from gearfe.multibody import constant
 from tests.makers.trains import SHIPPED, base_radius, curve, elastic, gear, loaded, train
@@ -81,6 +81,51 @@ def test_frequencies_are_those_of_the_unreduced_beams(monkeypatch: pytest.Monkey
     assert first_frequencies(reduced, 15) == pytest.approx(first_frequencies(whole, 15), rel=1e-4)
     stiff = build_train(elastic(train(SHIPPED), uneven=0.2, skew=0.5))
     assert (first_frequencies(reduced, 15) < first_frequencies(stiff, 15)).all()
+
+
+def test_shafts_keep_the_loads_that_act(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spur gears and bearings without tilt stiffness: first 15 to 1e-4.
+
+    Tilts that nothing loads would raise the highest frequency, and with it the number of steps.
+    """
+    bent = with_sections(on_bearings(elastic(train(SHIPPED), uneven=0.2, skew=0.5), radial=1e9), section())
+    reduced = build_train(bent)
+    with monkeypatch.context() as patched:
+        for name in ("_gear_loads", "_bore_loads"):
+            patched.setattr(elastic_shaft, name, lambda *_: LOADS)
+        loaded_all = build_train(bent)
+    elastic_shaft.reduced_shaft.cache_clear()
+    monkeypatch.setattr(
+        elastic_shaft,
+        "reduce_shaft",
+        lambda shaft, frame, _, elements: full_shaft(shaft, frame, 40e3, elements=elements),
+    )
+    whole = build_train(bent)
+    elastic_shaft.reduced_shaft.cache_clear()
+    assert first_frequencies(reduced, 15) == pytest.approx(first_frequencies(whole, 15), rel=1e-4)
+    assert reduced.coupled_frequencies_hz[-1] < 0.7 * loaded_all.coupled_frequencies_hz[-1]
+    assert reduced.system.size < loaded_all.system.size
+
+
+def test_loads_of_gears_and_bores_follow_from_what_acts_there() -> None:
+    """Tilt: of helical gears, of faces that do not share their middle, of hinges and of bearings that hold it."""
+    spur = with_sections(train([(20, 30)], ys=[PLACE]), section())
+
+    def loads(gear_train: GearTrain) -> dict[str, tuple[str, ...]]:
+        stations = elastic_shaft.beam_shaft(gear_train, gear_train.shafts[0]).stations
+        return {station.name: station.loads for station in stations}
+
+    assert loads(spur)["gear d0"] == ("radial", "torsion")
+    assert loads(spur)["attachment s0+"] == ("radial", "tilt", "axial")
+    moved = tuple(dataclasses.replace(g, along=g.along + 0.002 * (g.name == "g0")) for g in spur.gears)
+    assert loads(dataclasses.replace(spur, gears=moved))["gear d0"] == ("radial", "tilt", "torsion")
+    for stiffness, expected in (
+        ((1e8, 0.0, 1e8, 0.0, 0.0), ("radial",)),
+        ((1e8, 1e8, 1e8, 0.0, 0.0), ("radial", "axial")),
+        ((1e8, 1e8, 1e8, 1e4, 0.0), ("radial", "tilt", "axial")),
+    ):
+        held = dataclasses.replace(spur, bearings=(Bearing("s0+", stiffness),))
+        assert loads(held)["attachment s0+"] == expected
 
 
 def test_stiff_sections_make_the_rigid_shaft() -> None:

@@ -21,14 +21,18 @@ import numpy as np
 
 from ...base.typing import Array
 from ...fem.beams import BeamShaft, Disc, ReducedShaft, Station, reduce_shaft
+from ..bearings import BallBearing, RollerBearing
 from .driveline import spring_places
 from .elements import Gyration, Rotor, ShaftBody, gear_masses
-from .gear_train import Coupling, GearTrain, Machine, Shaft
+from .gear_train import Coupling, GearTrain, Machine, Shaft, ShaftGear
 
 #: Gyroscopic couples below this part of the largest are left out, as they count at this part of the highest frequency.
 #: Whirl frequencies of a train with shafts of 20 mm then change by 2e-8 at 600 rad/s and by 5e-7 at 3000 rad/s, and
 #: those of a rotor with an overhung gear by 5e-7 at 500 rad/s and by 4e-6 at 4000 rad/s.
 LEAST_GYRATION, COUNTED_AT = 1e-4, 0.1
+
+#: Part of a face width by which the middles of two faces may differ and count as one.
+SAME_MIDDLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,11 +169,10 @@ def beam_shaft(train: GearTrain, shaft: Shaft) -> BeamShaft:
     for item in (gear for gear in train.gears if gear.shaft == shaft.name):
         mass, polar, transverse, along = gear_masses(item, shaft, middle)
         discs.append(Disc(along, mass, polar, transverse))
-        thrust = ("axial",) if item.gear.helix_angle else ()
-        stations.append(Station(along, f"gear {item.name}", ("radial", "tilt", "torsion", *thrust)))
+        stations.append(Station(along, f"gear {item.name}", _gear_loads(train, item)))
     for bore in shaft.bores:
         along = float(train.bore_points[bore] @ train.frame[2])
-        stations.append(Station(along, f"attachment {bore}", ("radial", "tilt", "axial")))
+        stations.append(Station(along, f"attachment {bore}", _bore_loads(train, bore)))
     for name, end in train.shaft_ends(shaft.name):
         if not end.machine:
             stations.append(Station(train.place(end), name, ("torsion",)))
@@ -179,6 +182,29 @@ def beam_shaft(train: GearTrain, shaft: Shaft) -> BeamShaft:
             if name == shaft.name:
                 stations.append(Station(along, f"spring of {spring.name}", ("torsion",)))
     return BeamShaft(middle - 0.5 * shaft.length, shaft.sections, tuple(discs), tuple(stations), f"shaft {shaft.name}")
+
+
+def _gear_loads(train: GearTrain, item: ShaftGear) -> tuple[str, ...]:
+    """Directions in which meshes load a shaft at a gear: each one costs coordinates and shorter steps."""
+    off = False
+    for mesh in (mesh for mesh in train.meshes if item.name in (mesh.driver, mesh.driven)):
+        both = [train.gear(name) for name in (mesh.driver, mesh.driven)]
+        low = max(gear.along - 0.5 * gear.gear.face_width for gear in both)
+        high = min(gear.along + 0.5 * gear.gear.face_width for gear in both)
+        # a mesh acts at the middle of the common width
+        off |= abs(0.5 * (low + high) - item.along) > SAME_MIDDLE * item.gear.face_width
+    if item.gear.helix_angle:
+        return "radial", "tilt", "torsion", "axial"
+    return ("radial", "tilt", "torsion") if off else ("radial", "torsion")
+
+
+def _bore_loads(train: GearTrain, bore: str) -> tuple[str, ...]:
+    """Directions in which a hinge or bearing loads a shaft; a rolling bearing may load all of them."""
+    bearing = next((b for b in train.bearings if b.bore == bore), None)
+    if bearing is None or isinstance(bearing.stiffness, BallBearing | RollerBearing):
+        return "radial", "tilt", "axial"
+    size = np.abs(bearing.stiffness_matrix) + np.abs(bearing.damping_matrix)
+    return ("radial", *(("tilt",) if size[:, 3:].any() else ()), *(("axial",) if size[:, 1].any() else ()))
 
 
 @lru_cache(maxsize=32)
