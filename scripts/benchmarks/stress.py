@@ -2,7 +2,7 @@
 """Random campaigns that look for crashes, hangs and wrong results: docs/development/campaigns.md.
 
 Usage:
-    python scripts/benchmarks/stress.py [gears|laws|mesh_laws|mechanisms|trains|files|estimates|all] [--seed N] ...
+    python scripts/benchmarks/stress.py [gears|laws|mesh_laws|width|mechanisms|trains|files|estimates|all] [--seed N]
 """
 
 from __future__ import annotations

@@ -30,6 +30,7 @@ CAMPAIGNS: dict[str, str] = {
     "gears": "gears",
     "laws": "laws",
     "mesh_laws": "mesh_laws",
+    "width": "width",
     "mechanisms": "mechanisms",
     "trains": "trains",
     "files": "files",

@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "campaign",
         nargs="?",
         default="all",
-        help="gears, laws, mesh_laws, mechanisms, trains, files, estimates or all (default)",
+        help="gears, laws, mesh_laws, width, mechanisms, trains, files, estimates or all (default)",
     )
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the random cases (default: 1)")
     parser.add_argument("--out", metavar="DIR", default=None, help="results folder (default: out/stress)")

@@ -8,6 +8,7 @@ from functools import lru_cache
 from gearfe import Gear
 from gearfe.gears.geometry.mesh_geometry import MeshGeometry
 from gearfe.gears.width import ContactLines, WideMesh, contact_lines, wide_compliance
+from gearfe.gears.width.lines import POINTS_PER_FUNCTION
 
 from .gears import pair as gear_pair
 
@@ -35,6 +36,8 @@ def helical_lines(hand: float = 1.0, *, swapped: bool = False) -> ContactLines:
 
 
 @lru_cache(maxsize=8)
-def spur_lines(*, whole: bool = True, functions: int | None = None, density: float = 1.5) -> ContactLines:
+def spur_lines(
+    *, whole: bool = True, functions: int | None = None, density: float = POINTS_PER_FUNCTION
+) -> ContactLines:
     compliance = wide_compliance(WideMesh(SPUR, functions=functions), whole=whole)
     return contact_lines(compliance, density=density)

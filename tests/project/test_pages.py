@@ -30,6 +30,7 @@ RUN = (
     "campbell.md",
     "check.md",
     "exchange.md",
+    "face_width.md",
     "fields.md",
     "housing.md",
     "howto.md",

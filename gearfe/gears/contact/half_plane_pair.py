@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...base.typing import Array, ComplexArray, IntArray
 from ..geometry.face import NOMINAL, FlankTables, ToothDeviations, flank_tables
 from ..geometry.first_contact import FirstContacts, ToothFlanks
-from ..geometry.pair import GearPair
+from ..geometry.mesh_geometry import MeshGeometry
 from .compliance import MeshingPair
 from .flank_compliance import FlankCompliance, Shapes, corner_of, flank_compliance, shapes_of
 from .panels import Couplings, log_integral
@@ -56,7 +56,7 @@ class HalfPlanePair:
         Width of the contact (m).
     """
 
-    pair: GearPair
+    pair: MeshGeometry
     teeth: ToothFlanks
     sides: tuple[FlankCompliance, FlankCompliance]
     width: float

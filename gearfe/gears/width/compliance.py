@@ -17,7 +17,7 @@ where :math:`\cos\beta_b` makes the half-plane that of the normal section. In th
 that of a half-space under a line load that varies as the first function that is left out, with the wave number
 :math:`q = \pi n/b`: its surface moves by :math:`\tfrac{2}{\pi E'} K_0(q r)`, which near the load is
 :math:`-\tfrac{2}{\pi E'} \ln(r/l)` with :math:`l = 2 e^{-\gamma}/q` (K. L. Johnson, Contact Mechanics, 1985, eq. 3.19,
-integrated along the line).
+integrated along the line), and half a module at least.
 
 The finite elements are those of one tooth sector (`gearfe.fem.extruded`), factorised down to its two cut sides; cyclic
 symmetry makes the gear, as in `gearfe.gears.contact.compliance`. Loads go forward through the fronts, so no node of the
@@ -55,6 +55,9 @@ NO_ELEMENT = 0.1
 HIGHER = 2
 #: Polynomial order of the elements beyond the common width, and one more for each so many modules, up to that on it.
 BEYOND_ORDER, BEYOND_MODULES = 3, 1.0
+#: Least l in the logarithms (modules): the half-plane of a contact has to yield more under more load, so that l is
+#: longer than half of any contact's half width.
+LEAST_LENGTH = 0.5
 #: Mesh cycles beyond both ends of the path of contact within which tips may bear.
 TIPS = 0.7
 
@@ -189,26 +192,27 @@ def _wide_flank(mesh: WideMesh, gear: int, sector: SectorMesh, whole: bool) -> W
             fixed=bore if whole else np.union1d(bore, sides),
         )
         plane, axial = functions
-        over = [None if one is None else _over_width(mesh, one)[chosen] for one in functions]
+        over = _over_width(mesh, plane)[chosen]
         x, y = sector.points[flank.nodes].T
         count = plane.count
-        loads = np.zeros((len(flank.nodes), 2 * count + (0 if axial is None else axial.count), k, 2, len(over[0])))
+        loads = np.zeros((len(flank.nodes), 2 * count + (0 if axial is None else axial.count), k, 2, len(over)))
         for axis in (0, 1):
-            loads[:, axis * count : (axis + 1) * count, :, axis] = np.einsum("in,bp->npib", nodal, over[0])
-            if over[1] is not None and turn:
+            loads[:, axis * count : (axis + 1) * count, :, axis] = np.einsum("in,bp->npib", nodal, over)
+            if axial is not None and turn:
                 arm = turn * (y, -x)[axis]
-                loads[:, 2 * count :, :, axis] = np.einsum("in,n,bp->npib", nodal, arm, over[1])
+                along = _over_width(mesh, axial)[chosen]
+                loads[:, 2 * count :, :, axis] = np.einsum("in,n,bp->npib", nodal, arm, along)
         unknowns = unknowns_of(flank.nodes, loads.shape[1])
         eliminated, at_sides = factor.reduced_loads(unknowns, loads.reshape(len(unknowns), -1))
         of_steps = np.zeros((steps + 1, eliminated.shape[1], eliminated.shape[1]))
         if whole:
             of_steps = _cyclic(factor.schur, at_sides, (2 * count, loads.shape[1]), section.teeth, steps)
         of_steps[0] += eliminated.T @ eliminated
-        shape = k, 2, len(over[0])
+        shape = k, 2, len(over)
         influence[:, :, :, chosen, :, :, chosen] = of_steps.reshape(-1, *shape, *shape)
     inverse = material.contact_compliance("strain") / math.cos(mesh.base_helix_angle)
     corner, wedge = corner_of(face)
-    length = 2 * math.exp(-np.euler_gamma) * mesh.width / (math.pi * n)
+    length = max(2 * math.exp(-np.euler_gamma) * mesh.width / (math.pi * n), LEAST_LENGTH * mesh.module)
     bare = FlankCompliance(face, inverse, corner, wedge, stations, bumps, {})
     every = np.kron(np.ones((k, k)), 2 / math.pi * np.eye(2) + wedge)
     bracket = inverse * (local_bracket(bare) - math.log(length) * every)

@@ -25,31 +25,41 @@ another program bear out within 3 % of the load in the last 0.4 mm (docs/face_wi
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
 from ...base.typing import Array, BoolArray, IntArray
+from ..geometry.validity import MOST_YIELD
 from .compliance import WideCompliance, legendre
 from .flanks import WideFlanks
 from .pair_law import PairLaw, pair_law
 
 #: Gauss points of a line over the whole width for each function of the load, by the root of its share of the width;
 #: the least for a stretch, and those of a stretch beyond the path of contact.
-POINTS_PER_FUNCTION, LEAST_POINTS, TIP_POINTS = 1.5, 4, 4
+POINTS_PER_FUNCTION, LEAST_POINTS, TIP_POINTS = 2.0, 4, 6
 #: What the twist is more that points are placed at, beyond which they do not reach.
 MARGIN = 1.05
-#: Relative change of the twist that ends the placing of points, and how often they are placed.
-PLACED, PLACINGS = 2e-3, 8
+#: Relative change of the twist that ends the placing of points, how often they are placed, and how often their reach
+#: may become less from one placing to the next.
+PLACED, PLACINGS, FREE_PLACINGS = 1e-2, 12, 4
+#: Steps in which any number of points may lose their load or be let in. That converges in a few steps or runs in a
+#: circle; afterwards one does at a time, along the way of the convex problem of the moments, which has no circles.
+QUICK_STEPS = 15
+#: Change of the moments in parts of their sum in a whole step, below which another point is let in.
+ONE_BY_ONE = 1e-3
 #: Newton steps, change of the moments in parts of their sum in the last one, and the overlap (m) of a point that
 #: carries nothing that is none.
-STEPS, SETTLED, CLOSED = 80, 1e-9, 1e-12
+STEPS, SETTLED, CLOSED = 300, 1e-9, 1e-12
 #: Mesh stiffness per width in units of E' with which the search for a twist starts: c' of ISO 6336-1, 14 N/(mm um).
 USUAL_STIFFNESS = 0.06
 #: Distance from an end, in half widths of a bump, that is none.
 AT_END = 0.3
+#: Least derivative of c in parts of c/M under the lightest load, so that no contact yields less under more load.
+STIFFEST = 0.05
 #: Places on a line at which its gap is looked at.
 LOOKS = 33
 
@@ -75,6 +85,12 @@ class ContactLines:
         mesh = self.compliance.mesh
         modulus = 2 / sum(side.local.inverse_modulus for side in self.compliance.sides)
         return USUAL_STIFFNESS * modulus * mesh.width * mesh.sections.wheel.base_radius**2
+
+    @property
+    def most_torque(self) -> float:
+        """Torque at the wheel (N m) under which the teeth yield by `MOST_YIELD` modules."""
+        mesh = self.compliance.mesh
+        return MOST_YIELD * mesh.module * self.usual_stiffness / mesh.sections.wheel.base_radius
 
     def gap(self, z: Array, rows: Rows, pair: IntArray) -> Array:
         """Gap d (m) of tooth pairs at z (m), where `rows` has their place on the law's tables."""
@@ -130,12 +146,18 @@ def rows_at(law: PairLaw, angle: Array) -> Rows:
     i = np.clip(np.searchsorted(law.angle, angle, side="right") - 1, 0, len(law.angle) - 2)
     share = (angle - law.angle[i]) / (law.angle[i + 1] - law.angle[i])
 
-    def between(table: Array) -> Array:
-        weight = share.reshape(-1, *[1] * (table.ndim - 1))
-        return np.asarray(table[i] + weight * (table[i + 1] - table[i]))
-
-    names = ("touch", "arm", "normal", "point", "roll", "arc", "tooth_normal", "yields")
-    return Rows(**{name: between(getattr(law, name)) for name in names})
+    below = law.packed[i]
+    packed = below + share[:, None] * (law.packed[i + 1] - below)
+    return Rows(
+        touch=packed[:, 0],
+        arm=packed[:, 1],
+        normal=packed[:, 2] + 1j * packed[:, 3],
+        point=packed[:, 4] + 1j * packed[:, 5],
+        roll=packed[:, 6:8],
+        arc=packed[:, 8:10],
+        tooth_normal=packed[:, 10:14].reshape(-1, 2, 2),
+        yields=packed[:, 14:],
+    )
 
 
 @dataclass(frozen=True)
@@ -175,45 +197,73 @@ class Points:
         return np.asarray(np.gradient(self.rows.yields, axis=1))
 
 
-def place_points(lines: ContactLines, angle: float, twist: float) -> Points:
+@dataclass(frozen=True)
+class Looks:
+    """Where the lines of a pinion angle are closest: l lines that can meet.
+
+    Attributes
+    ----------
+    pair : ndarray, shape (l,)
+        Tooth pairs.
+    gap : ndarray, shape (l,)
+        Least of the gap d along each line, as a twist (rad).
+    least
+        Twist at which the rigid gears touch first (rad), infinite where they do not.
+    """
+
+    pair: IntArray
+    gap: Array
+    least: float
+
+
+def look_at(lines: ContactLines, angle: float) -> Looks:
+    """Look at the gaps along all lines that can meet at a pinion angle (rad)."""
+    mesh, law = lines.compliance.mesh, lines.law
+    rule, cycle = np.linspace(*mesh.zone, LOOKS), mesh.sections.mesh_cycle
+    first, *_, last = np.sort(angle + mesh.turns[0] * rule)
+    numbers = np.arange(math.ceil((law.angle[0] - last) / cycle), math.floor((law.angle[-1] - first) / cycle) + 1)
+    psi = angle + mesh.turns[0] * rule + cycle * numbers[:, None]
+    rows = rows_at(law, np.clip(psi.ravel(), law.angle[0], law.angle[-1]))
+    gap = lines.gap(np.tile(rule, len(numbers)), rows, np.repeat(numbers, LOOKS)) / rows.arm
+    outside = (psi < law.angle[0]) | (psi > law.angle[-1])
+    gap = np.where(outside, np.inf, gap.reshape(psi.shape))
+    least = float((gap + rows.touch.reshape(psi.shape)).min(initial=math.inf))
+    gaps = gap.min(axis=1, initial=math.inf)
+    return Looks(numbers[np.isfinite(gaps)], gaps[np.isfinite(gaps)], least)
+
+
+def place_points(lines: ContactLines, angle: float, twist: float, looks: Looks) -> Points:
     """Place points on all lines that may bear at a pinion angle and a twist of the wheel (rad)."""
     mesh, law = lines.compliance.mesh, lines.law
-    (low, high), cycle, turn = mesh.zone, mesh.sections.mesh_cycle, mesh.turns[0]
-    half = 0.5 * abs(turn) * mesh.width
-    middle = angle + 0.5 * turn * (low + high)
-    first = math.ceil((law.angle[0] - middle - half) / cycle)
-    last = math.floor((law.angle[-1] - middle + half) / cycle)
-    z, weight, pair = [], [], []
-    rule = np.linspace(low, high, LOOKS)
-    for k in range(first, last + 1):
-        psi = angle + turn * rule + k * cycle
-        within = (psi >= law.angle[0]) & (psi <= law.angle[-1])
-        if not within.any():
-            continue
-        rows = rows_at(law, psi[within])
-        gap = lines.gap(rule[within], rows, np.full(np.count_nonzero(within), k)) / rows.arm
-        reached = law.angle[law.touch < twist - gap.min()]
+    cycle, turn = mesh.sections.mesh_cycle, mesh.turns[0]
+    z, weight, pair = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=np.int64)]
+    for k, gap in zip(looks.pair.tolist(), looks.gap.tolist(), strict=True):
+        reached = law.angle[law.touch < twist - gap]
         if len(reached) == 0:
             continue
-        marks = np.clip([reached[0], *law.path, reached[-1]], reached[0], reached[-1])
-        for start, end, tip in ((0, 1, True), (1, 2, False), (2, 3, True)):
-            stretch = _stretch(marks[start], marks[end], angle + k * cycle, turn, mesh.zone, tip)
+        marks = np.clip([reached[0], *law.path, reached[-1]], reached[0], reached[-1]).tolist()
+        for (start, end), tip in zip(itertools.pairwise(marks), (True, False, True), strict=True):
+            stretch = _stretch(start, end, angle + k * cycle, turn, mesh.zone, tip)
             if stretch is None:
                 continue
             a, b = stretch
-            share = lines.density * mesh.count * math.sqrt((b - a) / (high - low))
-            count = (
-                math.ceil(TIP_POINTS * lines.density / POINTS_PER_FUNCTION)
-                if tip and turn
-                else max(LEAST_POINTS, math.ceil(share))
-            )
-            x, w = np.polynomial.legendre.leggauss(count)
+            x, w = _gauss(_count(lines, (b - a) / mesh.width, tip=tip and turn != 0.0))
             z.append(0.5 * (a + b) + 0.5 * (b - a) * x)
             weight.append(0.5 * (b - a) * w)
-            pair.append(np.full(count, k))
-    if not z:
-        return _points(lines, angle, np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64))
+            pair.append(np.full(len(x), k))
     return _points(lines, angle, np.concatenate(z), np.concatenate(weight), np.concatenate(pair))
+
+
+def _count(lines: ContactLines, share: float, *, tip: bool) -> int:
+    """Points of a stretch over so much of the width; `tip`: beyond the path of contact."""
+    if tip:
+        return math.ceil(TIP_POINTS * lines.density / POINTS_PER_FUNCTION)
+    return max(LEAST_POINTS, math.ceil(lines.density * lines.compliance.mesh.count * math.sqrt(share)))
+
+
+@cache
+def _gauss(count: int) -> tuple[Array, Array]:
+    return np.polynomial.legendre.leggauss(count)
 
 
 def _stretch(
@@ -276,15 +326,18 @@ def _influence(compliance: WideCompliance, z: Array, pair: IntArray, rows: Rows)
         load = values[:, gear, :size, None, None] * rows.tooth_normal[:, gear, None, :, None]
         load = (load * over_width[:, None, None]).reshape(len(z), 2 * size * mesh.count)
         for step in range(compliance.steps + 1):
-            moved = None
-            for k, source in of_pair.items():
-                felt = of_pair.get(k + step * (1 - 2 * gear))  # the wheel's teeth count the other way round
-                if felt is None:
-                    continue
-                if moved is None:
-                    square = side.influence[step].reshape(load.shape[1], load.shape[1])
-                    moved = load @ (square.T if step else square)
-                block = load[felt] @ moved[source].T
+            # the wheel's teeth count the other way round
+            way = step * (1 - 2 * gear)
+            couples = [(of_pair[k + way], source) for k, source in of_pair.items() if k + way in of_pair]
+            if not couples:
+                break
+            square = side.influence[step].reshape(load.shape[1], load.shape[1])
+            sources = np.concatenate([source for _, source in couples])
+            moved = load[sources] @ (square.T if step else square)
+            start = 0
+            for felt, source in couples:
+                block = load[felt] @ moved[start : start + len(source)].T
+                start += len(source)
                 if step == 0:
                     found[np.ix_(felt, source)] += 0.5 * (block + block.T)
                 else:
@@ -305,8 +358,10 @@ def own_twists(law: PairLaw, points: Points, moment: Array) -> tuple[Array, Arra
     a, b, da, db = values[row, i], values[row, i + 1], slopes[row, i], slopes[row, i + 1]
     c2, c3 = 3 * (b - a) - 2 * da - db, da + db - 2 * (b - a)
     slope = da + t * (2 * c2 + 3 * t * c3)
+    slope = np.where(x > last, 0.0, slope)  # beyond the loads of the table c/M stays, so that c rises
     share = a + t * (da + t * (c2 + t * c3)) + (x - inside) * slope
-    return share * moment, share + slope / spacing
+    rate = share + slope / spacing
+    return share * moment, np.maximum(rate, STIFFEST * points.rows.yields[:, 0])
 
 
 @dataclass(frozen=True)
@@ -355,45 +410,28 @@ def solve_position(
     guess : float
         Twist (rad) at which a torque is expected; 0: by a usual stiffness.
     """
+    looks = look_at(lines, angle)
     if torque is None:
         assert twist is not None
-        points = place_points(lines, angle, twist)
+        points = place_points(lines, angle, twist, looks)
         return _newton(lines, points, twist=twist, torque=None)
-    least = least_touch(lines, angle)
+    least = looks.least
     if not math.isfinite(least):
-        return Solution(place_points(lines, angle, -math.inf), math.nan, np.zeros(0), np.zeros((3, 3)), False, 0)
+        points = place_points(lines, angle, -math.inf, looks)
+        return Solution(points, math.nan, np.zeros(0), np.zeros((3, 3)), False, 0)
     ahead = guess - least if guess > least else torque / lines.usual_stiffness
-    steps = 0
-    for _ in range(PLACINGS):
-        points = place_points(lines, angle, least + MARGIN * ahead)
-        solution = _newton(lines, points, torque=torque, twist=None)
+    steps, settled = 0, False
+    for number in range(PLACINGS):
+        reach = MARGIN * ahead
+        solution = _newton(lines, place_points(lines, angle, least + reach, looks), torque=torque, twist=None)
         steps += solution.steps
-        if not solution.converged:
-            ahead *= 2.0
-            continue
         new = solution.twist - least
-        settled = abs(new - ahead) <= PLACED * new
-        ahead = new
+        free = number < FREE_PLACINGS
+        settled = solution.converged and (abs(new - ahead) <= PLACED * new or (not free and new <= reach))
         if settled:
             break
-    return replace(solution, steps=steps)
-
-
-def least_touch(lines: ContactLines, angle: float) -> float:
-    """Twist (rad) at which the rigid gears touch first at a pinion angle (rad), infinite where they do not."""
-    mesh, law = lines.compliance.mesh, lines.law
-    rule = np.linspace(*mesh.zone, LOOKS)
-    cycle = mesh.sections.mesh_cycle
-    middle = angle + mesh.turns[0] * rule
-    numbers = np.arange(
-        math.ceil((law.angle[0] - middle.max()) / cycle), math.floor((law.angle[-1] - middle.min()) / cycle) + 1
-    )
-    psi = (middle + cycle * numbers[:, None]).ravel()
-    within = (psi >= law.angle[0]) & (psi <= law.angle[-1])
-    if not within.any():
-        return math.inf
-    rows, z, pair = rows_at(law, psi[within]), np.tile(rule, len(numbers))[within], np.repeat(numbers, LOOKS)[within]
-    return float((rows.touch + lines.gap(z, rows, pair) / rows.arm).min())
+        ahead = new if free else max(new, ahead)
+    return replace(solution, steps=steps, converged=settled)
 
 
 def _newton(lines: ContactLines, points: Points, *, torque: float | None, twist: float | None) -> Solution:
@@ -420,16 +458,27 @@ def _newton(lines: ContactLines, points: Points, *, torque: float | None, twist:
         if torque is not None:
             at = (torque - answer[:, 0].sum()) / answer[:, 1].sum()
         new = np.zeros(n)
-        new[i] = np.maximum(answer[:, 0] + at * answer[:, 1], 0.0)
+        new[i] = answer[:, 0] + at * answer[:, 1]
         leaving = loaded & (new <= 0)
-        entering = ~loaded & (at - points.touch - points.influence @ new > closed)
+        share = 1.0
+        if steps > QUICK_STEPS and leaving.any():  # up to the first point that loses its load
+            past = np.flatnonzero(leaving)
+            shares = moment[past] / np.maximum(moment[past] - new[past], 1e-300)
+            share = float(shares.min())
+            leaving = np.zeros(n, dtype=bool)
+            leaving[past[shares <= share]] = True
+        new = np.where(leaving, 0.0, np.maximum(moment + share * (new - moment), 0.0))
         change = np.abs(new - moment).max() / max(new.sum(), 1e-300)
-        moment = new
-        if not (leaving.any() or entering.any()) and change < SETTLED:
+        moment = np.where(loaded, new, 0.0)
+        overlap = np.where(loaded, 0.0, at - points.touch - points.influence @ moment)
+        entering = overlap > closed
+        if steps > QUICK_STEPS and entering.any():  # after a whole step the deepest alone
+            entering = (overlap == overlap.max()) & (share == 1.0) & (change < ONE_BY_ONE)
+        if not (leaving.any() or (overlap > closed).any()) and change < SETTLED:
             converged = True
         loaded = (loaded & ~leaving) | entering
         if not loaded.any():
-            converged = torque is None
+            converged = torque is None and not (overlap > closed).any()
             loaded = points.touch <= points.touch.min()
     return Solution(points, at, moment, _tangent(law, points, moment), converged, steps)
 

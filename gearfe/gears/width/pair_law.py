@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
@@ -89,6 +90,15 @@ class PairLaw:
     moments: Array
     path: tuple[float, float]
     forward: complex
+
+    @cached_property
+    def packed(self) -> Array:
+        """Touch, arm, normal, point, roll, arc, normals in the teeth's axes and yields side by side, shape (n, c)."""
+        n = len(self.angle)
+        columns = [self.touch, self.arm, self.normal.real, self.normal.imag, self.point.real, self.point.imag]
+        return np.concatenate(
+            [np.stack(columns, axis=1), self.roll, self.arc, self.tooth_normal.reshape(n, 4), self.yields], axis=1
+        )
 
 
 def pair_law(compliance: WideCompliance, profiles: tuple[ToothDeviations, ToothDeviations]) -> PairLaw:

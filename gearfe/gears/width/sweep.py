@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...base.errors import InputError
 from ...base.progress import Stopwatch, one_thread
 from ...base.typing import Array, IntArray
+from ..geometry.validity import MOST_YIELD
 from .compliance import legendre
 from .lines import ContactLines, Solution, solve_position
 
@@ -154,6 +155,9 @@ def sweep_width(
         For neither or both of torques and twists, values out of range, and teeth that differ without angles.
     """
     loads, by_torque = _loads(torques, twists)
+    if by_torque and max(loads) > lines.most_torque:
+        problem = f"must be <= {lines.most_torque:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
+        raise InputError("torques", max(loads), problem, "linear elasticity does not reach so far; give less")
     at = _angles(lines, angles, positions)
     watch = watch or Stopwatch()
     with watch.stage("positions"), one_thread():
