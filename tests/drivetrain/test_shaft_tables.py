@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
 from gearfe.base.errors import InputError
 from gearfe.base.tables.examples import job_file as example
+from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.job import job_train, read_train_job
 from gearfe.drivetrain.train import GearTrain
-from tests.makers.files import job_file
+from tests.makers.files import csv_rows, job_file
 from tests.makers.job_texts import BARE_TRAIN, BORES
 from tests.places import GEOMETRY
 
@@ -137,3 +139,23 @@ def test_a_shaft_fits_its_bore(tmp_path: Path) -> None:
     assert read(tmp_path, elastic.replace("END", "20.0")).shafts[0].radius == pytest.approx(0.011)
     with pytest.raises(InputError, match=r"wider than attachment '1' from y = 25 to 41 mm: must be <= 20 mm"):
         read(tmp_path, elastic.replace("END", "20.5"))
+
+
+def test_the_command_reports_shafts_and_misalignment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Terminal, summary.json and misalignment.csv say the same, in um over the common face width."""
+    path, out = job_file(tmp_path, JOB.replace(RIGID, STEPPED)), tmp_path / "out"
+    options = ["--no-pictures", "--no-estimate", "--no-floquet", "--out", str(out)]
+    assert main(["vibration", str(path), *options]) == 0
+    said = capsys.readouterr().out
+    assert "shaft in: elastic" in said
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    mesh = summary["misalignment"]["a-b"]
+    assert f"mesh a-b: misalignment f_sh {mesh['f_sh_um']:.3g} um over 12 mm" in said
+    (row,) = csv_rows(out / "misalignment.csv")
+    assert row["mesh"] == "a-b"
+    assert float(row["f_sh_um"]) == pytest.approx(mesh["f_sh_um"])
+    assert float(row["f_sh_um"]) == pytest.approx(12e-3 * float(row["tilt_in_plane_urad"]))
+    parts = [float(row[f"f_sh_by_{part}_um"]) for part in ("shafts", "bearings", "housing")]
+    assert sum(parts) == pytest.approx(mesh["f_sh_um"])
+    assert parts[1:] == pytest.approx([0.0, 0.0], abs=1e-9)  # hinges in a rigid housing
+    assert summary["elastic_shafts"]["in"]["highest_frequency_Hz"] == 8000.0
