@@ -291,7 +291,7 @@ def bent_train() -> TrainModel:
     """Two elastic shafts of 20 mm on soft isotropic bearings."""
     steel = Section(0.09, 0.02, 0.02, young=200e9, poisson=0.3, density=7850.0)
     made = train([(20, 30)])
-    shafts = tuple(dataclasses.replace(shaft, sections=(steel,)) for shaft in made.shafts)
+    shafts = tuple(dataclasses.replace(shaft, sections=(steel,), highest_hz=2e4) for shaft in made.shafts)
     bearings = tuple(Bearing(bore, (1e8, 1e8, 1e8, 0.0, 0.0)) for bore in made.rigid_bores)
     return build_train(dataclasses.replace(made, shafts=shafts, bearings=bearings))
 
