@@ -711,7 +711,7 @@ def train_gearbox(
         of_pair = {sides[mesh.driver], sides[mesh.driven]} == {PINION, WHEEL}
         if distance is None and of_pair and pair is not None and pair.centre_distance_mm is not None:
             distance, distance_where = pair.centre_distance_mm, "pair"
-        tilts = {key: getattr(pair, key) if of_pair else 0.0 for key in TILTS}
+        tilts: dict[str, Any] = {key: getattr(pair, key) if of_pair else 0.0 for key in TILTS}
         if name in meshes:
             raise InputError(where, None, f"has the gears of another mesh, {name!r}", "two gears have one mesh")
         one, two = gears[mesh.driver], gears[mesh.driven]

@@ -145,7 +145,9 @@ def sweep_width(
     twists : array_like, shape (m,)
         Of the wheel from where unmodified flanks touch (rad), instead of `torques`.
     angles : array_like, shape (n,)
-        Pinion angles (rad); without them so many `positions` in a mesh cycle.
+        Pinion angles (rad).
+    positions
+        Number of angles in a mesh cycle where none are given.
     watch
         Takes the time of the stages.
 
