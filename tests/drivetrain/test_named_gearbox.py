@@ -198,7 +198,10 @@ WRONG_SHAFTS: list[tuple[dict[str, Any], str]] = [
     ({"shafts__s5": {"x_mm": 300.0, "length_mm": 9.0, "radius_mm": 2.0}}, r"shafts\.s5\.attachments: no bearing carr"),
     ({"shafts__s2__length_mm": 20.0}, r"beyond the end of shaft 's2'"),
     ({"shafts__s2__elastic": True}, r"shafts\.s2: unknown name 'elastic'"),
-    ({"shafts__s2__bending_stiffness": 1.0}, r"shafts\.s2\.bending_stiffness = 1.0: elastic shafts are not supported"),
+    (
+        {"shafts__s2__bending_stiffness": 1.0},
+        r"shafts\.s2\.bending_stiffness = 1.0: stiffnesses of elastic shafts are not",
+    ),
     ({"shafts": {}}, r"\[shafts\]: is empty"),
     ({"shafts": None}, r"\[shafts\]: is missing"),
     ({"shafts__s 1": {"x_mm": 300.0, "length_mm": 9.0, "radius_mm": 2.0}}, r"name in \[shafts\] = 's 1'"),
