@@ -69,12 +69,11 @@ def shaft_lines(summary: Mapping[str, Any]) -> list[str]:
     lines = []
     for name, shaft in summary.get("elastic_shafts", {}).items():
         frequencies = ", ".join(f"{frequency:.0f}" for frequency in shaft["own_frequencies_Hz"][:4])
-        modes = (
-            f"free modes {frequencies}" if frequencies else f"no free mode below {shaft['highest_frequency_Hz']:.0f}"
-        )
+        modes = f"no free mode below {shaft['highest_frequency_Hz']:.0f} Hz"
+        if frequencies:
+            modes = f"free modes {frequencies} Hz, errors up to {shaft['largest_frequency_error']:.1g}"
         lines.append(
-            f"shaft {name}: elastic, {shaft['elements']} elements, {shaft['coordinates']} coordinates; {modes} Hz, "
-            f"errors up to {shaft['largest_frequency_error']:.1g}"
+            f"shaft {name}: elastic, {shaft['elements']} elements, {shaft['coordinates']} coordinates; {modes}"
         )
     for name, mesh in summary.get("misalignment", {}).items():
         parts = ", ".join(f"{part} {mesh[f'f_sh_by_{part}_um']:.3g}" for part in PARTS)

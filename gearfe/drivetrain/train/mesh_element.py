@@ -76,7 +76,8 @@ class MeshLine:
     row : ndarray, shape (system size,)
         Approach of the driving flanks for unit coordinates of the system.
     columns : tuple of ndarray, shape (system size,)
-        Directions that its flanks count: approaches, then of a law the driver's turn, then those of friction.
+        Directions that its flanks count: approaches, then the driver's turn (of a law, and where its shaft is elastic),
+        then those of friction.
     spin : ndarray, shape (system size,)
         Rotation of the driver about its axis beside rolling.
     flanks
