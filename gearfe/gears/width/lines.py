@@ -233,7 +233,17 @@ def look_at(lines: ContactLines, angle: float) -> Looks:
 
 
 def place_points(lines: ContactLines, angle: float, twist: float, looks: Looks) -> Points:
-    """Place points on all lines that may bear at a pinion angle and a twist of the wheel (rad)."""
+    """Place points on all lines that may bear.
+
+    Parameters
+    ----------
+    lines : ContactLines
+        The gears.
+    angle, twist : float
+        Pinion angle and twist of the wheel (rad).
+    looks : Looks
+        The gaps along the lines of this angle.
+    """
     mesh, law = lines.compliance.mesh, lines.law
     cycle, turn = mesh.sections.mesh_cycle, mesh.turns[0]
     z, weight, pair = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=np.int64)]

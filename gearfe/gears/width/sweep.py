@@ -145,16 +145,17 @@ def sweep_width(
     twists : array_like, shape (m,)
         Of the wheel from where unmodified flanks touch (rad), instead of `torques`.
     angles : array_like, shape (n,)
-        Pinion angles (rad).
-    positions
-        Number of angles in a mesh cycle where none are given.
+        Pinion angles (rad); without them those of one mesh cycle.
+    positions : int
+        Number of angles of a mesh cycle where none are given.
     watch
         Takes the time of the stages.
 
     Raises
     ------
     InputError
-        For neither or both of torques and twists, values out of range, and teeth that differ without angles.
+        For neither or both of torques and twists, values out of range, torques beyond linear elasticity, and teeth that
+        differ without angles.
     """
     loads, by_torque = _loads(torques, twists)
     if by_torque and max(loads) > lines.most_torque:
