@@ -15,7 +15,9 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +26,7 @@ from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.runup.run_up import run_up
 from gearfe.drivetrain.train import GearTrain, TrainModel, build_train, elastic_shaft, simulate
 from gearfe.drivetrain.train.misalignment import misalignments
-from gearfe.fem.beams import Section, full_shaft
+from gearfe.fem.beams import BeamShaft, ReducedShaft, Section, full_shaft
 
 JOB = Path(__file__).resolve().parents[2] / "geometry" / "gear_train.toml"
 #: Diameter of the shafts (m).
@@ -46,15 +48,17 @@ def with_steel(train: GearTrain) -> GearTrain:
 
 def unreduced(train: GearTrain) -> TrainModel:
     """The model with all coordinates of the beams."""
-    reduce_shaft = elastic_shaft.reduce_shaft
+    reduce_shaft: Any = elastic_shaft.reduce_shaft
+
+    def whole(shaft: BeamShaft, frame: Any, _: float, *, elements: int | None) -> ReducedShaft:
+        return full_shaft(shaft, frame, ACCURATE_HZ, elements=elements)
+
     elastic_shaft.reduced_shaft.cache_clear()
-    elastic_shaft.reduce_shaft = lambda shaft, frame, _, elements: full_shaft(  # type: ignore[assignment]
-        shaft, frame, ACCURATE_HZ, elements=elements
-    )
+    setattr(elastic_shaft, "reduce_shaft", whole)  # noqa: B010
     try:
         return build_train(train)
     finally:
-        elastic_shaft.reduce_shaft = reduce_shaft
+        setattr(elastic_shaft, "reduce_shaft", reduce_shaft)  # noqa: B010
         elastic_shaft.reduced_shaft.cache_clear()
 
 
@@ -93,7 +97,7 @@ def main() -> None:
         f"run-up of {args.speeds} speeds": lambda model: run_up(model, speeds, tolerance=TOLERANCE, band_hz=BAND_HZ),
     }
     for kind, work in kinds.items():
-        taken = seconds(args.runs, {name: lambda m=model, w=work: w(m) for name, model in models.items()})
+        taken = seconds(args.runs, {name: partial(work, model) for name, model in models.items()})
         print(f"{kind}: rigid {taken['rigid']:.3f} s, elastic {taken['elastic']:.3f} s, "
               f"{taken['elastic'] / taken['rigid']:.2f} times")  # fmt: skip
 
