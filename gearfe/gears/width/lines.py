@@ -60,6 +60,8 @@ USUAL_STIFFNESS = 0.06
 AT_END = 0.3
 #: Least derivative of c in parts of c/M under the lightest load, so that no contact yields less under more load.
 STIFFEST = 0.05
+#: Least twist beyond the first touch that points are placed for, in those of a usual stiffness.
+LEAST_AHEAD = 0.1
 #: Places on a line at which its gap is looked at.
 LOOKS = 33
 
@@ -435,7 +437,8 @@ def solve_position(
         reach = MARGIN * ahead
         solution = _newton(lines, place_points(lines, angle, least + reach, looks), torque=torque, twist=None)
         steps += solution.steps
-        new = solution.twist - least
+        # between the places that are looked at, a line may touch a little earlier
+        new = max(solution.twist - least, LEAST_AHEAD * torque / lines.usual_stiffness)
         free = number < FREE_PLACINGS
         settled = solution.converged and (abs(new - ahead) <= PLACED * new or (not free and new <= reach))
         if settled:
