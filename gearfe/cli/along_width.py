@@ -85,7 +85,7 @@ def run_along_width(
     if loads is None and not args.no_estimate and (sweep.status == "converged").any():
         errors = width_job.estimated_errors(job, lines, sweep, watch)
     found = width_summary(job, wide, sweep, watch.seconds, errors=errors, **tables)
-    may_write = (f"{name}*.png", f"{name}*.csv", f"{name}*.vtkhdf")
+    may_write: tuple[str, ...] = (f"{name}*.png", f"{name}*.csv", f"{name}*.vtkhdf")
     if loads is None:
         may_write += ("fields.vtkhdf", "stress_*deg.png", "pressure.*")
     with whole_set(folder, may_write) as made:

@@ -29,6 +29,7 @@ from gearfe.gears.gearmesh.curve import SOLVED
 from gearfe.gears.gearmesh.job import read_stiffness_job
 from gearfe.gears.gearmesh.positions import ANGLE_ROUNDING, PositionSolver, position_solver
 from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.geometry.mesh_geometry import MeshGeometry
 from gearfe.gears.geometry.pair import GearPair
 
 from .campaign import Campaign, Case
@@ -156,7 +157,7 @@ def balance(elastic: MeshingPair, found: Positions, angle: float, twist: float) 
     return Check("balance", max(abs(resultant) / abs(on_wheel), off), BALANCE)
 
 
-def on_path(pair: GearPair, angle: float, twist: float, found: Positions) -> bool:
+def on_path(pair: MeshGeometry, angle: float, twist: float, found: Positions) -> bool:
     """Whether all loaded pairs touch well within the involutes, clear of tips, rounds, reliefs and form points."""
     start, end = pair.path_limits(relieved=True)
     margin = 0.08 * pair.base_pitch + 3.0 * abs(twist) * pair.wheel.base_radius

@@ -36,6 +36,10 @@ HEAVY = {
     ("gearfe.gears.gearmesh.check", "gearfe.gears.contact.whole_gears.position"): "finite elements of whole gears",
     ("gearfe.gears.gearmesh.job", "gearfe.gears.gearmesh.sweep"): "scipy; a curve is read from the cache",
     ("gearfe.drivetrain.gearbox.fields", "gearfe.fem.bodies.mesh_checks"): "sparse matrices",
+    (
+        "gearfe.figures.flanks",
+        "gearfe.gears.gearmesh.width_job",
+    ): "elastic teeth; for modifications along the width only",
 }
 #: Modules that import by name, and what they name: parts of their own package, of packages below, of other programs.
 BY_NAME = {

@@ -42,7 +42,7 @@ from ..contact.elements import solve_elements
 from ..contact.half_plane import HalfPlanePair, expected_twists, half_plane_pair, solve_half_plane
 from ..contact.laws import COARSENING, HalfPlane
 from ..contact.position import ANGLE_ROUNDING, TORQUES, Positions, in_batches, taken
-from ..geometry.pair import GearPair
+from ..geometry.mesh_geometry import MeshGeometry
 from .load_search import Response, newton_twist, search_load
 
 #: Solutions of a position in search of its torque; random pairs, laws and torques took three at most.
@@ -117,7 +117,7 @@ class PositionSolver:
     on_elements: bool
 
     @property
-    def pair(self) -> GearPair:
+    def pair(self) -> MeshGeometry:
         """Geometry of the gears."""
         return self.contact_model.pair
 

@@ -186,7 +186,9 @@ def material_along(flank: FlankOf, face: tuple[float, float], roll: Array, y: Ar
 
 def _check_size(flank: FlankOf, face: tuple[float, float]) -> None:
     """Raise `InputError` for modifications along the width that are no microgeometry, of the largest of their keys."""
-    roll, y = (grid.ravel() for grid in np.meshgrid(ends_of(flank.gear), np.linspace(*sorted(face), 33)))
+    roll, y = (
+        grid.ravel() for grid in np.meshgrid(np.array(ends_of(flank.gear)), np.linspace(min(face), max(face), 33))
+    )
     if np.abs(material_along(flank, (min(face), max(face)), roll, y)).max() <= MOST_GAP * flank.gear.module:
         return
     table = flank.own
