@@ -7,6 +7,7 @@ import math
 import time
 from typing import Any
 
+from ..base.shown import percent
 from ..base.tables.modes import ModesTable
 from .arguments import print_results, with_keys
 from .vibration import add_train, title
@@ -75,7 +76,7 @@ def _report_lines(summary: dict[str, Any]) -> list[str]:
         low, high = mode["frequency_Hz"], mode["frequency_at_the_fastest_speed_Hz"]
         ends = list(dict.fromkeys(f"{x:.5g} Hz" if math.isfinite(x) else "overdamped" for x in (low, high)))
         hertz = " to ".join(ends)
-        lines.append(f"{mode['name']}: {hertz}, {100.0 * mode['damping_ratio']:.3g} % damping")
+        lines.append(f"{mode['name']}: {hertz}, {percent(mode['damping_ratio'], 3)} damping")
     reached = [c for c in summary["critical_speeds"] if c["excited"]]
     for c in reached[:PRINTED]:
         at = f"critical speed {c['speed_rad_per_s']:.6g} rad/s"

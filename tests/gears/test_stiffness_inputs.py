@@ -122,7 +122,8 @@ def test_each_key_of_the_sweep_counts(key, base):
 def test_every_key_is_in_this_file():
     given = {key.rpartition(".")[2] for key in (*PAIR_CHANGES, *BASE)}
     per_gear = {"material", "pinion", "wheel", "teeth", "bore_diameter_mm", "pitch_diameter_mm", "density_kg_per_m3"}
-    assert set(PairTable.__dataclass_fields__) <= given | per_gear
+    along_width = {"helix_angle_deg", "misalignment_um", "misalignment_across_um"}  # tests/gears/test_width_job.py
+    assert set(PairTable.__dataclass_fields__) <= given | per_gear | along_width
     elsewhere = {"twist_deg", "twist_from", "nitsche_gamma0", "law_parameters", "solve_all", "interpolation"}
     elsewhere |= {"angle_stop_deg", "angle_step_deg"}
     assert {field.name for field in fields(StiffnessTable)} <= {*SWEEP_CHANGES, *elsewhere}

@@ -251,7 +251,7 @@ class Housing(Facts):
         if abs(share) > MOST_ADDED:
             problem = (
                 f"curved edges folded {shape.folded} elements, and straightening them changes the mass by "
-                f"{percent(share)}, more than {100.0 * MOST_ADDED:g} %"
+                f"{'+' if share > 0.0 else ''}{percent(share)}, more than {100.0 * MOST_ADDED:g} %"
             )
             cure = (
                 "mesh the curved walls with smaller elements, let the mesher keep them from folding (gmsh: "

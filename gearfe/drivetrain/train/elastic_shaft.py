@@ -211,4 +211,17 @@ def _bore_loads(train: GearTrain, bore: str) -> tuple[str, ...]:
 def reduced_shaft(
     shaft: BeamShaft, frame: tuple[tuple[float, ...], ...], highest_hz: float, elements: int | None
 ) -> ReducedShaft:
+    """Return the reduced coordinates of a shaft, kept by the values that they follow from.
+
+    Parameters
+    ----------
+    shaft : BeamShaft
+        The shaft.
+    frame : tuple, shape (3, 3)
+        Rows e1, e2, a.
+    highest_hz : float
+        Highest frequency of its own modes that are kept (Hz).
+    elements : int or None
+        Number of elements; None: as that frequency needs.
+    """
     return reduce_shaft(shaft, np.array(frame), highest_hz, elements=elements)

@@ -186,7 +186,19 @@ def _check(highest_hz: float, tolerance: float, elements: int | None, degree: in
 
 
 def needed_degree(section: Section, span: tuple[float, float], highest_hz: float, tolerance: float) -> int:
-    """Degree that an element over a span (parts of the section's length) needs; above `HIGHEST_DEGREE` if none does."""
+    """Return the degree that an element needs, or one above `HIGHEST_DEGREE` if none suffices.
+
+    Parameters
+    ----------
+    section : Section
+        The section.
+    span : tuple of float
+        Begin and end of the element, in parts of the section's length.
+    highest_hz : float
+        Highest frequency wanted (Hz).
+    tolerance : float
+        Of the frequency, relative.
+    """
     length = (span[1] - span[0]) * section.length
     phase = max(wave_number(section, part, highest_hz) for part in span) * length
     rate = _ellipse(section, span)
