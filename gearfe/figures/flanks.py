@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..base.tables.gearbox import NamedMesh
-from ..base.tables.microgeometry import ALONG_WIDTH
 from ..base.typing import Array
 from ..gears.geometry import pitch_errors
 from ..gears.geometry.deviation_job import FlankOf, flank_deviations
@@ -72,7 +71,7 @@ def _chart(mesh: NamedMesh, pair: GearPair, g: int, side: str, folder: Path) -> 
 
 def _along_width(one: FlankOf, centre: float) -> tuple[Array, Array, Array] | None:
     """Places along the axes (mm) and deviations there (um) at form and tip circle, its middle at y (m)."""
-    if not any(getattr(one.own, key) for key in ALONG_WIDTH):
+    if not one.own.along_width():
         return None
     from ..gears.gearmesh.width_job import material_along  # which loads finite elements
 

@@ -231,7 +231,7 @@ def test_back_flanks_have_their_own_microgeometry(tmp_path) -> None:
     """Loads of both signs against contact solutions: relief on the left flanks, crowning on the right ones."""
     torque, thin = 30.0, "tip_round_mm = 0.1\ntooth_thinning_um = 50.0"
     sides = "[microgeometry.pinion.left]\ntip_relief_um = 8.0\ntip_relief_length_mm = 3.0\n"
-    text = train_text(sides + "[microgeometry.wheel.right]\ncrowning_um = 5.0\n", mesh_model='"potential"')
+    text = train_text(sides + "[microgeometry.wheel.right]\nprofile_crowning_um = 5.0\n", mesh_model='"potential"')
     path = tmp_path / "job.toml"
     path.write_text(text.replace("tip_round_mm = 0.1", thin))
     job = read_train_job(path)
@@ -256,7 +256,11 @@ def test_back_flanks_have_their_own_microgeometry(tmp_path) -> None:
     [
         ("[microgeometry.pinion]\npitch_class = 7\n", "variable_stiffness", 'stand unevenly.*mesh_model = "potential"'),
         ("[microgeometry.pinion]\npitch_um = [1.0, 2.0]\n", "potential", "one entry for each of the 20 teeth"),
-        ("[microgeometry.pinion.left]\ncrowning_um = 5.0\n", "variable_stiffness", "left and right flanks differ"),
+        (
+            "[microgeometry.pinion.left]\nprofile_crowning_um = 5.0\n",
+            "variable_stiffness",
+            "left and right flanks differ",
+        ),
     ],
 )
 def test_what_a_train_refuses(more, model, told, tmp_path) -> None:

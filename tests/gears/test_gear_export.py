@@ -126,8 +126,9 @@ def test_the_command_exports_both_gears(tmp_path, capfd):
 def test_deviations_stand_in_the_table(tmp_path, capsys):
     """Crowning of 4 um is 0 in the middle between form and tip circle and -4 um at both ends; the slope adds a line."""
     (tmp_path / "pair.toml").write_text(
-        job_file("stiffness") + "\n[microgeometry]\ntorques_Nm = [100.0]\n[microgeometry.pinion]\ncrowning_um = 4.0\n"
-        "[microgeometry.pinion.right]\nslope_um = 6.0\n"
+        job_file("stiffness")
+        + "\n[microgeometry]\ntorques_Nm = [100.0]\n[microgeometry.pinion]\nprofile_crowning_um = 4.0\n"
+        "[microgeometry.pinion.right]\nprofile_slope_um = 6.0\n"
     )
     line = ["gear", str(tmp_path / "pair.toml"), "--out", str(tmp_path / "out"), "--no-pictures", "--export"]
     assert main([*line, "csv"]) == 0

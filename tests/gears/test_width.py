@@ -252,3 +252,33 @@ def test_mistakes_in_loads_are_reported():
 def test_gears_that_do_not_reach_each_other_have_no_contact():
     found = sweep_width(spur_lines(), twists=[-1e-3], angles=[0.0])
     assert found.status[0, 0] == "no_contact"
+
+
+@pytest.mark.parametrize(
+    "flanks", [WideFlanks(), WideFlanks(leads=(LeadModification(crowning=10e-6), LeadModification()))]
+)
+def test_one_loaded_pair_shares_nothing(flanks):
+    """K_Halpha is 1 by its definition where a single pair of spur teeth bears; K_Hbeta is that of its points."""
+    lines = spur_lines().with_flanks(flanks)
+    pitch = lines.compliance.mesh.sections.mesh_cycle
+    angles = np.linspace(0.0, pitch, 24, endpoint=False)
+    sweep = sweep_width(lines, [60.0], angles=angles)
+    alone = [i for i in range(24) if len(np.unique(sweep.points.pair[sweep.points.position == i])) == 1]
+    assert alone
+    one = sweep_width(lines, [60.0], angles=angles[alone[:1]])
+    assert one.k_h_alpha[0] == pytest.approx(1.0, abs=0.01)
+    load, weight = one.points.line_load, one.points.weight
+    assert one.k_h_beta[0] == pytest.approx(load.max() * lines.compliance.mesh.width / (load @ weight), rel=0.02)
+
+
+def test_tilts_open_gaps_as_displacements_of_the_wheel_do():
+    """A wheel moved by u leaves the flanks u.n farther apart: levers against n = forward (e + i ...), q = i e."""
+    lines = spur_lines()
+    turn = lines.law.forward
+    seen = np.exp(1j * np.array([-0.3, 0.0, 0.2]))  # normals beside that on the path
+    rows = type("Rows", (), {"normal": seen * turn})()
+    z = sum(lines.compliance.mesh.zone) / 2 + np.full(3, 2e-3)
+    in_plane, across = lines.levers(z, rows).T
+    moved = {"closing": -turn, "left": 1j * turn}  # displacement of the wheel per tilt and z
+    assert in_plane == pytest.approx([-2e-3 * (np.conj(n) * moved["closing"]).real for n in seen * turn])
+    assert across == pytest.approx([-2e-3 * (np.conj(n) * moved["left"]).real for n in seen * turn])

@@ -16,7 +16,7 @@ from ..errors import InputError, unknown_name
 from .bearing import BearingTable
 from .driveline import CouplingTable, MachineTable, TrainCouplingTable, TrainMachineTable
 from .loadmap import LoadMapTable
-from .microgeometry import ALONG_WIDTH, FlankTable, GearMicrogeometryTable, MicrogeometryTable
+from .microgeometry import FlankTable, GearMicrogeometryTable, MicrogeometryTable
 from .named import NamedBearingTable, NamedGearTable, NamedMeshTable, NamedShaftTable
 from .pair import (
     FROM_DISTANCE,
@@ -185,7 +185,7 @@ class NamedMesh:
         for gear in self.gears if self.deviates else ():
             for side in tuple(sides) or (self.flank,):
                 flank = FlankTable() if gear.microgeometry is None else gear.microgeometry.flank(side)
-                if key := next((key for key in ALONG_WIDTH if getattr(flank, key)), None):
+                if key := flank.along_width():
                     return f"{gear.microgeometry_where}.{key}", getattr(flank, key)
         for key in TILTS:
             if getattr(self, key):

@@ -110,6 +110,13 @@ class FlankTable:
     pitch_class: int | None = quantity(None, doc="index deviations drawn for a class of ISO 1328-1", low=1, high=11)
     pitch_seed: int = quantity(1, doc="seed of the draw", low=0, high=2**63 - 1)
 
+    def along_width(self) -> str:
+        """Return the first key by which the flank varies along the face width, or an empty text."""
+        reliefs = any(relief.amount_um for relief in self.triangular_reliefs)
+        return next(
+            (key for key in ALONG_WIDTH if (reliefs if key == "triangular_reliefs" else getattr(self, key))), ""
+        )
+
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that contradict each other."""
         for name, keys in itertools.product(("tip_relief", "root_relief"), (STARTS, ENDS)):

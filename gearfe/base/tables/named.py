@@ -61,7 +61,9 @@ class NamedMeshTable(TrainMeshTable):
         0.0, doc="tilt of the axes in the plane of action (um over the common face width), > 0: closes larger y"
     )
     misalignment_across_um: float = quantity(
-        0.0, doc="tilt of the axes across the plane of action (um over the common face width)"
+        0.0,
+        doc="tilt of the axes across the plane of action (um over the common face width), > 0: the driven gear "
+        "moves to the left of the force on it towards larger y",
     )
     stiffness: StiffnessTable | None = quantity(  # noqa: RUF009
         None, doc="keys of this mesh that win over those of [stiffness]: load, positions, contact law, sizes"

@@ -238,7 +238,9 @@ class PairTable(ToothFormTable):
         0.0, doc="tilt of the axes in the plane of action (um over the common face width), > 0: closes larger y"
     )
     misalignment_across_um: float = quantity(
-        0.0, doc="tilt of the axes across the plane of action (um over the common face width)"
+        0.0,
+        doc="tilt of the axes across the plane of action (um over the common face width), > 0: the driven gear "
+        "moves to the left of the force on it towards larger y",
     )
     material: MaterialTable = quantity(MaterialTable, doc="material of both gears")  # noqa: RUF009
 

@@ -329,7 +329,7 @@ def check_torque(pair: GearPair, model: PairModel, torque: float, name: str = "t
         If the teeth would deflect by more than `MOST_YIELD` modules.
     """
     gears = pair.pinion, pair.wheel
-    width = min(gear.face_width for gear in gears)
+    width = pair.common_width
     moduli = [
         gear.face_width / (width * material.contact_compliance(model.plane))  # E' per width of the contact
         for gear, material in zip(gears, model.materials, strict=True)

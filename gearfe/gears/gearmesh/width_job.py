@@ -157,13 +157,14 @@ def wide_flanks(job: StiffnessJob, mesh: WideMesh) -> WideFlanks:
             flank = FlankOf(job.mesh, job.pair, g, job.mesh.flank, job.folder)
             leads[g] = lead_modification(flank.own, sense)
             topographies[g] = _topography(flank.own, flank.gear, face, sense)
+            _check_lengths(flank)
             _check_size(flank, (sense * face[0], sense * face[1]))
     for key in TILTS:
         if abs(1e-6 * getattr(job.mesh, key)) > MOST_GAP * job.pair.pinion.module:
             where = job.mesh.tilts_where
             raise InputError(f"{where}.{key}", getattr(job.mesh, key), _too_large(job.pair.pinion), "is it in um?")
     over = 1e-6 * sense / mesh.width
-    tilt = Misalignment(over * job.mesh.misalignment_um, over * job.mesh.misalignment_across_um)
+    tilt = Misalignment(over * job.mesh.misalignment_um, abs(over) * job.mesh.misalignment_across_um)
     return WideFlanks(profiles, (leads[0], leads[1]), (topographies[0], topographies[1]), tilt)
 
 
@@ -182,6 +183,23 @@ def material_along(flank: FlankOf, face: tuple[float, float], roll: Array, y: Ar
     added = lead_modification(flank.own, 1.0).material(y, face)
     topography = _topography(flank.own, flank.gear, face, 1.0)
     return added if topography is None else added + topography(roll, y, np.zeros(y.shape, dtype=np.int64))
+
+
+def _check_lengths(flank: FlankOf) -> None:
+    """Raise `InputError` for reliefs of ends and corners that are longer than the flank."""
+    width, (form, tip) = 1e3 * flank.gear.face_width, (1e3 * end for end in ends_of(flank.gear))
+    own = flank.own
+    given: list[tuple[str, float | None, float]] = [
+        ("end_relief_low_length_mm", own.end_relief_low_length_mm, width),
+        ("end_relief_high_length_mm", own.end_relief_high_length_mm, width),
+    ]
+    for i, relief in enumerate(own.triangular_reliefs):
+        given.append((f"triangular_reliefs[{i}].width_mm", relief.width_mm, width))
+        given.append((f"triangular_reliefs[{i}].roll_length_mm", relief.roll_length_mm, abs(tip - form)))
+    for key, value, most in given:
+        if value is not None and value > most:
+            what = "roll length of the flank" if "roll" in key else "face width"
+            raise InputError(f"{flank.where}.{key}", value, f"must be <= {most:.6g} mm, the {what}", "give less")
 
 
 def _check_size(flank: FlankOf, face: tuple[float, float]) -> None:

@@ -64,7 +64,7 @@ def sweep_columns(job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep) -> dict[
         return np.asarray(values).reshape(loads * positions)
 
     teeth = flat(sweep.peak_pair)
-    bears = teeth >= 0 if not np.isfinite(flat(sweep.peak_line_load)).all() else flat(sweep.peak_line_load) > 0
+    bears = teeth >= 0
     return {
         "pinion_angle_deg": np.tile(np.degrees(sweep.angle), loads),
         "torque_wheel_Nm": flat(sweep.torque),
@@ -271,6 +271,8 @@ def width_summary(
     moduli = [material.youngs_modulus for material in job.materials]
     statuses, counts = np.unique(sweep.status, return_counts=True)
     cause = job.mesh.along_width()
+    directions = np.array([1.0, axial_sense(job), 1.0])  # of twist and tilts, from the solver's z to y
+    along_y = np.outer(directions, directions)
     return {
         "job": {**job.tables, **tables},
         "versions": versions(),
@@ -285,7 +287,7 @@ def width_summary(
         },
         "by_torque": load_table(job, mesh, sweep),
         "error_estimate": None if errors is None else dict(errors),
-        "mean_tangent_twist_and_tilts_Nm_per_rad": np.nanmean(sweep.tangent, axis=1).tolist(),
+        "mean_tangent_twist_and_tilts_Nm_per_rad": (np.nanmean(sweep.tangent, axis=1) * along_y).tolist(),
         "statuses": dict(zip(statuses.tolist(), counts.tolist(), strict=True)),
         "timings_s": timings,
     }

@@ -277,7 +277,7 @@ def iso_values(pair: GearPair, pinion_modulus: float, wheel_modulus: float) -> d
     pinion_modulus, wheel_modulus
         Young's moduli (Pa).
     """
-    width = min(pair.pinion.face_width, pair.wheel.face_width)
+    width = pair.common_width
     single = single_stiffness(pair, pinion_modulus, wheel_modulus)
     mean = mesh_stiffness(pair, pinion_modulus, wheel_modulus)
     return {

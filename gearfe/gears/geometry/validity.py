@@ -76,6 +76,11 @@ def check_spur(pair: MeshGeometry, what: str) -> None:
     if pair.pinion.helical:
         problem = f"is of a helical gear: {what} takes spur gears only"
         raise InputError("pinion.helix_angle", pair.pinion.helix_angle, problem, "use gears without helix angle")
+    smaller = min(pair.pinion.face_width, pair.wheel.face_width)
+    if pair.common_width < smaller * (1.0 - 1e-9):
+        problem = f"leaves {1e3 * pair.common_width:.4g} mm in common: {what} needs all of the smaller face width"
+        cure = "leave it out, or use gearfe.gears.width, which takes the common width"
+        raise InputError("axial_offset", getattr(pair, "axial_offset", None), problem, cure)
 
 
 def check_pair(pair: MeshGeometry) -> None:

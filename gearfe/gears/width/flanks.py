@@ -2,7 +2,7 @@ r"""The gap that modifications and misalignment put between two flanks with face
 
 The gap of a tooth pair at z, in the transverse section along the common normal, is
 
-.. math:: d = -\big(h_1(s_1, z) + h_2(s_2, z)\big) - z'\,\big(\gamma\, n\cdot e + \gamma_q\, n\cdot q\big)
+.. math:: d = -\big(h_1(s_1, z) + h_2(s_2, z)\big) - z'\,\big(\gamma\, n\cdot e - \gamma_q\, n\cdot q\big)
 
 with the material h that each gear's modifications add at roll length s and axial coordinate z, and the tilts
 :math:`\gamma` in the plane of action and :math:`\gamma_q` across it of the wheel's axis against the pinion's, which
@@ -27,8 +27,6 @@ from ..geometry.face import NOMINAL, ToothDeviations
 
 #: Material (m) that is added to a flank at roll lengths (m), axial coordinates z (m) and teeth, arrays of one shape.
 Topography = Callable[[Array, Array, IntArray], Array]
-#: Largest modification, in modules: more is geometry, and the gap is no longer small.
-MOST_MODIFICATION = 0.05
 
 
 @dataclass(frozen=True)
@@ -103,8 +101,8 @@ class Misalignment:
     Parameters
     ----------
     in_plane, across
-        In the plane of action and across it (rad), > 0: closes the gap towards larger z; `across` moves the wheel's
-        sections there to the left of the common normal out of the pinion.
+        In the plane of action (rad), > 0: closes the gap towards larger z; across it, > 0: moves the wheel's sections
+        there to the left of the common normal out of the pinion.
     """
 
     in_plane: float = 0.0

@@ -20,7 +20,7 @@ tangent over twist and tilts follows from the same matrix: :math:`B^T(T + c')^{-
 polynomials along the axis do not resolve: the half-plane's :math:`2/(\pi E')` grows there by
 :math:`\tfrac{\nu^2}{1-\nu^2}\tfrac12\ln(1 + a^2/(\zeta + a_0)^2)` with the distance :math:`\zeta` from the end and
 the half width a of the bumps. The factor is theory, the form between bump and depth a guess that 3D contacts of
-another program bear out within 3 % of the load in the last 0.4 mm (docs/face_width.md).
+another program bear out within 4 % of the load in the last 0.4 mm; `AT_END` was chosen on them (docs/face_width.md).
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class ContactLines:
         """Approach of the flanks at z (m) per tilt in the plane of action and across it, shape (n, 2) (m/rad)."""
         seen = rows.normal / self.law.forward
         off = z - 0.5 * sum(self.compliance.mesh.zone)
-        return np.stack([off * seen.real, off * seen.imag], axis=1)
+        return np.stack([off * seen.real, -off * seen.imag], axis=1)
 
 
 def contact_lines(

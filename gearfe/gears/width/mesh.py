@@ -104,7 +104,7 @@ class WideMesh:
 
     @property
     def module(self) -> float:
-        """Transverse module (m)."""
+        """Module of the pinion (m): of helical gears that of the normal section."""
         return self.sections.pinion.module
 
     @cached_property

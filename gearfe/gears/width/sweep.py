@@ -27,7 +27,6 @@ from ...base.errors import InputError
 from ...base.progress import Stopwatch, one_thread
 from ...base.typing import Array, IntArray
 from ..geometry.validity import MOST_YIELD
-from .compliance import legendre
 from .lines import ContactLines, Solution, solve_position
 
 #: Pinion angles of a mesh cycle where none are given; places along the width of the mean load.
@@ -279,17 +278,36 @@ def _load_factors(lines: ContactLines, angles: Array, solved: Sequence[Solution]
     if not any(one.moment.sum() > 0 for _, one in good):
         return math.nan, math.nan
     along = np.linspace(*mesh.zone, ALONG)
-    functions = legendre(along, mesh.zone, mesh.count)
     mean, most, even = np.zeros(ALONG), 0.0, 0.0
     for angle, one in good:
         force = one.moment / one.points.rows.arm
-        mean += functions @ (legendre(one.points.z, mesh.zone, mesh.count).T @ force) / len(good)
+        mean += _line_loads(one.points.pair, one.points.z, one.points.weight, force, along) / len(good)
         most = max(most, float((force / one.points.weight).max(initial=0.0)))
         length = _line_length(lines, angle)
         if length > 0:
             even = max(even, float(force.sum()) / length)
     face = float(mean.max() / np.trapezoid(mean, along) * mesh.width)
     return face, most / even / face if even > 0 else math.nan
+
+
+def _line_loads(pair: IntArray, z: Array, weight: Array, force: Array, along: Array) -> Array:
+    """Load per width (N/m) of all lines at places along z, straight between the points of each line.
+
+    Parameters
+    ----------
+    pair, z, weight, force : (n,)
+        Tooth pair, place (m), width (m) and force (N) of the points.
+    along : (k,)
+        Places (m).
+    """
+    load = np.zeros(len(along))
+    for number in np.unique(pair):
+        own = np.flatnonzero(pair == number)
+        own = own[np.argsort(z[own])]
+        first, last = own[0], own[-1]
+        inside = (along >= z[first] - 0.5 * weight[first]) & (along <= z[last] + 0.5 * weight[last])
+        load += np.where(inside, np.interp(along, z[own], force[own] / weight[own]), 0.0)
+    return load
 
 
 def _line_length(lines: ContactLines, angle: float) -> float:
