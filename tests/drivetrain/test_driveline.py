@@ -232,6 +232,28 @@ def test_rolling_bearings_of_a_train_by_torque_are_those_of_the_load() -> None:
         np.testing.assert_allclose(two, one, rtol=1e-6, atol=1e-6 * np.abs(one).max())
 
 
+def test_a_start_from_rest_does_not_matter_for_the_operating_point() -> None:
+    made = chain(torque=constant(40.0), slope=0.1)
+    names = [bore for shaft in made.shafts for bore in shaft.bores]
+    made = changed(made, bearings=tuple(Bearing(name, BallBearing(8, 7.9e-3, 33.5e-3)) for name in names))
+    resting = changed(
+        made,
+        shafts=tuple(dataclasses.replace(shaft, initial_speed=0.0) for shaft in made.shafts),
+        machines=tuple(dataclasses.replace(machine, initial_speed=0.0) for machine in made.machines),
+    )
+    for name in names:
+        one, two = (build_train(x).operating.bearings[name].stiffness for x in (made, resting))
+        np.testing.assert_array_equal(one, two)
+
+
+def test_shafts_of_a_coupling_do_not_overlap() -> None:
+    made = coupled()
+    inside = tuple(dataclasses.replace(s, point=(0.0, -0.07, 0.0)) if s.name == "in" else s for s in made.shafts)
+    bores = {**made.rigid_bores, "in+": (0.0, -0.06, 0.0), "in-": (0.0, -0.08, 0.0)}
+    with pytest.raises(InputError, match=r"coupling 'clutch': shafts 'in' and 's0' overlap by \d+"):
+        build_train(changed(made, shafts=inside, rigid_bores=bores))
+
+
 def test_gears_of_a_train_by_torque_tilt_as_those_of_one_by_speed() -> None:
     made = chain()
     names = [bore for shaft in made.shafts for bore in shaft.bores]
@@ -373,6 +395,11 @@ WRONG_KEYS: list[tuple[dict[str, Any], str]] = [
     ({"couplings": {"c": {"shafts": ["s1", "s2"]}}}, r"couplings\.c\.stiffness_Nm_per_rad: is required"),
     ({"couplings__c": {"shafts": ["s1", "s2"], **SOFT}}, r"coupling 'c': shafts .* 55 mm apart"),
     ({"train__drive__machine": "saw"}, r"train\.drive\.machine: unknown name 'saw'.*motor"),
+    (
+        {"train__drive": {"shaft": "s1", "machine": "motor", "speed_rad_per_s": 1.0, "y_mm": 7.0}},
+        r"train\.drive\.y_mm = 7.0: stands beside machine",
+    ),
+    ({"train__loads": [{**LOAD, "machine": "saw", "y_mm": 7.0}]}, r"loads\[0\]\.y_mm = 7.0: stands beside machine"),
     ({"train__loads": [{**LOAD, "machine": "x"}]}, r"train\.loads\[0\]\.machine: unknown name 'x'"),
     ({"train__drive__torque_slope_Nm_s_per_rad": 1.0}, r"torque_slope_Nm_s_per_rad = 1.0: is of a torque"),
     (

@@ -12,7 +12,9 @@ import pytest
 from gearfe.base.errors import InputError
 from gearfe.drivetrain.modes import energies
 from gearfe.drivetrain.modes.critical import campbell, crossings
+from gearfe.drivetrain.modes.job import ModesResult
 from gearfe.drivetrain.modes.orders import train_orders
+from gearfe.drivetrain.modes.report import warnings
 from gearfe.drivetrain.modes.swinging import swinging, write_modes
 from gearfe.drivetrain.modes.whirl import WhirlModes, train_modes
 from gearfe.drivetrain.train import Bearing, Damping, Drive, GearTrain, Load, Shaft, ShaftGear, TrainModel, build_train
@@ -305,6 +307,15 @@ def test_coordinates_of_elastic_shafts_are_of_the_kinds_that_the_reduction_gives
         assert (sum(its.kinds) == np.eye(body.size)).all()
         pairs = [(list(a).index(1.0), list(b).index(1.0)) for a, b in zip(its.first[2:], its.second[2:], strict=True)]
         assert [b - a for a, b in pairs] == [1] * (body.reduced.kinds.count("bending e1"))
+
+
+def test_a_band_beyond_the_modes_of_elastic_shafts_is_a_warning() -> None:
+    """Their own modes are kept up to 20 kHz, which serves a band up to 1 / 1.5 of that."""
+    model = bent_train()
+    for band, names in ((13e3, 0), (15e3, 2)):
+        diagram = campbell(train_modes(model, [100.0, 600.0], band), train_orders(model, 1, 0), band)
+        found = warnings(ModesResult(model, diagram, 600.0))
+        assert sum("highest_frequency_Hz = 22500" in sentence for sentence in found) == names
 
 
 def test_elastic_shafts_whirl_forward_faster_and_backward_slower() -> None:

@@ -367,7 +367,8 @@ class TrainDriveTable:
     damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of that coupling (N m s/rad)")
 
     def check(self, where: str) -> None:
-        """A ramp is of a number; a torque leaves the speed free."""
+        """A ramp is of a number; a torque leaves the speed free; a machine has its own place."""
+        _check_place(where, self.machine, self.y_mm)
         _check_ramp(where, "speed_rad_per_s", self.speed_rad_per_s, self.ramp_width_ms)
         if self.torque_Nm is None and self.torque_slope_Nm_s_per_rad:
             problem = "is of a torque, and none is given"
@@ -410,11 +411,18 @@ class TrainLoadTable:
     ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant torque")
 
     def check(self, where: str) -> None:
-        """A ramp is of a number, a mesh of orders."""
+        """A ramp is of a number, a mesh of orders; a machine has its own place."""
+        _check_place(where, self.machine, self.y_mm)
         _check_ramp(where, "torque_Nm", self.torque_Nm, self.ramp_width_ms)
         if self.mesh and not self.orders:
             problem = "is the mesh of orders, and there are none"
             raise InputError(f"{where}.mesh", self.mesh, problem, "add orders, or leave it out")
+
+
+def _check_place(where: str, machine: str, y_mm: float | None) -> None:
+    if machine and y_mm is not None:
+        problem = "stands beside machine, which has a place of its own"
+        raise InputError(f"{where}.y_mm", y_mm, problem, f"give y_mm of the machine {machine!r}, or leave machine out")
 
 
 def _check_ramp(where: str, key: str, value: float | TrainFunctionTable, width: float | None) -> None:

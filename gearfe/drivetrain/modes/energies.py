@@ -166,7 +166,7 @@ def _strain(model: TrainModel, parts: list[Part], number: int) -> list[Form]:
     if kind == MESH:
         return [Form(parts.index(Part(MESH, name)), rows, blocks[1] @ rows)]
     touched = [i for i, body in enumerate(model.shafts) if body is element or body in element.touches]
-    shaft = touched[0] if touched else 0
+    shaft = touched[0] if touched else model.train.shaft_number(model.train.driven.shaft)
     if element in model.shafts:
         chosen = enumerate(_coordinates(model, shaft).kinds)
         return [Form(3 * shaft + kind, pick @ rows, pick @ blocks[1] @ rows) for kind, pick in chosen]

@@ -84,14 +84,17 @@ def band_of(job: TrainJob) -> float:
 def at_speed(job: TrainJob, speed: float) -> TrainJob:
     """The job with a constant speed of its drive (rad/s), whose sense decides which flanks drive.
 
-    A drive by torque becomes one by speed: modes and steady states are those at a speed.
+    A drive by torque becomes one by speed, and speeds at the start are left out: modes and steady states are those at a
+    speed.
     """
     if job.table.drive is None:
         return job
     drive = replace(
         job.table.drive, speed_rad_per_s=speed, ramp_width_ms=None, torque_Nm=None, torque_slope_Nm_s_per_rad=0.0
     )
-    return replace(job, table=replace(job.table, drive=drive))
+    shafts = tuple(replace(shaft, initial_speed_rad_per_s=None) for shaft in job.table.shafts)
+    machines = tuple(replace(machine, initial_speed_rad_per_s=None) for machine in job.table.machines)
+    return replace(job, table=replace(job.table, drive=drive, shafts=shafts, machines=machines))
 
 
 def _running(job: TrainJob) -> float:

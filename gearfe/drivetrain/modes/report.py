@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from .critical import Campbell
+from .critical import Campbell, nearest
 from .job import ModesResult
 from .orders import TrainOrder
 from .whirl import WhirlModes
+
+#: Modes of elastic shafts are kept up to so many times the highest frequency of interest (docs/beams.md).
+KEPT = 1.5
 
 
 def tables(found: Campbell) -> dict[str, dict[str, Any]]:
@@ -19,7 +22,7 @@ def tables(found: Campbell) -> dict[str, dict[str, Any]]:
 
 def summary(result: ModesResult) -> dict[str, Any]:
     """What summary.json says of the modes."""
-    modes, row = result.campbell.modes, result.campbell.modes.fastest
+    modes = result.campbell.modes
     return {
         "speed_start_rad_per_s": float(modes.speeds[0]),
         "speed_stop_rad_per_s": float(modes.speeds[-1]),
@@ -30,7 +33,7 @@ def summary(result: ModesResult) -> dict[str, Any]:
         "critical_speeds": [
             {
                 "speed_rad_per_s": c.speed, "frequency_Hz": c.frequency, "order": c.cut.name, "mode": c.mode + 1,
-                "label": modes.labels[row][c.mode], "excited": result.campbell.excited(c),
+                "label": modes.labels[nearest(modes, c.speed)][c.mode], "excited": result.campbell.excited(c),
             }
             for c in result.campbell.met
         ],
@@ -41,7 +44,14 @@ def summary(result: ModesResult) -> dict[str, Any]:
 
 def warnings(result: ModesResult) -> list[str]:
     """Sentences about what a reader must know."""
-    return [*result.model.rounding_notes, *result.model.operating.warnings]
+    band = result.campbell.band_hz
+    few = [
+        f"shaft {shaft.name}: its own modes are kept up to {shaft.highest_hz:g} Hz, and the band ends at {band:g} Hz: "
+        f"modes may be missing there; give highest_frequency_Hz = {KEPT * band:g}"
+        for shaft in result.model.train.shafts
+        if shaft.sections and shaft.highest_hz < KEPT * band
+    ]
+    return [*result.model.rounding_notes, *result.model.operating.warnings, *few]
 
 
 def mode_entries(modes: WhirlModes) -> list[dict[str, Any]]:

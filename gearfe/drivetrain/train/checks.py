@@ -290,6 +290,11 @@ def _check_driveline(train: GearTrain) -> None:
         if apart > SAME * max(one.length, two.length):
             problem = f"shafts {one.name!r} and {two.name!r} are {1e3 * apart:.6g} mm apart: must lie on one axis"
             raise InputError(label, None, problem, "move one (x_mm, z_mm), or let gears connect them")
+        middles = abs(train.shaft_end(one.name, 0.0) - train.shaft_end(two.name, 0.0))
+        common = 0.5 * (one.length + two.length) - middles
+        if common > SAME * max(one.length, two.length):
+            problem = f"shafts {one.name!r} and {two.name!r} overlap by {1e3 * common:.6g} mm along their axis"
+            raise InputError(label, None, problem, "move one along it (y_mm), or shorten it")
     drive = train.driven
     if drive.torque is None:
         if drive.slope > 0.0:

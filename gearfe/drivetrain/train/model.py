@@ -193,7 +193,13 @@ def _operating_point(train: GearTrain) -> OperatingPoint:
     bearings = rolling_bearings(train)
     if not bearings:
         return OperatingPoint()
-    model = _assembled(typical(replace(train, drive=replace(train.driven, torque=None, slope=0.0))))
+    at_speed = replace(
+        train,
+        drive=replace(train.driven, torque=None, slope=0.0),
+        shafts=tuple(replace(shaft, initial_speed=None) for shaft in train.shafts),
+        machines=tuple(replace(machine, initial_speed=None) for machine in train.machines),
+    )
+    model = _assembled(typical(at_speed))
     placed = model.placed
     motions = {name: shaft_motion(model.train, placed, name) for name in bearings}
     stiffness = model.system.stiffness.copy()

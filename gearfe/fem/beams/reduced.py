@@ -20,7 +20,7 @@ the elastic ones of the plane of e2.
 
 **How many coordinates.** With a residual vector for each load that acts on the shaft, free modes up to 1.5 times the
 highest frequency of interest suffice; more raise the highest frequency of a train, which sets the steps of explicit
-integrators. A station should list the loads that act there and no others. `docs/shafts.md` has the figures.
+integrators. A station should list the loads that act there and no others. `docs/beams.md` has the figures.
 """
 
 from __future__ import annotations
