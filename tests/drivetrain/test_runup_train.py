@@ -439,7 +439,7 @@ def test_a_step_along_the_curve_does_not_end_on_another_one(tmp_path):
     assert summary["speeds_reached"] == 100
     rows = np.genfromtxt(tmp_path / "out" / "runup.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
     turning = set(summary["turning_speeds_rad_per_s"])
-    assert len(turning) == len(set(rows["branch"])) - 1
+    assert len(turning) == rows["branch"].max()  # branches count from 0; one between near turns may have no speed asked
     asked = np.linspace(100.0, 1200.0, 100)
     for branch in set(rows["branch"]):  # between two turning points the speed rises or falls
         speeds = rows["speed_rad_per_s"][rows["branch"] == branch]
