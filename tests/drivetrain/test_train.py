@@ -330,3 +330,16 @@ def test_reduced_against_full_housing_in_the_coupled_transient() -> None:
 def test_periods_of_other_trains() -> None:
     assert train([(17, 34)]).kinematics.common_turns == pytest.approx(1 / 17)
     assert train([(20, 30), (30, 20)]).kinematics.common_turns == pytest.approx(1 / 20)
+
+
+def test_gears_that_share_a_part_of_their_width_are_a_note():
+    """A computed mesh model is that of the whole width; a given constant is what the user wrote."""
+    for stiffness, notes in ((curve, 1), (1e8, 0)):
+        made = train([(20, 30)], stiffness=stiffness)
+        moved = tuple(
+            dataclasses.replace(one, along=one.along + 4e-3) if one.name == "g0" else one for one in made.gears
+        )
+        assert len(build_train(made).mesh_notes) == 0
+        found = build_train(dataclasses.replace(made, gears=moved)).mesh_notes
+        assert len(found) == notes
+        assert all("share 6 of 10 mm of face width" in note for note in found)

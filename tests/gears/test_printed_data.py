@@ -333,10 +333,10 @@ def test_shafts_as_far_apart_as_printed_carry_their_gears(distance: str, tmp_pat
     line = model.meshes[0]
     assert line.pair.normal_backlash == 0.0
     assert model.kinematics.steady_forces[0] == 0.0
-    assert [note for note in model.rounding_notes if note.startswith("mesh g1-g2: the centre distance jams")] == (
-        model.rounding_notes if distance else []
+    assert [note for note in model.mesh_notes if note.startswith("mesh g1-g2: the centre distance jams")] == (
+        model.mesh_notes if distance else []
     )
-    assert bool(model.rounding_notes) == bool(distance)  # without the distance nothing jams
+    assert bool(model.mesh_notes) == bool(distance)  # without the distance nothing jams
     job.write_text(TRAIN.format(distance="", x=91.49))
     with pytest.raises(InputError, match=r"are 91.49 mm apart, the gears need 91.500"):
         build_train(job_train(read_train_job(job)))

@@ -51,7 +51,7 @@ def warnings(result: ModesResult) -> list[str]:
         for shaft in result.model.train.shafts
         if shaft.sections and shaft.highest_hz < KEPT * band
     ]
-    return [*result.model.rounding_notes, *result.model.operating.warnings, *few]
+    return [*result.model.mesh_notes, *result.model.operating.warnings, *few]
 
 
 def mode_entries(modes: WhirlModes) -> list[dict[str, Any]]:

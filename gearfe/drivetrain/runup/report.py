@@ -172,7 +172,7 @@ def phases(run: RunUp) -> list[dict[str, Any]]:
 
 def warnings(run: RunUp) -> list[str]:
     """Sentences about what a reader must know."""
-    found = [*run.train.model.rounding_notes, *run.train.model.operating.warnings, *run.notes]
+    found = [*run.train.model.mesh_notes, *run.train.model.operating.warnings, *run.notes]
     for i, line in enumerate(run.train.model.meshes):
         if line.pulls:
             low = [(float(s.force[:, i].min()), s.speed) for s in run.states]

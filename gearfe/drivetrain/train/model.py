@@ -23,7 +23,7 @@ from ...multibody import Element, LinearJoint, LocalForce, ModalBlocks, Start, S
 from ...multibody.core.elimination import ModalCoordinates, modal_coordinates
 from ...multibody.series.timefunctions import sine
 from .bearings import BearingLoads, bearing_loads, bore_motion, shaft_motion
-from .checks import check_train
+from .checks import SAME, check_train, overlap
 from .driveline import Driveline, MachineRotor, driveline, machine_rotors
 from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, rotor
 from .forces import Gyro, TrainForces, derivative
@@ -144,9 +144,18 @@ class TrainModel(Facts):
         return np.sqrt(np.maximum(self.modal.eigenvalues, 0.0)) / (2.0 * math.pi)
 
     @property
-    def rounding_notes(self) -> list[str]:
-        """How gears of meshes were taken whose data fit each other except for rounding, one sentence each."""
-        return [f"mesh {line.name}: {note}" for line in self.meshes for note in line.pair.notes]
+    def mesh_notes(self) -> list[str]:
+        """How gears of meshes were taken, one sentence each: data that fit except for rounding, widths in part."""
+        notes = [f"mesh {line.name}: {note}" for line in self.meshes for note in line.pair.notes]
+        for line in self.meshes:
+            one, two = self.train.gear(line.given.driver), self.train.gear(line.given.driven)
+            common, smaller = overlap(one, two), min(one.gear.face_width, two.gear.face_width)
+            if common < smaller * (1.0 - SAME) and not isinstance(line.given.stiffness, float | int | None):
+                notes.append(
+                    f"mesh {line.name}: the gears share {1e3 * common:.4g} of {1e3 * smaller:.4g} mm of face width: "
+                    "a computed mesh model is that of all of it; gearfe stiffness takes the common width"
+                )
+        return notes
 
     @property
     def placed(self) -> Shafts:

@@ -255,7 +255,7 @@ def _whole(
     options: TransientOptions,
 ) -> TrainResponse:
     """The last piece with estimates and warnings of the whole run."""
-    warnings = model.rounding_notes + model.operating.warnings + totals.pulls(model) + _loose(model)
+    warnings = model.mesh_notes + model.operating.warnings + totals.pulls(model) + _loose(model)
     if response.status != "done":
         warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms {ended}")
     estimates: dict[str, float] = {}
