@@ -387,5 +387,14 @@ def test_mistakes_are_named(name: str) -> None:
 def test_two_bearings_at_one_place() -> None:
     given = bent()
     bores = {**given.rigid_bores, "s0-": given.rigid_bores["s0+"]}
-    with pytest.raises(InputError, match="at the same place"):
+    with pytest.raises(InputError, match=r"lies 0 mm from bearing .* they overlap"):
         build_train(dataclasses.replace(given, rigid_bores=bores))
+
+
+def test_a_speed_is_measured_where_the_drive_acts() -> None:
+    """A drive at a place of its own, against the ground: the section there, not the one at the first bore."""
+    given = bent()
+    place = given.bore_points["s0-"][1] + 5e-3
+    drive = dataclasses.replace(given.driven, bore=None, along=float(place))
+    model = build_train(dataclasses.replace(given, drive=drive))
+    np.testing.assert_allclose(model.spin[0], model.drive_row, atol=1e-12 * np.abs(model.drive_row).max())

@@ -298,15 +298,23 @@ def bent_train() -> TrainModel:
     return build_train(dataclasses.replace(made, shafts=shafts, bearings=bearings))
 
 
-def test_coordinates_of_elastic_shafts_are_of_the_kinds_that_the_reduction_gives() -> None:
+def test_coordinates_of_elastic_shafts_move_their_sections_as_their_kinds_say() -> None:
+    """A quarter of a turn about the axis takes bending along e1 to that along e2, and a tilt about e2 to -e1."""
     model = bent_train()
+    frame = model.train.frame
+    moves = {"bending e1": (0, 4), "bending e2": (1, 3), "axial": (2,), "torsion": (5,)}
     for number, body in enumerate(model.shafts):
-        its = energies._coordinates(model, number)
-        kinds = [energies.KINDS[int(np.argmax([kind[j, j] for kind in its.kinds]))] for j in range(6, body.size)]
-        assert kinds == [kind.split()[0] for kind in body.reduced.kinds]
-        assert (sum(its.kinds) == np.eye(body.size)).all()
-        pairs = [(list(a).index(1.0), list(b).index(1.0)) for a, b in zip(its.first[2:], its.second[2:], strict=True)]
-        assert [b - a for a, b in pairs] == [1] * (body.reduced.kinds.count("bending e1"))
+        middle = float(np.array(model.train.shafts[number].point) @ frame[2])
+        rows = body.section_rows(middle + np.linspace(-0.04, 0.04, 5), frame)
+        motion = np.concatenate([frame @ rows[:, :3], frame @ rows[:, 3:]], axis=1)
+        for coordinate, kind in enumerate(body.kinds, start=6):
+            others = np.setdiff1d(np.arange(6), moves[kind])
+            assert np.abs(motion[:, others, coordinate]).max() < 1e-9 * np.abs(motion[:, :, coordinate]).max()
+        whirl = energies._coordinates(model, number)
+        assert (sum(whirl.kinds) == np.eye(body.size)).all()
+        for first, second in zip(whirl.first[2:], whirl.second[2:], strict=True):
+            one, two = motion @ first, motion @ second
+            assert two[:, (1, 3)] == pytest.approx(one[:, (0, 4)] * (1.0, -1.0), rel=1e-12)
 
 
 def test_a_band_beyond_the_modes_of_elastic_shafts_is_a_warning() -> None:

@@ -80,7 +80,8 @@ def test_more_functions_hardly_change_spur_gears(flanks):
 
 #: Prototype's page "The face width", section 3: CalculiX 2.20, surface to surface, one sector of each gear with the
 #: cuts held, pitch point, flank elements 0.045 mm: ends of the layers from the middle, or from the loaded end (mm), and
-#: their loads (N/mm); torque at the twist (rad) that was given.
+#: their loads (N/mm); torque at the twist (rad) that was given. The page does not print the twists: they are those that
+#: the prototype, on coarse sections, finds at 100 N m.
 CALCULIX = {
     "plain": (WideFlanks(), 3.6928e-4, [0, 1.35, 2.65, 3.65, 4.35, 4.75, 5],
               [296.8, 293.1, 299.0, 298.5, 290.5, 261.7], 100.04),
@@ -103,7 +104,7 @@ def test_load_over_the_width_is_that_of_a_3d_contact_of_calculix(case):
     for low, high, known in zip(ends[:-1], ends[1:], expected, strict=True):
         at = 1e-3 * np.linspace(low, high, 400)
         mean = np.interp(at, points.z, load).mean()
-        last = max(abs(low), abs(high)) > 4.7
+        last = max(abs(low), abs(high)) > 4.8
         assert abs(mean - known) < (0.04 if last else 0.02) * max(expected)
 
 
@@ -118,15 +119,17 @@ def test_hand_mirrored_with_z_is_the_same(flanks):
 
 
 def test_exchanged_gears_are_the_same():
-    """Where tips bear, torques do not have the ratio of the teeth and the rolling angles differ by the twist: 0.1 %."""
+    """In one position of both gears, the wheel turned by the twist; points are placed anew: 0.05 %."""
     lines, other = helical_lines(), helical_lines(swapped=True)
     sections = lines.compliance.mesh.sections
-    ratio = sections.gear_ratio
+    ratio, turned = sections.gear_ratio, math.pi / sections.wheel.teeth
     angles = np.array([0.02, 0.11, 0.2])
     one = sweep_width(lines, [100.0], angles=angles)
-    two = sweep_width(other, [100.0 / ratio], angles=math.pi / sections.wheel.teeth - angles / ratio)
-    assert np.allclose(one.transmission_error, two.transmission_error, rtol=1e-3, atol=0)
-    assert np.allclose(one.axial_force, -two.axial_force, rtol=1e-9, atol=0)
+    for number, (angle, twist) in enumerate(zip(angles, one.twist[0], strict=True)):
+        two = sweep_width(other, twists=[twist * ratio], angles=[turned - angle / ratio + twist])
+        forces = [np.linalg.norm(force[:2]) for force in (one.force[0, number], two.force[0, 0])]
+        assert forces[1] == pytest.approx(forces[0], rel=5e-4)
+        assert two.axial_force[0, 0] == pytest.approx(-one.axial_force[0, number], rel=5e-4)
 
 
 def energy(lines, solution):

@@ -195,8 +195,8 @@ class _Coordinates(NamedTuple):
 def _coordinates(model: TrainModel, number: int) -> _Coordinates:
     """Kinds of a shaft's coordinates, and the places that go round in its bending.
 
-    Those of the mean motion are known. Each elastic one, of unit mass, is of one kind, which its motion at gears and
-    bores shows; bending comes in pairs of equal shapes along e1 and e2.
+    Those of the mean motion are known. Each elastic one, of unit mass, is of one kind; bending comes in pairs of equal
+    shapes along e1 and e2.
     """
     body, frame = model.shafts[number], model.train.frame
     bends, turns, shifts = (np.zeros((body.size, body.size)) for _ in KINDS)
@@ -207,35 +207,14 @@ def _coordinates(model: TrainModel, number: int) -> _Coordinates:
     first[0, :3], second[0, :3] = frame[0], frame[1]
     first[1, 3] = second[1, 4] = 1.0
     mass = [body.rotor.mass, body.rotor.transverse]
-    if body.size == 6:
-        return _Coordinates((bends, turns, shifts), first, second, np.array(mass))
-    along1, along2, twist, shift = _section_motion(model, number)
-    sizes = np.array([np.linalg.norm(x, axis=0) for x in (along1, along2, twist, shift)])
-    planes: tuple[list[int], list[int]] = ([], [])
-    for j, kind in enumerate(sizes[:, 6:].argmax(axis=0).tolist(), start=6):
-        (bends, bends, turns, shifts)[kind][j, j] = 1.0
-        if kind < 2:
-            planes[kind].append(j)
     unit, rows, others = np.eye(body.size), [first], [second]
-    for one, two in zip(*planes, strict=True):
+    planes: dict[str, list[int]] = {"bending e1": [], "bending e2": []}
+    for coordinate, kind in enumerate(body.kinds, start=6):
+        {"bending": bends, "torsion": turns, "axial": shifts}[kind.split()[0]][coordinate, coordinate] = 1.0
+        if kind in planes:
+            planes[kind].append(coordinate)
+    for one, two in zip(*planes.values(), strict=True):
         rows.append(unit[[one]])
-        others.append(float(np.sign(along1[:, one] @ along2[:, two])) * unit[[two]])
+        others.append(unit[[two]])
         mass.append(1.0)
     return _Coordinates((bends, turns, shifts), np.vstack(rows), np.vstack(others), np.array(mass))
-
-
-def _section_motion(model: TrainModel, number: int) -> tuple[Array, Array, Array, Array]:
-    """Motion of a shaft's gears and bores per unit coordinate, rotations times its length: bending along e1 and along
-    e2, (2 places, size) each, twist and shift along the axis, (places, size) each.
-    """
-    train, body, shaft = model.train, model.shafts[number], model.train.shafts[number]
-    frame, base = train.frame, np.array(shaft.point)
-    places = [gear.along for gear in train.gears if gear.shaft == shaft.name]
-    places += [float(train.bore_points[bore] @ frame[2]) for bore in shaft.bores]
-    moved, turned = [], []
-    for along in places:
-        moved.append(frame @ body.point_rows(base + (along - float(base @ frame[2])) * frame[2], frame, along))
-        turned.append(shaft.length * body.turn_rows(along))
-    u, r = np.array(moved), np.array(turned)
-    # a quarter of a turn about the axis takes e1 to e2, and a rotation about e2 to one against e1
-    return np.vstack([u[:, 0], r[:, 1]]), np.vstack([u[:, 1], -r[:, 0]]), r[:, 2], u[:, 2]

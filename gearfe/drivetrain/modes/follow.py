@@ -65,7 +65,7 @@ def follow_modes(train: TurningTrain, speeds: Array, highest_hz: float) -> Track
     rising = np.argsort(np.abs(speeds), kind="stable")
     steps = [train.poles(float(speeds[rising[0]]))]
     for one, two in itertools.pairwise(rising):
-        steps.append(_onward(train, steps[-1], (float(speeds[one]), float(speeds[two])), highest_hz, HALVINGS))
+        steps.append(_follow_step(train, steps[-1], (float(speeds[one]), float(speeds[two])), highest_hz, HALVINGS))
     count, back = len(steps[-1].values), np.argsort(rising)
     made = Tracks(*(np.array([_padded(x, count) for x in values])[back] for values in _columns(steps)))
     with np.errstate(invalid="ignore"):
@@ -85,7 +85,9 @@ def _padded(values: ComplexArray, count: int) -> ComplexArray:
     return np.pad(values, more, constant_values=np.nan)
 
 
-def _onward(train: TurningTrain, before: Poles, speeds: tuple[float, float], highest_hz: float, halvings: int) -> Poles:
+def _follow_step(
+    train: TurningTrain, before: Poles, speeds: tuple[float, float], highest_hz: float, halvings: int
+) -> Poles:
     """Modes at the second of two speeds in the order of those at the first; new ones come last."""
     after = train.poles(speeds[1])
     alike = np.abs(np.nan_to_num(before.vectors).conj().T @ after.vectors) ** 2
@@ -94,8 +96,8 @@ def _onward(train: TurningTrain, before: Poles, speeds: tuple[float, float], hig
     matters = size <= 2.0 * math.pi * highest_hz  # not of one that does not swing at the first speed
     if halvings and (alike[tracks, numbers][matters] < ALIKE).any():
         middle = 0.5 * (speeds[0] + speeds[1])
-        half = _onward(train, before, (speeds[0], middle), highest_hz, halvings - 1)
-        return _onward(train, half, (middle, speeds[1]), highest_hz, halvings - 1)
+        half = _follow_step(train, before, (speeds[0], middle), highest_hz, halvings - 1)
+        return _follow_step(train, half, (middle, speeds[1]), highest_hz, halvings - 1)
     new = np.setdiff1d(np.arange(len(after.values)), numbers)
     place = np.full(len(before.values) + len(new), -1)
     place[tracks] = numbers

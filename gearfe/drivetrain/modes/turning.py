@@ -77,7 +77,7 @@ class TurningTrain:
         chosen = np.flatnonzero(values.imag > least)
         chosen = chosen[np.argsort(values.imag[chosen], kind="stable")]
         values, vectors = values[chosen].astype(complex), vectors[:, chosen].astype(complex)
-        vectors = self._apart(values, vectors / np.linalg.norm(vectors, axis=0))
+        vectors = self._separated(values, vectors / np.linalg.norm(vectors, axis=0))
         rates = vectors[n:]
         return Poles(values, vectors, (rates.conj() * (self.gyroscopic @ rates)).sum(axis=0))
 
@@ -87,7 +87,7 @@ class TurningTrain:
         rate = vectors[n:]
         return rate / np.where(values == 0.0, 1.0, values), rate
 
-    def _apart(self, values: ComplexArray, vectors: ComplexArray) -> ComplexArray:
+    def _separated(self, values: ComplexArray, vectors: ComplexArray) -> ComplexArray:
         """Vectors of equal eigenvalues as those that the modes have as the speed changes, orthogonal to each other."""
         for together in _clusters(values):
             basis = np.linalg.qr(vectors[:, together])[0]
@@ -131,7 +131,7 @@ def turning_train(model: TrainModel, kinds: Array) -> TurningTrain:
 
 
 def _clusters(values: ComplexArray) -> list[slice]:
-    """Groups of eigenvalues, sorted by their imaginary parts, that are equal but for round-off."""
+    """Groups of eigenvalues, sorted by their imaginary parts, that are equal except for round-off."""
     if not len(values):
         return []
     near = EQUAL * np.abs(values) + np.finfo(float).eps * 1e2 * np.abs(values).max()

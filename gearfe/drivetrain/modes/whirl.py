@@ -195,13 +195,13 @@ class WhirlModes(ShownTable):
 
     def below(self, highest_hz: float) -> WhirlModes:
         """Those that come below a frequency at some of the speeds."""
-        return self.taking(self.inside(highest_hz))
+        return self.select(self.inside(highest_hz))
 
     def inside(self, highest_hz: float) -> IntArray:
         """Numbers, from 0, of the modes that come below a frequency at some of the speeds."""
         return np.flatnonzero((np.where(np.isnan(self.frequency), np.inf, self.frequency) <= highest_hz).any(axis=0))
 
-    def taking(self, numbers: IntArray) -> WhirlModes:
+    def select(self, numbers: IntArray) -> WhirlModes:
         """Modes of these numbers, from 0, in this order."""
         fields = ("frequency", "damping_ratio", "slope", "kinetic", "strain", "whirl", "whirl_weight", "shapes")
         return replace(self, **{name: getattr(self, name)[:, numbers] for name in fields})

@@ -69,7 +69,7 @@ def critical_speeds(run: RunUp, multiples: int, shaft_multiples: int = 2) -> Cri
     highest = (1.0 + NEAR) * max(run.band_hz, *(float(state.frequency.max()) for state in run.states))
     every = train_modes(model, speeds, highest)
     inside = every.inside(run.band_hz)  # first, so that a mode has one number
-    every = every.taking(np.concatenate([inside, np.setdiff1d(np.arange(every.frequency.shape[1]), inside)]))
+    every = every.select(np.concatenate([inside, np.setdiff1d(np.arange(every.frequency.shape[1]), inside)]))
     orders = train_orders(model, multiples, shaft_multiples)
     return CriticalSpeeds(campbell(every, orders, run.band_hz), every)
 

@@ -20,7 +20,7 @@ from ...gears.geometry.pair import Gear, gear_pair, in_keys
 from ...gears.geometry.validity import check_spur
 from ..bearings import BallBearing, RollerBearing
 from .friction import check_friction
-from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Machine, Shaft, ShaftGear
+from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Machine, Shaft, ShaftGear, common_face
 from .statics import check_flanks, check_yields, one_sided
 
 #: Agreement of lengths and angles that count as equal (relative).
@@ -118,10 +118,10 @@ def _check_apart(train: GearTrain) -> None:
     for shaft in train.shafts:
         places = sorted((float(train.bore_points[bore] @ train.frame[2]), bore) for bore in shaft.bores)
         for (low, one), (high, two) in itertools.pairwise(places):
-            needed = 0.5 * (width.get(one, 0.0) + width.get(two, 0.0))
-            if high - low < max(needed, SAME * shaft.length):
+            needed = max(0.5 * (width.get(one, 0.0) + width.get(two, 0.0)), SAME * shaft.length)
+            if high - low < needed:
                 problem = f"lies {1e3 * (high - low):.6g} mm from bearing {one!r} on shaft {shaft.name!r}: they overlap"
-                cure = f"place them more than {1e3 * needed:.6g} mm apart (y_mm), or use one with two rows"
+                cure = f"place them at least {1e3 * needed:.6g} mm apart (y_mm), or use one with two rows"
                 raise InputError(f"bearing {two!r}", None, problem, cure)
 
 
@@ -174,13 +174,8 @@ def _check_sections(shaft: Shaft) -> None:
 
 
 def _check_beside(train: GearTrain, shaft: Shaft, bore: str, along: float) -> None:
-    """On an elastic shaft no two bearings are at one place, and none within a gear."""
+    """On an elastic shaft no bearing is within a gear."""
     middle = float(np.array(shaft.point) @ train.frame[2])
-    for other in shaft.bores[: shaft.bores.index(bore)]:
-        apart = abs(float((train.bore_points[other] - train.bore_points[bore]) @ train.frame[2]))
-        if apart <= SAME * shaft.length:
-            problem = f"is at the same place of shaft {shaft.name!r} as attachment {other!r}"
-            raise InputError(f"attachment {bore!r}", None, problem, "move one along the shaft, or leave it out")
     for gear in train.gears:
         reach = 0.5 * gear.gear.face_width
         if gear.shaft == shaft.name and abs(gear.along - middle - along) < reach * (1.0 - SAME):
@@ -485,8 +480,8 @@ def shaft_distance(train: GearTrain, one: str, two: str) -> float:
 
 def overlap(one: ShaftGear, two: ShaftGear) -> float:
     """Length along the axis that two gears share (m); negative: the gap between them."""
-    high = min(one.along + 0.5 * one.gear.face_width, two.along + 0.5 * two.gear.face_width)
-    return high - max(one.along - 0.5 * one.gear.face_width, two.along - 0.5 * two.gear.face_width)
+    low, high = common_face(one, two)
+    return high - low
 
 
 def _check_room(train: GearTrain) -> None:

@@ -24,7 +24,7 @@ from ...fem.beams import BeamShaft, Disc, ReducedShaft, Station, reduce_shaft
 from ..bearings import BallBearing, RollerBearing
 from .driveline import spring_places
 from .elements import Gyration, Rotor, ShaftBody, gear_masses
-from .gear_train import Coupling, GearTrain, Machine, Shaft, ShaftGear
+from .gear_train import Coupling, GearTrain, Machine, Shaft, ShaftGear, common_face
 
 #: Gyroscopic couples below this part of the largest are left out, as they count at this part of the highest frequency.
 #: Whirl frequencies of a train with shafts of 20 mm then change by 2e-8 at 600 rad/s and by 5e-7 at 3000 rad/s, and
@@ -128,6 +128,11 @@ class ElasticShaft(ShaftBody):
             for size, *couple in zip(sizes[kept], over @ first, over @ second, strict=True)
         )
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of the coordinates beyond the six of the mean motion, of `gearfe.fem.beams.reduced.KINDS`."""
+        return self.reduced.kinds
+
     def elastic_facts(self) -> dict[str, Any]:
         """Entries of the summary: coordinates, elements, own modes without bearings, and their errors."""
         reduced = self.reduced
@@ -188,13 +193,9 @@ def _gear_loads(train: GearTrain, item: ShaftGear) -> tuple[str, ...]:
     """Directions in which meshes load a shaft at a gear: each one costs coordinates and shorter steps."""
     off = False
     for mesh in (mesh for mesh in train.meshes if item.name in (mesh.driver, mesh.driven)):
-        both = [train.gear(name) for name in (mesh.driver, mesh.driven)]
-        low = max(gear.along - 0.5 * gear.gear.face_width for gear in both)
-        high = min(gear.along + 0.5 * gear.gear.face_width for gear in both)
+        low, high = common_face(train.gear(mesh.driver), train.gear(mesh.driven))
         # a mesh acts at the middle of the common width
         off |= abs(0.5 * (low + high) - item.along) > SAME_MIDDLE * item.gear.face_width
-    if item.gear.helix_angle:
-        return "radial", "tilt", "torsion", "axial"
     return ("radial", "tilt", "torsion") if off else ("radial", "torsion")
 
 

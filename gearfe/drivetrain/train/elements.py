@@ -200,6 +200,11 @@ class ShaftBody(Element):
         """Gyroscopic couples."""
         raise NotImplementedError
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of the coordinates beyond the six of the mean motion; a rigid shaft has none."""
+        return ()
+
     def elastic_facts(self) -> dict[str, Any]:
         """Entries of the summary about an elastic shaft; none for a rigid one."""
         return {}
@@ -228,7 +233,7 @@ class RigidShaft(ShaftBody):
         return np.diag([r.mass, r.mass, r.mass, r.transverse, r.transverse, r.polar])
 
     def start(self) -> tuple[Array, Array]:
-        """At rest but for the spin."""
+        """At rest except for the spin."""
         return np.zeros(6), np.array([0.0, 0.0, 0.0, 0.0, 0.0, self.start_rate])
 
     def point_rows(self, point: Array, frame: Array, along: float | None = None) -> Array:  # noqa: ARG002

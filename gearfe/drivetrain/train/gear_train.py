@@ -560,3 +560,10 @@ def _tuples(errors: PitchErrors) -> PitchErrors:
     """Pitch errors as values, whatever sequences they are."""
     left, right = (tuple(float(error) for error in side) for side in errors)
     return left, right
+
+
+def common_face(one: ShaftGear, two: ShaftGear) -> tuple[float, float]:
+    """Coordinates along the axis (m) between which two gears face each other; where they do not, the second is less."""
+    low = max(gear.along - 0.5 * gear.gear.face_width for gear in (one, two))
+    high = min(gear.along + 0.5 * gear.gear.face_width for gear in (one, two))
+    return low, high

@@ -48,7 +48,7 @@ from ...multibody import Element, LinearJoint
 from .elements import Gyration, LinearForce, ShaftBody
 from .forces import CurveFlank, Flank, LawFlank
 from .friction import CREEP, NEAR, Lubrication, Sliding
-from .gear_train import GearMesh, GearTrain
+from .gear_train import GearMesh, GearTrain, common_face
 from .kinematics import fastest
 
 #: Least force F0 of a mesh's damping, in parts of the largest that its law is known for.
@@ -333,8 +333,7 @@ def _directions(train: GearTrain, mesh: GearMesh, pair: GearPair, sense: float, 
     distance = float(np.linalg.norm(arm))
     across = arm / distance
     along = np.cross(a, across)
-    low = max(g.along - 0.5 * g.gear.face_width for g in (driver, driven))
-    high = min(g.along + 0.5 * g.gear.face_width for g in (driver, driven))
+    low, high = common_face(driver, driven)
     centre = base + (0.5 * (low + high) - float(base @ a)) * a
     point = centre + pair.pinion_working_radius * across
 

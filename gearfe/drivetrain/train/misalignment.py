@@ -127,11 +127,7 @@ def static_state(model: TrainModel) -> Array | None:
     push = modal.constant.copy()
     for direction, torque in model.torques:
         push += modal.T.T @ direction * float(replace(torque, sines=())(model.torque_end))
-    K = np.diag(modal.eigenvalues)
-    for line, force in zip(model.meshes, model.kinematics.steady_forces.tolist(), strict=True):
-        if force < 0.0 and len(line.flanks) == 2:  # the spring of the driving flanks acts along the other line
-            driving, back = (modal.T.T @ row for row in line.columns[:2])
-            K += line.mean * (np.outer(back, back) - np.outer(driving, driving))
+    K = np.diag(modal.eigenvalues) + modal.T.T @ model.back_flanks @ modal.T
     if model.train.driven.torque is not None:  # held where it is driven, whatever the torque there
         row = modal.T.T @ model.drive_row
         K += float(modal.eigenvalues.max(initial=0.0)) / float(row @ row) * np.outer(row, row)

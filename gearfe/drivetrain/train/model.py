@@ -30,7 +30,13 @@ from .forces import Gyro, TrainForces, derivative
 from .gear_train import Drive, GearTrain, Load, Shaft
 from .kinematics import Kinematics, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
-from .operating import OperatingPoint, operating_point, rolling_bearings, settled, typical
+from .operating import (
+    OperatingPoint,
+    operating_point,
+    rolling_bearings,
+    with_operating_stiffness,
+    with_pressed_bearings,
+)
 from .program import train_series
 from .shaft_sections import ShaftSections, shaft_sections
 
@@ -158,6 +164,19 @@ class TrainModel(Facts):
         return notes
 
     @property
+    def back_flanks(self) -> Array:
+        """What the stiffness at rest (size, size) has more because statics press back flanks of meshes (N/m).
+
+        These have their own line of action, and the constant part of the system that of the driving flanks.
+        """
+        change = np.zeros_like(self.system.stiffness)
+        for line, force in zip(self.meshes, self.kinematics.steady_forces.tolist(), strict=True):
+            if force < 0.0 and line.backlash is not None:
+                back = line.columns[1]
+                change += line.mean * (np.outer(back, back) - np.outer(line.row, line.row))
+        return change
+
+    @property
     def placed(self) -> Shafts:
         """The shafts in the coordinates of the system."""
         return Shafts(self.shafts, self.first, tuple(self.ratios), self.system.size)
@@ -194,7 +213,7 @@ def build_train(train: GearTrain) -> TrainModel:
     """
     check_train(train)
     point = _operating_point(train)
-    return replace(_assembled(settled(train, point)), operating=point)
+    return replace(_assembled(with_operating_stiffness(train, point)), operating=point)
 
 
 def _operating_point(train: GearTrain) -> OperatingPoint:
@@ -208,17 +227,14 @@ def _operating_point(train: GearTrain) -> OperatingPoint:
         shafts=tuple(replace(shaft, initial_speed=None) for shaft in train.shafts),
         machines=tuple(replace(machine, initial_speed=None) for machine in train.machines),
     )
-    model = _assembled(typical(at_speed))
+    model = _assembled(with_pressed_bearings(at_speed))
     placed = model.placed
     motions = {name: shaft_motion(model.train, placed, name) for name in bearings}
     stiffness = model.system.stiffness.copy()
     for item in model.train.bearings:
         if item.bore in motions:
             stiffness -= motions[item.bore].T @ item.stiffness_matrix @ motions[item.bore]
-    for line, force in zip(model.meshes, model.kinematics.steady_forces.tolist(), strict=True):
-        if force < 0.0 and line.backlash is not None:  # the back flanks bear, along their own line of action
-            back = line.columns[1]
-            stiffness += line.mean * (np.outer(back, back) - np.outer(line.row, line.row))
+    stiffness += model.back_flanks
     end = model.load_end
     force = np.zeros(placed.size)
     for load in train.loads:
@@ -462,7 +478,7 @@ def _damped(train: GearTrain, elements: list[Element], bodies: list[Element]) ->
 def _start(
     train: GearTrain, system: System, shafts: tuple[ShaftBody, ...], rotors: tuple[MachineRotor, ...], first: IntArray
 ) -> Start:
-    """At rest beside rolling but for the given initial speeds, which the constraints must allow."""
+    """At rest beside rolling except for the given initial speeds, which the constraints must allow."""
     start = consistent_start(system, 0.0)
     open_rows = {system.row_names()[i] for i in start.freedoms.redundant}
     for mesh in train.meshes:
@@ -498,8 +514,12 @@ def _measured_against(train: GearTrain, name: str) -> tuple[str, float]:
 
     They are those of the drive, of a load, or of its first bore.
     """
-    ends = [(end.bore, train.place(end)) for _, end in train.shaft_ends(name) if end.bore is not None]
     first = train.shaft(name).bores[0]
+    ends = [
+        (end.bore or first, train.place(end))
+        for _, end in train.shaft_ends(name)
+        if end.bore is not None or end.along is not None
+    ]
     return next(iter(ends), (first, float(train.bore_points[first] @ train.frame[2])))
 
 

@@ -20,13 +20,12 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.typing import Array
 from ..bearings import BallBearing, BearingState, RollerBearing, deflected
+from ..bearings.equilibrium import MOST
 from ..bearings.minimum import least_energy
 from .gear_train import GearTrain, as_matrix
 
 #: Approach of a rolling element over its diameter at which the stiffness is taken that makes coordinates comparable.
 TYPICAL = 1e-3
-#: Rings that move by more than this part of an element's diameter do not carry their load.
-MOST = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +63,7 @@ class OperatingPoint:
         ]
 
 
-def typical(train: GearTrain) -> GearTrain:
+def with_pressed_bearings(train: GearTrain) -> GearTrain:
     """The train with its rolling bearings replaced by the stiffness of an axially and radially pressed one."""
     bearings = tuple(
         replace(item, stiffness=as_matrix(_pressed(item.stiffness)))
@@ -75,7 +74,7 @@ def typical(train: GearTrain) -> GearTrain:
     return replace(train, bearings=bearings)
 
 
-def settled(train: GearTrain, point: OperatingPoint) -> GearTrain:
+def with_operating_stiffness(train: GearTrain, point: OperatingPoint) -> GearTrain:
     """The train with the stiffness that its rolling bearings have at an operating point."""
     bearings = tuple(
         replace(item, stiffness=as_matrix(point.bearings[item.bore].stiffness)) if item.bore in point.bearings else item

@@ -15,13 +15,13 @@ import numpy as np
 
 from ...base.cache import versions
 from ...base.shown import percent
-from ...base.typing import Array, IntArray
+from ...base.typing import Array
 from ...output.exchange.vtkhdf import write_vtkhdf
 from ..geometry.derived import derived_geometry, iso_values
 from ..geometry.deviation_job import GEARS
 from ..geometry.gear_data import rounding
 from ..width import WideMesh, WidthSweep
-from ..width.sweep import LinePoints
+from ..width.sweep import mean_line_load
 from .job import StiffnessJob
 from .width_job import axial_sense
 
@@ -161,8 +161,7 @@ def flank_loads(job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep) -> list[Fl
             if surface is not None:
                 grid = np.stack(np.meshgrid(rolls / scale[0], z / scale[1], indexing="ij"), axis=-1)
                 pattern = _bridged(surface, grid)
-        good = sweep.status[load] == "converged"
-        mean = _mean_load(points, there, z, max(1, int(good.sum())))
+        mean = mean_line_load(points, load, z, int((sweep.status[load] == "converged").sum()))
         torque = float(np.nanmean(sweep.torque[load])) if np.isfinite(sweep.torque[load]).any() else math.nan
         order = slice(None, None, 1 if sense > 0 else -1)
         found.append(FlankLoad(torque, rolls, (sense * z)[order], pattern[:, order], mean[order]))
@@ -176,19 +175,6 @@ def _bridged(surface: Any, grid: Array) -> Array:
     corners = surface.tri.points[surface.tri.simplices]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     return np.where((triangles >= 0) & (longest[triangles] < BRIDGED), made, np.nan)
-
-
-def _mean_load(points: LinePoints, there: IntArray, z: Array, positions: int) -> Array:
-    """Load per width (N/m) at z, the mean of so many positions, straight between the points of each line."""
-    mean = np.zeros(len(z))
-    line = np.stack([points.position[there], points.pair[there]])
-    for own in np.unique(line, axis=1).T:
-        number = there[(line == own[:, None]).all(axis=0)]
-        number = number[np.argsort(points.z[number])]
-        at, load, reach = points.z[number], points.line_load[number], points.weight[number]
-        inside = (z >= at[0] - 0.5 * reach[0]) & (z <= at[-1] + 0.5 * reach[-1])
-        mean += np.where(inside, np.interp(z, at, load), 0.0) / positions
-    return mean
 
 
 def pattern_columns(flanks: list[FlankLoad]) -> dict[str, Any]:

@@ -236,7 +236,7 @@ def _assembled(
         records.append(record)
     empty = [np.zeros(0, dtype=np.int64)] * 3 + [np.zeros(0)] * 2 + [np.zeros((0, 2)), np.zeros(0)]
     points_ = LinePoints(*(np.concatenate(arrays) for arrays in zip(*(records or [empty]), strict=True)))
-    factors = [_load_factors(lines, angles, row) for row in solved]
+    factors = [_load_factors(lines, angles, points_, number) for number in range(len(solved))]
     return WidthSweep(
         angle=angles,
         status=status,
@@ -271,43 +271,47 @@ def _resultants(lines: ContactLines, solution: Solution) -> tuple[Array, Array]:
     return force.sum(axis=0), np.array(moments)
 
 
-def _load_factors(lines: ContactLines, angles: Array, solved: Sequence[Solution]) -> tuple[float, float]:
-    """K_Hbeta and K_Halpha over the converged positions of a load; NaN without any."""
-    mesh = lines.compliance.mesh
-    good = [(angle, one) for angle, one in zip(angles.tolist(), solved, strict=True) if one.converged]
-    if not any(one.moment.sum() > 0 for _, one in good):
-        return math.nan, math.nan
-    along = np.linspace(*mesh.zone, ALONG)
-    mean, most, even = np.zeros(ALONG), 0.0, 0.0
-    for angle, one in good:
-        force = one.moment / one.points.rows.arm
-        mean += _line_loads(one.points.pair, one.points.z, one.points.weight, force, along) / len(good)
-        most = max(most, float((force / one.points.weight).max(initial=0.0)))
-        length = _line_length(lines, angle)
-        if length > 0:
-            even = max(even, float(force.sum()) / length)
-    face = float(mean.max() / np.trapezoid(mean, along) * mesh.width)
-    return face, most / even / face if even > 0 else math.nan
+def mean_line_load(points: LinePoints, load: int, along: Array, positions: int) -> Array:
+    """Return the load per width of all tooth pairs at places along z, the mean of positions (N/m), shape (k,).
 
-
-def _line_loads(pair: IntArray, z: Array, weight: Array, force: Array, along: Array) -> Array:
-    """Load per width (N/m) of all lines at places along z, straight between the points of each line.
+    It runs straight between the points of each line, over the lengths that these have.
 
     Parameters
     ----------
-    pair, z, weight, force : (n,)
-        Tooth pair, place (m), width (m) and force (N) of the points.
-    along : (k,)
-        Places (m).
+    points : LinePoints
+        Loaded points of a sweep.
+    load : int
+        Number of the load.
+    along : ndarray, shape (k,)
+        Places z (m).
+    positions : int
+        Number of positions at this load that have converged.
     """
-    load = np.zeros(len(along))
-    for number in np.unique(pair):
-        own = np.flatnonzero(pair == number)
-        own = own[np.argsort(z[own])]
-        first, last = own[0], own[-1]
-        inside = (along >= z[first] - 0.5 * weight[first]) & (along <= z[last] + 0.5 * weight[last])
-        load += np.where(inside, np.interp(along, z[own], force[own] / weight[own]), 0.0)
-    return load
+    mean = np.zeros(len(along))
+    of_load = np.flatnonzero(points.load == load)
+    line = np.stack([points.position[of_load], points.pair[of_load]])
+    for one in np.unique(line, axis=1).T:
+        chosen = of_load[(line == one[:, None]).all(axis=0)]
+        chosen = chosen[np.argsort(points.z[chosen])]
+        z, reach = points.z[chosen], 0.5 * points.weight[chosen]
+        inside = (along >= z[0] - reach[0]) & (along <= z[-1] + reach[-1])
+        mean += np.where(inside, np.interp(along, z, points.line_load[chosen]), 0.0)
+    return mean / max(1, positions)
+
+
+def _load_factors(lines: ContactLines, angles: Array, points: LinePoints, load: int) -> tuple[float, float]:
+    """K_Hbeta and K_Halpha over the loaded positions of a load; NaN without any."""
+    mesh, of_load = lines.compliance.mesh, points.load == load
+    if not of_load.any():
+        return math.nan, math.nan
+    along = np.linspace(*mesh.zone, ALONG)
+    loaded = np.unique(points.position[of_load])
+    mean = mean_line_load(points, load, along, len(loaded))
+    face = float(mean.max() / np.trapezoid(mean, along) * mesh.width)
+    force = np.bincount(points.position[of_load], (points.line_load * points.weight)[of_load], len(angles))[loaded]
+    length = np.array([_line_length(lines, angle) for angle in angles[loaded].tolist()])
+    even = float(np.divide(force, length, out=np.zeros_like(force), where=length > 0.0).max())
+    return face, float(points.line_load[of_load].max()) / even / face if even > 0.0 else math.nan
 
 
 def _line_length(lines: ContactLines, angle: float) -> float:
