@@ -16,7 +16,7 @@ from ..multibody import Trajectory
 from ..multibody.core.modes import Modes
 from .mechanism_field import draw_field
 from .mechanism_scene import MOST_NAMES, draw_paths, draw_state, drawn_states, frame
-from .style import BLUE, COLOURS, ORANGE, fixed, new_figure, save_fixed, tidy
+from .style import BLUE, COLOURS, ORANGE, fixed, new_figure, save, tidy
 
 #: Times at which curves are drawn at least: four for each pixel of their width.
 LEAST_TIMES = 2000
@@ -48,7 +48,7 @@ def draw_figures(folder: Path, mechanism: Mechanism, results: Results) -> None:
         figure.set_size_inches(7, float(np.clip(6.1 * height / width, 2.2, 8.0)) + 0.9)
         draw_state(axes, mechanism, trajectory.dense(np.array([time])), names=names)
     axes.set_title(f"{mechanism.file.title or 'mechanism'} at {time:g} s", fontsize=11, loc="left")
-    save_fixed(figure, folder / "picture.png")
+    save(figure, folder / "picture.png")
     if mechanism.links:
         _links(folder / "links.png", mechanism, smooth)
     if mechanism.plates:
@@ -87,7 +87,7 @@ def draw_modes(folder: Path, mechanism: Mechanism, q: np.ndarray, modes: Modes) 
         frame(ax, mechanism, np.stack([q, moved, q - size * shape]))
         ax.set_aspect("equal", adjustable="datalim")
         ax.set_title(f"{k + 1}: {modes.frequencies[k]:.4g} Hz", fontsize=9)
-    save_fixed(figure, folder / "modes.png")
+    save(figure, folder / "modes.png")
 
 
 @stage("animation")
@@ -178,7 +178,7 @@ def _curves(path: Path, mechanism: Mechanism, results: Results) -> None:
         tidy(axes)
     all_axes[-1, 0].set_xlabel("time (s)")
     figure.align_ylabels(all_axes[:, 0])
-    save_fixed(figure, path)
+    save(figure, path)
 
 
 def _energy(path: Path, results: Results) -> None:
@@ -199,7 +199,7 @@ def _energy(path: Path, results: Results) -> None:
     lower.set_ylabel("drift (J)")
     lower.set_xlabel("time (s)")
     figure.legend(loc="outside upper center", ncols=5, fontsize=8.5, frameon=False)
-    save_fixed(figure, path)
+    save(figure, path)
 
 
 def _links(path: Path, mechanism: Mechanism, results: Results) -> None:
@@ -221,7 +221,7 @@ def _links(path: Path, mechanism: Mechanism, results: Results) -> None:
         axes[0].legend(fontsize=7)
     for ax in rows[-1]:
         ax.set_xlabel("s (m)")
-    save_fixed(figure, path)
+    save(figure, path)
 
 
 def _plates(path: Path, mechanism: Mechanism, results: Results) -> None:
@@ -251,4 +251,4 @@ def _plates(path: Path, mechanism: Mechanism, results: Results) -> None:
         axes.set_title(f"{name} at {time:.4g} s, when its stress is largest{note}", fontsize=9, loc="left")
         axes.set_xlabel("x (m)")
         axes.set_ylabel("y (m)")
-    save_fixed(figure, path)
+    save(figure, path)

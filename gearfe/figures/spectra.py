@@ -35,7 +35,6 @@ from .style import (
     new_figure,
     panel,
     save,
-    save_fixed,
     single,
     tidy,
 )
@@ -98,7 +97,7 @@ def draw_spectrum(
     axes.set_ylim(0.0, (1.3 + 0.06 * len({line.name for line in lines})) * top)  # rows of numbers are above the names
     label_lines(axes, named, frequency[shown], amplitude[shown], fontsize=8.5)
     axes.set_ylabel("amplitude  (m/s²)")
-    save_fixed(figure, path)
+    save(figure, path)
 
 
 def draw_power(
@@ -136,7 +135,7 @@ def draw_power(
     axes.bar(frequency[shown], loud[shown] - bottom, width=width, bottom=bottom, color=BLUE, linewidth=0)
     axes.set_ylim(bottom, top + 0.18 * (top - bottom) + 1.0)
     axes.set_ylabel("radiated power level  (dB re 1 pW)")
-    save_fixed(figure, path)
+    save(figure, path)
 
 
 def _frequency_axes(

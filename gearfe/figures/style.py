@@ -61,10 +61,15 @@ def literal(figure: Any) -> None:
 
 
 def save(figure: Any, path: str | Path, *, dpi: int = DPI) -> None:
-    """Write a figure whole."""
+    """Write a figure whole, as its suffix says; axes are laid out and drawn once, where `savefig` draws twice."""
     literal(figure)
+    figure.set_dpi(dpi)
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)
+        figure.set_layout_engine("none")
     with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=dpi)
+        figure.savefig(temporary, dpi=dpi, pil_kwargs={"compress_level": 4} if temporary.suffix == ".png" else None)
 
 
 def write_film(path: str | Path, pictures: Sequence[NDArray[np.uint8]], palette: Any, *, ms: int, dither: bool) -> None:
@@ -122,14 +127,6 @@ def fixed(width: float, height: float) -> Any:
     figure = new_figure(width, height)
     figure.set_layout_engine("none")
     return figure
-
-
-def save_fixed(figure: Any, path: str | Path) -> None:
-    """Write a PNG whole. The canvas is drawn once; `savefig` draws it twice."""
-    figure.set_dpi(DPI)
-    literal(figure)
-    with whole_file(path) as temporary:
-        figure.canvas.print_png(temporary, pil_kwargs={"compress_level": 4})
 
 
 def panel(axes: Any, ylabel: str, letter: str, title: str) -> Any:

@@ -19,7 +19,7 @@ from ..drivetrain.vibration.follow import Followed
 from ..drivetrain.vibration.report import attachment_acceleration
 from ..drivetrain.vibration.spectra import TrainSpectra
 from .spectra import draw_measured, draw_power, draw_spectrogram, draw_spectrum, draw_tracks
-from .style import BLUE, COLOURS, CYCLE, GREY, RED, fixed, panel, save_fixed
+from .style import BLUE, COLOURS, CYCLE, GREY, RED, fixed, panel, save
 from .train_scene import draw_scene
 
 #: First and last place of stretches.
@@ -164,7 +164,7 @@ def _draw_response(path: Path, response: TrainResponse, attachment: str, title: 
         part.tick_params(labelbottom=False)
     for part in (axes[0], axes[-3], turning, normal):
         part.set_xlabel("rotation of the drive  (deg)")
-    save_fixed(figure, path)
+    save(figure, path)
 
 
 def _draw_transmission(path: Path, train: GearTrain, response: TrainResponse, title: str) -> None:
@@ -192,7 +192,7 @@ def _draw_transmission(path: Path, train: GearTrain, response: TrainResponse, ti
         axes.legend(fontsize=8.5, frameon=False, ncols=3, loc="upper right")
         _span(axes, angle)
     axes.set_xlabel("rotation of the drive  (deg)")
-    save_fixed(figure, path)
+    save(figure, path)
 
 
 def _apart(response: TrainResponse, sense: float) -> list[Spans]:

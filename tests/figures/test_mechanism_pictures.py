@@ -164,7 +164,7 @@ def test_curves_follow_the_solution_between_output_times(step: float, tmp_path: 
     outputs = [{"name": "x", "value": "x(crank.A)"}, {"name": "turn", "value": "angle(crank)", "wrap": 2.0 * math.pi}]
     mechanism, results = crank(2.0, step, outputs=outputs)
     figures = []
-    monkeypatch.setattr("gearfe.figures.mechanism.save_fixed", lambda figure, _: figures.append(figure))
+    monkeypatch.setattr("gearfe.figures.mechanism.save", lambda figure, _: figures.append(figure))
     draw_figures(tmp_path, mechanism, results)
     x, turn = (axes.lines[0] for axes in figures[0].axes)
     time, value = x.get_xdata(), x.get_ydata()
