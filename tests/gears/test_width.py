@@ -22,7 +22,7 @@ from gearfe.gears.width import (
     sweep_width,
     wide_compliance,
 )
-from gearfe.gears.width.lines import own_twists, solve_position
+from gearfe.gears.width.lines import PLACED, own_twists, solve_position
 from tests.makers.half_plane_pairs import PAIRS
 from tests.makers.wide_gears import SPUR, helical_lines, helical_mesh, spur_lines
 
@@ -44,15 +44,14 @@ def test_influence_of_one_function_is_that_of_plane_strain():
 
 @pytest.mark.parametrize("name", PAIRS)
 def test_one_function_carries_the_torque_of_the_plane_law(name):
-    """On the path of contact within 0.02 %; where tips bear besides, a neighbour's load displaces them: 0.08 %."""
+    """On the path of contact within 0.02 %; where tips bear besides, a neighbour's load displaces them: 0.07 %."""
     pair = PAIRS[name]
     lines = contact_lines(wide_compliance(WideMesh(pair, functions=1, coarsen=1.0, flank_coarsen=4.0)))
     angles = (np.arange(24) + 0.5) * pair.mesh_cycle / 24
     plane = sweep_stiffness(pair, torque=100.0, angles=angles, kinematics="small")
     found = sweep_width(lines, [100.0], angles=angles)
     off = np.abs(found.twist[0] / plane.twist - 1)
-    assert np.median(off) < 1e-4
-    assert off.max() < 8e-4
+    assert off.max() < 7e-4
     assert np.quantile(off, 0.7) < 2e-4
 
 
@@ -118,18 +117,25 @@ def test_hand_mirrored_with_z_is_the_same(flanks):
     assert np.allclose(one.axial_force, -other.axial_force, rtol=1e-9, atol=0)
 
 
-def test_exchanged_gears_are_the_same():
-    """In one position of both gears, the wheel turned by the twist; points are placed anew: 0.05 %."""
-    lines, other = helical_lines(), helical_lines(swapped=True)
+@pytest.mark.parametrize("flanks", [WideFlanks(), CROWNED, TILTED], ids=["plain", "crowned", "tilted"])
+def test_exchanged_gears_are_the_same(flanks):
+    """Seen from behind the line of centres, in one position of both gears: the wheel is turned by the twist."""
+    exchanged = WideFlanks(leads=flanks.leads[::-1], misalignment=flanks.misalignment)
+    lines, other = helical_lines().with_flanks(flanks), helical_lines(swapped=True).with_flanks(exchanged)
     sections = lines.compliance.mesh.sections
     ratio, turned = sections.gear_ratio, math.pi / sections.wheel.teeth
     angles = np.array([0.02, 0.11, 0.2])
     one = sweep_width(lines, [100.0], angles=angles)
     for number, (angle, twist) in enumerate(zip(angles, one.twist[0], strict=True)):
         two = sweep_width(other, twists=[twist * ratio], angles=[turned - angle / ratio + twist])
-        forces = [np.linalg.norm(force[:2]) for force in (one.force[0, number], two.force[0, 0])]
-        assert forces[1] == pytest.approx(forces[0], rel=5e-4)
-        assert two.axial_force[0, 0] == pytest.approx(-one.axial_force[0, number], rel=5e-4)
+        assert -two.force[0, 0, :2] == pytest.approx(-one.force[0, number, :2], rel=1e-7)
+        for moment, mate in zip(two.moment[0, 0], one.moment[0, number, ::-1], strict=True):
+            assert moment[2] == pytest.approx(mate[2], rel=1e-7)
+        order = [np.lexsort((p.z, way * p.pair)) for p, way in ((one.points, 1), (two.points, -1))]
+        order[0] = order[0][one.points.position[order[0]] == number]
+        loads = [p.line_load[at] for p, at in zip((one.points, two.points), order, strict=True)]
+        # points at a torque are placed at a twist that is off by `PLACED`
+        assert loads[1] == pytest.approx(loads[0], abs=PLACED * loads[0].max())
 
 
 def energy(lines, solution):

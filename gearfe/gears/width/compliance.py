@@ -80,6 +80,11 @@ class WideFlank:
     influence: Array
     length: float
 
+    @cached_property
+    def usual_bump(self) -> float:
+        """Median of the bumps' half widths (m)."""
+        return float(np.median(self.local.bumps))
+
 
 @dataclass(frozen=True)
 class WideCompliance:
@@ -129,8 +134,13 @@ def legendre(z: Array, zone: tuple[float, float], count: int) -> Array:
     """Legendre functions at z (m), orthonormal on the zone and zero beyond, shape (..., count) (1/sqrt(m))."""
     low, high = zone
     x = (2 * z - low - high) / (high - low)
-    values = np.polynomial.legendre.legvander(x, count - 1) * np.sqrt((2 * np.arange(count) + 1) / (high - low))
-    return np.asarray(values * (np.abs(x) <= 1 + 1e-9)[..., None])
+    values = np.empty((count, *x.shape))
+    values[0] = np.abs(x) <= 1 + 1e-9
+    if count > 1:
+        values[1] = x * values[0]
+    for n in range(2, count):
+        values[n] = ((2 * n - 1) * x * values[n - 1] - (n - 1) * values[n - 2]) / n
+    return np.moveaxis(values, 0, -1) * np.sqrt((2 * np.arange(count) + 1) / (high - low))
 
 
 def _steps(mesh: WideMesh) -> int:

@@ -1,17 +1,20 @@
 r"""Lines of contact of all tooth pairs at one position, and how they share a load.
 
 A line is a tooth pair k over the common width; its point at z has the pair angle
-:math:`\psi = \varphi + \kappa z + 2\pi k/z_1`, where the pair's law (`.pair_law`) has its first contact t, its arm r
-and how its contact yields. Lines are broken at the ends of the path of contact, beyond which tips may bear, and have
-Gauss points with weights w in each stretch. With moments m of the points (N m, :math:`M = m/w` per width), the twist
-:math:`\theta`, the tilts as further twists, and the gap d of `.flanks`,
+:math:`\psi = \varphi + \kappa z + 2\pi k/z_1 - \tfrac12 i\theta` of `.pair_law`, where the pair has its first contact
+t, its arms, and how its contact yields. Lines are broken at the ends of the path of contact, beyond which tips may
+bear, and have Gauss points with weights w in each stretch. With the gap d of `.flanks`, a twist :math:`\theta` and the
+forces F of the points, f = F/w per width,
 
 .. math::
-    g_j = \theta - t_j - d_j/r_j - c_j(m_j/w_j) - \sum_l T_{jl}\,m_l \le 0, \qquad m_j \ge 0, \qquad g_j m_j = 0 .
+    g_j = \bar r_j(\theta - t_j) - d_j - C_j(f_j)\,f_j - \sum_l T_{jl}\,F_l \le 0, \quad F_j \ge 0, \quad g_j F_j = 0 .
 
-:math:`T_{jl} = \sum_{gears} v_j H_{k_j - k_l} v_l/(r_j r_l)` is the influence between all points of all lines, with
-:math:`v = N(s)\otimes n\otimes P(z)` the stations' and Legendre functions there. The torque is :math:`\sum m`; it is
-the derivative of the energy with the twist, since T is symmetric and c belongs to the moment.
+:math:`T_{jl} = \sum_{gears} v_j H_{k_j - k_l} v_l` is the influence between all points of all lines, with
+:math:`v = N(s)\otimes n\otimes P(z)` the stations' and Legendre functions there. The torque on the wheel is
+:math:`\sum r_2 F`, the derivative of the energy with the twist at a pinion angle: the pair angle moves back as the
+twist grows, so that the approach grows by :math:`r_2` per twist. Unknowns are the moments :math:`m = r_2 F`, whose
+points touch at the twist :math:`\theta - (\bar r(\theta - t) - d)/r_2`; T is that of the twist at which points are
+placed, which is the solution's to `PLACED`.
 
 Newton's method with an active set solves it at a given twist or, with the twist bordered, at a given torque. The
 tangent over twist and tilts follows from the same matrix: :math:`B^T(T + c')^{-1}B` over the loaded points.
@@ -41,11 +44,9 @@ from .pair_law import PairLaw, pair_law
 #: Gauss points of a line over the whole width for each function of the load, by the root of its share of the width;
 #: the least for a stretch, and those of a stretch beyond the path of contact.
 POINTS_PER_FUNCTION, LEAST_POINTS, TIP_POINTS = 2.0, 4, 6
-#: What the twist is more that points are placed at, beyond which they do not reach.
-MARGIN = 1.05
-#: Relative change of the twist that ends the placing of points, how often they are placed, and how often their reach
-#: may become less from one placing to the next.
-PLACED, PLACINGS, FREE_PLACINGS = 1e-2, 12, 4
+#: Change of the twist, in parts of its way since the first touch, that ends the placing of points: it moves the torque
+#: by 1e-3 of itself. How often they are placed, and how often their reach may become less from one to the next.
+PLACED, PLACINGS, FREE_PLACINGS = 1e-4, 12, 4
 #: Steps in which any number of points may lose their load or be let in. That converges in a few steps or runs in a
 #: circle; afterwards one does at a time, along the way of the convex problem of the moments, which has no circles.
 QUICK_STEPS = 15
@@ -100,8 +101,7 @@ class ContactLines:
         gap = np.zeros(len(z))
         for gear, tooth in enumerate((pair, -1 - pair)):
             gap -= flanks.material(gear, rows.roll[:, gear], z, tooth, mesh.faces[gear])
-            arm = rows.arm if gear else (np.conj(rows.point) * rows.normal).imag
-            gap -= flanks.profiles[gear].turn_of(tooth) * arm
+            gap -= flanks.profiles[gear].turn_of(tooth) * (rows.arm if gear else rows.pinion_arm)
         return np.asarray(gap - self.levers(z, rows) @ [flanks.misalignment.in_plane, flanks.misalignment.across])
 
     def levers(self, z: Array, rows: Rows) -> Array:
@@ -135,6 +135,7 @@ class Rows:
 
     touch: Array
     arm: Array
+    pinion_arm: Array
     normal: Array
     point: Array
     roll: Array
@@ -153,12 +154,13 @@ def rows_at(law: PairLaw, angle: Array) -> Rows:
     return Rows(
         touch=packed[:, 0],
         arm=packed[:, 1],
-        normal=packed[:, 2] + 1j * packed[:, 3],
-        point=packed[:, 4] + 1j * packed[:, 5],
-        roll=packed[:, 6:8],
-        arc=packed[:, 8:10],
-        tooth_normal=packed[:, 10:14].reshape(-1, 2, 2),
-        yields=packed[:, 14:],
+        pinion_arm=packed[:, 2],
+        normal=packed[:, 3] + 1j * packed[:, 4],
+        point=packed[:, 5] + 1j * packed[:, 6],
+        roll=packed[:, 7:9],
+        arc=packed[:, 9:11],
+        tooth_normal=packed[:, 11:15].reshape(-1, 2, 2),
+        yields=packed[:, 15:],
     )
 
 
@@ -175,7 +177,7 @@ class Points:
     rows : Rows
         Tables of the pair's law there.
     touch : ndarray, shape (n,)
-        Twist at which a point touches, t + d/r (rad).
+        Twist at which a point touches (rad).
     levers : ndarray, shape (n, 3)
         Twist of the wheel that a unit of twist, tilt in the plane of action and tilt across are worth (-).
     influence : ndarray, shape (n, n)
@@ -196,12 +198,13 @@ class Points:
     @cached_property
     def slopes(self) -> Array:
         """Slopes of the cubics between the loads of the law's tables, shape (n, loads)."""
-        return np.asarray(np.gradient(self.rows.yields, axis=1))
+        between = np.diff(self.rows.yields, axis=1)
+        return np.concatenate([between[:, :1], 0.5 * (between[:, :-1] + between[:, 1:]), between[:, -1:]], axis=1)
 
 
 @dataclass(frozen=True)
 class Looks:
-    """Where the lines of a pinion angle are closest: l lines that can meet.
+    """Where the lines at a pinion angle and a twist are closest: l lines that can meet.
 
     Attributes
     ----------
@@ -219,14 +222,14 @@ class Looks:
 
 
 def look_at(lines: ContactLines, angle: float) -> Looks:
-    """Look at the gaps along all lines that can meet at a pinion angle (rad)."""
+    """Look at the gaps along all lines that can meet; the pair angle of pair 0 at z = 0 is `angle` (rad)."""
     mesh, law = lines.compliance.mesh, lines.law
     rule, cycle = np.linspace(*mesh.zone, LOOKS), mesh.sections.mesh_cycle
     first, *_, last = np.sort(angle + mesh.turns[0] * rule)
     numbers = np.arange(math.ceil((law.angle[0] - last) / cycle), math.floor((law.angle[-1] - first) / cycle) + 1)
     psi = angle + mesh.turns[0] * rule + cycle * numbers[:, None]
     rows = rows_at(law, np.clip(psi.ravel(), law.angle[0], law.angle[-1]))
-    gap = lines.gap(np.tile(rule, len(numbers)), rows, np.repeat(numbers, LOOKS)) / rows.arm
+    gap = lines.gap(np.tile(rule, len(numbers)), rows, np.repeat(numbers, LOOKS)) / mean_arm(lines, rows)
     outside = (psi < law.angle[0]) | (psi > law.angle[-1])
     gap = np.where(outside, np.inf, gap.reshape(psi.shape))
     least = float((gap + rows.touch.reshape(psi.shape)).min(initial=math.inf))
@@ -234,7 +237,12 @@ def look_at(lines: ContactLines, angle: float) -> Looks:
     return Looks(numbers[np.isfinite(gaps)], gaps[np.isfinite(gaps)], least)
 
 
-def place_points(lines: ContactLines, angle: float, twist: float, looks: Looks) -> Points:
+def mean_arm(lines: ContactLines, rows: Rows) -> Array:
+    """Approach of the flanks per twist from their first contact (m), shape (n,)."""
+    return np.asarray(0.5 * (rows.arm + lines.compliance.mesh.sections.gear_ratio * rows.pinion_arm))
+
+
+def place_points(lines: ContactLines, angle: float, twist: float) -> Points:
     """Place points on all lines that may bear.
 
     Parameters
@@ -243,19 +251,19 @@ def place_points(lines: ContactLines, angle: float, twist: float, looks: Looks) 
         The gears.
     angle, twist : float
         Pinion angle and twist of the wheel (rad).
-    looks : Looks
-        The gaps along the lines of this angle.
     """
     mesh, law = lines.compliance.mesh, lines.law
     cycle, turn = mesh.sections.mesh_cycle, mesh.turns[0]
+    middle = angle - 0.5 * mesh.sections.gear_ratio * twist
+    looks = look_at(lines, middle)
     z, weight, pair = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=np.int64)]
     for k, gap in zip(looks.pair.tolist(), looks.gap.tolist(), strict=True):
-        reached = law.angle[law.touch < twist - gap]
-        if len(reached) == 0:
+        reached = _reached(law, twist - gap)
+        if reached is None:
             continue
-        marks = np.clip([reached[0], *law.path, reached[-1]], reached[0], reached[-1]).tolist()
+        marks = np.clip([reached[0], *law.path, reached[1]], *reached).tolist()
         for (start, end), tip in zip(itertools.pairwise(marks), (True, False, True), strict=True):
-            stretch = _stretch(start, end, angle + k * cycle, turn, mesh.zone, tip)
+            stretch = _stretch(start, end, middle + k * cycle, turn, mesh.zone, tip)
             if stretch is None:
                 continue
             a, b = stretch
@@ -263,14 +271,28 @@ def place_points(lines: ContactLines, angle: float, twist: float, looks: Looks) 
             z.append(0.5 * (a + b) + 0.5 * (b - a) * x)
             weight.append(0.5 * (b - a) * w)
             pair.append(np.full(len(x), k))
-    return _points(lines, angle, np.concatenate(z), np.concatenate(weight), np.concatenate(pair))
+    return _points(lines, middle, twist, np.concatenate(z), np.concatenate(weight), np.concatenate(pair))
+
+
+def _reached(law: PairLaw, twist: float) -> tuple[float, float] | None:
+    """First and last pair angle (rad) at which rigid flanks overlap at a twist (rad), or None."""
+    inside = np.flatnonzero(law.touch < twist)
+    if len(inside) == 0:
+        return None
+    ends = []
+    for i, beyond in ((inside[0], inside[0] - 1), (inside[-1], inside[-1] + 1)):
+        at = law.angle[i]
+        if 0 <= beyond < len(law.angle):
+            at += (law.angle[beyond] - at) * (twist - law.touch[i]) / (law.touch[beyond] - law.touch[i])
+        ends.append(float(at))
+    return ends[0], ends[1]
 
 
 def _count(lines: ContactLines, share: float, *, tip: bool) -> int:
     """Points of a stretch over so much of the width; `tip`: beyond the path of contact."""
     if tip:
         return math.ceil(TIP_POINTS * lines.density / POINTS_PER_FUNCTION)
-    return max(LEAST_POINTS, math.ceil(lines.density * lines.compliance.mesh.count * math.sqrt(share)))
+    return max(LEAST_POINTS, math.ceil(lines.density * lines.compliance.mesh.count * math.sqrt(share) - 1e-9))
 
 
 @cache
@@ -302,14 +324,14 @@ def _stretch(
     return (a, b) if b - a > 1e-9 * (zone[1] - zone[0]) else None
 
 
-def _points(lines: ContactLines, angle: float, z: Array, weight: Array, pair: IntArray) -> Points:
+def _points(lines: ContactLines, middle: float, twist: float, z: Array, weight: Array, pair: IntArray) -> Points:
     mesh, law = lines.compliance.mesh, lines.law
-    rows = rows_at(law, angle + mesh.turns[0] * z + pair * mesh.sections.mesh_cycle)
+    rows = rows_at(law, middle + mesh.turns[0] * z + pair * mesh.sections.mesh_cycle)
     levers = np.concatenate([np.ones((len(z), 1)), lines.levers(z, rows) / rows.arm[:, None]], axis=1)
-    touch = rows.touch + lines.gap(z, rows, pair) / rows.arm
-    rows = replace(rows, yields=rows.yields + (_softer_ends(lines.compliance, z) / rows.arm**2)[:, None])
+    approach = mean_arm(lines, rows) * (twist - rows.touch) - lines.gap(z, rows, pair)
+    rows = replace(rows, yields=rows.yields + _softer_ends(lines.compliance, z)[:, None])
     influence = _influence(lines.compliance, z, pair, rows) / (rows.arm[:, None] * rows.arm)
-    return Points(z, weight, pair, rows, touch, levers, influence)
+    return Points(z, weight, pair, rows, twist - approach / rows.arm, levers, influence)
 
 
 def _softer_ends(compliance: WideCompliance, z: Array) -> Array:
@@ -318,7 +340,7 @@ def _softer_ends(compliance: WideCompliance, z: Array) -> Array:
     if mesh.count == 1:
         return added
     for side, material, face in zip(compliance.sides, mesh.materials, mesh.faces, strict=True):
-        bump = float(np.median(side.local.bumps))
+        bump = side.usual_bump
         softer = material.poisson_ratio**2 / (1 - material.poisson_ratio**2)
         for end in face:
             near = bump / (np.abs(z - end) + AT_END * bump)
@@ -359,21 +381,21 @@ def _influence(compliance: WideCompliance, z: Array, pair: IntArray, rows: Rows)
 
 
 def own_twists(law: PairLaw, points: Points, moment: Array) -> tuple[Array, Array]:
-    """How contacts yield at moments per width M (N), shape (n,): c (rad) and its derivative (rad per N)."""
-    spacing = math.log(law.moments[1] / law.moments[0])
-    x = np.log(np.maximum(moment, 1e-9 * law.moments[0]) / law.moments[0]) / spacing
-    last = len(law.moments) - 1
-    inside = np.clip(x, 0.0, last)
+    """How contacts yield at moments per width (N), shape (n,): C f/r_2 (rad) and its derivative (rad per N)."""
+    force, spacing = moment / points.rows.arm, math.log(law.forces[1] / law.forces[0])
+    x = np.log(np.maximum(force / law.forces[0], 1e-9)) / spacing
+    last = len(law.forces) - 1
+    inside = np.minimum(np.maximum(x, 0.0), last)
     i = np.minimum(inside.astype(np.int64), last - 1)
-    t, row = inside - i, np.arange(len(i))
-    values, slopes = points.rows.yields, points.slopes
-    a, b, da, db = values[row, i], values[row, i + 1], slopes[row, i], slopes[row, i + 1]
+    t, first = inside - i, i + np.arange(0, len(i) * (last + 1), last + 1)
+    values, slopes = points.rows.yields.ravel(), points.slopes.ravel()
+    a, b, da, db = values[first], values[first + 1], slopes[first], slopes[first + 1]
     c2, c3 = 3 * (b - a) - 2 * da - db, da + db - 2 * (b - a)
     slope = da + t * (2 * c2 + 3 * t * c3)
-    slope = np.where(x > last, 0.0, slope)  # beyond the loads of the table c/M stays, so that c rises
+    slope = np.where(x > last, 0.0, slope)  # beyond the forces of the table C stays, so that C f rises
     share = a + t * (da + t * (c2 + t * c3)) + (x - inside) * slope
-    rate = share + slope / spacing
-    return share * moment, np.maximum(rate, STIFFEST * points.rows.yields[:, 0])
+    rate = np.maximum(share + slope / spacing, STIFFEST * points.rows.yields[:, 0])
+    return share * force / points.rows.arm, rate / points.rows.arm**2
 
 
 @dataclass(frozen=True)
@@ -422,39 +444,57 @@ def solve_position(
     guess : float
         Twist (rad) at which a torque is expected; 0: by a usual stiffness.
     """
-    looks = look_at(lines, angle)
     if torque is None:
         assert twist is not None
-        points = place_points(lines, angle, twist, looks)
-        return _newton(lines, points, twist=twist, torque=None)
-    least = looks.least
+        return _newton(lines, place_points(lines, angle, twist), twist=twist, torque=None)
+    least = look_at(lines, angle).least
     if not math.isfinite(least):
-        points = place_points(lines, angle, -math.inf, looks)
-        return Solution(points, math.nan, np.zeros(0), np.zeros((3, 3)), False, 0)
+        return Solution(_nowhere(lines), math.nan, np.zeros(0), np.zeros((3, 3)), False, 0)
     ahead = guess - least if guess > least else torque / lines.usual_stiffness
-    steps, settled = 0, False
+    steps, settled, before = 0, False, None
     for number in range(PLACINGS):
-        reach = MARGIN * ahead
-        solution = _newton(lines, place_points(lines, angle, least + reach, looks), torque=torque, twist=None)
-        steps += solution.steps
+        points = place_points(lines, angle, least + ahead)
+        solution = _newton(lines, points, torque=torque, twist=None, before=before)
+        steps, before = steps + solution.steps, solution
         # between the places that are looked at, a line may touch a little earlier
         new = max(solution.twist - least, LEAST_AHEAD * torque / lines.usual_stiffness)
         free = number < FREE_PLACINGS
-        settled = solution.converged and (abs(new - ahead) <= PLACED * new or (not free and new <= reach))
+        settled = solution.converged and (abs(new - ahead) <= PLACED * new or (not free and new <= ahead))
         if settled:
             break
         ahead = new if free else max(new, ahead)
     return replace(solution, steps=steps, converged=settled)
 
 
-def _newton(lines: ContactLines, points: Points, *, torque: float | None, twist: float | None) -> Solution:
-    """Solve the complementary problem of the points at a torque (N m) or a twist (rad)."""
+def _nowhere(lines: ContactLines) -> Points:
+    """No points."""
+    nothing = np.zeros(0)
+    return _points(lines, lines.law.angle[0], 0.0, nothing, nothing, nothing.astype(np.int64))
+
+
+def _newton(
+    lines: ContactLines,
+    points: Points,
+    *,
+    torque: float | None,
+    twist: float | None,
+    before: Solution | None = None,
+) -> Solution:
+    """Solve the complementary problem of the points at a torque (N m) or a twist (rad).
+
+    It begins with the loads of the solution `before` where that has as many points on the same lines.
+    """
     law, n, weight = lines.law, len(points), points.weight
     loaded: BoolArray = np.ones(n, dtype=bool)
     if torque is None:
         loaded = points.touch < twist
         start = np.where(loaded, twist - points.touch, 0.0) * weight
         moment = start * lines.usual_stiffness / lines.compliance.mesh.width
+    elif before is not None and np.array_equal(before.points.pair, points.pair):
+        moment = before.moment * weight / before.points.weight
+        loaded = moment > 0
+        if not loaded.any():
+            loaded[:] = True
     else:
         moment = torque * weight / max(weight.sum(), 1e-300)
     at, steps, converged = math.nan if twist is None else twist, 0, n == 0 and torque is None
@@ -463,10 +503,11 @@ def _newton(lines: ContactLines, points: Points, *, torque: float | None, twist:
         steps += 1
         own, rate = own_twists(law, points, moment / weight)
         i = np.flatnonzero(loaded)
-        system = points.influence[np.ix_(i, i)]
-        system[np.arange(len(i)), np.arange(len(i))] += rate[i] / weight[i]
+        system = points.influence[i[:, None], i]
+        rate /= weight
+        system.flat[:: len(i) + 1] += rate[i]
         right = np.ones((len(i), 2))
-        right[:, 0] = rate[i] * moment[i] / weight[i] - own[i] - points.touch[i]
+        right[:, 0] = rate[i] * moment[i] - own[i] - points.touch[i]
         answer = np.linalg.solve(system, right)
         if torque is not None:
             at = (torque - answer[:, 0].sum()) / answer[:, 1].sum()
@@ -502,6 +543,7 @@ def _tangent(law: PairLaw, points: Points, moment: Array) -> Array:
     if len(i) == 0:
         return np.zeros((3, 3))
     rate = own_twists(law, points, moment / points.weight)[1]
-    system = points.influence[np.ix_(i, i)] + np.diag(rate[i] / points.weight[i])
+    system = points.influence[i[:, None], i]
+    system.flat[:: len(i) + 1] += rate[i] / points.weight[i]
     levers = points.levers[i]
     return np.asarray(levers.T @ np.linalg.solve(system, levers))

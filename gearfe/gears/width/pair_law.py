@@ -1,24 +1,29 @@
 r"""One tooth pair in the transverse section: where it touches, and how its contact yields, over angle and load.
 
-Both are functions of the pair angle :math:`\psi` alone, the pinion angle at which tooth 0 is so: the section at z of
-the pair k has :math:`\psi = \varphi + \kappa z + 2\pi k/z_1`. Loads count as moments on the wheel per width,
-:math:`M = f\,r` with the arm r of the rigid flanks, and approaches as twists of the wheel, so that what belongs
-together has the energy :math:`M\,d\theta`.
+**Pair angle.** A twist :math:`\theta` of the wheel overlaps the flanks, whose rolls on both gears then sum up to more
+than the length of the path of contact. The pair angle counts the half of it on either gear, so that the place on the
+path belongs to both and gears may be exchanged: the section at z of the pair k, pinion tooth k, has
 
-A pair that carries M per width by itself, in plane strain, is twisted by
+.. math:: \psi = \varphi + \kappa z + \frac{2\pi k}{z_1} - \tfrac12\,i\,\theta, \qquad i = z_2/z_1 .
 
-.. math:: \theta(\psi, M) = t(\psi) + T_0(\psi)\,M + c(\psi, M),
+Both gears turned by their halves of :math:`t(\psi)` touch first. From there a twist approaches the flanks by
+:math:`\bar r(\theta - t)`, :math:`\bar r = \tfrac12(r_2 + i\,r_1)` with the arms of both gears, which are the base
+radii on the path of contact.
 
-with the first contact t of the rigid flanks and the far field :math:`T_0 = w\,nHn/r^2` where they touch. The rest c is
-the contact's own: half-planes, wedge, tip rounds within the contact, the normal that turns and the place that moves
-under load. The panels of `gearfe.gears.contact.half_plane` solve :math:`\theta(\psi, M)` once for many angles and
-loads. c/M is nearly straight in ln M, as of Hertz's contacts, and is interpolated so.
+**Load.** A pair that carries the force f per width by itself, in plane strain, approaches by
+
+.. math:: \bar r(\psi)\,\big(\theta - t(\psi)\big) = T_0(\psi)\,f + C(\psi, f)\,f,
+
+with the far field :math:`T_0 = w\,nHn` where the rigid flanks touch. The rest C is the contact's own: half-planes,
+wedge, tip rounds within the contact, the normal that turns and the place that moves under load. The panels of
+`gearfe.gears.contact.half_plane` solve it once for many pair angles and loads. C is nearly straight in ln f, as of
+Hertz's contacts, and is interpolated so.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,9 +32,8 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from ...base.errors import InputError
 from ...base.progress import one_thread
 from ...base.typing import Array, ComplexArray
-from ..contact.half_plane import expected_twists, solve_half_plane
+from ..contact.half_plane import far_field_compliance, hertz, solve_half_plane, unloaded
 from ..contact.half_plane_pair import HalfPlanePair
-from ..contact.position import of_positions
 from ..geometry.face import ToothDeviations
 from ..geometry.first_contact import FirstContacts, ToothFlanks
 from .compliance import TIPS, WideCompliance
@@ -44,8 +48,12 @@ LOADS = 1e-6 * 4.0 ** np.arange(7)
 NEAR = np.array([0.0, 0.001, 0.003, 0.005, 0.008, 0.012, 0.017, 0.024, 0.034, 0.048, 0.07, 0.11])
 #: Largest distance of solved pair angles (mesh cycles).
 COARSE = 0.04
-#: Solved share of the cells of a pair angle below which it is left out.
+#: Distance of pair angles that are the same (mesh cycles).
+SAME = 1e-6
+#: Solved loads of a pair angle below which it is left out.
 ENOUGH = 4
+#: Secant steps until both gears are turned by their halves of the twist at first contact.
+CENTRED = 4
 
 
 @dataclass(frozen=True)
@@ -58,8 +66,8 @@ class PairLaw:
         psi (rad).
     touch : ndarray, shape (n,)
         Twist at first contact (rad), from where unmodified flanks touch.
-    arm : ndarray, shape (n,)
-        Moment on the wheel per force (m).
+    arm, pinion_arm : ndarray, shape (n,)
+        Moments on the wheel and on the pinion per force (m).
     normal : ndarray of complex, shape (n,)
         Common normal out of the pinion, global axes.
     point : ndarray of complex, shape (n,)
@@ -69,9 +77,9 @@ class PairLaw:
     tooth_normal : ndarray, shape (n, 2, 2)
         The normal in the axes of both teeth: gear, xy.
     yields : ndarray, shape (n, loads)
-        c/M (rad per N) at the moments per width `moments`.
-    moments : ndarray, shape (loads,)
-        Rising moments per width (N), evenly spaced in their logarithms.
+        C (m2/N) at the forces per width `forces`.
+    forces : ndarray, shape (loads,)
+        Rising forces per width (N/m), evenly spaced in their logarithms.
     path : tuple of float
         Pair angles of the ends A and E of the path of contact (rad).
     forward : complex
@@ -81,21 +89,23 @@ class PairLaw:
     angle: Array
     touch: Array
     arm: Array
+    pinion_arm: Array
     normal: ComplexArray
     point: ComplexArray
     roll: Array
     arc: Array
     tooth_normal: Array
     yields: Array
-    moments: Array
+    forces: Array
     path: tuple[float, float]
     forward: complex
 
     @cached_property
     def packed(self) -> Array:
-        """Touch, arm, normal, point, roll, arc, normals in the teeth's axes and yields side by side, shape (n, c)."""
+        """Touch, arms, normal, point, roll, arc, normals in the teeth's axes and yields side by side, shape (n, c)."""
         n = len(self.angle)
-        columns = [self.touch, self.arm, self.normal.real, self.normal.imag, self.point.real, self.point.imag]
+        columns = [self.touch, self.arm, self.pinion_arm, self.normal.real, self.normal.imag]
+        columns += [self.point.real, self.point.imag]
         return np.concatenate(
             [np.stack(columns, axis=1), self.roll, self.arc, self.tooth_normal.reshape(n, 4), self.yields], axis=1
         )
@@ -119,41 +129,59 @@ def pair_law(compliance: WideCompliance, profiles: tuple[ToothDeviations, ToothD
     low, high = path[0] - TIPS * cycle, path[1] + TIPS * cycle
     marks = np.unique(np.concatenate([path, _kinks(model)]))
     marks = marks[(marks > low) & (marks < high)]
-    contacts = _contacts(teeth, np.unique(np.concatenate([np.linspace(low, high, ANGLES + 1), marks])))
-    solved = _contacts(teeth, _solved_angles(low, high, marks, cycle))
+    angles, contacts = _contacts(teeth, np.unique(np.concatenate([np.linspace(low, high, ANGLES + 1), marks])))
+    solved_angles, solved = _contacts(teeth, _solved_angles(low, high, marks, cycle))
     modulus = 2 / sum(side.inverse_modulus for side in sides)
-    moments = LOADS * modulus * mesh.module * pair.wheel.base_radius
+    forces = LOADS * modulus * mesh.module
     with one_thread():
-        at_marks = _yields(compliance, model, solved, moments)
+        at_marks = _yields(compliance, model, solved_angles, solved, forces)
     known = np.isfinite(at_marks).all(axis=1)
     if np.count_nonzero(known) < ENOUGH:
         problem = "the contact of a tooth pair is not solved at most pair angles"
         raise InputError("profiles", None, problem, "use smaller modifications, without short waves")
-    yields = PchipInterpolator(solved.angle[known], at_marks[known])(
-        np.clip(contacts.angle, solved.angle[known][0], solved.angle[known][-1])
-    )
+    known_angles = solved_angles[known]
+    yields = PchipInterpolator(known_angles, at_marks[known])(np.clip(angles, known_angles[0], known_angles[-1]))
     arc, tooth_normal = _on_teeth(model, contacts)
     radius = np.abs(np.stack([contacts.point, contacts.point - pair.working_centre_distance], axis=1))
     base = np.array([gear.base_radius for gear in mesh.gears])
     return PairLaw(
-        angle=contacts.angle,
+        angle=angles,
         touch=contacts.twist - pair.contact_twist,
         arm=contacts.arm[:, 1],
+        pinion_arm=contacts.arm[:, 0],
         normal=contacts.normal,
         point=contacts.point,
         roll=np.sqrt(np.maximum(radius**2 - base**2, 0.0)),
         arc=arc,
         tooth_normal=tooth_normal,
         yields=yields,
-        moments=moments,
+        forces=forces,
         path=path,
         forward=complex(np.exp(1j * (0.5 * math.pi - pair.working_pressure_angle))),
     )
 
 
-def _contacts(teeth: ToothFlanks, angles: Array) -> FirstContacts:
-    """First contacts of the pair 0 at pair angles (rad), where its flanks meet."""
-    return teeth.first_contacts_of(np.arange(len(angles)), angles, np.zeros(len(angles), dtype=np.int64))
+def _contacts(teeth: ToothFlanks, angles: Array) -> tuple[Array, FirstContacts]:
+    """Pair angles (rad) at which the flanks of pair 0 meet, and its first contacts there, of those asked for."""
+    pair = teeth.pair
+
+    def met_at(pinion_angle: Array) -> tuple[FirstContacts, Array]:
+        found = teeth.first_contacts_of(np.arange(len(pinion_angle)), pinion_angle, np.zeros(len(pinion_angle), int))
+        return found, found.angle - 0.5 * pair.gear_ratio * (found.twist - pair.contact_twist)
+
+    found, reached = met_at(angles)
+    goal = angles[found.position]
+    before, off_before = found.angle, reached - goal
+    at = before - off_before
+    for _ in range(CENTRED if np.abs(off_before).max(initial=0.0) > 0.0 else 0):  # by secants
+        found, reached = met_at(at)
+        kept = found.position
+        goal, before, off_before = goal[kept], before[kept], off_before[kept]
+        off = reached - goal
+        rise = np.divide(off - off_before, found.angle - before, out=np.ones(len(off)), where=found.angle != before)
+        before, off_before = found.angle, off
+        at = found.angle - off / np.clip(rise, 0.5, 2.0)
+    return reached, found
 
 
 def _kinks(model: HalfPlanePair) -> Array:
@@ -167,10 +195,10 @@ def _solved_angles(low: float, high: float, marks: Array, cycle: float) -> Array
     """Pair angles (rad), close to each other beside marks."""
     near = (marks[:, None] + cycle * np.concatenate([-NEAR, NEAR])).ravel()
     near = np.unique(np.concatenate([[low, high], near[(near > low) & (near < high)]]))
-    gaps = np.maximum(np.ceil(np.diff(near) / (COARSE * cycle)).astype(int), 1)
-    between = [a + (b - a) * np.arange(n) / n for a, b, n in zip(near[:-1], near[1:], gaps, strict=True)]
-    angles = np.concatenate([*between, [high]])
-    return np.asarray(angles[np.diff(angles, prepend=-np.inf) > 1e-6 * cycle])
+    near = near[np.diff(near, prepend=-np.inf) > SAME * cycle]
+    counts = np.maximum(np.ceil(np.diff(near) / (COARSE * cycle) - SAME).astype(int), 1)
+    between = [a + (b - a) * np.arange(n) / n for a, b, n in zip(near[:-1], near[1:], counts, strict=True)]
+    return np.concatenate([*between, [high]])
 
 
 def _on_teeth(model: HalfPlanePair, contacts: FirstContacts) -> tuple[Array, Array]:
@@ -191,27 +219,54 @@ def plane_far_field(compliance: WideCompliance, arc: Array, tooth_normal: Array)
     return total
 
 
-def _yields(compliance: WideCompliance, model: HalfPlanePair, contacts: FirstContacts, moments: Array) -> Array:
-    """c/M (rad per N) of first contacts at moments per width (N), shape (n, loads); NaN where it is not known."""
-    n, width = len(contacts), model.width
+def _yields(
+    compliance: WideCompliance, model: HalfPlanePair, angles: Array, contacts: FirstContacts, forces: Array
+) -> Array:
+    """C (m2/N) at first contacts and forces per width (N/m), shape (n, loads); NaN where it is not known.
+
+    The twists that are solved are those at which Hertz's law takes the forces. The force is the mean of what the
+    torques of both gears say, which differ by the turning of the normal.
+
+    Parameters
+    ----------
+    compliance : WideCompliance
+        The gears.
+    model : HalfPlanePair
+        The same for the plane law.
+    angles : ndarray, shape (n,)
+        Pair angles (rad).
+    contacts : FirstContacts
+        First contacts there.
+    forces : ndarray, shape (loads,)
+        Forces per width (N/m).
+    """
+    n, pair = len(contacts), model.pair
     arc, tooth_normal = _on_teeth(model, contacts)
-    far_field = plane_far_field(compliance, arc, tooth_normal) / contacts.arm[:, 1] ** 2
-    position = np.arange(n)
-    of_cells = of_positions(FirstContacts(**{**vars(contacts), "position": position}), np.tile(position, len(moments)))
-    torques = np.repeat(moments * width, n)
-    twists = expected_twists(model, torques, of_cells)
-    solved = solve_half_plane(model, of_cells.angle, twists, of_cells)
+    far_field = plane_far_field(compliance, arc, tooth_normal)
+    ratio, touch = pair.gear_ratio, contacts.twist - pair.contact_twist
+    mean_arm = 0.5 * (contacts.arm[:, 1] + ratio * contacts.arm[:, 0])
+    # of one curvature, so that a place between two marks of the flanks does not decide
+    alone = replace(contacts, position=np.arange(n), curvature=np.full(n, 1 / compliance.mesh.module))
+    setting, state = unloaded(model, contacts.twist, alone)
+    of_far = far_field_compliance(setting, state)[setting.couples.own]
+    twists = np.stack([touch + f * (hertz(setting, state, np.full(n, f))[0] + of_far) / mean_arm for f in forces])
+    of_cells = (angles + 0.5 * ratio * twists).ravel(), (twists + pair.contact_twist).ravel()
+    cells = np.arange(twists.size)
+    met = model.teeth.first_contacts_of(cells, of_cells[0], np.zeros(twists.size, dtype=np.int64))
+    solved = solve_half_plane(model, *of_cells, met)
     good = (solved.status == "converged") & (solved.torque_wheel > 0)
-    moment = np.where(good, solved.torque_wheel / width, np.nan).reshape(-1, n)
-    yields = (twists - of_cells.twist).reshape(-1, n) / moment - far_field
-    found = np.full((n, len(moments)), np.nan)
+    arms = np.tile(contacts.arm, (len(forces), 1)) * model.width
+    mean = 0.5 * (solved.torque_pinion / arms[:, 0] + solved.torque_wheel / arms[:, 1])
+    force = np.where(good, mean, np.nan).reshape(-1, n)
+    yields = mean_arm * (twists - touch) / force - far_field
+    found = np.full((n, len(forces)), np.nan)
     for i in range(n):
         known = np.flatnonzero(np.isfinite(yields[:, i]))
         if len(known) >= ENOUGH:
-            x = np.log(moment[known, i])
+            x = np.log(force[known, i])
             order = np.argsort(x)
             spline = CubicSpline(x[order], yields[known, i][order])
-            at = np.log(moments)
+            at = np.log(forces)
             inside = np.clip(at, x.min(), x.max())
             found[i] = spline(inside) + (at - inside) * spline(inside, 1)
     return found
