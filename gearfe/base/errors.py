@@ -22,7 +22,8 @@ OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
     r"transverse_(module|pressure)|^m_?t(_|$)|alpha_?t":
         ("data of the transverse section", "spur gears and helical ones by their normal section only"),
     r"overlap_ratio|contact_ratio": ("results as keys", "gearfe gear prints the ratios of spur and helical gears"),
-    r"internal|(^|_)ring(_|$)|annulus": ("internal gears", "external spur gears only"),
+    r"internal|(^|_)ring(_|$)|annulus":
+        ("internal gears by this name", "those among spur gears and helical gears have a negative number of teeth"),
     r"planet|carrier|sun(_|$)|epicyclic": ("planetary gears", "spur gears on fixed shafts only"),
     r"bevel|hypoid|cone_(angle|dist)|pitch_cone|miter|spiral|^zerol": ("bevel gears", "spur gears only"),
     r"worm|lead_angle": ("worm gears", "spur gears only"),
@@ -34,7 +35,7 @@ OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
     r"temperature|thermal|heat|conductiv|expansion": ("temperatures", "elastic spur gears without heat only"),
     r"yield|plastic|creep|hardening|damage|fatigue|wear":
         ("materials that yield, creep or wear", "spur gears of linear elastic material only"),
-    r"(web|rim|hub|spoke)_": ("webs and thin rims", "spur gears with a solid body on a rigid bore only"),
+    r"(web|hub|spoke)_|rim_(?!diameter)": ("webs and thin rims", "spur gears with a solid body on a rigid bore only"),
     r"^crown|^lead_|barrel|face_load|flank_line|parallelism|slope_deviation":
         ("modifications along the face width by this name", "those of spur gears and helical gears are "
          "helix_crowning_um, helix_slope_um, end_relief_low_um in [microgeometry], and misalignment_um in [pair]"),

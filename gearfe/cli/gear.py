@@ -160,8 +160,8 @@ def _export(path: Path, pair: GearPair, mesh: NamedMesh, folder: Path) -> None:
         columns = outline_columns(gear)
         write_csv(path, columns if not mesh.deviates else _with_deviations(columns, gear, sides))
     elif path.suffix == ".dxf":
-        circles = {"bore": gear.bore_diameter, "reference_circle": gear.pitch_diameter}
-        radii = {name: 0.5e3 * diameter for name, diameter in circles.items()}
+        held = "rim" if gear.internal else "bore"
+        radii = {held: 1e3 * gear.held_radius, "reference_circle": 0.5e3 * gear.pitch_diameter}
         radii["base_circle"] = 1e3 * gear.base_radius
         teeth = whole_outline(gear, sides, per_piece=100)
         write_dxf(path, {"outline": 1e3 * np.concatenate([p.points[:-1] for tooth in teeth for p in tooth])}, radii)
@@ -187,7 +187,7 @@ def _with_deviations(
     """The outline with the deviations of tooth 0 on its involutes, along the normals (um)."""
     import numpy as np
 
-    roll = 1e-3 * np.sqrt(np.maximum(columns["radius_mm"] ** 2 - (1e3 * gear.base_radius) ** 2, 0.0))
+    roll = gear.sign * 1e-3 * np.sqrt(np.maximum(columns["radius_mm"] ** 2 - (1e3 * gear.base_radius) ** 2, 0.0))
     made = np.full(len(roll), np.nan)
     for side, own in zip(("left", "right"), sides, strict=True):
         curve = own.profiles[own.profile[0]]

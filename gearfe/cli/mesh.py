@@ -71,9 +71,11 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
 
     from ..gears.geometry.pair import pair_of
+    from ..gears.geometry.validity import check_external
 
     check_alike_along(mesh, "a mesh of finite elements", places=False)
     pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
+    check_external(pair, "a mesh of finite elements")
 
     from ..base.files import output_folder
     from ..gears.gearmesh.job import StiffnessJob

@@ -34,10 +34,11 @@ def pair_picture(pair: GearPair, pinion_angle: float = 0.0, notes: str = "") -> 
     """
     outlines = [
         gear_outline(pair.pinion, pinion_angle, (0.0, 0.0)),
-        gear_outline(
-            pair.wheel, pair.wheel_angle_at(pinion_angle) + pair.wheel_phase, (pair.working_centre_distance, 0.0)
-        ),
+        gear_outline(pair.wheel, pair.wheel_angle_at(pinion_angle) + pair.wheel_phase, (pair.wheel_centre, 0.0)),
     ]
+    colours = [(PINION_FILL, BLUE), (WHEEL_FILL, ORANGE)]
+    if pair.internal:  # what the ring leaves free lies over its rim, the pinion over that
+        outlines, colours = outlines[::-1], [("white", ORANGE), (PINION_FILL, BLUE)]
     line_of_action = np.array([path_place(pair, 0.0), path_place(pair, pair.tangent_length)])
     whole, near, beside = _panels(pair)
     figure = near.figure
@@ -48,7 +49,9 @@ def pair_picture(pair: GearPair, pinion_angle: float = 0.0, notes: str = "") -> 
     }
     angle = np.linspace(0, 2 * np.pi, 721)
     for axes in (whole, near):
-        for outline, fill, edge in zip(outlines, (PINION_FILL, WHEEL_FILL), (BLUE, ORANGE), strict=True):
+        if pair.internal:
+            _fill_rim(axes, pair)
+        for outline, (fill, edge) in zip(outlines, colours, strict=True):
             axes.fill(outline[:, 0], outline[:, 1], facecolor=fill, edgecolor=edge, linewidth=1.1)
         named = set()
         for kind, x, radius in _circles(pair):
@@ -71,7 +74,7 @@ def pair_picture(pair: GearPair, pinion_angle: float = 0.0, notes: str = "") -> 
         axes.set_aspect("equal")
         axes.set_xlabel("x (mm)")
     whole.set_ylabel("y (mm)")
-    for x in (0.0, 1e3 * pair.working_centre_distance):
+    for x in (0.0, 1e3 * pair.wheel_centre):
         whole.plot(x, 0.0, "+", color="#374151", markersize=9)
     x, y, half = zone(pair)
     whole.add_patch(_rectangle(x, y, half))
@@ -119,13 +122,16 @@ def _panels(pair: GearPair) -> tuple[Any, Any, Any]:
 def _draw_helices(axes: Any, pair: GearPair, pinion_angle: float) -> None:
     """Both gears seen along +y: the middles of their tips on the tip cylinders, as far as they face the viewer."""
     wheel_angle = pair.wheel_angle_at(pinion_angle) + pair.wheel_phase
-    placed = ((pair.pinion, pinion_angle, 0.0, BLUE), (pair.wheel, wheel_angle, pair.working_centre_distance, ORANGE))
-    for (gear, angle, x, colour), fill in zip(placed, (PINION_FILL, WHEEL_FILL), strict=True):
-        half, radius = 0.5e3 * gear.face_width, 1e3 * gear.tip_radius
+    placed = [(pair.pinion, pinion_angle, 0.0, BLUE), (pair.wheel, wheel_angle, pair.wheel_centre, ORANGE)]
+    fills = [PINION_FILL, WHEEL_FILL]
+    if pair.internal:  # the pinion lies in front of the ring, as if this were cut open
+        placed, fills = placed[::-1], fills[::-1]
+    for (gear, angle, x, colour), fill in zip(placed, fills, strict=True):
+        half, radius = 0.5e3 * gear.face_width, 1e3 * (gear.held_radius if gear.internal else gear.tip_radius)
         corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (radius, half) + (1e3 * x, 0.0)
         axes.fill(corners[:, 0], corners[:, 1], facecolor=fill, edgecolor=colour, linewidth=1.1)
         z = np.linspace(-half, half, 41)
-        for tooth in range(gear.teeth):
+        for tooth in range(0 if gear.internal else gear.teeth):
             turned = angle + 2 * np.pi * tooth / gear.teeth + 1e-3 * gear.twist_rate * z
             seen = np.where(np.sin(turned) < 0.0, 1e3 * x + radius * np.cos(turned), np.nan)
             axes.plot(seen, z, color=colour, linewidth=0.8)
@@ -141,12 +147,20 @@ def _circles(pair: GearPair) -> list[tuple[str, float, float]]:
     found = []
     gears = (
         (pair.pinion, 0.0, pair.pinion_working_radius),
-        (pair.wheel, pair.working_centre_distance, pair.wheel_working_radius),
+        (pair.wheel, pair.wheel_centre, pair.wheel_working_radius),
     )
     for gear, x, pitch in gears:
-        radii = {"bore": 0.5 * gear.bore_diameter, "pitch": pitch, "base": gear.base_radius, "tip": gear.tip_radius}
+        radii = {} if gear.internal else {"bore": gear.held_radius}
+        radii |= {"pitch": pitch, "base": gear.base_radius, "tip": gear.tip_radius}
         found += [(kind, 1e3 * x, 1e3 * radius) for kind, radius in radii.items()]
     return found
+
+
+def _fill_rim(axes: Any, pair: GearPair) -> None:
+    """Fill the outer circle of an internal gear."""
+    angle, radius = np.linspace(0, 2 * np.pi, 721), 1e3 * pair.wheel.held_radius
+    x, y = 1e3 * pair.wheel_centre + radius * np.cos(angle), radius * np.sin(angle)
+    axes.fill(x, y, facecolor=WHEEL_FILL, edgecolor=ORANGE, linewidth=1.1)
 
 
 def _rectangle(x: float, y: float, half: float) -> Any:

@@ -67,7 +67,7 @@ def test_well_known_names_are_not_taken_for_slips(change: str, what: str, capsys
 
 
 def test_negative_numbers_of_teeth_are_internal_gears(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "external gear" in refused(capsys, "gear", JOB, "--set", "pair.wheel.teeth=-60")
+    assert "held at its rim" in refused(capsys, "gear", JOB, "--set", "pair.wheel.teeth=-60")
 
 
 def keys_of(table: type) -> Iterator[str]:

@@ -23,6 +23,7 @@ from .pair import (
     REQUIRED,
     ROUNDING_MM,
     SAME,
+    SIGNED,
     GearBodyTable,
     GearTable,
     MaterialTable,
@@ -30,6 +31,7 @@ from .pair import (
     StiffnessTable,
     ToothFormTable,
     common_module_mm,
+    magnitude,
     module_mm_of,
     tooth_form,
     transverse_teeth,
@@ -108,6 +110,11 @@ class NamedGear:
     y_mm: float = 0.0
     like: str = ""
     shift_from: str = ""
+
+    @property
+    def internal(self) -> bool:
+        """Whether it is an internal gear."""
+        return self.teeth < 0
 
     def written(self, key: str) -> str:
         """Table that a key of the gear stands in; an empty text for one that the file does not give."""
@@ -239,10 +246,11 @@ def shift_by_distance(gear: NamedGear, mate: NamedGear, distance_mm: float, wher
     InputError
         For a distance that no pressure angle belongs to.
     """
+    # with signs: negative for an internal pair
     teeth, normal = gear.teeth + mate.teeth, math.radians(gear.form["pressure_angle_deg"])
     helix = math.radians(gear.form["helix_angle_deg"])
     angle = math.atan(math.tan(normal) / math.cos(helix)) if helix else normal
-    lowest = 0.5 * teeth * gear.form["module_mm"] * math.cos(angle) / math.cos(helix)
+    lowest = 0.5 * abs(teeth) * gear.form["module_mm"] * math.cos(angle) / math.cos(helix)
     if distance_mm <= lowest:
         problem = f"leaves no working pressure angle: must be > {lowest:.9g} mm"
         raise InputError(where, distance_mm, problem, "use a larger centre distance")
@@ -290,12 +298,14 @@ def _with_shifts(box: Gearbox) -> Gearbox:
 
 
 def _with_hands(box: Gearbox) -> Gearbox:
-    """The gearbox with hands of all helices: opposite in each mesh, right for the first driver where none is written.
+    """The gearbox with hands of all helices, right for the first driver where none is written.
+
+    Hands are opposite in a mesh of external gears, the same in that of an internal gear.
 
     Raises
     ------
     InputError
-        For the hand of a spur gear, and hands of mates that are not opposite.
+        For the hand of a spur gear, and hands of mates that do not fit.
     """
     hands: dict[str, str] = {}
     for name, gear in box.gears.items():
@@ -313,11 +323,16 @@ def _with_hands(box: Gearbox) -> Gearbox:
             hands[known.driver.name] = "right"
         meshes.remove(known)
         one, two = known.gears if known.driver.name in hands else known.gears[::-1]
-        hand = hands.setdefault(two.name, OPPOSITE[hands[one.name]])
-        if hand == hands[one.name]:
+        internal = one.internal or two.internal
+        fitting = hands[one.name] if internal else OPPOSITE[hands[one.name]]
+        hand = hands.setdefault(two.name, fitting)
+        if hand != fitting:
             wrong, right = (two, one) if two.written("helix_hand") else (one, two)
             problem = f"is that of gear {right.name!r} in mesh {known.name!r}, too: must be {OPPOSITE[hand]}"
             cure = "the hands of external gears in mesh are opposite: write the other one, or leave it out"
+            if internal:
+                problem = f"is not that of gear {right.name!r} in mesh {known.name!r}: must be {OPPOSITE[hand]}"
+                cure = "an internal gear has the hand of its mate: write the other one, or leave it out"
             raise InputError(f"{wrong.where}.helix_hand", hand, problem, cure)
     gears = {
         name: replace(gear, form={**gear.form, "helix_hand": hands.get(name, "right")})
@@ -470,7 +485,7 @@ def _named_mesh(name: str, table: NamedMeshTable, gears: Mapping[str, NamedGear]
             value = two.drawn.get(given, b)
             raise InputError(f"{two.where}.{given}", value, problem, f"gears in mesh have equal {what}")
     tilts = {key: getattr(table, key) for key in TILTS}
-    distance = table.centre_distance_mm
+    distance = magnitude(table.centre_distance_mm, one.internal or two.internal, where)
     return NamedMesh(name, where, one, two, distance, where, table.flank, table.tolerance_class, **tilts)
 
 
@@ -494,14 +509,25 @@ def _form(
         if table.helix_hand is None:
             places["helix_hand"] = DEFAULT
         if table.pitch_diameter_mm is not None:
-            form["module_mm"] = table.pitch_diameter_mm / transverse_teeth(table.teeth, form["helix_angle_deg"])
+            form["module_mm"] = abs(table.pitch_diameter_mm) / transverse_teeth(table.teeth, form["helix_angle_deg"])
             places.pop("module_mm", None)
-        form["bore_diameter_mm"] = table.bore_diameter_mm
+        if table.internal:
+            ring = {
+                "rim_diameter_mm": table.size("rim_diameter_mm"),
+                "form_diameter_mm": table.size("form_diameter_mm"),
+            }
+            form |= ring | {key: getattr(table, key) for key in ("rim", "cutter_teeth", "cutter_shift")}
+        else:
+            form["bore_diameter_mm"] = table.bore_diameter_mm
     return form, places
 
 
 def _drawn(table: GearBodyTable) -> dict[str, Any]:
-    return {key: getattr(table, key) for key in DRAWN if getattr(table, key) is not None}
+    drawn = {key: getattr(table, key) for key in DRAWN if getattr(table, key) is not None}
+    for key in SIGNED:
+        if key in drawn:  # magnitudes, except of the span, which is negative there
+            drawn[key] = -abs(drawn[key]) if table.internal and key == "span_mm" else abs(drawn[key])
+    return drawn
 
 
 def named_train(
@@ -656,8 +682,9 @@ def pair_gearbox(pair: PairTable, microgeometry: MicrogeometryTable | None = Non
     """Return the two gears of [pair], pinion and wheel, and their mesh."""
     gears = {side: _pair_gear(pair, side, microgeometry) for side in (PINION, WHEEL)}
     name = mesh_name(PINION, WHEEL)
+    distance = magnitude(pair.centre_distance_mm, pair.pinion.internal or pair.wheel.internal, "pair")
     tilts = {key: getattr(pair, key) for key in TILTS}
-    mesh = NamedMesh(name, "pair", gears[PINION], gears[WHEEL], pair.centre_distance_mm, "pair", **tilts)
+    mesh = NamedMesh(name, "pair", gears[PINION], gears[WHEEL], distance, "pair", **tilts)
     if microgeometry is not None:
         mesh = replace(mesh, flank=microgeometry.flank, tolerance_class=microgeometry.tolerance_class)
     return _with_shifts(_with_hands(Gearbox(gears, {name: mesh})))
@@ -707,10 +734,11 @@ def train_gearbox(
     meshes: dict[str, NamedMesh] = {}
     for i, mesh in enumerate(table.meshes):
         name, where = mesh_name(mesh.driver, mesh.driven), f"train.meshes[{i}]"
-        distance, distance_where = mesh.centre_distance_mm, where
+        internal = any(gears[gear].internal for gear in (mesh.driver, mesh.driven))
+        distance, distance_where = magnitude(mesh.centre_distance_mm, internal, where), where
         of_pair = {sides[mesh.driver], sides[mesh.driven]} == {PINION, WHEEL}
         if distance is None and of_pair and pair is not None and pair.centre_distance_mm is not None:
-            distance, distance_where = pair.centre_distance_mm, "pair"
+            distance, distance_where = abs(pair.centre_distance_mm), "pair"
         tilts: dict[str, Any] = {key: getattr(pair, key) if of_pair else 0.0 for key in TILTS}
         if name in meshes:
             raise InputError(where, None, f"has the gears of another mesh, {name!r}", "two gears have one mesh")

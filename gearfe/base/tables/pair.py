@@ -47,6 +47,18 @@ REQUIRED = ("pressure_angle_deg", "face_width_mm")
 OPTIONAL = ("tip_relief_length_mm",)
 #: Modules that count as equal (relative).
 SAME = 1e-9
+#: Numbers of teeth of external and internal gears.
+LEAST_TEETH, LEAST_RING, MOST_TEETH = 8, 12, 1000
+#: Ways to hold the rim of an internal gear.
+RIMS = ("bolted", "free")
+#: Keys of internal gears alone, and those whose numbers may have the standard's minus sign there.
+RING_KEYS = ("rim_diameter_mm", "rim", "cutter_teeth", "cutter_shift", "form_diameter_mm")
+SIGNED = (
+    *("pitch_diameter_mm", "tip_diameter_mm", "root_diameter_mm"),
+    *("rim_diameter_mm", "form_diameter_mm", "span_mm"),
+)
+#: What the bore is.
+BORE_DOC = "diameter of the rigid bore (mm); it decides the stiffness level"
 
 
 @dataclass(frozen=True)
@@ -111,20 +123,58 @@ def tooth_form(*tables: ToothFormTable) -> dict[str, Any]:
 class GearBodyTable(ToothFormTable):
     """Teeth, bore and drawing of one gear."""
 
-    teeth: int = quantity(doc="number of teeth of an external gear", low=8, high=1000)
+    teeth: int = quantity(
+        doc="number of teeth, negative of an internal gear",
+        low=-MOST_TEETH,
+        high=MOST_TEETH,
+    )
     helix_hand: str | None = quantity(
         None, doc="hand of the helix; left out: opposite to that of the mate, right for the driver", choices=HANDS
     )
-    bore_diameter_mm: float = quantity(doc="diameter of the rigid bore (mm); it decides the stiffness level", above=0.0)
-    pitch_diameter_mm: float | None = quantity(None, doc="reference diameter (mm), instead of module_mm", above=0.0)
-    tip_diameter_mm: float | None = quantity(
-        None, doc="tip diameter (mm), instead of addendum and tip_shortening", above=0.0
+    bore_diameter_mm: float | None = quantity(None, doc=BORE_DOC, above=0.0)
+    rim_diameter_mm: float | None = quantity(
+        None, doc="outer diameter of the rim of an internal gear (mm), required there"
     )
-    root_diameter_mm: float | None = quantity(None, doc="root diameter (mm), instead of dedendum", above=0.0)
+    rim: str | None = quantity(
+        None,
+        doc="how the outer diameter of an internal gear is held: bolted (rigid all round, the default) or free "
+        "(elastic; its mean displacement and turn are held)",
+        choices=RIMS,
+    )
+    cutter_teeth: int | None = quantity(
+        None,
+        doc="number of teeth of the pinion-type cutter of an internal gear; left out: half of the gear's own, "
+        "rounded down",
+        low=8,
+        high=MOST_TEETH,
+    )
+    cutter_shift: float | None = quantity(
+        None, doc="profile shift coefficient of that cutter (times module), by default 0"
+    )
+    form_diameter_mm: float | None = quantity(
+        None,
+        doc="root form diameter of an internal gear (mm), from which a circular fillet leads to the root circle; left "
+        "out: the root is what the cutter makes it",
+    )
+    pitch_diameter_mm: float | None = quantity(None, doc="reference diameter (mm), instead of module_mm")
+    tip_diameter_mm: float | None = quantity(None, doc="tip diameter (mm), instead of addendum and tip_shortening")
+    root_diameter_mm: float | None = quantity(None, doc="root diameter (mm), instead of dedendum")
     span_mm: float | None = quantity(
-        None, doc="span size over span_teeth teeth, W_k (mm), instead of tooth_thinning_um", above=0.0
+        None,
+        doc="span size over span_teeth teeth, of an internal gear over so many spaces, W_k (mm), instead of "
+        "tooth_thinning_um",
     )
     span_teeth: int | None = quantity(None, doc="number of teeth k of span_mm", low=2)
+
+    @property
+    def internal(self) -> bool:
+        """Whether it is an internal gear."""
+        return self.teeth < 0
+
+    def size(self, key: str) -> float | None:
+        """Magnitude of a diameter, which a file may write with the standard's minus sign for an internal gear."""
+        value: float | None = getattr(self, key)
+        return None if value is None else abs(value)
 
 
 def check_gear(gear: GearBodyTable, where: str, shared: ToothFormTable | None = None, shared_where: str = "") -> None:
@@ -141,6 +191,7 @@ def check_gear(gear: GearBodyTable, where: str, shared: ToothFormTable | None = 
     shared_where : str
         Table of these in messages.
     """
+    _check_kind(gear, where)
     for key, others in INSTEAD.items():
         for other in others if getattr(gear, key) is not None else ():
             if getattr(gear, other) is not None:
@@ -159,7 +210,7 @@ def check_gear(gear: GearBodyTable, where: str, shared: ToothFormTable | None = 
     form = tooth_form(*tables)
     if gear.pitch_diameter_mm is not None and module is not None:
         teeth = transverse_teeth(gear.teeth, form["helix_angle_deg"])
-        implied = gear.pitch_diameter_mm / teeth
+        implied = abs(gear.pitch_diameter_mm) / teeth
         if abs(implied - module) > SAME * module and abs(implied - module) * teeth > ROUNDING_MM:
             problem = f"contradicts module_mm = {module:g}: {gear.teeth} teeth make it {module * teeth:.9g}"
             raise InputError(f"{where}.pitch_diameter_mm", gear.pitch_diameter_mm, problem, "leave one out")
@@ -172,9 +223,34 @@ def check_gear(gear: GearBodyTable, where: str, shared: ToothFormTable | None = 
         raise InputError(f"{where}.tip_relief_length_mm", None, "is required with a tip relief", cure)
 
 
+def _check_kind(gear: GearBodyTable, where: str) -> None:
+    """Raise `InputError` for a number of teeth that no gear has, and for keys of the other kind of gear."""
+    if -LEAST_RING < gear.teeth < LEAST_TEETH:
+        problem = f"must be >= {LEAST_TEETH} for an external gear, <= {-LEAST_RING} for an internal gear"
+        raise InputError(f"{where}.teeth", gear.teeth, problem, "use another number of teeth")
+    if gear.internal:
+        if gear.bore_diameter_mm is not None:
+            problem, cure = "is of external gears: an internal gear is held at its rim", "give rim_diameter_mm instead"
+            raise InputError(f"{where}.bore_diameter_mm", gear.bore_diameter_mm, problem, cure)
+        if gear.rim_diameter_mm is None:
+            raise InputError(f"{where}.rim_diameter_mm", None, "is required for an internal gear", "add it")
+    else:
+        for key in RING_KEYS:
+            if getattr(gear, key) is not None:
+                problem = "is of internal gears alone, whose number of teeth is negative"
+                raise InputError(f"{where}.{key}", getattr(gear, key), problem, "leave it out, or write teeth = -61")
+        if gear.bore_diameter_mm is None:
+            raise InputError(f"{where}.bore_diameter_mm", None, f"is required: {BORE_DOC}", "add it")
+    for key in SIGNED:
+        value = getattr(gear, key)
+        if value is not None and (value == 0.0 or (value < 0.0 and not gear.internal)):
+            problem = "must be > 0; negative sizes are of internal gears, by ISO 21771"
+            raise InputError(f"{where}.{key}", value, problem, "correct it")
+
+
 def transverse_teeth(teeth: int, helix_deg: float) -> float:
-    """Reference diameter over normal module, z/cos(beta) (-), at a helix angle (deg)."""
-    return teeth / math.cos(math.radians(helix_deg))
+    """Reference diameter over normal module, |z|/cos(beta) (-), at a helix angle (deg)."""
+    return abs(teeth) / math.cos(math.radians(helix_deg))
 
 
 def module_mm_of(gear: GearBodyTable, written: float | None, common: float | None, helix_deg: float) -> float:
@@ -194,10 +270,11 @@ def module_mm_of(gear: GearBodyTable, written: float | None, common: float | Non
     if gear.pitch_diameter_mm is None:
         return given(written, "module_mm")
     teeth = transverse_teeth(gear.teeth, helix_deg)
-    implied, module = gear.pitch_diameter_mm / teeth, common if written is None else written
+    diameter = abs(gear.pitch_diameter_mm)
+    implied, module = diameter / teeth, common if written is None else written
     if module is None or abs(implied - module) <= SAME * module:
         return implied
-    return module if abs(module * teeth - gear.pitch_diameter_mm) <= ROUNDING_MM else implied
+    return module if abs(module * teeth - diameter) <= ROUNDING_MM else implied
 
 
 def common_module_mm(gears: Iterable[GearBodyTable], helix_deg: float) -> float | None:
@@ -208,10 +285,26 @@ def common_module_mm(gears: Iterable[GearBodyTable], helix_deg: float) -> float 
     gears = list(gears)
     if named := [gear.module_mm for gear in gears if gear.module_mm is not None]:
         return named[0]
-    diameters = [gear.pitch_diameter_mm for gear in gears if gear.pitch_diameter_mm is not None]
+    diameters = [abs(gear.pitch_diameter_mm) for gear in gears if gear.pitch_diameter_mm is not None]
     if len(diameters) < len(gears):
         return None
-    return sum(diameters) / transverse_teeth(sum(gear.teeth for gear in gears), helix_deg)
+    return sum(diameters) / transverse_teeth(sum(abs(gear.teeth) for gear in gears), helix_deg)
+
+
+def magnitude(distance_mm: float | None, internal: bool, where: str) -> float | None:
+    """Return the magnitude of a centre distance (mm), which may have the minus sign of an internal pair alone.
+
+    Raises
+    ------
+    InputError
+        For 0 and for the negative distance of external gears.
+    """
+    if distance_mm is None:
+        return None
+    if distance_mm == 0.0 or (distance_mm < 0.0 and not internal):
+        problem = "must be > 0; a negative one is of an internal pair, by ISO 21771"
+        raise InputError(f"{where}.centre_distance_mm", distance_mm, problem, "correct it, or leave it out")
+    return abs(distance_mm)
 
 
 @dataclass(frozen=True)
@@ -232,7 +325,9 @@ class PairTable(ToothFormTable):
     pinion: GearTable = quantity(doc="the driving gear")  # noqa: RUF009
     wheel: GearTable = quantity(doc="the driven gear")  # noqa: RUF009
     centre_distance_mm: float | None = quantity(
-        None, doc="centre distance (mm); without it, from the profile shifts without backlash", above=0.0
+        None,
+        doc="centre distance (mm), with or without the minus sign of an internal pair; without it, from the profile "
+        "shifts without backlash",
     )
     misalignment_um: float = quantity(
         0.0, doc="tilt of the axes in the plane of action (um over the common face width), > 0: closes larger y"
@@ -260,6 +355,7 @@ class PairTable(ToothFormTable):
         self._check_shifts(where)
         for side in ("pinion", "wheel"):
             check_gear(getattr(self, side), f"{where}.{side}", self, where)
+        magnitude(self.centre_distance_mm, self.pinion.internal or self.wheel.internal, where)
 
     def _check_shifts(self, where: str) -> None:
         """Raise `InputError` unless at most one profile shift follows from a centre distance, which is given then."""

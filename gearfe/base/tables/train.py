@@ -248,7 +248,8 @@ class TrainMeshTable:
         "always with a stiffness",
     )
     centre_distance_mm: float | None = quantity(
-        None, above=0.0, doc="working centre distance (mm); left out: no backlash"
+        None,
+        doc="working centre distance (mm), with or without the minus sign of an internal pair; left out: no backlash",
     )
     mesh_model: str | None = quantity(
         None,

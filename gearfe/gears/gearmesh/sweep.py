@@ -31,7 +31,7 @@ from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, check_alike, ch
 from ..contact.position import Positions, in_batches, joined, taken
 from ..geometry.face import ToothDeviations
 from ..geometry.pair import GearPair
-from ..geometry.validity import MOST_OVERLAP, check_spur, overlaps
+from ..geometry.validity import MOST_OVERLAP, check_external, check_spur, overlaps
 from ..teeth.tooth_sector import sector_mesh, sector_recipes
 from .curve import BACK, SOLVED, StiffnessCurve
 from .load_map import LoadMap
@@ -71,6 +71,7 @@ def elastic_pair(
         Fields of the model to change, such as ``law="nitsche"``; see `PairModel.changed`.
     """
     check_spur(pair, "the law of plane sections")
+    check_external(pair, "the law of plane sections")
     model = model.changed(**changes)
     watch = watch or Stopwatch()
     gears = (pair.pinion, pair.wheel)

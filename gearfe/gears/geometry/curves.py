@@ -73,7 +73,11 @@ def bisect(function: Callable[[float], float], low: float, high: float) -> float
 
 @dataclass(frozen=True)
 class Arc:
-    """Circular arc passed clockwise, material on the side of its centre; angles in rad, lengths in m."""
+    """Circular arc, passed clockwise with the material on the side of its centre; angles in rad, lengths in m.
+
+    With a negative radius the angle is that of the outward normal still, the point lies opposite to it, and the
+    material on the far side from the centre: tip and root circles of internal gears, and concave fillets.
+    """
 
     centre: Point
     radius: float
@@ -87,7 +91,7 @@ class Arc:
         return np.exp(1j * (self.start_angle + t * (self.end_angle - self.start_angle)))
 
     def speed(self, t: Array) -> Array:
-        return np.full(np.shape(t), self.radius * abs(self.start_angle - self.end_angle))
+        return np.full(np.shape(t), abs(self.radius * (self.start_angle - self.end_angle)))
 
 
 @dataclass(frozen=True)
@@ -142,13 +146,69 @@ class Trochoid:
 
 
 @dataclass(frozen=True)
+class CutterTrochoid:
+    """Envelope of a pinion-type cutter's tip round in an internal gear, from the root circle (g = 0) to the flank.
+
+    Gear and cutter roll on pitch circles of the radii `gear_radius` R and `cutter_radius` R_0 (m) about centres on one
+    side of the pitch point P. The round of radius `radius` rho (m) has its centre Q at the radius `centre_radius` r_c
+    (m) of the cutter and the polar angle `half_angle` theta (rad) from the middle of its tooth, which faces the middle
+    of the gear's space at polar angle pi + `space_angle` (rad). The normal at the angle g to the line of centres passes
+    P (Litvin & Fuentes, ch. 6), so that with D = sqrt(r_c^2 - R_0^2 sin^2 g) Q lies L = D - R_0 cos g from P, and the
+    gear has turned by chi = R_0/R (arg(R_0 + L exp(i g)) - theta). The speed along the curve is
+    (L + rho) - chi' (R cos g + L + rho) with chi' = R_0 L/(R D).
+    """
+
+    gear_radius: float
+    cutter_radius: float
+    centre_radius: float
+    half_angle: float
+    radius: float
+    space_angle: float
+    end: float
+
+    def point(self, t: Array) -> ComplexArray:
+        g = t * self.end
+        reach = self._root(g) - self.cutter_radius * np.cos(g) + self.radius
+        return -(self.gear_radius + reach * np.exp(1j * g)) * np.exp(1j * (self.space_angle - self._turn(g)))
+
+    def normal(self, t: Array) -> ComplexArray:
+        g = t * self.end
+        return np.asarray(np.exp(1j * (g + self.space_angle - self._turn(g))))
+
+    def speed(self, t: Array) -> Array:
+        return np.abs(self.advance(t))
+
+    def advance(self, t: Array) -> Array:
+        """Derivative of the arc length (m) with t; negative where the curve runs backwards."""
+        g = t * self.end
+        root = self._root(g)
+        length = root - self.cutter_radius * np.cos(g)
+        turning = self.cutter_radius / self.gear_radius * length / root
+        reach = length + self.radius
+        return np.asarray(self.end * (reach - turning * (self.gear_radius * np.cos(g) + reach)))
+
+    def _root(self, g: Array) -> Array:
+        return np.asarray(np.sqrt(self.centre_radius**2 - (self.cutter_radius * np.sin(g)) ** 2))
+
+    def _turn(self, g: Array) -> Array:
+        length = self._root(g) - self.cutter_radius * np.cos(g)
+        place = np.arctan2(length * np.sin(g), self.cutter_radius + length * np.cos(g))
+        return np.asarray(self.cutter_radius / self.gear_radius * (place - self.half_angle))
+
+
+#: Curves between root circle and involute.
+Root = Trochoid | CutterTrochoid | Arc
+
+
+@dataclass(frozen=True)
 class Involute:
     """Involute, moved inwards along its normal by a tip relief delta(s) = amount ((s - relief_start)/length)^exponent.
 
     With u = s/r_b: Q = P - delta e2, dQ/ds = (u - delta/r_b) e1 - delta' e2; normal along (u - delta/r_b) e2 +
     delta' e1.
     The parameter is linear in the roll length from `start` to `end` (m). At a kink (exponent 1, s = relief_start) the
-    normal is that of the unrelieved side.
+    normal is that of the unrelieved side. The flank of an internal gear has a negative base radius and negative roll
+    lengths.
     """
 
     base_radius: float
@@ -214,12 +274,14 @@ class Involute:
     def roll_at(self, radius: Any) -> Array:
         """Roll lengths (m) of the points at radii r (m), from the base circle on: s - delta(s) = sqrt(r^2 - r_b^2)."""
         forward = np.sqrt(np.maximum(0.0, (radius - self.base_radius) * (radius + self.base_radius)))
+        if self.base_radius < 0.0:
+            forward = -forward
         s = forward
         for _ in range(NEWTON if self.modified else 0):
             depth, slope = self.relief(s)
             move = (s - depth - forward) / (1.0 - slope)
             s = s - move
-            if (np.abs(move) <= ROLL_ROUNDING * self.end).all():
+            if (np.abs(move) <= ROLL_ROUNDING * abs(self.end)).all():
                 break
         return np.asarray(s)
 
@@ -242,7 +304,7 @@ class Segment:
     Parameters
     ----------
     name
-        ``root_circle``, ``trochoid``, ``involute``, ``tip_round`` or ``tip``.
+        ``root_circle``, ``trochoid`` (or ``fillet``), ``involute``, ``tip_round`` or ``tip``.
     curve
         The exact curve over t in [0, 1].
     start, end
@@ -252,7 +314,7 @@ class Segment:
     """
 
     name: str
-    curve: Arc | Trochoid | Involute
+    curve: Root | Involute
     start: Point
     end: Point
     breaks: tuple[float, ...] = ()

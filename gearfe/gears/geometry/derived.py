@@ -32,18 +32,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.typing import Array
+from .balls import ball_diameter, over_balls
+from .cutter import cutter_facts
 from .pair import GearPair, MeshGeometry
+from .ring import CLEAR, radial_clearance
 from .spur_gear import Gear
+from .validity import tip_clearance
 
 #: Young's modulus of steel that the standard refers to (Pa).
 STEEL = 206e9
 #: Correction factor C_M between measured and theoretical stiffness.
 CORRECTION = 0.8
+#: Names of the specific sliding of pinion and wheel at a point of the path.
+SLIDING = ("pinion_specific_sliding", "wheel_specific_sliding")
 _UNIT = 1e9  # N/(mm um) in N/m^2
 
 
 def derived_geometry(pair: GearPair, spans: tuple[int | None, int | None] = (None, None)) -> dict[str, Any]:
     """Derived geometry of the pair and both gears: name with unit -> number.
+
+    Diameters, span sizes and the centre distance of internal gears are negative, as ISO 21771 has them.
 
     Parameters
     ----------
@@ -53,7 +61,7 @@ def derived_geometry(pair: GearPair, spans: tuple[int | None, int | None] = (Non
     helix = _of_helix(pair) if pair.pinion.helical else {}
     return {
         "gear_ratio": pair.gear_ratio,
-        "centre_distance_mm": 1e3 * pair.working_centre_distance,
+        "centre_distance_mm": 1e3 * pair.wheel_centre,
         "working_pressure_angle_deg": math.degrees(pair.working_pressure_angle),
         "base_pitch_mm": 1e3 * pair.base_pitch,
         "backlash_mm": 1e3 * pair.backlash,
@@ -63,6 +71,7 @@ def derived_geometry(pair: GearPair, spans: tuple[int | None, int | None] = (Non
         "contact_ratio_active": pair.contact_ratio_active,
         "contact_ratio_effective": pair.contact_ratio_effective,
         **helix,
+        **(_of_internal(pair) if pair.internal else {}),
         "path_length_mm": 1e3 * pair.path_length,
         "mesh_cycle_deg": math.degrees(pair.mesh_cycle),
         "path_of_contact": {
@@ -70,6 +79,7 @@ def derived_geometry(pair: GearPair, spans: tuple[int | None, int | None] = (Non
                 "pinion_roll_mm": 1e3 * point.pinion_roll,
                 "wheel_roll_mm": 1e3 * point.wheel_roll,
                 "pinion_angle_deg": math.degrees(point.pinion_angle),
+                **dict(zip(SLIDING, specific_sliding(pair, name), strict=True)),
             }
             for name, point in pair.path.items()
         },
@@ -99,26 +109,65 @@ def _helix_of_gear(gear: Gear, span: float) -> dict[str, Any]:
         "helix_hand": gear.hand,
         "lead_mm": 2e3 * math.pi / abs(gear.twist_rate),
         "virtual_teeth": gear.virtual_teeth,
-        "span_least_face_width_mm": 1e3 * span * math.sin(gear.base_helix_angle),
+        "span_least_face_width_mm": 1e3 * abs(span) * math.sin(gear.base_helix_angle),
     }
 
 
+def _of_internal(pair: MeshGeometry) -> dict[str, Any]:
+    """What belongs to the geometry of an internal pair alone."""
+    pinion, ring = pair.pinion, pair.wheel
+    radial = radial_clearance(pinion, ring, pair.working_centre_distance)
+    return {
+        "tip_clearance_pinion_mm": 1e3 * tip_clearance(pair, pinion, ring),
+        "tip_clearance_wheel_mm": 1e3 * tip_clearance(pair, ring, pinion),
+        "radial_assembly": radial >= -CLEAR * ring.module,
+        "radial_assembly_clearance_mm": 1e3 * radial,
+        "relative_curvature_A_per_mm": 1e-3 * relative_curvature(pair, "A"),
+        "relative_curvature_E_per_mm": 1e-3 * relative_curvature(pair, "E"),
+    }
+
+
+def relative_curvature(pair: MeshGeometry, point: str) -> float:
+    """Relative curvature 1/rho_1 + 1/rho_2 (1/m) at a point of the path, whose rho are the roll lengths with sign.
+
+    With sin(beta_b) of helical gears it is in the normal section: times cos(beta_b).
+    """
+    at = pair.path[point]
+    return (1.0 / at.pinion_roll + 1.0 / at.wheel_roll) * math.cos(pair.pinion.base_helix_angle)
+
+
+def specific_sliding(pair: MeshGeometry, point: str) -> tuple[float, float]:
+    """Specific sliding of pinion and wheel (-) at a point of the path: 1 - (speed of the mate's flank)/(own speed)."""
+    at, u = pair.path[point], pair.gear_ratio
+    ratio = at.wheel_roll / (u * at.pinion_roll) if at.pinion_roll else math.inf
+    return 1.0 - ratio, (1.0 - 1.0 / ratio if ratio else -math.inf)
+
+
+def _of_ring(gear: Gear) -> dict[str, Any]:
+    """Rim and root of an internal gear."""
+    root = cutter_facts(gear) if gear.form_diameter is None else {}
+    return {"rim_diameter_mm": -1e3 * (gear.rim_diameter or 0.0), "rim": gear.rim, **root}
+
+
 def _of_gear(gear: Gear, working_radius: float, span: int | None) -> dict[str, Any]:
-    spanned = gear.span_teeth if span is None else span
+    spanned, sign, balls = gear.span_teeth if span is None else span, gear.sign, ball_diameter(gear)
+    held = _of_ring(gear) if gear.internal else {"bore_diameter_mm": 1e3 * gear.bore_diameter}
     return {
         "teeth": gear.teeth,
         "module_mm": 1e3 * gear.module,
-        "pitch_diameter_mm": 1e3 * gear.pitch_diameter,
-        "working_pitch_diameter_mm": 2e3 * working_radius,
-        "base_diameter_mm": 2e3 * gear.base_radius,
-        "tip_diameter_mm": 2e3 * gear.tip_radius,
-        "root_diameter_mm": 2e3 * gear.root_radius,
-        "form_diameter_mm": 2e3 * gear.form_radius,
-        "bore_diameter_mm": 1e3 * gear.bore_diameter,
+        "pitch_diameter_mm": sign * 1e3 * gear.pitch_diameter,
+        "working_pitch_diameter_mm": sign * 2e3 * working_radius,
+        "base_diameter_mm": sign * 2e3 * gear.base_radius,
+        "tip_diameter_mm": sign * 2e3 * gear.tip_radius,
+        "root_diameter_mm": sign * 2e3 * gear.root_radius,
+        "form_diameter_mm": sign * 2e3 * gear.form_radius,
+        **held,
         "tip_thickness_mm": 1e3 * gear.tip_thickness,
         "profile_shift": gear.profile_shift,
         "span_teeth": spanned,
         "span_mm": 1e3 * gear.span_size(spanned),
+        "ball_diameter_mm": 1e3 * balls,
+        "over_balls_mm": 1e3 * over_balls(gear, balls),
         **(_helix_of_gear(gear, gear.span_size(spanned)) if gear.helical else {}),
         "undercut": gear.undercut,
     }
@@ -146,7 +195,7 @@ def gear_outline(gear: Gear, angle: float, centre: tuple[float, float], *, per_s
     half = gear.profile.polyline(per_segment)
     left = half[:, 0] + 1j * half[:, 1]
     tooth = np.concatenate([np.conj(left), left[::-1][1:]])  # counter-clockwise: right flank, tip, left flank
-    turns = np.exp(1j * (angle + 2 * np.pi * np.arange(gear.teeth) / gear.teeth))
+    turns = np.exp(1j * (angle + 2 * np.pi * np.arange(gear.tooth_count) / gear.teeth))
     around = (turns[:, None] * tooth[:-1]).ravel() + complex(*centre)
     around = np.append(around, around[0])
     return 1e3 * np.stack([around.real, around.imag], axis=1)
@@ -182,8 +231,9 @@ def single_pair_stretches(pair: GearPair, start: float, end: float) -> list[tupl
 
 
 def flexibility(pinion: Gear, wheel: Gear) -> float:
-    """q', minimum flexibility of a pair of teeth (mm um/N), of the virtual teeth z_n."""
-    z1, z2, x1, x2 = pinion.virtual_teeth, wheel.virtual_teeth, pinion.profile_shift, wheel.profile_shift
+    """q', minimum flexibility of a pair of teeth (mm um/N), of the virtual teeth z_n; an internal gear is a rack."""
+    z1, z2 = pinion.virtual_teeth, math.inf if wheel.internal else wheel.virtual_teeth
+    x1, x2 = pinion.profile_shift, wheel.profile_shift
     return (
         0.04723
         + 0.15551 / z1

@@ -1,9 +1,10 @@
-"""Exact transverse profile of an external involute gear tooth as a rack cuts it.
+"""Exact transverse profile of an involute gear tooth as a rack cuts it, or a pinion-type cutter an internal gear.
 
 The half profile of a tooth centred on the +x axis runs from the middle of the space (polar angle pi/z) to the tip
-centreline (polar angle 0) through up to five curves: root circle, trochoid, involute, tip round, tip circle. Names
-after ISO 21771; the curves themselves are in `gears.geometry.curves`. What a rack leaves at the root, the trochoid, the
-form point and the undercut, stands first.
+centreline (polar angle 0) through up to five curves: root circle, trochoid, involute, tip round, tip circle. That of an
+internal gear is at y > 0 of the -x axis, from which its polar angles count. Names after ISO 21771; the curves
+themselves are in `gears.geometry.curves`. What a rack leaves at the root, the trochoid, the form point and the
+undercut, stands first.
 """
 
 from __future__ import annotations
@@ -18,12 +19,15 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.typing import Array
-from .curves import Arc, Involute, Segment, Trochoid, bisect, inverse_inv
+from .curves import Arc, Involute, Root, Segment, Trochoid, bisect, inverse_inv
+from .cutter import ring_root
 from .deviation import Deviation
 from .gear_data import GearData, rounding
 
 #: Arcs of a smaller polar angle (rad) are taken for none: below 1e-9 mm on a gear of 1 m radius.
 NIL_ANGLE = 1e-12
+#: No tip round of an internal gear is larger (modules).
+LARGEST_ROUND = 3.0
 
 
 def largest_rack_tip_radius(gear: GearData) -> float:
@@ -107,7 +111,8 @@ class ToothProfile:
     Parameters
     ----------
     segments
-        In order root_circle, trochoid, involute, tip_round, tip; a piece of zero length is left out.
+        In order root_circle, trochoid (fillet, where an internal gear's form diameter is given), involute, tip_round,
+        tip; a piece of zero length is left out.
     flank
         The involute with its relief, from the form point to the start of the tip round.
     root, round_
@@ -122,7 +127,7 @@ class ToothProfile:
 
     segments: tuple[Segment, ...]
     flank: Involute
-    root: Trochoid | None
+    root: Root | None
     round_: Arc | None
     tip_roll: float
     undercut: bool
@@ -168,40 +173,50 @@ def tooth_profile(gear: GearData) -> ToothProfile:
     InputError
         When the rack has no land, the tooth is pointed or cut through, or tip round or relief do not fit.
     """
-    root, form_roll, undercut = tooth_root(gear)
+    fillet, land_angle, form_roll, undercut = _root_of(gear)
     flank, tip_roll = _flank(gear, form_roll)
     end_roll = float(flank.roll_at(gear.tip_radius))
-    tip_half_angle = cmath.phase(flank.at(np.array(end_roll)))
+    sign = gear.sign
+    tip_half_angle = sign * cmath.phase(sign * flank.at(np.array(end_roll)))
     if tip_half_angle <= 0.0:
-        peak = flank.base_radius / math.cos(inverse_inv(flank.base_angle))
+        peak = gear.base_radius / math.cos(inverse_inv(flank.base_angle))
         problem, limit = "the tooth is pointed below its tip circle", ("<", _addendum_to(gear, peak), "")
         cure = "use less addendum or profile shift, or some tip_shortening"
         raise InputError("addendum", gear.addendum, problem, cure, limit)
     round_roll = _round_start(gear, flank, tip_roll, end_roll)
     flank = replace(flank, end=round_roll)
 
-    pieces: list[tuple[str, Arc | Trochoid | Involute]] = []
-    space, land, round_ = math.pi / gear.teeth, tip_half_angle, None
-    land_angle = root.offset / root.reference_radius
-    fillet = root if root.radius > 0.0 or root.depth != 0.0 else None
+    pieces: list[tuple[str, Root | Involute]] = []
+    space, land, round_ = math.pi / gear.teeth, sign * tip_half_angle, None
     if gear.tip_round > 0.0:
         round_ = _tip_arc(gear, flank)
         land = round_.end_angle
     if land_angle > 0.0:
-        pieces.append(("root_circle", Arc((0.0, 0.0), gear.root_radius, space, space - land_angle)))
+        pieces.append(("root_circle", Arc((0.0, 0.0), sign * gear.root_radius, space, space - sign * land_angle)))
     if fillet is not None:
-        pieces.append(("trochoid", fillet))
+        pieces.append(("fillet" if isinstance(fillet, Arc) else "trochoid", fillet))
     pieces.append(("involute", flank))
     if round_ is not None:
         pieces.append(("tip_round", round_))
-    if land > NIL_ANGLE:
-        pieces.append(("tip", Arc((0.0, 0.0), gear.tip_radius, land, 0.0)))
+    if sign * land > NIL_ANGLE:
+        pieces.append(("tip", Arc((0.0, 0.0), sign * gear.tip_radius, land, 0.0)))
     return ToothProfile(_joined(pieces), flank, fillet, round_, tip_roll, undercut, tip_half_angle)
+
+
+def _root_of(gear: GearData) -> tuple[Root | None, float, float, bool]:
+    """Curve between root circle and involute, polar angle (rad) of the root circle, roll length (m) of the form point,
+    and whether it is undercut."""
+    if gear.internal:
+        made = ring_root(gear)
+        return made.curve, made.land, made.form_roll, False
+    root, form_roll, undercut = tooth_root(gear)
+    fillet = root if root.radius > 0.0 or root.depth != 0.0 else None
+    return fillet, root.offset / root.reference_radius, form_roll, undercut
 
 
 def _flank(gear: GearData, form_roll: float) -> tuple[Involute, float]:
     """Flank from the form point, end still open, and the roll length (m) of the tip circle."""
-    base, base_angle, tip_roll = gear.base_radius, gear.base_angle, gear.roll_length(gear.tip_radius)
+    base, base_angle, tip_roll = gear.signed_base_radius, gear.base_angle, gear.roll_length(gear.tip_radius)
     if tip_roll <= form_roll:
         lowest = _addendum_to(gear, math.hypot(base, form_roll))
         problem, cure = "the tip circle lies below the start of the involute", "use more addendum or less dedendum"
@@ -232,9 +247,10 @@ def _round_start(gear: GearData, flank: Involute, tip_roll: float, end_roll: flo
     rho, tip = gear.tip_round, gear.tip_radius
     if rho == 0.0:
         return end_roll
-    inner = tip - rho
+    sign = gear.sign
+    inner = tip - sign * rho
     core = (inner - flank.base_radius) * (inner + flank.base_radius)
-    start = rho + math.sqrt(core) if core >= 0.0 else -math.inf
+    start = rho + sign * math.sqrt(core) if core >= 0.0 else -math.inf
     if start <= flank.start:
         problem = f"would begin below the start of the involute: must be < {1e3 * _largest_round(gear, flank):.5g} mm"
         raise InputError("tip_round", rho, problem, "use a smaller tip round")
@@ -243,8 +259,8 @@ def _round_start(gear: GearData, flank: Involute, tip_roll: float, end_roll: flo
             problem = f"lies wholly inside the tip round: must be > {1e3 * (tip_roll - start):.6g} mm of roll length"
             raise InputError("tip_relief.length", flank.length, problem, "use a longer relief or a smaller tip round")
         above = np.nextafter(flank.relief_start, math.inf)
-        start = bisect(lambda s: abs(_round_centre(gear, flank, s)) - inner, float(above), end_roll)
-    if cmath.phase(_round_centre(gear, flank, start)) < -NIL_ANGLE:
+        start = bisect(lambda s: sign * (abs(_round_centre(gear, flank, s)) - inner), float(above), end_roll)
+    if sign * cmath.phase(sign * _round_centre(gear, flank, start)) < -NIL_ANGLE:
         limit = 1e3 * _largest_round(gear, flank)
         problem = f"does not fit the tip, the rounds of both flanks overlap: must be < {limit:.5g} mm"
         raise InputError("tip_round", rho, problem, "use a smaller tip round, less addendum or less profile shift")
@@ -253,14 +269,15 @@ def _round_start(gear: GearData, flank: Involute, tip_roll: float, end_roll: flo
 
 def _largest_round(gear: GearData, flank: Involute) -> float:
     """Largest tip round (m) that begins above the form point and leaves a tip land; relief not counted."""
-    tip, base = gear.tip_radius, flank.base_radius
+    tip, base, sign = gear.tip_radius, flank.base_radius, gear.sign
 
     def too_large(rho: float) -> float:
-        roll = math.sqrt((tip - rho - base) * (tip - rho + base))
+        inner = tip - sign * rho
+        roll = sign * math.sqrt((inner - base) * (inner + base))
         land = flank.base_angle - (rho + roll) / base + math.atan(roll / base)
-        return 1.0 if land < 0.0 or rho + roll < flank.start else -1.0
+        return 1.0 if sign * land < 0.0 or rho + roll < flank.start else -1.0
 
-    return bisect(too_large, 0.0, tip - base)
+    return bisect(too_large, 0.0, LARGEST_ROUND * gear.module if gear.internal else tip - base)
 
 
 def deviated(gear: GearData, nominal: Involute, deviation: Deviation) -> tuple[Involute, Arc | None]:
@@ -270,7 +287,7 @@ def deviated(gear: GearData, nominal: Involute, deviation: Deviation) -> tuple[I
     """
     tip, rho = gear.tip_radius, gear.tip_round
     flank, reach = replace(nominal, deviation=deviation), 2 * (deviation.most + nominal.amount) + 1e-12
-    if flank.start > reach:  # twice as far as any point moves
+    if abs(flank.start) > reach:  # twice as far as any point moves
         flank = replace(flank, start=float(flank.roll_at(abs(nominal.at(np.array(nominal.start))))))
     if rho == 0.0:
         return replace(flank, end=float(flank.roll_at(tip))), None
@@ -278,24 +295,24 @@ def deviated(gear: GearData, nominal: Involute, deviation: Deviation) -> tuple[I
 
     slope = float(np.abs(nominal.relief(np.linspace(flank.start, flank.end, 65))[1]).max()) + deviation.steepest
     low, high = (flank.end + way * (reach + 2 * rho * slope) for way in (-1, 1))
-    end = brentq(lambda s: abs(_round_centre(gear, flank, s)) - (tip - rho), low, high, xtol=ROLL)
+    end = brentq(lambda s: abs(_round_centre(gear, flank, s)) - (tip - gear.sign * rho), low, high, xtol=ROLL)
     flank = replace(flank, end=float(end))
     return flank, _tip_arc(gear, flank)
 
 
 def _addendum_to(gear: GearData, radius: float) -> float:
     """Addendum coefficient with which the tip circle has the given radius (m)."""
-    return radius / gear.module - gear.reference_modules - gear.profile_shift + gear.tip_shortening
+    return gear.sign * (radius / gear.module - gear.reference_modules) - gear.profile_shift + gear.tip_shortening
 
 
 def _tip_arc(gear: GearData, flank: Involute) -> Arc:
-    """Tip round from the end of the flank to the tip land, whose half angle is that of its end."""
+    """Tip round from the end of the flank to the tip land, whose half angle has the size of that of its end."""
     centre = _round_centre(gear, flank, flank.end)
     start = cmath.phase(flank.normal_at(np.array(flank.end)))
-    return Arc((centre.real, centre.imag), gear.tip_round, start, cmath.phase(centre))
+    return Arc((centre.real, centre.imag), gear.tip_round, start, cmath.phase(gear.sign * centre))
 
 
-def _joined(pieces: list[tuple[str, Arc | Trochoid | Involute]]) -> tuple[Segment, ...]:
+def _joined(pieces: list[tuple[str, Root | Involute]]) -> tuple[Segment, ...]:
     """Segments that share their end points: each inner joint is where the later piece starts."""
     ends = [complex(curve.point(np.array(0.0))) for _, curve in pieces]
     ends.append(complex(pieces[-1][1].point(np.array(1.0))))

@@ -7,6 +7,10 @@ of the pinion's teeth and the left flanks, in the wheel's own frame, of the whee
 the pinion's base circle at polar angle -alpha_w; with s1 and s2 the roll lengths on pinion and wheel, s1 + s2 =
 a sin(alpha_w) along it, and a pinion flank passes s1 at the pinion angle s1/r_b1 - alpha_w - psi1 - inv(alpha).
 
+The wheel may be an internal gear: with the negative z2, a, r_b2 and s2 of ISO 21771 all of this holds for it, too, so
+its centre lies at (-|a|, 0) and it turns with the pinion. A positive twist closes the driving flanks always: it turns
+an internal wheel clockwise. Centre distances and radii here are magnitudes, roll lengths and the gear ratio have signs.
+
 SI units and radians.
 """
 
@@ -37,14 +41,14 @@ class PathPoint:
 
 @dataclass(frozen=True)
 class MeshGeometry:
-    """Two external gears in mesh, not yet checked; `GearPair` is the checked one.
+    """Two gears in mesh, not yet checked; `GearPair` is the checked one.
 
     Parameters
     ----------
     pinion, wheel
-        The gears; the pinion drives.
+        The gears; the pinion drives, and the wheel may be an internal gear.
     centre_distance
-        Centre distance a (m); None: without backlash for the unthinned teeth, from the profile shifts.
+        Centre distance |a| (m); None: without backlash for the unthinned teeth, from the profile shifts.
     axial_offset
         Middle of the wheel's face width less that of the pinion's, along the axes (m).
     """
@@ -55,14 +59,29 @@ class MeshGeometry:
     axial_offset: float = field(default=0.0, kw_only=True)
 
     @cached_property
+    def internal(self) -> bool:
+        """Whether the wheel is an internal gear."""
+        return self.wheel.internal
+
+    @cached_property
+    def sign(self) -> int:
+        """Sign of the standard's centre distance: 1, of an internal pair -1."""
+        return self.wheel.sign
+
+    @cached_property
+    def wheel_centre(self) -> float:
+        """x of the wheel's centre (m), the standard's centre distance: negative for an internal pair."""
+        return self.sign * self.working_centre_distance
+
+    @cached_property
     def gear_ratio(self) -> float:
-        """Gear ratio z2/z1 (-)."""
+        """Gear ratio z2/z1 (-), negative for an internal pair."""
         return self.wheel.teeth / self.pinion.teeth
 
     @cached_property
     def reference_centre_distance(self) -> float:
-        """Reference centre distance a_0 = (r_1 + r_2) (m)."""
-        return self.pinion.reference_radius + self.wheel.reference_radius
+        """Reference centre distance a_0 = r_1 + r_2 (m), of an internal pair r_2 - r_1."""
+        return self.sign * self.pinion.reference_radius + self.wheel.reference_radius
 
     @cached_property
     def working_pressure_angle(self) -> float:
@@ -89,12 +108,12 @@ class MeshGeometry:
     @cached_property
     def pinion_working_radius(self) -> float:
         """Radius of the pinion's working pitch circle a/(1 + z2/z1) (m)."""
-        return self.working_centre_distance / (1.0 + self.gear_ratio)
+        return self.wheel_centre / (1.0 + self.gear_ratio)
 
     @cached_property
     def wheel_working_radius(self) -> float:
         """Radius of the wheel's working pitch circle (m)."""
-        return self.working_centre_distance - self.pinion_working_radius
+        return self.working_centre_distance - self.sign * self.pinion_working_radius
 
     @cached_property
     def base_pitch(self) -> float:
@@ -108,7 +127,7 @@ class MeshGeometry:
         half = inv(self.working_pressure_angle)
         pinion, wheel = self.pinion, self.wheel
         tooth1 = 2.0 * pinion.base_radius * (pinion.base_angle - half)
-        tooth2 = 2.0 * wheel.base_radius * (wheel.base_angle - half)
+        tooth2 = 2.0 * wheel.signed_base_radius * (wheel.base_angle - half)
         gap = self.base_pitch - tooth1 - tooth2
         return 0.0 if abs(gap) < 1e-12 else gap
 
@@ -134,8 +153,11 @@ class MeshGeometry:
 
     @cached_property
     def tangent_length(self) -> float:
-        """Length a sin(alpha_w) of the line of action between the base circles (m): s1 + s2 on it."""
-        return self.working_centre_distance * math.sin(self.working_pressure_angle)
+        """Length a sin(alpha_w) of the line of action between the base circles (m): s1 + s2 on it.
+
+        Negative for an internal pair, whose line of action touches both base circles on one side of the contact.
+        """
+        return self.wheel_centre * math.sin(self.working_pressure_angle)
 
     def pinion_angle_at(self, pinion_roll: float) -> float:
         """Pinion angle (rad) at which the driving flank of tooth 0 passes the roll length `pinion_roll` (m)."""
@@ -148,8 +170,11 @@ class MeshGeometry:
         return pinion.base_radius * (pinion_angle + self.working_pressure_angle + pinion.base_angle)
 
     def wheel_angle_at(self, pinion_angle: Any, twist: Any = 0.0) -> Any:
-        """Wheel angle (rad; a number or an array) from its meshing position, -pinion angle/ratio + twist."""
-        return twist - pinion_angle / self.gear_ratio
+        """Wheel angle (rad; a number or an array) from its meshing position, -pinion angle/ratio + twist.
+
+        A twist turns an internal wheel by its negative.
+        """
+        return self.sign * twist - pinion_angle / self.gear_ratio
 
     @cached_property
     def wheel_phase(self) -> float:

@@ -41,6 +41,8 @@ class Piece:
 def tooth_outline(gear: Gear, per_piece: int = 48, kinks: Iterable[float] = ()) -> list[Piece]:
     """Outline of tooth 0, whose centreline is +x, from the middle of the space before it to that of the space after it.
 
+    That of an internal gear is on the -x axis, and its outline runs clockwise round the gear, material on the left.
+
     The flanks hold reliefs and rounds. Pieces end where the curvature jumps, so a spline through the points of one is
     smooth: with 48 edges it is within 1e-5 mm of the exact curve. They end at the roll lengths `kinks` (m), too.
     """
@@ -54,7 +56,7 @@ def tooth_outline(gear: Gear, per_piece: int = 48, kinks: Iterable[float] = ()) 
             # goes with the square of the roll length
             t = np.linspace(low, high, per_piece + 1)
             curve = segment.curve
-            place = (curve.centre, curve.radius) if isinstance(curve, Arc) else None
+            place = (curve.centre, abs(curve.radius)) if isinstance(curve, Arc) else None
             left.append(Piece(segment.name, segment.points(t), segment.normals(t), place))
     flip = np.array([1.0, -1.0])
     made = []
@@ -83,7 +85,7 @@ def whole_outline(
     # from the middle of the space to that of the tip circle: right flanks, left ones mirrored
     sides = {"right": nominal[:half], "left": nominal[: half - 1 : -1]}
     made = []
-    for tooth in range(gear.teeth):
+    for tooth in range(gear.tooth_count):
         place = 2.0 * math.pi * tooth / gear.teeth
         halves = {}
         for (name, pieces), sign, own in zip(sides.items(), (-1.0, 1.0), deviations[::-1], strict=True):
@@ -94,20 +96,20 @@ def whole_outline(
 
 
 def _turns(gear: Gear, pieces: list[Piece], own: ToothDeviations, tooth: int) -> list[Array]:
-    """How far (rad) the points of half a tooth turn out of its material, root first."""
+    """Turns (rad) that move the points of the left half of a tooth out of its material, root first."""
     profile = own.profiles[int(own.profile_of(np.array(tooth)))]
     made = []
     for piece in pieces:
-        roll = np.sqrt(np.maximum((piece.points**2).sum(axis=1) - gear.base_radius**2, 0.0))
+        roll = gear.sign * np.sqrt(np.maximum((piece.points**2).sum(axis=1) - gear.base_radius**2, 0.0))
         roll = np.clip(roll, gear.profile.form_roll, gear.profile.round_roll)
         height = np.zeros(len(roll))
         if profile is not None:
             for _ in range(ROUNDS):
                 height = profile.at(roll - height)[0]
-        made.append(height / gear.base_radius + float(own.turn_of(np.array(tooth))))
+        made.append(gear.sign * (height / gear.base_radius + float(own.turn_of(np.array(tooth)))))
     for end in (0, -1):  # the pieces beside the middles
-        angle = np.abs(np.arctan2(*pieces[end].points.T[::-1]))
-        middle = math.pi / gear.teeth if end == 0 else 0.0
+        angle = np.abs(np.arctan2(*(gear.sign * pieces[end].points.T[::-1])))
+        middle = math.pi / gear.tooth_count if end == 0 else 0.0
         away = np.abs(angle - middle)
         made[end] = made[end] * (away / away.max() if away.max() > 0.0 else 1.0)
     return made

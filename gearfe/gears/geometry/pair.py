@@ -17,7 +17,7 @@ import numpy as np
 from ...base.errors import InputError, given
 from ...base.shown import Shown
 from ...base.tables.gearbox import NamedGear, NamedMesh, pair_gearbox, shift_by_distance
-from ...base.tables.pair import FROM_DISTANCE, PairTable, transverse_teeth
+from ...base.tables.pair import FROM_DISTANCE, RING_KEYS, PairTable, transverse_teeth
 from .gear_data import TipRelief, nominal_span, rounding
 from .mesh_geometry import MeshGeometry, PathPoint
 from .spur_gear import Gear
@@ -28,16 +28,16 @@ __all__ = ["Gear", "GearPair", "MeshGeometry", "PathPoint", "TipRelief"]
 
 @dataclass(frozen=True, repr=False)
 class GearPair(MeshGeometry, Shown):
-    """Two external spur or helical gears in mesh, checked when made.
+    """Two spur or helical gears in mesh, checked when made.
 
     Parameters
     ----------
     pinion, wheel
-        The gears; the pinion drives.
+        The gears; the pinion drives, and the wheel may be an internal gear.
     axial_offset
         Middle of the wheel's face width less that of the pinion's, along the axes (m).
     centre_distance
-        Centre distance a (m); None: without backlash for the unthinned teeth, from the profile shifts. Where it jams
+        Centre distance |a| (m); None: without backlash for the unthinned teeth, from the profile shifts. Where it jams
         the teeth by no more than rounding (`gear_data.rounding`), the wheel's teeth are made so much thinner.
     notes
         How given data were taken that fit each other except for rounding, one sentence each.
@@ -75,7 +75,7 @@ class GearPair(MeshGeometry, Shown):
         return {
             "teeth": f"{self.pinion.teeth}/{self.wheel.teeth}",
             "module": f"{1e3 * self.pinion.module:.6g} mm",
-            "centre distance": f"{1e3 * self.working_centre_distance:.6g} mm",
+            "centre distance": f"{1e3 * self.wheel_centre:.6g} mm",
             "working pressure angle": f"{math.degrees(self.working_pressure_angle):.5g} deg",
             "contact ratio": f"{self.contact_ratio:.4g}",
             "backlash": f"{1e3 * self.backlash:.4g} mm",
@@ -105,6 +105,8 @@ KEYS: dict[str, tuple[str, float]] = {
     "pressure_angle": ("pressure_angle_deg", math.pi / 180.0),
     "face_width": ("face_width_mm", 1e-3),
     "bore_diameter": ("bore_diameter_mm", 1e-3),
+    "rim_diameter": ("rim_diameter_mm", 1e-3),
+    "form_diameter": ("form_diameter_mm", 1e-3),
     "tip_round": ("tip_round_mm", 1e-3),
     "tip_relief.amount": ("tip_relief_amount_um", 1e-6),
     "tip_relief.length": ("tip_relief_length_mm", 1e-3),
@@ -154,8 +156,8 @@ def _shared_pair(
 
 
 def gear_of_form(teeth: int, form: Mapping[str, Any]) -> Gear:
-    """Gear with the keys of `gearfe.base.tables.pair.tooth_form`, ``module_mm`` and ``bore_diameter_mm``."""
-    made = dict(form)
+    """Gear with the keys of `gearfe.base.tables.pair.tooth_form`, ``module_mm``, and those of its bore or rim."""
+    made = {key: value for key, value in form.items() if value is not None or key not in RING_KEYS}
     for name, (key, unit) in KEYS.items():
         if made.get(key) is not None:
             value = made.pop(key)
@@ -276,15 +278,18 @@ class _Written:
         teeth, drawn = self.named[side].teeth, self.named[side].drawn
         module_mm, half, x = form["module_mm"], self._half_teeth(side), form["profile_shift"]
         made: dict[str, float] = {}
+        sign = -1 if teeth < 0 else 1
         if "tip_diameter_mm" in drawn:
-            made |= {"addendum": 0.5 * drawn["tip_diameter_mm"] / module_mm - half - x, "tip_shortening": 0.0}
+            height = sign * (0.5 * drawn["tip_diameter_mm"] / module_mm - half)
+            made |= {"addendum": height - x, "tip_shortening": 0.0}
         if "root_diameter_mm" in drawn:
-            made["dedendum"] = half + x - 0.5 * drawn["root_diameter_mm"] / module_mm
+            made["dedendum"] = sign * (half + sign * x - 0.5 * drawn["root_diameter_mm"] / module_mm)
         if "span_mm" in drawn:
             angle, span, over = math.radians(form["pressure_angle_deg"]), drawn["span_mm"], drawn["span_teeth"]
             most = module_mm * nominal_span(teeth, x, angle, over, self._helix(side))
             if span > most + 1e3 * rounding(1e-3 * module_mm):
-                problem = f"must be <= {most:.6g} mm, the span over {over} teeth without backlash"
+                what = f"{over} spaces" if teeth < 0 else f"{over} teeth"
+                problem = f"must be <= {most:.6g} mm, the span over {what} without backlash"
                 cure = "use more profile_shift, or another span_teeth"
                 raise InputError("span_mm", span, problem, cure)
             self.thinned_um[side] = 1e3 * (most - span) / math.cos(angle)
@@ -377,7 +382,9 @@ class _Written:
             return InputError(f"{where}.{key}", value, f"makes {error.field} {number}: {error.reason}", error.cure)
         form, (sign, bound, unit) = named.form, error.limit
         module, x = form["module_mm"], form["profile_shift"]
-        if key != "tip_diameter_mm":  # these fall as what they stand for grows
+        side_sign = -1 if named.teeth < 0 else 1
+        inward = key == ("tip_diameter_mm" if named.teeth < 0 else "root_diameter_mm")
+        if inward or key in ("span_mm", "tip_shortening"):  # these fall as what they stand for grows
             sign = {"<": ">", ">": "<", ">=": "<=", "<=": ">="}[sign]
         if key == "span_mm":
             over = named.drawn["span_teeth"]
@@ -389,9 +396,8 @@ class _Written:
                 cure = "use less tip_shortening of both gears, or more addendum"
                 return InputError(f"{where}.{key}", value, f"{error.reason}, even with 0 here", cure)
         else:
-            limit = module * (
-                2.0 * self._half_teeth(side) + 2.0 * x + 2.0 * (bound if key == "tip_diameter_mm" else -bound)
-            )
+            height = x + (bound if key == "tip_diameter_mm" else -bound)
+            limit = module * (2.0 * self._half_teeth(side) + side_sign * 2.0 * height)
         unit, cure = " mm" * key.endswith("_mm"), f"use a {'smaller' if '<' in sign else 'larger'} {key}"
         return InputError(f"{where}.{key}", value, f"{error.reason}: must be {sign} {limit:.6g}{unit}", cure)
 
@@ -458,7 +464,8 @@ class _Written:
         def possible(a: float) -> bool:
             return self._possible(side, self._shift(side, a), gears, 1e-3 * a)
 
-        reference = sum(map(self._half_teeth, SIDES)) * named.form["module_mm"]
+        halves = [math.copysign(self._half_teeth(each), self.named[each].teeth) for each in SIDES]
+        reference = abs(sum(halves)) * named.form["module_mm"]
         near = [d for d in np.linspace(0.99 * reference, 1.05 * reference, 121).tolist() if possible(d)]
         if not near:
             return InputError(f"{named.where}.profile_shift", FROM_DISTANCE, problem, error.cure)

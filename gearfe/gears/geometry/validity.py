@@ -25,6 +25,7 @@ from .curves import bisect, inv, inverse_inv
 from .gear_data import rounding
 from .involute import largest_rack_tip_radius, least_shift
 from .mesh_geometry import MeshGeometry
+from .ring import CLEAR, radial_clearance, ring_depths
 from .spur_gear import LEAST_ROUND, Gear
 
 #: Largest overlap, times module.
@@ -48,6 +49,13 @@ def check_seat(pair: MeshGeometry) -> float:
         For gears of different modules or pressure angles, and a centre distance that is impossible or jams the teeth.
     """
     pinion, wheel = pair.pinion, pair.wheel
+    if pinion.internal:
+        problem = "is an internal gear, which is the wheel of a pair here"
+        cure = "swap the gears: roles are names, and either gear may drive"
+        raise InputError("pinion.teeth", pinion.teeth, problem, cure)
+    if pair.internal and wheel.tooth_count <= pinion.teeth:
+        problem = f"leaves no room for the {pinion.teeth} teeth of the pinion inside"
+        raise InputError("wheel.teeth", wheel.teeth, problem, "use more teeth", ("<", -float(pinion.teeth), ""))
     degrees = 180.0 / math.pi
     for name, what, unit in (
         ("module", "module", 1e3),
@@ -61,8 +69,10 @@ def check_seat(pair: MeshGeometry) -> float:
             problem = f"gears that differ in {what}, {both}, do not mesh"
             limit = ("equal to", unit * other, symbol)
             raise InputError(f"wheel.{name}", value, problem, f"give both the same {what}", limit)
-    if pinion.helical and pinion.hand == wheel.hand:
+    if pinion.helical and (pinion.hand == wheel.hand) != pair.internal:
         problem = "is the hand of both helices: that of external gears in mesh is opposite"
+        if pair.internal:
+            problem = f"is not the hand of the pinion ({pinion.hand}): an internal gear has that of its mate"
         raise InputError("wheel.hand", wheel.hand, problem, "give the other hand to one of them")
     if not pair.common_width > 0.0:
         most = 0.5e3 * (pinion.face_width + wheel.face_width)
@@ -83,13 +93,24 @@ def check_spur(pair: MeshGeometry, what: str) -> None:
         raise InputError("axial_offset", getattr(pair, "axial_offset", None), problem, cure)
 
 
+def check_external(pair: MeshGeometry, what: str) -> None:
+    """Raise `InputError` for internal pairs; `what` names the computation that takes external gears only."""
+    if pair.internal:
+        problem = f"is an internal gear: {what} takes external gears only"
+        raise InputError(
+            "wheel.teeth", pair.wheel.teeth, problem, "gearfe gear computes the geometry of internal pairs"
+        )
+
+
 def check_pair(pair: MeshGeometry) -> None:
     """Raise `InputError` for gears that cannot run together; `check_seat` comes first."""
     pinion, wheel = pair.pinion, pair.wheel
-    a = pair.working_centre_distance
     for name, gear, mate in (("pinion", pinion, wheel), ("wheel", wheel, pinion)):
-        if gear.tip_radius + mate.root_radius >= a + rounding(gear.module):
-            room = (a - mate.root_radius - gear.tip_radius) / gear.module
+        # of external gears compared as sums: the printed bound is tested to the last bit
+        clearance, off = tip_clearance(pair, gear, mate), rounding(gear.module)
+        sums = gear.tip_radius + mate.root_radius, pair.working_centre_distance + off
+        if (clearance <= -off) if pair.internal else (sums[0] >= sums[1]):
+            room = clearance / gear.module
             problem, limit = "makes the tip circle hit the mate's root circle", ("<", gear.addendum + room, "")
             cure = "use more tip_shortening, less addendum, more dedendum or more centre distance"
             raise InputError(f"{name}.addendum", gear.addendum, problem, cure, limit)
@@ -98,18 +119,28 @@ def check_pair(pair: MeshGeometry) -> None:
         _check_interference(pair, name, mate_name)
 
 
+def tip_clearance(pair: MeshGeometry, gear: Gear, mate: Gear) -> float:
+    """Tip clearance c (m) between the tip circle of a gear of the pair and its mate's root circle."""
+    a = pair.working_centre_distance
+    if not pair.internal:
+        return a - mate.root_radius - gear.tip_radius
+    return mate.root_radius - gear.tip_radius - a if mate.internal else gear.tip_radius - mate.root_radius - a
+
+
 def _check_distance(pair: MeshGeometry) -> float:
     """Raise `InputError` for an impossible centre distance; return the jam (m) that rounding leaves."""
     pinion, wheel = pair.pinion, pair.wheel
-    alpha, lowest = pinion.transverse_pressure_angle, pinion.base_radius + wheel.base_radius
+    sign = pair.sign
+    alpha, lowest = pinion.transverse_pressure_angle, sign * pinion.base_radius + wheel.base_radius
     if pair.centre_distance is None:
         shift = pinion.profile_shift + wheel.profile_shift
         least = -0.5 * (pinion.teeth + wheel.teeth) * inv(alpha) / math.tan(pinion.pressure_angle)
-        if shift <= least:
-            limit = (">", least - wheel.profile_shift, "")
+        if sign * shift <= sign * least:
+            way, size = ("<", "smaller") if pair.internal else (">", "larger")
+            limit = (way, least - wheel.profile_shift, "")
             problem, cure = (
-                f"leaves no working pressure angle (sum of both: > {least:.6g})",
-                "use larger profile shifts",
+                f"leaves no working pressure angle (sum of both: {way} {least:.6g})",
+                f"use {size} profile shifts",
             )
             raise InputError("pinion.profile_shift", pinion.profile_shift, problem, cure, limit)
         return 0.0
@@ -118,12 +149,13 @@ def _check_distance(pair: MeshGeometry) -> float:
         problem = f"leaves no working pressure angle: must be finite and > {1e3 * lowest:.9g} mm"
         raise InputError("centre_distance", a, problem, "use a larger centre distance, or leave it out")
     if pair.base_backlash < 0.0:
-        angles = pinion.base_radius * pinion.base_angle + wheel.base_radius * wheel.base_angle - pair.base_pitch / 2
-        tight = lowest / math.cos(inverse_inv(angles / lowest))
-        if tight - a <= rounding(pinion.module):
+        rolled = pinion.base_radius * pinion.base_angle + wheel.signed_base_radius * wheel.base_angle
+        tight = lowest / math.cos(inverse_inv((rolled - pair.base_pitch / 2) / (sign * lowest)))
+        if sign * (tight - a) <= rounding(pinion.module):
             return -pair.base_backlash
-        problem = f"jams the teeth (backlash {1e3 * pair.backlash:.6g} mm): must be >= {1e3 * tight:.12g} mm"
-        cure = "use a larger centre distance, less profile shift or more tooth thinning, or leave it out"
+        way, size = ("<=", "smaller") if pair.internal else (">=", "larger")
+        problem = f"jams the teeth (backlash {1e3 * pair.backlash:.6g} mm): must be {way} {1e3 * tight:.12g} mm"
+        cure = f"use a {size} centre distance, less profile shift or more tooth thinning, or leave it out"
         raise InputError("centre_distance", a, problem, cure)
     return 0.0
 
@@ -142,7 +174,7 @@ def missing_addendum(pair: MeshGeometry, names: Sequence[str]) -> float:
 
     def ratio(more: float) -> float:
         gears = ((getattr(pair, name), more if name in names else 0.0) for name in ("pinion", "wheel"))
-        rolls = sum(gear.roll_length(gear.tip_radius + add * gear.module) for gear, add in gears)
+        rolls = sum(gear.roll_length(gear.tip_radius + gear.sign * add * gear.module) for gear, add in gears)
         return (rolls - pair.tangent_length) / pair.base_pitch - least
 
     least = least_ratio(pair)
@@ -164,6 +196,10 @@ def _check_ratio(pair: MeshGeometry) -> None:
         problem, cure = f"gives a contact ratio of {nominal:.4g} < {short}", "use less tip_shortening, or more teeth"
         # the distance of the points of tangency that leaves the least path between the tips
         tangent = pair.tangent_length - (least - nominal) * pair.base_pitch
+        if pair.internal and pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch:
+            lowest = pair.wheel.base_radius - pair.pinion.base_radius
+            limit = (">=", 1e3 * math.hypot(tangent, lowest), "mm")
+            raise InputError("centre_distance", pair.centre_distance, problem, "use a larger centre distance", limit)
         if pair.centre_distance is not None and pair.backlash > 1e-3 * pair.base_pitch and tangent > 0.0:
             most = math.hypot(tangent, pair.pinion.base_radius + pair.wheel.base_radius)
             cure = "use a smaller centre distance"
@@ -184,6 +220,8 @@ def _check_ratio(pair: MeshGeometry) -> None:
     cuts = {name: lost for name, lost in _lost_to_form_points(pair).items() if lost > 0.0}
     name = max(cuts, key=cuts.__getitem__)
     gear = getattr(pair, name)
+    if pair.internal and not gear.undercut:
+        _check_interference(pair, name, "wheel" if name == "pinion" else "pinion")
     problem = f"leaves an undercut root that eats the path of contact: contact ratio {active:.4g}, must be >= {short}"
     cure = f"use more profile shift (no undercut from {least_shift(gear):.4g} on), more teeth or less dedendum"
     raise InputError(f"{name}.profile_shift", gear.profile_shift, problem, cure)
@@ -216,7 +254,7 @@ def _check_interference(pair: MeshGeometry, name: str, mate_name: str) -> None:
     lost = _lost_to_form_points(pair)[name]
     if lost > rounding(gear.module) and not gear.undercut:
         allowed = math.hypot(mate.base_radius, pair.tangent_length - gear.form_roll)
-        most = mate.addendum - (mate.tip_radius - allowed) / mate.module
+        most = mate.addendum - mate.sign * (mate.tip_radius - allowed) / mate.module
         problem = (
             f"makes the tip reach {1e3 * lost:.4g} mm of roll length below the start of the {name}'s involute "
             f"(form diameter {2e3 * gear.form_radius:.6g} mm), where the root is no involute"
@@ -225,6 +263,9 @@ def _check_interference(pair: MeshGeometry, name: str, mate_name: str) -> None:
     depth = _tip_depth(pair, gear, mate)
     if depth > _allowed_depth(gear):
         problem = f"makes the tip cut {1e3 * depth:.4g} mm into the {name}'s root"
+        if pair.internal:
+            problem = f"makes the teeth cut {1e3 * depth:.4g} mm into those of the {name} beside the path of contact"
+            cure = "use less addendum or more tip_shortening, a larger difference of the numbers of teeth"
         raise InputError(f"{mate_name}.addendum", mate.addendum, problem, cure, _largest_addendum(pair, gear, mate))
 
 
@@ -235,6 +276,10 @@ def _allowed_depth(gear: Gear) -> float:
 
 def _tip_depth(pair: MeshGeometry, gear: Gear, mate: Gear) -> float:
     """Largest depth (m) by which tips of a mate enter a gear of the pair."""
+    if pair.internal:
+        ring, pinion = (gear, mate) if gear.internal else (mate, gear)
+        depths = ring_depths(pinion, ring, pair.working_centre_distance, 0.5 * pair.base_backlash / ring.base_radius)
+        return depths.ring if mate.internal else depths.pinion
     return tip_penetration(gear, mate, pair.working_centre_distance, 0.5 * pair.base_backlash / mate.base_radius)
 
 
@@ -260,7 +305,7 @@ def _largest_addendum(pair: MeshGeometry, gear: Gear, mate: Gear) -> tuple[str, 
 
 def _addendum_at(gear: Gear, radius: float) -> float:
     """Addendum (times module) that has its tip circle at a radius (m)."""
-    return gear.addendum + (radius - gear.tip_radius) / gear.module
+    return gear.addendum + gear.sign * (radius - gear.tip_radius) / gear.module
 
 
 def tip_penetration(gear: Gear, mate: Gear, centre_distance: float, twist: float) -> float:
@@ -341,13 +386,13 @@ def rounding_notes(pair: MeshGeometry) -> list[str]:
     """Return how the data of gears were taken where they fit each other except for rounding, one sentence each."""
     notes = []
     for name, gear, mate in (("pinion", pair.pinion, pair.wheel), ("wheel", pair.wheel, pair.pinion)):
-        largest = largest_rack_tip_radius(gear)
+        largest = math.inf if gear.internal else largest_rack_tip_radius(gear)
         if gear.rack_tip_radius > largest * (1.0 + 1e-12):
             notes.append(
                 f"rack_tip_radius {gear.rack_tip_radius:g} of the {name} exceeds a full fillet by rounding: "
                 f"{largest:.6g} is taken"
             )
-        room = pair.working_centre_distance - mate.root_radius - gear.tip_radius
+        room = tip_clearance(pair, gear, mate)
         if room <= 0.0:
             notes.append(
                 f"the tip clearance of the {name} is {1e6 * room:.3g} um, 0 except for rounding: tips that touch the "
@@ -376,10 +421,24 @@ def pair_warnings(pair: MeshGeometry) -> list[str]:
             )
         else:
             said.append(f"the {name} is undercut below its active flank; the path of contact is whole")
+    if pair.internal:
+        said += ring_warnings(pair)
     if pair.contact_ratio_effective < least_ratio(pair):
         said.append(
             f"tip relief leaves a contact ratio of {pair.contact_ratio_effective:.4g} on the unrelieved flanks: "
             "unloaded, the teeth hand over on the relieved part"
+        )
+    return said
+
+
+def ring_warnings(pair: MeshGeometry) -> list[str]:
+    """What is said of the assembly of an internal pair and of the cutter of its ring, one sentence each."""
+    said, ring = [], pair.wheel
+    clearance = radial_clearance(pair.pinion, ring, pair.working_centre_distance)
+    if clearance < -CLEAR * ring.module:
+        said.append(
+            f"the pinion cannot be moved into the internal gear radially, tips overlap by {-1e3 * clearance:.4g} mm: "
+            "assemble along the axis"
         )
     return said
 

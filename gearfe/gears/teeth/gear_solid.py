@@ -21,7 +21,9 @@ SECTION_TURN, LEAST_SECTIONS = 0.05, 5
 
 
 def write_solid(path: Path, gear: Gear, deviations: tuple[ToothDeviations, ToothDeviations] = NOMINAL) -> None:
-    """Write the gear with its bore over the face width, its middle plane at z = 0, tooth 0 on +x there.
+    """Write the gear with its bore or rim over the face width, its middle plane at z = 0, tooth 0 on +x there.
+
+    Tooth 0 of an internal gear is on -x.
 
     Left and right flanks have their deviations. Spur gears are extruded, helical ones led through turned sections.
 
@@ -35,8 +37,9 @@ def write_solid(path: Path, gear: Gear, deviations: tuple[ToothDeviations, Tooth
             _add_helical(occ, gear, teeth)
         else:
             loop = occ.addCurveLoop(_outline(occ, teeth, -0.5 * width))
-            bore = occ.addCurveLoop([occ.addCircle(0.0, 0.0, -0.5 * width, 0.5e3 * gear.bore_diameter)])
-            occ.extrude([(2, occ.addPlaneSurface([loop, bore]))], 0.0, 0.0, width)
+            held = occ.addCurveLoop([occ.addCircle(0.0, 0.0, -0.5 * width, 1e3 * gear.held_radius)])
+            loops = [held, loop] if gear.internal else [loop, held]
+            occ.extrude([(2, occ.addPlaneSurface(loops))], 0.0, 0.0, width)
         occ.synchronize()
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
         with _without_words():
@@ -58,7 +61,7 @@ def _without_words() -> Iterator[None]:
 
 
 def _add_helical(occ: Any, gear: Gear, teeth: list[list[Piece]]) -> None:
-    """Add the solid of a helical gear: through turned sections, less the bore."""
+    """Add the solid of a helical gear: through turned sections, less the bore; an internal gear's rim less those."""
     width, rate = 1e3 * gear.face_width, 1e-3 * gear.twist_rate
     count = max(LEAST_SECTIONS, 1 + math.ceil(abs(rate) * width / SECTION_TURN))
     wires = []
@@ -68,8 +71,9 @@ def _add_helical(occ: Any, gear: Gear, teeth: list[list[Piece]]) -> None:
         occ.rotate([(1, curve) for curve in curves], 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, rate * z)
         wires.append(occ.addWire(curves))
     solid = occ.addThruSections(wires, makeSolid=True, makeRuled=False)
-    bore = occ.addCylinder(0.0, 0.0, -0.5 * width, 0.0, 0.0, width, 0.5e3 * gear.bore_diameter)
-    occ.cut([pair for pair in solid if pair[0] == 3], [(3, bore)])
+    cylinder = [(3, occ.addCylinder(0.0, 0.0, -0.5 * width, 0.0, 0.0, width, 1e3 * gear.held_radius))]
+    sections = [pair for pair in solid if pair[0] == 3]
+    occ.cut(*((cylinder, sections) if gear.internal else (sections, cylinder)))
 
 
 def _outline(occ: Any, teeth: list[list[Piece]], z: float) -> list[int]:

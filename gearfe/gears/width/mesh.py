@@ -16,6 +16,7 @@ from ...fem.plane import Material
 from ..contact.laws import STEEL
 from ..geometry.mesh_geometry import MeshGeometry
 from ..geometry.spur_gear import Gear
+from ..geometry.validity import check_external
 
 #: Largest base helix angle (rad). Elastic teeth are checked up to 30 degrees at the reference circle.
 MOST_HELIX = math.radians(45.0)
@@ -68,6 +69,7 @@ class WideMesh:
 
     def __post_init__(self) -> None:
         pinion = self.sections.pinion
+        check_external(self.sections, "contact over the width")
         angle = -pinion.base_helix_angle if pinion.hand == "left" else pinion.base_helix_angle
         if self.base_helix_angle is None:
             object.__setattr__(self, "base_helix_angle", angle)

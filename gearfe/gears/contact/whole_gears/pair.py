@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from ....base.typing import Array
 from ....fem.plane import Material, Plane
 from ...geometry.pair import GearPair
-from ...geometry.validity import check_spur
+from ...geometry.validity import check_external, check_spur
 from ...teeth.tooth_sector import SectorMesh, sector_mesh, sector_recipes
 from ...teeth.whole_gear import WholeGear, whole_gear
 from ..laws import ElementLaw, PairModel
@@ -153,6 +153,7 @@ def whole_pair(pair: GearPair, model: PairModel, kinematics: Kinematics = "small
         ``small`` or ``finite`` strain.
     """
     check_spur(pair, "the check on whole gears")
+    check_external(pair, "the check on whole gears")
     gears = pair.pinion, pair.wheel
     recipes = sector_recipes(pair, coarsen=model.coarsen, flank_coarsen=model.mesh_flank_coarsen)
     pinion, wheel = (
