@@ -226,6 +226,9 @@ def _mesh_lines(response: TrainResponse, train: GearTrain, summary: Mapping[str,
         force = ""
         if mean is not None and math.isfinite(mean[i]):
             force = f", mean contact force {mean[i]:.1f}{_error(summary, 'mean_contact_forces_N', i)} N"
+            driver = train.gear(train.meshes[i].driver).gear
+            if driver.helical:
+                force += f", axial {abs(mean[i]) * math.tan(driver.base_helix_angle):.1f} N"
         lines.append(f"mesh {i + 1} ({name}): {_frequency(train, response, float(frequency))}, {k}{force}")
     return lines
 

@@ -144,7 +144,8 @@ class GearMesh:
     driver, driven
         Names of gears.
     stiffness
-        A mesh law, a curve over the driver's rotation, its interpolant (N/m over rad), a constant (N/m), the model from
+        A mesh law, a curve over the driver's rotation, its interpolant (N/m over rad), a constant (N/m; along the line
+        of action, of helical gears in the transverse section), the model from
         which `gearfe.compute_meshes` computes the law (materials of driver and driven gear, element sizes), or None for
         the ideal rigid mesh: a constraint whose multiplier is the contact force.
     phase
@@ -161,8 +162,8 @@ class GearMesh:
     centre_distance
         Working centre distance of the gears (m); None: the one without backlash.
     backlash
-        Normal backlash (m), along the line of action. None: with a law that of the gears, or no back flanks where they
-        have none; with a curve or a constant a spring that acts both ways.
+        Backlash (m) along the line of action, of helical gears in the transverse section. None: with a law that of the
+        gears, or no back flanks where they have none; with a curve or a constant a spring that acts both ways.
     friction
         Coefficient of friction, or what it follows from; for meshes with a law. See `gearfe.drivetrain.train.friction`.
     name

@@ -12,6 +12,15 @@ presses. The phase :math:`\varphi` follows the driver's actual rotation in its d
 no force. P lies in the middle of the face that both gears share. A rigid mesh is the constraint :math:`\delta = 0`, F
 its multiplier.
 
+Of helical gears F and :math:`\delta` are those of the transverse section, :math:`F = T/r_b`. The normal of the flanks
+has the base helix angle :math:`\beta_b` against it, so
+
+.. math:: n = \cos\alpha_w\,t + \sin\alpha_w\,c - h\,s\tan\beta_b\,a
+
+with the axis a, the driver's sense of rotation s about it, and h = 1 of a right-handed driver, -1 of a left-handed one
+(a force on a gear has the axial part :math:`-\kappa` times its torque about a, :math:`\kappa = h\tan\beta_b/r_b`).
+On the back flanks the axial part has the other sign. Phases are those of the section at coordinate 0 along the axis.
+
 A mesh with given data has an unloaded static transmission error e over the phase beside k,
 
 .. math:: F = k(\varphi)\,(\delta - e(\varphi)) + d\,(\dot\delta - \dot e) ,
@@ -72,7 +81,9 @@ class MeshLine:
     driver
         Number of the driver's shaft.
     direction, point : ndarray, shape (3,)
-        n and P (m).
+        n of the transverse section, and P (m).
+    axial
+        Axial force on the driven gear, along the axis, per force of the driving flanks; 0 of spur gears.
     row : ndarray, shape (system size,)
         Approach of the driving flanks for unit coordinates of the system.
     columns : tuple of ndarray, shape (system size,)
@@ -94,6 +105,7 @@ class MeshLine:
     driver: int
     direction: Array
     point: Array
+    axial: float
     row: Array
     columns: tuple[Array, ...]
     spin: Array
@@ -180,7 +192,8 @@ class MeshLine:
             return "a spring that acts both ways"
         if self.backlash is None:
             return "driving flanks only: the gears have no backlash, and backlash_um is not given"
-        return f"both flanks, {1e6 * self.backlash:.6g} um of normal backlash"
+        normal = self.backlash * math.cos(self.pair.pinion.base_helix_angle)
+        return f"both flanks, {1e6 * normal:.6g} um of normal backlash"
 
     def stiffness(self, angle: Array, rest: Array | float = 0.0) -> Array:
         """k (N/m) at rotations `angle` (rad) of the drive, the driver's rotation beside rolling being `rest` (rad)."""
@@ -242,8 +255,9 @@ class Shafts:
 class _Directions(NamedTuple):
     """Directions of a mesh in the coordinates of the system (system size,), and its line of action."""
 
-    direction: Array  # n (3,)
+    direction: Array  # n of the transverse section (3,)
     point: Array  # P (m), (3,)
+    axial: float  # axial part of n
     row: Array  # approach of the driving flanks
     back: Array  # approach of the back flanks
     turn: Array  # the driver's rotation relative to the line of centres
@@ -305,8 +319,8 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
             parts = backlash is not None
             flanks.append(CurveFlank(*place, curve, parts, in_contact[0], mean_damping, error, always))
     return MeshLine(
-        mesh, pair, i, along.direction, along.point, along.row, tuple(columns) if flanks else (), along.spin,
-        tuple(flanks), rayleigh, reference,
+        mesh, pair, i, along.direction, along.point, along.axial, along.row, tuple(columns) if flanks else (),
+        along.spin, tuple(flanks), rayleigh, reference,
     )  # fmt: skip
 
 
@@ -347,8 +361,9 @@ def _directions(train: GearTrain, mesh: GearMesh, pair: GearPair, sense: float, 
     spins = spin - shafts.whole(j, shafts.bodies[j].turn_rows(driven.along)[2])
     turn = relative(along / distance, centre, centre + arm) + spin
     slides = relative(np.cross(a, line), point, point), relative(np.cross(a, back), point, point)
-    rows = relative(line, point, point), relative(back, point, point)
-    return _Directions(line, point, *rows, turn, slides, spin, spins)
+    axial = -sense * pair.pinion.twist_rate * pair.pinion.base_radius
+    rows = relative(line + axial * a, point, point), relative(back - axial * a, point, point)
+    return _Directions(line, point, axial, *rows, turn, slides, spin, spins)
 
 
 def _sliding(mesh: GearMesh, pair: GearPair, force: float, ratios: tuple[float, float], speed: float) -> Sliding | None:

@@ -89,14 +89,14 @@ def _misalignment(model: TrainModel, q: Array, number: int, force: float) -> Mes
     """Misalignment of one mesh with its force (N) in the state q."""
     train, line = model.train, model.meshes[number]
     driver, driven = train.gear(line.given.driver), train.gear(line.given.driven)
-    a, n = train.frame[2], line.direction
+    a, n, axial = train.frame[2], line.direction, line.axial
     if force < 0.0:  # the back flanks, whose line of action is the mirror image at the line of centres
         along = np.cross(a, np.array(train.shaft(driven.shaft).point) - np.array(train.shaft(driver.shaft).point))
         along = along / np.linalg.norm(along)
-        n = n - 2.0 * (n @ along) * along
+        n, axial = n - 2.0 * (n @ along) * along, -axial
     moves = [gear_motion(model, q, gear.name) for gear in (driver, driven)]
     between = moves[0] - moves[1]  # (parts, 6)
-    in_plane, across, apart = between[:, 3:] @ np.cross(a, n), between[:, 3:] @ n, -between[:, :3] @ n
+    in_plane, across, apart = between[:, 3:] @ np.cross(a, n), between[:, 3:] @ n, -between[:, :3] @ (n + axial * a)
     turns = [move[:, 3:].sum(axis=0) for move in moves]
     tilts = [turn - (turn @ a) * a for turn in turns]
     return MeshMisalignment(

@@ -156,7 +156,8 @@ class TrainModel(Facts):
         for line in self.meshes:
             one, two = self.train.gear(line.given.driver), self.train.gear(line.given.driven)
             common, smaller = overlap(one, two), min(one.gear.face_width, two.gear.face_width)
-            if common < smaller * (1.0 - SAME) and not isinstance(line.given.stiffness, float | int | None):
+            given = isinstance(line.given.stiffness, float | int | None) or line.given.transmission_error is not None
+            if common < smaller * (1.0 - SAME) and not given:
                 notes.append(
                     f"mesh {line.name}: the gears share {1e3 * common:.4g} of {1e3 * smaller:.4g} mm of face width: "
                     "a computed mesh model is that of all of it; gearfe stiffness takes the common width"
