@@ -376,7 +376,7 @@ def test_what_takes_no_helical_gears_says_so(
 
 
 @pytest.mark.parametrize("command", ["vibration", "runup"])
-def test_trains_take_no_helical_gears(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_mesh_laws_take_no_helical_gears(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     job = tmp_path / "box.toml"
     text = job_file("gearbox")
     gears = re.findall(r"^\[gears\.\w+\]$", text, re.MULTILINE)
@@ -385,7 +385,9 @@ def test_trains_take_no_helical_gears(command: str, tmp_path: Path, capsys: pyte
     job.write_text(text)
     assert main([command, str(job)]) == 2
     message = capsys.readouterr().err
-    assert re.search(r"gears\.\w+\.helix_angle_deg = 5\.0: makes the load vary .*: a train takes spur gears", message)
+    assert re.search(
+        r"gears\.\w+\.helix_angle_deg = 5\.0: makes the load vary .*: mesh_model = \"potential\" of", message
+    )
 
 
 def test_functions_take_no_helical_gears() -> None:

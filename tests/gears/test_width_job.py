@@ -204,23 +204,24 @@ LEADS = [
 @pytest.mark.parametrize("lead", LEADS)
 @pytest.mark.parametrize("side", ["", ".right"])
 @pytest.mark.parametrize("command", ["vibration", "runup"])
-def test_trains_take_no_lead_modifications(
+def test_mesh_laws_take_no_lead_modifications(
     lead: str, side: str, command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = job_file("gearbox") + f"\n[gears.input_wheel.microgeometry{side}]\n{lead}\n"
     key = lead.partition(" ")[0]
     message = refused(tmp_path, capsys, text, command)
     assert f"gears.input_wheel.microgeometry.{key}" in message
-    assert "a train takes spur gears alike along it only" in message
+    assert "of mesh 'first' takes spur gears alike along it only" in message
+    assert 'write mesh_model = "variable_stiffness" (or "mean_stiffness") in the mesh' in message
 
 
 @pytest.mark.parametrize("command", ["vibration", "runup"])
 @pytest.mark.parametrize("key", ["misalignment_um", "misalignment_across_um"])
-def test_trains_take_no_misalignment(
+def test_mesh_laws_take_no_misalignment(
     command: str, key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     message = refused(tmp_path, capsys, job_file("gearbox"), command, "--set", f"meshes.second.{key}=3.0")
-    assert f"meshes.second.{key} = 3.0: makes the load vary along the face width: a train" in message
+    assert f"meshes.second.{key} = 3.0: makes the load vary along the face width: mesh_model = " in message
 
 
 @pytest.mark.parametrize(

@@ -346,7 +346,14 @@ def _with_gears(mesh: NamedMesh, gears: Mapping[str, NamedGear]) -> NamedMesh:
     return replace(mesh, driver=gears[mesh.driver.name], driven=gears[mesh.driven.name])
 
 
-def check_alike_along(mesh: NamedMesh, what: str, *, sides: Iterable[str] = (), places: bool = True) -> None:
+def check_alike_along(
+    mesh: NamedMesh,
+    what: str,
+    *,
+    sides: Iterable[str] = (),
+    places: bool = True,
+    cure: str = "leave it out; gearfe stiffness and gearfe loadmap take it",
+) -> None:
     """Raise `InputError` for a mesh whose load varies along the face width; see `NamedMesh.along_width`.
 
     Parameters
@@ -357,12 +364,13 @@ def check_alike_along(mesh: NamedMesh, what: str, *, sides: Iterable[str] = (), 
         What takes only gears that are alike along the face width, for the message.
     sides, places
         What counts.
+    cure
+        What to do, for the message.
     """
     found = mesh.along_width(sides, places=places)
     if found is not None:
         key, value = found
         problem = f"makes the load vary along the face width: {what} takes spur gears alike along it only"
-        cure = "leave it out; gearfe stiffness and gearfe loadmap take it"
         raise InputError(key, None if isinstance(value, tuple) else value, problem, cure)
 
 

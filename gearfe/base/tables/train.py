@@ -237,7 +237,8 @@ class TrainMeshTable:
     phase_deg: float | None = quantity(
         None,
         doc="rotation of the driver, in its driving sense, past a tooth on the line of centres at the start (deg), for "
-        "a gear keyed at an angle; left out: 0, and where gears are shared by meshes what their teeth make it",
+        "a gear keyed at an angle, of helical gears in the section y = 0; left out: 0, and where gears are shared by "
+        "meshes what their teeth make it",
     )
     damping_N_s_per_m: float = quantity(0.0, low=0.0, doc="damping along the line of action (N s/m)")
     damping_acts: str | None = quantity(
@@ -255,7 +256,8 @@ class TrainMeshTable:
         None,
         choices=MESH_MODELS,
         gone=GONE_MODELS,
-        doc="potential: mesh law with transmission error and separation; variable_stiffness: k(phi) delta; "
+        doc="potential: mesh law with transmission error and separation, of loads alike along the face width; "
+        "variable_stiffness: k(phi) delta, of other loads with their transmission error; "
         "mean_stiffness: the mean of k over the mesh cycle; left out: that of [train.curves]",
     )
     mesh_model_torque_Nm: float | None = quantity(
@@ -286,7 +288,9 @@ class TrainMeshTable:
         "fraction_of_pitch or driver_angle_deg, k_mesh_N_per_m or k_mesh_N_per_um, and "
         "transmission_error_unloaded_um, or transmission_error_loaded_um with mesh_force_N or torque_driven_Nm",
     )
-    stiffness_N_per_m: float | None = quantity(None, above=0.0, doc="constant stiffness (N/m)")
+    stiffness_N_per_m: float | None = quantity(
+        None, above=0.0, doc="constant stiffness (N/m), dF/d approach in the transverse section"
+    )
     rigid: bool = quantity(False, doc="true: an ideal rigid mesh, a constraint")
 
     #: Removed keys, see `gearfe.base.config.build`.
@@ -479,7 +483,8 @@ class TrainCurvesTable:
     load: str | None = quantity(
         None,
         choices=("stiffness", "torque"),
-        doc="of curves: load and angles of [stiffness] (when left out), or the torque that each mesh carries",
+        doc="of curves: load and angles of [stiffness], or the torque that each mesh carries; left out: those of "
+        "[stiffness], of meshes whose load varies along the face width that torque",
     )
     positions: int | None = quantity(
         None, low=8, high=10_000, doc='positions in one mesh cycle, for load = "torque"; left out: 36'

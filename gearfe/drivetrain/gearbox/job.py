@@ -23,7 +23,15 @@ from ...base.tables.jobs import read_train_tables
 from ...base.tables.pair import MaterialTable, StiffnessTable
 from ...base.tables.spectrum import SpectrumTable
 from ...base.tables.timefunction import TrainFunctionTable
-from ...base.tables.train import POTENTIAL, ShaftSectionTable, TrainMeshTable, TrainShaftTable, TrainTable
+from ...base.tables.train import (
+    MEAN,
+    POTENTIAL,
+    VARIABLE,
+    ShaftSectionTable,
+    TrainMeshTable,
+    TrainShaftTable,
+    TrainTable,
+)
 from ...base.typing import Array
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
@@ -99,8 +107,11 @@ class TrainJob:
             For gears that cannot be made, and gears that cannot run together.
         """
         made: dict[str, Gear] = {}
-        for mesh in self.meshes:
-            check_alike_along(mesh, "a train", sides=("left", "right"), places=False)
+        for table, mesh in zip(self.table.meshes, self.meshes, strict=True):
+            if self.table.model_of(table) == POTENTIAL:
+                cure = f'write mesh_model = "{VARIABLE}" (or "{MEAN}") in the mesh or in [train.curves]'
+                what = f'mesh_model = "{POTENTIAL}" of mesh {mesh.name!r}'
+                check_alike_along(mesh, what, sides=("left", "right"), places=False, cure=cure)
             pair = pair_of(mesh)
             made |= {mesh.driver.name: pair.pinion, mesh.driven.name: pair.given_wheel}
         return made | {name: gear_of(named) for name, named in self.gearbox.gears.items() if name not in made}
@@ -329,6 +340,7 @@ def back_flanks(job: TrainJob, train: GearTrain, number: int) -> bool:
 
 def _mesh(job: TrainJob, table: TrainMeshTable, named: NamedMesh) -> GearMesh:
     distance = named.centre_distance_mm
+    normal = math.cos(job.gears[table.driver].base_helix_angle)
     return GearMesh(
         table.driver,
         table.driven,
@@ -337,7 +349,7 @@ def _mesh(job: TrainJob, table: TrainMeshTable, named: NamedMesh) -> GearMesh:
         table.damping_N_s_per_m,
         job.table.curves.interpolation,
         None if distance is None else 1e-3 * distance,
-        None if table.backlash_um is None else 1e-6 * table.backlash_um,
+        None if table.backlash_um is None else 1e-6 * table.backlash_um / normal,
         damping_acts=table.damping_acts,
         name=named.name,
     )

@@ -13,13 +13,14 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.progress import stage
+from ...base.tables.gearbox import NamedMesh
 from ...base.tables.train import MEAN, POTENTIAL
-from ...gears.contact.laws import HalfPlane, PairModel, check_alike, check_deviations
+from ...gears.contact.laws import HalfPlane, PairModel, check_alike, check_deviations, check_torque
 from ...gears.gearmesh.curve import NO_CYCLE, StiffnessCurve
 from ...gears.gearmesh.job import StiffnessJob, cached_curve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.law_store import cached_law
-from ...gears.gearmesh.mesh_table import read_mesh_table
+from ...gears.gearmesh.mesh_table import MeshTable, read_mesh_table
 from ...gears.geometry.deviation_job import deviations_of
 from ...gears.geometry.face import NOMINAL, ToothDeviations
 from ...gears.geometry.pair import GearPair, gear_pair
@@ -77,6 +78,8 @@ def train_curves(
                 found.append(_read_curve(job.path.parent / mesh.curve, teeth))
         elif job.table.model_of(mesh) == POTENTIAL:
             found.append(_computed_law(job, train, number, estimate))
+        elif _driving(job, train, number).along_width(places=False) is not None:
+            found.append(_computed_spring(job, train, number))
         else:
             curve = _computed_curve(job, train, number, estimate)
             constant = job.table.model_of(mesh) == MEAN
@@ -166,6 +169,58 @@ def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool
         return cached_curve(pair, model, estimate_error=estimate, **sweep)
 
 
+def _computed_spring(job: TrainJob, train: GearTrain, number: int) -> MeshTable:
+    """Spring of a mesh whose load varies along the face width, with the driver as pinion.
+
+    The load is the torque that the mesh carries, or that of [stiffness] where train.curves.load says so.
+    """
+    from ...gears.gearmesh.width_spring import mesh_spring, width_states  # teeth in three dimensions, for these meshes
+
+    mesh, curves = train.meshes[number], job.table.curves
+    pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
+    width = StiffnessJob(_driving(job, train, number), pair, job.path.parent)
+    if back_flanks(job, train, number):
+        _check_back_flanks(width.mesh)
+    count = curves.positions or POSITIONS
+    angles = pair.mesh_cycle * np.arange(count) / count
+    load: dict[str, float]
+    if curves.load == "stiffness":
+        width.check_load()
+        angles, table = np.radians(width.table.angles_deg(math.degrees(pair.mesh_cycle))), width.table
+        load = {"twist": math.radians(table.twist_deg)} if table.torque_Nm is None else {"torque": table.torque_Nm}
+        label = "stiffness.torque_Nm"
+    else:
+        load, label = {"torque": _carried_torque(train, number)}, f"mesh {mesh.name!r} torque"
+        if not load["torque"] > 0.0:
+            problem = "carries no torque, so its stiffness along the face width has no load to be computed with"
+            raise InputError(f"mesh {mesh.name!r}", None, problem, 'add a load, or write load = "stiffness"')
+    if "torque" in load:
+        check_torque(pair, PairModel(width.materials), load["torque"], label)
+    with stage(mesh.name):
+        states = width_states(width, angles, **load)
+        mean = job.table.model_of(job.table.meshes[number]) == MEAN
+        return mesh_spring(states, pair.mesh_cycle, mean=mean, method=curves.interpolation)
+
+
+def _driving(job: TrainJob, train: GearTrain, number: int) -> NamedMesh:
+    """The mesh with the flanks that its sense of rotation lets drive."""
+    return replace(job.meshes[number], flank=_flanks(train, number)[0])
+
+
+def _flanks(train: GearTrain, number: int) -> tuple[str, str]:
+    """Driving and back flanks of a mesh: the left ones drive where the driver turns about the axis of the shafts."""
+    return ("left", "right") if train.kinematics.senses[number] > 0.0 else ("right", "left")
+
+
+def _check_back_flanks(mesh: NamedMesh) -> None:
+    """Raise `InputError` for back flanks with other modifications, for which a spring is not computed."""
+    for gear in mesh.gears:
+        if gear.microgeometry is not None and gear.microgeometry.flank("left") != gear.microgeometry.flank("right"):
+            problem = f"left and right flanks differ, but mesh {mesh.name!r} has one stiffness for both"
+            cure = "make them alike, or leave backlash_um out"
+            raise InputError(gear.microgeometry_where, None, problem, cure)
+
+
 def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> MeshLaw:
     """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
 
@@ -230,8 +285,7 @@ def _deviations(
     if not named.deviates:
         return NOMINAL, NOMINAL
     mesh = train.meshes[number]
-    flanks = ("left", "right") if train.kinematics.senses[number] > 0.0 else ("right", "left")
-    driving, back = (deviations_of(named, pair, job.path.parent, flank=flank) for flank in flanks)
+    driving, back = (deviations_of(named, pair, job.path.parent, flank=flank) for flank in _flanks(train, number))
     mapped = job.table.model_of(job.table.meshes[number]) == POTENTIAL
     if mapped:  # pitch errors are the train's own
         driving, back = ((replace(a, turn=(0.0,)), replace(b, turn=(0.0,))) for a, b in (driving, back))

@@ -35,9 +35,9 @@ TABLE = "mesh table"
 
 @dataclass(frozen=True, eq=False)
 class MeshTable:
-    """Stiffness k (N/m) and unloaded static transmission error e (m) over the driver's rotation (rad)."""
+    """Stiffness k (N/m), alike or over the driver's rotation (rad), and unloaded static transmission error e (m)."""
 
-    stiffness: PeriodicInterpolant
+    stiffness: PeriodicInterpolant | float
     transmission_error: PeriodicInterpolant
 
 
