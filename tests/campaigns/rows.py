@@ -24,6 +24,7 @@ KINDS = (
     "symmetric",
     "order",
     "stiff",
+    "rattle",
 )
 #: Tolerance of trains, as `gearfe.base.tables.train` has it.
 DEFAULT = 1e-6
@@ -48,7 +49,7 @@ def curve_text(random: np.random.Generator, teeth: int, mean: float, swing: floa
 def row(random: np.random.Generator, kind: str) -> Made:
     """Tables, curve files and what the checks need to know of a random train."""
     symmetric = kind == "symmetric"
-    stages = int(random.integers(1, 5)) if kind in ("general", "order", "stiff") else 1
+    stages = int(random.integers(1, 5)) if kind in ("general", "order", "stiff", "rattle") else 1
     smooth = kind == "stiff" or (kind == "order" and random.random() < 0.5)
     most = (40, 50) if stages == 1 else (26, 27)  # gears of longer rows must clear the shafts beside them
     teeth = [(int(random.integers(18, most[0])), int(random.integers(18, most[1]))) for _ in range(stages)]
@@ -138,6 +139,23 @@ def _special(
         train["tolerance"] = rounded(log_uniform(random, least, 1e-2), 2)
         train["duration_ms"] = 1e3 * SETTLED / alpha
         train["step_us"] = 1e3 * train["duration_ms"] / 100
+    if kind == "rattle":
+        # torques that change sign again and again, behind backlashes from far below to far above the deflections
+        train |= {"damping": {"ratio": 0.0}, "duration_ms": 2.0}
+        for mesh in train["meshes"]:
+            mesh["backlash_um"] = rounded(log_uniform(random, 0.1, 300.0), 3)
+            mesh["damping_N_s_per_m"] = rounded(log_uniform(random, 1.0, 3000.0), 3)
+            mesh["damping_acts"] = str(random.choice(["always", "in_contact"]))
+        mean = train["loads"][0]["torque_Nm"]
+        waves = [
+            {
+                "frequency_Hz": rounded(log_uniform(random, 100.0, 2e4), 3),
+                "amplitude": rounded(abs(mean) * random.uniform(0.5, 4.0), 3),
+                "phase_deg": rounded(random.uniform(0.0, 360.0), 3),
+            }
+            for _ in range(int(random.integers(1, 3)))
+        ]
+        train["loads"][0]["torque_Nm"] = {"constant": mean, "sines": waves}
     if kind in ("floquet", "resonance"):
         # a driven wheel that is free to turn: the drive holds the pinion, k works on its polar inertia
         inertia = wheel_inertia(teeth[1])
