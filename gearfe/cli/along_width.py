@@ -59,6 +59,7 @@ def run_along_width(
         flank_loads,
         load_columns,
         pattern_columns,
+        root_columns,
         sweep_columns,
         width_lines,
         width_summary,
@@ -84,14 +85,21 @@ def run_along_width(
     errors = None
     if loads is None and not args.no_estimate and (sweep.status == "converged").any():
         errors = width_job.estimated_errors(job, lines, sweep, watch)
-    found = width_summary(job, wide, sweep, watch.seconds, errors=errors, **tables)
+    roots = None
+    if loads is not None and loads.root_stress and (sweep.status == "converged").any():
+        from ..gears.gearmesh.width_root import wide_roots
+
+        with watch.stage("root stress"):
+            roots = wide_roots(lines, sweep)
+    found = width_summary(job, wide, sweep, watch.seconds, errors=errors, roots=roots, **tables)
     may_write: tuple[str, ...] = (f"{name}*.png", f"{name}*.csv", f"{name}*.vtkhdf")
     if loads is None:
         may_write += ("fields.vtkhdf", "stress_*deg.png", "pressure.*")
     with whole_set(folder, may_write) as made:
         with watch.stage("tables"):
-            main, load = sweep_columns(job, wide, sweep), load_columns(job, sweep)
-            write_csvs(made, {name: main, "load": load, "pattern": pattern_columns(flanks)})
+            main, load = sweep_columns(job, wide, sweep, roots), load_columns(job, sweep)
+            over_root = {} if roots is None else {"root": root_columns(job, sweep, roots)}
+            write_csvs(made, {name: main, "load": load, "pattern": pattern_columns(flanks), **over_root})
             write_flank(made / f"{name}_flank.vtkhdf", job, flanks[-1])
         if not args.no_pictures:
             from ..figures.flank_load import flank_load_picture
@@ -101,6 +109,10 @@ def run_along_width(
                 title = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, load along the face width"
                 picture = flank_load_picture(flanks, sweep, pair.wheel.base_radius, pair.path_limits(), title)
                 save(picture, made / f"{name}_load.png")
+                if roots is not None:
+                    from ..figures.flank_load import root_picture
+
+                    save(root_picture(root_columns(job, sweep, roots), title), made / f"{name}_root.png")
                 if mesh.deviates and loads is not None:
                     from ..figures.flanks import flank_picture
 

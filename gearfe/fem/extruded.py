@@ -89,23 +89,38 @@ def lobatto_functions(ends: Sequence[float], orders: Sequence[int], breaks: Sequ
     AxialFunctions
         1 + the sum of the orders, by place.
     """
-    count, start = 1 + sum(orders), 0
-    parts: list[tuple[Array, Array, Array, Array]] = []
-    for (low, high), order in zip(itertools.pairwise(ends), orders, strict=True):
-        nodes = _lobatto_points(order)
-        to_nodal = np.linalg.inv(np.polynomial.legendre.legvander(nodes, order))
-        slopes = [np.polynomial.legendre.Legendre.basis(k).deriv() for k in range(order + 1)]
+    parts: list[AxialFunctions] = []
+    for number, ((low, high), order) in enumerate(zip(itertools.pairwise(ends), orders, strict=True)):
         rule, weights = np.polynomial.legendre.leggauss(order + 2)
         for a, b in itertools.pairwise(sorted({low, high, *(at for at in breaks if low < at < high)})):
             points = 0.5 * (a + b) + 0.5 * (b - a) * rule
-            at = (2 * points - low - high) / (high - low)
-            value, slope = np.zeros((2, len(points), count))
-            span = slice(start, start + order + 1)
-            value[:, span] = np.polynomial.legendre.legvander(at, order) @ to_nodal
-            slope[:, span] = 2 / (high - low) * np.stack([one(at) for one in slopes], axis=1) @ to_nodal
-            parts.append((points, 0.5 * (b - a) * weights, value, slope))
-        start += order
-    return AxialFunctions(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+            parts.append(replace(_on_element(ends, orders, number, points), weights=0.5 * (b - a) * weights))
+    return _joined(parts)
+
+
+def lobatto_functions_at(ends: Sequence[float], orders: Sequence[int], places: Array) -> AxialFunctions:
+    """Return the functions of `lobatto_functions` at rising places (m) within their ends, without weights."""
+    number = np.clip(np.searchsorted(ends, places, side="right") - 1, 0, len(orders) - 1)
+    return _joined([_on_element(ends, orders, i, places[number == i]) for i in range(len(orders))])
+
+
+def _on_element(ends: Sequence[float], orders: Sequence[int], number: int, points: Array) -> AxialFunctions:
+    """All functions at points (m) of one element, without weights."""
+    low, high, order = ends[number], ends[number + 1], orders[number]
+    start = sum(orders[:number])
+    to_nodal = np.linalg.inv(np.polynomial.legendre.legvander(_lobatto_points(order), order))
+    slopes = [np.polynomial.legendre.Legendre.basis(k).deriv() for k in range(order + 1)]
+    at = (2 * points - low - high) / (high - low)
+    values, rates = np.zeros((2, len(points), 1 + sum(orders)))
+    span = slice(start, start + order + 1)
+    values[:, span] = np.polynomial.legendre.legvander(at, order) @ to_nodal
+    rates[:, span] = 2 / (high - low) * np.stack([one(at) for one in slopes], axis=1) @ to_nodal
+    return AxialFunctions(points, np.zeros(len(points)), values, rates)
+
+
+def _joined(parts: Sequence[AxialFunctions]) -> AxialFunctions:
+    names = ("points", "weights", "values", "slopes")
+    return AxialFunctions(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def _lobatto_points(order: int) -> Array:

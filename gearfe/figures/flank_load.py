@@ -1,13 +1,14 @@
-"""Picture of the load over the flanks: contact pattern, load along the width, transmission error and stiffness."""
+"""Pictures of gears whose load varies along the face width: load over the flanks, stress at the roots."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..gears.gearmesh.width_report import FlankLoad
+from ..gears.geometry.deviation_job import GEARS
 from ..gears.width import WidthSweep
 from .style import BLUE, CYCLE, GREY, headed, labelled, new_figure
 
@@ -64,5 +65,29 @@ def flank_load_picture(
         stiffness.plot(angle, tangent, color=colour if len(flanks) > 1 else BLUE, linewidth=0.9, linestyle=(0, (4, 3)))
     width.set_ylim(bottom=min(0.0, width.get_ylim()[0]))
     width.legend(fontsize=7, frameon=False)
+    headed(figure, title)
+    return figure
+
+
+def root_picture(columns: Mapping[str, Any], title: str = "") -> Any:
+    """Largest root stress over the mesh cycle along the width, a panel for each gear and a curve for each torque.
+
+    Parameters
+    ----------
+    columns
+        Of `gearfe.gears.gearmesh.width_report.root_columns`.
+    title
+        Above the picture.
+    """
+    figure = new_figure(10.0, 4.0)
+    gear, torque = np.asarray(columns["gear"]), np.asarray(columns["torque_wheel_Nm"])
+    for name, axes in zip(GEARS, figure.subplots(1, 2, sharey=True).tolist(), strict=True):
+        labelled(axes, f"largest root stress over the mesh cycle, {name}  (MPa)", "y along the axes (mm)")
+        for value, colour in zip(np.unique(torque), CYCLE, strict=False):
+            chosen = (gear == name) & (torque == value)
+            y, stress = (np.asarray(columns[key])[chosen] for key in ("y_mm", "root_stress_MPa"))
+            axes.plot(y, stress, color=colour, linewidth=1.3, label=f"{value:.4g} N m")
+        axes.set_ylim(bottom=0.0)
+        axes.legend(fontsize=7, frameon=False)
     headed(figure, title)
     return figure

@@ -39,7 +39,8 @@ SIZE_OF_RADIUS, SIZE_OF_MODULE = 0.25, 0.06
 REACH = 3
 #: Size of flank, strips and back on these meshes, times module.
 FLANK_SIZE = 0.12
-_GAUSS = 0.5 + np.array([-0.5, 0.5]) / math.sqrt(3.0)
+#: Gauss points of an edge (0 to 1).
+GAUSS = 0.5 + np.array([-0.5, 0.5]) / math.sqrt(3.0)
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ def root_mesh(gear: Gear, body: GearBody, recipe: SectorRecipe) -> RootMesh:
     fine = gear_body(mesh, body.material, body.plane, body.thickness, with_stress=False)
     edges = mesh.boundaries["root_left"]
     corners = mesh.points[edges]  # (e, 3, 2)
-    shapes, slopes, _ = edge_shapes(_GAUSS)
+    shapes, slopes, _ = edge_shapes(GAUSS)
     along = np.einsum("qa,eai->eqi", slopes, corners)
     speed = np.linalg.norm(along, axis=-1)
     nu, modulus = body.material.poisson_ratio, body.material.youngs_modulus
@@ -149,13 +150,13 @@ def root_mesh(gear: Gear, body: GearBody, recipe: SectorRecipe) -> RootMesh:
     rows = {k: (free @ fine.coupling[k % teeth] @ fine.interface.T) @ spread for k in range(-reach, reach + 1)}
     rows[0] = rows[0] + held @ spread
     ends = np.concatenate([[0.0], np.cumsum(_lengths(corners))])
-    place = (ends[:-1, None] + np.diff(ends)[:, None] * _GAUSS).ravel()
+    place = (ends[:-1, None] + np.diff(ends)[:, None] * GAUSS).ravel()
     radius = np.linalg.norm(np.einsum("qa,eai->eqi", shapes, corners), axis=-1).ravel()
     return RootMesh(place, radius, rows, recipe.root)
 
 
 def _lengths(corners: Array) -> Array:
-    slopes = edge_shapes(_GAUSS)[1]
+    slopes = edge_shapes(GAUSS)[1]
     return 0.5 * np.linalg.norm(np.einsum("qa,eai->eqi", slopes, corners), axis=-1).sum(axis=1)
 
 

@@ -337,10 +337,6 @@ def check_map_job(job: StiffnessJob, table: LoadMapTable) -> None:
     check_width_job(job)
     for torque in table.torques():
         check_torque(job.pair, PairModel(job.materials), torque, f"{table.NAME}.torques_Nm")
-    if table.root_stress:
-        key, _ = job.mesh.along_width() or ("the mesh", None)
-        problem = f"is for loads alike along the face width, which {key} makes vary"
-        raise InputError(f"{table.NAME}.root_stress", True, problem, "leave it out")
     if table.mesh_cycles is None and not all(flank.alike for flank in deviations_of(job.mesh, job.pair, job.folder)):
         problem = "is required where teeth differ and the load varies along the face width"
         raise InputError(f"{table.NAME}.mesh_cycles", None, problem, "give the mesh cycles to compute")

@@ -24,6 +24,7 @@ from ..width import WideMesh, WidthSweep
 from ..width.sweep import mean_line_load
 from .job import StiffnessJob
 from .width_job import axial_sense
+from .width_root import WideRoots, roots_along, roots_of_cells
 
 #: Places of the contact pattern along the profile and along the width.
 PATTERN = 61, 61
@@ -54,7 +55,9 @@ class FlankLoad:
     mean: Array
 
 
-def sweep_columns(job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep) -> dict[str, Any]:
+def sweep_columns(
+    job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep, roots: WideRoots | None = None
+) -> dict[str, Any]:
     """Return the table of all positions, one row each, load by load."""
     sense, radius = axial_sense(job), job.pair.wheel.base_radius
     moments = _tilting_moments(mesh, sweep, sense)
@@ -78,7 +81,35 @@ def sweep_columns(job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep) -> dict[
         "peak_roll_length_pinion_mm": 1e3 * flat(sweep.peak_roll[..., 0]),
         "peak_roll_length_wheel_mm": 1e3 * flat(sweep.peak_roll[..., 1]),
         "peak_pinion_tooth": np.where(bears, teeth % job.pair.pinion.teeth, -1),
+        **({} if roots is None else _root_cells(roots, sense, (loads, positions))),
         "status": flat(sweep.status),
+    }
+
+
+def _root_cells(roots: WideRoots, sense: float, shape: tuple[int, int]) -> dict[str, Array]:
+    """Largest root stress of each position, its place and estimated relative error."""
+    found, columns = roots_of_cells(roots, shape), {}
+    for g, gear in enumerate(GEARS):
+        columns[f"root_stress_{gear}_MPa"] = 1e-6 * found.stress[:, :, g].ravel()
+        columns[f"root_y_{gear}_mm"] = 1e3 * sense * found.z[:, :, g].ravel()
+        columns[f"root_diameter_{gear}_mm"] = 2e3 * found.radius[:, :, g].ravel()
+        columns[f"root_stress_error_{gear}"] = found.error[:, :, g].ravel()
+    return columns
+
+
+def root_columns(job: StiffnessJob, sweep: WidthSweep, roots: WideRoots) -> dict[str, Any]:
+    """Return root stresses over the width: a row for each load, gear and place, the largest over the mesh cycle."""
+    sense, (stress, radius, row) = axial_sense(job), roots_along(roots, len(sweep.status))
+    loads, _, places = stress.shape
+    torque = np.array(_mean(sweep.torque))
+    y = np.broadcast_to(1e3 * sense * roots.z, stress.shape)
+    angle = np.degrees(np.where(row >= 0, sweep.angle[roots.position[row]], np.nan))
+    order = slice(None, None, 1 if sense > 0 else -1)
+    columns = {"y_mm": y, "root_stress_MPa": 1e-6 * stress, "root_diameter_mm": 2e3 * radius, "pinion_angle_deg": angle}
+    return {
+        "torque_wheel_Nm": np.repeat(torque, 2 * places),
+        "gear": np.tile(np.repeat(GEARS, places), loads),
+        **{name: values[:, :, order].ravel() for name, values in columns.items()},
     }
 
 
@@ -190,9 +221,11 @@ def pattern_columns(flanks: list[FlankLoad]) -> dict[str, Any]:
     return {name: np.concatenate(values) for name, values in rows.items()}
 
 
-def load_table(job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep) -> dict[str, list[float]]:
-    """Return a row per load: means over the positions, load factors, the largest line load and its place."""
-    columns = sweep_columns(job, mesh, sweep)
+def load_table(
+    job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep, roots: WideRoots | None = None
+) -> dict[str, list[float]]:
+    """Return a row per load: means over the positions, load factors, the largest line load and root stresses."""
+    columns = sweep_columns(job, mesh, sweep, roots)
     loads = len(sweep.status)
     by_load = {name: np.asarray(values).reshape(loads, -1) for name, values in columns.items()}
     error, peak = by_load["transmission_error_um"], by_load["peak_line_load_N_per_mm"]
@@ -219,8 +252,26 @@ def load_table(job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep) -> dict[str
             for name, values in by_load.items()
             if name.startswith("tilting_moment")
         },
+        **({} if roots is None else _largest_roots(by_load)),
         "failed_positions": (sweep.status != "converged").sum(axis=1).tolist(),
     }
+
+
+def _largest_roots(by_load: Mapping[str, Array]) -> dict[str, list[float]]:
+    """Largest root stress of each load and gear, its places, pinion angle and estimated relative error."""
+    found: dict[str, list[float]] = {}
+    for gear in GEARS:
+        stress = np.nan_to_num(np.asarray(by_load[f"root_stress_{gear}_MPa"], dtype=float), nan=-np.inf)
+        row, most = np.arange(len(stress)), np.argmax(stress, axis=1)
+        for name, column in (
+            ("largest_root_stress_{}_MPa", "root_stress_{}_MPa"),
+            ("largest_root_stress_{}_y_mm", "root_y_{}_mm"),
+            ("largest_root_stress_{}_diameter_mm", "root_diameter_{}_mm"),
+            ("largest_root_stress_{}_pinion_angle_deg", "pinion_angle_deg"),
+            ("largest_root_stress_{}_error_estimate", "root_stress_error_{}"),
+        ):
+            found[name.format(gear)] = np.asarray(by_load[column.format(gear)])[row, most].tolist()
+    return found
 
 
 def _mean(values: Array) -> list[float]:
@@ -235,6 +286,7 @@ def width_summary(
     timings: Mapping[str, float],
     *,
     errors: Mapping[str, float] | None = None,
+    roots: WideRoots | None = None,
     **tables: Any,
 ) -> dict[str, Any]:
     """Return the content of summary.json or loadmap.json.
@@ -251,6 +303,8 @@ def width_summary(
         Name -> time that a part of the work took (s).
     errors : mapping, optional
         Estimated relative errors, see `.width_job.estimated_errors`.
+    roots : WideRoots, optional
+        Root stresses.
     tables
         Of the job, beside those of the model.
     """
@@ -271,7 +325,7 @@ def width_summary(
             "functions": mesh.count,
             "kinematics": "small",
         },
-        "by_torque": load_table(job, mesh, sweep),
+        "by_torque": load_table(job, mesh, sweep, roots),
         "error_estimate": None if errors is None else dict(errors),
         "mean_tangent_twist_and_tilts_Nm_per_rad": (np.nanmean(sweep.tangent, axis=1) * along_y).tolist(),
         "statuses": dict(zip(statuses.tolist(), counts.tolist(), strict=True)),
@@ -316,6 +370,14 @@ def width_lines(found: Mapping[str, Any]) -> list[str]:
             f"of centres {table['tilting_moment_pinion_about_centre_line_mean_Nm'][i]:.4g} N m (pinion), "
             f"{table['tilting_moment_wheel_about_centre_line_mean_Nm'][i]:.4g} N m (wheel)",
         ]
+        if f"largest_root_stress_{GEARS[0]}_MPa" in table:
+            stresses = (
+                f"{gear} {table[f'largest_root_stress_{gear}_MPa'][i]:.4g} MPa at y "
+                f"{table[f'largest_root_stress_{gear}_y_mm'][i]:.4g} mm (error "
+                f"{percent(table[f'largest_root_stress_{gear}_error_estimate'][i])})"
+                for gear in GEARS
+            )
+            lines.append(f"  largest root stress: {', '.join(stresses)}")
     if found["error_estimate"] is not None:
         errors = ", ".join(f"{name} {percent(error)}" for name, error in found["error_estimate"].items())
         lines.append(f"estimated errors, by two more functions along the width and coarser sections: {errors}")

@@ -32,7 +32,7 @@ Spur gears that are symmetric about the middle of the common width part into two
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -41,7 +41,13 @@ from scipy.linalg import cholesky, solve_triangular
 
 from ...base.progress import Stopwatch, one_thread
 from ...base.typing import Array
-from ...fem.extruded import AxialFunctions, condense_extruded, lobatto_functions, section_integrals
+from ...fem.extruded import (
+    AxialFunctions,
+    condense_extruded,
+    lobatto_functions,
+    lobatto_functions_at,
+    section_integrals,
+)
 from ...fem.multifrontal import unknowns_of
 from ..contact.flank import flank_of
 from ..contact.flank_compliance import FlankCompliance, Shapes, corner_of, local_bracket, shapes_of, stations_of
@@ -150,12 +156,12 @@ def _steps(mesh: WideMesh) -> int:
     return math.ceil(length + 2 * TIPS + mesh.overlap_ratio)
 
 
-def _axial_functions(mesh: WideMesh, face: tuple[float, float]) -> AxialFunctions:
-    """Functions along the face of a gear: one element on the common width, others beyond its ends."""
+def _axial_elements(mesh: WideMesh, face: tuple[float, float], higher: int) -> tuple[list[float], list[int]]:
+    """Ends (m) and orders of the elements along a face: one on the common width, others beyond its ends."""
     low, high = mesh.zone
     if mesh.count == 1:
-        return lobatto_functions(face, [0], mesh.zone)
-    order = mesh.count - 1 + HIGHER
+        return list(face), [0]
+    order = mesh.count - 1 + higher
     ends, orders = [low, high], [order]
     for beyond, at in ((low - face[0], 0), (face[1] - high, len(orders))):
         if beyond <= NO_ELEMENT * mesh.module:
@@ -164,27 +170,106 @@ def _axial_functions(mesh: WideMesh, face: tuple[float, float]) -> AxialFunction
         more = BEYOND_ORDER + math.ceil(beyond / (BEYOND_MODULES * mesh.module))
         orders.insert(0 if at == 0 else len(orders), min(order, more))
         ends.insert(0 if at == 0 else len(ends), face[0 if at == 0 else 1])
-    return lobatto_functions(ends, orders, mesh.zone)
+    return ends, orders
 
 
-def _systems(mesh: WideMesh, gear: int) -> Iterator[tuple[tuple[AxialFunctions, AxialFunctions | None], slice]]:
-    """Functions of v and w of the systems that part, each with the Legendre functions of its loads."""
-    functions = _axial_functions(mesh, mesh.faces[gear])
+#: Functions of v and of w along the axis; of w none where it is zero.
+FunctionPair = tuple[AxialFunctions, AxialFunctions | None]
+
+
+@dataclass(frozen=True)
+class AxialSystem:
+    """Functions along a gear's axis that part from the others.
+
+    Attributes
+    ----------
+    functions
+        Of v and w on a quadrature rule.
+    at
+        The same functions at places that were asked for.
+    loads
+        The Legendre functions of the loads that act on them.
+    """
+
+    functions: FunctionPair
+    at: FunctionPair
+    loads: slice
+
+    @property
+    def width(self) -> int:
+        """Unknowns of a node."""
+        plane, axial = self.functions
+        return 2 * plane.count + (0 if axial is None else axial.count)
+
+
+def axial_systems(
+    mesh: WideMesh, gear: int, *, higher: int = HIGHER, places: Array | None = None
+) -> Iterator[AxialSystem]:
+    """Yield the systems along the axis of a gear that part: two for spur gears that are symmetric, or one.
+
+    Parameters
+    ----------
+    mesh : WideMesh
+        The gears.
+    gear : int
+        0 for the pinion, 1 for the wheel.
+    higher
+        Order of the elements beyond that of the load.
+    places : ndarray, shape (c,)
+        Places (m) at which the functions are wanted besides.
+    """
+    ends, orders = _axial_elements(mesh, mesh.faces[gear], higher)
+    functions = lobatto_functions(ends, orders, mesh.zone)
+    at = lobatto_functions_at(ends, orders, np.zeros(0) if places is None else places)
     if mesh.count == 1:
-        yield (functions, None), slice(0, 1)
+        yield AxialSystem((functions, None), (at, None), slice(0, 1))
         return
     (low, high), (first, last) = mesh.zone, mesh.faces[gear]
     if mesh.base_helix_angle == 0.0 and math.isclose(low - first, last - high, abs_tol=1e-9 * mesh.width):
-        even, odd = functions.by_parity()
-        yield (even, odd), slice(0, None, 2)
-        yield (odd, even), slice(1, None, 2)
+        (even, odd), (even_at, odd_at) = functions.by_parity(), at.by_parity()
+        yield AxialSystem((even, odd), (even_at, odd_at), slice(0, None, 2))
+        yield AxialSystem((odd, even), (odd_at, even_at), slice(1, None, 2))
         return
-    yield (functions, functions), slice(0, None)
+    yield AxialSystem((functions, functions), (at, at), slice(0, None))
+
+
+def loads_of(mesh: WideMesh, gear: int, system: AxialSystem, points: Array, nodal: Array) -> Array:
+    """Return the nodal loads of one system of loads on the flank.
+
+    Parameters
+    ----------
+    mesh : WideMesh
+        The gears.
+    gear : int
+        0 for the pinion, 1 for the wheel.
+    system : AxialSystem
+        Functions along the axis.
+    points : ndarray, shape (n, 2)
+        Nodes of the flank (m).
+    nodal : ndarray, shape (k, n)
+        Shares of the stations' loads on them.
+
+    Returns
+    -------
+    ndarray, shape (n, width, k, 2, loads)
+        Node, unknown, station, axis of the tooth, Legendre function.
+    """
+    plane, axial = system.functions
+    x, y = points.T
+    over, count, turn = _over_width(mesh, plane)[system.loads], plane.count, mesh.turns[gear]
+    loads = np.zeros((len(points), system.width, len(nodal), 2, len(over)))
+    for axis in (0, 1):
+        loads[:, axis * count : (axis + 1) * count, :, axis] = np.einsum("in,bp->npib", nodal, over)
+        if axial is not None and turn:
+            arm = turn * (y, -x)[axis]
+            along = _over_width(mesh, axial)[system.loads]
+            loads[:, 2 * count :, :, axis] = np.einsum("in,n,bp->npib", nodal, arm, along)
+    return loads
 
 
 def _wide_flank(mesh: WideMesh, gear: int, sector: SectorMesh, whole: bool) -> WideFlank:
-    section, material, turn = mesh.gears[gear], mesh.materials[gear], mesh.turns[gear]
-    integrals = section_integrals(sector.points, sector.triangles, material, turn)
+    section, material = mesh.gears[gear], mesh.materials[gear]
+    integrals = section_integrals(sector.points, sector.triangles, material, mesh.turns[gear])
     flank, n, steps = flank_of(sector, 4), mesh.count, _steps(mesh)
     face = face_of(section)
     stations, bumps, nodal = stations_of(flank, float(face.arc[0]), section.module)
@@ -192,33 +277,24 @@ def _wide_flank(mesh: WideMesh, gear: int, sector: SectorMesh, whole: bool) -> W
     sides = np.concatenate([sector.cut_right[:-1], sector.cut_left[:-1]])  # the last node of a cut lies on the bore
     k = len(stations)
     influence = np.zeros((steps + 1, k, 2, n, k, 2, n))
-    for functions, chosen in _systems(mesh, gear):
+    for system in axial_systems(mesh, gear):
         factor = condense_extruded(
             sector.points,
             sector.triangles,
             integrals,
-            functions,
+            system.functions,
             retained=sides if whole else sides[:0],
             fixed=bore if whole else np.union1d(bore, sides),
         )
-        plane, axial = functions
-        over = _over_width(mesh, plane)[chosen]
-        x, y = sector.points[flank.nodes].T
-        count = plane.count
-        loads = np.zeros((len(flank.nodes), 2 * count + (0 if axial is None else axial.count), k, 2, len(over)))
-        for axis in (0, 1):
-            loads[:, axis * count : (axis + 1) * count, :, axis] = np.einsum("in,bp->npib", nodal, over)
-            if axial is not None and turn:
-                arm = turn * (y, -x)[axis]
-                along = _over_width(mesh, axial)[chosen]
-                loads[:, 2 * count :, :, axis] = np.einsum("in,n,bp->npib", nodal, arm, along)
-        unknowns = unknowns_of(flank.nodes, loads.shape[1])
+        loads, chosen = loads_of(mesh, gear, system, sector.points[flank.nodes], nodal), system.loads
+        unknowns = unknowns_of(flank.nodes, system.width)
         eliminated, at_sides = factor.reduced_loads(unknowns, loads.reshape(len(unknowns), -1))
         of_steps = np.zeros((steps + 1, eliminated.shape[1], eliminated.shape[1]))
         if whole:
-            of_steps = _cyclic(factor.schur, at_sides, (2 * count, loads.shape[1]), section.teeth, steps)
+            widths = 2 * system.functions[0].count, system.width
+            of_steps = cyclic_response(factor.schur, at_sides, at_sides, widths, section.teeth, range(steps + 1))
         of_steps[0] += eliminated.T @ eliminated
-        shape = k, 2, len(over)
+        shape = k, 2, loads.shape[-1]
         influence[:, :, :, chosen, :, :, chosen] = of_steps.reshape(-1, *shape, *shape)
     inverse = material.contact_compliance("strain") / math.cos(mesh.base_helix_angle)
     corner, wedge = corner_of(face)
@@ -240,25 +316,29 @@ def _over_width(mesh: WideMesh, functions: AxialFunctions) -> Array:
     return np.asarray(values.T @ functions.values)
 
 
-def _cyclic(stiffness: Array, loads: Array, widths: tuple[int, int], teeth: int, steps: int) -> Array:
-    """Displacements along the loads of the flank so many steps on, of the whole gear with loads at cut sides alone.
+def cyclic_response(
+    stiffness: Array, felt: Array, loads: Array, widths: tuple[int, int], teeth: int, steps: Sequence[int]
+) -> Array:
+    """Linear forms of the displacement of the sector so many steps on from loads, of the whole gear, by its cut sides.
 
     Parameters
     ----------
     stiffness : ndarray, shape (2 h, 2 h)
         Of one sector's sides, the right one first (N/m).
-    loads : ndarray, shape (2 h, c)
-        Loads there (N).
+    felt, loads : ndarray, shapes (2 h, r), (2 h, c)
+        Forms (-) and loads (N) there.
     widths : pair of int
         Unknowns of a node that turn with the tooth, and all.
-    teeth, steps : int
-        Number of teeth, and largest step.
+    teeth : int
+        Number of teeth.
+    steps : sequence of int
+        Steps.
 
     Returns
     -------
-    ndarray, shape (steps + 1, c, c)
+    ndarray, shape (steps, r, c)
     """
-    half, columns, (plane, width) = len(stiffness) // 2, loads.shape[1], widths
+    half, (plane, width) = len(stiffness) // 2, widths
     angle = 2 * math.pi / teeth
     c, s = math.cos(angle), math.sin(angle)
     turn = np.eye(width)
@@ -271,14 +351,19 @@ def _cyclic(stiffness: Array, loads: Array, widths: tuple[int, int], teeth: int,
     rr, rl, ll = stiffness[:half, :half], stiffness[:half, half:], stiffness[half:, half:]
     to_next, beside = turned(rl.T).T, rr + turned(turned(ll).T).T
     right, left = loads[:half], turned(loads[half:])
-    found = np.zeros((steps + 1, columns, columns))
+    felt_right, felt_left = felt[:half].T, turned(felt[half:]).T
+    found = np.zeros((len(steps), felt.shape[1], loads.shape[1]))
     for n in range(teeth // 2 + 1):
         phase = np.exp(1j * n * angle)
         root = cholesky(beside + phase * to_next + np.conj(phase) * to_next.T, check_finite=False)
         reduced = solve_triangular(root, right + np.conj(phase) * left, trans="C", check_finite=False)
-        product = reduced.conj().T @ reduced
+        if felt is loads:
+            product = reduced.conj().T @ reduced
+        else:
+            moved = solve_triangular(root, reduced, check_finite=False)
+            product = felt_right @ moved + phase * (felt_left @ moved)
         twice = 1 if n == 0 or 2 * n == teeth else 2
-        for k in range(steps + 1):
+        for i, k in enumerate(steps):
             share = twice * np.exp(1j * n * k * angle) / teeth
-            found[k] += share.real * product.real - share.imag * product.imag
+            found[i] += share.real * product.real - share.imag * product.imag
     return found
