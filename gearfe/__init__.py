@@ -31,6 +31,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .gears.gearmesh.sweep import sweep_loads, sweep_stiffness
     from .gears.geometry import Gear, GearPair
     from .multibody import constant
+    from .output.exchange.rexs import RexsJob, read_rexs, rexs_job
     from .study.job import read_study, run_study
     from .study.search import Search
 
@@ -52,6 +53,7 @@ _PUBLIC: dict[str, str] = {
     "Material": "fem.plane",
     "ModalBody": "fem.reduction.modal_body",
     "PairModel": "gears.contact.laws",
+    "RexsJob": "output.exchange.rexs",
     "RollerBearing": "drivetrain.bearings",
     "Search": "study.search",
     "Shaft": "drivetrain.train",
@@ -66,7 +68,9 @@ _PUBLIC: dict[str, str] = {
     "check_positions": "gears.gearmesh.check",
     "constant": "multibody",
     "housing_from_job": "drivetrain.housing.build",
+    "read_rexs": "output.exchange.rexs",
     "read_study": "study.job",
+    "rexs_job": "output.exchange.rexs",
     "run_study": "study.job",
     "run_up": "drivetrain.runup.run_up",
     "simulate": "drivetrain.train",
@@ -95,6 +99,7 @@ __all__ = [
     "Material",
     "ModalBody",
     "PairModel",
+    "RexsJob",
     "RollerBearing",
     "Search",
     "Shaft",
@@ -109,7 +114,9 @@ __all__ = [
     "compute_meshes",
     "constant",
     "housing_from_job",
+    "read_rexs",
     "read_study",
+    "rexs_job",
     "run_study",
     "run_up",
     "simulate",

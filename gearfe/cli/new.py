@@ -1,4 +1,7 @@
-"""``gearfe new KIND|JOB.toml [FILE]``: write a commented job file to start from, or a shipped job with its files."""
+"""``gearfe new KIND|JOB.toml [FILE]``, ``gearfe new --from MODEL.rexs [FILE]``: write a commented job to start from.
+
+A kind of job with all its keys, a shipped job with its files, or the gearbox of a REXS file.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +25,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("kind", nargs="?", metavar="KIND", help=f"{', '.join(JOBS)}, or a shipped job, as housing.toml")
     parser.add_argument("file", nargs="?", metavar="FILE", help="file to write (default: KIND.toml)")
     parser.add_argument("--list", action="store_true", help="tell the kinds and the shipped jobs")
+    parser.add_argument(
+        "--from",
+        dest="source",
+        metavar="MODEL",
+        help="instead of a kind: gearbox of a REXS file (.rexs, .rexsj, .rexsz)",
+    )
+    parser.add_argument(
+        "--load-case",
+        type=int,
+        metavar="N",
+        help="load case of that file whose loads and speeds hold (default: the first)",
+    )
     parser.add_argument("--force", action="store_true", help="replace files that exist")
 
 
@@ -30,6 +45,10 @@ def run(args: argparse.Namespace) -> int:
     from ..base.errors import InputError, unknown_name
     from ..base.files import whole_file
 
+    if args.source is not None:
+        return _from_rexs(args)
+    if args.load_case is not None:
+        raise InputError("--load-case", args.load_case, "is of a REXS file", "add --from MODEL.rexs")
     shipped = {path.name: path for folder in _folders() for path in sorted(folder.glob("*.toml"))}
     if args.list or args.kind is None:
         for name, (about, *_) in JOBS.items():
@@ -47,13 +66,47 @@ def run(args: argparse.Namespace) -> int:
     named = [] if source is None else [p for p in source.parent.iterdir() if p != source and _names(text, p.name)]
     files = {target: text.encode(), **{target.parent / path.name: path.read_bytes() for path in named}}
     for path, content in files.items():
-        if path.exists() and not args.force and (path == target or path.read_bytes() != content):
-            raise InputError("file", str(path), "exists", "choose another name, or give --force to replace it")
+        if path == target or (path.exists() and path.read_bytes() != content):
+            _check_free(path, args.force)
     for path, content in files.items():
         with whole_file(path) as temporary:
             temporary.write_bytes(content)
     print("written: " + ", ".join(map(str, files)))
     print(f"run it:  gearfe {_command(args.kind, text)} {target}")
+    return 0
+
+
+def _check_free(path: Path, force: bool) -> None:
+    """Raise `InputError` for a file that exists and may not be replaced."""
+    from ..base.errors import InputError
+
+    if path.exists() and not force:
+        raise InputError("file", str(path), "exists", "choose another name, or give --force to replace it")
+
+
+def _from_rexs(args: argparse.Namespace) -> int:
+    """Write the job of a REXS file, and print what became of its values."""
+    from ..base.errors import InputError
+    from ..base.files import whole_file
+    from ..output.exchange.rexs import rexs_job
+    from ..output.exchange.rexs.ledger import KINDS
+
+    if args.file is not None or args.list:
+        given = args.file if args.file is not None else "--list"
+        raise InputError("file", given, "is too much beside --from", "write gearfe new --from MODEL.rexs [FILE]")
+    source = Path(args.source)
+    target = Path(args.kind or f"{source.name.partition('.')[0] or 'rexs'}.toml")
+    if target.is_dir():
+        raise InputError("file", str(target), "is a folder", f"name a file in it, as {target / 'gearbox.toml'}")
+    job = rexs_job(source, load_case=args.load_case)
+    _check_free(target, args.force)
+    with whole_file(target) as temporary:
+        temporary.write_text(job.text(source.name), encoding="utf-8")
+    print(f"written: {target}")
+    print("values of the model: " + ", ".join(f"{job.count(kind)} {kind}" for kind in KINDS) + " (listed in the file)")
+    for (kind, name), (_, reason) in job.left.items():
+        print(f"not in the job, a comment in the file: {kind} {name}: {reason}".replace(" :", ":"))
+    print(f"look at it:  gearfe gear {target}")
     return 0
 
 

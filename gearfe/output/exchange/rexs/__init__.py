@@ -1,0 +1,7 @@
+"""REXS, the Reusable Engineering EXchange Standard of gearboxes (https://www.rexs.info): files to jobs and back."""
+
+from .job import RexsJob, rexs_job
+from .model import Attribute, Component, Model, Relation
+from .read import read_rexs
+
+__all__ = ["Attribute", "Component", "Model", "Relation", "RexsJob", "read_rexs", "rexs_job"]
