@@ -50,6 +50,9 @@ def test_sections_of_a_list(tmp_path: Path) -> None:
     assert (cone.outer_start, cone.outer_end, cone.young, cone.density) == pytest.approx((0.018, 0.014, 110e9, 4500.0))
     assert thick.inner_start == 0.0
     assert shaft.radius_within(-0.001, 0.001) == pytest.approx(0.01)
+    for low, high, first, last in shaft.outline:  # a gear between two shoulders, by rounding beyond them
+        within = shaft.radius_within(low * (1.0 - 4e-16) - 1e-17, high * (1.0 + 4e-16) + 1e-17)
+        assert within == pytest.approx(max(first, last), rel=1e-12)
     assert shaft.radius_within(0.018, 0.03) == pytest.approx(0.008)  # the cone half way on
     assert other.sections == ()
 

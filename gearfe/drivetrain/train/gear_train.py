@@ -40,6 +40,10 @@ HIGHEST_HZ = 10e3
 ALWAYS, IN_CONTACT = "always", "in_contact"
 
 
+#: Overlap of two parts of a shaft that is rounding, over its length: a gear may end at a shoulder.
+ROUNDING = 1e-9
+
+
 @dataclass(frozen=True)
 class Shaft:
     """A round shaft, rigid or elastic; its gears become part of it.
@@ -100,10 +104,10 @@ class Shaft:
 
     def radius_within(self, low: float, high: float) -> float:
         """Largest outer radius (m) between two places along the axis, from its middle; 0 where they lie beside it."""
-        most = 0.0
+        most, touching = 0.0, ROUNDING * self.length
         for start, end, first, last in self.outline:
             inside = np.clip([low, high], start, end)
-            if inside[1] > inside[0] or (low == high and start <= low <= end):
+            if inside[1] - inside[0] > touching or (low == high and start <= low <= end):
                 most = max(most, *(first + (last - first) * (inside - start) / (end - start)))
         return float(most)
 

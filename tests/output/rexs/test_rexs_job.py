@@ -489,6 +489,8 @@ def test_the_planetary_model_balances():
     load = train["loads"][0]
     assert load["shaft"] == "Steg_1"
     assert load["torque_Nm"] == pytest.approx(-1591.5494309189535 * (1.0 + 61.0 / 17.0), rel=1e-10)
+    ring = job.tables["gears"]["Hohlrad"]
+    assert (ring["teeth"], ring["rim_diameter_mm"], ring["cutter_teeth"]) == (-61, -280.0, 23)
     sun = [mesh for mesh in job.tables["meshes"].values() if mesh["driver"] == "Sonnenrad"]
     shares = [mesh["stiffness"]["torque_Nm"] for mesh in sun]
     assert shares == pytest.approx(3 * [1591.5494309189535 / 3.0 * 22.0 / 17.0], rel=1e-8)
@@ -510,10 +512,20 @@ def test_the_command(tmp_path, capsys):
     assert main(["new", "--from", str(tmp_path / "lost.rexs"), str(tmp_path / "y.toml")]) == 2
 
 
-def test_gears_of_the_published_model_run(tmp_path, capsys):
-    """Every mesh of the job has its geometry without an edit."""
+@pytest.mark.parametrize(("model", "said"), [(SEW, "shafts 77 mm apart"), (FVA, "radial_assembly")])
+def test_gears_of_the_published_models_run(tmp_path, capsys, model, said):
+    """Every mesh of the job has its geometry without an edit: helical ones, and those of a ring."""
     target = tmp_path / "box.toml"
-    assert main(["new", "--from", str(SEW), str(target)]) == 0
+    assert main(["new", "--from", str(model), str(target)]) == 0
     assert main(["gear", str(target), "--out", str(tmp_path / "gear"), "--no-pictures"]) == 0
-    said = capsys.readouterr().out
-    assert "shafts 77 mm apart" in said
+    assert said in capsys.readouterr().out
+
+
+def test_tips_of_a_ring_stay_on_the_involutes_of_the_planets():
+    """Root form circle of the planets by ISO 21771: 82.8268 mm; the tip of the ring may reach 0.9347 modules."""
+    assert gearfe.rexs_job(FVA).tables["gears"]["Hohlrad"]["addendum"] == 0.9
+
+
+def test_meshes_whose_load_varies_along_the_width_are_springs():
+    models = [mesh.get("mesh_model") for mesh in gearfe.rexs_job(SEW).tables["meshes"].values()]
+    assert models == 3 * ["variable_stiffness"]

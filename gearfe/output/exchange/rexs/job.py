@@ -19,7 +19,8 @@ from typing import Any
 
 from ....base.config import build
 from ....base.errors import InputError, unknown_name
-from ....base.tables.jobs import TABLES, table_class
+from ....base.tables.gearbox import Gearbox
+from ....base.tables.jobs import TABLES, gearbox_of, table_class
 from ....base.tables.named import NAMED
 from ....base.tables.text import table_text, toml_document
 from . import parts
@@ -126,6 +127,7 @@ def rexs_job(source: str | Path | Model, *, load_case: int | None = None) -> Rex
     _loads(reading, tables, held, cases)
     _own(reading, tables)
     _refuse(reading, tables, left)
+    _models(reading, tables)
     reading.leftovers(_why)
     labels = {
         (kind, name): model.components[number].label
@@ -696,12 +698,92 @@ def _refuse(
     used = {mesh[role] for mesh in tables.get("meshes", {}).values() for role in ("driver", "driven")}
     for name in [name for name in tables.get("gears", {}) if name not in used]:
         leave("gears", name, "meshes with no gear of the job")
-    lost_train = _without_train(tables, left)
-    if lost_train and "train" in tables:
-        for table in ("train", "runup"):
-            if table in tables:
-                left[table, ""] = (tables.pop(table), lost_train)
-        reading.entries.append(Entry(IGNORED, "", 0, "[train], [runup]", "", plain(lost_train)))
+    reason = _without_train(tables, left)
+    if not reason:
+        for name in _idle(tables):
+            leave("shafts", name, "no bearing between it and the housing carries it, and no gear is on it")
+        return
+    # gears and meshes alone: shafts would be a train
+    for name, gear in tables.get("gears", {}).items():
+        if gear.pop("shaft", None) is not None:
+            rule = f"its place along the axis alone, for there is no train: {reason}"
+            reading.derived(reading.part("gears", name), "assembly", f"gears.{name}.shaft", rule)
+    for kind in ("shafts", "bearings", "machines", "couplings"):
+        for name in list(tables.get(kind, {})):
+            leave(kind, name, f"there is no train: {reason}")
+    for table in ("train", "runup"):
+        if table in tables:
+            left[table, ""] = (tables.pop(table), reason)
+            reading.entries.append(Entry(IGNORED, "", 0, f"[{table}]", "", plain(reason)))
+
+
+def _idle(tables: Mapping[str, Any]) -> list[str]:
+    """Names of shafts that neither bearings carry nor gears are on."""
+    busy = {entry["shaft"] for kind in ("bearings", "gears") for entry in tables.get(kind, {}).values()}
+    busy |= {name for name, entry in tables.get("shafts", {}).items() if entry.get("attachments")}
+    busy |= {shaft for entry in tables.get("couplings", {}).values() for shaft in entry["shafts"]}
+    return [name for name in tables.get("shafts", {}) if name not in busy]
+
+
+def _models(reading: Reading, tables: dict[str, Any]) -> None:
+    """Springs instead of potentials in meshes whose load varies along the face width, if the file chooses nothing."""
+    if not tables.get("meshes"):
+        return
+    try:
+        box = gearbox_of({name: tables[name] for name in NAMED if tables.get(name)}, "REXS")
+    except InputError as error:
+        reading.note(IGNORED, None, "the gears and meshes together", "", str(error))
+        return
+    _ring_tips(reading, tables, box)
+    for name, mesh in box.meshes.items():
+        entry = tables["meshes"][name]
+        varies = mesh.along_width(("left", "right"))
+        if varies is None or "mesh_model" in entry or reading.part("meshes", name).attributes.get(OWN_KEYS):
+            continue
+        entry["mesh_model"] = "variable_stiffness"
+        rule = f"variable_stiffness: {varies[0]} makes the load vary along the face width"
+        reading.defaulted(reading.part("meshes", name), f"meshes.{name}.mesh_model", rule)
+        for key in [key for key in ("oil_viscosity_mPa_s", "roughness_um") if key in entry]:
+            del entry[key]
+            rule = "friction is of meshes with a potential: its load varies along the face width"
+            reading.ignored(reading.part("meshes", name), key, rule)
+
+
+def _ring_tips(reading: Reading, tables: dict[str, Any], box: Gearbox) -> None:
+    """Addendum of rings that the file gives no tips: 1, or as much as stays on the involutes of their mates.
+
+    The rolling length at the tip of a ring less a sin(alpha_wt) is that of the mate there, which must not be less than
+    that of its form circle, r sin(alpha_t) - (h_fP - rho_fP (1 - sin(alpha_n)) - x) m_n/sin(alpha_t) (ISO 21771).
+    """
+    for name, ring in box.gears.items():
+        entry = tables["gears"][name]
+        if (
+            ring.teeth > 0
+            or reading.part("gears", name).attributes.get(OWN_KEYS)
+            or ({"addendum", "tip_diameter_mm", "tip_shortening"} & entry.keys())
+        ):
+            continue
+        module, most = ring.form["module_mm"], 1.0
+        for mesh in box.meshes.values():
+            mate = mesh.driver if mesh.driven.name == name else mesh.driven if mesh.driver.name == name else None
+            if mate is None or mesh.centre_distance_mm is None or mate.teeth < 0:
+                continue
+            normal, helix = (math.radians(ring.form[key]) for key in ("pressure_angle_deg", "helix_angle_deg"))
+            angle = math.atan(math.tan(normal) / math.cos(helix))
+            radii = [0.5 * abs(gear.teeth) * module / math.cos(helix) for gear in (ring, mate)]
+            bases = [radius * math.cos(angle) for radius in radii]
+            depth = mate.form["dedendum"] - mate.form["rack_tip_radius"] * (1.0 - math.sin(normal))
+            form = radii[1] * math.sin(angle) - (depth - mate.form["profile_shift"]) * module / math.sin(angle)
+            between = abs(mesh.centre_distance_mm) ** 2 - (bases[0] - bases[1]) ** 2
+            if between <= 0.0:
+                continue
+            least = math.hypot(bases[0], math.sqrt(between) + max(form, 0.0))
+            most = min(most, (radii[0] - least) / module - ring.form["profile_shift"])
+        rule = "1, of ISO 53"
+        if most < 1.0:
+            entry["addendum"] = math.floor(20.0 * most) / 20.0
+            rule = "the next twentieth that keeps its tips on the involutes of its mates; 1, of ISO 53, would not"
+        reading.defaulted(reading.part("gears", name), f"gears.{name}.addendum", rule)
 
 
 def _without_train(tables: dict[str, Any], left: Mapping[tuple[str, str], tuple[Mapping[str, Any], str]]) -> str:
@@ -711,6 +793,11 @@ def _without_train(tables: dict[str, Any], left: Mapping[tuple[str, str], tuple[
         return f"mesh {lost[0]} is missing, so the power does not flow"
     if not tables.get("meshes"):
         return "there are no meshes"
+    carried = {entry["shaft"] for entry in tables.get("bearings", {}).values()}
+    carried |= {name for name, entry in tables.get("shafts", {}).items() if entry.get("attachments")}
+    loose = [gear["shaft"] for gear in tables.get("gears", {}).values() if gear.get("shaft", "") not in carried]
+    if loose:
+        return f"no bearing between it and the housing carries shaft {loose[0]}"
     return ""
 
 

@@ -24,6 +24,8 @@ USUAL = 2e8
 STIFFEST_GPA = 2000.0
 #: Material below the root circle of a gear that is cut into its shaft, and that of a gear on a shaft (normal modules).
 RIM = 1.5
+#: Rim of a ring without any size in the file (modules).
+USUAL_RIM = 3.0
 #: Type of bearing in REXS -> in a job.
 TYPES = {
     "radial_grooved_ball_bearing": DEEP_GROOVE,
@@ -393,20 +395,18 @@ def _heights(
     key: str,
 ) -> None:
     """Addendum, dedendum and the round of the rack."""
-    module = entry.get("module_mm")
+    module, sign = entry.get("module_mm"), -1.0 if gear.kind == "ring_gear" else 1.0
     outside = _first(reading, sides, "addendum_coefficient_basic_profile", "none", f"{key}.addendum")
     tip = reading.number(gear, "tip_diameter", "mm")
     if outside is not None:
         entry["addendum"] = outside
         if tip is not None:
             reading.ignored(gear, "tip_diameter", "the addendum of the basic profile says it")
-    elif tip is not None and gear.kind == "cylindrical_gear":
-        entry["tip_diameter_mm"] = tip
+    elif tip is not None:
+        entry["tip_diameter_mm"] = sign * abs(tip)
         reading.note(READ, gear, "tip_diameter", f"{key}.tip_diameter_mm")
-    else:
+    elif gear.kind == "cylindrical_gear":
         reading.defaulted(gear, f"{key}.addendum", "1, of ISO 53")
-        if tip is not None:
-            reading.ignored(gear, "tip_diameter", "of an internal gear: its addendum stands for it")
     racks = [tool for tool in tools if tool.kind in ("rack_shaped_tool", "cutter_wheel_tool")]
     for tool in racks[1:]:
         reading.ignored(tool, "tool", "the first tool makes the root, later ones the flanks")
@@ -426,12 +426,18 @@ def _heights(
             value = None if amount is None else amount / module
         if value is not None:
             values[where] = value
+    for tool in racks[:1]:
+        if gear.kind == "ring_gear" and tool.kind == "cutter_wheel_tool":
+            teeth = reading.integer(tool, "number_of_teeth", f"{key}.cutter_teeth")
+            shift = reading.number(tool, "addendum_modification_coefficient", "none", f"{key}.cutter_shift")
+            entry |= {} if teeth is None else {"cutter_teeth": teeth}
+            entry |= {} if shift is None else {"cutter_shift": shift}
     root = reading.number(gear, "root_diameter", "mm")
     if "dedendum" in values:
         if root is not None:
             reading.ignored(gear, "root_diameter", "the tool says it")
-    elif root is not None and gear.kind == "cylindrical_gear":
-        entry["root_diameter_mm"] = root
+    elif root is not None:
+        entry["root_diameter_mm"] = sign * abs(root)
         reading.note(READ, gear, "root_diameter", f"{key}.root_diameter_mm")
     else:
         reading.defaulted(gear, f"{key}.dedendum", "1.25, of ISO 53")
@@ -482,30 +488,21 @@ def _thickness(
         reading.ignored(gear, "tooth_thickness_deviation_tolerance_series_din_3967_1978", rule)
 
 
-def _bore(reading: Reading, gear: Component, entry: dict[str, Any], shaft: dict[str, Any] | None, key: str) -> None:
+def _bore(reading: Reading, gear: Component, entry: dict[str, Any], shaft: dict[str, Any] | None, where: str) -> None:
     """Diameter of the rigid bore, of a ring that of its rim."""
     module = entry.get("module_mm", 1.0)
     pitch = abs(entry["teeth"]) * module / math.cos(math.radians(entry.get("helix_angle_deg", 0.0)))
-    key = f"{key}.bore_diameter_mm"
-    ring = gear.kind == "ring_gear"
-    name = "outer_diameter" if ring else "inner_diameter"
     bodies = reading.parts(gear, "assembly", "assembly", "part", "gear_body")
+    if gear.kind == "ring_gear":
+        _rim(reading, gear, bodies, entry, shaft, pitch, where)
+        return
+    key = f"{where}.bore_diameter_mm"
     for item in (gear, *bodies):
-        value = reading.number(item, name, "mm")
+        value = reading.number(item, "inner_diameter", "mm")
         if value:
             entry["bore_diameter_mm"] = value
-            reading.note(READ, item, name, key)
+            reading.note(READ, item, "inner_diameter", key)
             return
-    if ring:
-        y = entry.get("y_mm")
-        rim = diameter_at(shaft, y) if shaft is not None and y is not None else None
-        if rim and rim > pitch + 2.0 * (1.25 + RIM) * module:
-            entry["bore_diameter_mm"] = rim
-            reading.derived(gear, "shaft_section", key, "outer diameter of its shaft: the rim is held there")
-        else:
-            entry["bore_diameter_mm"] = pitch + 2.0 * (1.25 + 3.0) * module
-            reading.defaulted(gear, key, "a rim of 3 modules outside of the root circle")
-        return
     root = entry.get("root_diameter_mm") or pitch + 2.0 * module * (_shift(entry) - entry.get("dedendum", 1.25))
     largest = root - 2.0 * RIM * module
     y = entry.get("y_mm")
@@ -520,6 +517,33 @@ def _bore(reading: Reading, gear: Component, entry: dict[str, Any], shaft: dict[
     else:
         entry["bore_diameter_mm"] = float(f"{0.2 * pitch:.6g}")
         reading.defaulted(gear, key, "0.2 times the pitch diameter: the file gives no shaft section there")
+
+
+def _rim(
+    reading: Reading,
+    gear: Component,
+    bodies: list[Component],
+    entry: dict[str, Any],
+    shaft: dict[str, Any] | None,
+    pitch: float,
+    where: str,
+) -> None:
+    """Outer diameter of the rim of a ring, negative as in ISO 21771: its body's, that of its shaft, or a usual one."""
+    key, module = f"{where}.rim_diameter_mm", entry.get("module_mm", 1.0)
+    for item in bodies:
+        value = reading.number(item, "outer_diameter", "mm")
+        if value:
+            entry["rim_diameter_mm"] = -value
+            reading.note(READ, item, "outer_diameter", key)
+            return
+    y = entry.get("y_mm")
+    rim = diameter_at(shaft, y) if shaft is not None and y is not None else None
+    if rim and rim > pitch + 2.0 * (1.25 + RIM) * module:
+        entry["rim_diameter_mm"] = -rim
+        reading.derived(gear, "shaft_section", key, "outer diameter of its shaft")
+    else:
+        entry["rim_diameter_mm"] = -float(f"{pitch + 2.0 * (1.25 + USUAL_RIM) * module:.6g}")
+        reading.defaulted(gear, key, f"a rim of {USUAL_RIM:g} modules outside of the root circle")
 
 
 def _shift(entry: dict[str, Any]) -> float:
