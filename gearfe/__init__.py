@@ -31,7 +31,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .gears.gearmesh.sweep import sweep_loads, sweep_stiffness
     from .gears.geometry import Gear, GearPair
     from .multibody import constant
-    from .output.exchange.rexs import RexsJob, read_rexs, rexs_job
+    from .output.exchange.rexs import RexsJob, read_rexs, rexs_job, write_rexs
     from .study.job import read_study, run_study
     from .study.search import Search
 
@@ -78,6 +78,7 @@ _PUBLIC: dict[str, str] = {
     "sweep_loads": "gears.gearmesh.sweep",
     "sweep_stiffness": "gears.gearmesh.sweep",
     "train_modes": "drivetrain.modes.whirl",
+    "write_rexs": "output.exchange.rexs",
 }
 
 # written out for type checkers; a test holds it against the names above
@@ -124,6 +125,7 @@ __all__ = [
     "sweep_loads",
     "sweep_stiffness",
     "train_modes",
+    "write_rexs",
 ]
 
 

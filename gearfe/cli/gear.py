@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Forms of ``--export``, and the files that they are.
 EXPORTS = ("csv", "dxf", "step", "brep")
+#: The whole job as REXS, beside the forms of each gear.
+REXS = "rexs"
 FILES = tuple(f"{side}.{form}" for side in ("pinion", "wheel") for form in EXPORTS)
 
 
@@ -33,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         default="",
         help=f"each gear also as {', '.join(EXPORTS)}, or several, as dxf,step, or one gear, as pinion.dxf: outline of "
-        "a tooth (csv), of the gear (dxf), solid (step, brep); mm",
+        "a tooth (csv), of the gear (dxf), solid (step, brep), mm; rexs: the whole job as gearbox.rexs",
     )
     parser.add_argument(
         "--angle-deg", type=float, default=0.0, metavar="X", help="pinion angle of the drawing (deg, default: 0)"
@@ -47,9 +49,27 @@ def run(args: argparse.Namespace) -> int:
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
     _exports(args.export)
     code = each_mesh(args, _run_mesh)
+    if _wants_rexs(args.export):
+        _write_rexs(args)
     if args.mesh is None:
         _show_gearbox(args)
     return code
+
+
+def _wants_rexs(text: str) -> bool:
+    """Whether a value of ``--export`` names REXS."""
+    return REXS in (word.strip() for word in text.split(","))
+
+
+def _write_rexs(args: argparse.Namespace) -> None:
+    """Write the whole job as REXS 2.0."""
+    from ..base.files import output_folder
+    from ..output.exchange.rexs import write_rexs
+
+    folder = output_folder(args.out)
+    with stage("writing gearbox.rexs"):
+        write_rexs(args.job, folder / "gearbox.rexs")
+    print_results([], folder, ["gearbox.rexs"], {}, ())
 
 
 def _show_gearbox(args: argparse.Namespace) -> None:
@@ -137,9 +157,9 @@ def _exports(text: str) -> list[str]:
     from ..base.errors import InputError, nearest
 
     made: list[str] = []
-    for name in (word.strip() for word in text.split(",") if word.strip()):
+    for name in (word.strip() for word in text.split(",") if word.strip() not in ("", REXS)):
         if name not in (*EXPORTS, *FILES):
-            problem = f"must be {', '.join(EXPORTS)}, or a file of one gear, as pinion.dxf"
+            problem = f"must be {', '.join(EXPORTS)}, {REXS}, or a file of one gear, as pinion.dxf"
             raise InputError("--export", name, problem, nearest(name, FILES) or "--out tells the folder")
         made += [file for file in FILES if name in (file, Path(file).suffix[1:])]
     return sorted(set(made))

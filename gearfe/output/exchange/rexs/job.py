@@ -32,7 +32,7 @@ from .reading import Reading
 from .schema import CUSTOM, OWN
 
 #: Attributes of files that this program wrote: keys of an entry, and the other tables of the job.
-OWN_KEYS, OWN_TABLES = f"{OWN}keys", f"{OWN}tables"
+OWN_KEYS, OWN_TABLES, OWN_NAME = f"{OWN}keys", f"{OWN}tables", f"{OWN}name"
 #: Largest text of these (characters).
 LONGEST = 2**20
 #: Damping of a train (s) that REXS does not give, factor of the stiffness.
@@ -134,7 +134,7 @@ def rexs_job(source: str | Path | Model, *, load_case: int | None = None) -> Rex
         for (kind, name), number in reading.numbers.items()
         if name in tables.get(kind, {})
     }
-    tables = {name: table for name, table in tables.items() if table}
+    tables = {name: table for name, table in tables.items() if table or name not in NAMED}
     return RexsJob(model, tables, labels, left, tuple(reading.entries))
 
 
@@ -635,14 +635,25 @@ def _own(reading: Reading, tables: dict[str, Any]) -> None:
         kind, name = str(keys.get("table", "")), reading.name(component)
         if kind not in NAMED:
             raise unknown_name(f"table in {OWN_KEYS} of {component.label}", kind, NAMED)
+        given, kept = keys.get("keys", {}), keys.get("kept", [])
+        if not isinstance(given, dict) or not isinstance(kept, list):
+            where = f"{OWN_KEYS} of {component.label}"
+            raise InputError(where, None, "must have a table keys and a list kept", "write the file again")
         entry = tables.setdefault(kind, {}).setdefault(name, {})
-        kept = {key: entry[key] for key in keys.get("kept", []) if key in entry}
-        tables[kind][name] = {**kept, **keys.get("keys", {})}
+        tables[kind][name] = {key: entry[key] for key in kept if isinstance(key, str) and key in entry} | given
         reading.note(READ, component, OWN_KEYS, f"{kind}.{name}")
     for component in reading.model.of_kind("gear_unit"):
         found = _toml(reading, component, OWN_TABLES)
         if found is None:
             continue
+        for name, table in found.items():
+            where = f"{OWN_TABLES} of {component.label}"
+            if name not in TABLES and name not in NAMED:
+                raise unknown_name(where, name, (*TABLES, *NAMED))
+            if not isinstance(table, dict) or (name in NAMED and tables.get(name)):
+                raise InputError(f"{where}, {name}", None, "must be a table of its own", "write the file again")
+            if name in TABLES:
+                build(table_class(name), table, name, rules=False)
         for name in [name for name in tables if name not in NAMED]:
             del tables[name]
         tables |= found
@@ -698,6 +709,8 @@ def _refuse(
     used = {mesh[role] for mesh in tables.get("meshes", {}).values() for role in ("driver", "driven")}
     for name in [name for name in tables.get("gears", {}) if name not in used]:
         leave("gears", name, "meshes with no gear of the job")
+    if any(unit.attributes.get(OWN_TABLES) for unit in reading.model.of_kind("gear_unit")):
+        return  # a job of this program, whole as it is
     reason = _without_train(tables, left)
     if not reason:
         for name in _idle(tables):
@@ -795,9 +808,11 @@ def _without_train(tables: dict[str, Any], left: Mapping[tuple[str, str], tuple[
         return "there are no meshes"
     carried = {entry["shaft"] for entry in tables.get("bearings", {}).values()}
     carried |= {name for name, entry in tables.get("shafts", {}).items() if entry.get("attachments")}
-    loose = [gear["shaft"] for gear in tables.get("gears", {}).values() if gear.get("shaft", "") not in carried]
-    if loose:
-        return f"no bearing between it and the housing carries shaft {loose[0]}"
+    for name, gear in tables.get("gears", {}).items():
+        if "shaft" not in gear:
+            return f"gear {name} is on no shaft"
+        if gear["shaft"] not in carried:
+            return f"no bearing between it and the housing carries shaft {gear['shaft']}"
     return ""
 
 
@@ -836,10 +851,10 @@ def _text(job: RexsJob, source: str) -> str:
                 label = job.labels.get((kind, name), "")
                 remark = _comment(f"REXS: {label}") if label else ""
                 notes = "".join(_comment(f"{line}") for line in _notes(job, f"{kind}.{name}"))
-                blocks.append(remark + notes + table_text(NAMED[kind], entry, f"{kind}.{_key(name)}", brief=True))
+                blocks.append(remark + notes + _table(NAMED[kind], entry, f"{kind}.{_key(name)}"))
         elif kind in TABLES:
             notes = "".join(_comment(line) for line in _notes(job, kind))
-            blocks.append(notes + table_text(table_class(kind), table, kind, brief=True))
+            blocks.append(notes + _table(table_class(kind), table, kind))
         else:
             blocks.append(f"[{kind}]\n{toml_document(table, kind)}")
     text = "\n".join(block.rstrip("\n") + "\n" for block in blocks)
@@ -855,6 +870,24 @@ def _text(job: RexsJob, source: str) -> str:
         text += "#\n" + _comment(f"{kind}:")
         text += "".join(_comment(f"  {line}") for line in job.lines(kind)) or _comment("  nothing")
     return text
+
+
+def _table(cls: type, entry: Mapping[str, Any], header: str) -> str:
+    """Text of a table with its explanations; without them where they would lose something."""
+    text = table_text(cls, entry, header, brief=True)
+    place: Any = tomllib.loads(text)
+    for part in _parts(header):
+        place = place.get(part, {})
+    return text if place == entry and text.strip() else _document(entry, header)
+
+
+def _parts(header: str) -> list[str]:
+    """Parts of a dotted name."""
+    names, place = [], tomllib.loads(f"[{header}]")
+    while place:
+        name, place = next(iter(place.items()))
+        names.append(name)
+    return names
 
 
 def _document(entry: Mapping[str, Any], header: str) -> str:

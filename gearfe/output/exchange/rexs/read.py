@@ -68,20 +68,24 @@ def read_rexs(path: str | Path) -> Model:
         of components that are missing or twice, relations to components that do not exist, values of a wrong type, and
         units that do not exist or measure something else.
     """
-    raw = read_bytes(path, FIELD, LARGEST_ARCHIVE)
+    return read_model(read_bytes(path, FIELD, LARGEST_ARCHIVE), str(path))
+
+
+def read_model(raw: bytes, path: str) -> Model:
+    """Return the model of the content of a file; `path` names it in messages. Errors are those of `read_rexs`."""
     notes: list[str] = []
     if raw.startswith(b"PK\x03\x04") or raw.startswith(b"PK\x05\x06"):
-        raw, notes = _unpacked(raw, str(path))
+        raw, notes = _unpacked(raw, path)
     if len(raw) > LARGEST:
-        raise InputError(FIELD, str(path), f"is larger than {LARGEST >> 20} MB", "is it the right file?")
+        raise InputError(FIELD, path, f"is larger than {LARGEST >> 20} MB", "is it the right file?")
     start = raw.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
     if start == b"{":
-        model = _from_json(raw, str(path))
+        model = _from_json(raw, path)
     elif start == b"<" or raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        model = _from_xml(raw, str(path))
+        model = _from_xml(raw, path)
     else:
         problem = "is no REXS file: must be XML (.rexs), JSON (.rexsj) or a ZIP archive of one (.rexsz)"
-        raise InputError(FIELD, str(path), problem, "export it as REXS")
+        raise InputError(FIELD, path, problem, "export it as REXS")
     return _checked(_with_notes(model, notes))
 
 

@@ -11,6 +11,7 @@ from ....base.errors import InputError
 from .frames import Axes, Frame, axes_along, frames_of
 from .ledger import DEFAULTED, DERIVED, IGNORED, READ, Entry, plain
 from .model import Attribute, Component, Model
+from .schema import OWN
 
 #: Type of a component -> table of a job that it becomes an entry of.
 TABLES = {
@@ -26,6 +27,8 @@ TABLES = {
     "switchable_coupling": "couplings",
     "additional_mass": "machines",
 }
+#: Names that this program wrote.
+_NAME = re.compile(r"[^\W_][\w-]{0,79}")
 #: Longest name of a part.
 LONGEST = 60
 
@@ -67,7 +70,8 @@ class Reading:
             return self.names[component.number]
         text = unicodedata.normalize("NFKC", component.name.removesuffix(f"[{component.number}]"))
         name = re.sub(r"[^\w-]+", "_", text).strip("_-")[:LONGEST].strip("_-")
-        name = name or f"{component.kind}_{component.number}"
+        own = self.text(component, f"{OWN}name")
+        name = own if _NAME.fullmatch(own) else name or f"{component.kind}_{component.number}"
         table = TABLES.get(component.kind, component.kind)
         for candidate in (name, f"{name}_{component.number}", f"{component.kind}_{component.number}"):
             if (table, candidate.casefold()) not in self._taken:

@@ -1,0 +1,568 @@
+"""Write a job as REXS 2.0: what the schema has attributes for as these, the rest in attributes of gearfe's own.
+
+The model is written, read back as any REXS file is, and compared with the job. Keys that differ, and tables without a
+component, go into ``custom_gearfe_keys`` and ``custom_gearfe_tables``, which the reader puts over what it derived. So a
+job comes back with every number as it was, and another program finds all that REXS can say.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import escape, quoteattr
+
+from ....base.config import read_toml
+from ....base.errors import InputError
+from ....base.files import whole_file
+from ....base.tables.bearing import ANGULAR, CYLINDRICAL, DEEP_GROOVE, TAPERED
+from ....base.tables.gearbox import Gearbox, NamedGear
+from ....base.tables.jobs import gearbox_of, job_tables
+from ....base.tables.named import NAMED
+from ....base.tables.pair import FROM_DISTANCE
+from ....base.tables.text import toml_document
+from ....version import VERSION as PROGRAM
+from .job import OWN_KEYS, OWN_NAME, OWN_TABLES, rexs_job
+from .modifications import SHAPES
+from .parts import TYPES
+from .read import read_model
+from .schema import VERSION, schema
+from .units import written
+
+#: Endings of files -> form.
+ENDINGS = {
+    ".rexs": "xml",
+    ".rexs.xml": "xml",
+    ".rexsj": "json",
+    ".rexs.json": "json",
+    ".rexsz": "zip",
+    ".rexs.zip": "zip",
+}
+#: Tables that become components; others by name have none in REXS.
+AS_COMPONENTS = ("materials", "gears", "meshes", "shafts", "bearings", "machines", "couplings")
+#: Type of bearing in a job -> in REXS.
+_TYPES = {kind: name for name, kind in reversed(TYPES.items())}
+#: Shape of a relief in a job -> in REXS.
+_SHAPES = {shape: name for name, shape in SHAPES.items()}
+
+
+@dataclass
+class _Part:
+    """A component under way: attribute -> value as text, truth value, or list of texts."""
+
+    number: int
+    kind: str
+    name: str
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass
+class _Builder:
+    """Components and relations of a model under way."""
+
+    parts: list[_Part] = field(default_factory=list)
+    relations: list[tuple[str, dict[str, int], int | None]] = field(default_factory=list)
+    numbers: dict[tuple[str, str], int] = field(default_factory=dict)
+
+    def add(self, kind: str, name: str = "", table: str = "", **values: Any) -> _Part:
+        """Add a component; a value is (number, its unit), a text, a truth value, a whole number or None for nothing."""
+        part = _Part(len(self.parts) + 1, kind, name)
+        self.parts.append(part)
+        self.set(part, **values)
+        if table:
+            self.numbers[table, name] = part.number
+        return part
+
+    def set(self, part: _Part, **values: Any) -> None:
+        """Set attributes of a component, in the unit of the schema."""
+        for key, value in values.items():
+            if value is None:
+                continue
+            known = schema().attribute(part.kind, key)
+            assert known is not None, (part.kind, key)
+            if isinstance(value, tuple):
+                number, unit = value
+                if number is None:
+                    continue
+                many = isinstance(number, list)
+                texts = [written(item, unit, known.unit) for item in (number if many else [number])]
+                part.attributes[key] = texts if many else texts[0]
+            else:
+                part.attributes[key] = value
+
+    def relate(self, kind: str, order: int | None = None, **roles: int) -> None:
+        """Add a relation."""
+        self.relations.append((kind, roles, order))
+
+
+def write_rexs(job: str | Path | Mapping[str, Any], path: str | Path) -> None:
+    """Write a job as a REXS 2.0 file; its ending says the form: .rexs (XML), .rexsj (JSON), .rexsz (archive of XML).
+
+    Parameters
+    ----------
+    job
+        Job file, or its parsed tables.
+    path
+        File to write.
+
+    Raises
+    ------
+    InputError
+        For mistakes in the job, jobs without gears, and other endings.
+    """
+    path = Path(path)
+    form = next((form for ending, form in ENDINGS.items() if path.name.lower().endswith(ending)), None)
+    if form is None:
+        raise InputError("file", str(path), f"must end in {', '.join(ENDINGS)}", "name it gearbox.rexs")
+    name = "job" if isinstance(job, Mapping) else str(job)
+    raw = dict(job) if isinstance(job, Mapping) else read_toml(job)
+    content = rexs_bytes(raw, form, name)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def rexs_bytes(raw: Mapping[str, Any], form: str = "xml", name: str = "job") -> bytes:
+    """Return a parsed job as REXS 2.0.
+
+    Parameters
+    ----------
+    raw
+        Tables of the job.
+    form
+        ``xml``, ``json`` or ``zip``.
+    name
+        Of the job, for messages.
+    """
+    tables, others = _by_name(dict(raw), name)
+    builder = _model(tables, others)
+    derived = rexs_job(read_model(_xml(builder), name)).tables
+    for kind in AS_COMPONENTS:
+        for key, entry in tables.get(kind, {}).items():
+            part = builder.parts[builder.numbers[kind, key] - 1]
+            made = derived.get(kind, {}).get(key, {})
+            if made != entry:
+                kept = [k for k, value in entry.items() if k in made and made[k] == value]
+                keys = {k: value for k, value in entry.items() if k not in kept}
+                part.attributes[OWN_KEYS] = toml_document({"table": kind, "kept": kept, "keys": keys})
+            part.attributes[OWN_NAME] = key
+    unit = builder.parts[0]
+    unit.attributes[OWN_TABLES] = toml_document(others) or "# no other tables"
+    xml = _xml(builder)
+    if form == "json":
+        return _json(builder)
+    return xml if form == "xml" else _zip(xml)
+
+
+# --- jobs by name ---------------------------------------------------------------------------------------------------
+
+
+def _by_name(raw: dict[str, Any], path: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the tables by name of a job, of [pair] and [microgeometry], too, and its other tables."""
+    if "gears" not in raw and "pair" in raw and "shafts" not in raw.get("train", {}):
+        raw = _of_pair(raw, path)
+    if "gears" not in raw:
+        problem = "is not there: REXS is written of gears by name, or of [pair]"
+        raise InputError("[gears]", None, problem, "write [gears.NAME] and [meshes.NAME] (gearfe new gearbox)")
+    job_tables(raw, path, ("gears", "meshes"), tuple(name for name in NAMED if name in raw))
+    gearbox_of(raw, path)  # raises for gears that cannot mesh
+    tables = {kind: raw[kind] for kind in AS_COMPONENTS if kind in raw}
+    return tables, {name: table for name, table in raw.items() if name not in AS_COMPONENTS}
+
+
+def _of_pair(raw: dict[str, Any], path: str) -> dict[str, Any]:
+    """Tables by name that say what [pair] and [microgeometry] do."""
+    box: Gearbox = gearbox_of(raw, path)
+    mesh = next(iter(box.meshes.values()))
+    keys = {"driver": mesh.driver.name, "driven": mesh.driven.name, "centre_distance_mm": mesh.centre_distance_mm,
+            "flank": mesh.flank, "tolerance_class": mesh.tolerance_class, "misalignment_um": mesh.misalignment_um,
+            "misalignment_across_um": mesh.misalignment_across_um}  # fmt: skip
+    keep = {key: value for key, value in keys.items() if value not in (None, 0.0)}
+    gears = {gear.name: _gear_entry(gear) for gear in mesh.gears}
+    others = {name: table for name, table in raw.items() if name not in ("pair", "microgeometry")}
+    loads = {
+        key: value
+        for key, value in raw.get("microgeometry", {}).items()
+        if key not in ("flank", "tolerance_class", "pinion", "wheel")
+    }
+    if loads and "loadmap" not in others:
+        others["loadmap"] = loads
+    materials = {f"{gear.name}_material": table_dict(gear.material) for gear in mesh.gears if gear.material is not None}
+    return {**others, "gears": gears, "meshes": {"pair": keep}, **({"materials": materials} if materials else {})}
+
+
+def _gear_entry(gear: NamedGear) -> dict[str, Any]:
+    """Entry of a gear with the keys that its tables give."""
+    entry: dict[str, Any] = {"teeth": gear.teeth, **gear.drawn}
+    for key, value in gear.form.items():
+        if value is not None and (gear.written(key) or key in ("module_mm", "pressure_angle_deg", "face_width_mm")):
+            entry[key] = FROM_DISTANCE if key == "profile_shift" and gear.shift_from else value
+    entry.pop("pitch_diameter_mm", None)
+    if gear.y_mm:
+        entry["y_mm"] = gear.y_mm
+    if gear.material is not None:
+        entry["material"] = f"{gear.name}_material"
+    if gear.microgeometry is not None:
+        entry["microgeometry"] = table_dict(gear.microgeometry)
+    return entry
+
+
+def table_dict(table: Any) -> dict[str, Any]:
+    """Return the keys of a table that are not their defaults, tables within it alike."""
+    entry = {}
+    for item in fields(table):
+        value = getattr(table, item.name)
+        if value is None or value in (item.default, ()):
+            continue
+        if is_dataclass(value):
+            value = table_dict(value)
+        elif isinstance(value, tuple):
+            value = [table_dict(one) if is_dataclass(one) else _plain(one) for one in value]
+        if value not in ({}, []):
+            entry[item.name] = value
+    return entry
+
+
+def _plain(value: Any) -> Any:
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value
+
+
+# --- components -----------------------------------------------------------------------------------------------------
+
+
+def _pose(u: float, v: float = 0.0, w: float = 0.0) -> dict[str, Any]:
+    """Attributes of a place in the system of the gear unit."""
+    return {
+        "reference_component_for_position": 1, "support_vector": ([u, v, w], "mm"),
+        "u_axis_vector": ([1.0, 0.0, 0.0], "mm"), "w_axis_vector": ([0.0, 0.0, 1.0], "mm"),
+    }  # fmt: skip
+
+
+def _model(tables: Mapping[str, Any], others: Mapping[str, Any]) -> _Builder:
+    """Return the components and relations of a job."""
+    b = _Builder()
+    b.add("gear_unit", "gear unit", **_pose(0.0))
+    casing = b.add("gear_casing", "housing").number
+    b.relate("assembly", assembly=1, part=casing)
+    for name, entry in tables.get("materials", {}).items():
+        b.add("material", name, "materials", elastic_modulus=(entry.get("youngs_modulus_GPa", 200.0), "GPa"),
+              poisson_ratio=(entry.get("poisson_ratio", 0.3), "none"),
+              density=(entry.get("density_kg_per_m3", 7850.0), "kg / m^3"))  # fmt: skip
+    train = others.get("train", {})
+    for name, entry in tables.get("shafts", {}).items():
+        _shaft(b, name, entry, train)
+    for name, entry in tables["gears"].items():
+        _gear(b, name, entry, tables.get("shafts", {}))
+    for name, entry in tables["meshes"].items():
+        _mesh(b, name, entry)
+    for name, entry in tables.get("bearings", {}).items():
+        _bearing(b, name, entry, tables.get("shafts", {}), casing)
+    for name, entry in tables.get("machines", {}).items():
+        shaft = tables.get("shafts", {}).get(entry["shaft"], {})
+        at = None if "y_mm" not in entry else entry["y_mm"] - _start(shaft)
+        part = b.add("additional_mass", name, "machines", moment_of_inertia_u_axis=(entry["inertia_kg_m2"], "kg m^2"),
+                     u_coordinate_on_shaft=(at, "mm"))  # fmt: skip
+        b.relate("assembly", assembly=b.numbers["shafts", entry["shaft"]], part=part.number)
+    for name, entry in tables.get("couplings", {}).items():
+        one, two = (b.numbers["shafts", shaft] for shaft in entry["shafts"])
+        part = b.add("coupling", name, "couplings", rotational_stiffness=(entry["stiffness_Nm_per_rad"], "N m / rad"))
+        b.relate("side", assembly=part.number, inner_part=one, outer_part=two)
+    _train(b, train, tables.get("shafts", {}))
+    return b
+
+
+def _start(shaft: Mapping[str, Any]) -> float:
+    """Place of the end of lowest y of a shaft (mm)."""
+    sections = shaft.get("sections", [])
+    length = sum(section["length_mm"] for section in sections) if sections else shaft.get("length_mm", 0.0)
+    return float(shaft.get("y_mm", 0.0) - 0.5 * length)
+
+
+def _shaft(b: _Builder, name: str, entry: Mapping[str, Any], train: Mapping[str, Any]) -> None:
+    part = b.add("shaft", name, "shafts", **_pose(_start(entry), entry.get("z_mm", 0.0), entry["x_mm"]))
+    b.relate("assembly", assembly=1, part=part.number)
+    drive = train.get("drive", {})
+    speed = drive.get("speed_rad_per_s")
+    if drive.get("shaft") == name and isinstance(speed, (int, float)):
+        b.set(part, rotational_speed=(speed, "rad / s"), defines_speed=True)
+    _reference(b, part.number, entry)
+    sections = (
+        entry.get("sections") or [{"length_mm": entry["length_mm"], "outer_diameter_mm": 2.0 * entry["radius_mm"]}]
+        if "sections" in entry or "length_mm" in entry
+        else []
+    )
+    at = 0.0
+    for section in sections:
+        ends = {}
+        for which in ("outer", "inner"):
+            for end, mine in (("begin", "start"), ("end", "end")):
+                default = 0.0 if which == "inner" else None
+                value = section.get(f"{which}_diameter_mm", section.get(f"{which}_diameter_{mine}_mm", default))
+                ends[f"{which}_diameter_{end}"] = (value, "mm")
+        piece = b.add(
+            "shaft_section", "", u_coordinate_on_shaft=(at, "mm"), length=(section["length_mm"], "mm"), **ends
+        )
+        b.relate("assembly", assembly=part.number, part=piece.number)
+        at += section["length_mm"]
+
+
+def _reference(b: _Builder, number: int, entry: Mapping[str, Any]) -> None:
+    """Material of a part, where it is one by name."""
+    target = b.numbers.get(("materials", str(entry.get("material"))))
+    if target is not None:
+        b.relate("reference", origin=number, referenced=target)
+
+
+def _gear(b: _Builder, name: str, entry: Mapping[str, Any], shafts: Mapping[str, Any]) -> None:
+    internal = entry["teeth"] < 0
+    shaft = shafts.get(entry.get("shaft", ""), {})
+    helix = entry.get("helix_angle_deg", 0.0)
+    sign = -1.0 if entry.get("helix_hand") == "left" else 1.0
+    place = _pose(entry.get("y_mm", 0.0), shaft.get("z_mm", 0.0), shaft.get("x_mm", 0.0))
+    part = b.add("ring_gear" if internal else "cylindrical_gear", name, "gears", number_of_teeth=abs(entry["teeth"]),
+                 normal_module=(entry.get("module_mm"), "mm"), face_width=(entry.get("face_width_mm"), "mm"),
+                 helix_angle_reference_diameter=(sign * helix + 0.0, "deg"),
+                 u_coordinate_on_shaft=(entry.get("y_mm", 0.0) - _start(shaft) if shaft else None, "mm"),
+                 tip_diameter=(_size(entry.get("tip_diameter_mm")), "mm"),
+                 root_diameter=(_size(entry.get("root_diameter_mm")), "mm"), **place)  # fmt: skip
+    if not internal:
+        b.set(part, inner_diameter=(entry.get("bore_diameter_mm"), "mm"), span_measurement=(entry.get("span_mm"), "mm"),
+              number_of_teeth_for_span_measurement=entry.get("span_teeth"))  # fmt: skip
+    elif "rim_diameter_mm" in entry:
+        body = b.add("gear_body", "", outer_diameter=(_size(entry["rim_diameter_mm"]), "mm"))
+        b.relate("assembly", assembly=part.number, part=body.number)
+    if shaft:
+        b.relate("assembly", assembly=b.numbers["shafts", entry["shaft"]], part=part.number)
+    _reference(b, part.number, entry)
+    shift = entry.get("profile_shift", 0.0)
+    flanks = {}
+    for side in ("left", "right"):
+        flank = b.add("cylindrical_gear_flank", "", normal_pressure_angle=(entry.get("pressure_angle_deg"), "deg"))
+        b.set(flank, addendum_coefficient_basic_profile=(entry.get("addendum"), "none"))
+        if not isinstance(shift, str):
+            b.set(flank, addendum_modification_coefficient=(shift, "none"))
+        flanks[side] = flank.number
+    b.relate("flank", gear=part.number, **flanks)
+    _tool(b, entry, flanks, internal)
+    deviations = entry.get("microgeometry")
+    if deviations:
+        b.set(part, datum_face_orientation="positive")
+        for side, flank in flanks.items():
+            for kind, values in _modifications({**deviations, **deviations.get(side, {})}):
+                item = b.add(kind, "", **values)
+                b.relate("reference", origin=flank, referenced=item.number)
+
+
+def _size(value: float | None) -> float | None:
+    return None if value is None else abs(value)
+
+
+def _tool(b: _Builder, entry: Mapping[str, Any], flanks: Mapping[str, int], internal: bool) -> None:
+    """Tool of a gear whose file gives dedendum, rack tip radius or cutter."""
+    if not {"dedendum", "rack_tip_radius", "cutter_teeth"} & entry.keys():
+        return
+    values: dict[str, Any] = {
+        "addendum_coefficient_reference_profile": (entry.get("dedendum"), "none"),
+        "tip_corner_radius_factor_reference_profile": (entry.get("rack_tip_radius"), "none"),
+    }
+    if internal:
+        values |= {
+            "number_of_teeth": entry.get("cutter_teeth"),
+            "addendum_modification_coefficient": (entry.get("cutter_shift"), "none"),
+        }
+    tool = b.add("cutter_wheel_tool" if internal else "rack_shaped_tool", "", **values)
+    for flank in flanks.values():
+        settings = b.add("cylindrical_gear_manufacturing_settings", "")
+        b.relate("manufacturing_step", 1, workpiece=flank, tool=tool.number, manufacturing_settings=settings.number)
+
+
+def _modifications(table: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Components of the modifications of one flank."""
+    items: list[tuple[str, dict[str, Any]]] = []
+    for end in ("tip", "root"):
+        if f"{end}_relief_um" in table:
+            items.append((f"{end}_relief", {
+                f"{end}_relief_depth": (table[f"{end}_relief_um"], "um"),
+                f"{end}_relief_datum_length": (table.get(f"{end}_relief_length_mm"), "mm"),
+                f"{end}_relief_datum_diameter": (table.get(f"{end}_relief_start_diameter_mm"), "mm"),
+                f"{end}_relief_evaluation_reference": (table.get(f"{end}_relief_end_diameter_mm"), "mm"),
+                "shape_of_relief": _SHAPES[table.get(f"{end}_relief_shape", "linear")],
+            }))  # fmt: skip
+    for name, face in (("low", "non_datum_face"), ("high", "datum_face")):
+        if f"end_relief_{name}_um" in table:
+            items.append((f"end_relief_{face}", {
+                f"end_relief_depth_{face}": (table[f"end_relief_{name}_um"], "um"),
+                f"end_relief_length_{face}": (table.get(f"end_relief_{name}_length_mm"), "mm"),
+                "shape_of_relief": _SHAPES[table.get("end_relief_shape", "linear")],
+            }))  # fmt: skip
+    for key, kind, names in (
+        ("profile_crowning_um", "profile_crowning", ("profile_crowning_at_tip", "profile_crowning_at_root")),
+        ("helix_crowning_um", "helix_crowning",
+         ("helix_crowning_amount_datum_face", "helix_crowning_amount_non_datum_face")),
+        ("profile_slope_um", "profile_slope", ("profile_slope",)),
+        ("helix_slope_um", "helix_slope", ("helix_slope",)),
+        ("bias_um", "profile_twist", ("profile_twist",)),
+    ):  # fmt: skip
+        if key in table:
+            items.append((kind, dict.fromkeys(names, (table[key], "um"))))
+    return items
+
+
+def _mesh(b: _Builder, name: str, entry: Mapping[str, Any]) -> None:
+    distance = entry.get("centre_distance_mm")
+    part = b.add("cylindrical_stage", name, "meshes", center_distance=(_size(distance), "mm"))
+    b.relate("assembly", assembly=1, part=part.number)
+    gears = [b.numbers["gears", entry[role]] for role in ("driver", "driven")]
+    b.relate("stage", stage=part.number, gear_1=gears[0], gear_2=gears[1])
+    for gear, drives in zip(gears, (True, False), strict=True):
+        data = b.add("cylindrical_stage_gear_data", "", is_driving_gear=drives)
+        b.relate("stage_gear_data", stage=part.number, gear=gear, stage_gear_data=data.number)
+
+
+def _bearing(b: _Builder, name: str, entry: Mapping[str, Any], shafts: Mapping[str, Any], casing: int) -> None:
+    shaft = shafts.get(entry["shaft"], {})
+    y = entry.get("y_mm", 0.0)
+    at = {f"u_coordinate_on_shaft_{side}_side": (y - _start(shaft), "mm") for side in ("inner",)}
+    pose = _pose(y, shaft.get("z_mm", 0.0), shaft.get("x_mm", 0.0)) if "y_mm" in entry else {}
+    kind = entry.get("type")
+    if kind is None:
+        stiffness = entry.get("stiffness")
+        values: dict[str, Any] = {}
+        if stiffness is not None:
+            values = {
+                "radial_stiffness": (stiffness[0], "N / m"), "axial_stiffness": (stiffness[1], "N / m"),
+                "bending_stiffness": (stiffness[3], "N m / rad"),
+            }  # fmt: skip
+        part = b.add("concept_bearing", name, "bearings", **pose, **at, **values)
+    else:
+        part = _rolling(b, name, entry, kind, {**pose, **at})
+    b.relate("side", assembly=part.number, inner_part=b.numbers["shafts", entry["shaft"]], outer_part=casing)
+
+
+def _rolling(b: _Builder, name: str, entry: Mapping[str, Any], kind: str, values: dict[str, Any]) -> _Part:
+    """A rolling bearing with its rows and an element of each."""
+    count = 2 if entry.get("row_distance_mm") else 1
+    axial = {"+y": "positive", "-y": "negative"}.get(entry.get("carries", ""))
+    part = b.add("rolling_bearing_with_detailed_geometry", name, "bearings", bearing_type=_TYPES[kind],
+                 number_of_bearing_rows=count, distance_between_bearing_rows=(entry.get("row_distance_mm"), "mm"),
+                 operating_radial_bearing_clearance=(entry.get("radial_clearance_um"), "um"),
+                 axial_force_absorption=axial, **values)  # fmt: skip
+    size = entry["element_diameter_mm"]
+    for order in range(1, count + 1):
+        row = b.add("rolling_bearing_row", "", number_of_rolling_elements=entry["elements"],
+                    reference_diameter_rolling_bearing=(entry["pitch_diameter_mm"], "mm"),
+                    pressure_angle=(entry.get("contact_angle_deg", 0.0), "deg"))  # fmt: skip
+        if kind in (DEEP_GROOVE, ANGULAR):
+            for side in ("inner", "outer"):
+                if f"{side}_osculation" in entry:
+                    b.set(row, **{f"raceway_radius_of_{side}_ring": (entry[f"{side}_osculation"] * size, "mm")})
+        element = b.add("rolling_element", "", diameter_of_rolling_element=(size, "mm"))
+        if kind in (CYLINDRICAL, TAPERED):
+            b.set(element, length_of_rolling_element=(entry["roller_length_mm"], "mm"))
+        b.relate("ordered_assembly", order, assembly=part.number, part=row.number)
+        b.relate("ordered_assembly", 1, assembly=row.number, part=element.number)
+    return part
+
+
+def _train(b: _Builder, train: Mapping[str, Any], shafts: Mapping[str, Any]) -> None:
+    """Drive and loads as external loads."""
+    drive = train.get("drive")
+    loads = [("drive", drive)] if drive else []
+    loads += [(f"load {number}", load) for number, load in enumerate(train.get("loads", []), start=1)]
+    for name, load in loads:
+        shaft = shafts.get(load["shaft"])
+        if shaft is None:
+            continue
+        torque = load.get("torque_Nm")
+        known = isinstance(torque, (int, float))
+        y = load.get("y_mm", shaft.get("y_mm", 0.0))
+        part = b.add("external_load", name, u_coordinate_on_shaft=(y - _start(shaft), "mm"),
+                     torque_around_u_axis=(torque, "N m") if known else None, transmits_torque=True,
+                     defines_torque=True if known else None)  # fmt: skip
+        b.relate("assembly", assembly=b.numbers["shafts", load["shaft"]], part=part.number)
+
+
+# --- text -----------------------------------------------------------------------------------------------------------
+
+
+def _head() -> dict[str, str]:
+    now = datetime.now(UTC).replace(microsecond=0).isoformat()
+    return {"version": VERSION, "applicationId": "gearfe", "applicationVersion": PROGRAM, "date": now}
+
+
+def _unit(part: _Part, name: str) -> str:
+    known = schema().attribute(part.kind, name)
+    return "none" if known is None else known.unit
+
+
+def _xml(b: _Builder) -> bytes:
+    head = " ".join(f"{key}={quoteattr(value)}" for key, value in _head().items())
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', f"<model {head}>", "  <relations>"]
+    kinds = {part.number: part.kind for part in b.parts}
+    for number, (kind, roles, order) in enumerate(b.relations, start=1):
+        place = "" if order is None else f' order="{order}"'
+        lines.append(f'    <relation id="{number}" type="{kind}"{place}>')
+        lines += [f'      <ref id="{target}" role="{role}" hint="{kinds[target]}"/>' for role, target in roles.items()]
+        lines.append("    </relation>")
+    lines += ["  </relations>", "  <components>"]
+    for part in b.parts:
+        lines.append(f'    <component id="{part.number}" type="{part.kind}" name={quoteattr(part.name)}>')
+        for name, value in part.attributes.items():
+            text = _xml_value(value)
+            lines.append(f'      <attribute id="{name}" unit={quoteattr(_unit(part, name))}>{text}</attribute>')
+        lines.append("    </component>")
+    return "\n".join([*lines, "  </components>", "</model>", ""]).encode()
+
+
+def _xml_value(value: Any) -> str:
+    if isinstance(value, list):
+        return "<array>" + "".join(f"<c>{escape(str(item))}</c>" for item in value) + "</array>"
+    return str(value).lower() if isinstance(value, bool) else escape(str(value))
+
+
+def _json(b: _Builder) -> bytes:
+    components = []
+    for part in b.parts:
+        attributes = []
+        for name, value in part.attributes.items():
+            known = schema().attribute(part.kind, name)
+            kind = "string" if known is None else known.kind
+            attributes.append({"id": name, "unit": _unit(part, name), kind: _Number.of(kind, value)})
+        components.append({"id": part.number, "type": part.kind, "name": part.name, "attributes": attributes})
+    relations = []
+    for number, (kind, roles, order) in enumerate(b.relations, start=1):
+        refs = [{"id": target, "role": role, "hint": b.parts[target - 1].kind} for role, target in roles.items()]
+        place = {} if order is None else {"order": order}
+        relations.append({"id": number, "type": kind, **place, "refs": refs})
+    text = json.dumps({"model": {**_head(), "relations": relations, "components": components}}, indent=1, default=str)
+    return _Number.unquoted(text).encode()
+
+
+class _Number:
+    """Decimal numbers of JSON: written as marked texts, and the marks taken off, for floats have too few digits."""
+
+    MARK = "\ue000"
+
+    @classmethod
+    def of(cls, kind: str, value: Any) -> Any:
+        """Value of an attribute for `json.dumps`."""
+        if isinstance(value, list):
+            return [cls.of(kind.removesuffix("_array"), item) for item in value]
+        return f"{cls.MARK}{value}{cls.MARK}" if kind == "floating_point" else value
+
+    @classmethod
+    def unquoted(cls, text: str) -> str:
+        """Text of JSON with its numbers."""
+        mark = json.dumps(cls.MARK)[1:-1]
+        return text.replace(f'"{mark}', "").replace(f'{mark}"', "")
+
+
+def _zip(xml: bytes) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("model.rexs", xml)
+    return stream.getvalue()

@@ -1,0 +1,334 @@
+"""Jobs as REXS 2.0: valid by the table of the schema, and back again without a change of any number."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+import zipfile
+from decimal import Decimal
+from typing import Any
+
+import pytest
+
+import gearfe
+from gearfe.base.errors import InputError
+from gearfe.base.tables.examples import job_file
+from gearfe.base.tables.jobs import gearbox_of
+from gearfe.cli.main import main
+from gearfe.output.exchange.rexs import read_rexs, rexs_job, write_rexs
+from gearfe.output.exchange.rexs.read import read_model
+from gearfe.output.exchange.rexs.schema import OWN, schema
+from gearfe.output.exchange.rexs.units import UNITS
+from gearfe.output.exchange.rexs.write import rexs_bytes
+from tests.makers.rexs_models import saved, spur_pair, xml_of
+from tests.places import DATA
+
+EXAMPLES = sorted((DATA / "rexs").glob("*.rexs"))
+
+#: A job with every table by name, and numbers that no decimal has: thirds, and those with all digits.
+ODD = """
+[materials.steel]
+youngs_modulus_GPa = 206.33333333333334
+poisson_ratio = 0.29
+density_kg_per_m3 = 7833.123456789012
+[materials.iron]
+youngs_modulus_GPa = 170.1
+
+[gears.sun-1]
+teeth = 21
+module_mm = 2.1166666666666667
+pressure_angle_deg = 22.5
+helix_angle_deg = 13.1
+helix_hand = "left"
+face_width_mm = 20.1
+profile_shift = 0.1
+addendum = 1.05
+dedendum = 1.3
+rack_tip_radius = 0.2
+tip_round_mm = 0.07
+tooth_thinning_um = 33.3
+bore_diameter_mm = 17.7
+material = "steel"
+shaft = "in_"
+y_mm = 3.3333333333333335
+[gears.sun-1.microgeometry]
+tip_relief_um = 11.1
+tip_relief_length_mm = 1.3
+helix_crowning_um = 4.7
+profile_slope_um = -2.3
+end_relief_low_um = 7.0
+end_relief_low_length_mm = 2.0
+[[gears.sun-1.microgeometry.waviness]]
+amplitude_um = 0.3
+waves = 21
+[gears.sun-1.microgeometry.right]
+tip_relief_um = 5.5
+tip_relief_length_mm = 1.1
+
+[gears.wheel]
+teeth = 40
+module_mm = 2.1166666666666667
+pressure_angle_deg = 22.5
+helix_angle_deg = 13.1
+face_width_mm = 19.9
+profile_shift = "from centre distance"
+bore_diameter_mm = 30.0
+material = { youngs_modulus_GPa = 199.9 }
+shaft = "out"
+y_mm = 3.0
+
+[meshes.first]
+driver = "sun-1"
+driven = "wheel"
+centre_distance_mm = 67.12345678901234
+mesh_model = "mean_stiffness"
+damping_N_s_per_m = 12.5
+misalignment_um = 3.0
+[meshes.first.stiffness]
+torque_Nm = 77.7
+[meshes.first.loadmap]
+torques_Nm = [10.0, 77.7]
+
+[shafts.in_]
+x_mm = -12.345678901234567
+z_mm = 0.1
+y_mm = 1.1
+material = "steel"
+damping_ratio = 0.01
+[[shafts.in_.sections]]
+length_mm = 33.3
+outer_diameter_mm = 18.1
+[[shafts.in_.sections]]
+length_mm = 41.7
+outer_diameter_start_mm = 20.0
+outer_diameter_end_mm = 25.1
+inner_diameter_mm = 3.3
+material = "iron"
+
+[shafts.out]
+x_mm = 54.777777777777886
+z_mm = 0.1
+length_mm = 80.0
+radius_mm = 15.0
+initial_speed_rad_per_s = 3.0
+
+[bearings.A]
+shaft = "in_"
+y_mm = -30.3
+type = "deep_groove_ball"
+elements = 9
+element_diameter_mm = 7.938
+pitch_diameter_mm = 38.5
+inner_osculation = 0.5173
+radial_clearance_um = 4.1
+damping = [1.0, 2.0, 3.0, 0.0, 0.0]
+[bearings.B]
+shaft = "in_"
+y_mm = 33.0
+type = "angular_contact_ball"
+elements = 12
+element_diameter_mm = 7.0
+pitch_diameter_mm = 38.0
+contact_angle_deg = 25.0
+carries = "-y"
+axial_preload_um = 3.0
+[bearings.C]
+shaft = "out"
+y_mm = -30.0
+stiffness = [1.1e8, 2.2e7, 3.3e8, 1.7e4, 1.9e4]
+[bearings.D]
+shaft = "out"
+y_mm = 30.0
+stiffness = [3e8, 0.0, 3e8, 1e4, 1e4]
+[bearings.E]
+shaft = "out"
+y_mm = 35.0
+
+[machines.motor]
+shaft = "in_"
+y_mm = -40.0
+inertia_kg_m2 = 0.0123
+stiffness_Nm_per_rad = 4567.8
+
+[stiffness]
+kinematics = "small"
+[train]
+housing = "rigid"
+duration_ms = 12.3
+[train.drive]
+shaft = "in_"
+y_mm = -35.0
+speed_rad_per_s = 123.45678901234567
+[[train.loads]]
+shaft = "out"
+torque_Nm = 147.1
+[train.damping]
+rayleigh_beta_s = 3.3e-7
+[modes]
+[runup]
+speed_start_rad_per_s = 10.0
+speed_stop_rad_per_s = 200.0
+"""
+
+JOBS = {
+    "gearbox": job_file("gearbox"),
+    "odd": ODD,
+    **{path.stem[:3]: rexs_job(path).text(path.name) for path in EXAMPLES},
+}
+
+
+@pytest.mark.parametrize("form", ["xml", "json", "zip"])
+@pytest.mark.parametrize("name", JOBS)
+def test_a_job_comes_back_without_a_change(name, form):
+    raw = tomllib.loads(JOBS[name])
+    back = rexs_job(read_model(rexs_bytes(raw, form), name))
+    assert dict(back.tables) == raw
+    assert tomllib.loads(back.text()) == raw
+    assert not back.left
+
+
+@pytest.mark.parametrize("name", JOBS)
+def test_files_are_valid_by_the_table_of_the_schema(name):
+    """Component types, attributes, units, types of values, enumerations, relations and their order."""
+    table = schema()
+    model = read_model(rexs_bytes(tomllib.loads(JOBS[name])), name)
+    assert model.version == "2.0"
+    for component in model.components.values():
+        assert component.kind in table.components
+        for attribute in component.attributes.values():
+            if attribute.name.startswith(OWN):
+                assert attribute.unit == "none"
+                continue
+            known = table.attribute(component.kind, attribute.name)
+            assert known is not None, (component.kind, attribute.name)
+            assert attribute.unit == known.unit
+            assert attribute.unit in UNITS
+            assert not known.choices or attribute.value in known.choices, attribute
+    kinds = {number: component.kind for number, component in model.components.items()}
+    for relation in model.relations:
+        joined = frozenset((kinds[number], role) for role, number in relation.roles.items())
+        assert joined in table.relations[relation.kind], (relation.kind, joined)
+        assert (relation.order is not None) == (relation.kind in table.ordered)
+
+
+def test_other_programs_find_what_rexs_can_say():
+    """Without the attributes of this program the numbers of the standard are those of the job."""
+    raw = tomllib.loads(ODD)
+    model = read_model(rexs_bytes(raw), "odd")
+    by_name = {(part.kind, part.name): part for part in model.components.values()}
+
+    def number(kind: str, name: str, attribute: str, unit: str) -> float:
+        return by_name[kind, name].attributes[attribute].number(unit)
+
+    assert number("cylindrical_gear", "sun-1", "normal_module", "mm") == 2.1166666666666667
+    assert number("cylindrical_gear", "sun-1", "helix_angle_reference_diameter", "deg") == -13.1
+    assert number("material", "steel", "elastic_modulus", "GPa") == 206.33333333333334
+    assert number("material", "steel", "density", "kg / m^3") == 7833.123456789012
+    assert number("shaft", "in_", "rotational_speed", "rad / s") == 123.45678901234567
+    assert number("concept_bearing", "D", "bending_stiffness", "N m / rad") == 1e4
+    assert number("external_load", "load 1", "torque_around_u_axis", "N m") == 147.1
+    tip = [part.attributes["tip_relief_depth"].number("um") for part in model.of_kind("tip_relief")]
+    assert tip == [11.1, 5.5]  # left and right
+
+
+def test_bare_models_keep_the_standard_part(tmp_path):
+    """A job of another program's model, written without the attributes of this one, has the same gears and shafts."""
+    first = rexs_job(saved(tmp_path, xml_of(*spur_pair())))
+    model = read_model(rexs_bytes(first.tables), "x")
+    for component in model.components.values():
+        for name in [name for name in component.attributes if name.startswith(OWN)]:
+            del component.attributes[name]
+    again = rexs_job(model).tables
+    for kind in ("materials", "gears", "meshes", "shafts", "bearings"):
+        assert again[kind] == first.tables[kind], kind
+    assert again["train"]["drive"] == first.tables["train"]["drive"]
+
+
+def test_a_pair_with_its_flanks():
+    """[pair] and [microgeometry] become gears by name with the same numbers."""
+    raw: dict[str, Any] = tomllib.loads(job_file("loadmap"))
+    back = rexs_job(read_model(rexs_bytes(raw), "pair")).tables
+    one, two = (next(iter(gearbox_of(job, "x").meshes.values())) for job in (raw, dict(back)))
+    assert dict(two.driver.form) == dict(one.driver.form)
+    assert dict(two.driven.form) == dict(one.driven.form)
+    assert two.driver.microgeometry == one.driver.microgeometry
+    assert two.driver.material == one.driver.material
+    assert back["loadmap"]["torques_Nm"] == raw["loadmap"]["torques_Nm"]
+
+
+def test_json_numbers_are_numbers(tmp_path):
+    path = tmp_path / "a.rexsj"
+    write_rexs(tomllib.loads(ODD), path)
+    tree = json.loads(path.read_text(encoding="utf-8"), parse_float=Decimal)
+    values = [
+        a["floating_point"] for c in tree["model"]["components"] for a in c["attributes"] if "floating_point" in a
+    ]
+    assert len(values) > 50
+    assert all(isinstance(value, (Decimal, int)) for value in values)
+
+
+def test_files_by_their_endings(tmp_path):
+    raw = tomllib.loads(job_file("gearbox"))
+    for name in ("a.rexs", "a.rexsj", "a.rexsz", "a.rexs.zip"):
+        gearfe.write_rexs(raw, tmp_path / name)
+        assert dict(gearfe.rexs_job(tmp_path / name).tables) == raw
+    assert zipfile.is_zipfile(tmp_path / "a.rexsz")
+    with pytest.raises(InputError, match=r"must end in \.rexs"):
+        write_rexs(raw, tmp_path / "a.xml")
+    assert not (tmp_path / "a.xml").exists()
+
+
+def test_what_is_no_gearbox_is_refused(tmp_path):
+    with pytest.raises(InputError, match="gears by name"):
+        write_rexs({"bodies": {}, "run": {}}, tmp_path / "a.rexs")
+    raw = tomllib.loads(job_file("gearbox"))
+    raw["gears"]["input_pinion"]["teeth"] = "many"
+    with pytest.raises(InputError, match=r"input_pinion\.teeth"):
+        write_rexs(raw, tmp_path / "a.rexs")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("table = 'nonsense'\nkept = []\n[keys]", "nonsense"),
+        ("table = 'gears'\nkept = []\n[keys]\nteeth = '21'", ""),
+        ("table = 'gears'\nkept = []\nkeys = 3", "must have a table keys"),
+        ("table = 'gears'\nkept = 'teeth'", "a list kept"),
+        ("= = =", "not valid TOML"),
+        ("[" * 10_000, "not valid TOML"),
+    ],
+)
+def test_own_attributes_of_strangers_are_checked(tmp_path, text, words):
+    parts, joints = spur_pair(custom_gearfe_keys=text)
+    path = saved(tmp_path, xml_of(parts, joints))
+    if words:
+        with pytest.raises(InputError, match=words):
+            rexs_job(path)
+    else:  # a key of a wrong type is a comment
+        assert "teeth" in rexs_job(path).left["gears", "pinion"][1]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("train = 3", "must be a table"),
+        ("[nonsense]\na = 1", "nonsense"),
+        ("[train]\nnonsense = 1", "nonsense"),
+        ("[gears.x]\nteeth = 20", "table of its own"),
+    ],
+)
+def test_own_tables_of_strangers_are_checked(tmp_path, text, words):
+    parts, joints = spur_pair()
+    parts = [(n, kind, name, {**a, "custom_gearfe_tables": text} if n == 1 else a) for n, kind, name, a in parts]
+    with pytest.raises(InputError, match=words):
+        rexs_job(saved(tmp_path, xml_of(parts, joints)))
+
+
+def test_the_command(tmp_path, capsys):
+    job = tmp_path / "box.toml"
+    job.write_text(ODD, encoding="utf-8")
+    assert main(["gear", str(job), "--out", str(tmp_path / "out"), "--export", "rexs", "--no-pictures"]) == 0
+    assert "gearbox.rexs" in capsys.readouterr().out
+    assert dict(rexs_job(tmp_path / "out" / "gearbox.rexs").tables) == tomllib.loads(ODD)
+    assert read_rexs(tmp_path / "out" / "gearbox.rexs").application.startswith("gearfe")
