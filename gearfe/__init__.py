@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .gears.gearmesh.load_map import LoadMap
     from .gears.gearmesh.sweep import sweep_loads, sweep_stiffness
     from .gears.geometry import Gear, GearPair
+    from .gears.rating.rate import Rating, rate
     from .multibody import constant
     from .output.exchange.rexs import RexsJob, read_rexs, rexs_job, write_rexs
     from .study.job import read_study, run_study
@@ -53,6 +54,7 @@ _PUBLIC: dict[str, str] = {
     "Material": "fem.plane",
     "ModalBody": "fem.reduction.modal_body",
     "PairModel": "gears.contact.laws",
+    "Rating": "gears.rating.rate",
     "RexsJob": "output.exchange.rexs",
     "RollerBearing": "drivetrain.bearings",
     "Search": "study.search",
@@ -68,6 +70,7 @@ _PUBLIC: dict[str, str] = {
     "check_positions": "gears.gearmesh.check",
     "constant": "multibody",
     "housing_from_job": "drivetrain.housing.build",
+    "rate": "gears.rating.rate",
     "read_rexs": "output.exchange.rexs",
     "read_study": "study.job",
     "rexs_job": "output.exchange.rexs",
@@ -100,6 +103,7 @@ __all__ = [
     "Material",
     "ModalBody",
     "PairModel",
+    "Rating",
     "RexsJob",
     "RollerBearing",
     "Search",
@@ -115,6 +119,7 @@ __all__ = [
     "compute_meshes",
     "constant",
     "housing_from_job",
+    "rate",
     "read_rexs",
     "read_study",
     "rexs_job",

@@ -20,6 +20,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "derived geometry of a gear pair, and a drawing of it in mesh",
         "gearfe gear pair.toml --angle-deg 5 --export dxf,step",
     ),
+    "rating": (
+        "load capacity by ISO 6336: safety factors of flanks and roots with every value and its formula",
+        "gearfe rating pair.toml --torque-Nm 200 --speed-rpm 1500",
+    ),
     "mesh": (
         "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp, or a CalculiX deck of its contact",
         "gearfe mesh pair.toml --teeth 3 --out gears.msh",

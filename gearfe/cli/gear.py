@@ -115,13 +115,15 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
 
     from ..base.files import output_folder, whole_set, write_json
     from ..gears.gearmesh.job import materials_of
-    from ..gears.geometry.derived import derived_geometry, iso_values
+    from ..gears.geometry.derived import derived_geometry
+    from ..gears.rating.stiffness import iso_values
 
     folder = output_folder(args.out)
     spans = mesh.driver.drawn.get("span_teeth"), mesh.driven.drawn.get("span_teeth")
     geometry = derived_geometry(pair, spans)
     moduli = [material.youngs_modulus for material in materials_of(mesh)]
     iso = iso_values(pair, moduli[0], moduli[1])
+    rated = _measures(args, mesh, pair)
     with whole_set(folder, ("gear_pair.png", *FILES)) as made:
         for name in exports:
             with stage(f"writing {name}"):
@@ -132,10 +134,10 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
 
             with stage("drawing"):
                 save(pair_picture(pair, math.radians(args.angle_deg), _notes(geometry)), made / "gear_pair.png")
-        write_json(made / "gear_pair.json", {**geometry, "iso_6336": iso, "warnings": list(pair.warnings)})
+        write_json(made / "gear_pair.json", {**geometry, **rated, "iso_6336": iso, "warnings": list(pair.warnings)})
         names = sorted(path.name for path in made.iterdir())
     _show(geometry)
-    _show({"iso_6336": iso})
+    _show({"iso_6336": iso, **rated})
     if exports and pair.pinion.helical:
         print("csv and dxf are of the transverse section in the middle of the face width, step and brep of the helix")
     if exports and mesh.deviates and any(_along_width(gear) for gear in mesh.gears):
@@ -144,6 +146,22 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
         print("flanks with the deviations of [microgeometry]: dxf, step and brep all teeth, csv tooth 0")
     print_results((), folder, names, {}, pair.warnings)
     return 0
+
+
+def _measures(args: argparse.Namespace, mesh: NamedMesh, pair: GearPair) -> dict[str, Any]:
+    """Tolerances, sizes over balls and spans with their limits, and backlash, of a file with [rating]."""
+    from ..base.config import read_toml
+    from ..base.tables.jobs import job_tables, whole_gearbox
+
+    raw = read_toml(args.job)
+    if "rating" not in raw:
+        return {}
+    from ..gears.rating.report import measures
+
+    table, box = job_tables(raw, args.job, ("rating",))["rating"], whole_gearbox(raw, args.job)
+    names = mesh.driver.name, mesh.driven.name
+    keys = {name: table.of_gear(name, box.gears) for name in names}
+    return {"measures": measures(pair, names, keys, table.of_mesh(mesh.name, box.meshes), table.edition)}
 
 
 def _along_width(gear: NamedGear) -> bool:

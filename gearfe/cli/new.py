@@ -14,6 +14,7 @@ from ..base.tables.examples import JOBS, RUN_BY, job_file
 RUNS = {
     "bodies": "mechanism",
     "study": "study",
+    "rating": "rating",
     "microgeometry": "loadmap",
     "train": "vibration",
     "housing": "housing",

@@ -10,10 +10,10 @@ import numpy as np
 
 from ..base.tables.gearbox import NamedMesh
 from ..base.typing import Array
-from ..gears.geometry import pitch_errors
 from ..gears.geometry.deviation_job import FlankOf, flank_deviations
 from ..gears.geometry.modifications import ends_of
 from ..gears.geometry.pair import GearPair
+from ..gears.geometry.tolerances import tolerances
 from .style import BLUE, GREY, ORANGE, headed, new_figure, some_of, tidy
 
 #: Lines of a panel; of more profiles, so many are drawn.
@@ -56,7 +56,7 @@ def _chart(mesh: NamedMesh, pair: GearPair, g: int, side: str, folder: Path) -> 
     own = flank_deviations(one)
     index, band = 1e6 * np.array(own.turn) * gear.reference_radius, None
     if mesh.tolerance_class is not None:
-        allowed = pitch_errors.tolerances(gear, mesh.tolerance_class)
+        allowed = tolerances(gear, mesh.tolerance_class)
         band = 1e6 * (0.5 * allowed.form + allowed.slope * ((roll - ends[0]) / (ends[1] - ends[0])))
     return _Chart(
         title=f"{mesh.gears[g].name}, {side} flanks{', driving' if side == mesh.flank else ''}",

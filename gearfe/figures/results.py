@@ -115,6 +115,7 @@ PICTURES = {
     "GearPair": "gears:pair_picture",
     "LoadMap": "load_map:load_map_picture",
     "ModalBody": "results:body_plot",
+    "Rating": "rating:rating_plot",
     "RunUp": "runup:forces_picture",
     "Spectrum": "results:spectrum_plot",
     "StiffnessCurve": "results:curve_plot",

@@ -21,7 +21,7 @@ from ..base.tables.named import NAMED
 from ..base.tables.study import DistributionTable
 from ..base.typing import Array
 from ..gears.geometry.pair import gear_of
-from ..gears.geometry.pitch_errors import helix_slope_tolerance, tolerances
+from ..gears.geometry.tolerances import helix_tolerances, tolerances
 
 _KEYS = {field.name for field in dataclasses.fields(DistributionTable)}
 WHERE = "study.parameters"
@@ -184,7 +184,8 @@ def _of_class(found: DistributionTable, class_: int, name: str, base: Mapping[st
         raise InputError(f"{WHERE}.{name}.iso_class", class_, "has no tolerance for this key", cure)
     gear = gear_of(named)
     of_helix = parts[-1] == "helix_slope_um"
-    allowed = 1e6 * (helix_slope_tolerance(gear, class_) if of_helix else tolerances(gear, class_).slope)
+    slope = helix_tolerances(gear, class_).helix_slope if of_helix else tolerances(gear, class_).slope
+    allowed = 1e6 * slope
     mean = found.mean or 0.0
     return DistributionTable(mean=mean, deviation=allowed / 3.0, low=mean - allowed, high=mean + allowed)
 

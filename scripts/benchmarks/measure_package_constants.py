@@ -124,9 +124,9 @@ def housings() -> Answers:
 def gears() -> Answers:
     """Rigid touch of a relieved pair and one with an undercut, ISO's stiffness, area and inertia."""
     from gearfe.drivetrain.train.elements import outline_moments
-    from gearfe.gears.geometry.derived import mesh_stiffness
     from gearfe.gears.geometry.gear_data import TipRelief
     from gearfe.gears.geometry.pair import Gear, GearPair
+    from gearfe.gears.rating.stiffness import mesh_stiffness
 
     form: dict[str, Any] = {"module": 2.5e-3, "pressure_angle": np.radians(20.0), "face_width": 10e-3}
     form |= {"tip_round": 1e-4, "tip_relief": TipRelief(2e-5, 2e-3)}

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
-from gearfe.gears.geometry import derived
 from gearfe.gears.geometry.curves import inv
 from gearfe.gears.geometry.pair import Gear, GearPair, TipRelief
+from gearfe.gears.rating import dynamics, stiffness
 
 
 def gear(teeth, module=2.5e-3, degrees=25.0, **form):
@@ -176,11 +176,11 @@ def test_gears_are_values():
 
 def test_iso_6336_stiffness_of_the_shipped_pair():
     """By hand: q' = 0.04723 + 0.15551/20 + 0.25791/30, C_M 0.8, C_B 0.975 * 1.1, E 200/206."""
-    assert derived.flexibility(SHIPPED.pinion, SHIPPED.wheel) == pytest.approx(0.0636025)
-    assert derived.rack_factor(SHIPPED.pinion) == pytest.approx(1.0725)
-    assert derived.single_stiffness(SHIPPED, 200e9, 200e9) / 1e9 == pytest.approx(13.1, abs=0.05)
-    assert derived.mesh_stiffness(SHIPPED, 200e9, 200e9) / 1e9 == pytest.approx(17.4, abs=0.05)
-    assert derived.pair_modulus(210e9, 70e9) == pytest.approx(105e9)
+    assert stiffness.flexibility(SHIPPED.pinion, SHIPPED.wheel) == pytest.approx(0.0636025)
+    assert stiffness.rack_factor(SHIPPED.pinion) == pytest.approx(1.0725)
+    assert stiffness.single_stiffness(SHIPPED, 200e9, 200e9) / 1e9 == pytest.approx(13.1, abs=0.05)
+    assert stiffness.mesh_stiffness(SHIPPED, 200e9, 200e9) / 1e9 == pytest.approx(17.4, abs=0.05)
+    assert stiffness.pair_modulus(210e9, 70e9) == pytest.approx(105e9)
 
 
 def test_iso_6336_dynamic_factor():
@@ -193,9 +193,9 @@ def test_iso_6336_dynamic_factor():
     sub, top = 0.32 * p + 0.34 * f + 0.23 * k, 1 + 0.32 * p + 0.34 * f + 0.90 * k
     end = 0.47 * p + 0.47 * f + 0.75
     by_hand = [1 + 0.5 * sub, 1 + 0.85 * sub, top, top, 0.5 * (top + end), end, end]
-    found = derived.dynamic_factor(SHIPPED, speed * (1 - 1e-12), **given, relief=5e-6, deviations=(2e-6, 1.5e-6))
+    found = dynamics.dynamic_factor(SHIPPED, speed * (1 - 1e-12), **given, relief=5e-6, deviations=(2e-6, 1.5e-6))
     assert found == pytest.approx(by_hand, rel=1e-9)
-    light = derived.dynamic_factor(SHIPPED, speed[:2], **{**given, "force": 500.0 / math.cos(math.radians(25))})
+    light = dynamics.dynamic_factor(SHIPPED, speed[:2], **{**given, "force": 500.0 / math.cos(math.radians(25))})
     assert light == pytest.approx([1 + 0.5 * 0.23, 1.9], rel=1e-9)  # N_S = 0.5 + 0.35 sqrt(0.5) = 0.75
 
 

@@ -20,8 +20,9 @@ from gearfe.cli.main import main
 from gearfe.gears.contact.laws import PairModel
 from gearfe.gears.contact.whole_gears.pair import whole_pair
 from gearfe.gears.gearmesh.sweep import elastic_pair
-from gearfe.gears.geometry.derived import STEEL, derived_geometry, flexibility, mesh_stiffness, single_stiffness
+from gearfe.gears.geometry.derived import derived_geometry
 from gearfe.gears.geometry.mesh_geometry import MeshGeometry
+from gearfe.gears.rating.stiffness import STEEL, flexibility, mesh_stiffness, single_stiffness
 from tests.makers.gears import gear
 
 DEGREE = math.pi / 180.0

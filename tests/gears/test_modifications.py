@@ -13,6 +13,7 @@ from gearfe.gears.geometry import pitch_errors
 from gearfe.gears.geometry.deviation import Deviation
 from gearfe.gears.geometry.modifications import FlankModification, Relief, Waviness, tooth_deviations
 from gearfe.gears.geometry.pair import Gear
+from gearfe.gears.geometry.tolerances import rounded, tolerances
 from tests.makers.gears import pair as gear_pair
 
 PAIR = gear_pair(tip_round=1e-4)
@@ -96,7 +97,7 @@ def test_modifications_that_are_refused(made, told) -> None:
 
 def test_tolerances_of_the_standard() -> None:
     """d = 50 mm, m = 2.5 mm in class 5 by hand; two classes double."""
-    five, seven = (pitch_errors.tolerances(PINION, c) for c in (5, 7))
+    five, seven = (tolerances(PINION, c) for c in (5, 7))
     assert 1e6 * five.single == pytest.approx(0.05 + 1.0 + 5)
     assert 1e6 * five.cumulative == pytest.approx(0.1 + 0.55 * 50**0.5 + 1.75 + 12)
     assert 1e6 * five.slope == pytest.approx(5.05)
@@ -110,7 +111,7 @@ def test_tolerances_against_published_values() -> None:
     and 29 um, profile 12 um.
     """
     gear = Gear(40, 3e-3, math.radians(20), 30e-3, 20e-3)
-    made = pitch_errors.tolerances(gear, 6)
+    made = tolerances(gear, 6)
     assert 1e6 * made.single == pytest.approx(8.94, abs=0.005)
     assert 1e6 * made.cumulative == pytest.approx(28.80, abs=0.005)
     told = made.rounded_um
@@ -122,16 +123,16 @@ def test_tolerances_against_published_values() -> None:
 )
 def test_rounding_of_tolerances(value, told) -> None:
     """5.2.3: to 1 um above 10, to 0.5 um from 5 on, to 0.1 um below."""
-    assert pitch_errors.rounded(value) == told
+    assert rounded(value) == told
 
 
 def test_gears_that_the_standard_does_not_have() -> None:
     with pytest.raises(InputError, match=r"module_mm = 0\.4.*0\.5 to 70"):
-        pitch_errors.tolerances(Gear(40, 0.4e-3, math.radians(20), 5e-3, 4e-3), 6)
+        tolerances(Gear(40, 0.4e-3, math.radians(20), 5e-3, 4e-3), 6)
 
 
 def test_drawn_gears_are_as_bad_as_the_class_and_come_again() -> None:
-    allowed = pitch_errors.tolerances(PINION, 7)
+    allowed = tolerances(PINION, 7)
     reached = []
     for seed in range(12):
         index = pitch_errors.sampled(PINION, 7, seed)

@@ -13,7 +13,7 @@ from gearfe.base.tables.pair import PairTable, StiffnessTable
 from gearfe.gears.gearmesh.job import StiffnessJob, stiffness_job
 from gearfe.gears.gearmesh.positions import twists_for_torque
 from gearfe.gears.gearmesh.sweep import sweep_stiffness
-from gearfe.gears.geometry.derived import iso_values
+from gearfe.gears.rating.stiffness import iso_values
 from tests.makers.solving import given_positions
 
 #: A pair in which every feature is on, so that each change is a small step from it.

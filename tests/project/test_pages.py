@@ -36,7 +36,8 @@ RUN = (
     "howto.md",
     "loadmap.md",
 )
-RUN += ("mesh_law.md", "mechanisms.md", "microgeometry.md", "rexs.md", "runup.md", "shafts.md", "start.md")
+RUN += ("mesh_law.md", "mechanisms.md", "microgeometry.md", "rating.md", "rexs.md", "runup.md", "shafts.md")
+RUN += ("start.md",)
 #: What pages and the jobs that they name do in a minute: fewer cases, rounds and positions here.
 SHORTER = {
     "cases = 128": "cases = 8",

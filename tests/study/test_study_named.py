@@ -9,7 +9,7 @@ import pytest
 from gearfe.base.errors import InputError
 from gearfe.gears.gearmesh.job import read_stiffness_job
 from gearfe.gears.gearmesh.sweep import sweep_stiffness
-from gearfe.gears.geometry.pitch_errors import tolerances
+from gearfe.gears.geometry.tolerances import tolerances
 from gearfe.study.job import read_study, run_study
 from tests.makers.gearboxes import text
 

@@ -186,6 +186,18 @@ MECHANISM: dict[str, Any] = {
 
 LOADMAP: dict[str, Any] = {"torques_Nm": [20.0, 50.0, 100.0, 200.0], "root_stress": True}
 
+RATING: dict[str, Any] = {
+    "torque_Nm": 100.0,
+    "speed_rpm": 1500.0,
+    "life_h": 20_000.0,
+    "application_factor": 1.25,
+    "material": "Eh",
+    "grade": "MQ",
+    "hardness": 720.0,
+    "quality": 6,
+    "gears": {"wheel": {"quality": 7}},
+}
+
 RUNUP: dict[str, Any] = {"speed_start_rad_per_s": 300.0, "speed_stop_rad_per_s": 1200.0, "speeds": 100}
 
 #: Kind, which is the command that runs it except for those of `RUN_BY`
@@ -195,6 +207,11 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
     "loadmap": (
         "a pair with its reliefs over angle and torque: transmission error, load share, root stress",
         {"pair": PAIR, "loadmap": LOADMAP, "microgeometry": RELIEFS},
+        "",
+    ),
+    "rating": (
+        "load capacity of a gear pair by ISO 6336: safety factors of flanks and roots",
+        {"pair": PAIR | {"face_width_mm": 25.0}, "rating": RATING},
         "",
     ),
     "study": (

@@ -29,6 +29,7 @@ TABLES: dict[str, str] = {
     "stiffness": "gearfe.base.tables.pair:StiffnessTable",
     "loadmap": "gearfe.base.tables.loadmap:LoadMapTable",
     "microgeometry": "gearfe.base.tables.microgeometry:MicrogeometryTable",
+    "rating": "gearfe.base.tables.rating:RatingTable",
     "housing": "gearfe.base.tables.housing:HousingTable",
     "train": "gearfe.base.tables.train:TrainTable",
     "modes": "gearfe.base.tables.modes:ModesTable",
@@ -196,10 +197,24 @@ def meshes_of(
     box = gearbox_of(raw, path, variant)
     if name is None:
         return list(box.meshes.values())
-    if name not in box.meshes and "pair" in raw and "train" in raw:
-        more: Gearbox = train_tables(raw, path, variant or "")["gearbox"]
-        box = Gearbox({**more.gears, **box.gears}, {**more.meshes, **box.meshes})
+    if name not in box.meshes:
+        box = whole_gearbox(raw, path, variant)
     return [box.mesh(name, field)]
+
+
+def whole_gearbox(raw: dict[str, Any], path: str | Path, variant: str | None = None) -> Gearbox:
+    """Return `gearbox_of`, with [pair] and [train] the gears and meshes of both.
+
+    Raises
+    ------
+    InputError
+        For mistakes in the tables.
+    """
+    box = gearbox_of(raw, path, variant)
+    if not ("pair" in raw and "train" in raw):
+        return box
+    more: Gearbox = train_tables(raw, path, variant or "")["gearbox"]
+    return Gearbox({**more.gears, **box.gears}, {**more.meshes, **box.meshes})
 
 
 def only_mesh(raw: dict[str, Any], path: str | Path, name: str | None = None, field: str = "--mesh") -> NamedMesh:

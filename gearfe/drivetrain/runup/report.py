@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...base.typing import Array
-from ...gears.geometry.derived import dynamic_factor
+from ...gears.rating.dynamics import dynamic_factor
 from ..modes.report import mode_entries
 from ..modes.report import tables as mode_tables
 from ..train.response import XYZ

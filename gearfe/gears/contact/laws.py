@@ -39,11 +39,11 @@ from ...base.errors import InputError
 from ...base.tables.pair import GROUP, LAWS, check_flank_coarsen, check_law, known_laws
 from ...base.typing import Array, BoolArray
 from ...fem.plane import Material, Plane
-from ..geometry.derived import mesh_stiffness
 from ..geometry.face import NOMINAL, ToothDeviations
 from ..geometry.mesh_geometry import ContactModel
 from ..geometry.pair import GearPair
 from ..geometry.validity import MOST_YIELD
+from ..rating.stiffness import mesh_stiffness
 
 Sides = Literal["both", "pinion", "wheel", "tip"]
 

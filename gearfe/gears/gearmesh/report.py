@@ -18,10 +18,12 @@ from ...base.tables.pair import DEFAULT_LAW
 from ...base.typing import Array
 from ..contact.laws import COARSENING
 from ..geometry import pitch_errors
-from ..geometry.derived import derived_geometry, iso_values
+from ..geometry.derived import derived_geometry
 from ..geometry.deviation_job import GEARS
 from ..geometry.modifications import CHECKED, ends_of
+from ..geometry.tolerances import tolerances
 from ..geometry.validity import overlap_warnings
+from ..rating.stiffness import iso_values
 from .curve import BACK, EDGES, StiffnessCurve
 from .job import StiffnessJob
 from .load_map import LoadMap
@@ -153,7 +155,7 @@ def _deviations(job: StiffnessJob) -> dict[str, Any]:
             "cumulative_pitch_deviation_um": 1e6 * float(np.ptp(index)),
         }
         if class_ is not None:
-            allowed[name] = pitch_errors.tolerances(gear, class_).rounded_um
+            allowed[name] = tolerances(gear, class_).rounded_um
     return {"pitch": made, "tolerances_um": allowed or None}
 
 

@@ -17,9 +17,10 @@ from ...base.cache import versions
 from ...base.shown import percent
 from ...base.typing import Array
 from ...output.exchange.vtkhdf import write_vtkhdf
-from ..geometry.derived import derived_geometry, iso_values
+from ..geometry.derived import derived_geometry
 from ..geometry.deviation_job import GEARS
 from ..geometry.gear_data import rounding
+from ..rating.stiffness import iso_values
 from ..width import WideMesh, WidthSweep
 from ..width.sweep import mean_line_load
 from .job import StiffnessJob

@@ -1,4 +1,4 @@
-"""Gears and gear pairs: exact profiles, checks, geometry of the mesh (ISO 21771), ISO 6336 stiffness. NumPy only."""
+"""Gears and gear pairs: exact profiles, checks, geometry of the mesh (ISO 21771), ISO 1328-1 tolerances. NumPy only."""
 
 from .pair import Gear, GearPair, PathPoint, TipRelief
 

@@ -19,22 +19,33 @@ from .gear_data import GearData
 
 #: Ball diameters are rounded to this share of a module.
 STEP = 0.05
+#: Steps of the iteration for the ball of a helical gear, each of which gains a digit or more.
+_STEPS = 60
 
 
-def ball_diameter(gear: GearData) -> float:
-    """Diameter (m) of balls that touch the flanks near the circle d + 2 x m_n, rounded to a twentieth of a module.
+def touching_ball(gear: GearData) -> float:
+    """Diameter (m) of the balls that touch the flanks at the circle d + 2 x m_n.
 
-    The centre lies on the middle of the space, so alpha_K = pi/z - psi - inv(alpha_t) + tan(alpha_v).
+    The ball touches where the roll length is that of its centre less D_M/2 cos(beta_b), as the normal is inclined by
+    the base helix angle: alpha_K = pi/z - psi - inv(alpha_t) + tan(alpha_v) - D_M/d_b sin(beta_b) tan(beta_b).
     """
     radius = gear.reference_radius + gear.sign * gear.profile_shift * gear.module
     slope = abs(gear.roll_length(radius)) / gear.base_radius  # tan(alpha_v)
-    centre = math.pi / gear.teeth - gear.base_angle + slope
-    size = 2.0 * gear.signed_base_radius * (math.tan(centre) - slope) * math.cos(gear.base_helix_angle)
+    straight = math.pi / gear.teeth - gear.base_angle + slope
+    helix, base, size = gear.base_helix_angle, 2.0 * gear.signed_base_radius, 0.0
+    for _ in range(_STEPS if gear.helical else 1):
+        centre = straight - size / base * math.sin(helix) * math.tan(helix)
+        size = base * (math.tan(centre) - slope) / math.cos(helix)
+    return size
+
+
+def ball_diameter(gear: GearData) -> float:
+    """Diameter (m) of balls that touch the flanks near the circle d + 2 x m_n, rounded to a twentieth of a module."""
     step = STEP * gear.module
-    return max(1, round(size / step)) * step
+    return max(1, round(touching_ball(gear) / step)) * step
 
 
-def over_balls(gear: GearData, diameter: float) -> float:
+def over_balls(gear: GearData, diameter: float, thinning: float | None = None) -> float:
     """Return the dimension over balls M_dK (m), negative for an internal gear; NaN where the balls touch no involute.
 
     Parameters
@@ -43,10 +54,14 @@ def over_balls(gear: GearData, diameter: float) -> float:
         The gear.
     diameter : float
         Diameter of the balls (m).
+    thinning : float, optional
+        Thinning of its teeth at the reference circle, in the normal section (m); None: that of the gear.
     """
     z = gear.teeth
     share = diameter / (z * gear.module * math.cos(gear.pressure_angle))
-    value = inv(gear.transverse_pressure_angle) + share - (math.pi / z - gear.sign * gear.half_thickness_angle)
+    thinner = 0.0 if thinning is None else (thinning - gear.tooth_thinning) / (z * gear.module)
+    half = gear.sign * gear.half_thickness_angle - thinner
+    value = inv(gear.transverse_pressure_angle) + share - (math.pi / z - half)
     if value <= 0.0:
         return math.nan
     centres = 2.0 * gear.signed_base_radius / math.cos(inverse_inv(value))

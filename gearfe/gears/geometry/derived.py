@@ -1,26 +1,5 @@
-r"""What follows from the data of a gear pair: geometry in everyday units with the unit in every name (ISO 21771 names),
-plain geometry for pictures in millimetres, and what ISO 6336-1:2006, method B, says of stiffness and dynamic factor:
-sanity checks for the level of what is computed.
-
-Clause 9: the minimum flexibility q' of a tooth pair is a series in the virtual tooth numbers and profile shifts,
-valid for x1 >= x2 and -0.5 <= x1 + x2 <= 2 and for loads of at least 100 N per mm of face width; the factors turn the
-theoretical single stiffness c'_th = 1/q' into that of a solid steel gear with the basic rack at hand.
-
-Clause 6.5: with :math:`N = n_1/n_{E1}`, :math:`n_{E1}` the speed at which teeth mesh as often as
-:math:`\sqrt{c_\gamma/m_{red}}` swings,
-
-.. math::
-    B_p = \frac{c' f_{pb,eff}}{K_A F_t/b},\quad B_f = \frac{c' f_{f\alpha,eff}}{K_A F_t/b},\quad
-    B_k = \Big|1 - \frac{c' C_a}{K_A F_t/b}\Big|
-
-.. math::
-    K_v = \begin{cases}
-    1 + N\,(C_{v1}B_p + C_{v2}B_f + C_{v3}B_k) & N \le N_S\\
-    1 + C_{v1}B_p + C_{v2}B_f + C_{v4}B_k & N_S < N \le 1.15\\
-    C_{v5}B_p + C_{v6}B_f + C_{v7} & N \ge 1.5
-    \end{cases}
-
-and straight between 1.15 and 1.5; N_S is 0.85, less below 100 N/mm.
+"""What follows from the data of a gear pair: geometry in everyday units with the unit in every name (ISO 21771 names),
+and plain geometry for pictures in millimetres.
 """
 
 from __future__ import annotations
@@ -29,7 +8,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...base.typing import Array
 from .balls import ball_diameter, over_balls
@@ -39,13 +17,8 @@ from .ring import CLEAR, radial_clearance
 from .spur_gear import Gear
 from .validity import tip_clearance
 
-#: Young's modulus of steel that the standard refers to (Pa).
-STEEL = 206e9
-#: Correction factor C_M between measured and theoretical stiffness.
-CORRECTION = 0.8
 #: Names of the specific sliding of pinion and wheel at a point of the path.
 SLIDING = ("pinion_specific_sliding", "wheel_specific_sliding")
-_UNIT = 1e9  # N/(mm um) in N/m^2
 
 
 def derived_geometry(pair: GearPair, spans: tuple[int | None, int | None] = (None, None)) -> dict[str, Any]:
@@ -83,8 +56,8 @@ def derived_geometry(pair: GearPair, spans: tuple[int | None, int | None] = (Non
             }
             for name, point in pair.path.items()
         },
-        "pinion": _of_gear(pair.pinion, pair.pinion_working_radius, spans[0]),
-        "wheel": _of_gear(pair.wheel, pair.wheel_working_radius, spans[1]),
+        "pinion": _of_gear(pair.pinion, pair.pinion_working_radius, spans[0], pair.path["A"].pinion_roll),
+        "wheel": _of_gear(pair.wheel, pair.wheel_working_radius, spans[1], pair.path["E"].wheel_roll),
     }
 
 
@@ -149,7 +122,8 @@ def _of_ring(gear: Gear) -> dict[str, Any]:
     return {"rim_diameter_mm": -1e3 * (gear.rim_diameter or 0.0), "rim": gear.rim, **root}
 
 
-def _of_gear(gear: Gear, working_radius: float, span: int | None) -> dict[str, Any]:
+def _of_gear(gear: Gear, working_radius: float, span: int | None, active_roll: float) -> dict[str, Any]:
+    """Geometry of a gear whose flank is active from a roll length (m) on."""
     spanned, sign, balls = gear.span_teeth if span is None else span, gear.sign, ball_diameter(gear)
     held = _of_ring(gear) if gear.internal else {"bore_diameter_mm": 1e3 * gear.bore_diameter}
     return {
@@ -161,6 +135,8 @@ def _of_gear(gear: Gear, working_radius: float, span: int | None) -> dict[str, A
         "tip_diameter_mm": sign * 2e3 * gear.tip_radius,
         "root_diameter_mm": sign * 2e3 * gear.root_radius,
         "form_diameter_mm": sign * 2e3 * gear.form_radius,
+        "active_tip_diameter_mm": sign * 2e3 * active_tip_radius(gear),
+        "active_root_diameter_mm": sign * 2e3 * math.hypot(gear.base_radius, active_roll),
         **held,
         "tip_thickness_mm": 1e3 * gear.tip_thickness,
         "profile_shift": gear.profile_shift,
@@ -171,6 +147,11 @@ def _of_gear(gear: Gear, working_radius: float, span: int | None) -> dict[str, A
         **(_helix_of_gear(gear, gear.span_size(spanned)) if gear.helical else {}),
         "undercut": gear.undercut,
     }
+
+
+def active_tip_radius(gear: Gear) -> float:
+    """Radius at which the flank ends (m): at the tip circle, or where its tip round begins."""
+    return math.hypot(gear.base_radius, min(gear.profile.round_roll, gear.profile.tip_roll))
 
 
 def gear_outline(gear: Gear, angle: float, centre: tuple[float, float], *, per_segment: int = 24) -> Array:
@@ -225,113 +206,3 @@ def single_pair_stretches(pair: GearPair, start: float, end: float) -> list[tupl
     first, last = math.floor((start - high) / cycle), math.ceil((end - low) / cycle)
     found = [(max(start, low + n * cycle), min(end, high + n * cycle)) for n in range(first, last + 1)]
     return [(a, b) for a, b in found if b > a]
-
-
-# ---- ISO 6336 -------------------------------------------------------------------------------------------------------
-
-
-def flexibility(pinion: Gear, wheel: Gear) -> float:
-    """q', minimum flexibility of a pair of teeth (mm um/N), of the virtual teeth z_n; an internal gear is a rack."""
-    z1, z2 = pinion.virtual_teeth, math.inf if wheel.internal else wheel.virtual_teeth
-    x1, x2 = pinion.profile_shift, wheel.profile_shift
-    return (
-        0.04723
-        + 0.15551 / z1
-        + 0.25791 / z2
-        - 0.00635 * x1
-        - 0.11654 * x1 / z1
-        - 0.00193 * x2
-        - 0.24188 * x2 / z2
-        + 0.00529 * x1**2
-        + 0.00182 * x2**2
-    )
-
-
-def rack_factor(gear: Gear) -> float:
-    """C_B, basic rack factor (-): [1 + 0.5 (1.2 - h_fP/m)] [1 - 0.02 (20 deg - alpha)]."""
-    return (1.0 + 0.5 * (1.2 - gear.dedendum)) * (1.0 - 0.02 * (20.0 - math.degrees(gear.pressure_angle)))
-
-
-def pair_modulus(pinion: float, wheel: float) -> float:
-    """Young's modulus E = 2 E1 E2/(E1 + E2) of a pair of two materials (Pa)."""
-    return 2.0 * pinion * wheel / (pinion + wheel)
-
-
-def single_stiffness(pair: MeshGeometry, pinion_modulus: float, wheel_modulus: float) -> float:
-    """c', maximum stiffness of one tooth pair per face width (N/m^2; 1e9 N/m^2 = 1 N/(mm um)).
-
-    c' = c'_th C_M C_R C_B cos(beta) E/E_steel with C_R = 1 (solid discs) and the mean C_B of both racks.
-
-    Parameters
-    ----------
-    pinion_modulus, wheel_modulus
-        Young's moduli (Pa).
-    """
-    rack = 0.5 * (rack_factor(pair.pinion) + rack_factor(pair.wheel))
-    material = pair_modulus(pinion_modulus, wheel_modulus) / STEEL
-    return (
-        _UNIT / flexibility(pair.pinion, pair.wheel) * CORRECTION * rack * material * math.cos(pair.pinion.helix_angle)
-    )
-
-
-def mesh_stiffness(pair: MeshGeometry, pinion_modulus: float, wheel_modulus: float) -> float:
-    """c_gamma = c' (0.75 eps_alpha + 0.25), mean stiffness of the mesh per face width (N/m^2)."""
-    return single_stiffness(pair, pinion_modulus, wheel_modulus) * (0.75 * pair.contact_ratio + 0.25)
-
-
-def dynamic_factor(
-    pair: MeshGeometry, speeds: ArrayLike, *, stiffness: float, mass: float, force: float, relief: float = 0.0,
-    deviations: tuple[float, float] = (0.0, 0.0),
-) -> Array:  # fmt: skip
-    """Compute K_v of a spur pair at speeds of its pinion.
-
-    Parameters
-    ----------
-    pair : MeshGeometry
-        The gears.
-    speeds : array_like, shape (n,)
-        rad/s.
-    stiffness
-        Mean stiffness of the mesh, c_gamma b (N/m).
-    mass
-        Reduced mass of pinion and wheel, and of what turns with them, on the line of action (kg).
-    force
-        Along the line of action, K_A included (N).
-    relief, deviations
-        C_a; effective deviations of pitch and profile, f_pb,eff and f_falpha,eff (m).
-    """
-    pitch, profile = deviations
-    N = np.abs(np.asarray(speeds, dtype=float)) * pair.pinion.teeth / math.sqrt(stiffness / mass)
-    ratio, width = pair.contact_ratio, min(pair.pinion.face_width, pair.wheel.face_width)
-    load = force * math.cos(pair.pinion.transverse_pressure_angle) / width
-    single = stiffness / width / (0.75 * ratio + 0.25)
-    p, f, k = single * pitch / load, single * profile / load, abs(1.0 - single * relief / load)
-    if ratio <= 2.0:
-        of_pitch, of_profile, below, at, beyond = 0.32, 0.34, 0.23, 0.90, 0.47
-    else:
-        of_pitch, of_profile, below = 0.32, 0.57 / (ratio - 0.3), 0.096 / (ratio - 1.56)
-        at, beyond = (0.57 - 0.05 * ratio) / (ratio - 1.44), 0.12 / (ratio - 1.74)
-    still = 0.125 * math.sin(math.pi * (min(max(ratio, 1.5), 2.5) - 2.0)) + 0.875
-    whole = of_pitch * p + of_profile * f
-    resonant, fast = 1.0 + whole + at * k, 0.47 * p + beyond * f + still
-    first = 0.85 if load >= 100e3 else 0.5 + 0.35 * math.sqrt(load / 100e3)
-    later = fast + (resonant - fast) * np.clip((1.5 - N) / 0.35, 0.0, 1.0)
-    return np.where(first >= N, 1.0 + N * (whole + below * k), later)
-
-
-def iso_values(pair: GearPair, pinion_modulus: float, wheel_modulus: float) -> dict[str, float]:
-    """ISO 6336-1 method B for the pair: c', c_gamma per face width, and c_gamma times the common face width.
-
-    Parameters
-    ----------
-    pinion_modulus, wheel_modulus
-        Young's moduli (Pa).
-    """
-    width = pair.common_width
-    single = single_stiffness(pair, pinion_modulus, wheel_modulus)
-    mean = mesh_stiffness(pair, pinion_modulus, wheel_modulus)
-    return {
-        "c_prime_N_per_mm_um": single * 1e-9,
-        "c_gamma_N_per_mm_um": mean * 1e-9,
-        "c_gamma_times_width_N_per_m": mean * width,
-    }

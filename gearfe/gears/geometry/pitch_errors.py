@@ -22,25 +22,13 @@ to the tangent, both outwards. The vector along these normals, over :math:`\cos\
 both sides of a place on the circle differ in phase by twice the pressure angle, besides the opposite sign, and the
 backlash varies with the distance of the centres. One value a tooth leaves out that the vector turns while it meets.
 
-Tolerances in um (ISO 1328-1:2013, 5.3, formulae 5 to 9), for the diameter d and the module m in mm and class A:
-
-.. math::
-    f_{pT} = (0.001\,d + 0.4\,m + 5)\,\sqrt2^{\,A-5}, \quad
-    F_{pT} = (0.002\,d + 0.55\sqrt{d} + 0.7\,m + 12)\,\sqrt2^{\,A-5}, \\
-    f_{H\alpha T} = (0.001\,d + 0.4\,m + 4)\,\sqrt2^{\,A-5}, \quad
-    f_{f\alpha T} = (0.55\,m + 5)\,\sqrt2^{\,A-5}, \quad
-    F_{\alpha T} = \sqrt{f_{H\alpha T}^2 + f_{f\alpha T}^2} .
-
-and of the helix, for the face width b in mm,
-:math:`f_{H\beta T} = (0.05\sqrt d + 0.35\sqrt b + 4)\,\sqrt2^{\,A-5}`. They hold for 5 to 1000 teeth, d from 5 to
-15,000 mm, m from 0.5 to 70 mm, b from 4 to 1200 mm, and are not extrapolated (5.2.1).
+Tolerances by class are in `gears.geometry.tolerances`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -49,90 +37,12 @@ from numpy.typing import ArrayLike
 from ...base.errors import InputError
 from ...base.typing import Array
 from .spur_gear import Gear
+from .tolerances import tolerances
 
 Value = TypeVar("Value")
 
-#: Classes of the standard.
-CLASSES = (1, 11)
-#: Teeth, diameters (mm) and modules (mm) that it is for.
-SCOPE = ((5, 1000), (5.0, 15_000.0), (0.5, 70.0))
-#: Face widths (mm) that its tolerances of the helix are for.
-WIDTHS = (4.0, 1200.0)
 #: Sum of single pitch deviations (m) that is rounding of a list in um.
 CLOSED = 1e-6
-
-
-@dataclass(frozen=True)
-class PitchTolerances:
-    """Tolerances of a class, not rounded (m): single and cumulative pitch; slope, form and whole of the profile."""
-
-    single: float
-    cumulative: float
-    slope: float
-    form: float
-
-    @property
-    def total(self) -> float:
-        """Of the whole profile (m)."""
-        return math.hypot(self.slope, self.form)
-
-    @property
-    def rounded_um(self) -> dict[str, float]:
-        """All of them by the standard's names, rounded by its rules (5.2.3), in um."""
-        named = {
-            "f_pT": self.single,
-            "F_pT": self.cumulative,
-            "f_HalphaT": self.slope,
-            "f_falphaT": self.form,
-            "F_alphaT": self.total,
-        }
-        return {name: rounded(1e6 * value) for name, value in named.items()}
-
-
-def rounded(value: float) -> float:
-    """A tolerance (um) rounded by the rules of the standard (5.2.3): to 1 above 10, to 0.5 from 5 on, to 0.1 below."""
-    step = 1.0 if value > 10 else 0.5 if value >= 5 else 0.1
-    return round(math.floor(value / step + 0.5 + 1e-9) * step, 1)
-
-
-def tolerances(gear: Gear, class_: int) -> PitchTolerances:
-    """Tolerances of a gear in a class of ISO 1328-1.
-
-    Raises
-    ------
-    InputError
-        For a class or a gear that the standard does not have.
-    """
-    if not CLASSES[0] <= class_ <= CLASSES[1]:
-        raise InputError("class", class_, f"must be {CLASSES[0]} to {CLASSES[1]}", "5 to 8 are usual")
-    d, m, step = 1e3 * gear.pitch_diameter, 1e3 * gear.module, 1e-6 * math.sqrt(2.0) ** (class_ - 5)
-    given = {"teeth": gear.teeth, "pitch_diameter_mm": d, "module_mm": m}
-    for (name, value), (low, high) in zip(given.items(), SCOPE, strict=True):
-        if not low * (1 - 1e-12) <= value <= high * (1 + 1e-12):
-            problem = f"must be {low:g} to {high:g} for a class of ISO 1328-1: its formulas are not extrapolated"
-            raise InputError(name, value, problem, "give the deviations themselves")
-    return PitchTolerances(
-        single=(0.001 * d + 0.4 * m + 5) * step,
-        cumulative=(0.002 * d + 0.55 * math.sqrt(d) + 0.7 * m + 12) * step,
-        slope=(0.001 * d + 0.4 * m + 4) * step,
-        form=(0.55 * m + 5) * step,
-    )
-
-
-def helix_slope_tolerance(gear: Gear, class_: int) -> float:
-    """Tolerance f_HbetaT (m) of the helix slope of a gear in a class of ISO 1328-1.
-
-    Raises
-    ------
-    InputError
-        For a class or a gear that the standard does not have.
-    """
-    tolerances(gear, class_)  # refuses what it does not have
-    d, b = 1e3 * gear.pitch_diameter, 1e3 * gear.face_width
-    if not WIDTHS[0] * (1 - 1e-12) <= b <= WIDTHS[1] * (1 + 1e-12):
-        problem = f"must be {WIDTHS[0]:g} to {WIDTHS[1]:g} for a class of ISO 1328-1: its formulas are not extrapolated"
-        raise InputError("face_width_mm", b, problem, "give the deviation itself")
-    return 1e-6 * math.sqrt(2.0) ** (class_ - 5) * (0.05 * math.sqrt(d) + 0.35 * math.sqrt(b) + 4)
 
 
 def from_single(single: ArrayLike) -> Array:

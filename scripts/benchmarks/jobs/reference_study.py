@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearfe.gears.gearmesh.sweep import sweep_stiffness
-from gearfe.gears.geometry.derived import mesh_stiffness, single_stiffness
+from gearfe.gears.rating.stiffness import mesh_stiffness, single_stiffness
 from gearfe.multibody import integrate
 from tests.makers.housing_meshes import reference_housing
 from tests.places import DATA

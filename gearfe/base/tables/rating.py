@@ -1,0 +1,187 @@
+"""The [rating] table: load capacity by ISO 6336, in everyday units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from ..config import quantity
+from ..errors import InputError, unknown_name
+
+#: Editions of ISO 6336; that of 2006 goes with the tolerances of ISO 1328-1:1995, that of 2019 with those of 2013.
+EDITIONS = (2006, 2019)
+#: Materials of ISO 6336-5.
+MATERIALS = (
+    *("St", "St_cast", "GTS", "GGG", "GGG_ferritic", "GG", "V_carbon", "V", "V_cast_carbon", "V_cast"),
+    *("Eh", "IF", "NT", "NV", "NV_nitrocar"),
+)
+#: Qualities of material of ISO 6336-5.
+GRADES = ("ML", "MQ", "ME")
+#: Hardness of the core of case-hardened steel of grade MQ (HRC).
+CORES = ("25", "25_jominy", "30")
+#: Arrangements of ISO 6336-1, Figure 13.
+ARRANGEMENTS = ("a", "b", "c", "d", "e")
+#: Helix modifications of ISO 6336-1, Table 8.
+HELIX_MODIFICATIONS = ("none", "crowning", "crowning_of_load", "correction", "correction_and_crowning", "end_relief")
+
+
+@dataclass(frozen=True)
+class GearRatingTable:
+    """Strength and accuracy of one gear."""
+
+    material: str | None = quantity(
+        None, choices=MATERIALS, doc="material of ISO 6336-5, by default Eh (case-hardened steel)"
+    )
+    grade: str | None = quantity(None, choices=GRADES, doc="quality of the material: ML, MQ (default) or ME")
+    hardness: float | None = quantity(
+        None, above=0.0, doc="hardness of the surface (HV; HBW of St, St_cast, GTS, GGG, GG)"
+    )
+    core_hardness: str | None = quantity(
+        None,
+        choices=CORES,
+        doc="core of case-hardened steel of grade MQ: 25 HRC (default), 25_jominy (and 28 HRC at J = 12 mm), 30 HRC",
+    )
+    sigma_h_lim_MPa: float | None = quantity(
+        None, above=0.0, doc="allowable stress number of contact (MPa), instead of that of the material"
+    )
+    sigma_f_lim_MPa: float | None = quantity(
+        None, above=0.0, doc="allowable stress number of bending (MPa), instead of that of the material"
+    )
+    yield_strength_MPa: float | None = quantity(
+        None, above=0.0, doc="yield point or 0.2 % proof stress (MPa); needed for St, V, GGG, GTS; tensile for GG"
+    )
+    flank_roughness_um: float | None = quantity(None, above=0.0, doc="R_z of the flanks (um), by default 4.8")
+    root_roughness_um: float | None = quantity(None, above=0.0, doc="R_z of the fillets (um), by default 20")
+    quality: int | None = quantity(
+        None, low=0, high=12, doc="flank tolerance class of ISO 1328-1, by default 6 (edition 2006: accuracy grade)"
+    )
+    single_pitch_um: float | None = quantity(
+        None, low=0.0, doc="single pitch deviation f_pt (um), instead of that of quality"
+    )
+    profile_form_um: float | None = quantity(
+        None, low=0.0, doc="profile form deviation f_falpha (um), instead of that of quality"
+    )
+    helix_slope_um: float | None = quantity(
+        None, low=0.0, doc="helix slope deviation f_Hbeta (um), instead of that of quality"
+    )
+    tip_relief_um: float | None = quantity(
+        None, low=0.0, doc="tip relief C_a (um); left out: that of the gear, and without any what running-in makes"
+    )
+    web_thickness_mm: float | None = quantity(None, above=0.0, doc="web b_s (mm), for C_R; left out: a solid disc")
+    rim_thickness_mm: float | None = quantity(
+        None, above=0.0, doc="rim s_R below the roots (mm), for C_R and Y_B; left out: it is thick"
+    )
+    mates: int | None = quantity(
+        None, low=1, high=100, doc="mates that share its torque at the same time, as planets at a sun; by default 1"
+    )
+    alternating_factor: float | None = quantity(
+        None, above=0.0, high=1.0, doc="factor Y_M of the bending number, 0.7 for idlers and planets; by default 1"
+    )
+    thickness_allowances_um: tuple[float, float] | None = quantity(
+        None, doc="upper and lower allowance of the tooth thickness (um), A_sne and A_sni, for the backlash"
+    )
+    ball_diameter_mm: float | None = quantity(
+        None, above=0.0, doc="diameter of the balls of M_dK (mm); left out: one that touches near d + 2 x m_n"
+    )
+
+
+@dataclass(frozen=True)
+class SpectrumBinTable:
+    """A part of a load spectrum."""
+
+    torque_Nm: float = quantity(doc="torque at the driver (N m)", above=0.0)
+    speed_rpm: float = quantity(doc="speed of the driver (1/min)", above=0.0)
+    hours: float = quantity(doc="time at this load (h)", above=0.0)
+
+
+@dataclass(frozen=True)
+class MeshRatingTable:
+    """Load, lubricant and factors of one mesh."""
+
+    torque_Nm: float | None = quantity(None, above=0.0, doc="torque at the driver (N m)")
+    speed_rpm: float | None = quantity(
+        None, above=0.0, doc="speed of the driver (1/min); in planetary gears relative to the carrier"
+    )
+    life_h: float | None = quantity(None, above=0.0, doc="required life (h), by default 20,000")
+    application_factor: float | None = quantity(None, low=1.0, doc="application factor K_A, by default 1")
+    mesh_load_factor: float | None = quantity(None, low=1.0, doc="mesh load factor K_gamma, by default 1")
+    dynamic_factor: float | None = quantity(None, low=1.0, doc="dynamic factor K_v; left out: method B")
+    face_load_factor: float | None = quantity(None, low=1.0, doc="face load factor K_Hbeta; left out: method C")
+    transverse_load_factor: float | None = quantity(
+        None, low=1.0, doc="transverse load factors K_Halpha = K_Falpha; left out: method B"
+    )
+    blank_factor: float | None = quantity(
+        None, above=0.0, high=1.0, doc="gear blank factor C_R; left out: from web and rim, 1 for solid discs"
+    )
+    viscosity_40_mm2_per_s: float | None = quantity(
+        None, above=0.0, doc="kinematic viscosity of the oil at 40 C (mm2/s), by default 220"
+    )
+    misalignment_um: float | None = quantity(
+        None, low=0.0, doc="mesh misalignment of manufacture f_ma (um); left out: from both helix slope deviations"
+    )
+    shaft_misalignment_um: float | None = quantity(
+        None, low=0.0, doc="misalignment by deflection f_sh (um); left out: from the keys of the shaft, else 0"
+    )
+    bearing_span_mm: float | None = quantity(None, above=0.0, doc="bearing span l of the pinion's shaft (mm)")
+    pinion_offset_mm: float | None = quantity(
+        None, low=0.0, doc="distance s of the pinion from the middle of the span (mm)"
+    )
+    shaft_diameter_mm: float | None = quantity(None, above=0.0, doc="diameter d_sh of the pinion's shaft (mm)")
+    arrangement: str | None = quantity(
+        None, choices=ARRANGEMENTS, doc="arrangement of ISO 6336-1, Figure 13, by default a"
+    )
+    helix_modification: str | None = quantity(
+        None, choices=HELIX_MODIFICATIONS, doc="helix modification of ISO 6336-1, Table 8, by default none"
+    )
+    tip_relief_factor: float | None = quantity(
+        None,
+        low=1.0,
+        high=1.2,
+        doc="factor f_ZCa of helical gears (edition 2019): 1 with proven modifications, 1.2 (default) without",
+    )
+    pitting_allowed: bool | None = quantity(None, doc="true: a certain amount of pitting is allowed")
+    long_life_factor: float | None = quantity(
+        None, low=0.85, high=1.0, doc="life factors at 1e10 cycles, by default 0.85; 1 for optimum conditions"
+    )
+    least_flank_safety: float | None = quantity(None, above=0.0, doc="required safety S_Hmin, by default 1")
+    least_root_safety: float | None = quantity(None, above=0.0, doc="required safety S_Fmin, by default 1.4")
+    distance_allowances_um: tuple[float, float] | None = quantity(
+        None, doc="upper and lower allowance of the centre distance (um), for the backlash"
+    )
+    spectrum: tuple[SpectrumBinTable, ...] | None = quantity(
+        None, doc="load spectrum for damage and life by Miner's rule; left out: torque_Nm, speed_rpm and life_h"
+    )
+
+
+@dataclass(frozen=True)
+class RatingTable(MeshRatingTable, GearRatingTable):
+    """Keys of all meshes and gears, and those of single ones by name, which win."""
+
+    edition: int = quantity(2019, low=2006, high=2019, doc="edition of ISO 6336: 2006 or 2019")
+    gears: dict[str, GearRatingTable] = quantity(dict, doc="keys of gears by their names")  # noqa: RUF009
+    meshes: dict[str, MeshRatingTable] = quantity(dict, doc="keys of meshes by their names")  # noqa: RUF009
+
+    def check(self, where: str) -> None:
+        """Raise `InputError` for an edition that there is not."""
+        if self.edition not in EDITIONS:
+            raise InputError(f"{where}.edition", self.edition, "must be 2006 or 2019", "2019 is the newer one")
+
+    def of_gear(self, name: str, known: Mapping[str, Any]) -> GearRatingTable:
+        """Return the keys of a gear: its own, else those of all; `known`: names of gears that there are."""
+        return _merged(self, self.gears, name, known, GearRatingTable, "gears")
+
+    def of_mesh(self, name: str, known: Mapping[str, Any]) -> MeshRatingTable:
+        """Return the keys of a mesh: its own, else those of all; `known`: names of meshes that there are."""
+        return _merged(self, self.meshes, name, known, MeshRatingTable, "meshes")
+
+
+def _merged(
+    table: RatingTable, own: Mapping[str, Any], name: str, known: Mapping[str, Any], kind: Any, where: str
+) -> Any:
+    for other in own:
+        if other not in known:
+            raise unknown_name(f"rating.{where}", other, known)
+    keys = [field.name for field in fields(kind)]
+    chosen = {key: getattr(own[name], key) for key in keys} if name in own else {}
+    return kind(**{key: chosen.get(key) if chosen.get(key) is not None else getattr(table, key) for key in keys})

@@ -1,0 +1,64 @@
+"""``gearfe rating JOB.toml``: load capacity of the meshes of a file by ISO 6336."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from .arguments import add_folder, add_job, add_keys, add_mesh, each_mesh, print_results, with_keys
+
+if TYPE_CHECKING:
+    from ..base.tables.gearbox import NamedMesh
+
+#: Keys of the table [rating] that options stand for.
+KEYS = ("edition", "torque_Nm", "speed_rpm", "life_h", "application_factor", "quality")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    from ..base.tables.rating import RatingTable
+
+    add_job(parser, "job", "job file with gears and the table [rating]")
+    add_mesh(parser)
+    add_folder(parser)
+    add_keys(parser, RatingTable, *KEYS)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Rate each mesh; write rating.json, rating.csv and rating.png."""
+    return each_mesh(args, _run_mesh)
+
+
+def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
+    """The rating of one mesh."""
+    from ..base.config import read_toml
+    from ..base.tables.jobs import job_tables, whole_gearbox
+
+    raw = read_toml(args.job)
+    table = with_keys(args, job_tables(raw, args.job, ("rating",))["rating"], *KEYS)
+    box = whole_gearbox(raw, args.job)
+
+    from ..gears.geometry.pair import pair_of
+    from ..gears.rating.rate import rate_mesh
+
+    pair = pair_of(mesh)
+    rating = rate_mesh(mesh, table, box.gears, box.meshes, pair)
+
+    from ..base.files import output_folder, whole_set, write_csv, write_json
+    from ..base.progress import stage
+    from ..gears.rating.report import rating_lines, rating_summary
+
+    folder = output_folder(args.out)
+    found: dict[str, Any] = rating_summary(rating, pair, table, mesh.name)
+    with whole_set(folder, ("rating.png",)) as made:
+        if not args.no_pictures:
+            from ..figures.rating import rating_picture
+            from ..figures.style import save
+
+            with stage("drawing"):
+                save(rating_picture(rating), made / "rating.png")
+        write_json(made / "rating.json", found)
+        write_csv(made / "rating.csv", dict(rating.columns()))
+        names = sorted(path.name for path in made.iterdir())
+    print_results(rating_lines(rating), folder, names, {}, found["warnings"])
+    return 0

@@ -1,0 +1,348 @@
+"""What a rating takes: gears in the lengths and signs of the standard, their strength, load and lubricant.
+
+Gear 1 is the pinion of the standard, the gear with fewer teeth, whichever drives.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ...base.errors import InputError
+from ...base.tables.rating import GearRatingTable, MeshRatingTable
+from ..geometry.derived import active_tip_radius
+from ..geometry.mesh_geometry import MeshGeometry
+from ..geometry.spur_gear import Gear
+from ..geometry.tolerances import helix_tolerances, rounded, tolerances
+from . import materials
+from .stiffness import ordered
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...base.tables.rating import SpectrumBinTable
+
+#: Edition of ISO 6336 -> edition of ISO 1328-1 whose tolerances go with it.
+TOLERANCES = {2006: 1995, 2019: 2013}
+#: What holds where the file gives no value.
+MATERIAL, GRADE, CORE = "Eh", "MQ", "25"
+FLANK_ROUGHNESS, ROOT_ROUGHNESS, QUALITY = 4.8, 20.0, 6
+VISCOSITY, LIFE, FLANK_SAFETY, ROOT_SAFETY, LONG_LIFE = 220.0, 20_000.0, 1.0, 1.4, 0.85
+#: Factor f_ZCa of helical gears without modifications, ISO 6336-2:2019.
+NO_RELIEF = 1.2
+#: HBW of a hardness in HV (ISO 18265: HB = 0.95 HV).
+BRINELL = 0.95
+
+
+@dataclass(frozen=True)
+class Strength:
+    """Strength and accuracy of a gear.
+
+    Attributes
+    ----------
+    material
+        Key of `gears.rating.materials.TABLE`.
+    sigma_H_lim, sigma_F_lim
+        Allowable stress numbers (N/mm^2).
+    brinell
+        Hardness of the surface (HBW), None: not known.
+    yield_strength
+        0.2 % proof stress or yield point (N/mm^2), None: not known; tensile strength of grey cast iron.
+    flank_roughness, root_roughness
+        R_z (um).
+    quality
+        Class of ISO 1328-1.
+    f_pt, f_falpha, f_Hbeta
+        Single pitch, profile form and helix slope deviation (um).
+    C_a
+        Tip relief (um), None: not given.
+    web, rim
+        b_s and s_R (mm), None: a solid disc, a thick rim.
+    mates
+        Mates that share its torque at the same time.
+    alternating
+        Y_M.
+    """
+
+    material: str
+    sigma_H_lim: float
+    sigma_F_lim: float
+    brinell: float | None = None
+    yield_strength: float | None = None
+    flank_roughness: float = FLANK_ROUGHNESS
+    root_roughness: float = ROOT_ROUGHNESS
+    quality: int = QUALITY
+    f_pt: float = 0.0
+    f_falpha: float = 0.0
+    f_Hbeta: float = 0.0
+    C_a: float | None = None
+    web: float | None = None
+    rim: float | None = None
+    mates: int = 1
+    alternating: float = 1.0
+
+    @property
+    def hardened(self) -> bool:
+        """Whether its surface is hardened."""
+        return self.material in materials.SURFACE_HARDENED
+
+
+def strength_of(table: GearRatingTable, gear: Gear, edition: int, where: str) -> Strength:
+    """Return the strength of a gear that a table describes.
+
+    Parameters
+    ----------
+    table : GearRatingTable
+        Its keys.
+    gear : Gear
+        The gear, for its tolerances.
+    edition : int
+        Edition of ISO 6336.
+    where : str
+        Name of the table, for messages.
+
+    Raises
+    ------
+    InputError
+        For hardness out of the range of the material, a missing yield point, a class that the gear has no tolerances
+        in.
+    """
+    material, grade = table.material or MATERIAL, table.grade or GRADE
+    core, hardness = table.core_hardness or CORE, table.hardness
+
+    def number(given: float | None, stress: str) -> float:
+        if given is not None:
+            return given
+        return materials.stress_number(material, stress, grade, hardness, core=core, field=f"{where}.hardness")
+
+    if table.yield_strength_MPa is None and material not in materials.SURFACE_HARDENED:
+        problem = f"is required for {material}: the slip-layer thickness depends on it (ISO 6336-3, Table 3)"
+        cure = "add the tensile strength" if material in materials.SOFT_IRON else "add the 0.2 % proof stress"
+        raise InputError(f"{where}.yield_strength_MPa", None, problem, cure)
+    brinell = None
+    if hardness is not None:
+        scale = materials.TABLE[material][materials.CONTACT][grade].scale
+        brinell = hardness if scale == "HBW" else BRINELL * hardness
+    quality = QUALITY if table.quality is None else table.quality
+    deviations = {
+        "single_pitch_um": lambda: tolerances(gear, quality, TOLERANCES[edition]).single,
+        "profile_form_um": lambda: tolerances(gear, quality, TOLERANCES[edition]).form,
+        "helix_slope_um": lambda: helix_tolerances(gear, quality, TOLERANCES[edition]).helix_slope,
+    }
+    found: dict[str, float] = {}
+    for key, tolerance in deviations.items():
+        given = getattr(table, key)
+        try:
+            found[key] = given if given is not None else rounded(1e6 * tolerance())
+        except InputError as error:
+            field = "quality" if error.field == "class" else error.field
+            raise InputError(f"{where}.{field}", error.value, error.reason, f"add {key} to {where}") from None
+    relief = table.tip_relief_um
+    if relief is None and gear.tip_relief is not None:
+        relief = 1e6 * gear.tip_relief.amount
+    return Strength(
+        material=material,
+        sigma_H_lim=number(table.sigma_h_lim_MPa, materials.CONTACT),
+        sigma_F_lim=number(table.sigma_f_lim_MPa, materials.BENDING),
+        brinell=brinell,
+        yield_strength=table.yield_strength_MPa,
+        flank_roughness=table.flank_roughness_um or FLANK_ROUGHNESS,
+        root_roughness=table.root_roughness_um or ROOT_ROUGHNESS,
+        quality=quality,
+        f_pt=found["single_pitch_um"],
+        f_falpha=found["profile_form_um"],
+        f_Hbeta=found["helix_slope_um"],
+        C_a=relief,
+        web=table.web_thickness_mm,
+        rim=table.rim_thickness_mm,
+        mates=table.mates or 1,
+        alternating=table.alternating_factor or 1.0,
+    )
+
+
+@dataclass(frozen=True)
+class Load:
+    """Load of a mesh, lubricant and what is prescribed; names as of `gearfe.base.tables.rating.MeshRatingTable`."""
+
+    torque: float
+    speed: float
+    hours: float = LIFE
+    application_factor: float = 1.0
+    mesh_load_factor: float = 1.0
+    dynamic_factor: float | None = None
+    face_load_factor: float | None = None
+    transverse_load_factor: float | None = None
+    blank_factor: float | None = None
+    viscosity_40: float = VISCOSITY
+    misalignment: float | None = None
+    shaft_misalignment: float | None = None
+    bearing_span: float | None = None
+    pinion_offset: float = 0.0
+    shaft_diameter: float | None = None
+    arrangement: str = "a"
+    helix_modification: str = "none"
+    tip_relief_factor: float = NO_RELIEF
+    pitting_allowed: bool = False
+    long_life: float = LONG_LIFE
+    flank_safety: float = FLANK_SAFETY
+    root_safety: float = ROOT_SAFETY
+    spectrum: Sequence[SpectrumBinTable] = ()
+
+
+def load_of(table: MeshRatingTable, where: str, torque: float | None = None) -> Load:
+    """Return the load of a mesh that a table describes.
+
+    Parameters
+    ----------
+    table : MeshRatingTable
+        Its keys.
+    where : str
+        Name of the table, for messages.
+    torque : float, optional
+        Torque at the driver (N m) where the table gives none.
+
+    Raises
+    ------
+    InputError
+        For a missing torque or speed, and keys of the shaft that need each other.
+    """
+    given = torque if table.torque_Nm is None else table.torque_Nm
+    spectrum = table.spectrum or ()
+    speed = table.speed_rpm
+    if spectrum:
+        given = max(part.torque_Nm for part in spectrum) if given is None else given
+        speed = max(part.speed_rpm for part in spectrum) if speed is None else speed
+    if given is None:
+        cure = "add torque_Nm (N m at the driver) to [rating], or torque_Nm to [stiffness]"
+        raise InputError(f"{where}.torque_Nm", None, "no torque is given", cure)
+    if speed is None:
+        raise InputError(f"{where}.speed_rpm", None, "is required", "add the speed of the driver (1/min)")
+    span, shaft = table.bearing_span_mm, table.shaft_diameter_mm
+    if (span is None) != (shaft is None):
+        lacking = "bearing_span_mm" if span is None else "shaft_diameter_mm"
+        raise InputError(f"{where}.{lacking}", None, "is required with the other one", "give both, or neither")
+    offset = table.pinion_offset_mm or 0.0
+    if span is not None and offset > 0.3 * span:
+        problem = f"must be <= {0.3 * span:.6g} mm, 0.3 of the span, for method C of ISO 6336-1"
+        raise InputError(f"{where}.pinion_offset_mm", offset, problem, "give shaft_misalignment_um of an analysis")
+    return Load(
+        torque=given,
+        speed=speed,
+        hours=table.life_h or LIFE,
+        application_factor=table.application_factor or 1.0,
+        mesh_load_factor=table.mesh_load_factor or 1.0,
+        dynamic_factor=table.dynamic_factor,
+        face_load_factor=table.face_load_factor,
+        transverse_load_factor=table.transverse_load_factor,
+        blank_factor=table.blank_factor,
+        viscosity_40=table.viscosity_40_mm2_per_s or VISCOSITY,
+        misalignment=table.misalignment_um,
+        shaft_misalignment=table.shaft_misalignment_um,
+        bearing_span=span,
+        pinion_offset=offset,
+        shaft_diameter=shaft,
+        arrangement=table.arrangement or "a",
+        helix_modification=table.helix_modification or "none",
+        tip_relief_factor=NO_RELIEF if table.tip_relief_factor is None else table.tip_relief_factor,
+        pitting_allowed=bool(table.pitting_allowed),
+        long_life=table.long_life_factor or LONG_LIFE,
+        flank_safety=table.least_flank_safety or FLANK_SAFETY,
+        root_safety=table.least_root_safety or ROOT_SAFETY,
+        spectrum=spectrum,
+    )
+
+
+@dataclass(frozen=True)
+class PairData:
+    """Gears of a mesh as the formulas take them: mm and rad, gear 1 with fewer teeth, signs of ISO 21771.
+
+    Attributes
+    ----------
+    z, x, z_n
+        Tooth numbers, profile shifts and virtual tooth numbers.
+    m_n, alpha_n, beta, alpha_t, beta_b, alpha_wt
+        Module and angles.
+    a
+        Centre distance.
+    d, d_b, d_a, d_f
+        Reference, base, active tip and root diameter.
+    h_fP, rho_fP
+        Dedendum and tip radius of the racks.
+    b, b_F
+        Common face width, and the widths that bear at the roots.
+    eps_alpha, eps_beta
+        Transverse contact ratio and overlap ratio.
+    """
+
+    z: tuple[int, int]
+    x: tuple[float, float]
+    z_n: tuple[float, float]
+    m_n: float
+    alpha_n: float
+    beta: float
+    alpha_t: float
+    beta_b: float
+    alpha_wt: float
+    a: float
+    d: tuple[float, float]
+    d_b: tuple[float, float]
+    d_a: tuple[float, float]
+    d_f: tuple[float, float]
+    h_fP: tuple[float, float]
+    rho_fP: tuple[float, float]
+    b: float
+    b_F: tuple[float, float]
+    eps_alpha: float
+    eps_beta: float
+
+    @property
+    def u(self) -> float:
+        """Gear ratio z_2/z_1, negative for an internal wheel."""
+        return self.z[1] / self.z[0]
+
+    @property
+    def eps_gamma(self) -> float:
+        """Total contact ratio."""
+        return self.eps_alpha + self.eps_beta
+
+    @property
+    def rho_red(self) -> float:
+        """Radius of relative curvature at the pitch point, transverse (mm), ISO 6336-2:2006 (46), (47)."""
+        one, two = (0.5 * d_b * math.tan(self.alpha_wt) for d_b in self.d_b)
+        return one * two / (one + two)
+
+
+def pair_data(pair: MeshGeometry) -> PairData:
+    """Return the gears of a mesh as the formulas take them."""
+    one, two = ordered(pair)
+
+    def diameters(radii: tuple[float, float]) -> tuple[float, float]:
+        return 2e3 * one.sign * radii[0], 2e3 * two.sign * radii[1]
+
+    b = 1e3 * pair.common_width
+    return PairData(
+        z=(one.teeth, two.teeth),
+        x=(one.profile_shift, two.profile_shift),
+        z_n=(one.virtual_teeth, two.virtual_teeth),
+        m_n=1e3 * one.module,
+        alpha_n=one.pressure_angle,
+        beta=one.helix_angle,
+        alpha_t=one.transverse_pressure_angle,
+        beta_b=one.base_helix_angle,
+        alpha_wt=pair.working_pressure_angle,
+        a=1e3 * pair.wheel_centre,
+        d=diameters((one.reference_radius, two.reference_radius)),
+        d_b=diameters((one.base_radius, two.base_radius)),
+        d_a=diameters((active_tip_radius(one), active_tip_radius(two))),
+        d_f=diameters((one.root_radius, two.root_radius)),
+        h_fP=(1e3 * one.dedendum * one.module, 1e3 * two.dedendum * two.module),
+        rho_fP=(1e3 * one.rack_tip_radius * one.module, 1e3 * two.rack_tip_radius * two.module),
+        b=b,
+        b_F=(
+            min(1e3 * one.face_width, b + 2e3 * one.module),
+            min(1e3 * two.face_width, b + 2e3 * two.module),
+        ),
+        eps_alpha=pair.contact_ratio_active,
+        eps_beta=pair.overlap_ratio,
+    )

@@ -1,0 +1,284 @@
+"""The rating of a mesh: safety factors of flanks and roots with all values that lead to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ...base.config import build
+from ...base.errors import InputError
+from ...base.shown import ShownTable
+from ...base.tables.gearbox import NamedMesh
+from ...base.tables.pair import MaterialTable
+from ...base.tables.rating import EDITIONS, RatingTable
+from ..geometry.mesh_geometry import MeshGeometry
+from ..geometry.pair import pair_of
+from .data import Load, PairData, Strength, load_of, pair_data, strength_of
+from .flank import NOTABLE, Flank, contact_ratio_factor, flank
+from .ledger import Entry, entries
+from .load_factors import Influence, influence, speed_range
+from .root import NOTCHES, Root, root
+from .service import Service, service
+from .stiffness import ordered, single_stiffness
+
+#: Steel of the standard (E 206 GPa).
+STEEL_TABLE = MaterialTable(youngs_modulus_GPa=206.0, poisson_ratio=0.3, density_kg_per_m3=7830.0)
+#: Sums of profile shifts that the series of the flexibility holds for.
+SHIFTS = (-0.5, 2.0)
+
+
+@dataclass(frozen=True, repr=False)
+class Rating(ShownTable):
+    """Rating of a mesh by ISO 6336; pairs of values are of gear 1, with fewer teeth, and gear 2.
+
+    Attributes
+    ----------
+    edition
+        Edition of ISO 6336.
+    names
+        Names of gear 1 and gear 2.
+    driver
+        0 where gear 1 drives, else 1.
+    pair, strengths, load
+        What was rated.
+    general, flank, root, service
+        Factors of general influence; flanks; roots; life under the spectrum.
+    """
+
+    edition: int
+    names: tuple[str, str]
+    driver: int
+    pair: PairData
+    strengths: tuple[Strength, Strength]
+    load: Load
+    general: Influence
+    flank: Flank
+    root: Root
+    service: Service
+
+    @property
+    def S_H(self) -> tuple[float, float]:
+        """Safety factors against pitting."""
+        return self.flank.S_H
+
+    @property
+    def S_F(self) -> tuple[float, float]:
+        """Safety factors of the roots."""
+        return self.root.S_F
+
+    def entries(self) -> list[Entry]:
+        """All values with their formulas."""
+        groups = {"influence": self.general, "flank": self.flank, "root": self.root, "life": self.service}
+        return [entry for group, results in groups.items() for entry in entries(group, results)]
+
+    def facts(self) -> Mapping[str, str]:
+        """Edition, safety factors."""
+        return {
+            "edition": f"ISO 6336:{self.edition}",
+            "S_H": f"{self.S_H[0]:.4g}/{self.S_H[1]:.4g}",
+            "S_F": f"{self.S_F[0]:.4g}/{self.S_F[1]:.4g}",
+            "gears": "/".join(self.names),
+        }
+
+    def columns(self) -> Mapping[str, Iterable[Any]]:
+        """All values as a table; a value of the mesh stands for both gears."""
+        rows = self.entries()
+        values = [row.value if isinstance(row.value, tuple) else (row.value, row.value) for row in rows]
+        return {
+            "group": [row.group for row in rows],
+            "name": [row.name for row in rows],
+            "gear_1": [value[0] for value in values],
+            "gear_2": [value[1] for value in values],
+            "unit": [row.unit for row in rows],
+            "formula": [row.formula for row in rows],
+            "meaning": [row.meaning for row in rows],
+        }
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the standard asks to look at, one sentence each."""
+        made: list[str] = []
+        pair, general = self.pair, self.general
+        where = speed_range(general.N, general.line_load_N_per_mm)
+        if where in ("main resonance", "intermediate"):
+            made.append(f"N = {general.N:.3g} is in the {where} range: ISO 6336-1 recommends method A for K_v there")
+        total = sum(pair.x)
+        if not SHIFTS[0] <= total <= SHIFTS[1]:
+            made.append(f"x_1 + x_2 = {total:.3g} is beyond -0.5 to 2, the range of c' in ISO 6336-1")
+        if pair.eps_alpha < 1.2:
+            made.append(f"eps_alpha = {pair.eps_alpha:.3g} < 1.2: c_gamma may be up to 10 % too large (ISO 6336-1)")
+        for name, q_s in zip(self.names, self.root.q_s, strict=True):
+            if not NOTCHES[0] <= q_s < NOTCHES[1]:
+                made.append(f"q_s = {q_s:.3g} of {name} is beyond 1 to 8, the range of Y_S in ISO 6336-3")
+        if general.K_Hbeta > NOTABLE:
+            made.append(
+                f"K_Hbeta = {general.K_Hbeta:.3g} > {NOTABLE:g}: the load is on a part of the width; a computed load "
+                "distribution says more (gearfe loadmap with [width])"
+            )
+        least = {"S_H": (self.S_H, self.load.flank_safety), "S_F": (self.S_F, self.load.root_safety)}
+        for symbol, (values, required) in least.items():
+            for name, value in zip(self.names, values, strict=True):
+                if value < required:
+                    made.append(f"{symbol} = {value:.4g} of {name} is below the required {required:g}")
+        return tuple(made)
+
+
+def rate(
+    pair: MeshGeometry,
+    table: RatingTable | Mapping[str, Any],
+    *,
+    materials: tuple[MaterialTable, MaterialTable] = (STEEL_TABLE, STEEL_TABLE),
+    names: tuple[str, str] = ("pinion", "wheel"),
+    mesh: str = "pinion-wheel",
+    torque: float | None = None,
+) -> Rating:
+    """Rate a mesh by ISO 6336.
+
+    Parameters
+    ----------
+    pair : GearPair
+        The gears; the pinion of the pair drives.
+    table : RatingTable or mapping
+        Keys of the table [rating]: load, strength, lubricant; what they say is in docs/keys.md.
+    materials : (MaterialTable, MaterialTable)
+        Elastic constants and densities of driver and driven gear.
+    names, mesh : (str, str), str
+        Names of the gears and of the mesh, under which the table may have keys of their own.
+    torque : float, optional
+        Torque at the driver (N m) where the table gives none.
+
+    Raises
+    ------
+    InputError
+        For mistakes in the table, and gears beyond the formulas.
+    """
+    keys = build(RatingTable, table, "rating") if isinstance(table, Mapping) else table
+    keys.check("rating")
+    return _rated(pair, keys, materials, names, mesh, torque, dict.fromkeys(names), {mesh: None})
+
+
+def rate_mesh(
+    mesh: NamedMesh,
+    table: RatingTable,
+    gears: Mapping[str, Any],
+    meshes: Mapping[str, Any],
+    pair: MeshGeometry | None = None,
+) -> Rating:
+    """Rate a mesh of a job file.
+
+    Parameters
+    ----------
+    mesh : NamedMesh
+        The mesh.
+    table : RatingTable
+        The table [rating].
+    gears, meshes : mapping
+        Names of gears and meshes that the file has.
+    pair : MeshGeometry, optional
+        Its gears, where they were made before.
+
+    Raises
+    ------
+    InputError
+        For mistakes in the table, a gear without material, and gears beyond the formulas.
+    """
+    for gear in mesh.gears:
+        if gear.material is None:
+            problem = "has no material: the flank's elasticity factor needs one"
+            raise InputError(f"{gear.where}.material", None, problem, "write all gears as [gears.NAME]")
+    stiffness = mesh.stiffness.torque_Nm
+    made = pair_of(mesh) if pair is None else pair
+    torque = None if stiffness is None else stiffness / abs(made.gear_ratio)  # that of [stiffness] is at the wheel
+    materials = tuple(gear.material for gear in mesh.gears)
+    names = mesh.driver.name, mesh.driven.name
+    return _rated(made, table, materials, names, mesh.name, torque, gears, meshes)
+
+
+def _rated(
+    pair: MeshGeometry,
+    table: RatingTable,
+    materials: tuple[Any, ...],
+    names: tuple[str, str],
+    mesh: str,
+    torque: float | None,
+    gears: Mapping[str, Any],
+    meshes: Mapping[str, Any],
+) -> Rating:
+    if table.edition not in EDITIONS:
+        raise InputError("rating.edition", table.edition, "must be 2006 or 2019", "2019 is the newer one")
+    load = load_of(table.of_mesh(mesh, meshes), f"rating.meshes.{mesh}" if mesh in table.meshes else "rating", torque)
+    one, other = ordered(pair)
+    swap = one is not pair.pinion
+    order = (1, 0) if swap else (0, 1)
+    both, names = (one, other), (names[order[0]], names[order[1]])
+    elastic = tuple(materials[i] for i in order)
+    strengths = tuple(
+        strength_of(
+            table.of_gear(name, gears), gear, table.edition, f"rating.gears.{name}" if name in table.gears else "rating"
+        )
+        for name, gear in zip(names, both, strict=True)
+    )
+    data, two = pair_data(pair), (strengths[0], strengths[1])
+    # torque and speed of gear 1 from those of the driver
+    ratio = abs(data.u) if swap else 1.0
+    modulus = 1e9 * elastic[0].youngs_modulus_GPa, 1e9 * elastic[1].youngs_modulus_GPa
+    single = 1e-9 * single_stiffness(pair, modulus[0], modulus[1])
+
+    def cycles_of(speed: float, hours: float) -> tuple[float, float]:
+        turns = 60.0 * hours * speed * ratio
+        return turns * two[0].mates, turns / abs(data.u) * two[1].mates
+
+    cycles = cycles_of(load.speed, load.hours)
+
+    def stressed(torque: float, speed: float) -> tuple[Influence, Flank, Root]:
+        """Factors and stresses at a torque (N m) and a speed (1/min) of the driver."""
+        general = influence(
+            data,
+            two,
+            load,
+            torque=torque / ratio,
+            speed=speed * ratio,
+            single=single,
+            bores=(2e3 * one.held_radius, 2e3 * other.held_radius),
+            density=(1e-9 * elastic[0].density_kg_per_m3, 1e-9 * elastic[1].density_kg_per_m3),
+            contact_factor=contact_ratio_factor(data),
+        )
+        of_flank = flank(
+            data,
+            two,
+            load,
+            general,
+            edition=table.edition,
+            modulus=(1e-6 * modulus[0], 1e-6 * modulus[1]),
+            poisson=(elastic[0].poisson_ratio, elastic[1].poisson_ratio),
+            cycles=cycles,
+        )
+        return general, of_flank, root(data, two, load, general, edition=table.edition, cycles=cycles)
+
+    general, of_flank, of_root = stressed(load.torque, load.speed)
+    parts = [(part.torque_Nm, part.speed_rpm, part.hours) for part in load.spectrum]
+    parts = parts or [(load.torque, load.speed, load.hours)]
+    made = [stressed(torque, speed) for torque, speed, _ in parts]
+    of_service = service(
+        {"flank": of_flank.curves, "root": of_root.curves},
+        {
+            "flank": lambda i: [found[1].sigma_H_MPa[i] for found in made],
+            "root": lambda i: [found[2].sigma_F_MPa[i] for found in made],
+        },
+        lambda i: [cycles_of(speed, hours)[i] for _, speed, hours in parts],
+        sum(hours for _, _, hours in parts),
+        {"flank": load.flank_safety, "root": load.root_safety},
+    )
+    return Rating(
+        edition=table.edition,
+        names=names,
+        driver=order.index(0),
+        pair=data,
+        strengths=two,
+        load=load,
+        general=general,
+        flank=of_flank,
+        root=of_root,
+        service=of_service,
+    )

@@ -1,0 +1,183 @@
+"""Report of a rating: the content of rating.json, the table rating.csv, and the lines that are printed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.tables.rating import GearRatingTable, MeshRatingTable, RatingTable
+from ..geometry.balls import ball_diameter, over_balls
+from ..geometry.derived import derived_geometry
+from ..geometry.measures import backlash_limits, span_of
+from ..geometry.pair import Gear, GearPair
+from ..geometry.tolerances import tolerances_um
+from .data import QUALITY, TOLERANCES
+from .ledger import Entry
+from .rate import Rating
+
+#: Roles of the gears of a pair.
+SIDES = ("pinion", "wheel")
+
+
+def rating_summary(rating: Rating, pair: GearPair, table: RatingTable, mesh: str) -> dict[str, Any]:
+    """Return the content of rating.json.
+
+    Parameters
+    ----------
+    rating : Rating
+        The rating.
+    pair : GearPair
+        Its gears.
+    table : RatingTable
+        The table [rating].
+    mesh : str
+        Name of the mesh.
+    """
+    names = rating.names[rating.driver], rating.names[1 - rating.driver]
+    groups: dict[str, dict[str, Any]] = {}
+    for entry in rating.entries():
+        groups.setdefault(entry.group, {})[entry.name] = {
+            "value": _by_name(entry, rating.names),
+            "unit": entry.unit,
+            "formula": entry.formula,
+            "meaning": entry.meaning,
+        }
+    gear_keys = {name: table.of_gear(name, dict.fromkeys((*names, *table.gears))) for name in names}
+    mesh_keys = table.of_mesh(mesh, dict.fromkeys((mesh, *table.meshes)))
+    return {
+        "edition": f"ISO 6336:{rating.edition}",
+        "gears": dict(zip(("gear_1", "gear_2"), rating.names, strict=True)),
+        "driver": names[0],
+        "safety": {
+            symbol: dict(zip(rating.names, values, strict=True))
+            for symbol, values in (("S_H", rating.S_H), ("S_F", rating.S_F))
+        },
+        **groups,
+        "strength": {name: asdict(s) for name, s in zip(rating.names, rating.strengths, strict=True)},
+        "load": asdict(rating.load),
+        "geometry": derived_geometry(pair),
+        "measures": measures(pair, names, gear_keys, mesh_keys, rating.edition),
+        "warnings": [*pair.warnings, *rating.warnings],
+    }
+
+
+def _by_name(entry: Entry, names: tuple[str, str]) -> Any:
+    if isinstance(entry.value, tuple):
+        return dict(zip(names, entry.value, strict=True))
+    return entry.value
+
+
+def measures(
+    pair: GearPair,
+    names: tuple[str, str],
+    gears: Mapping[str, GearRatingTable],
+    mesh: MeshRatingTable,
+    edition: int = 2019,
+) -> dict[str, Any]:
+    """Return tolerances, sizes over balls and spans with their limits, and the backlash that allowances leave.
+
+    Parameters
+    ----------
+    pair : GearPair
+        The gears.
+    names : (str, str)
+        Names of pinion and wheel of the pair.
+    gears : mapping
+        Name -> keys of the gear.
+    mesh : MeshRatingTable
+        Keys of the mesh.
+    edition : int
+        Edition of ISO 6336, with which one of ISO 1328-1 goes.
+    """
+    made: dict[str, Any] = {}
+    allowances = [gears[name].thickness_allowances_um for name in names]
+    for side, name in zip(SIDES, names, strict=True):
+        gear, keys = getattr(pair, side), gears[name]
+        quality = QUALITY if keys.quality is None else keys.quality
+        allowance = keys.thickness_allowances_um
+        thinning = [] if allowance is None else [-1e-6 * value for value in allowance]
+        k = gear.span_teeth
+        sizes: dict[str, Any] = {"span_teeth": k, "span_mm": 1e3 * gear.span_size(k)}
+        if thinning:
+            sizes["span_limits_mm"] = [1e3 * span_of(gear, k, value) for value in thinning]
+        sizes |= _balls(gear, keys.ball_diameter_mm, thinning)
+        made[name] = {
+            "quality": quality,
+            "tolerances_um": _tolerances(gear, quality, TOLERANCES[edition]),
+            **sizes,
+        }
+    distance = mesh.distance_allowances_um
+    if distance is not None or any(allowances):
+        thickness = [(0.0, 0.0) if a is None else (1e-6 * a[0], 1e-6 * a[1]) for a in allowances]
+        one, two = (0.0, 0.0) if distance is None else distance
+        found = backlash_limits(pair, (thickness[0], thickness[1]), (1e-6 * one, 1e-6 * two))
+        made["backlash"] = {
+            "circumferential_mm": [1e3 * value for value in found.circumferential],
+            "normal_mm": [1e3 * value for value in found.normal],
+        }
+    return made
+
+
+def _balls(gear: Gear, given_mm: float | None, thinning: list[float]) -> dict[str, Any]:
+    """Ball diameter and sizes over balls with their limits (mm) at each thinning (m)."""
+    ball = ball_diameter(gear) if given_mm is None else 1e-3 * given_mm
+    made: dict[str, Any] = {"ball_diameter_mm": 1e3 * ball, "over_balls_mm": 1e3 * over_balls(gear, ball)}
+    if thinning:
+        made["over_balls_limits_mm"] = [1e3 * over_balls(gear, ball, value) for value in thinning]
+    if given_mm is not None and any(math.isnan(value) for value in np.hstack(list(made.values()))):
+        problem = "is too small: such balls fall to the root of the space"
+        raise InputError("rating.ball_diameter_mm", given_mm, problem, f"{1e3 * ball_diameter(gear):.4g} mm fits")
+    return made
+
+
+def _tolerances(gear: Any, quality: int, edition: int) -> dict[str, float] | None:
+    """Tolerances (um) of a gear, None: the standard has none for it."""
+    try:
+        return tolerances_um(gear, quality, edition)
+    except InputError:
+        return None
+
+
+#: Values that the command prints of each group.
+PRINTED = {
+    "influence": (
+        *("F_t_N", "v_m_per_s", "c_prime_N_per_mm_um", "c_gamma_alpha_N_per_mm_um"),
+        *("N", "K_A", "K_gamma", "K_v", "K_Hbeta", "K_Fbeta", "K_Halpha", "K_Falpha"),
+    ),
+    "flank": (
+        *("Z_H", "Z_E", "Z_eps", "Z_beta", "Z_BD", "Z_L", "Z_v", "Z_R", "Z_W", "Z_NT"),
+        *("sigma_H0_MPa", "sigma_H_MPa", "sigma_HP_MPa", "S_H"),
+    ),
+    "root": (
+        *("Y_F", "Y_S", "Y_beta", "Y_B", "Y_DT", "Y_NT", "Y_delta_rel_T", "Y_R_rel_T", "Y_X"),
+        *("sigma_F0_MPa", "sigma_F_MPa", "sigma_FP_MPa", "S_F"),
+    ),
+    "life": ("U_H", "U_F", "life_flank_h", "life_root_h", "S_H_spectrum", "S_F_spectrum"),
+}
+
+
+def rating_lines(rating: Rating) -> list[str]:
+    """Lines to print: the main values of both gears."""
+    lines = [f"ISO 6336:{rating.edition}, method B: {rating.names[0]} (gear 1), {rating.names[1]} (gear 2)"]
+    for entry in rating.entries():
+        if entry.name in PRINTED[entry.group]:
+            pair = entry.value if isinstance(entry.value, tuple) else (entry.value,)
+            values = "  ".join(f"{value:>12.6g}" for value in pair)
+            lines.append(f"  {entry.name:<28}{values:<28}{entry.meaning}")
+    return lines
+
+
+def safety_bars(rating: Rating) -> list[tuple[str, float, float]]:
+    """Name, safety factor and required safety of flanks and roots, for the picture."""
+    made = []
+    for symbol, values, least in (
+        ("S_H", rating.S_H, rating.load.flank_safety),
+        ("S_F", rating.S_F, rating.load.root_safety),
+    ):
+        made += [(f"{symbol} {name}", value, least) for name, value in zip(rating.names, values, strict=True)]
+    return [bar for bar in made if math.isfinite(bar[1])]

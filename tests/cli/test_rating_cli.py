@@ -1,0 +1,115 @@
+"""``gearfe rating``: files, several meshes, options, and jobs that are refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from gearfe.base.tables.examples import job_file
+from gearfe.cli.main import main
+from tests.places import GEOMETRY
+
+FZG = GEOMETRY / "fzg_c.toml"
+
+
+def test_the_shipped_pair(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["rating", str(FZG), "--out", str(tmp_path)]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"rating.csv", "rating.json", "rating.png"}
+    made = json.loads((tmp_path / "rating.json").read_text())
+    printed = capsys.readouterr().out
+    assert f"{made['safety']['S_H']['pinion']:.6g}" in printed
+    rows = list(csv.DictReader((tmp_path / "rating.csv").open()))
+    by_name = {row["name"]: row for row in rows}
+    assert float(by_name["S_F"]["gear_2"]) == made["safety"]["S_F"]["wheel"] == made["root"]["S_F"]["value"]["wheel"]
+    assert all(row["formula"].startswith("ISO 6336") for row in rows)
+    assert made["measures"]["pinion"]["tolerances_um"]["f_pT"] == 7.0
+    assert len(made["measures"]["backlash"]["circumferential_mm"]) == 2
+
+
+def test_the_gear_command_prints_what_rating_gives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["gear", str(FZG), "--out", str(tmp_path), "--no-pictures"]) == 0
+    printed = capsys.readouterr().out
+    made = json.loads((tmp_path / "gear_pair.json").read_text())
+    assert "F_betaT" in printed
+    assert made["pinion"]["over_balls_mm"] == made["measures"]["pinion"]["over_balls_mm"]
+    assert made["pinion"]["active_root_diameter_mm"] > made["pinion"]["form_diameter_mm"]
+
+
+def test_all_meshes_of_a_gearbox(tmp_path: Path) -> None:
+    """Torques are those of [stiffness] of each mesh, at the driven gear; one mesh has keys of its own."""
+    job = tmp_path / "box.toml"
+    job.write_text(
+        job_file("gearbox")
+        + "\n[rating]\nspeed_rpm = 900.0\nhardness = 700.0\n"
+        + "[rating.gears.input_wheel]\nmaterial = 'GGG'\nhardness = 250.0\n"
+        + "yield_strength_MPa = 500.0\n[rating.meshes.second]\nspeed_rpm = 440.0\napplication_factor = 1.5\n"
+    )
+    assert main(["rating", str(job), "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
+    first, second = (json.loads((tmp_path / "out" / name / "rating.json").read_text()) for name in ("first", "second"))
+    assert first["load"]["torque"] == pytest.approx(60.0 * 20 / 41)
+    assert (first["influence"]["K_A"]["value"], second["influence"]["K_A"]["value"]) == (1.0, 1.5)
+    assert second["load"]["speed"] == 440.0
+    assert first["strength"]["input_wheel"]["material"] == "GGG"
+
+
+def test_options_win_over_the_file(tmp_path: Path) -> None:
+    line = ["rating", str(FZG), "--torque-Nm", "200", "--edition", "2006", "--out", str(tmp_path), "--no-pictures"]
+    assert main(line) == 0
+    made = json.loads((tmp_path / "rating.json").read_text())
+    assert (made["load"]["torque"], made["edition"]) == (200.0, "ISO 6336:2006")
+
+
+def test_the_written_example_runs(tmp_path: Path) -> None:
+    (tmp_path / "job.toml").write_text(job_file("rating"))
+    assert main(["rating", str(tmp_path / "job.toml"), "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (["rating.speed_rmp=3"], "speed_rpm"),
+        (["rating.gears.pinon.quality=5"], "pinion"),
+        (["rating.gears.wheel.hardness=300"], "rating.gears.wheel.hardness = 300"),
+        (["rating.speed_rpm=-3"], "rating.speed_rpm"),
+        (["rating.thickness_allowances_um=[-90,-60]"], "upper allowance"),
+        (["rating.ball_diameter_mm=2"], "ball_diameter_mm = 2"),
+        (["rating.spectrum=[{torque_Nm=1,speed_rpm=1}]"], "hours"),
+        (["rating.edition=2010"], "2006 or 2019"),
+        (["rating.quality=12"], "1 to 11"),
+        (["rating.material=V"], "yield_strength_MPa"),
+        (["rating.tip_relief_factor=1.3"], "tip_relief_factor"),
+    ],
+)
+def test_jobs_that_are_refused(
+    changes: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ["rating", str(FZG), "--out", str(tmp_path / "out"), "--no-pictures"]
+    for change in changes:
+        line += ["--set", change]
+    assert main(line) == 2
+    told = capsys.readouterr().err
+    assert message in told
+    assert "Traceback" not in told
+    assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
+
+
+def test_files_without_the_table_or_the_speed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    job = tmp_path / "pair.toml"
+    job.write_text(job_file("stiffness"))
+    assert main(["rating", str(job), "--out", str(tmp_path / "out")]) == 2
+    assert "[rating]" in capsys.readouterr().err
+    assert main(["rating", str(job), "--set", "rating.quality=6", "--out", str(tmp_path / "out")]) == 2
+    assert "speed_rpm" in capsys.readouterr().err
+
+
+def test_internal_gears_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    job = FZG.with_name("internal.toml")
+    line = ["rating", str(job), "--set", "rating.speed_rpm=1000", "--set", "rating.torque_Nm=100"]
+    assert main([*line, "--out", str(tmp_path / "out"), "--no-pictures"]) == 2
+    assert "is an internal gear" in capsys.readouterr().err
+    assert main(["gear", *line[1:], "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
+    made = json.loads((tmp_path / "out" / "gear_pair.json").read_text())
+    assert made["measures"]["ring"]["over_balls_mm"] < 0.0
