@@ -16,7 +16,7 @@ from gearfe.drivetrain.train import TrainModel, build_train
 from gearfe.drivetrain.train.statics import static_errors
 from gearfe.gears.gearmesh.job import StiffnessJob
 from gearfe.gears.gearmesh.width_job import job_lines
-from gearfe.gears.gearmesh.width_spring import WidthStates, mesh_spring
+from gearfe.gears.gearmesh.width_spring import WidthStates, mesh_spring, width_states
 from gearfe.gears.geometry.pair import gear_pair
 from gearfe.gears.width import sweep_width
 from tests.makers.files import job_file
@@ -89,6 +89,27 @@ def test_slow_running_follows_the_static_transmission_error(model: str, tmp_path
     assert len(job.meshes) == 1
 
 
+def test_tilts_load_the_spring_as_they_load_the_contact(tmp_path: Path) -> None:
+    """Change of force and moment between contacts whose axes differ by 1 um over the width, at one twist."""
+    states = []
+    for tilt in (9.5, 10.0, 10.5):
+        job = read(tmp_path, text(pair=f"misalignment_um = {tilt}"))
+        pair = gear_pair(*(gear.gear for gear in job_train(job).gears))
+        angles = pair.mesh_cycle * np.arange(6) / 6
+        states.append(width_states(StiffnessJob(job.meshes[0], pair), angles, twist=math.radians(0.03)))
+    low, middle, high = states
+    gamma = 1e-6 / 10e-3
+    against = middle.stiffness * middle.lever**2 + middle.against_tilting
+    for change, tangent in (
+        (high.force - low.force, middle.stiffness * middle.lever),
+        (high.moment - low.moment, against),
+    ):
+        off = np.sort(np.abs(change / (tangent * gamma) - 1.0))
+        assert off[-2] < 5e-3
+        assert off[-1] < 0.1  # a pair comes into contact there
+    assert (middle.moment > 0.0).all()  # the flanks close towards larger y
+
+
 def test_right_flanks_drive_where_the_driver_turns_backwards(tmp_path: Path) -> None:
     """A slope over the width closes the flanks at one end whichever drives: the mirror image has the same spring."""
     lead = "[microgeometry]\n[microgeometry.pinion]\nhelix_slope_um = {}\n"
@@ -106,6 +127,9 @@ def test_right_flanks_drive_where_the_driver_turns_backwards(tmp_path: Path) -> 
     for other in (two, tilted):
         np.testing.assert_allclose(other.stiffness.values, one.stiffness.values, rtol=1e-4)
         np.testing.assert_allclose(other.transmission_error.values, one.transmission_error.values, atol=1e-9)
+        np.testing.assert_allclose(other.tilting.lever.values, one.tilting.lever.values, atol=1e-6)
+        assert other.tilting.stiffness == pytest.approx(one.tilting.stiffness, rel=1e-3)
+    assert one.tilting.lever.values.min() > 0.0  # the loaded end, for both senses of rotation
 
 
 def test_a_spur_mesh_alike_along_the_width_keeps_its_curve(tmp_path: Path) -> None:
@@ -119,14 +143,25 @@ def test_a_mean_has_the_force_of_the_load() -> None:
     """F = k (delta - e) at the given approach is the force of the sweep, for both kinds."""
     pitch = 0.3
     angle = pitch * np.arange(12) / 12
+    swing = np.cos(2.0 * math.pi * angle / pitch)
     states = WidthStates(
-        angle, np.full(12, 1500.0), 1e-5 + 1e-6 * np.cos(2 * math.pi * angle / pitch), 2e8 + 3e7 * np.sin(21.0 * angle)
+        angle,
+        force=np.full(12, 1500.0),
+        approach=1e-5 + 1e-6 * swing,
+        stiffness=2e8 + 3e7 * np.sin(21.0 * angle),
+        lever=1e-3 * swing,
+        moment=2.0 - swing,
+        against_tilting=np.full(12, 700.0),
     )
     varying, mean = (mesh_spring(states, pitch, mean=mean) for mean in (False, True))
     for table in (varying, mean):
         k = table.stiffness if isinstance(table.stiffness, float) else table.stiffness(angle).value
         force = k * (states.approach - table.transmission_error(angle).value)
         np.testing.assert_allclose(force, 1500.0, rtol=1e-12)
+        assert table.tilting is not None
+        moment = table.tilting.lever(angle).value * force + table.tilting.moment(angle).value
+        np.testing.assert_allclose(moment, states.moment, rtol=1e-12)
+        assert table.tilting.stiffness == pytest.approx(700.0, rel=1e-12)
     assert isinstance(mean.stiffness, float)
     assert mean.stiffness == pytest.approx(varying.stiffness.mean, rel=1e-12)
 

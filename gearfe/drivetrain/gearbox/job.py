@@ -358,7 +358,8 @@ def _mesh(job: TrainJob, table: TrainMeshTable, named: NamedMesh) -> GearMesh:
 def _given(curve: Stiffness) -> dict[str, Any]:
     """Fields of a mesh that its stiffness gives."""
     if isinstance(curve, MeshTable):
-        return {"stiffness": curve.stiffness, "transmission_error": curve.transmission_error}
+        errors = {"transmission_error": curve.transmission_error, "tilting": curve.tilting}
+        return {"stiffness": curve.stiffness, **errors}
     return {"stiffness": curve}
 
 

@@ -160,9 +160,9 @@ def _of_drive(oil: Lubrication, pair: MeshGeometry, force: float, ratio: float, 
 
 
 def _directions(flank: Flank) -> tuple[int, int, int, int]:
-    """Numbers of a flank's approach and turn, and of those of its friction or -1."""
+    """Numbers of a flank's approach and turn, and of those of its friction, or of its gears' tilt, or -1."""
     sliding = flank.sliding
-    return flank.direction, flank.turn, *((-1, -1) if sliding is None else (sliding.across, sliding.spin))
+    return flank.direction, flank.turn, *((flank.tilt, -1) if sliding is None else (sliding.across, sliding.spin))
 
 
 def _check(model: TrainModel) -> None:
@@ -239,10 +239,10 @@ def _scale(
     size = max(float(np.abs(linear.rest[np.unique(freedoms[:, 0])]).max()), 1e-9)
     scale = np.full(linear.size, size)
     scale[list(torques)] = size / (0.5 * model.meshes[0].module * 2.0 * math.pi)
-    for flank, (d, r, _, s) in zip(flanks, freedoms, strict=True):
+    for flank, (d, r, a, s) in zip(flanks, freedoms, strict=True):
         if flank.mean > 0.0:
             scale[d] = max(abs(float(linear.rest[d])), 0.1 * size)
-        for turn in (r, s):
+        for turn in (r, s, a if flank.tilt >= 0 else -1):
             if turn >= 0:
                 scale[turn] = size / (0.5 * model.meshes[0].module * 2.0 * math.pi)
     return scale

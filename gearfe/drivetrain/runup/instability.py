@@ -85,10 +85,11 @@ def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Array:
     """Derivatives of the forces (S, m, m) where each mesh carries its steady force times a factor, without motion."""
     u = np.tile(train.system.linear.rest, (len(theta), 1))
     for numbers, steady in zip(train.flanks_of_mesh, train.steady, strict=True):
-        flank, (along, turn) = train.forces.flanks[numbers[0]], train.forces.freedoms[numbers[0], :2]
+        flank, (along, turn, tilt) = train.forces.flanks[numbers[0]], train.forces.freedoms[numbers[0], :3]
         phase = flank.sense * (flank.ratio * (theta @ train.forces.turns[numbers[0]]) + u[:, turn]) + flank.phase
         if isinstance(flank, CurveFlank):
-            u[:, along] = flank.touch(phase) + factor * steady / flank.curve(phase).value
+            tilts = u[:, tilt] if flank.tilt >= 0 else 0.0
+            u[:, along] = factor * steady / flank.curve(phase).value - flank.beyond_touch(phase, np.zeros(()), tilts)
         else:
             u[:, along] = flank.gap + flank.law.approach(phase, factor * steady)
     return train.forces(theta, 1.0, u, np.zeros_like(u)).by_place

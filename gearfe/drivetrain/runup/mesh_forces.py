@@ -105,7 +105,7 @@ class MeshForces:
         Of all meshes.
     freedoms : (f, 4)
         For each flank the numbers of its approach and of its driver's rotation among the freedoms, and of the
-        displacement and turn that its friction acts on (-1 without).
+        displacement and turn that its friction acts on, or of the tilt of its gears (-1 without).
     turns : (f, n)
         For each flank the turns of the drive in a period of the phase that its mesh follows, negative where it turns
         backwards; 0 of other phases.
@@ -144,8 +144,10 @@ class MeshForces:
             begin = self._pairs.get((number, len(phase)))
             if begin is None:
                 begin = self._pairs[number, len(phase)] = np.zeros((len(phase), flank.law.slots))
-        slip = Slip(speed, du[:, [along, across, spin]], None if rubs is None else rubs.at(speed))
-        return flank.forces(phase, u[:, along] - flank.touch(phase), slip, begin)
+        tilt = u[:, across] if flank.tilt >= 0 else 0.0
+        rates = du[:, [along, across, turn if spin < 0 else spin]]
+        slip = Slip(speed, rates, None if rubs is None else rubs.at(speed), tilt)
+        return flank.forces(phase, flank.beyond_touch(phase, u[:, along], tilt), slip, begin)
 
     def __call__(self, theta: Array, speed: float, u: Array, du: Array) -> Pushes:
         """Forces at the freedoms, what the linear part has taken off."""
@@ -157,6 +159,12 @@ class MeshForces:
             value[:, d] += flank.mean * u[:, d] - at.force
             by_place[:, d, d] += flank.mean - at.tangent
             by_place[:, d, r] -= flank.sense * at.cross
+            if at.lever is not None and at.couple is not None and at.couple_by_phase is not None:
+                value[:, a] -= at.couple
+                by_place[:, d, a] -= at.tangent * at.lever
+                by_place[:, a, d] -= at.tangent * at.lever
+                by_place[:, a, a] -= at.tangent * at.lever**2
+                by_place[:, a, r] -= flank.sense * at.couple_by_phase
             if at.momentum is not None and at.per_rate is not None:
                 if momentum is None or momentum_by_place is None:
                     momentum, momentum_by_place = np.zeros_like(u), np.zeros_like(by_place)

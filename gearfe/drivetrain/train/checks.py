@@ -406,6 +406,12 @@ def _check_pitch_errors(label: str, gear: ShaftGear, law: bool) -> None:
 def _check_error(mesh: GearMesh, teeth: int) -> None:
     """The transmission error of a mesh covers one pitch of its driver, in finite numbers."""
     error, pitch = mesh.transmission_error, 2.0 * math.pi / teeth
+    if mesh.tilting is not None:
+        nodes = () if error is None else error.nodes
+        for table in (mesh.tilting.lever, mesh.tilting.moment):
+            if len(table.nodes) != len(nodes) or not np.allclose(table.nodes, nodes, rtol=0.0, atol=SAME * pitch):
+                problem = "must have the phases of the transmission error"
+                raise InputError(f"mesh {mesh.name!r} tilting", None, problem, "interpolate both over the same phases")
     if error is None:
         return
     label = f"mesh {mesh.name!r} transmission_error"

@@ -7,7 +7,8 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
   :math:`\varphi = s\,(g\psi + u_r) + \varphi_0` and r the driver's rotation. The part with the mean :math:`k_0` stands
   in the system's stiffness. A flank that may part bears where :math:`u_d > j`. A damper that acts in contact only
   adds :math:`-(c\,H(u_d - j)\,u_d' - c_0 u_d')`, H being Heaviside's step and :math:`c_0` what stands in the system's
-  damping;
+  damping. One that acts along the face width has the approach :math:`u_d + \ell(\varphi) u_t`, u_t the tilt of the
+  gears in the plane of action, and along it :math:`-(\ell F + m(\varphi))` with its spring force F;
 - of a *flank with a mesh law* (`gears.gearmesh.law`): :math:`-(F\,\langle 1 + \chi u_d'\rangle - k_0 u_d)` along d, and
   :math:`-s M` along r, the driver's rotation relative to the line of centres; with *friction* (`train.friction`)
   :math:`-\sum\mu N_k s(v_k/v_0)` across the line of action, and that times :math:`e_k` along the driver's turn
@@ -32,6 +33,7 @@ import numpy as np
 
 from ...base.typing import Array, BoolArray, IntArray
 from ...gears.gearmesh.law import MeshForces, MeshLaw
+from ...gears.gearmesh.mesh_table import Tilting
 from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...multibody.series.timefunctions import TimeFunction
 from .friction import Sliding, smooth_sign
@@ -68,15 +70,19 @@ class FlankForces(NamedTuple):
     momentum: Array | None = None  # N s: its rate of change is the damper's part of the force, which jumps at the touch
     momentum_by_phase: Array | float = 0.0  # N s/rad
     push: Array | float = 0.0  # N: the damper's part of the force
+    lever: Array | None = None  # m: approach per tilt of the gears, and moment on it per spring force
+    couple: Array | None = None  # N m on the tilt
+    couple_by_phase: Array | None = None  # N m/rad
 
 
 class Slip(NamedTuple):
-    """What friction and damping depend on: psi' (1/s), rates of approach, of the way across and of the turn (n, 3), and
-    the friction itself."""
+    """What forces depend on beside phase and approach: psi' (1/s), rates of approach, of the way across and of the turn
+    (n, 3), friction, tilt."""
 
     rate: Array | float
     rates: Array
     sliding: Sliding | None
+    tilt: Array | float = 0.0  # rad: of the gears, for flanks that act along the face width
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +101,11 @@ class MeshFlank(ABC):
         Approach (m) at which unmodified flanks touch.
 
     Flanks also have a `mean_damping` (N s/m), which the system's constant part has along the approach already, and a
-    `damping` that acts while their teeth bear.
+    `damping` that acts while their teeth bear. `tilt` is the number of the tilt of the gears among the directions, of
+    flanks that act along the face width, else -1.
     """
+
+    tilt = -1
 
     direction: int
     turn: int
@@ -130,10 +139,18 @@ class MeshFlank(ABC):
         """Approach (m) at which its flanks touch at phases (rad), except for what a law adds itself."""
         return np.asarray(self.gap)
 
+    def beyond_touch(self, phase: Array, approach: Array, tilt: Array | float) -> Array:  # noqa: ARG002
+        """Approach beyond the touch (m) at phases (rad), approaches (m) and tilts of the gears (rad), (n,)."""
+        return np.asarray(approach - self.touch(phase))
+
     def phase_and_approach(self, angle: Array, u: Array) -> tuple[Array, Array]:
         """Phase (rad) and approach beyond the touch (m), u of shape (n, directions)."""
         phase = self.sense * (self.ratio * angle + u[:, self.turn]) + self.phase
-        return phase, u[:, self.direction] - self.touch(phase)
+        return phase, self.beyond_touch(phase, u[:, self.direction], self.tilt_of(u))
+
+    def tilt_of(self, u: Array) -> Array | float:
+        """Tilt of the gears (rad) where the flank acts along the face width, u of shape (n, directions)."""
+        return np.asarray(u[:, self.tilt]) if self.tilt >= 0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +159,8 @@ class CurveFlank(MeshFlank):
 
     `damping` is c (N s/m) of a damper that acts in contact only: at the touch its force jumps. `error` is e (m), the
     unloaded static transmission error, on the nodes of the curve, or None. Dampers act on the rate of approach - e;
-    `always` is c (N s/m) of the one that the system's constant part has along the approach.
+    `always` is c (N s/m) of the one that the system's constant part has along the approach. `tilting`, on the nodes of
+    the curve too, says how the flank acts along the face width; its stiffness is in the system's constant part.
     """
 
     sliding: ClassVar[None] = None
@@ -152,6 +170,13 @@ class CurveFlank(MeshFlank):
     mean_damping: float = 0.0
     error: PeriodicInterpolant | None = None
     always: float = 0.0
+    tilt: int = -1
+    tilting: Tilting | None = None
+
+    def beyond_touch(self, phase: Array, approach: Array, tilt: Array | float) -> Array:
+        """Approach beyond the touch (m) at phases (rad), approaches (m) and tilts of the gears (rad), (n,)."""
+        beyond = approach - self.touch(phase)
+        return np.asarray(beyond if self.tilting is None else beyond + self.tilting.lever(phase).value * tilt)
 
     def touch(self, phase: Array) -> Array:
         """Approach (m) at which its flanks touch at phases (rad): gap and transmission error."""
@@ -174,16 +199,24 @@ class CurveFlank(MeshFlank):
         k, slope = self.curve(phase)
         bears = self.bears(phase, approach)
         late, rise = (0.0, 0.0) if self.error is None else self.error(phase)
-        force, tangent, cross = (np.where(bears, x, 0.0) for x in (k * approach, k, slope * approach - k * rise))
+        along: dict[str, Array] = {}
+        if self.tilting is not None:
+            lever, more = self.tilting.lever(phase)
+            moment, steep = self.tilting.moment(phase)
+        closing = rise if self.tilting is None else rise - more * slip.tilt
+        force, tangent, cross = (np.where(bears, x, 0.0) for x in (k * approach, k, slope * approach - k * closing))
+        if self.tilting is not None:
+            by_phase = more * force + lever * cross + steep
+            along = {"lever": lever, "couple": lever * force + moment, "couple_by_phase": by_phase}
         never = np.zeros(len(phase), dtype=bool)
         if not (self.damping > 0.0 or (self.error is not None and self.always > 0.0)):
-            return FlankForces(force, tangent, cross, ~bears, never)
+            return FlankForces(force, tangent, cross, ~bears, never, **along)
         c, momentum = np.where(bears, self.damping, 0.0), np.where(bears, self.damping * approach, 0.0)
         turning = self.sense * (self.ratio * slip.rate + slip.rates[:, 2])
         push = c * slip.rates[:, 0] - (c + self.always) * rise * turning
         return FlankForces(
             force + push, tangent, cross, ~bears, never, per_rate=c, momentum=momentum - self.always * late,
-            momentum_by_phase=-(c + self.always) * rise, push=push,
+            momentum_by_phase=-(c + self.always) * rise, push=push, **along,
         )  # fmt: skip
 
     def bears(self, phase: Array, approach: Array) -> BoolArray:  # noqa: ARG002
@@ -304,7 +337,7 @@ class TrainForces:
         for flank in self.flanks:
             sliding = flank.sliding
             across = (flank.direction, flank.turn) if sliding is None else (sliding.across, sliding.spin)
-            slip = Slip(rate, du[:, [flank.direction, *across]], sliding)
+            slip = Slip(rate, du[:, [flank.direction, *across]], sliding, flank.tilt_of(u))
             forces.append(flank.forces(*flank.phase_and_approach(angle, u), slip))
         return forces
 
@@ -320,6 +353,8 @@ class TrainForces:
             out[:, flank.direction] -= made.force
             if made.moment is not None:
                 out[:, flank.turn] -= flank.sense * made.moment
+            if made.couple is not None:
+                out[:, flank.tilt] -= made.couple
             if flank.sliding is not None and made.drag is not None:
                 out[:, flank.sliding.across] -= made.drag.value[:, 0]
                 out[:, flank.sliding.spin] -= made.drag.value[:, 1]

@@ -19,6 +19,7 @@ from ...base.typing import Array
 from ...fem.reduction.modal_body import ModalBody
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
+from ...gears.gearmesh.mesh_table import Tilting
 from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.mesh_geometry import ContactModel
 from ...gears.geometry.pair import Gear, MeshGeometry
@@ -175,6 +176,9 @@ class GearMesh:
     transmission_error
         Unloaded static transmission error e over the driver's rotation (m over rad), of one pitch: the approach at
         which the flanks touch, positive where the driven gear stays behind. For meshes with a curve or a constant.
+    tilting
+        How the driving flanks act along the face width; beside a transmission error on the same phases. None: in the
+        middle of the common width, without a stiffness against tilting.
     """
 
     driver: str
@@ -189,10 +193,21 @@ class GearMesh:
     damping_acts: str | None = None
     name: str = ""
     transmission_error: PeriodicInterpolant | None = None
+    tilting: Tilting | None = None
 
     def __post_init__(self) -> None:
         if not self.name:
             object.__setattr__(self, "name", f"{self.driver}-{self.driven}")
+
+    @property
+    def back_error(self) -> PeriodicInterpolant | None:
+        """Transmission error of the back flanks over their own phase, which runs backwards.
+
+        Given data are of a tooth position, whose error has the other sign on back flanks. Data of flanks along the face
+        width are those of the mirrored position.
+        """
+        error = self.transmission_error
+        return error if error is None or self.tilting is not None else error.reversed()
 
     @property
     def damps_in_contact(self) -> bool:

@@ -27,6 +27,10 @@ A mesh with given data has an unloaded static transmission error e over the phas
 
 positive where the driven gear stays behind; on the back flanks, behind the backlash, e counts with the other sign.
 
+A spring whose load varies along the face width (`gears.gearmesh.mesh_table.Tilting`) acts at P moved along the axis by
+:math:`\ell(\varphi)`, whose mean is in the rows, and has a moment and a stiffness against the tilt
+:math:`\gamma = (\theta_1 - \theta_2)\cdot(a\times n)` of the gears.
+
 A mesh law (`gears.gearmesh.law`) replaces :math:`k\,\delta`. Its phase is the driver's rotation relative to the
 line of centres, whose turn is :math:`t\cdot(u_2 - u_1)/a` with the displacements of the gears' centres, and its moment
 M acts on that: on the driver, and across the line of centres. The back flanks, where a backlash j is known, have the
@@ -91,6 +95,9 @@ class MeshLine:
         then those of friction.
     spin : ndarray, shape (system size,)
         Rotation of the driver about its axis beside rolling.
+    tilt : ndarray, shape (system size,)
+        Tilt of the gears in the plane of action, > 0 where it closes the driving flanks towards larger coordinates
+        along the axis.
     flanks
         Driving flanks, and the back flanks behind a backlash; none of a rigid mesh.
     rayleigh
@@ -109,6 +116,7 @@ class MeshLine:
     row: Array
     columns: tuple[Array, ...]
     spin: Array
+    tilt: Array
     flanks: tuple[Flank, ...]
     rayleigh: float
     reference: float
@@ -206,7 +214,17 @@ class MeshLine:
             return LinearJoint(tuple(bodies), self.row[None, :], np.zeros(1), name=f"mesh {self.name}")
         square = np.outer(self.row, self.row)
         damping = self.rayleigh if self.in_contact else self.damping
-        return LinearForce(tuple(bodies), damping * square, self.mean * square, f"mesh {self.name}")
+        C, K = damping * square, self.mean * square
+        if self.given.tilting is not None:
+            against = self.given.tilting.stiffness * np.outer(self.tilt, self.tilt)
+            C, K = C + self.rayleigh / self.mean * against, K + against
+        return LinearForce(tuple(bodies), C, K, f"mesh {self.name}")
+
+    @property
+    def preload(self) -> Array:
+        """Generalised force (system size,) of the mean moment that its spring has along the face width without tilt."""
+        tilting = self.given.tilting
+        return np.zeros_like(self.tilt) if tilting is None else -tilting.moment.mean * self.tilt
 
 
 @dataclass(frozen=True)
@@ -264,6 +282,7 @@ class _Directions(NamedTuple):
     across: tuple[Array, Array]  # displacement of driver against driven gear at P along a x n and a x n_b
     spin: Array  # the driver's turn
     spins: Array  # the driver's turn against the driven gear's
+    tilt: Array  # tilt of the gears against each other in the plane of action
 
 
 def mesh_lines(train: GearTrain, shafts: Shafts) -> tuple[MeshLine, ...]:
@@ -300,6 +319,10 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
     if law is None and shafts.bodies[i].size > 6:  # a section of an elastic shaft turns by itself
         turn = first + len(columns)
         columns.append(along.spin)
+    tilt = -1
+    if mesh.tilting is not None:
+        tilt = first + len(columns)
+        columns.append(along.tilt)
     if law is not None:
         turn = first + len(columns)
         columns.append(along.turn)
@@ -312,16 +335,24 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
             chi = in_contact[0] / reference
             flanks.append(LawFlank(*place, law.sides[side], chi, rubs, shifts[side], mean_damping))
         elif mesh.stiffness is not None:
-            curve, error = mesh.interpolant(), mesh.transmission_error
+            curve, error = mesh.interpolant(), mesh.back_error if side else mesh.transmission_error
             always = 0.0 if side or mesh.damps_in_contact else mesh.damping + rayleigh
-            if error is not None:  # of the same tooth position on back flanks, whose phase runs backwards
-                curve, error = on_common_nodes(curve, error if sign > 0.0 else error.reversed())
-            parts = backlash is not None
-            flanks.append(CurveFlank(*place, curve, parts, in_contact[0], mean_damping, error, always))
+            if error is not None:
+                curve, error = on_common_nodes(curve, error)
+            parts, along_width = backlash is not None, {}
+            if mesh.tilting is not None and sign > 0.0:
+                centred = replace(mesh.tilting, lever=_without_mean(mesh.tilting.lever))
+                along_width = {"tilt": tilt, "tilting": centred}
+            flanks.append(CurveFlank(*place, curve, parts, in_contact[0], mean_damping, error, always, **along_width))
     return MeshLine(
         mesh, pair, i, along.direction, along.point, along.axial, along.row, tuple(columns) if flanks else (),
-        along.spin, tuple(flanks), rayleigh, reference,
+        along.spin, along.tilt, tuple(flanks), rayleigh, reference,
     )  # fmt: skip
+
+
+def _without_mean(curve: PeriodicInterpolant) -> PeriodicInterpolant:
+    """Return a function less its mean."""
+    return replace(curve, cubics=curve.cubics - curve.mean * np.array([1.0, 0.0, 0.0, 0.0]))
 
 
 def _stiffness(mesh: GearMesh, force: float) -> tuple[MeshLaw | None, float | None, float, float]:
@@ -362,8 +393,10 @@ def _directions(train: GearTrain, mesh: GearMesh, pair: GearPair, sense: float, 
     turn = relative(along / distance, centre, centre + arm) + spin
     slides = relative(np.cross(a, line), point, point), relative(np.cross(a, back), point, point)
     axial = -sense * pair.pinion.twist_rate * pair.pinion.base_radius
-    rows = relative(line + axial * a, point, point), relative(back - axial * a, point, point)
-    return _Directions(line, point, axial, *rows, turn, slides, spin, spins)
+    tilt = relative(line, point + a, point + a) - relative(line, point, point)
+    place = point if mesh.tilting is None else point + mesh.tilting.lever.mean * a
+    rows = relative(line + axial * a, place, place), relative(back - axial * a, point, point)
+    return _Directions(line, point, axial, *rows, turn, slides, spin, spins, tilt)
 
 
 def _sliding(mesh: GearMesh, pair: GearPair, force: float, ratios: tuple[float, float], speed: float) -> Sliding | None:

@@ -124,7 +124,7 @@ def static_state(model: TrainModel) -> Array | None:
     if model.operating.bearings:
         return model.operating.coordinates
     modal = model.modal
-    push = modal.constant.copy()
+    push = modal.constant + modal.T.T @ model.preload
     for direction, torque in model.torques:
         push += modal.T.T @ direction * float(replace(torque, sines=())(model.torque_end))
     K = np.diag(modal.eigenvalues) + modal.T.T @ model.back_flanks @ modal.T

@@ -178,6 +178,13 @@ class TrainModel(Facts):
         return change
 
     @property
+    def preload(self) -> Array:
+        """Generalised forces (size,) of the mean moments of meshes along their face widths, on the driving flanks."""
+        steady = self.kinematics.steady_forces.tolist()
+        moments = [line.preload for line, force in zip(self.meshes, steady, strict=True) if force > 0.0]
+        return np.asarray(sum(moments, np.zeros(self.system.size)))
+
+    @property
     def placed(self) -> Shafts:
         """The shafts in the coordinates of the system."""
         return Shafts(self.shafts, self.first, tuple(self.ratios), self.system.size)
@@ -237,7 +244,7 @@ def _operating_point(train: GearTrain) -> OperatingPoint:
             stiffness -= motions[item.bore].T @ item.stiffness_matrix @ motions[item.bore]
     stiffness += model.back_flanks
     end = model.load_end
-    force = np.zeros(placed.size)
+    force = model.preload
     for load in train.loads:
         force += _acts(train, load, placed) * float(replace(load.torque, sines=())(end))
     return operating_point(bearings, motions, stiffness, model.modal.T, force)

@@ -22,7 +22,7 @@ from .series import Flanks, Gyros, Places, Program, Slides
 #: In place of the friction of flanks without any.
 SMOOTH = Sliding(0.0, 1.0, 0, 0, 0.0, 0.0, 0.0, 0.0)
 #: Columns of whole numbers.
-WHOLE = ("direction", "turn", "across", "spin")
+WHOLE = ("direction", "turn", "across", "spin", "tilt")
 
 
 def train_program(forces: TrainForces) -> tuple[Program, int, int]:
@@ -34,13 +34,18 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
     places, shifts, watches = [], [], []
     curves: list[PeriodicInterpolant] = []
     errors: list[PeriodicInterpolant] = []
+    levers: list[PeriodicInterpolant] = []
+    moments: list[PeriodicInterpolant] = []
     for number, flank in enumerate(forces.flanks):
         watches += _watches(number, flank, rows, slots)
         if isinstance(flank, CurveFlank):
             places.append((len(curves), 0, rows, pieces))
             shifts.append(np.zeros(1))
             curves.append(flank.curve)
-            errors.append(flank.error or replace(flank.curve, cubics=np.zeros_like(flank.curve.cubics)))
+            none = replace(flank.curve, cubics=np.zeros_like(flank.curve.cubics))
+            errors.append(flank.error or none)
+            levers.append(none if flank.tilting is None else flank.tilting.lever)
+            moments.append(none if flank.tilting is None else flank.tilting.moment)
             rows, pieces = rows + series.PER_CURVE, pieces + series.PER_FLANK
         else:
             places.append((-1, order.index(id(flank.law)), rows, pieces))
@@ -57,7 +62,7 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
         Places(curve, law, row, piece, np.cumsum([0, *map(len, shifts)]), np.concatenate([np.zeros(0), *shifts])),
         np.array(watches, dtype=np.int64).reshape(-1, 4),
         curve_arrays(curves),
-        curve_arrays(errors).cubics,
+        *(curve_arrays(tables).cubics for tables in (errors, levers, moments)),
         laws,
     )
     return program, rows, pieces

@@ -20,9 +20,10 @@ from .friction import product, smoothed_sign
 
 #: Rows of a flank: phase from the cell's node with its square and cube, approach, numbers of the cell (four
 #: coefficients, then the phase of its node); of one with a curve then its stiffness, the numbers of its transmission
-#: error, the slope of that, and the rate of the phase; of one with a mesh law 1 + chi
+#: error, the slope of that, the rate of the phase, and along the face width the tilt, the lever with its numbers, those
+#: of the moment, and the spring force; of one with a mesh law 1 + chi
 #: delta', J, forces at the end of the step before, sliding for unit e.
-Z, Z2, Z3, DELTA, CELL, STIFFNESS, ERROR, RISES, TURNING, PER_CURVE = range(10)
+Z, Z2, Z3, DELTA, CELL, STIFFNESS, ERROR, RISES, TURNING, TIPPED, OFFSET, OFFSETS, MOMENTS, PRESS, PER_CURVE = range(15)
 DAMPED, JACOBIAN, BEFORE, SPIN, SLOTS = range(STIFFNESS, STIFFNESS + 5)
 #: Rows of a slot: f = F - F_0, F, gap of a pair that does not bear, Lambda's inner polynomials (Horner), coefficients
 #: of t (then F_0), and of the energy; t', inner polynomials of the energy's slope, normal force; of friction e with its
@@ -68,6 +69,7 @@ class Flanks(NamedTuple):
     damping: Array
     mean_damping: Array
     always: Array
+    tilt: IntArray
 
 
 class Slides(NamedTuple):
@@ -105,6 +107,8 @@ class Program(NamedTuple):
     watches: IntArray  # (w, 4): what, flank, row, slot
     curves: Curves
     errors: Array  # (all nodes, 4) transmission errors over the phase, on the nodes of the curves
+    levers: Array  # (all nodes, 4) places along the face width, alike
+    moments: Array  # (all nodes, 4) moments along the face width, alike
     laws: Laws
 
 
@@ -163,13 +167,22 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
         else:
             memory[row + STIFFNESS, j] = _cubic(j, row, row + CELL, 0, memory)
             memory[row + DELTA, j] -= _cubic(j, row, row + ERROR, 0, memory)
+            tilt = p.flanks.tilt[k]
+            if tilt >= 0:
+                memory[row + TIPPED, j] = u[tilt, j]
+                memory[row + OFFSET, j] = _cubic(j, row, row + OFFSETS, 0, memory)
+                memory[row + DELTA, j] += product(j, row + OFFSET, row + TIPPED, memory)
+                out[tilt] -= _cubic(j, row, row + MOMENTS, 0, memory)
             memory[row + RISES, j] = _cubic_slope(j, row, row + ERROR, 0, memory)
             turned = p.flanks.ratio[k] * memory[0, j + 1] + u[p.flanks.turn[k], j + 1]
             memory[row + TURNING, j] = p.flanks.sense[k] * rate * turned
             late = product(j, row + RISES, row + TURNING, memory)  # rate of the transmission error
             out[d] += p.flanks.always[k] * late
             if pieces[p.places.piece[k] + 2] >= 0:
-                out[d] -= product(j, row + STIFFNESS, row + DELTA, memory)
+                memory[row + PRESS, j] = product(j, row + STIFFNESS, row + DELTA, memory)
+                out[d] -= memory[row + PRESS, j]
+                if tilt >= 0:
+                    out[tilt] -= product(j, row + OFFSET, row + PRESS, memory)
                 out[d] -= p.flanks.damping[k] * (rate * u[d, j + 1] - late)
 
 
@@ -317,6 +330,8 @@ def _step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray
             for a in range(4):
                 memory[row + CELL, a] = p.curves.cubics[first + cell, a]
                 memory[row + ERROR, a] = p.errors[first + cell, a]
+                memory[row + OFFSETS, a] = p.levers[first + cell, a]
+                memory[row + MOMENTS, a] = p.moments[first + cell, a]
             continue
         law = p.places.law[k]
         cycle = p.laws.nodes[law, p.laws.cells[law]] - p.laws.nodes[law, 0]

@@ -151,10 +151,13 @@ def _approach(mesh: GearMesh, force: float, phase: Array, shifts: tuple[Array, A
             return None
         return _side(lambda x: acting.approach(x, abs(force), late(x)), phase, force, gap)
     curve = mesh.interpolant()
-    error = 0.0 if mesh.transmission_error is None else np.asarray(mesh.transmission_error(phase).value)
-    if gap is None:  # a spring that acts both ways
-        return error + force / np.asarray(curve(phase).value)
-    return error + _side(lambda x: abs(force) / np.asarray(curve(x).value), phase, force, gap)
+    error = mesh.transmission_error if force >= 0.0 or gap is None else mesh.back_error
+
+    def yielding(x: Array) -> Array:
+        late = 0.0 if error is None else error(x).value
+        return np.asarray(late + (force if gap is None else abs(force)) / curve(x).value)
+
+    return _side(yielding, phase, force, gap)
 
 
 def _side(approach: Callable[[Array], Array], phase: Array, force: float, gap: float | None) -> Array:

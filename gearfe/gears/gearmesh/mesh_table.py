@@ -34,11 +34,37 @@ TABLE = "mesh table"
 
 
 @dataclass(frozen=True, eq=False)
+class Tilting:
+    r"""How a mesh spring acts along the face width, about the middle of the common width, y from there along the axis.
+
+    Under the approach delta in the middle and the tilt gamma in the plane of action, beside that of the data,
+
+    .. math:: F = k\,(\delta + \ell\,\gamma - e), \qquad M = \ell\,F + m + \kappa\,\gamma .
+
+    Attributes
+    ----------
+    lever : PeriodicInterpolant
+        y at which the tangent stiffness acts (m) over the driver's rotation (rad).
+    moment : PeriodicInterpolant
+        m, the moment of the force about there (N m).
+    stiffness
+        kappa, against tilting about there (N m/rad).
+    """
+
+    lever: PeriodicInterpolant
+    moment: PeriodicInterpolant
+    stiffness: float
+
+
+@dataclass(frozen=True, eq=False)
 class MeshTable:
-    """Stiffness k (N/m), alike or over the driver's rotation (rad), and unloaded static transmission error e (m)."""
+    """Stiffness k (N/m), alike or over the driver's rotation (rad), unloaded static transmission error e (m), and how
+    the spring acts along the face width where that is known.
+    """
 
     stiffness: PeriodicInterpolant | float
     transmission_error: PeriodicInterpolant
+    tilting: Tilting | None = None
 
 
 def read_mesh_table(path: str | Path, pitch: float, driven_base_radius: float, *, method: str = "cubic") -> MeshTable:

@@ -8,6 +8,12 @@ pinion and the tangent k at each position, the mesh is the spring
 
 which has the force and the tangent of the contact at that torque: its static transmission error under the torque is
 that of the contact. A mean stiffness :math:`k_m` has :math:`e = \delta_0 - F_0/k_m`.
+
+**Tilting.** With the approach at y from the middle of the common width, :math:`\delta + y\gamma` under a tilt
+:math:`\gamma` in the plane of action, the tangent of force and moment is :math:`k, k\ell, k_{\gamma\gamma}`. So the
+spring acts at the lever :math:`\ell`, has the stiffness :math:`\kappa = k_{\gamma\gamma} - k\ell^2` against tilting
+about there, whose mean over the positions is taken, and the moment :math:`m = M_0 - \ell F_0` there
+(`.mesh_table.Tilting`). Tilts across the plane of action do nothing to involutes.
 """
 
 from __future__ import annotations
@@ -24,9 +30,9 @@ from ..contact.laws import check_alike
 from ..width import contact_lines, sweep_width, wide_compliance
 from ..width.sweep import CONVERGED
 from .job import PACKAGES, StiffnessJob
-from .mesh_table import MeshTable
+from .mesh_table import MeshTable, Tilting
 from .periodic import periodic_interpolant
-from .width_job import check_width_job, wide_flanks, wide_mesh
+from .width_job import axial_sense, check_width_job, wide_flanks, wide_mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +49,21 @@ class WidthStates:
         Along the line of action, from where unmodified flanks touch (m).
     stiffness : ndarray, shape (n,)
         dF/d approach (N/m).
+    lever : ndarray, shape (n,)
+        y of that stiffness from the middle of the common width (m), along the axes of the job file.
+    moment : ndarray, shape (n,)
+        Moment of the force about the middle of the common width (N m), > 0 for a force at larger y.
+    against_tilting : ndarray, shape (n,)
+        Stiffness against tilts in the plane of action about the lever (N m/rad).
     """
 
     angle: Array
     force: Array
     approach: Array
     stiffness: Array
+    lever: Array
+    moment: Array
+    against_tilting: Array
 
 
 def width_states(
@@ -78,12 +93,17 @@ def width_states(
 
     def solve() -> dict[str, Array]:
         sweep = sweep_width(contact_lines(wide_compliance(mesh), flanks), **load, angles=angles)
-        radius = mesh.sections.wheel.base_radius
+        radius, sense, points = mesh.sections.wheel.base_radius, axial_sense(job), sweep.points
         solved = sweep.status[0] == CONVERGED
+        tangent = sweep.tangent[0]
+        forces = points.line_load * points.weight * (points.z - 0.5 * sum(mesh.zone))
         states = {
             "force": sweep.torque[0] / radius,
             "approach": sweep.transmission_error[0],
-            "stiffness": sweep.stiffness[0] / radius**2,
+            "stiffness": tangent[:, 0, 0] / radius**2,
+            "lever": sense * radius * tangent[:, 0, 1] / tangent[:, 0, 0],
+            "moment": sense * np.bincount(points.position, forces, len(angles)),
+            "against_tilting": tangent[:, 1, 1] - tangent[:, 0, 1] ** 2 / tangent[:, 0, 0],
         }
         return {name: np.where(solved, values, np.nan) for name, values in states.items()}
 
@@ -121,4 +141,9 @@ def mesh_spring(states: WidthStates, pitch: float, *, mean: bool, method: str = 
         stiffness = float(stiffness.mean)
         softness = 1.0 / stiffness
     error = states.approach - states.force * softness
-    return MeshTable(stiffness, periodic_interpolant(states.angle, error, pitch, method=method))
+    moment = states.moment - states.lever * states.force
+    error_, lever, moment_ = (
+        periodic_interpolant(states.angle, values, pitch, method=method) for values in (error, states.lever, moment)
+    )
+    against = float(periodic_interpolant(states.angle, states.against_tilting, pitch, method=method).mean)
+    return MeshTable(stiffness, error_, Tilting(lever, moment_, max(0.0, against)))
