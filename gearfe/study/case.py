@@ -5,13 +5,16 @@ from __future__ import annotations
 import copy
 import ctypes
 import functools
+import itertools
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..base.config import set_key
 from ..base.errors import InputError
@@ -46,6 +49,10 @@ class Task:
         Parameter -> names of further keys that take its value.
     mesh
         Mesh of the job, where it has several.
+    worst_over
+        Name of a key -> values; each case is solved at all of their combinations.
+    least
+        Outputs of which the least over these counts; of the others the largest does.
     """
 
     kind: str
@@ -56,6 +63,16 @@ class Task:
     outputs: Mapping[str, str]
     also: Mapping[str, Sequence[str]]
     mesh: str | None = None
+    worst_over: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    least: tuple[str, ...] = ()
+
+    def combinations(self, values: Sequence[Any]) -> Iterator[dict[str, Any]]:
+        """Yield the tables of the job with these values at all combinations of what the worst is taken over."""
+        for combination in itertools.product(*self.worst_over.values()):
+            made = self.tables(values)
+            for name, value in zip(self.worst_over, combination, strict=True):
+                set_key(made, name, value, f"study.worst_over.{name}")
+            yield made
 
     def tables(self, values: Sequence[Any]) -> dict[str, Any]:
         """Tables of the job with these values."""
@@ -82,15 +99,25 @@ class Row:
 
 
 def evaluate(task: Task, values: Sequence[Any], shared: Shared) -> tuple[dict[str, float], Answer]:
-    """Outputs of a case, and the job's answer.
+    """Outputs of a case, and the job's answer: the first that has a problem where there are several.
 
     Raises
     ------
     InputError
         What the job's command would refuse, and outputs that the job does not give.
     """
-    answer = solve(task.kind, task.tables(values), task.path, shared, estimate=task.estimate, mesh=task.mesh)
-    return {name: value_of(output, answer) for name, output in task.expressions().items()}, answer
+    expressions, rows = task.expressions(), list[list[float]]()
+    first: Answer | None = None
+    for tables in task.combinations(values):
+        answer = solve(task.kind, tables, task.path, shared, estimate=task.estimate, mesh=task.mesh)
+        rows.append([value_of(output, answer) for output in expressions.values()])
+        first = answer if first is None or not first.problem else first
+    assert first is not None
+    worst = {
+        name: float(np.min(values) if name in task.least else np.max(values))  # NaN where one is
+        for name, values in zip(expressions, zip(*rows, strict=True), strict=True)
+    }
+    return worst, first
 
 
 def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -> Row:

@@ -19,7 +19,7 @@ from ..base.tables.study import StudyTable
 from .case import DIED, ERROR, HERE, INVALID, Row, Task, evaluate, files_named
 from .design import Cases, study_cases
 from .journal import Journal, only_writer
-from .parameters import Parameter
+from .parameters import WHERE, Parameter, read_parameters
 from .run import serially, side_by_side
 from .statistics import StudyResult
 
@@ -127,11 +127,44 @@ def read_study(path: str | Path) -> Study:
     parameters, cases = study_cases(table, path.parent, tables)
     names = tuple(one.name for one in parameters)
     also = {one.name: one.also for one in parameters}
-    task = Task(table.job, base, tables, table.estimate, names, table.outputs, also, table.mesh)
+    worst_over, least = _worst(table, names, tables)
+    task = Task(table.job, base, tables, table.estimate, names, table.outputs, also, table.mesh, worst_over, least)
     task.expressions()
     for case in cases[:1]:
         task.tables(case)
     return Study(path, table, parameters, cases, task)
+
+
+def _worst(
+    table: StudyTable, names: Sequence[str], base: Mapping[str, Any]
+) -> tuple[dict[str, tuple[Any, ...]], tuple[str, ...]]:
+    """Values that the worst is taken over by key, and the outputs of which the least is the worst.
+
+    Raises
+    ------
+    InputError
+        For keys that do not exist or are varied, too, what is no list, and outputs whose worst is open.
+    """
+    if not table.worst_over:
+        return {}, ()
+    try:
+        parameters = read_parameters(table.worst_over, table.job, base)
+    except InputError as error:
+        field = error.field.replace(f"{WHERE}.", "study.worst_over.")
+        raise InputError(field, error.value, error.problem, error.cure) from None
+    for one in parameters:
+        if not one.values:
+            raise InputError(
+                f"study.worst_over.{one.name}", None, "must be a list of values", "write it as [low, high]"
+            )
+        if one.name in names:
+            raise InputError(f"study.worst_over.{one.name}", None, "is varied, too", "leave it out of the parameters")
+    for name, limit in table.limits.items():
+        if limit.low is not None and limit.high is not None:
+            problem = "has two limits, so its worst over other values is open"
+            raise InputError(f"study.limits.{name}", [limit.low, limit.high], problem, "make an output for each limit")
+    low = [name for name, limit in table.limits.items() if limit.high is None and name not in table.minimise]
+    return {one.name: tuple(one.values) for one in parameters}, (*table.maximise, *low)
 
 
 def check_outputs(study: Study) -> dict[str, float]:

@@ -97,6 +97,11 @@ class StudyTable:
     parameters: dict[str, Any] = quantity(  # noqa: RUF009
         dict, doc="dotted name of a key of the job -> list of values, or low and high, mean and deviation, or iso_class"
     )
+    worst_over: dict[str, Any] = quantity(  # noqa: RUF009
+        dict,
+        doc="dotted name of a key -> list of values: each case is solved at all their combinations, and the worst of "
+        "each output counts: the least of one in maximise or with a lower limit alone, else the largest",
+    )
     outputs: dict[str, str] = quantity(  # noqa: RUF009
         doc="name -> expression of the job's columns and of summary, as `ptp(transmission_error_um)`"
     )

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...base.cache import cache_key
 from ...base.errors import InputError
 from ...base.progress import Stopwatch
 from ...base.tables.gearbox import TILTS
@@ -251,7 +252,8 @@ def _topography(table: FlankTable, gear: Gear, face: tuple[float, float], sense:
 
 
 def job_lines(job: StiffnessJob, *, keep: Keep | None = None, watch: Stopwatch | None = None) -> ContactLines:
-    """Return the lines of contact of a job; the elastic gears are kept, which flanks and loads do not change.
+    """Return the lines of contact of a job; the elastic gears are kept, which flanks and loads do not change, and the
+    laws of the last profiles.
 
     Parameters
     ----------
@@ -271,7 +273,14 @@ def job_lines(job: StiffnessJob, *, keep: Keep | None = None, watch: Stopwatch |
 
     compliance = make() if keep is None else keep("wide", make)
     with watch.stage("lines of contact"):
-        return contact_lines(compliance, flanks)
+        if keep is None:
+            return contact_lines(compliance, flanks)
+        last: dict[str, ContactLines] = keep("lines", dict)
+        profiles = cache_key("profiles", flanks.profiles)
+        if profiles not in last:
+            last.clear()
+            last[profiles] = contact_lines(compliance, flanks)
+        return last[profiles].with_flanks(flanks)
 
 
 def stiffness_sweep(job: StiffnessJob, lines: ContactLines, watch: Stopwatch | None = None) -> WidthSweep:
