@@ -75,16 +75,13 @@ def run_along_width(
         width_job.check_map_job(job, loads)
     folder = output_folder(args.out)
     lines = width_job.job_lines(job, watch=watch)
-    if loads is None:
-        sweep = width_job.stiffness_sweep(job, lines, watch)
-    else:
-        sweep = width_job.map_sweep(job, lines, loads, watch)
+    sweep = width_job.job_sweep(job, lines, loads, watch)
     wide, name = lines.compliance.mesh, "stiffness" if loads is None else "loadmap"
     flanks = flank_loads(job, wide, sweep)
     tables = {} if loads is None else {loads.NAME: asdict(loads)}
     errors = None
-    if loads is None and not args.no_estimate and (sweep.status == "converged").any():
-        errors = width_job.estimated_errors(job, lines, sweep, watch)
+    if not args.no_estimate and (sweep.status == "converged").any():
+        errors = width_job.estimated_errors(job, lines, sweep, loads, watch)
     roots = None
     if loads is not None and loads.root_stress and (sweep.status == "converged").any():
         from ..gears.gearmesh.width_root import wide_roots

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..base.errors import InputError
 from ..base.tables.loadmap import LoadMapTable
 from ..base.tables.pair import StiffnessTable, check_law
 from .arguments import (
@@ -46,6 +47,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_keys(parser, LoadMapTable, *LOADS, spacing="torque_spacing")
     add_keys(parser, StiffnessTable, *MODEL)
+    parser.add_argument(
+        "--no-estimate",
+        action="store_true",
+        help="leave out the error estimate of loads that vary along the face width",
+    )
     add_removed(parser, StiffnessTable.REMOVED)
     add_removed(parser, {"flank": ("is a key of [microgeometry]", "write --set microgeometry.flank=right")})
 
@@ -69,6 +75,9 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
         from .along_width import run_along_width
 
         return run_along_width(args, mesh, pair, started, table)
+    if args.no_estimate:
+        problem = "is for loads that vary along the face width"
+        raise InputError("--no-estimate", None, problem, "leave it out: maps of loads alike along it have no estimate")
 
     from ..base.files import output_folder, whole_set, write_csvs, write_json
     from ..base.progress import Stopwatch

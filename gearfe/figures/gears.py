@@ -122,15 +122,18 @@ def _panels(pair: GearPair) -> tuple[Any, Any, Any]:
 def _draw_helices(axes: Any, pair: GearPair, pinion_angle: float) -> None:
     """Both gears seen along +y: the middles of their tips on the tip cylinders, as far as they face the viewer."""
     wheel_angle = pair.wheel_angle_at(pinion_angle) + pair.wheel_phase
-    placed = [(pair.pinion, pinion_angle, 0.0, BLUE), (pair.wheel, wheel_angle, pair.wheel_centre, ORANGE)]
+    placed = [
+        (pair.pinion, pinion_angle, 0.0, 0.0, BLUE),
+        (pair.wheel, wheel_angle, pair.wheel_centre, 1e3 * pair.axial_offset, ORANGE),
+    ]
     fills = [PINION_FILL, WHEEL_FILL]
     if pair.internal:  # the pinion lies in front of the ring, as if this were cut open
         placed, fills = placed[::-1], fills[::-1]
-    for (gear, angle, x, colour), fill in zip(placed, fills, strict=True):
+    for (gear, angle, x, middle, colour), fill in zip(placed, fills, strict=True):
         half, radius = 0.5e3 * gear.face_width, 1e3 * (gear.held_radius if gear.internal else gear.tip_radius)
-        corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (radius, half) + (1e3 * x, 0.0)
+        corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (radius, half) + (1e3 * x, middle)
         axes.fill(corners[:, 0], corners[:, 1], facecolor=fill, edgecolor=colour, linewidth=1.1)
-        z = np.linspace(-half, half, 41)
+        z = middle + np.linspace(-half, half, 41)
         for tooth in range(0 if gear.internal else gear.teeth):
             turned = angle + 2 * np.pi * tooth / gear.teeth + 1e-3 * gear.twist_rate * z
             seen = np.where(np.sin(turned) < 0.0, 1e3 * x + radius * np.cos(turned), np.nan)

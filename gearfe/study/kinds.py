@@ -102,7 +102,8 @@ def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool, mesh: str | 
 def _along_width(job: Any, shared: Shared, table: Any, *, estimate: bool = False) -> Answer:
     """A mesh whose load varies along the face width: [stiffness], or the torques of a load map's table."""
     from ..gears.gearmesh import width_job
-    from ..gears.gearmesh.width_report import load_columns, sweep_columns, width_summary
+    from ..gears.gearmesh.width_report import load_columns, root_columns, sweep_columns, width_summary
+    from ..gears.gearmesh.width_root import wide_roots
 
     if table is None:
         width_job.check_stiffness_job(job)
@@ -111,14 +112,15 @@ def _along_width(job: Any, shared: Shared, table: Any, *, estimate: bool = False
     gears = [(gear.teeth, gear.form, gear.drawn, gear.y_mm) for gear in job.mesh.gears]
     sizes = job.materials, job.table.coarsen, job.table.flank_coarsen, job.mesh.flank
     lines = width_job.job_lines(job, keep=partial(shared.get, repr((gears, job.mesh.centre_distance_mm, sizes))))
-    if table is None:
-        name, sweep = "stiffness", width_job.stiffness_sweep(job, lines)
-    else:
-        name, sweep = "loadmap", width_job.map_sweep(job, lines, table)
-    mesh = lines.compliance.mesh
-    errors = width_job.estimated_errors(job, lines, sweep, Stopwatch()) if estimate else None
-    rows = {name: sweep_columns(job, mesh, sweep), "load": load_columns(job, sweep)}
-    return Answer(rows, width_summary(job, mesh, sweep, {}, errors=errors), _positions(sweep.status != "converged"))
+    sweep, mesh = width_job.job_sweep(job, lines, table), lines.compliance.mesh
+    errors = width_job.estimated_errors(job, lines, sweep, table, Stopwatch()) if estimate else None
+    roots = wide_roots(lines, sweep) if table is not None and table.root_stress else None
+    name = "stiffness" if table is None else "loadmap"
+    rows = {name: sweep_columns(job, mesh, sweep, roots), "load": load_columns(job, sweep)}
+    if roots is not None:
+        rows["root"] = root_columns(job, sweep, roots)
+    summary = width_summary(job, mesh, sweep, {}, errors=errors, roots=roots)
+    return Answer(rows, summary, _positions(sweep.status != "converged"))
 
 
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:

@@ -266,7 +266,11 @@ def test_the_commands_write_the_load_over_the_flank(tmp_path: Path, capsys: pyte
     # a map in the same folder, of two torques; then a plane curve leaves none of these files behind
     line[0] = "loadmap"
     assert main([*line[:4], "--torques-Nm", "20", "50", "--positions", "3", *sets]) == 0
-    rows = json.loads((tmp_path / "out" / "loadmap.json").read_text())["by_torque"]
+    written = json.loads((tmp_path / "out" / "loadmap.json").read_text())
+    rows = written["by_torque"]
+    for name, errors in written["error_estimate"].items():
+        assert len(errors) == 2, name
+        assert max(errors) < (0.05 if "peak" in name else 0.03), name
     assert rows["torque_wheel_Nm"] == pytest.approx([20.0, 50.0], rel=1e-9)
     assert rows["K_H_beta"][0] > rows["K_H_beta"][1]  # a larger load spreads
 
@@ -364,3 +368,38 @@ def test_the_pattern_lies_on_the_flank_in_space(flank: str, tmp_path: Path) -> N
     assert rate == pytest.approx(np.full((4, 2), math.tan(math.radians(12.0)) / pinion.reference_radius), rel=1e-4)
     side = 1.0 if flank == "left" else -1.0
     assert (side * angle[:, 1] > 0.0).all()
+
+
+def test_gaps_of_both_flanks_and_the_tilt_count_together() -> None:
+    """Each is within 0.1 module by itself; opposite ones cancel."""
+    both = {"torques_Nm": [60.0], "pinion": {"helix_crowning_um": 150.0}, "wheel": {"helix_crowning_um": 140.0}}
+    with pytest.raises(InputError, match=r"pinion\.helix_crowning_um = 150\.0: leaves the range"):
+        wide_flanks(job(both), wide_mesh(job(both)))
+    tilted = job({"torques_Nm": [60.0], "pinion": {"helix_slope_um": 240.0}}, misalignment_um=245.0)
+    wide_flanks(tilted, wide_mesh(tilted))  # half of each at the ends
+    tilted = job({"torques_Nm": [60.0], "pinion": {"helix_slope_um": 300.0}}, misalignment_um=245.0)
+    with pytest.raises(InputError, match=r"pinion\.helix_slope_um = 300\.0: leaves the range"):
+        wide_flanks(tilted, wide_mesh(tilted))
+    against = job({"torques_Nm": [60.0], "pinion": {"helix_slope_um": -300.0}}, misalignment_um=245.0)
+    wide_flanks(against, wide_mesh(against))
+
+
+def test_loads_beyond_linear_elasticity_are_reported_by_their_keys() -> None:
+    """Torques before the gears are condensed, twists from where the flanks touch."""
+    heavy = job(misalignment_um=5.0, stiffness={"torque_Nm": 1e5})
+    with pytest.raises(InputError, match=r"stiffness\.torque_Nm = 100000\.0: must be <="):
+        width_job.check_stiffness_job(heavy)
+    table = replace(heavy.mesh.stiffness, torque_Nm=None, twist_deg=2.0)
+    far = stiffness_job(replace(heavy.mesh, stiffness=table))
+    with pytest.raises(InputError, match=r"stiffness\.twist_deg = 2\.0: must be <="):
+        stiffness_sweep(far, job_lines(far))
+
+
+def test_helices_are_drawn_where_the_gears_are() -> None:
+    from gearfe.figures.gears import _draw_helices
+    from gearfe.figures.style import new_figure
+
+    axes = new_figure(4.0, 4.0).subplots()
+    _draw_helices(axes, job(helix_angle_deg=10.0, wheel={"y_mm": 2.0}).pair, 0.0)
+    middles = [0.5 * (patch.get_xy()[:, 1].min() + patch.get_xy()[:, 1].max()) for patch in axes.patches]
+    assert middles == pytest.approx([0.0, 2.0])

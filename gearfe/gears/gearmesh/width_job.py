@@ -7,6 +7,7 @@ pair is seen from the other side, whose axial coordinate z is -y: ends and slope
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ from ...base.tables.gearbox import TILTS
 from ...base.tables.microgeometry import ALONG_WIDTH, FlankTable
 from ...base.tables.pair import StiffnessTable
 from ...base.typing import Array, IntArray
-from ..contact.laws import COARSENING, PairModel, check_poisson, check_torque
+from ..contact.laws import COARSENING, check_poisson
 from ..geometry.deviation_job import FlankOf, deviations_of
 from ..geometry.face import NOMINAL
 from ..geometry.modifications import ends_of
@@ -159,14 +160,15 @@ def wide_flanks(job: StiffnessJob, mesh: WideMesh) -> WideFlanks:
             leads[g] = lead_modification(flank.own, sense)
             topographies[g] = _topography(flank.own, flank.gear, face, sense)
             _check_lengths(flank)
-            _check_size(flank, (sense * face[0], sense * face[1]))
     for key in TILTS:
         if abs(1e-6 * getattr(job.mesh, key)) > MOST_GAP * job.pair.pinion.module:
             where = job.mesh.tilts_where
             raise InputError(f"{where}.{key}", getattr(job.mesh, key), _too_large(job.pair.pinion), "is it in um?")
     over = 1e-6 * sense / mesh.width
     tilt = Misalignment(over * job.mesh.misalignment_um, abs(over) * job.mesh.misalignment_across_um)
-    return WideFlanks(profiles, (leads[0], leads[1]), (topographies[0], topographies[1]), tilt)
+    flanks = WideFlanks(profiles, (leads[0], leads[1]), (topographies[0], topographies[1]), tilt)
+    _check_gap(job, mesh, flanks)
+    return flanks
 
 
 def material_along(flank: FlankOf, face: tuple[float, float], roll: Array, y: Array) -> Array:
@@ -203,20 +205,31 @@ def _check_lengths(flank: FlankOf) -> None:
             raise InputError(f"{flank.where}.{key}", value, f"must be <= {most:.6g} mm, the {what}", "give less")
 
 
-def _check_size(flank: FlankOf, face: tuple[float, float]) -> None:
-    """Raise `InputError` for modifications along the width that are no microgeometry, of the largest of their keys."""
-    roll, y = (
-        grid.ravel() for grid in np.meshgrid(np.array(ends_of(flank.gear)), np.linspace(min(face), max(face), 33))
-    )
-    if np.abs(material_along(flank, (min(face), max(face)), roll, y)).max() <= MOST_GAP * flank.gear.module:
+def _check_gap(job: StiffnessJob, mesh: WideMesh, flanks: WideFlanks) -> None:
+    """Raise `InputError` for a gap of both flanks and tilts that is no microgeometry, of its largest key."""
+    z = np.linspace(*mesh.zone, 33)
+    rolls = [np.array(ends_of(gear)) for gear in (job.pair.pinion, job.pair.wheel)]
+    gap = flanks.misalignment.in_plane * (z - 0.5 * sum(mesh.zone))
+    for g, face in enumerate(mesh.faces):
+        # the form of one flank meets the tip of the other
+        roll, at = (grid.ravel() for grid in np.meshgrid(rolls[g][:: 1 - 2 * g], z, indexing="ij"))
+        material = flanks.leads[g].material(at, face)
+        topography = flanks.topographies[g]
+        if topography is not None:
+            material = material + topography(roll, at, np.zeros(len(at), dtype=np.int64))
+        gap = gap + material.reshape(2, len(z))
+    if np.abs(gap).max() <= MOST_GAP * job.pair.pinion.module:
         return
-    table = flank.own
-    amounts = {key: getattr(table, key) or 0.0 for key in ALONG_WIDTH if key != "triangular_reliefs"}
-    amounts |= {
-        f"triangular_reliefs[{i}].amount_um": relief.amount_um for i, relief in enumerate(table.triangular_reliefs)
-    }
+    amounts: dict[str, float] = {f"{job.mesh.tilts_where}.{key}": getattr(job.mesh, key) for key in TILTS}
+    for g in range(2 if job.mesh.deviates else 0):
+        flank = FlankOf(job.mesh, job.pair, g, job.mesh.flank, job.folder)
+        for key in ALONG_WIDTH:
+            if key != "triangular_reliefs":
+                amounts[f"{flank.where}.{key}"] = getattr(flank.own, key) or 0.0
+        for i, relief in enumerate(flank.own.triangular_reliefs):
+            amounts[f"{flank.where}.triangular_reliefs[{i}].amount_um"] = relief.amount_um
     key = max(amounts, key=lambda name: abs(amounts[name]))
-    raise InputError(f"{flank.where}.{key}", amounts[key], _too_large(flank.gear), "use less modification")
+    raise InputError(key, amounts[key], _too_large(job.pair.pinion), "use less modification and tilt")
 
 
 def _too_large(gear: Gear) -> str:
@@ -287,13 +300,28 @@ def stiffness_sweep(job: StiffnessJob, lines: ContactLines, watch: Stopwatch | N
     """Return the sweep of [stiffness]: one torque, or one twist, over its angles."""
     t, angles = job.table, np.radians(job.table.angles_deg(math.degrees(job.pair.mesh_cycle)))
     load: dict[str, Any] = {"torques": t.torque_Nm} if t.twist_deg is None else {"twists": math.radians(t.twist_deg)}
-    return sweep_width(lines, **load, angles=angles, watch=watch)
+    try:
+        return sweep_width(lines, **load, angles=angles, watch=watch)
+    except InputError as error:
+        if error.field == "twists":
+            raise InputError("stiffness.twist_deg", t.twist_deg, error.problem, error.cure) from None
+        raise
 
 
-def estimated_errors(job: StiffnessJob, lines: ContactLines, sweep: WidthSweep, watch: Stopwatch) -> dict[str, float]:
-    """Return relative errors of the headline numbers of [stiffness], by two more functions and by coarser sections.
+def job_sweep(
+    job: StiffnessJob, lines: ContactLines, table: LoadMapTable | None, watch: Stopwatch | None = None
+) -> WidthSweep:
+    """Return the sweep of a load map's table, or of [stiffness] where it is None."""
+    return stiffness_sweep(job, lines, watch) if table is None else map_sweep(job, lines, table, watch)
 
-    Differences of sections `COARSENING` times coarser count over what the order of convergence makes of them.
+
+def estimated_errors(
+    job: StiffnessJob, lines: ContactLines, sweep: WidthSweep, table: LoadMapTable | None, watch: Stopwatch
+) -> dict[str, Array]:
+    """Return relative errors of the headline numbers of a sweep, for each load.
+
+    They are the differences by points doubled, by two more functions along the width, and by coarser sections. Those of
+    sections `COARSENING` times coarser count over what the order of convergence makes of them.
 
     Parameters
     ----------
@@ -303,33 +331,46 @@ def estimated_errors(job: StiffnessJob, lines: ContactLines, sweep: WidthSweep, 
         Their lines of contact.
     sweep : WidthSweep
         The results.
+    table : LoadMapTable, optional
+        Of the load map, see `job_sweep`.
     watch
         Takes the time.
     """
     mesh, flanks = lines.compliance.mesh, lines.flanks
-    numbers, found = headline_numbers(sweep), dict.fromkeys(headline_numbers(sweep), 0.0)
-    variants = (
+    numbers = headline_numbers(sweep)
+    found = {name: np.zeros(len(sweep.status)) for name in numbers}
+    meshes = (
+        (mesh, 1.0),
         (replace(mesh, functions=mesh.count + 2), 1.0),
         (replace(mesh, functions=mesh.count, coarsen=COARSENING * mesh.coarsen), COARSENING**ORDER - 1.0),
     )
-    for variant, share in variants:
+    for variant, share in meshes:
         with watch.stage("error estimate"):
-            other = headline_numbers(stiffness_sweep(job, contact_lines(wide_compliance(variant), flanks)))
+            if variant is mesh:
+                changed = replace(lines, density=2.0 * lines.density)
+            else:
+                changed = contact_lines(wide_compliance(variant), flanks)
+            other = headline_numbers(job_sweep(job, changed, table))
         for name, value in numbers.items():
-            found[name] += abs(other[name] - value) / share / abs(value) if value else math.nan
+            with np.errstate(invalid="ignore", divide="ignore"):
+                found[name] += np.where(value != 0.0, np.abs(other[name] - value) / share / np.abs(value), np.nan)
     return found
 
 
-def headline_numbers(sweep: WidthSweep) -> dict[str, float]:
-    """Return the headline numbers of the first load of a sweep, in SI units."""
-    error = sweep.transmission_error[0]
+def headline_numbers(sweep: WidthSweep) -> dict[str, Array]:
+    """Return the headline numbers of each load of a sweep, in SI units; NaN where no position is solved."""
+    error, peak = sweep.transmission_error, sweep.peak_line_load
+
+    def of_solved(values: Array, what: Callable[..., Array]) -> Array:
+        return np.array([what(row) if np.isfinite(row).any() else np.nan for row in values])
+
     return {
-        "transmission_error_mean": float(np.nanmean(error)),
-        "transmission_error_peak_to_peak": float(np.nanmax(error) - np.nanmin(error)),
-        "k_tangent_mean": float(np.nanmean(sweep.stiffness[0])),
-        "largest_line_load": float(np.nanmax(sweep.peak_line_load[0])),
-        "K_H_beta": float(sweep.k_h_beta[0]),
-        "K_H_alpha": float(sweep.k_h_alpha[0]),
+        "transmission_error_mean": of_solved(error, np.nanmean),
+        "transmission_error_peak_to_peak": of_solved(error, lambda row: np.nanmax(row) - np.nanmin(row)),
+        "k_tangent_mean": of_solved(sweep.stiffness, np.nanmean),
+        "largest_line_load": of_solved(peak, np.nanmax),
+        "K_H_beta": sweep.k_h_beta,
+        "K_H_alpha": sweep.k_h_alpha,
     }
 
 
@@ -338,14 +379,14 @@ def check_stiffness_job(job: StiffnessJob) -> None:
     job.check_load()
     check_width_job(job)
     if job.table.torque_Nm is not None:
-        check_torque(job.pair, PairModel(job.materials), job.table.torque_Nm, "stiffness.torque_Nm")
+        wide_mesh(job).check_torque(job.table.torque_Nm, "stiffness.torque_Nm")
 
 
 def check_map_job(job: StiffnessJob, table: LoadMapTable) -> None:
     """Raise `InputError` for torques out of range, and keys that a load along the width does not take."""
     check_width_job(job)
     for torque in table.torques():
-        check_torque(job.pair, PairModel(job.materials), torque, f"{table.NAME}.torques_Nm")
+        wide_mesh(job).check_torque(torque, f"{table.NAME}.torques_Nm")
     if table.mesh_cycles is None and not all(flank.alike for flank in deviations_of(job.mesh, job.pair, job.folder)):
         problem = "is required where teeth differ and the load varies along the face width"
         raise InputError(f"{table.NAME}.mesh_cycles", None, problem, "give the mesh cycles to compute")

@@ -286,7 +286,7 @@ def width_summary(
     sweep: WidthSweep,
     timings: Mapping[str, float],
     *,
-    errors: Mapping[str, float] | None = None,
+    errors: Mapping[str, Array] | None = None,
     roots: WideRoots | None = None,
     **tables: Any,
 ) -> dict[str, Any]:
@@ -303,7 +303,7 @@ def width_summary(
     timings : mapping
         Name -> time that a part of the work took (s).
     errors : mapping, optional
-        Estimated relative errors, see `.width_job.estimated_errors`.
+        Estimated relative errors of each load, see `.width_job.estimated_errors`.
     roots : WideRoots, optional
         Root stresses.
     tables
@@ -327,7 +327,7 @@ def width_summary(
             "kinematics": "small",
         },
         "by_torque": load_table(job, mesh, sweep, roots),
-        "error_estimate": None if errors is None else dict(errors),
+        "error_estimate": None if errors is None else {name: values.tolist() for name, values in errors.items()},
         "mean_tangent_twist_and_tilts_Nm_per_rad": (np.nanmean(sweep.tangent, axis=1) * along_y).tolist(),
         "statuses": dict(zip(statuses.tolist(), counts.tolist(), strict=True)),
         "timings_s": timings,
@@ -379,9 +379,9 @@ def width_lines(found: Mapping[str, Any]) -> list[str]:
                 for gear in GEARS
             )
             lines.append(f"  largest root stress: {', '.join(stresses)}")
-    if found["error_estimate"] is not None:
-        errors = ", ".join(f"{name} {percent(error)}" for name, error in found["error_estimate"].items())
-        lines.append(f"estimated errors, by two more functions along the width and coarser sections: {errors}")
+        if found["error_estimate"] is not None:
+            errors = ", ".join(f"{name} {percent(values[i])}" for name, values in found["error_estimate"].items())
+            lines.append(f"  estimated errors, by points doubled, two more functions and coarser sections: {errors}")
     lines.append(
         f"ISO 6336 method B, for comparison: c' = {iso['c_prime_N_per_mm_um']:.3g}, "
         f"c_gamma = {iso['c_gamma_N_per_mm_um']:.3g} N/(mm um); "

@@ -125,7 +125,9 @@ class FilletMesh:
         fields = np.zeros((3, 2, int(self.edges.max()) + 1, len(self.z)))  # v_x, v_y, w; value and slope along z
         for system in self.systems:
             of_system = system.axial.loads
-            moved = sum(np.tensordot(system.response[step], load[:, :, of_system], axes=3) for step, load in loads)
+            moved = np.zeros(system.response.shape[1:3])
+            for step, load in loads:
+                moved += np.tensordot(system.response[step], load[:, :, of_system], axes=3)
             plane, axial = system.axial.at
             for axis, functions in enumerate((plane, plane, axial)):
                 if functions is not None:

@@ -36,7 +36,6 @@ from functools import cache, cached_property
 import numpy as np
 
 from ...base.typing import Array, BoolArray, IntArray
-from ..geometry.validity import MOST_YIELD
 from .compliance import WideCompliance, legendre
 from .flanks import WideFlanks
 from .pair_law import PairLaw, pair_law
@@ -55,8 +54,6 @@ ONE_BY_ONE = 1e-3
 #: Newton steps, change of the moments in parts of their sum in the last one, and the overlap (m) of a point that
 #: carries nothing that is none.
 STEPS, SETTLED, CLOSED = 300, 1e-9, 1e-12
-#: Mesh stiffness per width in units of E' with which the search for a twist starts: c' of ISO 6336-1, 14 N/(mm um).
-USUAL_STIFFNESS = 0.06
 #: Distance from an end, in half widths of a bump, that is none.
 AT_END = 0.3
 #: Least derivative of c in parts of c/M under the lightest load, so that no contact yields less under more load.
@@ -81,19 +78,6 @@ class ContactLines:
         if flanks.profiles == self.flanks.profiles:
             return replace(self, flanks=flanks)
         return contact_lines(self.compliance, flanks, density=self.density)
-
-    @cached_property
-    def usual_stiffness(self) -> float:
-        """Torque per twist (N m/rad) of a usual pair of teeth over the common width, to begin with."""
-        mesh = self.compliance.mesh
-        modulus = 2 / sum(side.local.inverse_modulus for side in self.compliance.sides)
-        return USUAL_STIFFNESS * modulus * mesh.width * mesh.sections.wheel.base_radius**2
-
-    @property
-    def most_torque(self) -> float:
-        """Torque at the wheel (N m) under which the teeth yield by `MOST_YIELD` modules."""
-        mesh = self.compliance.mesh
-        return MOST_YIELD * mesh.module * self.usual_stiffness / mesh.sections.wheel.base_radius
 
     def gap(self, z: Array, rows: Rows, pair: IntArray) -> Array:
         """Gap d (m) of tooth pairs at z (m), where `rows` has their place on the law's tables."""
@@ -450,14 +434,14 @@ def solve_position(
     least = look_at(lines, angle).least
     if not math.isfinite(least):
         return Solution(_nowhere(lines), math.nan, np.zeros(0), np.zeros((3, 3)), False, 0)
-    ahead = guess - least if guess > least else torque / lines.usual_stiffness
+    ahead = guess - least if guess > least else torque / lines.compliance.mesh.usual_stiffness
     steps, settled, before = 0, False, None
     for number in range(PLACINGS):
         points = place_points(lines, angle, least + ahead)
         solution = _newton(lines, points, torque=torque, twist=None, before=before)
         steps, before = steps + solution.steps, solution
         # between the places that are looked at, a line may touch a little earlier
-        new = max(solution.twist - least, LEAST_AHEAD * torque / lines.usual_stiffness)
+        new = max(solution.twist - least, LEAST_AHEAD * torque / lines.compliance.mesh.usual_stiffness)
         free = number < FREE_PLACINGS
         settled = solution.converged and (abs(new - ahead) <= PLACED * new or (not free and new <= ahead))
         if settled:
@@ -489,7 +473,7 @@ def _newton(
     if torque is None:
         loaded = points.touch < twist
         start = np.where(loaded, twist - points.touch, 0.0) * weight
-        moment = start * lines.usual_stiffness / lines.compliance.mesh.width
+        moment = start * lines.compliance.mesh.usual_stiffness / lines.compliance.mesh.width
     elif before is not None and np.array_equal(before.points.pair, points.pair):
         moment = before.moment * weight / before.points.weight
         loaded = moment > 0

@@ -16,7 +16,7 @@ from ...fem.plane import Material
 from ..contact.laws import STEEL
 from ..geometry.mesh_geometry import MeshGeometry
 from ..geometry.spur_gear import Gear
-from ..geometry.validity import check_external
+from ..geometry.validity import MOST_YIELD, check_external
 
 #: Largest base helix angle (rad). Elastic teeth are checked up to 30 degrees at the reference circle.
 MOST_HELIX = math.radians(45.0)
@@ -25,6 +25,8 @@ MOST_HELIX = math.radians(45.0)
 LEAST_FUNCTIONS, MODULES_PER_FUNCTION = 5, 2.5
 #: Most functions along the width: a node of the section has three times as many unknowns.
 MOST_FUNCTIONS = 40
+#: Mesh stiffness per width in units of E': c' of ISO 6336-1, 14 N/(mm um).
+USUAL_STIFFNESS = 0.06
 #: Common width (modules) below which two gears do not mesh.
 LEAST_OVERLAP = 0.05
 
@@ -149,3 +151,23 @@ class WideMesh:
     def overlap_ratio(self) -> float:
         """Overlap ratio eps_beta = b tan(beta_b)/p_bt (-)."""
         return self.width * abs(math.tan(self.base_helix_angle)) / self.sections.base_pitch
+
+    @property
+    def usual_stiffness(self) -> float:
+        """Torque per twist (N m/rad) of a usual pair of teeth over the common width."""
+        soft = sum(material.contact_compliance("strain") for material in self.materials)
+        modulus = 2 * math.cos(self.base_helix_angle) / soft
+        return USUAL_STIFFNESS * modulus * self.width * self.sections.wheel.base_radius**2
+
+    @property
+    def most_torque(self) -> float:
+        """Torque at the wheel (N m) under which the teeth yield by `MOST_YIELD` modules."""
+        return MOST_YIELD * self.module * self.usual_stiffness / self.sections.wheel.base_radius
+
+    def check_torque(self, torque: float, name: str) -> None:
+        """Raise `InputError`, with the name of the field, for a torque (N m) that bends the teeth too far."""
+        if torque > self.most_torque:
+            problem = (
+                f"must be <= {self.most_torque:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
+            )
+            raise InputError(name, torque, problem, "linear elasticity does not reach so far; give less")

@@ -27,7 +27,7 @@ from ...base.errors import InputError
 from ...base.progress import Stopwatch, one_thread
 from ...base.typing import Array, IntArray
 from ..geometry.validity import MOST_YIELD
-from .lines import ContactLines, Solution, solve_position
+from .lines import ContactLines, Solution, look_at, solve_position
 
 #: Pinion angles of a mesh cycle where none are given; places along the width of the mean load.
 ANGLES, ALONG = 24, 65
@@ -157,10 +157,11 @@ def sweep_width(
         differ without angles.
     """
     loads, by_torque = _loads(torques, twists)
-    if by_torque and max(loads) > lines.most_torque:
-        problem = f"must be <= {lines.most_torque:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
-        raise InputError("torques", max(loads), problem, "linear elasticity does not reach so far; give less")
     at = _angles(lines, angles, positions)
+    if by_torque:
+        lines.compliance.mesh.check_torque(max(loads), "torques")
+    else:
+        _check_twist(lines, at, max(loads))
     watch = watch or Stopwatch()
     with watch.stage("positions"), one_thread():
         solved = [_solved(lines, at, load, by_torque) for load in loads]
@@ -176,6 +177,16 @@ def _loads(torques: ArrayLike | None, twists: ArrayLike | None) -> tuple[list[fl
     if loads.ndim != 1 or len(loads) == 0 or not (np.isfinite(loads).all() and (twists is not None or loads.min() > 0)):
         raise InputError(name, given, f"must be finite{' and > 0' if twists is None else ''} ({unit})", "correct them")
     return loads.tolist(), twists is None
+
+
+def _check_twist(lines: ContactLines, angles: Array, twist: float) -> None:
+    """Raise `InputError` for a twist (rad) that overlaps the flanks by more than linear elasticity holds for."""
+    mesh = lines.compliance.mesh
+    first = min((look_at(lines, angle).least for angle in angles.tolist()), default=math.inf)
+    most = first + MOST_YIELD * mesh.module / mesh.sections.wheel.base_radius
+    if twist > most:
+        problem = f"must be <= {most:.4g} rad: the teeth would yield by more than {MOST_YIELD:g} modules"
+        raise InputError("twists", twist, problem, "linear elasticity does not reach so far; give less")
 
 
 def _angles(lines: ContactLines, angles: ArrayLike | None, positions: int) -> Array:
