@@ -493,7 +493,7 @@ def test_the_planetary_model_balances():
     assert (ring["teeth"], ring["rim_diameter_mm"], ring["cutter_teeth"]) == (-61, -280.0, 23)
     sun = [mesh for mesh in job.tables["meshes"].values() if mesh["driver"] == "Sonnenrad"]
     shares = [mesh["stiffness"]["torque_Nm"] for mesh in sun]
-    assert shares == pytest.approx(3 * [1591.5494309189535 / 3.0 * 22.0 / 17.0], rel=1e-8)
+    assert shares == pytest.approx(len(shares) * [1591.5494309189535 / 3.0 * 22.0 / 17.0], rel=1e-8)
 
 
 def test_the_command(tmp_path, capsys):

@@ -23,7 +23,7 @@ from ....base.tables.gearbox import Gearbox
 from ....base.tables.jobs import TABLES, gearbox_of, table_class
 from ....base.tables.named import NAMED
 from ....base.tables.text import table_text, toml_document
-from . import parts
+from . import parts, planets
 from .balance import Row, speeds_of, torques_of
 from .ledger import DEFAULTED, DERIVED, IGNORED, KINDS, READ, Entry, lines_of, plain
 from .model import Attribute, Component, LoadCase, Model
@@ -119,12 +119,12 @@ def rexs_job(source: str | Path | Model, *, load_case: int | None = None) -> Rex
     left: dict[tuple[str, str], tuple[Mapping[str, Any], str]] = {}
     for kind, reasons in (("shafts", left_shafts), ("bearings", left_bearings), ("couplings", left_couplings)):
         left |= {(kind, name): ({}, reason) for name, reason in reasons.items()}
-    left |= {("couplings", name): ({}, f"holds {shaft} on the housing") for shaft, name in held.items()}
-    for (kind, name), (_, reason) in left.items():
-        reading.entries.append(Entry(IGNORED, kind, reading.numbers.get((kind, name), 0), name, "", plain(reason)))
-    _planetary(reading)
+    left |= {("couplings", name): ({}, f"holds {shaft} on the housing") for name, shaft in held.items()}
     _friction(reading, tables)
     _loads(reading, tables, held, cases)
+    planets.planetary(reading, tables, held, left)
+    for (kind, name), (_, reason) in left.items():
+        reading.entries.append(Entry(IGNORED, kind, reading.numbers.get((kind, name), 0), name, "", plain(reason)))
     _own(reading, tables)
     _refuse(reading, tables, left)
     _models(reading, tables)
@@ -278,12 +278,6 @@ def _shifts(
     reading.derived(stage, "center_distance", f"gears.{missing[-1]}.profile_shift", "no backlash at that distance")
 
 
-def _planetary(reading: Reading) -> None:
-    """Note planetary stages: their meshes and shafts are read, their carrier has no table."""
-    for item in reading.model.of_kind("planetary_stage"):
-        reading.ignored(item, "planetary_stage", "its carrier has no table in a job: its meshes alone are computed")
-
-
 def _friction(reading: Reading, tables: dict[str, Any]) -> None:
     """Viscosity of the oil in each mesh, where lubricant, its temperature and the roughness of the flanks are known."""
     casing = next(iter(reading.model.of_kind("gear_casing")), None)
@@ -395,7 +389,7 @@ def _loads(reading: Reading, tables: dict[str, Any], held: dict[str, str], cases
     """Drive, loads and the load of each mesh."""
     shafts = list(tables["shafts"])
     rows = _rows(reading, tables)
-    known = dict.fromkeys((name for name in held if name in tables["shafts"]), 0.0)
+    known = dict.fromkeys((name for name in held.values() if name in tables["shafts"]), 0.0)
     given: list[str] = []
     for item in reading.model.of_kind("shaft"):
         speed, name = reading.number(item, "rotational_speed", "rad / s"), reading.names[item.number]
@@ -453,7 +447,7 @@ def _balance(
         if load.torque is not None:
             known[load.shaft] = known.get(load.shaft, 0.0) + load.torque
     unknown = [load.shaft for load in loads if load.torque is None]
-    unknown += [name for name in held if name in shafts]
+    unknown += [name for name in held.values() if name in shafts]
     if not known:
         return {}, {}
     torques, shares = torques_of(shafts, rows, known, list(dict.fromkeys(unknown)))
@@ -478,7 +472,9 @@ def _mesh_loads(
         relative = _relative(tables, names[0], carriers.get(reading.numbers["meshes", row.name]), speeds)
         driving = [_driving(reading, row.name, name) for name in names]
         power = None if share is None or relative is None else share * gears[names[0]]["teeth"] * relative
-        if power is not None and abs(power) > 0.0:
+        if gears[names[0]]["teeth"] * gears[names[1]]["teeth"] < 0:
+            turned, rule = gears[names[0]]["teeth"] < 0, "the external gear of a mesh with a ring, whoever drives"
+        elif power is not None and abs(power) > 0.0:
             # power into the first gear from the mesh: positive, it is driven
             turned, rule = power > 0.0, "power flows from the driver to the driven gear"
         else:
@@ -807,7 +803,7 @@ def _without_train(tables: dict[str, Any], left: Mapping[tuple[str, str], tuple[
     if not tables.get("meshes"):
         return "there are no meshes"
     carried = {entry["shaft"] for entry in tables.get("bearings", {}).values()}
-    carried |= {name for name, entry in tables.get("shafts", {}).items() if entry.get("attachments")}
+    carried |= {name for name, e in tables.get("shafts", {}).items() if e.get("attachments") or e.get("carrier")}
     for name, gear in tables.get("gears", {}).items():
         if "shaft" not in gear:
             return f"gear {name} is on no shaft"

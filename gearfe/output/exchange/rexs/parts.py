@@ -20,8 +20,8 @@ COUPLINGS = ("coupling", "switchable_coupling")
 RIGID, RIGID_TILT, RIGID_TORSION = 1e10, 1e7, 1e7
 #: Stiffness of a bearing without any in the file (N/m): a deep-groove ball bearing of 50 mm under load.
 USUAL = 2e8
-#: Largest Young's modulus of a job (GPa).
-STIFFEST_GPA = 2000.0
+#: Young's modulus of a rigid material in a job (GPa): that of diamond, above which the program warns.
+STIFFEST_GPA = 1200.0
 #: Material below the root circle of a gear that is cut into its shaft, and that of a gear on a shaft (normal modules).
 RIM = 1.5
 #: Rim of a ring without any size in the file (modules).
@@ -52,7 +52,7 @@ def materials(reading: Reading) -> dict[str, dict[str, Any]]:
             continue
         key = f"materials.{reading.name(item)}"
         if modulus > STIFFEST_GPA:
-            modulus, rule = STIFFEST_GPA, f"E of {modulus:.4g} GPa: rigid, the largest of a job"
+            modulus, rule = STIFFEST_GPA, f"E of {modulus:.4g} GPa: rigid, as diamond in a job"
         attribute = "shear_modulus" if shear is not None else "elastic_modulus"
         reading.note(DERIVED if rule else READ, item, attribute, f"{key}.youngs_modulus_GPa", rule)
         entry: dict[str, Any] = {"youngs_modulus_GPa": modulus}
@@ -793,7 +793,7 @@ def _springs(reading: Reading, bearing: Component, key: str) -> dict[str, Any]:
 
 
 def couplings(reading: Reading) -> tuple[dict[str, dict[str, Any]], dict[str, str], dict[str, str]]:
-    """Return [couplings.NAME], shafts held by the casing -> their coupling, and other couplings -> reason."""
+    """Return [couplings.NAME], couplings to the casing -> the shaft that they hold, and others -> reason."""
     tables: dict[str, dict[str, Any]] = {}
     held: dict[str, str] = {}
     left: dict[str, str] = {}
@@ -811,7 +811,7 @@ def couplings(reading: Reading) -> tuple[dict[str, dict[str, Any]], dict[str, st
         kinds = sorted(part.kind for part in parts)
         if kinds == ["gear_casing", "shaft"]:
             shaft = next(part for part in parts if part.kind == "shaft")
-            held[reading.name(shaft)] = name
+            held[name] = reading.name(shaft)
             continue
         if set(kinds) & set(GEARS):
             reading.derived(item, "side relation", "gears.shaft", "a gear on its shaft turns with it without play")

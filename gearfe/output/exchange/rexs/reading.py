@@ -68,7 +68,10 @@ class Reading:
         """Return the name of the part of the job that a component becomes: letters, digits, _ and -; each one once."""
         if component.number in self.names:
             return self.names[component.number]
-        text = unicodedata.normalize("NFKC", component.name.removesuffix(f"[{component.number}]"))
+        # FVA-Workbench: NAME [number], and for planets NAME [number of the first one] @ angle @ angle @ angle
+        text, turned, _ = component.name.removesuffix(f"[{component.number}]").partition(" @ ")
+        text = re.sub(r"\s*\[\d+\]$", "", text) if turned else text
+        text = unicodedata.normalize("NFKC", text)
         name = re.sub(r"[^\w-]+", "_", text).strip("_-")[:LONGEST].strip("_-")
         own = self.text(component, f"{OWN}name")
         name = own if _NAME.fullmatch(own) else name or f"{component.kind}_{component.number}"
