@@ -270,3 +270,25 @@ def test_an_elastic_housing_feels_the_axial_force() -> None:
     assert q is not None
     moved = dict(zip(model.bores, model.axial @ q, strict=True))
     assert moved["s0 high"] > 0.0 > moved["s1 high"]
+
+
+def floating(train: GearTrain, *shafts: str) -> GearTrain:
+    """The train with bearings of these shafts that hold them nowhere along the axis."""
+    bearings = tuple(
+        dataclasses.replace(one, stiffness=FLOATING) if one.bore.split()[0] in shafts else one for one in train.bearings
+    )
+    return dataclasses.replace(train, bearings=bearings)
+
+
+@pytest.mark.parametrize("shaft", ["s0", "s1"])
+def test_a_shaft_that_nothing_holds_along_its_axis(shaft: str) -> None:
+    with pytest.raises(InputError, match=rf"shaft '{shaft}' bearings.*held by nothing along its axis"):
+        build_train(floating(helical_pair(), shaft))
+    build_train(floating(helical_pair(beta=0.0), shaft))  # spur gears do not push it
+
+
+def test_a_floating_shaft_between_two_meshes() -> None:
+    """Thrusts that cancel, of an idler, leave it in place; others screw it away."""
+    build_train(floating(helical_chain(BETA, idler=True), "s1"))
+    with pytest.raises(InputError, match="shaft 's1' bearings"):
+        build_train(floating(helical_chain(math.radians(25.0)), "s1"))

@@ -221,7 +221,32 @@ def build_train(train: GearTrain) -> TrainModel:
     """
     check_train(train)
     point = _operating_point(train)
-    return replace(_assembled(with_operating_stiffness(train, point)), operating=point)
+    model = replace(_assembled(with_operating_stiffness(train, point)), operating=point)
+    _check_held(model)
+    return model
+
+
+def _check_held(model: TrainModel) -> None:
+    """Raise `InputError` for a shaft that the axial forces of helical gears move freely along its axis.
+
+    Such a motion yields to no spring, turns the gears so that no flank closes, and the loads work on it.
+    """
+    if model.train.driven.torque is not None or not any(line.axial for line in model.meshes):
+        return
+    modal = model.modal
+    push = sum((modal.T.T @ row * float(replace(f, sines=())(model.torque_end)) for row, f in model.torques), 0.0)
+    free = modal.eigenvalues <= FREE * float(modal.eigenvalues.max(initial=0.0))
+    push = np.where(free, push, 0.0) if np.ndim(push) else np.zeros(len(free))
+    if not np.abs(push).max(initial=0.0) > FREE:
+        return
+    moved = modal.T @ push
+    along = [abs(float(moved[i : i + 3] @ model.train.frame[2])) for i in model.first.tolist()]
+    if not max(along) > FREE * float(np.abs(moved).max()):
+        return
+    shaft = model.train.shafts[int(np.argmax(along))]
+    problem = "is held by nothing along its axis, and the axial force of its helical gears moves it without end"
+    cure = "give one of its bearings a stiffness along the axis, or leave it out for a hinge"
+    raise InputError(f"shaft {shaft.name!r} bearings", list(shaft.bores), problem, cure)
 
 
 def _operating_point(train: GearTrain) -> OperatingPoint:
