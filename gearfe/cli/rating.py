@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .arguments import add_folder, add_job, add_keys, add_mesh, each_mesh, print_results, with_keys
 
 if TYPE_CHECKING:
     from ..base.tables.gearbox import NamedMesh
+    from ..gears.gearmesh.rated import Compared
 
 #: Keys of the table [rating] that options stand for.
 KEYS = ("edition", "torque_Nm", "speed_rpm", "life_h", "application_factor", "quality")
@@ -22,6 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_mesh(parser)
     add_folder(parser)
     add_keys(parser, RatingTable, *KEYS)
+    parser.add_argument(
+        "--computed",
+        action="store_true",
+        help="also stiffness, pressure and root stress by finite elements beside them",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -50,15 +57,28 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
 
     folder = output_folder(args.out)
     found: dict[str, Any] = rating_summary(rating, pair, table, mesh.name)
+    rows: list[Compared] = []
+    if args.computed:
+        from ..gears.gearmesh.job import stiffness_job
+        from ..gears.gearmesh.rated import compared
+
+        with stage("computing the mesh"):
+            rows = compared(stiffness_job(mesh, Path(args.job).parent, pair), rating)
+        found["computed"] = [row.row() for row in rows]
     with whole_set(folder, ("rating.png",)) as made:
         if not args.no_pictures:
             from ..figures.rating import rating_picture
             from ..figures.style import save
 
             with stage("drawing"):
-                save(rating_picture(rating), made / "rating.png")
+                save(rating_picture(rating, found.get("computed", ())), made / "rating.png")
         write_json(made / "rating.json", found)
         write_csv(made / "rating.csv", dict(rating.columns()))
         names = sorted(path.name for path in made.iterdir())
-    print_results(rating_lines(rating), folder, names, {}, found["warnings"])
+    lines = rating_lines(rating)
+    if rows:
+        from ..gears.gearmesh.rated import compared_lines
+
+        lines += compared_lines(rows)
+    print_results(lines, folder, names, {}, found["warnings"])
     return 0

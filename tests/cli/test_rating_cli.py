@@ -113,3 +113,37 @@ def test_internal_gears_are_refused(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert main(["gear", *line[1:], "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
     made = json.loads((tmp_path / "out" / "gear_pair.json").read_text())
     assert made["measures"]["ring"]["over_balls_mm"] < 0.0
+
+
+def test_computed_values_beside_the_standard(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """At C one pair carries all, where the standard's stress holds Z_eps for two; the rest is near."""
+    assert main(["rating", str(FZG), "--computed", "--out", str(tmp_path)]) == 0
+    made = json.loads((tmp_path / "rating.json").read_text())
+    rows = {row["name"]: row for row in made["computed"]}
+    at_C, Z_eps = rows["pressure at C"], made["flank"]["Z_eps"]["value"]
+    assert at_C["computed"] * Z_eps == pytest.approx(at_C["standard"], rel=2e-3)
+    assert "carries 1 of the load" in at_C["meaning"]
+    near = {"c_prime": 0.08, "c_gamma": 0.08, "root stress pinion": 0.13, "root stress wheel": 0.13}
+    for name, most in near.items():
+        assert abs(rows[name]["difference"]) < most
+    for name in ("pressure at B", "pressure at D"):
+        assert rows[name]["computed"] < at_C["computed"]  # a second pair carries there already
+    assert "+8.2 %" in capsys.readouterr().out
+
+
+def test_computed_values_of_loads_along_the_width(tmp_path: Path) -> None:
+    job = ["--set", "rating.speed_rpm=1500", "--set", "rating.torque_Nm=135", "--set", "stiffness.coarsen=2"]
+    line = ["rating", str(FZG.with_name("helical.toml")), *job, "--computed", "--out", str(tmp_path), "--no-pictures"]
+    assert main(line) == 0
+    made = json.loads((tmp_path / "rating.json").read_text())
+    rows = {row["name"]: row for row in made["computed"]}
+    assert set(rows) == {"c_gamma", "K_Hbeta"}
+    assert rows["K_Hbeta"]["standard"] == made["influence"]["K_Hbeta"]["value"]
+    assert rows["K_Hbeta"]["computed"] == pytest.approx(1.48, abs=0.1)
+    assert rows["c_gamma"]["computed"] == pytest.approx(11.6, rel=0.05)
+
+
+def test_computed_values_of_a_torque_out_of_range(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = ["rating", str(FZG), "--computed", "--set", "rating.torque_Nm=1e7", "--out", str(tmp_path), "--no-pictures"]
+    assert main(line) == 2
+    assert "rating.torque_Nm" in capsys.readouterr().err

@@ -114,7 +114,7 @@ class Rating(ShownTable):
         if general.K_Hbeta > NOTABLE:
             made.append(
                 f"K_Hbeta = {general.K_Hbeta:.3g} > {NOTABLE:g}: the load is on a part of the width; a computed load "
-                "distribution says more (gearfe loadmap with [width])"
+                "distribution says more (gearfe rating --computed)"
             )
         least = {"S_H": (self.S_H, self.load.flank_safety), "S_F": (self.S_F, self.load.root_safety)}
         for symbol, (values, required) in least.items():

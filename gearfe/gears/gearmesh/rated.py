@@ -1,0 +1,161 @@
+"""Computed values next to those that a rating takes: stiffness, pressure, root stress, load factor of the width.
+
+Loads are nominal, those of the rating without its factors K. Where one pair of teeth carries all of it, the standard's
+stress at B, C and D holds Z_eps for the other pair, which the computed pressure lacks. Root stresses are the largest at
+positions with one loaded pair, next to sigma_F0 with the load at the outer point of single pair contact.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..contact.laws import PairModel, check_torque
+from ..rating.rate import Rating
+from ..width import sweep_width
+from .job import StiffnessJob
+from .load_map import LoadMap
+from .sweep import sweep_loads
+from .width_job import check_width_job, job_lines
+
+#: Positions in a mesh cycle, and in the stretch with one pair in contact.
+POSITIONS, SINGLE = 24, 9
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A value of the standard and the computed one."""
+
+    name: str
+    unit: str
+    standard: float
+    computed: float
+    meaning: str
+
+    @property
+    def difference(self) -> float:
+        """Computed over standard less 1 (-)."""
+        return self.computed / self.standard - 1.0
+
+    def row(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {**asdict(self), "difference": self.difference}
+
+
+def compared(job: StiffnessJob, rating: Rating) -> list[Compared]:
+    """Compute a rated mesh by finite elements under its nominal load.
+
+    Parameters
+    ----------
+    job : StiffnessJob
+        The mesh.
+    rating : Rating
+        Its rating.
+
+    Returns
+    -------
+    rows : list of Compared
+        Of plane sections stiffness, pressure and root stress; of gears whose load varies along the width stiffness and
+        K_Hbeta.
+
+    Raises
+    ------
+    InputError
+        For a torque out of range, and what the computation refuses.
+    """
+    torque = 0.5 * rating.general.F_t_N * job.pair.wheel.pitch_diameter
+    check_torque(job.pair, PairModel(job.materials), torque, "rating.torque_Nm")
+    return _of_width(job, rating, torque) if job.mesh.along_width() else _of_sections(job, rating, torque)
+
+
+def _of_width(job: StiffnessJob, rating: Rating, torque: float) -> list[Compared]:
+    """Stiffness and load factor of gears whose load varies along the face width."""
+    check_width_job(job)
+    sweep = sweep_width(job_lines(job), [torque])
+    general, mean = rating.general, float(np.nanmean(sweep.stiffness[0]))
+    stiffness = mean / job.pair.wheel.base_radius**2 / job.pair.common_width
+    return [
+        Compared(
+            "c_gamma", "N/(mm um)", general.c_gamma_alpha_N_per_mm_um, 1e-9 * stiffness, "mean stiffness of the mesh"
+        ),
+        Compared(
+            "K_Hbeta",
+            "-",
+            general.K_Hbeta,
+            float(sweep.k_h_beta[0]),
+            "face load factor; computed: of the modifications and tilts of the file",
+        ),
+    ]
+
+
+def _of_sections(job: StiffnessJob, rating: Rating, torque: float) -> list[Compared]:
+    """Stiffness, pressure at B, C and D and root stresses of plane sections."""
+    pair = job.pair
+    points = {name: pair.path[name] for name in ("B", "C", "D")}
+    low, high = points["B"].pinion_angle, points["D"].pinion_angle
+    cycle = np.arange(POSITIONS) * pair.mesh_cycle / POSITIONS
+    angles = np.concatenate([cycle, np.linspace(low, high, SINGLE), [point.pinion_angle for point in points.values()]])
+    load_map = sweep_loads(
+        pair, [torque], angles=angles, root_stress=True, kinematics=job.table.kinematics, elastic=job.elastic()
+    )
+    single = _single(load_map)
+    tangent, width, general = load_map.quantity("k_tangent")[0], pair.common_width, rating.general
+    rows = []
+    if single.any():
+        rows.append(
+            Compared(
+                "c_prime",
+                "N/(mm um)",
+                general.c_prime_N_per_mm_um,
+                1e-9 * float(np.nanmax(tangent[single])) / width,
+                "largest stiffness of one pair of teeth",
+            )
+        )
+    mean = 1e-9 * float(np.nanmean(tangent[:POSITIONS])) / width
+    rows.append(Compared("c_gamma", "N/(mm um)", general.c_gamma_alpha_N_per_mm_um, mean, "mean stiffness of the mesh"))
+    # gear 1 of the standard has its inner point of single pair contact at B where it drives
+    inner = dict(zip(("B", "D"), rating.flank.M if not rating.driver else rating.flank.M[::-1], strict=True))
+    for at, (name, point) in enumerate(points.items()):
+        found, share = _pressure(load_map, POSITIONS + SINGLE + at, point.pinion_roll)
+        standard = rating.flank.sigma_H0_MPa * inner.get(name, 1.0)
+        meaning = f"nominal contact stress; computed where this pair carries {share:.3g} of the load"
+        rows.append(Compared(f"pressure at {name}", "MPa", standard, 1e-6 * found, meaning))
+    root = load_map.root
+    if root is not None and single.any():
+        for i, name in enumerate(rating.names):
+            side = i if not rating.driver else 1 - i
+            largest = 1e-6 * float(np.nanmax(root.largest[0, single, side]))
+            rows.append(
+                Compared(f"root stress {name}", "MPa", rating.root.sigma_F0_MPa[i], largest, "nominal root stress")
+            )
+    return [row for row in rows if math.isfinite(row.computed)]
+
+
+def _single(load_map: LoadMap) -> Any:
+    """Whether one pair of teeth alone carries load at each position."""
+    (pairs,) = load_map.pairs
+    return np.bincount(pairs.position, minlength=load_map.shape[1]) == 1
+
+
+def _pressure(load_map: LoadMap, position: int, roll: float) -> tuple[float, float]:
+    """Pressure (Pa) and load share of the pair of teeth that touch nearest to a roll length (m) on the pinion."""
+    (pairs,) = load_map.pairs
+    here = np.flatnonzero((pairs.position == position) & np.isfinite(pairs.roll[:, 0]))
+    if not len(here):
+        return math.nan, math.nan
+    nearest = here[np.argmin(np.abs(pairs.roll[here, 0] - roll))]
+    return float(pairs.pressure[nearest]), float(pairs.share[nearest])
+
+
+def compared_lines(rows: list[Compared]) -> list[str]:
+    """Lines to print."""
+    lines = [f"  {'nominal load':<26}{'ISO 6336':>12}{'computed':>12}{'difference':>12}"]
+    for row in rows:
+        unit = "" if row.unit == "-" else f" {row.unit}"
+        lines.append(
+            f"  {row.name + unit:<26}{row.standard:>12.5g}{row.computed:>12.5g}{100.0 * row.difference:>+11.1f} %"
+        )
+    return lines
