@@ -14,6 +14,7 @@ from typing import Any
 
 from ..errors import InputError, unknown_name
 from .bearing import BearingTable
+from .carrier import CarrierTable, TrainCarrierTable
 from .driveline import CouplingTable, MachineTable, TrainCouplingTable, TrainMachineTable
 from .loadmap import LoadMapTable
 from .microgeometry import FlankTable, GearMicrogeometryTable, MicrogeometryTable
@@ -545,22 +546,23 @@ def named_train(
     bearings: Mapping[str, NamedBearingTable],
     machines: Mapping[str, MachineTable] | None = None,
     couplings: Mapping[str, CouplingTable] | None = None,
+    carriers: Mapping[str, CarrierTable] | None = None,
 ) -> TrainTable:
-    """Return [train] with the shafts, meshes, bearings, machines and couplings of their own tables.
+    """Return [train] with the shafts, meshes, bearings, machines, couplings and carriers of their own tables.
 
     Parameters
     ----------
     table : TrainTable
         [train], without lists of these.
-    meshes, shafts, bearings, machines, couplings
-        The tables by name.
+    meshes, shafts, bearings, machines, couplings, carriers
+        The tables by name, with an entry for each planet.
 
     Raises
     ------
     InputError
         For lists of [train] that stand beside these tables, and for names that do not exist.
     """
-    for key in ("shafts", "gears", "meshes", "bearings", "machines", "couplings"):
+    for key in ("shafts", "gears", "meshes", "bearings", "machines", "couplings", "carriers"):
         if getattr(table, key):
             problem = f"stands beside [{'shafts' if key == 'gears' else key}.NAME]"
             raise InputError(f"[[train.{key}]]", None, problem, f"write all {key} as [{key}.NAME], or all as lists")
@@ -579,7 +581,11 @@ def named_train(
         for name, shaft in shafts.items()
     }
     for name, bores in carried.items():
-        if not bores:
+        if shafts[name].carrier is not None:
+            if bores:
+                problem = f"is a planet of carrier {shafts[name].carrier!r}, and bearings carry it: {', '.join(bores)}"
+                raise InputError(f"shafts.{name}", None, problem, "leave out its bearings, or its carrier")
+        elif not bores:
             cure = f'add [bearings.NAME] with shaft = "{name}", or attachments = ["1", "2"]'
             raise InputError(f"shafts.{name}.attachments", None, "no bearing carries the shaft", cure)
     rows = tuple(
@@ -613,6 +619,12 @@ def named_train(
         table, shafts=rows, meshes=tuple(meshes.values()), bearings=springs,
         machines=_named_rows(TrainMachineTable, machines or {}),
         couplings=_named_rows(TrainCouplingTable, couplings or {}),
+        carriers=tuple(
+            TrainCarrierTable(
+                name=name, **{f.name: getattr(carrier, f.name) for f in fields(TrainCarrierTable) if f.name != "name"}
+            )
+            for name, carrier in (carriers or {}).items()
+        ),
     )  # fmt: skip
     made.check_driveline("machines.{name}", "couplings.{name}")
     made = replace(made, rigid_bores=places or table.rigid_bores)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..config import build, read_toml
 from ..errors import InputError, unknown_key, unknown_name
+from .carrier import with_planets
 from .gearbox import Gearbox, NamedMesh, named_gearbox, named_train, pair_gearbox, train_gearbox, with_materials
 from .loadmap import TORQUES, LoadMapTable
 from .named import NAMED, named_tables
@@ -120,6 +121,7 @@ def _check_shorthand(raw: Mapping[str, Any]) -> None:
         ("bearings", "shafts"),
         ("machines", "shafts"),
         ("couplings", "shafts"),
+        ("carriers", "shafts"),
         ("shafts", "gears"),
     )
     for kind, needs in pairs:
@@ -284,7 +286,7 @@ def read_train_tables(path: str | Path, variant: str | None = None) -> dict[str,
 
 def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = None) -> dict[str, Any]:
     """The same of tables that are parsed; `path` is named in messages; ``gearbox`` has the gears and meshes."""
-    tables = job_tables(raw, path, ("train",), OF_TRAINS)
+    raw, tables = planet_tables(raw, path, ("train",), OF_TRAINS)
     table: TrainTable = tables["train"]
     table = table.chosen(table.variant if variant is None else variant)
     if "gears" in tables:
@@ -297,7 +299,7 @@ def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = No
             problem = "stands beside an elastic housing, whose bores have places of their own"
             cure = 'name the bore (attachment) instead, or write housing = "rigid" in [train]'
             raise InputError(f"bearings.{placed}.y_mm", bearings[placed].y_mm, problem, cure)
-        parts = {kind: tables.get(kind, {}) for kind in ("machines", "couplings")}
+        parts = {kind: tables.get(kind, {}) for kind in ("machines", "couplings", "carriers")}
         table = named_train(table, tables["meshes"], tables["shafts"], bearings, **parts)
         table = with_materials(table, tables.get("materials", {}), "shafts.{name}")
     else:
@@ -316,6 +318,24 @@ def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = No
     if table.housing == "elastic" and "housing" not in tables:
         raise InputError("train.housing", "elastic", "needs a table [housing]", 'add it, or write housing = "rigid"')
     return {**tables, "train": table}
+
+
+def planet_tables(
+    raw: dict[str, Any], path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = ()
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return a parsed job with an entry for each planet (`with_planets`), and its tables as `job_tables` does.
+
+    Parameters
+    ----------
+    raw, path, needed, optional
+        See `job_tables`, which raises for the tables as they stand in the file.
+    """
+    tables = job_tables(raw, path, needed, optional)
+    planets = any(shaft.carrier is not None for shaft in tables.get("shafts", {}).values())
+    if not planets and not tables.get("carriers"):
+        return raw, tables
+    raw = with_planets(raw, tables.get("carriers", {}))
+    return raw, job_tables(raw, path, needed, optional)
 
 
 def stiffness_of(raw: Mapping[str, Any], variant: str | None = None, mesh: str | None = None) -> StiffnessTable:

@@ -1,4 +1,4 @@
-"""Tables by name: [gears.NAME], [meshes.NAME], [shafts.NAME], [bearings.NAME], [machines.NAME], [couplings.NAME].
+"""Tables by name: [gears.NAME], [meshes.NAME], [shafts.NAME], [bearings.NAME], [carriers.NAME], [machines.NAME], ...
 
 The tables of a pair ([pair], [microgeometry]) and the lists of a train ([[train.gears]], ...) are shorthand for these.
 `gearfe.base.tables.gearbox` makes one form of either.
@@ -15,6 +15,7 @@ from typing import Any
 from ..config import build, quantity
 from ..errors import InputError
 from .bearing import BearingTable
+from .carrier import CarrierTable
 from .driveline import CouplingTable, MachineTable
 from .loadmap import LoadMapTable
 from .microgeometry import GearMicrogeometryTable
@@ -102,6 +103,7 @@ NAMED: dict[str, type] = {
     "bearings": NamedBearingTable,
     "machines": MachineTable,
     "couplings": CouplingTable,
+    "carriers": CarrierTable,
     "materials": MaterialTable,
 }
 

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import ClassVar
 
 from ..config import Removed, quantity
 from ..errors import InputError, unknown_name
 from .bearing import BearingTable
+from .carrier import TrainCarrierTable
 from .driveline import TrainCouplingTable, TrainMachineTable
 from .kinds import GONE_METHODS
 from .pair import FROM_DISTANCE, HANDS, MaterialTable, StiffnessTable, ToothFormTable
@@ -142,6 +144,24 @@ class ShaftTable:
         0.0, low=0.0, below=1.0, doc="of an elastic shaft: damping ratio of its own modes, beside [train.damping]"
     )
 
+    carrier: str | None = quantity(
+        None, doc="name of the carrier (of [carriers.NAME]) of which it is a planet; left out: bearings carry it"
+    )
+    speed_ratio: float | str | None = quantity(
+        None,
+        doc='its rotation is prescribed: so many times the speed of the drive, a number or a fraction as "-1/3"; '
+        "0: it is fixed; left out: it follows from gears and couplings",
+    )
+    holding_stiffness_Nm_per_rad: float | None = quantity(
+        None, above=0.0, doc="of a torsional spring to that rotation (N m/rad); left out: rigid"
+    )
+    holding_damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of the damper beside it (N m s/rad)")
+
+    @property
+    def guided(self) -> Fraction | None:
+        """Its speed over that of the drive where it is prescribed."""
+        return None if self.speed_ratio is None else Fraction(str(self.speed_ratio))
+
     @property
     def whole_length_mm(self) -> float:
         """Length (mm), that of the sections where it has some."""
@@ -154,6 +174,7 @@ class ShaftTable:
 
     def check(self, where: str) -> None:
         """Without sections length and radius are required; with them all follows from them."""
+        self._check_guided(where)
         if self.material is not None and self.density_kg_per_m3 is not None:
             problem = "stands beside material, which has a density"
             raise InputError(f"{where}.density_kg_per_m3", self.density_kg_per_m3, problem, "leave one out")
@@ -182,6 +203,22 @@ class ShaftTable:
                 raise InputError(
                     f"{where}.{key}", getattr(self, key), problem, "leave it out, or leave the sections out"
                 )
+
+    def _check_guided(self, where: str) -> None:
+        """A prescribed rotation is a fraction, of a shaft that is no planet; springs and dampers are of one."""
+        try:
+            _ = self.guided
+        except (ValueError, ZeroDivisionError):
+            cure = 'write 0 for a fixed shaft, else a number or a fraction as "-1/3"'
+            raise InputError(f"{where}.speed_ratio", self.speed_ratio, "is no number", cure) from None
+        for key in ("holding_stiffness_Nm_per_rad", "holding_damping_Nm_s_per_rad"):
+            needed = "speed_ratio" if self.speed_ratio is None else "holding_stiffness_Nm_per_rad"
+            if getattr(self, key) and (self.speed_ratio is None or self.holding_stiffness_Nm_per_rad is None):
+                problem = f"is of a shaft with {needed}"
+                raise InputError(f"{where}.{key}", getattr(self, key), problem, f"add {needed}, or leave it out")
+        if self.carrier is not None and self.speed_ratio is not None:
+            problem = "is of a planet, whose rotation follows from its meshes"
+            raise InputError(f"{where}.speed_ratio", self.speed_ratio, problem, "fix the sun, the ring or the carrier")
 
 
 @dataclass(frozen=True)
@@ -539,6 +576,7 @@ class TrainTable:
     rigid_bores: tuple[TrainRigidBoreTable, ...] = quantity((), doc="[[train.rigid_bores]]")
     machines: tuple[TrainMachineTable, ...] = quantity((), doc="[[train.machines]]; or [machines.NAME]")
     couplings: tuple[TrainCouplingTable, ...] = quantity((), doc="[[train.couplings]]; or [couplings.NAME]")
+    carriers: tuple[TrainCarrierTable, ...] = quantity((), doc="[[train.carriers]]; or [carriers.NAME]")
     curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.curves]")  # noqa: RUF009
     damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.damping]")  # noqa: RUF009
     variant: str = quantity("", doc="variant that is simulated when none is asked for; left out: [train] as it stands")

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.errors import InputError, given
+from ...base.tables.carrier import TrainCarrierTable
 from ...base.tables.gearbox import Gearbox, NamedMesh, check_alike_along
 from ...base.tables.housing import HousingTable
 from ...base.tables.jobs import read_train_tables
@@ -43,13 +44,16 @@ from ..housing.body import bore_points, reduced_housing
 from ..train.checks import check_flanks, check_layout
 from ..train.friction import Lubrication
 from ..train.gear_train import (
+    Carrier,
     Coupling,
     Damping,
     Drive,
     GearMesh,
     GearTrain,
+    Guide,
     Load,
     Machine,
+    Pin,
     Shaft,
     ShaftGear,
 )
@@ -227,6 +231,12 @@ def _rigid_train(job: TrainJob) -> GearTrain:
     bearings = tuple(bearing_of(str(b.attachment), b) for b in t.bearings)
     return GearTrain(
         shafts, gears, meshes, drive, loads, None, _rigid_bores(job), bearings, damping,
+        carriers=tuple(_carrier(carrier, t) for carrier in t.carriers),
+        guides=tuple(
+            Guide(s.name, s.guided, s.holding_stiffness_Nm_per_rad, s.holding_damping_Nm_s_per_rad)
+            for s in t.shafts
+            if s.guided is not None
+        ),
         machines=tuple(
             Machine(
                 m.name, m.shaft, m.inertia_kg_m2, m.stiffness_Nm_per_rad, m.damping_Nm_s_per_rad,
@@ -238,6 +248,23 @@ def _rigid_train(job: TrainJob) -> GearTrain:
             Coupling(c.name, c.shafts, c.stiffness_Nm_per_rad, c.damping_Nm_s_per_rad) for c in t.couplings
         ),
     )  # fmt: skip
+
+
+def _carrier(table: TrainCarrierTable, train: TrainTable) -> Carrier:
+    """A carrier with the pins of all shafts that name it."""
+    planets = [shaft.name for shaft in train.shafts if shaft.carrier == table.name]
+    springs, dampers = (_pin_values(v) for v in (table.pin_stiffness_N_per_m, table.pin_damping_N_s_per_m))
+    pins = []
+    for number, name in enumerate(planets):
+        errors = (table.pin_radial_errors_um, table.pin_tangential_errors_um)
+        radial, tangential = (1e-6 * values[number % len(values)] if values else 0.0 for values in errors)
+        pins.append(Pin(name, springs, 0.0 if dampers is None else dampers, (radial, tangential)))
+    return Carrier(table.name, table.shaft, tuple(pins))
+
+
+def _pin_values(values: float | tuple[float, ...] | None) -> Any:
+    """One number for two directions, or five."""
+    return values[0] if isinstance(values, tuple) and len(values) == 1 else values
 
 
 def _metres(length_mm: float | None) -> float | None:

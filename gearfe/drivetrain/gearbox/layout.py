@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ...base.tables.gearbox import Gearbox, named_train, with_materials
-from ...base.tables.jobs import OF_GEARS, gearbox_of, job_tables, train_tables
+from ...base.tables.jobs import OF_GEARS, gearbox_of, planet_tables, train_tables
 from ...base.tables.train import TrainTable
 from ...gears.geometry.pair import gear_of, pair_of
 from .job import bore_places, shaft_of
@@ -114,7 +114,7 @@ def gearbox_layout(raw: dict[str, Any], path: str | Path) -> GearboxLayout | Non
         tables = train_tables(raw, path, "")
         box, table = tables["gearbox"], tables["train"]
     elif "shafts" in raw:
-        tables = job_tables(raw, path, ("gears", "meshes", "shafts"), (*OF_GEARS, "housing"))
+        raw, tables = planet_tables(raw, path, ("gears", "meshes", "shafts"), (*OF_GEARS, "housing"))
         box = gearbox_of(raw, path)
         table = named_train(TrainTable(), tables["meshes"], tables["shafts"], tables.get("bearings", {}))
         table = with_materials(table, tables.get("materials", {}), "shafts.{name}")

@@ -31,6 +31,7 @@ import numpy as np
 
 from ...base.typing import Array, ComplexArray
 from ..train.bearings import shaft_motion
+from ..train.elements import planes
 from ..train.mesh_element import Shafts
 from ..train.model import TrainModel
 
@@ -153,7 +154,7 @@ def train_forms(model: TrainModel, sense: float) -> TrainForms:
     return TrainForms(tuple(parts), tuple(kinetic), tuple(strain), tuple(orbits))
 
 
-def _strain(model: TrainModel, parts: list[Part], number: int) -> list[Form]:
+def _strain(model: TrainModel, parts: list[Part], number: int) -> list[Form]:  # noqa: PLR0911
     """Forms of the strain of an element of the system."""
     element = model.system.elements[number]
     blocks = element.blocks()
@@ -180,6 +181,9 @@ def _strain(model: TrainModel, parts: list[Part], number: int) -> list[Form]:
             Form(3 * shaft + KINDS.index(AXIAL), along[:, None] * moved, forces),
             Form(3 * shaft + KINDS.index(BENDING), (1 - along)[:, None] * moved, forces),
         ]
+    if kind == "pin":
+        planet = model.train.shaft_number(name)
+        return [Form(3 * planet + KINDS.index(BENDING), rows, blocks[1] @ rows)]
     return [Form(3 * shaft + KINDS.index(TORSION), rows, blocks[1] @ rows)]
 
 
@@ -203,18 +207,7 @@ def _coordinates(model: TrainModel, number: int) -> _Coordinates:
     shifts[:3, :3] = np.outer(frame[2], frame[2])
     bends[:3, :3] = np.eye(3) - shifts[:3, :3]
     bends[3, 3] = bends[4, 4] = turns[5, 5] = 1.0
-    first, second = np.zeros((2, body.size)), np.zeros((2, body.size))
-    first[0, :3], second[0, :3] = frame[0], frame[1]
-    first[1, 3] = second[1, 4] = 1.0
-    mass = [body.rotor.mass, body.rotor.transverse]
-    unit, rows, others = np.eye(body.size), [first], [second]
-    planes: dict[str, list[int]] = {"bending e1": [], "bending e2": []}
     for coordinate, kind in enumerate(body.kinds, start=6):
         {"bending": bends, "torsion": turns, "axial": shifts}[kind.split()[0]][coordinate, coordinate] = 1.0
-        if kind in planes:
-            planes[kind].append(coordinate)
-    for one, two in zip(*planes.values(), strict=True):
-        rows.append(unit[[one]])
-        others.append(unit[[two]])
-        mass.append(1.0)
-    return _Coordinates((bends, turns, shifts), np.vstack(rows), np.vstack(others), np.array(mass))
+    mass, first, second = zip(*planes(body, frame), strict=True)
+    return _Coordinates((bends, turns, shifts), np.array(first), np.array(second), np.array(mass))

@@ -7,8 +7,10 @@ r"""Eigenvalue problem of a train that turns at a steady speed.
     \begin{pmatrix} w\\ \dot y\end{pmatrix}, \qquad w = \Lambda^{1/2}y
 
 y are the modal coordinates of unit mass of the train at rest, with the mean stiffness of its meshes, G the gyroscopic
-moments for unit speed of the drive. The squared length of a state is twice its energy. Without damping the matrix is
-skew: modes of one speed are orthogonal in energy, and :math:`d\lambda/d\Omega = x^H B x` with :math:`B = diag(0, G)`.
+moments for unit speed of the drive. Carriers add :math:`\Omega^2 S y` on the right, the centrifugal forces of their
+frames; G then has those of Coriolis. The squared length of a state is twice its energy. Without damping and carriers
+the matrix is skew: modes of one speed are orthogonal in energy, and :math:`d\lambda/d\Omega = x^H B x` with
+:math:`B = diag(0, G)`.
 """
 
 from __future__ import annotations
@@ -45,8 +47,8 @@ class TurningTrain:
     ----------
     squares : (n,)
         Squares of the natural frequencies at rest (rad2/s2).
-    damping, gyroscopic : (n, n)
-        D (1/s), and G for unit speed of the drive.
+    damping, gyroscopic, stiffening : (n, n)
+        D (1/s), G for unit speed of the drive, and S for its square.
     kinds : (n, n)
         A weight of the kinetic energies of the parts, different for each: of modes that agree in all speeds those are
         taken that belong to different parts.
@@ -55,6 +57,7 @@ class TurningTrain:
     squares: Array
     damping: Array
     gyroscopic: Array
+    stiffening: Array
     kinds: Array
 
     @cached_property
@@ -71,7 +74,10 @@ class TurningTrain:
     def poles(self, speed: float) -> Poles:
         """Modes at a speed of the drive (rad/s)."""
         n, stiff = len(self.rates), np.diag(self.rates)
-        A = np.block([[np.zeros((n, n)), stiff], [-stiff, speed * self.gyroscopic - self.damping]])
+        below = -stiff
+        if self.stiffening.any():
+            below = below + speed**2 * self.stiffening @ np.linalg.pinv(stiff)
+        A = np.block([[np.zeros((n, n)), stiff], [below, speed * self.gyroscopic - self.damping]])
         values, vectors = np.linalg.eig(A)
         least = np.sqrt(ROUND_OFF) * float(self.rates.max(initial=0.0))
         chosen = np.flatnonzero(values.imag > least)
@@ -122,12 +128,13 @@ def turning_train(model: TrainModel, kinds: Array) -> TurningTrain:
         if line.in_contact:  # its Rayleigh part is in the constant damping already
             along = modal.T.T @ line.row
             damping += line.given.damping * np.outer(along, along)
-    gyroscopic = np.zeros_like(damping)
+    gyroscopic, stiffening = np.zeros_like(damping), np.zeros_like(damping)
     for couple in model.forces.gyros:
         tilt, other = modal.T.T @ model.directions[:, couple.direction : couple.direction + 2].T[:, :, None]
         first, second = tilt[:, 0], other[:, 0]
         gyroscopic += couple.polar * couple.ratio * (np.outer(second, first) - np.outer(first, second))
-    return TurningTrain(modal.eigenvalues, damping, gyroscopic, kinds)
+        stiffening += couple.stiffening * (np.outer(first, first) + np.outer(second, second))
+    return TurningTrain(modal.eigenvalues, damping, gyroscopic, stiffening, kinds)
 
 
 def _clusters(values: ComplexArray) -> list[slice]:

@@ -5,20 +5,37 @@ The path of a job: `drivetrain.gearbox.job` reads the tables and makes a `GearTr
 `TrainResponse`.
 """
 
-from .gear_train import Bearing, Coupling, Damping, Drive, GearMesh, GearTrain, Load, Machine, Shaft, ShaftGear
+from .gear_train import (
+    Bearing,
+    Carrier,
+    Coupling,
+    Damping,
+    Drive,
+    GearMesh,
+    GearTrain,
+    Guide,
+    Load,
+    Machine,
+    Pin,
+    Shaft,
+    ShaftGear,
+)
 from .model import TrainModel, build_train
 from .response import TrainResponse
 from .simulate import simulate
 
 __all__ = [
     "Bearing",
+    "Carrier",
     "Coupling",
     "Damping",
     "Drive",
     "GearMesh",
     "GearTrain",
+    "Guide",
     "Load",
     "Machine",
+    "Pin",
     "Shaft",
     "ShaftGear",
     "TrainModel",

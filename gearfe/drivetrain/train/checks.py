@@ -20,7 +20,19 @@ from ...gears.geometry.pair import Gear, gear_pair, in_keys
 from ...gears.geometry.validity import check_external, check_spur
 from ..bearings import BallBearing, RollerBearing
 from .friction import check_friction
-from .gear_train import ALWAYS, IN_CONTACT, Drive, GearMesh, GearTrain, Load, Machine, Shaft, ShaftGear, common_face
+from .gear_train import (
+    ALWAYS,
+    IN_CONTACT,
+    Carrier,
+    Drive,
+    GearMesh,
+    GearTrain,
+    Load,
+    Machine,
+    Shaft,
+    ShaftGear,
+    common_face,
+)
 from .statics import check_flanks, check_yields, one_sided
 
 #: Agreement of lengths and angles that count as equal (relative).
@@ -46,6 +58,7 @@ def check_layout(train: GearTrain) -> None:
     _names("gear", [g.name for g in train.gears])
     _names("mesh", [m.name for m in train.meshes])
     _check_shafts(train)
+    _check_stages(train)
     _check_ends(train)
     for gear in train.gears:
         _known("gear " + repr(gear.name), "shaft", gear.shaft, [s.name for s in train.shafts])
@@ -57,8 +70,8 @@ def check_layout(train: GearTrain) -> None:
     _ = train.kinematics  # which refuses trains that cannot roll or be assembled
 
 
-def _names(kind: str, names: list[str]) -> None:
-    if not names and kind != "mesh":
+def _names(kind: str, names: list[str], *, some: bool = True) -> None:
+    if not names and kind != "mesh" and some:
         raise InputError(f"train.{kind}s", None, f"the train has no {kind}", f"add a {kind}")
     twice = sorted({n for n in names if names.count(n) > 1})
     if twice:
@@ -83,6 +96,8 @@ def _check_shafts(train: GearTrain) -> None:
                 raise InputError(f"{label} {key}", value, "must be finite and > 0", "give it in SI units")
         if shaft.sections:
             _check_sections(shaft)
+        if train.carrier_of(shaft.name) is not None:
+            continue
         if not shaft.bores:
             raise InputError(f"{label} bores", None, "no bore holds the shaft", "name the attachments that carry it")
         for bore in shaft.bores:
@@ -98,6 +113,116 @@ def _check_shafts(train: GearTrain) -> None:
         for key in ("stiffness", "damping"):
             _check_yields(f"bearing at {bearing.bore!r} {key}", getattr(bearing, key))
     _check_apart(train)
+
+
+def _check_stages(train: GearTrain) -> None:
+    """Carriers, their planets, and shafts that are fixed or guided fit each other."""
+    shafts = [shaft.name for shaft in train.shafts]
+    _names("carrier", [carrier.name for carrier in train.carriers], some=False)
+    guided = [guide.shaft for guide in train.guides]
+    for guide in train.guides:
+        label = f"shaft {guide.shaft!r}"
+        _known("speed_ratio", "shaft", guide.shaft, shafts)
+        if guide.shaft == train.driven.shaft or guided.count(guide.shaft) > 1:
+            problem = "is driven and fixed or guided at once" if guided.count(guide.shaft) == 1 else "is guided twice"
+            raise InputError(f"{label} speed_ratio", float(guide.ratio), problem, "leave one out")
+        for key in ("stiffness", "damping"):
+            value = getattr(guide, key)
+            if value is not None and not (math.isfinite(value) and (value > 0.0 or (key == "damping" and not value))):
+                raise InputError(f"{label} holding {key}", value, "must be finite and > 0", "give it in SI units")
+    if not train.carriers:
+        return
+    if train.housing is not None:
+        problem = "stands beside an elastic housing: planets pass it, which changes what they move"
+        raise InputError("train.housing", "elastic", problem, 'write housing = "rigid" in [train]')
+    carried: dict[str, str] = {}
+    for carrier in train.carriers:
+        _check_carrier(train, carrier, carried)
+    for mesh in train.meshes:
+        _check_carried_mesh(train, mesh)
+    for shaft in train.shafts:
+        frames = train.frames_of(shaft.name)
+        if frames:
+            _check_frame(train, shaft, frames)
+
+
+def _check_carrier(train: GearTrain, carrier: Carrier, carried: dict[str, str]) -> None:
+    """A carrier is a shaft, and its planets are shafts off its axis that nothing else carries."""
+    label, shafts = f"carrier {carrier.name!r}", [shaft.name for shaft in train.shafts]
+    _known(label, "shaft", carrier.shaft, shafts)
+    if not carrier.pins:
+        raise InputError(label, None, "has no planets", f'give a shaft carrier = "{carrier.name}"')
+    for pin in carrier.pins:
+        _known(label, "shaft", pin.shaft, shafts)
+        shaft = train.shaft(pin.shaft)
+        if pin.shaft in carried or pin.shaft == carrier.shaft:
+            problem = f"cannot be a planet of {label}: it is {carried.get(pin.shaft, 'the carrier itself')}"
+            raise InputError(f"shaft {pin.shaft!r} carrier", carrier.name, problem, "a planet has one carrier")
+        carried[pin.shaft] = f"a planet of {label}"
+        if shaft.bores:
+            problem = f"is a planet of {label}, whose pin carries it, and of bearings: {', '.join(shaft.bores)}"
+            raise InputError(f"shaft {pin.shaft!r} bores", None, problem, "leave out its bearings, or its carrier")
+        if shaft_distance(train, pin.shaft, carrier.shaft) <= SAME * shaft.length:
+            problem = f"lies on the axis of {label}"
+            raise InputError(f"shaft {pin.shaft!r}", None, problem, "place it off that axis (x_mm, z_mm)")
+        for key in ("stiffness", "damping"):
+            values = getattr(pin, key)
+            given = np.array(0.0 if values is None else values, dtype=float)
+            positive = key == "damping" or values is None or given.max() > 0.0
+            if given.shape not in ((), (5,)) or not np.isfinite(given).all() or (given < 0.0).any() or not positive:
+                problem = "must be one number, radial and tangential, or five >= 0"
+                raise InputError(f"{label} pin {key}", values, problem, "see the documentation of Pin")
+
+
+def _check_carried_mesh(train: GearTrain, mesh: GearMesh) -> None:
+    """The gears of a mesh have axes that one carrier carries, or lie on its axis."""
+    ends = [train.gear(name).shaft for name in (mesh.driver, mesh.driven)]
+    carriers = [train.carrier_of(shaft) for shaft in ends]
+    carrier = carriers[0] or carriers[1]
+    if carrier is None:
+        return
+    label = f"mesh {mesh.name!r}"
+    for shaft, own in zip(ends, carriers, strict=True):
+        if own is not None and own is not carrier:
+            problem = f"joins planets of the carriers {carrier.name!r} and {own.name!r}, which pass each other"
+            raise InputError(label, None, problem, "mesh planets of one carrier")
+        off = shaft_distance(train, shaft, carrier.shaft)
+        if own is None and off > SAME * max(train.shaft(shaft).length, 1e-3):
+            problem = f"shaft {shaft!r} is {1e3 * off:.6g} mm off the axis of carrier {carrier.name!r}"
+            cure = "move the shaft onto that axis (x_mm, z_mm): its gear meshes with planets that go round it"
+            raise InputError(label, None, problem, cure)
+
+
+def _check_frame(train: GearTrain, shaft: Shaft, frames: list[Carrier]) -> None:
+    """A shaft that moves in the frame of a carrier has bearings that are alike in all directions across the axis."""
+    label = f"shaft {shaft.name!r}"
+    gears = {gear.name for gear in train.gears if gear.shaft == shaft.name}
+    fixed = [m.name for m in train.meshes if gears & {m.driver, m.driven} and train.mesh_carrier(m) is None]
+    if len(frames) > 1 or fixed:
+        other = f"mesh {fixed[0]!r}, whose axes are fixed" if fixed else f"carrier {frames[1].name!r}"
+        problem = f"moves in its bearings with carrier {frames[0].name!r} and with {other}, at different speeds"
+        cure = "part it into two shafts on one axis with [couplings.NAME] between them, or hold it in hinges"
+        raise InputError(label, None, problem, cure)
+    for bearing in train.bearings:
+        if bearing.bore not in shaft.bores:
+            continue
+        if isinstance(bearing.stiffness, BallBearing | RollerBearing):
+            problem = f"carries shaft {shaft.name!r} of a planetary stage, whose load goes round with the carrier"
+            raise InputError(f"bearing {bearing.bore!r}", None, problem, "give its stiffness, or a hinge")
+        for key in ("stiffness_matrix", "damping_matrix"):
+            matrix = getattr(bearing, key)
+            if not np.allclose(_turned(matrix), matrix, rtol=0.0, atol=SAME * np.abs(matrix).max()):
+                problem = f"differs across the axis, and shaft {shaft.name!r} moves in the frame of a carrier"
+                cure = "give equal values in both directions across the axis, translations and tilts"
+                raise InputError(f"bearing {bearing.bore!r} {key.split('_')[0]}", None, problem, cure)
+
+
+def _turned(matrix: np.ndarray) -> np.ndarray:
+    """Matrix of a bearing (e1, a, e2, tilts about e1 and e2) seen from axes that are turned by 1 rad about a."""
+    cosine, sine = math.cos(1.0), math.sin(1.0)
+    turn = np.eye(5)
+    turn[np.ix_([0, 2], [0, 2])] = turn[np.ix_([3, 4], [3, 4])] = [[cosine, sine], [-sine, cosine]]
+    return np.asarray(turn @ matrix @ turn.T)
 
 
 def _check_yields(label: str, values: Any) -> None:
@@ -495,21 +620,32 @@ def overlap(one: ShaftGear, two: ShaftGear) -> float:
 def _check_room(train: GearTrain) -> None:
     """No two gears in one place, and no gear in another shaft."""
     meshing = {frozenset((m.driver, m.driven)) for m in train.meshes}
+    # rings are hollow, and carriers are cages round the gears: their cylinders are of no form that is known
+    rims = {gear.shaft for gear in train.gears if gear.gear.teeth < 0} | {c.shaft for c in train.carriers}
     for i, one in enumerate(train.gears):
         for two in train.gears[i + 1 :]:
             if overlap(one, two) <= SAME * one.gear.face_width or frozenset((one.name, two.name)) in meshing:
                 continue
             room = 0.0 if one.shaft == two.shaft else shaft_distance(train, one.shaft, two.shaft)
+            if one.shaft != two.shaft and (one.gear.teeth < 0) != (two.gear.teeth < 0):
+                ring, other = (one, two) if one.gear.teeth < 0 else (two, one)
+                if room + other.gear.tip_radius <= ring.gear.tip_radius:
+                    continue  # within the ring
             if one.shaft == two.shaft or room < one.gear.tip_radius + two.gear.tip_radius:
                 problem = f"overlaps gear {two.name!r} over {1e3 * overlap(one, two):.6g} mm along the axis"
                 raise InputError(f"gear {one.name!r}", None, problem, "move one along its shaft, or let them mesh")
         for shaft in train.shafts:
             along, half = one.along - float(np.array(shaft.point) @ train.frame[2]), 0.5 * one.gear.face_width
             beside = abs(along) - 0.5 * (shaft.length + one.gear.face_width) >= 0.0
-            if shaft.name == one.shaft or beside:
+            if shaft.name == one.shaft or beside or shaft.name in rims:
                 continue
             radius = shaft.radius_within(along - half, along + half)
             room = shaft_distance(train, one.shaft, shaft.name) - radius
+            if one.gear.teeth < 0:
+                if one.gear.tip_radius < room + 2.0 * radius:
+                    problem = f"its teeth cut into shaft {shaft.name!r}, which runs through it"
+                    raise InputError(f"gear {one.name!r}", None, problem, "thinner or shorter shaft, or a larger ring")
+                continue
             if one.gear.tip_radius > room:
                 problem = f"its tip cuts {1e3 * (one.gear.tip_radius - room):.4g} mm into shaft {shaft.name!r}"
                 raise InputError(f"gear {one.name!r}", None, problem, "thinner shaft, smaller gear, or a shorter shaft")

@@ -148,6 +148,23 @@ class Gyration(NamedTuple):
     other: Array  # about e2, (size,)
 
 
+class Plane(NamedTuple):
+    """Two coordinates of a shaft, along e1 and e2 or about them, that have one inertia."""
+
+    inertia: float
+    first: Array  # (size,)
+    second: Array  # (size,)
+
+
+def planes(body: ShaftBody, frame: Array) -> tuple[Plane, ...]:
+    """Motion of a shaft across the axis in pairs: of the mass centre, both tilts, elastic bending of unit mass."""
+    unit = np.eye(body.size)
+    across = unit[:3].T @ frame[:2].T
+    pairs = [Plane(body.rotor.mass, *across.T), Plane(body.rotor.transverse, unit[3], unit[4])]
+    bending = [[6 + i for i, kind in enumerate(body.kinds) if kind == f"bending {e}"] for e in ("e1", "e2")]
+    return (*pairs, *(Plane(1.0, unit[one], unit[two]) for one, two in zip(*bending, strict=True)))
+
+
 class ShaftBody(Element):
     """A shaft with its gears, rigid or elastic: what a train asks of it.
 
@@ -321,6 +338,33 @@ def hinge(shaft: ShaftBody, housing: ModalBlocks | None, rows: Array, name: str)
     """
     touches: tuple[Element, ...] = (shaft,) if housing is None else (shaft, housing)
     return LinearJoint(touches, rows, np.zeros(len(rows)), name=name)
+
+
+def pin_rows(planet: ShaftBody, carrier: ShaftBody, point: Array, radial: Array, frame: Array) -> Array:
+    """Return the motion of a planet against its carrier: radial, along the axis, tangential, tilts about e1 and e2.
+
+    Parameters
+    ----------
+    planet, carrier : ShaftBody
+        Their shafts.
+    point : ndarray, shape (3,)
+        Middle of the pin (m).
+    radial : ndarray, shape (3,)
+        Unit vector from the carrier's axis to the pin.
+    frame : ndarray, shape (3, 3)
+        Rows e1, e2, a: directions of the train.
+
+    Returns
+    -------
+    rows : ndarray, shape (5, sizes of planet and carrier)
+    """
+    axis = frame[2]
+    directions, along = np.array([radial, axis, np.cross(axis, radial)]), float(point @ axis)
+    rows = []
+    for sign, body in ((1.0, planet), (-1.0, carrier)):
+        moved = directions @ body.point_rows(point, frame, along)
+        rows.append(sign * np.vstack([moved, body.turn_rows(along)[:2]]))
+    return np.hstack(rows)
 
 
 def bearing(

@@ -300,15 +300,41 @@ Flank = CurveFlank | LawFlank
 
 @dataclass(frozen=True)
 class Gyro:
-    """Gyroscopic moments on the tilts `direction` and the one after it, of a shaft that turns by the direction `spin`.
+    r"""Forces that turn the motion along the directions `direction` and the one after it: gyroscopic, or of a frame.
 
-    `polar` is in kg m2.
+    With :math:`H = p\,(g\psi' + u_s')`, p the polar inertia and s the direction of the spin, the moments on two tilts
+    are :math:`-H u_2'` and :math:`H u_1'`. In a frame that turns with :math:`\Omega = g\psi'` a mass m has the Coriolis
+    forces with :math:`p = -2m`, the centrifugal ones :math:`m g^2\psi'^2 u` and those of Euler, :math:`-H' u_2/2` and
+    :math:`H' u_1/2`; of its place on the first direction, `offset` (m) is part beside u.
+
+    Attributes
+    ----------
+    direction, spin
+        Numbers of directions.
+    ratio
+        g.
+    polar
+        p (kg m2, of a mass kg).
+    stiffening
+        Factor of psi'^2 u (kg m2, kg).
+    euler
+        Whether those forces act.
+    offset
+        m.
     """
 
     direction: int
     spin: int
     ratio: float
     polar: float
+    stiffening: float = 0.0
+    euler: bool = False
+    offset: float = 0.0
+
+    @property
+    def of_frame(self) -> bool:
+        """Whether its motion is described in a frame that turns."""
+        return self.euler or self.stiffening != 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,6 +389,11 @@ class TrainForces:
             momentum = gyro.polar * (gyro.ratio * rate + du[:, gyro.spin])
             out[:, d] -= momentum * du[:, d + 1]
             out[:, d + 1] += momentum * du[:, d]
+            if gyro.of_frame:
+                first, second = u[:, d] + gyro.offset, u[:, d + 1]
+                half = 0.5 * gyro.euler * gyro.polar * gyro.ratio * self.angle(t, 2)
+                out[:, d] += gyro.stiffening * rate**2 * first - half * second
+                out[:, d + 1] += gyro.stiffening * rate**2 * second + half * first
         for direction, torque in self.torques:
             out[:, direction] += torque(t)
         return out

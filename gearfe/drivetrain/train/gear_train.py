@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -27,7 +28,7 @@ from ...multibody.series.timefunctions import TimeFunction
 from ..bearings import BallBearing, RollerBearing
 from .friction import Lubrication
 from .kinematics import Kinematics, kinematics
-from .layout import LayoutGear, LayoutMesh, PitchErrors, TrainLayout
+from .layout import LayoutCarrier, LayoutGear, LayoutMesh, PitchErrors, TrainLayout
 
 if TYPE_CHECKING:
     from ...fem.beams import Section
@@ -54,11 +55,11 @@ class Shaft:
     name
         How other parts call it.
     point
-        Middle of the shaft (m).
+        Middle of the shaft at the start (m).
     length, radius
         Of the cylinder (m); of a shaft with sections the sum of their lengths and the largest radius.
     bores
-        Names of the attachments (bores) that carry it; two hinges are usual.
+        Names of the attachments (bores) that carry it; two hinges are usual. None of a planet, which a pin carries.
     density
         kg/m3.
     initial_speed
@@ -420,6 +421,67 @@ class Damping:
     gyroscopic: bool = True
 
 
+@dataclass(frozen=True)
+class Pin:
+    """A planet on its carrier: springs between its shaft and the carrier, or a hinge.
+
+    Parameters
+    ----------
+    shaft
+        Name of the planet's shaft.
+    stiffness
+        Radial and tangential (N/m, one number; the other motions are held), or five: radial, along the axis, tangential
+        (N/m), and two tilts (N m/rad). None: a hinge.
+    damping
+        Of these springs (N s/m, N m s/rad): radial and tangential, or five.
+    error
+        Radial and tangential error of the pin's place on the carrier (m).
+    """
+
+    shaft: str
+    stiffness: float | Five | None = None
+    damping: float | Five = 0.0
+    error: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """A shaft that carries planets round its axis.
+
+    Parameters
+    ----------
+    name, shaft
+        Its name, and that of its shaft.
+    pins
+        One for each planet. Planets with equal gears are one set, numbered in the order of their pins; of planets that
+        mesh with each other those of one number do.
+    """
+
+    name: str
+    shaft: str
+    pins: tuple[Pin, ...]
+
+
+@dataclass(frozen=True)
+class Guide:
+    """A shaft whose rotation is prescribed beside that of the drive.
+
+    Parameters
+    ----------
+    shaft
+        Its name.
+    ratio
+        Its speed over that of the drive; 0: it is fixed.
+    stiffness, damping
+        Of a torsional spring between the prescribed rotation and the shaft (N m/rad, N m s/rad); None: rigid.
+    """
+
+    shaft: str
+    ratio: Fraction = Fraction(0)
+    stiffness: float | None = None
+    damping: float = 0.0
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class GearTrain(Facts):
     """A whole gear train.
@@ -440,6 +502,8 @@ class GearTrain(Facts):
         Direction of all shafts.
     machines, couplings
         Inertias at the shafts, and torsional springs between shafts on one axis.
+    carriers, guides
+        Carriers of planetary stages, and shafts that are fixed or guided.
     """
 
     shafts: tuple[Shaft, ...]
@@ -454,6 +518,8 @@ class GearTrain(Facts):
     axis: Vector = (0.0, 1.0, 0.0)
     machines: tuple[Machine, ...] = ()
     couplings: tuple[Coupling, ...] = ()
+    carriers: tuple[Carrier, ...] = ()
+    guides: tuple[Guide, ...] = ()
 
     def facts(self) -> dict[str, str]:
         """Shafts, gears, meshes, drive, loads, housing."""
@@ -494,7 +560,58 @@ class GearTrain(Facts):
         coupled = tuple(
             (self.shaft_number(one), self.shaft_number(two)) for one, two in (c.shafts for c in self.couplings)
         )
-        return TrainLayout(names, driven, self.driven.speed, tuple(gears.values()), meshes, loads, coupled)
+        guided = tuple((self.shaft_number(guide.shaft), guide.ratio) for guide in self.guides)
+        return TrainLayout(
+            names, driven, self.driven.speed, tuple(gears.values()), meshes, loads, coupled, guided,
+            tuple(map(self._layout_carrier, self.carriers)),
+        )  # fmt: skip
+
+    def _layout_carrier(self, carrier: Carrier) -> LayoutCarrier:
+        sets: dict[tuple[tuple[int, float], ...], list[tuple[int, float]]] = {}
+        for pin in carrier.pins:
+            gears = tuple((gear.gear.teeth, gear.along) for gear in self.gears if gear.shaft == pin.shaft)
+            place = self.shaft_number(pin.shaft), self.pin_angle(carrier, pin)
+            sets.setdefault(gears, []).append(place)
+        return LayoutCarrier(carrier.name, self.shaft_number(carrier.shaft), tuple(map(tuple, sets.values())))
+
+    def pin_arm(self, carrier: Carrier, pin: Pin) -> Array:
+        """Vector across the axis from that of a carrier to that of a planet at the start, along e1 and e2 (m)."""
+        arm = np.array(self.shaft(pin.shaft).point) - np.array(self.shaft(carrier.shaft).point)
+        return np.asarray(self.frame[:2] @ arm)
+
+    def pin_angle(self, carrier: Carrier, pin: Pin) -> float:
+        """Place of a planet about the axis of its carrier at the start (rad), from the first direction e1."""
+        arm = self.pin_arm(carrier, pin)
+        return math.atan2(arm[1], arm[0])
+
+    def carrier_of(self, shaft: str) -> Carrier | None:
+        """Carrier that carries a shaft as a planet, or None."""
+        return next((c for c in self.carriers if any(pin.shaft == shaft for pin in c.pins)), None)
+
+    def mesh_carrier(self, mesh: GearMesh) -> Carrier | None:
+        """Carrier of the planet of a mesh; None where both axes are fixed."""
+        return self.carrier_of(self.gear(mesh.driver).shaft) or self.carrier_of(self.gear(mesh.driven).shaft)
+
+    def frame_of(self, shaft: str) -> Carrier | None:
+        """Carrier in whose frame, which turns with it, the motion of a shaft is described; None: it does not turn.
+
+        It is that of its planets, their carrier, and the gears that these mesh with, except for shafts in hinges,
+        which do not move across the axis.
+        """
+        carriers = self.frames_of(shaft)
+        return carriers[0] if carriers else None
+
+    def frames_of(self, shaft: str) -> list[Carrier]:
+        """Carriers whose frames the motion of a shaft across the axis needs; more than one cannot be."""
+        own = self.carrier_of(shaft)
+        if own is not None:
+            return [own]
+        springs = {bearing.bore for bearing in self.bearings}
+        if any(bore not in springs for bore in self.shaft(shaft).bores):
+            return []
+        gears = {gear.name for gear in self.gears if gear.shaft == shaft}
+        meshes = [self.mesh_carrier(mesh) for mesh in self.meshes if gears & {mesh.driver, mesh.driven}]
+        return [c for c in self.carriers if c.shaft == shaft or any(mesh is c for mesh in meshes)]
 
     def _layout_gear(self, item: ShaftGear) -> LayoutGear:
         gear, errors = item.gear, _tuples(item.pitch_errors)
@@ -505,8 +622,12 @@ class GearTrain(Facts):
         arm = self.frame[:2] @ (np.array(self.shaft(two.shaft).point) - np.array(self.shaft(one.shaft).point))
         # teeth that jam by rounding have no backlash, and those that jam by more are refused elsewhere
         twist = max(0.0, MeshGeometry(one.gear, two.gear, mesh.centre_distance).contact_twist)
+        if driver.teeth * driven.teeth < 0:
+            arm = -arm  # the pitch point lies beyond the driver, seen from the axis of the ring
         towards, distance = math.atan2(arm[1], arm[0]), float(np.linalg.norm(arm))
-        return LayoutMesh(mesh.name, driver, driven, towards, distance, twist, mesh.phase)
+        carrier = self.mesh_carrier(mesh)
+        number = None if carrier is None else self.shaft_number(carrier.shaft)
+        return LayoutMesh(mesh.name, driver, driven, towards, distance, twist, mesh.phase, number)
 
     @cached_property
     def kinematics(self) -> Kinematics:

@@ -1,9 +1,10 @@
 r"""Kinematics of a train: ratios of the shafts, driving senses, common period, teeth at the start, steady forces.
 
-With :math:`\Delta\varphi_2 = -(z_1/z_2)\,\Delta\varphi_1` at each mesh all ratios are rational, so the common period
-is exact: a mesh repeats after :math:`1/(|g| z)` turns of the drive (g the ratio of its driver, z the driver's teeth),
-and fractions have a least common multiple. In steady running the moments about the axis of each shaft that is not
-driven balance: base radius times force at each mesh.
+All ratios are rational (`gearfe.drivetrain.train.rolling`), so the common period is exact: a mesh repeats after
+:math:`1/(|g| z)` turns of the drive (g the speed of its driver over that of the drive, against the carrier of a
+planetary stage, z the driver's teeth), and fractions have a least common multiple. In steady running the moments about
+the axis of each shaft that is not held balance: base radius times force at each mesh, and on a carrier the opposite of
+what its meshes exert on their gears.
 """
 
 from __future__ import annotations
@@ -16,14 +17,17 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...base.errors import InputError
 from ...base.typing import Array
 from ...multibody.series.timefunctions import TimeFunction
 from .layout import LayoutMesh, TrainLayout
 from .phases import pair_shifts, tooth_places
+from .planetary import check_assembly
+from .rolling import Rolling, rolling
 
 #: A common period of more cycles of the fastest mesh than this is of no practical use.
 MOST_CYCLES = 200
+#: Forces of meshes that are smaller, in parts of the largest, are round-off: they say nothing of flanks.
+ROUND_OFF = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +36,10 @@ class Kinematics:
 
     Attributes
     ----------
-    ratios
-        Speed of each shaft for unit speed of the drive, in the order of the shafts.
+    rolling
+        Speeds of the shafts, and what their torques react on.
+    drivers
+        Speed of the driver of each mesh for unit speed of the drive, against the carrier of its stage.
     cycles
         Mesh cycles in one turn of the drive, one a mesh.
     common_turns
@@ -43,7 +49,7 @@ class Kinematics:
         Why there is no common period, or nothing.
     senses
         For each mesh, +1 or -1: sense about the axis in which the driver pushes, that of its rotation. Where the drive
-        stands still, it follows from the loads.
+        stands still, it follows from the loads; in a planetary stage always, for there "driver" is a name only.
     steady_forces : ndarray, shape (meshes,)
         Force of each mesh (N) under the final torques of the loads, without inertia; negative presses the back flanks.
         In a loop of gears those of least squares: statics alone do not determine them.
@@ -57,7 +63,8 @@ class Kinematics:
         `gearfe.drivetrain.train.phases.pair_shifts`.
     """
 
-    ratios: tuple[Fraction, ...]
+    rolling: Rolling
+    drivers: tuple[Fraction, ...]
     cycles: tuple[Fraction, ...]
     common_turns: Fraction | None
     note: str
@@ -67,6 +74,11 @@ class Kinematics:
     phases: tuple[float, ...]
     shifts: tuple[tuple[Array, Array], ...]
 
+    @property
+    def ratios(self) -> tuple[Fraction, ...]:
+        """Speed of each shaft for unit speed of the drive, in the order of the shafts."""
+        return self.rolling.ratios
+
 
 @lru_cache(maxsize=32)
 def kinematics(layout: TrainLayout) -> Kinematics:
@@ -75,50 +87,34 @@ def kinematics(layout: TrainLayout) -> Kinematics:
     Raises
     ------
     InputError
-        For shafts that neither drive nor mesh hold, loops of gears whose ratios contradict each other, and what
+        For what `gearfe.drivetrain.train.rolling.rolling` refuses, planets that cannot be assembled, and what
         `gearfe.drivetrain.train.phases.tooth_places` refuses.
     """
-    ratios = rolling(layout)
-    cycles = tuple(abs(ratios[mesh.driver.shaft]) * mesh.driver.teeth for mesh in layout.meshes)
-    uneven = [gear.shaft for gear in layout.gears if any(gear.pitch_errors)]
-    common, note = _common((*cycles, *(abs(ratios[shaft]) for shaft in uneven)))
-    senses, forces = _senses_and_forces(layout, ratios)
+    rolled = rolling(layout)
+    drivers = tuple(against(mesh, mesh.driver.shaft, rolled.ratios) for mesh in layout.meshes)
+    cycles = tuple(abs(speed * mesh.driver.teeth) for speed, mesh in zip(drivers, layout.meshes, strict=True))
+    common, note = _common((*cycles, *_uneven(layout, rolled.ratios)))
+    senses, forces = _senses_and_forces(layout, drivers)
     forces.setflags(write=False)
+    check_assembly(layout)
     places = tooth_places(layout, senses)
     shifts = tuple(pair_shifts(mesh, sense, places) for mesh, sense in zip(layout.meshes, senses, strict=True))
-    return Kinematics(ratios, cycles, common, note, senses, forces, places.angles, places.phases, shifts)
+    return Kinematics(rolled, drivers, cycles, common, note, senses, forces, places.angles, places.phases, shifts)
 
 
-def rolling(layout: TrainLayout) -> tuple[Fraction, ...]:
-    """Speed of each shaft for unit speed of the drive.
-
-    Raises
-    ------
-    InputError
-        For shafts that neither drive nor mesh hold, and for loops of gears whose ratios contradict each other.
-    """
-    known = {layout.driven: Fraction(1)}
-    joins = [(f"mesh {m.name!r}", m.driver.shaft, m.driven.shaft, _ratio(m)) for m in layout.meshes]
-    joins += [(f"coupling of {layout.shafts[i]!r}", i, j, Fraction(1)) for i, j in layout.couplings]
-    for _ in layout.shafts:
-        for label, driver, driven, ratio in joins:
-            for first, second, factor in ((driver, driven, ratio), (driven, driver, 1 / ratio)):
-                if first not in known:
-                    continue
-                speed = known[first] * factor
-                if known.setdefault(second, speed) != speed:
-                    problem = f"closes a loop that cannot turn: shaft {layout.shafts[second]!r} would need two speeds"
-                    raise InputError(label, None, problem, "take a gear out of the loop, or change its teeth")
-    for number, name in enumerate(layout.shafts):
-        if number not in known:
-            problem = "is held by nothing: neither the drive nor a mesh connects it to the train"
-            cure = "add a mesh between its gears and the train's, or a coupling to a shaft on its axis"
-            raise InputError(f"shaft {name!r}", None, problem, cure)
-    return tuple(known[number] for number in range(len(layout.shafts)))
+def against(mesh: LayoutMesh, shaft: int, ratios: Sequence[Fraction]) -> Fraction:
+    """Speed of a shaft for unit speed of the drive against the carrier of a mesh, or against the ground."""
+    return ratios[shaft] - (0 if mesh.carrier is None else ratios[mesh.carrier])
 
 
-def _ratio(mesh: LayoutMesh) -> Fraction:
-    return Fraction(-mesh.driver.teeth, mesh.driven.teeth)
+def _uneven(layout: TrainLayout, ratios: Sequence[Fraction]) -> list[Fraction]:
+    """Turns of the gears with pitch errors in a turn of the drive, against the carriers of their meshes."""
+    return [
+        abs(against(mesh, gear.shaft, ratios))
+        for mesh in layout.meshes
+        for gear in (mesh.driver, mesh.driven)
+        if any(gear.pitch_errors)
+    ]
 
 
 def mesh_phases(cycles: Sequence[Fraction], most: int) -> list[tuple[Fraction, list[int]]]:
@@ -148,7 +144,7 @@ def mesh_phases(cycles: Sequence[Fraction], most: int) -> list[tuple[Fraction, l
 
 def _repeating(cycles: Sequence[Fraction]) -> Fraction:
     """Turns after which what repeats so often in a turn is in phase again."""
-    periods = [1 / c for c in cycles]
+    periods = [1 / c for c in cycles if c]
     return Fraction(math.lcm(*(p.numerator for p in periods)), math.gcd(*(p.denominator for p in periods)))
 
 
@@ -156,6 +152,8 @@ def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
     """Turns after which all meshes are in phase again, or why there are none."""
     if not cycles:
         return None, "the train has no meshes"
+    if not any(cycles):
+        return None, "the gears of all meshes stand still against each other"
     turns = _repeating(cycles)
     if turns * max(cycles) > MOST_CYCLES:
         count = int(turns * max(cycles))
@@ -164,14 +162,17 @@ def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
     return turns, ""
 
 
-def _senses_and_forces(layout: TrainLayout, ratios: Sequence[Fraction]) -> tuple[tuple[float, ...], Array]:
-    """Driving senses, and steady forces (N), see `Kinematics`."""
-    rolled = tuple(math.copysign(1.0, ratios[mesh.driver.shaft]) for mesh in layout.meshes)
+def _senses_and_forces(layout: TrainLayout, drivers: Sequence[Fraction]) -> tuple[tuple[float, ...], Array]:
+    """Driving senses, and steady forces (N), see `Kinematics`; `drivers` are the speeds of the meshes' drivers."""
+    rolled = tuple(math.copysign(1.0, speed) for speed in drivers)
     forces = balanced_forces(layout, rolled, load_torques(layout, [load_end(layout)]))[:, 0]
     sense = drive_sense(layout.speed)
     if sense == 0.0:
         sense = math.copysign(1.0, forces.sum())
-    return tuple(sense * s for s in rolled), sense * forces
+    carried = np.array([mesh.carrier is not None for mesh in layout.meshes], dtype=bool)
+    least = -ROUND_OFF * float(np.abs(forces).max(initial=0.0))
+    turned = np.where(carried & (sense * forces < least), -sense, sense)
+    return tuple((turned * rolled).tolist()), turned * forces
 
 
 def load_end(layout: TrainLayout) -> float:
@@ -192,11 +193,14 @@ def balanced_forces(layout: TrainLayout, senses: Sequence[float], torques: Array
     count = len(layout.meshes)
     arms = np.zeros((len(layout.shafts), count + len(layout.couplings)))
     for column, (mesh, sense) in enumerate(zip(layout.meshes, senses, strict=True)):
-        for gear in (mesh.driver, mesh.driven):
-            arms[gear.shaft, column] += sense * gear.base_radius
+        for gear, side in ((mesh.driver, 1.0), (mesh.driven, -1.0 if mesh.turns_alike else 1.0)):
+            arms[gear.shaft, column] += side * sense * gear.base_radius
+            if mesh.carrier is not None:
+                arms[mesh.carrier, column] -= side * sense * gear.base_radius
     for column, (one, two) in enumerate(layout.couplings, start=count):
         arms[one, column], arms[two, column] = 0.01, -0.01  # as of a force at an arm of 10 mm
-    free = [shaft for shaft in range(len(layout.shafts)) if shaft != layout.driven]
+    held = {layout.driven, *(shaft for shaft, _ in layout.guided)}
+    free = [shaft for shaft in range(len(layout.shafts)) if shaft not in held]
     return np.asarray(np.linalg.lstsq(arms[free], torques[free], rcond=None)[0][:count])
 
 

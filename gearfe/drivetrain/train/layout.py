@@ -6,6 +6,7 @@ Trains that differ in stiffness, damping, friction or housing only have equal la
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 from ...multibody.series.timefunctions import TimeFunction
 
@@ -24,7 +25,7 @@ class LayoutGear:
     shaft
         Number of its shaft.
     teeth
-        Their number.
+        Their number, negative of an internal gear.
     base_radius
         Radius of the base circle (m).
     pitch_errors
@@ -49,13 +50,15 @@ class LayoutMesh:
     driver, driven
         The gears.
     towards
-        Angle (rad) of the line of centres from driver to driven gear, from the train's first direction e1.
+        Angle (rad) of the line from the driver's axis to the pitch point, from the train's first direction e1.
     distance
         Of the axes (m).
     contact_twist
         Half the backlash as a twist of the driven gear (rad).
     phase
         Given angle of the driver at the start (rad), or None.
+    carrier
+        Number of the shaft that carries the axis of one of the gears; None: both axes are fixed.
     """
 
     name: str
@@ -65,6 +68,31 @@ class LayoutMesh:
     distance: float
     contact_twist: float
     phase: float | None
+    carrier: int | None = None
+
+    @property
+    def turns_alike(self) -> bool:
+        """Whether both gears turn in one sense: one of them is internal."""
+        return self.driver.teeth * self.driven.teeth < 0
+
+
+@dataclass(frozen=True)
+class LayoutCarrier:
+    """A carrier with its planets as kinematics see it.
+
+    Attributes
+    ----------
+    name
+        Of the carrier.
+    shaft
+        Number of the shaft that it is.
+    sets
+        Sets of planets that are alike: (number of its shaft, angle about the carrier's axis in rad) of each planet.
+    """
+
+    name: str
+    shaft: int
+    sets: tuple[tuple[tuple[int, float], ...], ...]
 
 
 @dataclass(frozen=True)
@@ -85,6 +113,10 @@ class TrainLayout:
         Pairs (number of a shaft, torque over time in N m).
     couplings
         Pairs of numbers of shafts on one axis that turn alike.
+    guided
+        Pairs (number of a shaft, its speed over that of the drive) of shafts whose rotation is prescribed; 0: fixed.
+    carriers
+        Of the train.
     """
 
     shafts: tuple[str, ...]
@@ -94,3 +126,5 @@ class TrainLayout:
     meshes: tuple[LayoutMesh, ...]
     loads: tuple[tuple[int, TimeFunction], ...]
     couplings: tuple[tuple[int, int], ...] = ()
+    guided: tuple[tuple[int, Fraction], ...] = ()
+    carriers: tuple[LayoutCarrier, ...] = ()

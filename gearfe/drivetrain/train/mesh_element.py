@@ -37,6 +37,10 @@ M acts on that: on the driver, and across the line of centres. The back flanks, 
 line of action :math:`n_b = -\cos\alpha_w\,t + \sin\alpha_w\,c` and bear behind j. Friction acts across the line of
 action, see `gearfe.drivetrain.train.friction`.
 
+In a mesh with an internal gear, the driven one, c points from the driver's centre to P, and a is negative. In a
+planetary stage all members move in the frame of their carrier, in which the lines of action of the mean motion stand
+still; phases follow the rotations against the line of centres, which turns with the carrier.
+
 The damper of a mesh acts always, :math:`d\,\dot\delta` along the driving line of action (Kahraman & Singh, J. Sound
 Vib. 142, 1990), or in contact only. With a curve that is :math:`d\,\dot\delta\,H(\delta)`, on each flank along its own
 line of action; with a mesh law it grows with the force, :math:`d\,\dot\delta\,F/F_0`, and never pulls (Hunt & Crossley,
@@ -307,16 +311,21 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
     force, sense, shifts = float(rolled.steady_forces[number]), rolled.senses[number], rolled.shifts[number]
     driver, driven = train.gear(mesh.driver), train.gear(mesh.driven)
     i, j = train.shaft_number(driver.shaft), train.shaft_number(driven.shaft)
-    ratio, pair = shafts.ratios[i], gear_pair(driver.gear, driven.gear, mesh.centre_distance)
+    ratio, pair = float(rolled.drivers[number]), gear_pair(driver.gear, driven.gear, mesh.centre_distance)
+    carrier = train.mesh_carrier(mesh)
     along = _directions(train, mesh, pair, sense, shafts)
     law, backlash, mean, reference = _stiffness(mesh, force)
     rayleigh = 0.0 if mesh.stiffness is None else train.damping.beta * mean
     in_contact = (mesh.damping + rayleigh, rayleigh) if mesh.damps_in_contact else (0.0, 0.0)
-    sliding = _sliding(mesh, pair, force, (ratio, shafts.ratios[j]), fastest(train.driven.speed))
+    turned = ratio - shafts.ratios[i]
+    sliding = _sliding(mesh, pair, force, (ratio, shafts.ratios[j] + turned), fastest(train.driven.speed))
     ends = [(1.0, mean, 0.0, in_contact[1])] + ([] if backlash is None else [(-1.0, 0.0, backlash, 0.0)])
     columns, flanks = [along.row, along.back][: len(ends)], list[Flank]()
     turn = shafts.spins[i]
-    if law is None and shafts.bodies[i].size > 6:  # a section of an elastic shaft turns by itself
+    if law is None and carrier is not None:  # its line of centres turns with the carrier, and with the planet's motion
+        turn = first + len(columns)
+        columns.append(along.turn)
+    elif law is None and shafts.bodies[i].size > 6:  # a section of an elastic shaft turns by itself
         turn = first + len(columns)
         columns.append(along.spin)
     tilt = -1
@@ -375,8 +384,8 @@ def _directions(train: GearTrain, mesh: GearMesh, pair: GearPair, sense: float, 
     base = np.array(train.shaft(driver.shaft).point)
     arm = np.array(train.shaft(driven.shaft).point) - base
     arm = arm - (arm @ a) * a
-    distance = float(np.linalg.norm(arm))
-    across = arm / distance
+    distance = math.copysign(float(np.linalg.norm(arm)), driver.gear.teeth * driven.gear.teeth)
+    across = arm / distance  # towards the pitch point, which lies beyond the driver in a mesh with an internal gear
     along = np.cross(a, across)
     low, high = common_face(driver, driven)
     centre = base + (0.5 * (low + high) - float(base @ a)) * a

@@ -9,6 +9,7 @@ drive of changing speed adds :math:`-J_p g_i\ddot\psi` on every shaft.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -19,15 +20,25 @@ from ...base.errors import InputError
 from ...base.shown import Facts
 from ...base.typing import Array, IntArray
 from ...fem.reduction.modal_body import ModalBody
-from ...multibody import Element, LinearJoint, LocalForce, ModalBlocks, Start, System, TimeFunction, consistent_start
+from ...multibody import (
+    Element,
+    LinearJoint,
+    LocalForce,
+    ModalBlocks,
+    Start,
+    System,
+    TimeFunction,
+    consistent_start,
+    constant,
+)
 from ...multibody.core.elimination import ModalCoordinates, modal_coordinates
 from ...multibody.series.timefunctions import sine
 from .bearings import BearingLoads, bearing_loads, bore_motion, shaft_motion
 from .checks import SAME, check_train, overlap
 from .driveline import Driveline, MachineRotor, driveline, machine_rotors
-from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, rotor
+from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, pin_rows, planes, rotor
 from .forces import Gyro, TrainForces, derivative
-from .gear_train import Drive, GearTrain, Load, Shaft
+from .gear_train import Carrier, Drive, Five, GearTrain, Load, Pin, Shaft
 from .kinematics import Kinematics, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
 from .operating import (
@@ -196,6 +207,30 @@ class TrainModel(Facts):
         return bearing_loads(self.train, self.system, self.placed, self.bores, shared=shared)
 
     @cached_property
+    def frame_ratios(self) -> Array:
+        """Speed of the frame in which each shaft's motion is described, for unit speed of the drive; 0 without one."""
+        frames = (self.train.frame_of(shaft.name) for shaft in self.train.shafts)
+        return np.array([0.0 if f is None else self.ratios[self.train.shaft_number(f.shaft)] for f in frames])
+
+    def frame_turns(self, t: Array, shafts: Sequence[int]) -> Array:
+        """Rotations (n, shafts, 3, 3) from the frames of shafts to axes that stand still, at times (n,)."""
+        e1, e2, axis = self.train.frame
+        turned = self.angle(t)[:, None] * self.frame_ratios[list(shafts)]
+        across = np.outer(e1, e1) + np.outer(e2, e2)
+        right = np.outer(e2, e1) - np.outer(e1, e2)
+        return np.asarray(
+            np.cos(turned)[..., None, None] * across + np.sin(turned)[..., None, None] * right + np.outer(axis, axis)
+        )
+
+    def fixed_axes(self, t: Array, vectors: Array) -> Array:
+        """Vectors (n, bores, k, 3) at the bores, in the frames of their shafts, along axes that stand still."""
+        if not self.train.carriers:
+            return vectors
+        held = {bore: number for number, shaft in enumerate(self.train.shafts) for bore in shaft.bores}
+        turns = self.frame_turns(t, [held[bore] for bore in self.bores])
+        return np.asarray(np.einsum("nbij,nbkj->nbki", turns, vectors))
+
+    @cached_property
     def sections(self) -> ShaftSections | None:
         """Cross-sections of the elastic shafts; None without any."""
         return shaft_sections(self.train, self.placed)
@@ -307,7 +342,8 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
     spin = np.array([_turning(train, placed, shaft.name) for shaft in train.shafts])
     springs = driveline(train, placed)
     elements = [
-        *bodies, *_supports(train, placed, housing, rotors), *(line.element(bodies) for line in lines),
+        *bodies, *_supports(train, placed, housing, rotors), *_stages(train, placed),
+        *(line.element(bodies) for line in lines),
         *springs.elements(train, placed, rotors, train.damping), *_slopes(train, placed, bodies), changing,
     ]  # fmt: skip
     system, modal = _damped(train, elements, bodies)
@@ -360,6 +396,11 @@ def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tup
     if train.driven.torque is not None:
         made.append((_acts(train, train.driven, shafts), train.driven.torque))
     made += [(_acts(train, load, shafts), load.torque) for load in train.loads]
+    for carrier in train.carriers:
+        for pin in carrier.pins:
+            if any(pin.error) and pin.stiffness is not None:  # springs whose rest is where the pin is
+                rows, local = _pin_rows(train, shafts, carrier, pin), _pin_springs(pin)
+                made.append(((local @ _pin_error(pin)) @ rows, constant(1.0)))
     return tuple(made)
 
 
@@ -417,20 +458,54 @@ def _forces(
     """All that is not constant: of each shaft tilts and spin, of each mesh up to six directions, one a torque."""
     columns: list[Array] = []
     gyros: list[Gyro] = []
+    frames = [train.frame_of(shaft.name) for shaft in train.shafts]
+    turns = [0.0 if frame is None else shafts.ratios[train.shaft_number(frame.shaft)] for frame in frames]
     for number, (couples, spin) in enumerate(zip(shafts.gyrations, shafts.spins, strict=True)):
         for couple in couples:
-            gyros.append(Gyro(len(columns), spin, shafts.ratios[number], couple.polar))
+            turn = turns[number] * shafts.ratios[number]
+            gyros.append(Gyro(len(columns), spin, shafts.ratios[number], couple.polar, stiffening=-turn * couple.polar))
             columns += [shafts.whole(number, couple.tilt), shafts.whole(number, couple.other)]
         columns.append(np.eye(shafts.size)[shafts.first[number] + 5])
+    columns += [column for line in lines for column in line.columns]  # numbered as in `mesh_lines`
+    if any(turns):
+        columns.append(np.zeros(shafts.size))  # the frame of a carrier turns by nothing beside the mean motion
+        for number, turn in enumerate(turns):
+            if turn:
+                gyros += _of_frame(train, shafts, number, turn, columns)
     if not train.damping.gyroscopic:
         gyros = []
-    columns += [column for line in lines for column in line.columns]
     flanks = tuple(flank for line in lines for flank in line.flanks)
     at = len(columns)
     columns += [direction for direction, _ in torques]
     numbered = tuple((at + i, function) for i, (_, function) in enumerate(torques))
     made = TrainForces(len(columns), angle, tuple(gyros), flanks, numbered)
     return made, np.array(columns).T
+
+
+def _of_frame(train: GearTrain, shafts: Shafts, number: int, turn: float, columns: list[Array]) -> list[Gyro]:
+    """Coriolis, centrifugal and Euler forces of a shaft whose motion is described in a frame that turns.
+
+    The frame turns `turn` times as fast as the drive; directions are appended to the columns, whose last one is of no
+    motion. Those of a planet are radial and tangential, for its mean place is off the axis.
+    """
+    still, gyros = len(columns) - 1, []
+    name, frame = train.shafts[number].name, train.frame
+    own = train.carrier_of(name)
+    angle, radius = 0.0, 0.0
+    if own is not None:
+        pin = next(pin for pin in own.pins if pin.shaft == name)
+        angle, radius = train.pin_angle(own, pin), float(np.hypot(*train.pin_arm(own, pin)))
+    turned = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    for index, plane in enumerate(planes(shafts.bodies[number], frame)):
+        gyros.append(
+            Gyro(
+                len(columns), still, turn, -2.0 * plane.inertia, stiffening=plane.inertia * turn**2, euler=True,
+                offset=0.0 if index else radius,
+            )
+        )  # fmt: skip
+        first, second = turned @ np.array([plane.first, plane.second])
+        columns += [shafts.whole(number, first), shafts.whole(number, second)]
+    return gyros
 
 
 def bore_selector(train: GearTrain, bore: str) -> Array:
@@ -479,6 +554,68 @@ def _supports(
                 touches = (turns, housing)
             made.append(_drive(drive, touches, row))
     return made
+
+
+def _stages(train: GearTrain, shafts: Shafts) -> list[Element]:
+    """Pins of planets, and what fixes or guides shafts."""
+    made: list[Element] = []
+    for carrier in train.carriers:
+        middle = shafts.bodies[train.shaft_number(carrier.shaft)]
+        for pin in carrier.pins:
+            planet = shafts.bodies[train.shaft_number(pin.shaft)]
+            whole, touches = _pin_rows(train, shafts, carrier, pin), (planet, middle)
+            places = [(shafts.first[train.shaft_number(name)], body.size) for name, body in
+                      ((pin.shaft, planet), (carrier.shaft, middle))]  # fmt: skip
+            rows = np.hstack([whole[:, at : at + size] for at, size in places])
+            name, held = f"pin {pin.shaft}", _held_by_pin(pin)
+            if held:
+                made.append(LinearJoint(touches, rows[held], _pin_error(pin)[held], name=name))
+            if pin.stiffness is not None:
+                stiffness = _pin_springs(pin)
+                damping = _pin_matrix(pin.damping) + train.damping.beta * stiffness
+                made.append(LinearForce(touches, rows.T @ damping @ rows, rows.T @ stiffness @ rows, name))
+    for guide in train.guides:
+        number = train.shaft_number(guide.shaft)
+        body = shafts.bodies[number]
+        row = body.turn_rows(train.shaft_end(guide.shaft, 0.0))[2:]
+        name = f"hold of {guide.shaft}"
+        if guide.stiffness is None:
+            made.append(LinearJoint((body,), row, np.zeros(1), name=name))
+            continue
+        square, rate = row.T @ row, guide.damping + train.damping.beta * guide.stiffness
+        made.append(LinearForce((body,), rate * square, guide.stiffness * square, name))
+    return made
+
+
+def _pin_rows(train: GearTrain, shafts: Shafts, carrier: Carrier, pin: Pin) -> Array:
+    """Motion of a planet against its carrier at the middle of its shaft, (5, system size)."""
+    arm, (e1, e2, _) = train.pin_arm(carrier, pin), train.frame
+    radial = (arm[0] * e1 + arm[1] * e2) / np.hypot(*arm)
+    one, two = train.shaft_number(pin.shaft), train.shaft_number(carrier.shaft)
+    planet, middle = shafts.bodies[one], shafts.bodies[two]
+    rows = pin_rows(planet, middle, np.array(train.shaft(pin.shaft).point), radial, train.frame)
+    return shafts.whole(one, rows[:, : planet.size]) + shafts.whole(two, rows[:, planet.size :])
+
+
+def _held_by_pin(pin: Pin) -> list[int]:
+    """Motions of a planet against its carrier that a pin holds: radial, along the axis, tangential, tilts."""
+    if pin.stiffness is None:
+        return [0, 1, 2, 3, 4]
+    return [1, 3, 4] if isinstance(pin.stiffness, float | int) else []
+
+
+def _pin_matrix(values: float | Five) -> Array:
+    """Springs or dampers of a pin, (5, 5)."""
+    return np.diag([values, 0.0, values, 0.0, 0.0] if isinstance(values, float | int) else values)
+
+
+def _pin_springs(pin: Pin) -> Array:
+    return np.zeros((5, 5)) if pin.stiffness is None else _pin_matrix(pin.stiffness)
+
+
+def _pin_error(pin: Pin) -> Array:
+    """Where the pin is on the carrier, beside its nominal place, (5,)."""
+    return np.array([pin.error[0], 0.0, pin.error[1], 0.0, 0.0])
 
 
 def _drive(drive: Drive, touches: tuple[Element, ...], row: Array) -> Element:
@@ -547,6 +684,8 @@ def _measured_against(train: GearTrain, name: str) -> tuple[str, float]:
 
     They are those of the drive, of a load, or of its first bore.
     """
+    if not train.shaft(name).bores:  # a planet
+        return "", train.shaft_end(name, 0.0)
     first = train.shaft(name).bores[0]
     ends = [
         (end.bore or first, train.place(end))

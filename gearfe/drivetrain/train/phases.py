@@ -7,7 +7,9 @@ from driver (1) to driven gear (2), driving flanks touch when
     z_1(\tau_1 - \beta) + z_2(\tau_2 - \beta - \pi) = \pi + s\,z_2\,h \pmod{2\pi} ,
 
 s the driver's sense (+1 or -1) and h half the backlash as a twist of the driven gear: for h = 0 a tooth on the line
-of centres faces a space. The curve of the mesh begins at :math:`\varphi_0 = s(\tau_1 - \beta)`. Gears joined by meshes
+of centres faces a space. An internal driven gear has a negative z_2, and its teeth face the driver's at beta, the
+direction from the driver's axis to the pitch point: the term is :math:`z_2(\tau_2 - \beta)`, with :math:`+s|z_2|h`. The
+curve of the mesh begins at :math:`\varphi_0 = s(\tau_1 - \beta)`. Gears joined by meshes
 are one group, so one angle places all their teeth; gears on one shaft that are joined by no mesh are keyed on it
 independently of each other.
 """
@@ -49,7 +51,7 @@ class ToothPlaces:
 
 @dataclass(frozen=True)
 class _Join:
-    """A mesh as a relation of two teeth: ``z1 (t1 - towards) + z2 (t2 - towards - pi) = remainder``, modulo 2 pi."""
+    """A mesh as a relation of two teeth: ``z1 (t1 - towards) + z2 (t2 - facing) = remainder``, modulo 2 pi."""
 
     mesh: LayoutMesh
     sense: float
@@ -62,7 +64,12 @@ class _Join:
     @property
     def remainder(self) -> float:
         """Right side of the relation (rad)."""
-        return math.pi + self.sense * self.mesh.driven.teeth * self.mesh.contact_twist
+        return math.pi + self.sense * abs(self.mesh.driven.teeth) * self.mesh.contact_twist
+
+    @property
+    def facing(self) -> float:
+        """Angle of the pitch point about the axis of the driven gear (rad)."""
+        return self.mesh.towards if self.mesh.turns_alike else self.mesh.towards + math.pi
 
     def driver_tooth_at(self, phase: float) -> float:
         """Driver's tooth at a phase."""
@@ -77,17 +84,17 @@ class _Join:
     def driven_tooth(self, tooth: float) -> float:
         """Place of a driven tooth for a driver's."""
         towards, (z1, z2) = self.mesh.towards, self.teeth
-        return towards + math.pi + (self.remainder - z1 * (tooth - towards)) / z2
+        return self.facing + (self.remainder - z1 * (tooth - towards)) / z2
 
     def driver_tooth(self, tooth: float) -> float:
         """Place of a driver's tooth for a driven one."""
         towards, (z1, z2) = self.mesh.towards, self.teeth
-        return towards + (self.remainder - z2 * (tooth - towards - math.pi)) / z1
+        return towards + (self.remainder - z2 * (tooth - self.facing)) / z1
 
     def turn_left(self, driver: float, driven: float) -> float:
         """Rotation of the driver (rad) that is missing for its flanks to touch, at most half a pitch."""
         towards, (z1, z2) = self.mesh.towards, self.teeth
-        sides = z1 * (driver - towards) + z2 * (driven - towards - math.pi)
+        sides = z1 * (driver - towards) + z2 * (driven - self.facing)
         return math.remainder(sides - self.remainder, 2.0 * math.pi) / z1
 
 
@@ -160,8 +167,9 @@ def pair_shifts(mesh: LayoutMesh, sense: float, places: ToothPlaces) -> tuple[Ar
     r"""Return how much later the tooth pairs of a mesh touch because of the gears' pitch errors.
 
     Pair k is the k-th tooth of the driver behind the one whose place is the phase. It meets the driver's tooth
-    :math:`s(k + m_1)` and the driven gear's :math:`m_2 - s k`, with m1, m2 from the places at the start, and touches
-    later by :math:`-(e_1 + e_2)`. On the back flanks all is seen from the other side, with the sense -s.
+    :math:`s(k + m_1)` and the driven gear's :math:`m_2 - s k` (:math:`m_2 + s k` of an internal one), with m1, m2 from
+    the places at the start, and touches later by :math:`-(e_1 + e_2)`. On the back flanks all is seen from the other
+    side, with the sense -s.
 
     Parameters
     ----------
@@ -187,12 +195,13 @@ def _shifts(join: _Join, places: ToothPlaces, sense: float) -> Array:
     errors = [np.array(g.pitch_errors[0 if sense > 0.0 else 1] or (0.0,)) for g in gears]
     if not any(e.any() for e in errors):
         return np.zeros(1)
-    p1, p2 = (2.0 * math.pi / teeth for teeth in join.teeth)
+    p1, p2 = (2.0 * math.pi / abs(teeth) for teeth in join.teeth)
+    side = -1 if join.mesh.turns_alike else 1
     driver, driven = (places.angles[g.name] for g in gears)
     phase = join.sense * sense * join.phase(driver)
     first = round((phase - sense * (driver - towards)) / p1)
-    facing = (towards + math.pi - driven - sense * phase * p2 / p1) / p2 - 0.5 * sense
+    facing = (join.facing - driven - side * sense * phase * p2 / p1) / p2 - 0.5 * side * sense
     k = np.arange(math.lcm(*join.teeth))
     turn = round(sense)
-    met = turn * (k + first), round(facing) - turn * k
+    met = turn * (k + first), round(facing) - side * turn * k
     return -np.asarray(sum(e[j % len(e)] for e, j in zip(errors, met, strict=True)))

@@ -32,8 +32,9 @@ F, FULL, GAP, H1, H2, H3, TOUCHES, ENERGIES, RISE, E1, E2, E3, E4 = range(13)
 NORMAL, ARM, LEVER, SPEED, SIGN, SQUARE, INNER, DRAG, PER_SLOT = range(E4 + 1, E4 + 10)
 #: Rows of a couple of slots: C, its coefficients, C', product of both forces.
 COUPLE, NUMBERS, COUPLE_SLOPE, BOTH, PER_COUPLE = range(5)
-#: Rows of a gyroscopic moment: angular momentum, rates of both tilts.
-MOMENTUM, TILT, OTHER, PER_GYRO = range(4)
+#: Rows of a gyroscopic moment: angular momentum, rates of both tilts; of a frame that turns beside these its speed,
+#: its square, half the rate of the momentum, and both places.
+MOMENTUM, TILT, OTHER, TURN, TURN2, EULER, FIRST, SECOND, PER_GYRO = range(9)
 #: Column of the phase of a cell's node, and of F_0 beside the coefficients of t.
 ORIGIN = 4
 #: What a step may not pass: the cell of a phase, touch of a flank with a curve, pull of a damper, the cell of a pair,
@@ -54,6 +55,9 @@ class Gyros(NamedTuple):
     spin: IntArray
     ratio: Array
     polar: Array
+    stiffening: Array
+    euler: Array
+    offset: Array
 
 
 class Flanks(NamedTuple):
@@ -150,6 +154,22 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
         memory[row + OTHER, j] = rate * u[d + 1, j + 1]
         out[d] -= product(j, row + MOMENTUM, row + OTHER, memory)
         out[d + 1] += product(j, row + MOMENTUM, row + TILT, memory)
+        if p.gyros.stiffening[i] != 0.0 or p.gyros.euler[i] != 0.0:
+            memory[row + FIRST, j] = u[d, j]
+            memory[row + SECOND, j] = u[d + 1, j]
+            if j == 0:
+                memory[row + FIRST, 0] += p.gyros.offset[i]
+            memory[row + TURN, j] = rate * memory[0, j + 1]
+            memory[row + TURN2, j] = product(j, row + TURN, row + TURN, memory)
+            out[d] += p.gyros.stiffening[i] * product(j, row + TURN2, row + FIRST, memory)
+            out[d + 1] += p.gyros.stiffening[i] * product(j, row + TURN2, row + SECOND, memory)
+            if j + 2 < memory.shape[1]:
+                twice = (j + 2) * (j + 1) / (s * s) * memory[0, j + 2]
+                memory[row + EULER, j] = 0.5 * p.gyros.euler[i] * p.gyros.polar[i] * p.gyros.ratio[i] * twice
+            else:
+                memory[row + EULER, j] = 0.0
+            out[d] -= product(j, row + EULER, row + SECOND, memory)
+            out[d + 1] += product(j, row + EULER, row + FIRST, memory)
     for k in range(p.places.row.shape[0]):
         row = p.places.row[k]
         d = p.flanks.direction[k]

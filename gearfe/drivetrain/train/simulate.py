@@ -398,6 +398,14 @@ def _gear_poses(model: TrainModel, moved: TrainStates) -> tuple[Array, Array]:
         poses[:, i, :3] = own @ body.point_rows(centres[i], frame, item.along).T
         turn[:, 2] += model.ratios[k] * model.angle(moved.time)
         poses[:, i, 3:] = turn @ frame
+        if model.frame_ratios[k]:  # in axes that stand still; a planet goes round with its carrier
+            turns, carrier = model.frame_turns(moved.time, [k])[:, 0], train.carrier_of(item.shaft)
+            arm = np.zeros(3)
+            if carrier is not None:
+                along = np.array(train.shaft(carrier.shaft).point)
+                arm = base - along - float((base - along) @ frame[2]) * frame[2]
+            poses[:, i, :3] = np.einsum("nij,nj->ni", turns, poses[:, i, :3] + arm) - arm
+            poses[:, i, 3:] = np.einsum("nij,nj->ni", turns, poses[:, i, 3:])
     return poses, centres
 
 

@@ -30,7 +30,7 @@ class TrainStates:
     drive_torque : (n,)
         Torque of the drive on its shaft (N m).
     mesh_power, friction_power : (n, meshes)
-        What the driver gives to the mesh, and what friction takes of it (W).
+        What the driver gives to the mesh, in a planetary stage seen from its carrier; what friction takes of it (W).
     bearing : (n, bores, 6)
         Force (N) and moment (N m) of the shaft on each bore about its reference point, along x, y, z.
     """
@@ -75,11 +75,13 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     rows = np.array([line.row for line in model.meshes]).reshape(-1, q.shape[1])
     force, drag, loss, apart = _contact_forces(model, v, flanks, multipliers)
     drivers = [line.driver for line in model.meshes]
+    ratios = np.array([float(ratio) for ratio in model.kinematics.drivers])
     turning = np.array([line.spin for line in model.meshes]).reshape(-1, q.shape[1])
-    speed = model.angle(t, 1)[:, None] * model.ratios[drivers] + v @ turning.T
+    speed = model.angle(t, 1)[:, None] * ratios + v @ turning.T
     arms = rows[np.arange(len(rows)), [int(model.first[i]) + 5 for i in drivers]]
     power = speed * (arms * force + drag)
-    return TrainStates(t, q, v, a, force, q @ rows.T, apart, push, power, loss, model.bearings(q, v, a, acting))
+    loads = model.fixed_axes(t, model.bearings(q, v, a, acting).reshape(len(t), -1, 2, 3))
+    return TrainStates(t, q, v, a, force, q @ rows.T, apart, push, power, loss, loads.reshape(len(t), -1, 6))
 
 
 def _contact_forces(

@@ -69,6 +69,11 @@ def _inertia(train: GearTrain, times: Array) -> Array:
     """Torque of inertia of each shaft as it rolls with the drive (N m), shape (shafts, times)."""
     push = replace(train.driven.speed, sines=())(times, 1)
     polar = [rotor(train, shaft).polar + train.inertia_of_machines(shaft.name) for shaft in train.shafts]
+    for carrier in train.carriers:  # planets go round with it
+        polar[train.shaft_number(carrier.shaft)] += sum(
+            rotor(train, train.shaft(pin.shaft)).mass * float(np.sum(train.pin_arm(carrier, pin) ** 2))
+            for pin in carrier.pins
+        )
     return -np.outer(np.multiply(polar, [float(r) for r in train.kinematics.ratios]), push)
 
 
@@ -126,7 +131,7 @@ def static_errors(train: GearTrain, angle: Array) -> tuple[Array | None, ...]:
     rolled = train.kinematics
     errors: list[Array | None] = []
     for number, mesh in enumerate(train.meshes):
-        ratio = float(rolled.ratios[train.shaft_number(train.gear(mesh.driver).shaft)])
+        ratio = float(rolled.drivers[number])
         phase = rolled.senses[number] * ratio * angle + rolled.phases[number]
         errors.append(_approach(mesh, float(rolled.steady_forces[number]), phase, rolled.shifts[number]))
     return tuple(errors)

@@ -1,0 +1,194 @@
+"""Carriers of planetary stages: [carriers.NAME], and the planets that a file writes once for all places."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..config import quantity
+from ..errors import InputError
+
+#: Most planets of a set: more do not fit round a sun.
+MOST_PLANETS = 24
+#: Kinds of tables by name of which each planet has its own entry.
+OF_PLANETS = ("shafts", "gears", "meshes")
+
+
+@dataclass(frozen=True)
+class _Pins:
+    """The carrier and its pins."""
+
+    shaft: str = quantity(doc="name of the shaft that is the carrier")
+    pin_stiffness_N_per_m: float | tuple[float, ...] | None = quantity(
+        None,
+        doc="of each pin, radial and tangential (N/m), the other motions being held; or five numbers: radial, along y, "
+        "tangential (N/m), and two tilts (N m/rad); left out: hinges",
+    )
+    pin_damping_N_s_per_m: float | tuple[float, ...] = quantity(
+        0.0, doc="of those springs (N s/m), or five numbers: three translations, and two tilts (N m s/rad)"
+    )
+    pin_radial_errors_um: tuple[float, ...] = quantity(
+        (), doc="how much farther from the axis of the carrier each pin is than it should be (um); left out: 0"
+    )
+    pin_tangential_errors_um: tuple[float, ...] = quantity(
+        (), doc="how much farther about +y each pin is than it should be (um); left out: 0"
+    )
+
+    def check(self, where: str) -> None:
+        """Springs of pins are one number > 0 or five, dampers >= 0 alike."""
+        for key, least in (("pin_stiffness_N_per_m", True), ("pin_damping_N_s_per_m", False)):
+            value = getattr(self, key)
+            numbers = value if isinstance(value, tuple) else (0.0 if value is None else value,)
+            wrong = len(numbers) not in (1, 5) or not all(math.isfinite(x) and x >= 0.0 for x in numbers)
+            if wrong or (least and value is not None and max(numbers) <= 0.0):
+                problem = f"must be one number {'>' if least else '>='} 0, or five >= 0"
+                cure = "one: radial and tangential; five: radial, along y, tangential, two tilts"
+                shown = list(value) if isinstance(value, tuple) else value
+                raise InputError(f"{where}.{key}", shown, problem, cure)
+        if self.pin_damping_N_s_per_m and self.pin_stiffness_N_per_m is None:
+            problem = "is of pins with a stiffness, and these are hinges"
+            value = self.pin_damping_N_s_per_m
+            shown = list(value) if isinstance(value, tuple) else value
+            cure = "add pin_stiffness_N_per_m, or leave it out"
+            raise InputError(f"{where}.pin_damping_N_s_per_m", shown, problem, cure)
+
+
+@dataclass(frozen=True)
+class CarrierTable(_Pins):
+    """A carrier: the shaft that it is, its planets, and their pins. A shaft is a planet by carrier = "NAME"."""
+
+    planets: int | tuple[float, ...] = quantity(
+        doc="number of planets with equal spacing, or the angle of each (deg, about +y, from the place of its shaft)"
+    )
+
+    @property
+    def angles_deg(self) -> tuple[float, ...]:
+        """Angle of each planet from the place that its shaft has in the file."""
+        if isinstance(self.planets, tuple):
+            return self.planets
+        return tuple(360.0 * k / self.planets for k in range(self.planets))
+
+    def check(self, where: str) -> None:
+        """Planets of a number that can be, at places of their own; errors for each pin."""
+        super().check(where)
+        angles = self.planets if isinstance(self.planets, tuple) else None
+        count = len(angles) if angles is not None else int(self.planets)  # type: ignore[arg-type]
+        if not 1 <= count <= MOST_PLANETS:
+            problem = f"must be 1 to {MOST_PLANETS} planets"
+            raise InputError(f"{where}.planets", count, problem, "write a number, or the angle of each in degrees")
+        turned = sorted(angle % 360.0 for angle in angles or ())
+        if any(not math.isfinite(angle) for angle in angles or ()) or len(set(turned)) < len(turned):
+            problem = "must be finite angles (deg), each once"
+            raise InputError(f"{where}.planets", list(angles or ()), problem, "give each planet a place of its own")
+        for key in ("pin_radial_errors_um", "pin_tangential_errors_um"):
+            errors = getattr(self, key)
+            if errors and len(errors) != count:
+                problem = f"has {len(errors)} values for {count} planets"
+                raise InputError(f"{where}.{key}", list(errors), problem, "give one for each planet, or leave it out")
+
+
+@dataclass(frozen=True)
+class _Named:
+    """What an entry of a list is called."""
+
+    name: str = quantity(doc="name, by which the shafts of its planets call it (carrier)")
+
+
+@dataclass(frozen=True)
+class TrainCarrierTable(_Pins, _Named):
+    """A carrier in a list; each of its planets is a shaft of the list with carrier = its name."""
+
+
+def with_planets(raw: Mapping[str, Any], carriers: Mapping[str, CarrierTable]) -> dict[str, Any]:
+    """Return a parsed job in which each planet has its own shaft, gears and meshes: NAME_1, NAME_2, ...
+
+    A shaft with a carrier, the gears on it and their meshes are written once. The first planet is where the file has
+    it, the others are turned about the axis of the carrier; planets that mesh with each other have one number.
+
+    Parameters
+    ----------
+    raw : mapping
+        The parsed job, whose tables have been checked.
+    carriers : mapping
+        Its tables [carriers.NAME].
+
+    Raises
+    ------
+    InputError
+        For carriers and shafts that do not exist, carriers without planets, and names that two entries would have.
+    """
+    shafts: Mapping[str, Any] = raw.get("shafts", {})
+    planets = {name: entry["carrier"] for name, entry in shafts.items() if "carrier" in entry}
+    for name, carrier in planets.items():
+        if carrier not in carriers:
+            problem = "is no carrier of this file"
+            known = " or ".join(f'"{other}"' for other in carriers)
+            cure = f"write {known}, or leave it out" if known else f"add [carriers.{carrier}], or leave it out"
+            raise InputError(f"shafts.{name}.carrier", carrier, problem, cure)
+    for name, table in carriers.items():
+        if table.shaft not in shafts:
+            problem, cure = "is no shaft of this file", f"write one of {', '.join(shafts)}"
+            raise InputError(f"carriers.{name}.shaft", table.shaft, problem, cure)
+        if table.shaft in planets:
+            problem = "is a planet itself"
+            raise InputError(f"carriers.{name}.shaft", table.shaft, problem, "the carrier is a shaft in bearings")
+        if name not in planets.values():
+            problem, cure = "carries nothing", f'write carrier = "{name}" in the shaft of its planets'
+            raise InputError(f"[carriers.{name}]", None, problem, cure)
+    made = dict(raw)
+    gears: Mapping[str, Any] = raw.get("gears", {})
+    of_gear = {name: planets[entry["shaft"]] for name, entry in gears.items() if entry.get("shaft") in planets}
+    made["shafts"] = _each(shafts, planets, carriers, "shafts", lambda entry, k, name: _place(
+        entry, shafts[carriers[name].shaft], carriers[name].angles_deg[k]))  # fmt: skip
+    made["gears"] = _each(gears, of_gear, carriers, "gears", lambda entry, k, _: {
+        **entry, "shaft": f"{entry['shaft']}_{k + 1}"})  # fmt: skip
+    meshes: Mapping[str, Any] = raw.get("meshes", {})
+    of_mesh = {
+        name: next(of_gear[entry[key]] for key in ("driver", "driven") if entry[key] in of_gear)
+        for name, entry in meshes.items()
+        if {entry.get("driver"), entry.get("driven")} & of_gear.keys()
+    }
+    made["meshes"] = _each(meshes, of_mesh, carriers, "meshes", lambda entry, k, _: {
+        **entry, **{key: f"{entry[key]}_{k + 1}" for key in ("driver", "driven") if entry[key] in of_gear},
+    })  # fmt: skip
+    return {name: table for name, table in made.items() if name in raw}
+
+
+def _each(
+    entries: Mapping[str, Any],
+    repeated: Mapping[str, str],
+    carriers: Mapping[str, CarrierTable],
+    kind: str,
+    change: Any,
+) -> dict[str, Any]:
+    """Entries of a table of tables, those that are repeated once for each planet of their carrier."""
+    made: dict[str, Any] = {}
+    for name, entry in entries.items():
+        if name not in repeated:
+            copies = {name: entry}
+        else:
+            count = len(carriers[repeated[name]].angles_deg)
+            copies = {f"{name}_{k + 1}": change(copy.deepcopy(entry), k, repeated[name]) for k in range(count)}
+        for one, table in copies.items():
+            if one in made or (one != name and one in entries):
+                problem = f"is the name of a planet's own entry, made of [{kind}.{name}]"
+                raise InputError(f"name in [{kind}]", one, problem, "rename it")
+            made[one] = table
+    return made
+
+
+def _place(entry: dict[str, Any], carrier: Mapping[str, Any], angle_deg: float) -> dict[str, Any]:
+    """A planet's shaft, turned about +y round the axis of its carrier."""
+    x, z = float(carrier["x_mm"]), float(carrier.get("z_mm", 0.0))
+    along, up = float(entry["x_mm"]) - x, z - float(entry.get("z_mm", 0.0))  # along e1 = +x and e2 = -z
+    turns = round(angle_deg / 90.0)
+    exact = abs(angle_deg - 90.0 * turns) < 1e-12
+    cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    if exact:
+        cosine, sine = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[turns % 4]
+    entry["x_mm"] = x + cosine * along - sine * up
+    entry["z_mm"] = z - (sine * along + cosine * up)
+    return entry
