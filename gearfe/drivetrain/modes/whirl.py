@@ -18,6 +18,7 @@ from ..train.kinematics import drive_sense
 from ..train.model import TrainModel
 from .energies import BENDING, HOUSING, KINDS, MESH, Part, train_forms
 from .follow import follow_modes
+from .stages import stage_kinds
 from .turning import turning_train
 
 #: Orbits that are flatter are planar: the sense of whirl of an ellipse whose axes are as 1 to 40.
@@ -62,6 +63,8 @@ class WhirlModes(ShownTable):
         Names of the shafts.
     free
         Number of motions at rest that nothing holds, at 0 Hz; they are no modes of the table.
+    stages : (s, n)
+        What the modes of planetary stages are, see `gearfe.drivetrain.modes.stages`; empty texts for others.
     """
 
     speeds: Array
@@ -76,6 +79,7 @@ class WhirlModes(ShownTable):
     shapes: ComplexArray
     shafts: tuple[str, ...]
     free: int
+    stages: Array
 
     @property
     def shares(self) -> Array:
@@ -141,8 +145,8 @@ class WhirlModes(ShownTable):
         if not np.isfinite(self.frequency[row, mode]):
             return OVERDAMPED
         kind, direction = self.kinds[row][mode], self.direction[row][mode]
-        label = LABELS[kind]
-        if kind == BENDING:
+        label = self.stages[row, mode] or LABELS[kind]
+        if kind == BENDING and not self.stages[row, mode]:
             shares = [float(self.share(BENDING, name)[row, mode]) for name in self.shafts]
             label = f"{direction} whirl of shaft {self.shafts[int(np.argmax(shares))]}"
         strained = self.mesh_strain[row, mode]
@@ -203,7 +207,17 @@ class WhirlModes(ShownTable):
 
     def select(self, numbers: IntArray) -> WhirlModes:
         """Modes of these numbers, from 0, in this order."""
-        fields = ("frequency", "damping_ratio", "slope", "kinetic", "strain", "whirl", "whirl_weight", "shapes")
+        fields = (
+            "frequency",
+            "damping_ratio",
+            "slope",
+            "kinetic",
+            "strain",
+            "whirl",
+            "whirl_weight",
+            "shapes",
+            "stages",
+        )
         return replace(self, **{name: getattr(self, name)[:, numbers] for name in fields})
 
 
@@ -239,7 +253,7 @@ def train_modes(model: TrainModel, speeds: ArrayLike, highest_hz: float = 5000.0
         for found, made in zip((whirl, weight), forms.whirl(rate), strict=True):
             found.append(made)
         shapes.append((model.modal.T @ y).T)
-    size = np.abs(tracks.values)
+    size, whole = np.abs(tracks.values), np.array(shapes).reshape(len(given), count, model.system.size)
     slope = (tracks.values.conj() * tracks.slopes).real / size
     return WhirlModes(
         speeds=given,
@@ -251,9 +265,10 @@ def train_modes(model: TrainModel, speeds: ArrayLike, highest_hz: float = 5000.0
         strain=np.array(strain).reshape(len(given), count, len(forms.parts)),
         whirl=np.array(whirl).reshape(len(given), count, len(forms.orbits)),
         whirl_weight=np.array(weight).reshape(len(given), count, len(forms.orbits)),
-        shapes=np.array(shapes).reshape(len(given), count, model.system.size),
+        shapes=whole,
         shafts=tuple(shaft.name for shaft in model.train.shafts),
         free=turning.free,
+        stages=stage_kinds(model, whole),
     )
 
 

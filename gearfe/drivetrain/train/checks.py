@@ -17,7 +17,7 @@ from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.gear_data import rounding
 from ...gears.geometry.mesh_geometry import ContactModel
 from ...gears.geometry.pair import Gear, gear_pair, in_keys
-from ...gears.geometry.validity import check_external, check_spur
+from ...gears.geometry.validity import check_spur
 from ..bearings import BallBearing, RollerBearing
 from .friction import check_friction
 from .gear_train import (
@@ -473,7 +473,6 @@ def _check_mesh(train: GearTrain, mesh: GearMesh) -> None:
         pair = gear_pair(one.gear, two.gear, mesh.centre_distance)
         if isinstance(mesh.stiffness, MeshLaw):
             check_spur(pair, "a mesh law")
-        check_external(pair, "a train")
         expected = pair.working_centre_distance
     except InputError as error:
         side, _, name = error.field.rpartition(".")

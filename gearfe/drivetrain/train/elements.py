@@ -6,10 +6,10 @@ shaft moves as the section that carries it (`ShaftBody`). A housing has the six 
 internal ones. Forces of second order in the small motions (torque times tilt) are left out.
 
 **Mass and inertia** of a shaft with its gears follow from geometry and density. A gear is its exact tooth outline of
-width b outside the shaft (or its bore, where that is wider); with the polygon's :math:`A = \tfrac12\sum c_i`, :math:`J
-= \tfrac1{12}\sum c_i(|p_i|^2 + p_i\cdot p_{i+1} + |p_{i+1}|^2)`, :math:`c_i = p_i \times p_{i+1}` (Green's theorem),
-its mass is :math:`\rho b A`, its polar inertia :math:`\rho b J`, its transverse one :math:`\rho b J/2 + m b^2/12`. All
-are summed about the common mass centre.
+width b outside the shaft (or its bore, where that is wider), an internal gear what its rim has outside of the outline.
+With the polygon's :math:`A = \tfrac12\sum c_i`, :math:`J = \tfrac1{12}\sum c_i(|p_i|^2 + p_i\cdot p_{i+1} +
+|p_{i+1}|^2)`, :math:`c_i = p_i \times p_{i+1}` (Green's theorem), its mass is :math:`\rho b A`, its polar inertia
+:math:`\rho b J`, its transverse one :math:`\rho b J/2 + m b^2/12`. All are summed about the common mass centre.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def section_masses(shaft: Shaft, middle: float) -> list[Masses]:
 
 
 def gear_masses(item: ShaftGear, shaft: Shaft, middle: float) -> Masses:
-    """Gear outside of its shaft, or outside of its bore where that is wider.
+    """Gear outside of its shaft, or outside of its bore where that is wider; an internal gear up to its rim diameter.
 
     Parameters
     ----------
@@ -95,13 +95,18 @@ def gear_masses(item: ShaftGear, shaft: Shaft, middle: float) -> Masses:
         If the shaft reaches the teeth.
     """
     gear, width = item.gear, item.gear.face_width
+    area, second = outline_moments(gear)
+    if gear.internal:  # the rim outside of its teeth
+        rim = 0.5 * (gear.rim_diameter or 0.0)
+        mass = item.density * width * (math.pi * rim**2 - area)
+        polar = item.density * width * (0.5 * math.pi * rim**4 - second)
+        return Masses(mass, polar, 0.5 * polar + mass * width**2 / 12.0, item.along)
     radius = shaft.radius_within(item.along - middle - 0.5 * width, item.along - middle + 0.5 * width)
     if radius >= gear.root_radius:
         problem = f"radius {1e3 * radius:g} mm reaches the teeth of gear {item.name!r}"
         cure = f"must be < {1e3 * gear.root_radius:.6g} mm, its root radius"
         raise InputError(f"shaft {shaft.name!r}", None, problem, cure)
     inner = max(radius, 0.5 * gear.bore_diameter)
-    area, second = outline_moments(gear)
     mass = item.density * width * (area - math.pi * inner**2)
     polar = item.density * width * (second - 0.5 * math.pi * inner**4)
     return Masses(mass, polar, 0.5 * polar + mass * width**2 / 12.0, item.along)

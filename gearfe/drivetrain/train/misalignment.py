@@ -165,6 +165,8 @@ def gear_motion(model: TrainModel, q: Array, name: str) -> Array:
         return np.concatenate([body.point_rows(point, frame, along) @ own, turn])
 
     places = np.array([float(train.bore_points[bore] @ frame[2]) for bore in shaft.bores])
+    if not shaft.bores:  # of a planet the pin counts as its bearing
+        places = np.array([float(base @ frame[2])])
     at_bores = np.array([section(place) for place in places])
     bores = np.zeros_like(at_bores)
     if train.housing is not None:

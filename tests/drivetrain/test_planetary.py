@@ -1,0 +1,230 @@
+"""Planetary stages in trains: published frequencies, kinds of modes, load sharing, balance of energy."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gearfe.base.errors import InputError
+from gearfe.drivetrain.modes.whirl import WhirlModes, train_modes
+from gearfe.drivetrain.train import Damping, Drive, Guide, TrainResponse, build_train, simulate
+from gearfe.drivetrain.train.misalignment import static_state
+from gearfe.drivetrain.train.planetary import mesh_families
+from gearfe.multibody import constant, smoothed_step
+from tests.makers.planetary import ALONG, ALPHA, LIN_PARKER, MODULE, SPEED, TILT, TORQUE, stage
+from tests.makers.trains import curve
+
+#: Lin & Parker (1999), three planets: frequencies (Hz) and kinds; translational ones are double, six pairs of them.
+PUBLISHED = [
+    (743.2, "translational"), (1102.4, "translational"), (1475.7, "rotational"), (1896.0, "translational"),
+    (1930.3, "rotational"), (2276.4, "translational"), (2658.3, "rotational"), (6986.3, "translational"),
+    (7462.8, "rotational"), (9647.9, "translational"), (11775.3, "rotational"),
+]  # fmt: skip
+
+
+#: Teeth of sun and planets with which so many planets have room and fit.
+TEETH = {3: (30, 36), 4: (30, 36), 5: (30, 25), 6: (36, 24)}
+
+
+def modes_of(count: int, angles: list[float] | None = None) -> WhirlModes:
+    drive = Drive("sun", "sun", constant(SPEED), torque=constant(TORQUE))
+    return train_modes(build_train(stage(count, TEETH[count], angles=angles, drive=drive)), [0.0], 2e4)
+
+
+def test_the_frequencies_of_lin_and_parker_to_every_printed_digit() -> None:
+    found = modes_of(3)
+    printed = [pair for pair in PUBLISHED for _ in range(2 if pair[1] == "translational" else 1)]
+    assert found.free == 1  # the published 0 Hz
+    assert [f"{f:.1f}" for f in found.frequency[0]] == [f"{f:.1f}" for f, _ in printed]
+    assert [label.split(",")[0] for label in found.labels[0]] == [f"{kind} mode of carrier arm" for _, kind in printed]
+    pairs = [i for i, (_, kind) in enumerate(printed) if kind == "translational"]
+    np.testing.assert_allclose(found.frequency[0][pairs[::2]], found.frequency[0][pairs[1::2]], rtol=1e-10)
+
+
+@pytest.mark.parametrize("count", [4, 5, 6])
+def test_kinds_and_degeneracies_for_more_planets(count: int) -> None:
+    """6 rotational modes with the free one, 6 pairs of translational ones, 3 planet modes of multiplicity N - 3."""
+    found = modes_of(count)
+    kinds = [label.split()[0] for label in found.labels[0]]
+    assert (kinds.count("rotational"), kinds.count("translational")) == (5, 12)
+    assert kinds.count("planet") == 3 * (count - 3)
+    planet = found.frequency[0][[i for i, kind in enumerate(kinds) if kind == "planet"]].reshape(3, -1)
+    np.testing.assert_allclose(planet, planet[:, :1] * np.ones(count - 3), rtol=1e-9)
+
+
+def test_planets_at_unequal_distances_have_mixed_modes() -> None:
+    """96 + ... : angles at multiples of 360/(z_s + z_r) deg, not opposite to each other."""
+    pitch = 2.0 * math.pi / (30 + 102)
+    labels = modes_of(3, [0.0, 40 * pitch, 90 * pitch]).labels[0]
+    assert any(label.startswith("mixed") for label in labels)
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_a_purely_torsional_stage_has_the_closed_form_of_kahraman(count: int) -> None:
+    """J. Sound Vib. 173 (1994) 125, ring fixed."""
+    k = 5e8
+    teeth = (30, 36) if count == 3 else (30, 35)
+    train = stage(count, teeth, mesh=k, pin=None, bearing=None, ring=None)
+    train = dataclasses.replace(train, drive=Drive("sun", "sun", constant(SPEED), torque=constant(TORQUE)))
+    found = build_train(train).coupled_frequencies_hz
+    ms, mp = LIN_PARKER["sun"][1], LIN_PARKER["planet"][1]
+    mc = (LIN_PARKER["carrier"][1] + count * LIN_PARKER["planet"][0]) / math.cos(ALPHA) ** 2
+    L1 = mp * mc * ms
+    L2 = -(count * k * mp * mc + 2 * k * mc * ms + count * 2 * k * mp * ms)
+    L3 = count * k * k * (count * mp + mc + 4 * ms)
+    root = math.sqrt(L2**2 - 4 * L1 * L3)
+    squares = sorted([0.0, *[2 * k / mp] * (count - 1), (-L2 - root) / (2 * L1), (-L2 + root) / (2 * L1)])
+    np.testing.assert_allclose(found, np.sqrt(squares) / (2 * math.pi), rtol=1e-9, atol=1e-3)
+
+
+def run(train: object, end: float = 4e-3, tolerance: float = 1e-10) -> TrainResponse:
+    return simulate(build_train(train), np.linspace(0.0, end, 161), tolerance=tolerance, method="taylor")  # type: ignore[arg-type]
+
+
+def test_three_ideal_planets_share_alike_and_their_forces_balance() -> None:
+    """In a transient with stiffness that varies: shares to 1e-9; the sun's meshes make the torque of its drive."""
+    swinging = stage(mesh=_rigid_curve, damping=Damping(ratio=0.03))
+    response = run(swinging)
+    force = response.contact_force
+    scale = np.abs(force).max()
+    for kind in (force[:, :3], force[:, 3:]):
+        assert np.ptp(kind) > 0.1 * scale
+        np.testing.assert_allclose(kind - kind.mean(axis=1, keepdims=True), 0.0, atol=1e-9 * scale)
+    arm = 0.5 * MODULE * 30 * math.cos(ALPHA)
+    np.testing.assert_allclose(response.drive_torque, arm * force[:, :3].sum(axis=1), atol=1e-9 * arm * scale)
+    np.testing.assert_allclose(response.bearing_load[..., :3], 0.0, atol=1e-8 * scale)
+
+
+def _rigid_curve(teeth: int) -> object:
+    """The curve of the makers over one pitch of gears of this module; its phase does not depend on the module."""
+    return curve(teeth, mean=5e8, swing=0.15)
+
+
+def test_energy_is_that_of_drive_and_load() -> None:
+    """Hinges and springs without damping under a torque that sets in: work is the rise of the energy, to 1e-9."""
+    torque = -TORQUE * 4.4
+    load = stage().loads[0]
+    train = stage(pin=None, bearing=None, ring=None)
+    train = dataclasses.replace(train, loads=(dataclasses.replace(load, torque=smoothed_step(1e-3, 2e-3, torque)),))
+    model = build_train(train)
+    t = np.linspace(0.0, 4e-3, 6401)
+    response = simulate(model, t, tolerance=1e-11, method="taylor")
+    radius = {"sun": 15 * MODULE * math.cos(ALPHA), "planet": 18 * MODULE * math.cos(ALPHA), "carrier": 33 * MODULE}
+    inertia = {name: LIN_PARKER[name][1] * r**2 for name, r in radius.items()}
+    inertia["carrier"] += 3 * LIN_PARKER["planet"][0] * radius["carrier"] ** 2
+    speed = dict(zip(response.shaft_names, response.speed_absolute.T, strict=True))
+    kinetic = 0.5 * (inertia["sun"] * speed["sun"] ** 2 + inertia["carrier"] * speed["carrier"] ** 2)
+    kinetic += 0.5 * inertia["planet"] * sum(speed[f"planet{k}"] ** 2 for k in range(3))
+    energy = kinetic + 0.5 * (response.contact_force**2).sum(axis=1) / 5e8
+    power = response.drive_torque * speed["sun"] + smoothed_step(1e-3, 2e-3, torque)(t) * speed["carrier"]
+    h = t[1] - t[0]
+    work = h / 3.0 * (power[0:-2:2] + 4 * power[1:-1:2] + power[2::2]).cumsum()
+    assert np.abs(power).max() > 10.0
+    np.testing.assert_allclose(
+        energy[2::2] - energy[0], work, atol=1e-9 * np.abs(power).max() * t[-1] + 1e-9 * energy[0]
+    )
+
+
+def test_a_pin_out_of_place_takes_its_share_by_the_stiffness_of_the_planets() -> None:
+    """Two meshes of k and a pin of k_p in a row: F_1 - F_2 = k cos(a) e / (1 + 2 k cos^2(a)/k_p)."""
+    k, pin, error = 5e8, 1e8, 5e-6
+    model = build_train(stage(mesh=k, pin=pin, bearing=None, ring=None, errors=[error, 0.0, 0.0]))
+    q = static_state(model)
+    assert q is not None
+    force = np.array([k * line.row @ q for line in model.meshes])
+    c = math.cos(ALPHA)
+    apart = k * c * error / (1.0 + 2.0 * k * c**2 / pin)
+    np.testing.assert_allclose(np.abs(force[[0, 3]] - force[[1, 4]]), apart, rtol=1e-9)
+    np.testing.assert_allclose(force[:3].sum(), 3 * model.kinematics.steady_forces[0], rtol=1e-9)
+
+
+def test_a_sun_that_moves_shares_the_load_alike_in_spite_of_a_pin_out_of_place() -> None:
+    """With three planets a sun without stiffness across the axis finds the place where their forces are equal."""
+    given = stage(bearing=1e9, errors=[2e-5, 0.0, 0.0])
+    spreads = []
+    for stiffness in (1e9, 1e4):
+        sun = dataclasses.replace(given.bearings[0], stiffness=(stiffness, ALONG, stiffness, TILT, TILT))
+        model = build_train(dataclasses.replace(given, bearings=(sun, *given.bearings[1:])))
+        q = static_state(model)
+        assert q is not None
+        force = np.array([5e8 * line.row @ q for line in model.meshes])[:3]
+        spreads.append(float(np.ptp(force) / force.mean()))
+    assert spreads[0] > 1.0
+    assert spreads[1] < 1e-2
+
+
+def test_bearing_forces_stand_still_in_axes_that_do() -> None:
+    """A pin out of place pushes the ring: in the housing this force goes round once a turn of the carrier."""
+    train = stage(errors=[2e-5, 0.0, 0.0], damping=Damping(ratio=0.3))
+    model = build_train(train)
+    turn = 2.0 * math.pi / (SPEED * float(model.kinematics.ratios[2]))
+    response = simulate(model, np.linspace(0.0, 1.25 * turn, 501), tolerance=1e-8, method="taylor")
+    ring = response.bearing_load[:, response.attachment_names.index("ring"), [0, 2]]  # x, z = e1, -e2
+    late = ring[100:, 0] - 1j * ring[100:, 1]
+    angle = np.unwrap(np.angle(late))
+    assert np.ptp(np.abs(late)) < 1e-3 * np.abs(late).mean()
+    np.testing.assert_allclose(np.ptp(angle), 2.0 * math.pi, rtol=1e-3)
+
+
+def test_coriolis_forces_split_translational_modes_by_the_speed_of_the_carrier() -> None:
+    """A free rotor on a spring seen from a frame that turns: its frequencies are w0 - W and w0 + W."""
+    train = stage(mesh=1.0, bearing=1e8, loads=())
+    model = build_train(train)
+    speed = 300.0
+    found = train_modes(model, [speed], 4000.0)
+    turning = speed * float(model.kinematics.ratios[2])
+    rest = math.sqrt(1e8 / LIN_PARKER["ring"][0])
+    for sign in (-1.0, 1.0):
+        expected = (rest + sign * turning) / (2.0 * math.pi)
+        assert np.abs(found.frequency[0] - expected).min() < 1e-6 * expected
+
+
+def test_mesh_phases_follow_from_the_places_of_the_planets() -> None:
+    """z_s/N = 10 and z_r/N = 34: three planets in phase; harmonics excite rotational modes only."""
+    train = stage()
+    for family in mesh_families(train.layout, train.kinematics.phases):
+        assert family.phases == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+        assert [kind for kind, value in family.excites(1).items() if value] == ["rotational"]
+
+
+def test_a_differential_is_guided_at_its_ratio() -> None:
+    """w_c = (z_s w_s + z_r w_r)/(z_s + z_r), and the ring turns so in a run."""
+    train = stage(guides=(Guide("ring", Fraction(-1, 4)),), damping=Damping(ratio=0.1))
+    model = build_train(train)
+    expected = Fraction(30 - Fraction(102, 4), 132)
+    assert model.kinematics.ratios[2] == expected
+    response = run(train, tolerance=1e-8)
+    np.testing.assert_allclose(response.speed_absolute[:, 1], -0.25 * SPEED, rtol=1e-9)
+    np.testing.assert_allclose(response.speed_absolute[:, 2].mean(), float(expected) * SPEED, rtol=1e-2)
+
+
+def test_what_a_stage_cannot_be_is_refused() -> None:
+    good = stage()
+    carrier = good.carriers[0]
+    uneven = dataclasses.replace(good.bearings[0], stiffness=(1e8, 1e8, 2e8, 1e8, 1e8))
+    on_axis = tuple(
+        dataclasses.replace(shaft, point=(0.0, 0.0, 0.0)) if shaft.name == "planet1" else shaft for shaft in good.shafts
+    )
+    wrong = [
+        ({"carriers": (carrier, dataclasses.replace(carrier, name="second", pins=()))}, "has no planets"),
+        ({"carriers": (dataclasses.replace(carrier, shaft="arm"),)}, "unknown shaft 'arm'"),
+        ({"bearings": (uneven, *good.bearings[1:])}, "differs across the axis"),
+        ({"shafts": on_axis}, "lies on the axis"),
+        ({"guides": ()}, "turns freely"),
+        ({"guides": (Guide("ring"), Guide("carrier"))}, "is fixed, but"),
+        ({"guides": (Guide("ring"), Guide("sun"))}, "driven and fixed or guided at once"),
+        ({"drive": None}, "no shaft is driven"),
+    ]
+    for changes, text in wrong:
+        with pytest.raises(InputError, match=text):
+            build_train(dataclasses.replace(good, **changes))  # type: ignore[arg-type]
+
+
+def test_planets_that_collide_are_refused() -> None:
+    """Six planets of 36 teeth round a sun of 30 overlap: 2 r_c sin(30 deg) < d_a."""
+    with pytest.raises(InputError, match=r"'planet0'.*overlaps gear 'planet1'"):
+        build_train(stage(6, (30, 36)))
