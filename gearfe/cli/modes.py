@@ -66,12 +66,13 @@ def run(args: argparse.Namespace) -> int:
 def _report_lines(summary: dict[str, Any]) -> list[str]:
     """Lines for the terminal."""
     from ..drivetrain.gearbox.inherited import inherited_lines
+    from ..drivetrain.gearbox.stage_report import stage_lines
 
     start, stop = summary["speed_start_rad_per_s"], summary["speed_stop_rad_per_s"]
     lines = [f"{len(summary['modes'])} modes from {start:.6g} to {stop:.6g} rad/s"]
     if summary["free_motions"]:
         lines.append(f"{summary['free_motions']} motions that nothing holds, at 0 Hz: rotation of the shafts together")
-    lines += inherited_lines(summary.get("inherited", {}))
+    lines += [*inherited_lines(summary.get("inherited", {})), *stage_lines(summary)]
     for mode in summary["modes"]:
         low, high = mode["frequency_Hz"], mode["frequency_at_the_fastest_speed_Hz"]
         ends = list(dict.fromkeys(f"{x:.5g} Hz" if math.isfinite(x) else "overdamped" for x in (low, high)))

@@ -84,12 +84,13 @@ def _report_lines(summary: dict[str, Any]) -> list[str]:
     from ..drivetrain.gearbox.bearing_report import bearing_lines
     from ..drivetrain.gearbox.inherited import inherited_lines
     from ..drivetrain.gearbox.shaft_report import shaft_lines
+    from ..drivetrain.gearbox.stage_report import stage_lines
 
     lines = [
         f"{summary['speeds_reached']} of {summary['speeds']} speeds, {summary['steady_states']} steady states; largest "
         f"error estimate {summary['largest_error_estimate']:.2g} of the approach under the steady force"
     ]
-    lines += [*inherited_lines(summary.get("inherited", {})), *shaft_lines(summary)]
+    lines += [*inherited_lines(summary.get("inherited", {})), *shaft_lines(summary), *stage_lines(summary)]
     lines += bearing_lines(summary.get("bearings", {}))
     changes: dict[str, list[str]] = {}
     for change in summary["bifurcations"]:

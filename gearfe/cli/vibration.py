@@ -177,10 +177,11 @@ def report_lines(response: TrainResponse, train: GearTrain, written: Written, ch
     from ..drivetrain.gearbox.bearing_report import bearing_lines
     from ..drivetrain.gearbox.inherited import inherited_lines
     from ..drivetrain.gearbox.shaft_report import shaft_lines
+    from ..drivetrain.gearbox.stage_report import stage_lines
 
     summary = written.summary
     lines = [*_mesh_lines(response, train, summary), *_contact_lines(response.mesh_names, summary)]
-    lines += [*inherited_lines(summary.get("inherited", {})), *shaft_lines(summary)]
+    lines += [*inherited_lines(summary.get("inherited", {})), *shaft_lines(summary), *stage_lines(summary)]
     lines += bearing_lines(summary.get("bearings", {}))
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)

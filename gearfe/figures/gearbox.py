@@ -118,7 +118,8 @@ def _along_the_axes(axes: Any, layout: GearboxLayout, colours: dict[str, str]) -
     for shaft in layout.shafts:
         x, _, z = shaft.centre
         angle = {"color": colours[shaft.name], "alpha": 0.25}
-        axes.fill(1e3 * (x + shaft.radius * np.cos(_AROUND)), 1e3 * (z + shaft.radius * np.sin(_AROUND)), **angle)
+        if not any(gear.teeth < 0 for gear in layout.gears if gear.shaft == shaft.name):  # a ring has no shaft inside
+            axes.fill(1e3 * (x + shaft.radius * np.cos(_AROUND)), 1e3 * (z + shaft.radius * np.sin(_AROUND)), **angle)
         lines = [shaft.name, *(f"{gear.name} ({gear.teeth})" for gear in layout.gears if gear.shaft == shaft.name)]
         box = _free_box(layout, shaft, lines, point, boxes)
         boxes.append(box)

@@ -12,6 +12,7 @@ import numpy as np
 from ..base.typing import Array, IntArray
 from ..drivetrain.gearbox.fields import frames
 from ..drivetrain.train.gear_train import GearTrain
+from ..drivetrain.train.planetary import mesh_families
 from ..drivetrain.train.response import TrainResponse
 from ..drivetrain.train.statics import static_errors
 from ..drivetrain.vibration.analysis import Analysed
@@ -64,6 +65,8 @@ class TrainPictures:
         _draw_response(folder / "response.png", response, attachment, self.title, made.mean_force)
         if train.drive is not None and any(mesh.stiffness is not None for mesh in train.meshes):
             _draw_transmission(folder / "transmission_error.png", train, response, self.title)
+        if train.carriers:
+            _draw_load_shares(folder / "load_share.png", train, response, self.title)
         draw_spectrum(folder / "spectrum.png", response, spectra, attachment, self.title, self.band)
         if spectra.power is not None:
             draw_power(folder / "radiated_power.png", response, spectra, spectra.power, self.title, self.band)
@@ -192,6 +195,35 @@ def _draw_transmission(path: Path, train: GearTrain, response: TrainResponse, ti
         axes.legend(fontsize=8.5, frameon=False, ncols=3, loc="upper right")
         _span(axes, angle)
     axes.set_xlabel("rotation of the drive  (deg)")
+    save(figure, path)
+
+
+def _draw_load_shares(path: Path, train: GearTrain, response: TrainResponse, title: str) -> None:
+    """Force of each mesh of a planet over the mean of its kind, over the rotation of the carrier, under the load."""
+    rolled = train.kinematics
+    families = [family for family in mesh_families(train.layout, rolled.phases) if len(family.meshes) > 1]
+    late = response.time >= min(response.load_end_s, 0.5 * float(response.time[-1]))
+    figure = fixed(11.5, 1.3 + 2.7 * max(1, len(families)))
+    head = f"Load sharing of planets: mesh force over the mean of all planets\n{title}"
+    figure.suptitle(head, fontsize=12, x=0.012, y=0.985, ha="left")
+    tall = 1.3 + 2.7 * max(1, len(families))
+    room = {"top": 1.0 - 0.75 / tall, "bottom": 0.55 / tall, "hspace": 0.32}
+    grid = figure.add_gridspec(max(1, len(families)), 1, left=0.062, right=0.985, **room)
+    for number, family in enumerate(families):
+        carrier = next(carrier.shaft for carrier in train.carriers if carrier.name == family.carrier)
+        ratio = abs(float(rolled.ratios[train.shaft_number(carrier)])) or 1.0
+        angle = ratio * np.abs(np.degrees(response.drive_angle[late]))
+        name = f"{family.names[0]}-{family.names[1]} and those like it"
+        axes = panel(figure.add_subplot(grid[number]), "share  (-)", "abcdefgh"[number % 8], name)
+        shares = response.load_shares(family.meshes)[late]
+        for colour, mesh, share in zip(CYCLE, family.meshes, shares.T, strict=False):
+            label = f"{response.mesh_names[mesh]}: {share.min():.4g} to {share.max():.4g}"
+            axes.plot(angle, share, color=colour, linewidth=1.1, label=label)
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.2 * (high - low))
+        axes.legend(fontsize=8.5, frameon=False, ncols=3, loc="upper right")
+        _span(axes, angle)
+        axes.set_xlabel("rotation of the carrier  (deg)")
     save(figure, path)
 
 

@@ -22,7 +22,7 @@ CLOSE = 1e-6
 
 @dataclass(frozen=True)
 class PlacedGear:
-    """A gear on its shaft: name, shaft, centre (x, y, z), radii of tip circle, reference circle and bore, width; m."""
+    """A gear: name, shaft, centre (x, y, z), radii of tip circle, reference circle, bore or rim, width; m."""
 
     name: str
     shaft: str
@@ -147,7 +147,8 @@ def _placed(box: Gearbox, shafts: tuple[PlacedShaft, ...]) -> GearboxLayout:
     for name, named in box.gears.items():
         gear = made[name] if name in made else gear_of(named)
         x, _, z = places[named.shaft]
-        centre, radius = (x, 1e-3 * named.y_mm, z), 0.5 * gear.bore_diameter
+        held = (gear.rim_diameter or 0.0) if gear.internal else gear.bore_diameter
+        centre, radius = (x, 1e-3 * named.y_mm, z), 0.5 * held
         radii = gear.tip_radius, gear.reference_radius, radius
         gears[name] = PlacedGear(name, named.shaft, centre, *radii, gear.face_width, gear.teeth)
     meshes = []

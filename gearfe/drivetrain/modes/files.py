@@ -12,6 +12,7 @@ from ...base.errors import InputError
 from ...base.files import whole_set, write_csv, write_json
 from ..gearbox import bearing_report
 from ..gearbox.shaft_report import shaft_entries
+from ..gearbox.stage_report import stage_entries
 from . import report
 from .critical import Campbell
 from .energies import HOUSING
@@ -84,7 +85,7 @@ def write_modes_result(
         bearings = bearing_report.bearing_summary(result.model.operating)
         if bearings:
             write_csv(target / bearing_report.FILE, bearing_report.bearing_columns(bearings))
-        parts = {"bearings": bearings, **shaft_entries(result.model)}
+        parts = {"bearings": bearings, **shaft_entries(result.model), **stage_entries(result.model)}
         summary = {**further, **parts, **report.summary(result), "warnings": report.warnings(result)}
         summary["timings_s"] = dict(watch.seconds)
         write_json(target / "summary.json", summary)

@@ -114,7 +114,7 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     ends = ((d, float(replace(f, sines=())(model.torque_end))) for d, f in model.torques)
     torque = sum((d * value for d, value in ends), start=np.zeros(len(modal.T)))
     push = modal.constant + modal.T.T @ torque
-    gyros = model.forces.gyros
+    gyros = model.forces.couples
     tilts = [column for g in gyros for column in (g.direction, g.direction + 1)]
     linear = Linear(
         modal.eigenvalues, _damping(model), to_modes[:, used], push, to_modes[:, tilts],

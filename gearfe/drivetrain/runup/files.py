@@ -12,6 +12,7 @@ from ...output.arrays import save_arrays
 from ..gearbox import bearing_report
 from ..gearbox.report import attachment_to_draw
 from ..gearbox.shaft_report import misalignment_columns, shaft_entries, yielding
+from ..gearbox.stage_report import stage_entries
 from ..modes.swinging import mesh_modes, write_modes
 from . import report
 from .critical import CriticalSpeeds, critical_speeds
@@ -102,7 +103,12 @@ def write_runup(
         bearings = bearing_report.bearing_summary(model.operating)
         if bearings:
             write_csv(target / bearing_report.FILE, bearing_report.bearing_columns(bearings))
-        results = {"bearings": bearings, **shaft_entries(model), **report.summary(run, critical)}
+        results = {
+            "bearings": bearings,
+            **shaft_entries(model),
+            **stage_entries(model),
+            **report.summary(run, critical),
+        }
         summary = {**further, **results, "warnings": report.warnings(run)}
         summary["timings_s"] = dict(watch.seconds)
         write_json(target / "summary.json", summary)

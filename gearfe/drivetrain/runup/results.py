@@ -175,7 +175,7 @@ def _bearing(train: CondensedTrain, orbit: Orbit, omega: Array, modal: ComplexAr
     for line in model.meshes:
         if line.in_contact:  # which the constant part has, too
             acting += line.rayleigh * real_times(v, np.outer(line.row, line.row))
-    tilts = [column for g in model.forces.gyros for column in (g.direction, g.direction + 1)]
+    tilts = [column for g in model.forces.couples for column in (g.direction, g.direction + 1)]
     along = model.directions[:, tilts]
     acting += orbit.speed * real_times(v, along @ linear.gyroscopic.T @ along.T)
     acting[0] += train.torque

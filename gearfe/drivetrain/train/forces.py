@@ -357,6 +357,11 @@ class TrainForces:
     flanks: tuple[Flank, ...]
     torques: tuple[tuple[int, TimeFunction], ...]
 
+    @property
+    def couples(self) -> tuple[Gyro, ...]:
+        """Gyroscopic moments and Coriolis forces: those of the gyros that grow with rates."""
+        return tuple(gyro for gyro in self.gyros if gyro.polar)
+
     def of_flanks(self, t: Array, u: Array, du: Array) -> list[FlankForces]:
         """Forces of each flank at the times t (n,), u and du of shape (n, directions)."""
         angle, rate, forces = self.angle(t), self.angle(t, 1), []

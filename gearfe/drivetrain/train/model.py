@@ -486,25 +486,30 @@ def _of_frame(train: GearTrain, shafts: Shafts, number: int, turn: float, column
     """Coriolis, centrifugal and Euler forces of a shaft whose motion is described in a frame that turns.
 
     The frame turns `turn` times as fast as the drive; directions are appended to the columns, whose last one is of no
-    motion. Those of a planet are radial and tangential, for its mean place is off the axis.
+    motion. Those of a planet are radial and tangential, for its mean place is off the axis. Its centrifugal force acts
+    along the arm of the carrier, which turns with it: with the rotation of the carrier alone it does no work.
     """
-    still, gyros = len(columns) - 1, []
+    still, gyros = len(columns) - 1, list[Gyro]()
     name, frame = train.shafts[number].name, train.frame
     own = train.carrier_of(name)
-    angle, radius = 0.0, 0.0
+    angle, radius, follows = 0.0, 0.0, np.zeros(shafts.size)
     if own is not None:
         pin = next(pin for pin in own.pins if pin.shaft == name)
         angle, radius = train.pin_angle(own, pin), float(np.hypot(*train.pin_arm(own, pin)))
+        carrier = train.shaft_number(own.shaft)
+        turning = shafts.bodies[carrier].turn_rows(train.shaft_end(name, 0.0))[2]
+        follows = radius * shafts.whole(carrier, turning)
     turned = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     for index, plane in enumerate(planes(shafts.bodies[number], frame)):
-        gyros.append(
-            Gyro(
-                len(columns), still, turn, -2.0 * plane.inertia, stiffening=plane.inertia * turn**2, euler=True,
-                offset=0.0 if index else radius,
-            )
-        )  # fmt: skip
-        first, second = turned @ np.array([plane.first, plane.second])
-        columns += [shafts.whole(number, first), shafts.whole(number, second)]
+        first, second = (shafts.whole(number, row) for row in turned @ np.array([plane.first, plane.second]))
+        offset, moves = (0.0, 0.0 * follows) if index else (radius, follows)
+        coriolis = Gyro(len(columns), still, turn, -2.0 * plane.inertia, euler=True, offset=offset)
+        columns += [first, second]
+        centrifugal = replace(
+            coriolis, direction=len(columns), polar=0.0, euler=False, stiffening=plane.inertia * turn**2
+        )
+        columns += [first, second - moves]
+        gyros += [coriolis, centrifugal]
     return gyros
 
 

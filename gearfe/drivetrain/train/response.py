@@ -128,6 +128,8 @@ class TrainResponse(ShownTable):
         Torque of a machine's spring on its shaft, or of a coupling on its second shaft (N m).
     machine_names, coupling_names
         Of the train.
+    shared_meshes
+        Numbers of the meshes among which planets share a load, a tuple for each kind.
     """
 
     time: Array
@@ -171,6 +173,7 @@ class TrainResponse(ShownTable):
     spring_torque: Array | None = None
     machine_names: tuple[str, ...] = ()
     coupling_names: tuple[str, ...] = ()
+    shared_meshes: tuple[tuple[int, ...], ...] = ()
 
     AXES = ("time_s",)
 
@@ -211,7 +214,15 @@ class TrainResponse(ShownTable):
             made |= {f"machine_{name}_speed_rad_per_s": self.machine_speed[:, i] for i, name in speeds}
             springs = (f"machine_{name}" for name in self.machine_names), (f"coupling_{n}" for n in self.coupling_names)
             made |= {f"{name}_torque_Nm": self.spring_torque[:, i] for i, name in enumerate(chain(*springs))}
+        for meshes in self.shared_meshes:
+            made |= {f"load_share_{i + 1}": share for i, share in zip(meshes, self.load_shares(meshes).T, strict=True)}
         return made
+
+    def load_shares(self, meshes: tuple[int, ...]) -> Array:
+        """Force of each of n meshes over the mean of them, (times, n); 0 where none of them has a force."""
+        force = self.contact_force[:, list(meshes)]
+        mean = force.mean(axis=1, keepdims=True)
+        return np.asarray(np.divide(force, mean, out=np.zeros_like(force), where=mean != 0.0))
 
     def bearing_forces(self) -> dict[str, Array]:
         """Force of the shaft on each bore over time, its components as columns."""

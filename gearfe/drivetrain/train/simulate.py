@@ -20,6 +20,7 @@ from ...multibody import IntegrationError, Start, Status, Trajectory, integrate
 from ...multibody.integrators.integrate import chosen_method
 from .model import TrainModel
 from .parting import Parting, apart_in_steps, beyond_law, parted
+from .planetary import mesh_families
 from .response import TrainResponse, joined
 from .states import TrainStates, train_states
 from .statics import ROUND_OFF
@@ -376,6 +377,7 @@ def response_of(
         spring_torque=model.driveline.torques(moved.q, moved.v),
         machine_names=tuple(m.name for m in train.machines),
         coupling_names=tuple(c.name for c in train.couplings),
+        shared_meshes=tuple(family.meshes for family in mesh_families(train.layout, train.kinematics.phases)),
     )
 
 

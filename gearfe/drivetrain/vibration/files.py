@@ -19,6 +19,7 @@ from ..gearbox import bearing_report
 from ..gearbox.fields import write_gears, write_housing
 from ..gearbox.report import attachment_to_draw
 from ..gearbox.shaft_report import misalignment_columns, shaft_entries, yielding
+from ..gearbox.stage_report import stage_entries
 from ..train.gear_train import GearTrain
 from ..train.model import TrainModel
 from ..train.response import TrainResponse
@@ -38,6 +39,7 @@ MAY_WRITE = (
     "spectrum.png",
     "radiated_power.png",
     "transmission_error.png",
+    "load_share.png",
     "gears.vtkhdf",
     "housing.vtkhdf",
     "fields.png",
@@ -224,7 +226,8 @@ def write_run(
             shapes = deflection.deflection_entries(train, made.deflections)
             run = Run({**run.summary, "deflections": shapes}, spectra)
         watch.seconds["total"] = time.perf_counter() - watch.begun
-        summary = {**run.summary, **shaft_entries(planned.model), "timings_s": dict(watch.seconds)}
+        stages = stage_entries(planned.model, run.summary.get("mean_contact_forces_N"))
+        summary = {**run.summary, **shaft_entries(planned.model), **stages, "timings_s": dict(watch.seconds)}
         write_json(target / "summary.json", summary)
         names = tuple(sorted(path.name for path in target.iterdir()))
     return Written(names, response, spectra, tuple(problems), summary)

@@ -1,0 +1,124 @@
+"""Planetary stages in job files: the shipped one, keys, and what is wrong with a file."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gearfe.base.errors import InputError
+from gearfe.base.tables.jobs import train_tables
+from gearfe.cli.main import main
+from gearfe.drivetrain.gearbox.job import job_train, train_job
+from gearfe.drivetrain.gearbox.stage_report import stage_entries
+from gearfe.drivetrain.train import GearTrain, build_train
+from tests.places import GEOMETRY
+
+SHIPPED = GEOMETRY / "planetary.toml"
+
+
+def tables(**changes: Any) -> dict[str, Any]:
+    """The shipped job with given stiffnesses and some keys changed, as ``shafts__ring__speed_ratio``."""
+    raw = tomllib.loads(SHIPPED.read_text(encoding="utf-8"))
+    raw["meshes"]["sun_planet"] = {"driver": "sun", "driven": "planet", "stiffness_N_per_m": 8e8}
+    raw["meshes"]["planet_ring"].pop("backlash_um")
+    for key, value in changes.items():
+        *path, last = key.split("__")
+        table = raw
+        for part in path:
+            table = table.setdefault(part, {})
+        if value is None:
+            table.pop(last)
+        else:
+            table[last] = value
+    return raw
+
+
+def made(raw: dict[str, Any]) -> GearTrain:
+    return job_train(train_job(SHIPPED, train_tables(copy.deepcopy(raw), SHIPPED)), None)
+
+
+def test_planets_are_written_once_and_stand_at_their_places() -> None:
+    train = made(tables())
+    assert [shaft.name for shaft in train.shafts] == ["sun", "planet_1", "planet_2", "planet_3", "ring", "carrier"]
+    assert [mesh.name for mesh in train.meshes][:3] == ["sun_planet_1", "sun_planet_2", "sun_planet_3"]
+    carrier = train.carriers[0]
+    angles = np.degrees([train.pin_angle(carrier, pin) for pin in carrier.pins]) % 360.0
+    np.testing.assert_allclose(angles, [0.0, 120.0, 240.0], atol=1e-9)
+    np.testing.assert_allclose([pin.error for pin in carrier.pins], [[0.0, 2e-5], [0.0, 0.0], [0.0, 0.0]])
+
+
+def test_angles_are_about_plus_y() -> None:
+    """z = -78 mm is a quarter of a turn about +y from x = 78 mm."""
+    pitch = 360.0 / 78.0
+    train = made(
+        tables(carriers__arm__planets=[0.0, 20 * pitch, 50 * pitch], carriers__arm__pin_tangential_errors_um=None)
+    )
+    angle = math.radians(20 * pitch)
+    np.testing.assert_allclose(train.shafts[2].point, [0.078 * math.cos(angle), 0.0, -0.078 * math.sin(angle)])
+
+
+def test_the_summary_has_fractions_phases_and_sidebands() -> None:
+    """17/22/-61, ring fixed: carrier 17/78, planet -17/44; 61/3 leaves 1: translational modes, sidebands."""
+    train = made(tables())
+    entries = stage_entries(build_train(train))["planetary"]
+    assert entries["speed_ratios"]["carrier"] == "17/78"
+    assert entries["speed_ratios"]["planet_1"] == "-17/44"
+    assert entries["torque_ratios"]["carrier"] == {"sun": "-17/78", "ring": "-61/78"}
+    ring = entries["meshes"][1]
+    assert sorted(ring["phases_of_a_cycle"]) == pytest.approx([0.0, 1 / 3, 2 / 3], abs=1e-9)
+    assert ring["harmonics"][0]["excites"] == ["translational"]
+    assert ring["harmonics"][2]["excites"] == ["rotational"]
+    order = entries["orders"][0]
+    assert order["order"] == pytest.approx(17 * 61 / 78)
+    assert list(order["sidebands"].values()) == pytest.approx([17 * 60 / 78, 17 * 62 / 78])
+
+
+def test_shipped_modes_run_from_the_command_line(tmp_path: Path) -> None:
+    assert main(["modes", str(SHIPPED), "--out", str(tmp_path), "--no-pictures", "-q"]) == 0
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    labels = [mode["label"] for mode in summary["modes"]]
+    assert any(label.startswith("translational mode of carrier arm") for label in labels)
+    assert summary["planetary"]["speed_ratios"]["carrier"] == "17/78"
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"shafts__ring__speed_ratio": None, "shafts__ring__holding_stiffness_Nm_per_rad": None}, "turns freely"),
+        ({"shafts__carrier__speed_ratio": 0}, r"shaft 'carrier' speed_ratio.*is fixed, but"),
+        ({"train__drive": None}, "no shaft is driven"),
+        ({"carriers__arm__planets": 4, "carriers__arm__pin_tangential_errors_um": None}, "does not mesh with gears"),
+        ({"carriers__arm__planets": [0.0, 30.0]}, r"pin_tangential_errors_um.*3 values for 2 planets"),
+        ({"carriers__arm__planets": 0}, r"carriers\.arm\.planets = 0"),
+        ({"carriers__arm__planets": [0.0, 120.0, 480.0]}, "each once"),
+        ({"carriers__arm__shaft": "arm"}, r"carriers\.arm\.shaft.*no shaft of this file"),
+        ({"carriers__arm__pin_stiffness_N_per_m": [1e8, 1e8]}, r"one number > 0, or five"),
+        ({"shafts__planet__carrier": "leg"}, r"shafts\.planet\.carrier.*write \"arm\""),
+        ({"shafts__planet__carrier": None}, r"carriers\.arm.*carries nothing"),
+        ({"shafts__planet__speed_ratio": 0}, "whose rotation follows from its meshes"),
+        ({"shafts__ring__speed_ratio": "none"}, "is no number"),
+        ({"shafts__sun__holding_stiffness_Nm_per_rad": 1e6}, "is of a shaft with speed_ratio"),
+        ({"gears__ring__module_mm": 4.5}, "modules"),
+        ({"gears__ring__teeth": -62}, "mm apart"),
+        ({"meshes__planet_ring__driver": "ring", "meshes__planet_ring__driven": "planet"}, "swap the gears"),
+        ({"train__housing": "elastic"}, "housing"),
+        ({"bearings__sun__stiffness": [1e7, 1e8, 2e7, 1e6, 1e6]}, "differs across the axis"),
+    ],
+)
+def test_what_is_wrong_with_a_stage_is_named(changes: dict[str, Any], text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        build_train(made(tables(**changes)))
+
+
+def test_planets_that_collide_are_named() -> None:
+    """At 60 deg the tips of two planets of 22 teeth overlap: 78 mm < 2 * 48 mm."""
+    raw = tables(carriers__arm__planets=[0.0, 60.0], carriers__arm__pin_tangential_errors_um=None)
+    with pytest.raises(InputError, match=r"'planet_1'.*overlaps gear 'planet_2'"):
+        build_train(made(raw))
