@@ -312,7 +312,7 @@ def gears(
 
 def _flanks(reading: Reading, gear: Component) -> dict[str, Component]:
     """Left and right flank of a gear."""
-    flanks = {}
+    flanks: dict[str, Component] = {}
     for relation in reading.model.joined("flank", "gear", gear.number):
         reading.relations.add(relation.number)
         flanks |= {side: reading.model.components[number] for side, number in relation.roles.items() if side != "gear"}

@@ -202,7 +202,7 @@ def _absorb(
 
 def _joined(shafts: dict[str, Any], main: str, others: set[str]) -> list[str]:
     """Append the sections of coaxial shafts that follow each other to those of a shaft; return their names in order."""
-    names = []
+    names: list[str] = []
     while True:
         body = shafts[main]
         if "sections" not in body:

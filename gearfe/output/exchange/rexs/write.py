@@ -297,7 +297,7 @@ def _shaft(b: _Builder, name: str, entry: Mapping[str, Any], train: Mapping[str,
     )
     at = 0.0
     for section in sections:
-        ends = {}
+        ends: dict[str, Any] = {}
         for which in ("outer", "inner"):
             for end, mine in (("begin", "start"), ("end", "end")):
                 default = 0.0 if which == "inner" else None
@@ -351,10 +351,10 @@ def _gear(b: _Builder, name: str, entry: Mapping[str, Any], shafts: Mapping[str,
     deviations = entry.get("microgeometry")
     if deviations:
         b.set(part, datum_face_orientation="positive")
-        for side, flank in flanks.items():
+        for side, number in flanks.items():
             for kind, values in _modifications({**deviations, **deviations.get(side, {})}):
                 item = b.add(kind, "", **values)
-                b.relate("reference", origin=flank, referenced=item.number)
+                b.relate("reference", origin=number, referenced=item.number)
 
 
 def _size(value: float | None) -> float | None:
