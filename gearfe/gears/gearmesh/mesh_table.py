@@ -123,7 +123,7 @@ def read_mesh_table(path: str | Path, pitch: float, driven_base_radius: float, *
         curves = [periodic_interpolant(phase, values, pitch, method=method) for values in (k, error)]
     except InputError as found:
         raise InputError(TABLE, str(path), found.problem, "give rows over a whole pitch, in small steps") from None
-    return MeshTable(*curves)
+    return MeshTable(curves[0], curves[1])
 
 
 def _one_of(columns: Mapping[str, Sequence[str]], names: Sequence[str], path: str | Path) -> str:
