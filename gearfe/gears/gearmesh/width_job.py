@@ -311,7 +311,19 @@ def stiffness_sweep(job: StiffnessJob, lines: ContactLines, watch: Stopwatch | N
 def job_sweep(
     job: StiffnessJob, lines: ContactLines, table: LoadMapTable | None, watch: Stopwatch | None = None
 ) -> WidthSweep:
-    """Return the sweep of a load map's table, or of [stiffness] where it is None."""
+    """Return the sweep of a load map's table, or of [stiffness] where it is None.
+
+    Parameters
+    ----------
+    job : StiffnessJob
+        Gears and model.
+    lines : ContactLines
+        Their lines of contact.
+    table : LoadMapTable or None
+        Torques and positions of a load map.
+    watch : Stopwatch, optional
+        Takes the time of the stages.
+    """
     return stiffness_sweep(job, lines, watch) if table is None else map_sweep(job, lines, table, watch)
 
 

@@ -59,7 +59,19 @@ class FlankLoad:
 def sweep_columns(
     job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep, roots: WideRoots | None = None
 ) -> dict[str, Any]:
-    """Return the table of all positions, one row each, load by load."""
+    """Return the table of all positions, one row each, load by load.
+
+    Parameters
+    ----------
+    job : StiffnessJob
+        Gears and model.
+    mesh : WideMesh
+        The gears with their face widths.
+    sweep : WidthSweep
+        The contact.
+    roots : WideRoots, optional
+        Root stress over the width.
+    """
     sense, radius = axial_sense(job), job.pair.wheel.base_radius
     moments = _tilting_moments(mesh, sweep, sense)
     loads, positions = sweep.status.shape
@@ -225,7 +237,19 @@ def pattern_columns(flanks: list[FlankLoad]) -> dict[str, Any]:
 def load_table(
     job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep, roots: WideRoots | None = None
 ) -> dict[str, list[float]]:
-    """Return a row per load: means over the positions, load factors, the largest line load and root stresses."""
+    """Return a row per load: means over the positions, load factors, the largest line load and root stresses.
+
+    Parameters
+    ----------
+    job : StiffnessJob
+        Gears and model.
+    mesh : WideMesh
+        The gears with their face widths.
+    sweep : WidthSweep
+        The contact.
+    roots : WideRoots, optional
+        Root stress over the width.
+    """
     columns = sweep_columns(job, mesh, sweep, roots)
     loads = len(sweep.status)
     by_load = {name: np.asarray(values).reshape(loads, -1) for name, values in columns.items()}
