@@ -16,6 +16,7 @@ from gearfe.gears.rating.data import Strength, pair_data
 from gearfe.gears.rating.flank import auxiliary_factors, work_hardening
 from gearfe.gears.rating.life import FatigueCurve, flank_life, root_life
 from gearfe.gears.rating.load_factors import running_in, running_in_beta
+from gearfe.gears.rating.loss import loss
 from gearfe.gears.rating.materials import stress_number
 from gearfe.gears.rating.rate import Rating, rate
 from gearfe.gears.rating.service import life_hours, miner
@@ -420,3 +421,12 @@ def test_static_overload_has_no_life() -> None:
     rating = rate(spur_stage(), SPUR | {"spectrum": [part]})
     assert rating.service.U_H[0] >= 1e9
     assert rating.service.life_flank_h[0] < 1e-6
+
+
+def test_loss_factor_of_the_fzg_pair_as_printed() -> None:
+    """C14 with the tip radii that the report prints: H_V 0.1950."""
+    gears = [
+        Gear(z, 4.5e-3, math.radians(20), 14e-3, 30e-3, profile_shift=x, addendum=tip / 4.5 - z / 2 - x)
+        for z, x, tip in ((16, 0.1817, 41.228), (24, 0.1715, 59.182))
+    ]
+    assert loss(pair_data(MeshGeometry(gears[0], gears[1], 91.5e-3))).H_V == pytest.approx(0.1950, abs=5e-5)

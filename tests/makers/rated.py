@@ -130,6 +130,7 @@ def example_1() -> MeshGeometry:
 
 #: As printed; K_v and K_Hbeta are prescribed with two decimals, so stresses with them have three digits.
 SPUR_PRINTED: dict[str, str] = {
+    "H_V": "0.149",
     "F_t_N": "285900",
     "v_m_per_s": "4.88",
     "K_Fbeta": "1.94",
@@ -173,6 +174,7 @@ SPUR_PRINTED: dict[str, str] = {
 }
 
 HELICAL_PRINTED: dict[str, str] = {
+    "H_V": "0.106",
     "F_t_N": "240064",
     "v_m_per_s": "20.83",
     "C_R": "0.898",

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ...base.errors import given
 from ..contact.laws import PairModel, check_torque
 from ..rating.rate import Rating
 from ..width import sweep_width
@@ -131,7 +132,20 @@ def _of_sections(job: StiffnessJob, rating: Rating, torque: float) -> list[Compa
             rows.append(
                 Compared(f"root stress {name}", "MPa", rating.root.sigma_F0_MPa[i], largest, "nominal root stress")
             )
+    sliding = _loss(load_map)
+    rows.append(Compared("H_V", "-", rating.loss.H_V, sliding, "loss factor, computed with the load shares"))
     return [row for row in rows if math.isfinite(row.computed)]
+
+
+def _loss(load_map: LoadMap) -> float:
+    """H_V of the computed loads: mean of the forces times sliding speeds over the power, for a friction of 1."""
+    (pairs,), mesh = load_map.pairs, given(load_map.pair, "pair")
+    here = pairs.position < POSITIONS
+    way = np.abs(pairs.roll[here, 0] - mesh.path["C"].pinion_roll)
+    at_edges = max(abs(mesh.path[end].pinion_roll - mesh.path["C"].pinion_roll) for end in ("A", "E"))
+    way = np.where(np.isfinite(way), way, at_edges)
+    speed = way * (1.0 + 1.0 / mesh.gear_ratio) / mesh.pinion.base_radius
+    return float(np.sum(pairs.share[here] * speed)) / POSITIONS
 
 
 def _single(load_map: LoadMap) -> Any:

@@ -18,6 +18,7 @@ from .data import Load, PairData, Strength, load_of, pair_data, strength_of
 from .flank import NOTABLE, Flank, contact_ratio_factor, flank
 from .ledger import Entry, entries
 from .load_factors import Influence, influence, speed_range
+from .loss import Loss, loss
 from .root import NOTCHES, Root, root
 from .service import Service, service
 from .stiffness import ordered, single_stiffness
@@ -42,8 +43,8 @@ class Rating(ShownTable):
         0 where gear 1 drives, else 1.
     pair, strengths, load
         What was rated.
-    general, flank, root, service
-        Factors of general influence; flanks; roots; life under the spectrum.
+    general, flank, root, service, loss
+        Factors of general influence; flanks; roots; life under the spectrum; loss factor.
     """
 
     edition: int
@@ -56,6 +57,7 @@ class Rating(ShownTable):
     flank: Flank
     root: Root
     service: Service
+    loss: Loss
 
     @property
     def S_H(self) -> tuple[float, float]:
@@ -69,7 +71,13 @@ class Rating(ShownTable):
 
     def entries(self) -> list[Entry]:
         """All values with their formulas."""
-        groups = {"influence": self.general, "flank": self.flank, "root": self.root, "life": self.service}
+        groups: dict[str, Any] = {
+            "influence": self.general,
+            "flank": self.flank,
+            "root": self.root,
+            "life": self.service,
+        }
+        groups["loss"] = self.loss
         return [entry for group, results in groups.items() for entry in entries(group, results)]
 
     def facts(self) -> Mapping[str, str]:
@@ -281,4 +289,5 @@ def _rated(
         flank=of_flank,
         root=of_root,
         service=of_service,
+        loss=loss(data),
     )

@@ -158,6 +158,7 @@ PRINTED = {
         *("sigma_F0_MPa", "sigma_F_MPa", "sigma_FP_MPa", "S_F"),
     ),
     "life": ("U_H", "U_F", "life_flank_h", "life_root_h", "S_H_spectrum", "S_F_spectrum"),
+    "loss": ("H_V",),
 }
 
 

@@ -1,0 +1,37 @@
+r"""Loss factor of a gear pair, ISO/TR 15144-1:2014 after Ohlendorf (Niemann/Winter, Maschinenelemente II).
+
+With the load shared evenly where two pairs touch, sliding takes the share :math:`\mu_m H_V` of the power:
+
+.. math::
+    \varepsilon_{1,2} = \frac{z_{1,2}}{2\pi}\,(\tan\alpha_{a1,2} - \tan\alpha_{wt}), \quad
+    H_V = \frac{\pi\,(u + 1)}{z_1 u\cos\beta_b}\,(1 - \varepsilon_\alpha + \varepsilon_1^2 + \varepsilon_2^2).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from .data import PairData
+from .ledger import cited
+
+_SOURCE = "ISO/TR 15144-1:2014"
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Parts of the contact ratio and loss factor."""
+
+    eps: tuple[float, float] = cited("addendum contact ratios", f"{_SOURCE}, loss factor")
+    H_V: float = cited("loss factor: sliding takes mu_m H_V of the power", f"{_SOURCE}, loss factor")
+
+
+def loss(pair: PairData) -> Loss:
+    """Return the loss factor of a pair with a transverse contact ratio below 2."""
+    one, two = (
+        z / (2.0 * math.pi) * (math.sqrt((d_a / d_b) ** 2 - 1.0) - math.tan(pair.alpha_wt))
+        for z, d_a, d_b in zip(pair.z, pair.d_a, pair.d_b, strict=True)
+    )
+    shared = 1.0 - pair.eps_alpha + one**2 + two**2
+    H_V = math.pi * (pair.u + 1.0) / (pair.z[0] * pair.u * math.cos(pair.beta_b)) * shared
+    return Loss(eps=(one, two), H_V=H_V)
