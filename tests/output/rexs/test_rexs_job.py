@@ -430,6 +430,71 @@ def test_modifications_without_a_key_are_in_the_list(tmp_path, kind):
 # --- what strangers write -------------------------------------------------------------------------------------------
 
 
+def test_components_that_a_job_has_not_are_in_the_list(tmp_path):
+    parts, joints = spur_pair()
+    parts += [(95, "bevel_stage", "angle", {}), (96, "sleeve", "", {}), (97, "nonsense", "", {"a": 1.0})]
+    job = job_of(tmp_path, parts, joints)
+    complete(job)
+    ignored = job.lines("ignored")
+    for kind in ("bevel_stage 95", "sleeve 96", "nonsense 97"):
+        assert any(line.startswith(f"{kind} component") for line in ignored)
+    assert "bevel_stage 95" in job.left["train", ""][1]
+    assert list(job.tables["meshes"]) == ["stage"]
+
+
+def test_units_that_a_file_leaves_out_are_in_the_list(tmp_path):
+    text = xml_of(*spur_pair()).replace('id="center_distance" unit="mm"', 'id="center_distance"')
+    job = rexs_job(saved(tmp_path, text))
+    assert job.tables["meshes"]["stage"]["centre_distance_mm"] == 60.0
+    assert any("unit of center_distance" in line for line in job.lines("defaulted"))
+
+
+def with_motor(kind, attributes, relation, index=1):
+    """A shaft of a motor before the input shaft, and the coupling between them."""
+    parts, joints = spur_pair()
+    parts = with_attributes(parts, 1, gear_shift_index=index)
+    parts += [
+        (70, "shaft", "motor", pose(-60.0, 0.0, 0.0)),
+        (71, "shaft_section", "", {"u_coordinate_on_shaft": 0.0, "length": 50.0, "outer_diameter_begin": 30.0}),
+        (72, kind, "clutch", attributes),
+        (74, "concept_bearing", "M", {**pose(-40.0, 0.0, 0.0), "radial_stiffness": 1e8}),
+    ]  # fmt: skip
+    joints += [
+        ("assembly", {"assembly": 70, "part": 71}), relation,
+        ("side", {"assembly": 74, "inner_part": 70, "outer_part": 2}),
+    ]  # fmt: skip
+    return parts, joints
+
+
+def test_couplings_of_version_1_0(tmp_path):
+    """A relation of its own, and a type that later versions do not have."""
+    relation = ("coupling", {"assembly": 72, "side_1": 70, "side_2": 3})
+    model = with_motor("fixed_coupling", {"rotational_stiffness": (5e6, "N mm / rad")}, relation)
+    tables = job_of(tmp_path, *model, version="1.0").tables
+    assert tables["couplings"]["clutch"] == {"shafts": ["motor", "input"], "stiffness_Nm_per_rad": 5000.0}
+
+
+@pytest.mark.parametrize(("index", "engaged"), [(1, True), (2, False)])
+def test_clutches_are_those_of_the_engaged_gear(tmp_path, index, engaged):
+    relation = ("side", {"assembly": 72, "inner_part": 70, "outer_part": 3})
+    attributes = {"rotational_stiffness": 5e6, "is_engaged": [True, False]}
+    job = job_of(tmp_path, *with_motor("switchable_coupling", attributes, relation, index))
+    assert ("clutch" in job.tables.get("couplings", {})) == engaged
+    assert engaged or "not engaged" in job.left["couplings", "clutch"][1]
+
+
+def test_places_in_the_system_of_another_component(tmp_path):
+    """A gear and a bearing in the system of their shaft, which is turned about u in that of the gear unit."""
+    parts, joints = spur_pair()
+    parts = with_attributes(parts, 4, w_axis_vector=[0.0, -1.0, 0.0])
+    within = {"reference_component_for_position": 4, "support_vector": [50.0, 0.0, 0.0]}
+    parts = with_attributes(parts, 6, **within)
+    parts = with_attributes(parts, 13, **{**within, "support_vector": [21.5, 0.0, 0.0]})
+    tables = tables_of(tmp_path, parts, joints)
+    assert tables["gears"]["wheel"]["y_mm"] == 50.0
+    assert tables["bearings"]["B13"]["y_mm"] == 21.5
+
+
 def test_names_of_the_model_cannot_leave_their_comments(tmp_path):
     evil = "x\n[train]\nhousing = 1 \r\u2028 \x7f ] #"
     parts, joints = spur_pair()

@@ -427,6 +427,8 @@ def _external(reading: Reading, item: Component, tables: dict[str, Any], speeds:
     if torque is None and power is not None and speeds.get(name):
         torque = abs(power / speeds[name]) * math.copysign(1.0, power * speeds[name]) * direction
         reading.derived(item, "power", "train.loads.torque_Nm", "P/omega")
+    elif torque is None and power is not None:
+        reading.ignored(item, "power", "the speed of its shaft does not follow from the file")
     reading.flag(item, "defines_torque")
     reading.flag(item, "transmits_torque")
     for part in ("force_u_direction", "force_v_direction", "force_w_direction", "torque_around_v_axis",
@@ -707,7 +709,7 @@ def _refuse(
         leave("gears", name, "meshes with no gear of the job")
     if any(unit.attributes.get(OWN_TABLES) for unit in reading.model.of_kind("gear_unit")):
         return  # a job of this program, whole as it is
-    reason = _without_train(tables, left)
+    reason = _without_train(reading, tables, left)
     if not reason:
         for name in _idle(tables):
             leave("shafts", name, "no bearing between it and the housing carries it, and no gear is on it")
@@ -795,13 +797,18 @@ def _ring_tips(reading: Reading, tables: dict[str, Any], box: Gearbox) -> None:
         reading.defaulted(reading.part("gears", name), f"gears.{name}.addendum", rule)
 
 
-def _without_train(tables: dict[str, Any], left: Mapping[tuple[str, str], tuple[Mapping[str, Any], str]]) -> str:
+def _without_train(
+    reading: Reading, tables: dict[str, Any], left: Mapping[tuple[str, str], tuple[Mapping[str, Any], str]]
+) -> str:
     """Why the parts of the job are no train; empty: they are one."""
     lost = [name for kind, name in left if kind == "meshes"]
     if lost:
         return f"mesh {lost[0]} is missing, so the power does not flow"
     if not tables.get("meshes"):
         return "there are no meshes"
+    others = reading.model.of_kind("bevel_stage", "worm_stage", "involute_spline_connection")
+    if others:
+        return f"power goes through {others[0].label}, which a job has not"
     carried = {entry["shaft"] for entry in tables.get("bearings", {}).values()}
     carried |= {name for name, e in tables.get("shafts", {}).items() if e.get("attachments") or e.get("carrier")}
     for name, gear in tables.get("gears", {}).items():

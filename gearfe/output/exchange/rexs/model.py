@@ -31,6 +31,8 @@ class Attribute:
         Identifier that the file has.
     known
         Whether the schema of 2.0.0 has it for its component.
+    assumed
+        Whether the file gives no unit: it is that of the schema.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Attribute:
     unit: str = "none"
     written: str = ""
     known: bool = True
+    assumed: bool = False
 
     def number(self, unit: str) -> float:
         """Return the value as a float in a unit."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from .ledger import READ
 from .model import Component
-from .reading import Reading
+from .reading import MODIFICATIONS, Reading
 
 #: Shape in REXS -> in a job.
 SHAPES = {"linear": "linear", "parabolic": "parabolic", "circular": "arc"}
@@ -32,7 +32,7 @@ def microgeometry(reading: Reading, gear: Component, flanks: dict[str, Component
     for side, flank in flanks.items():
         table: dict[str, Any] = {}
         for item in reading.parts(flank, "reference", "origin", "referenced"):
-            if item.kind in _MODIFICATIONS:
+            if item.kind in MODIFICATIONS:
                 _take(reading, item, table, f"{key}.microgeometry", datum_high)
         sides[side] = table
     used = [table for table in sides.values() if table]
@@ -162,10 +162,3 @@ def _symmetric(
     else:
         rule = f"{given[0]:g} and {given[-1]:g} um at the ends: the mean"
         reading.derived(item, "amount at both ends", f"{key}.{name}", rule)
-
-
-_MODIFICATIONS = (
-    "tip_relief", "root_relief", "end_relief_datum_face", "end_relief_non_datum_face", "profile_crowning",
-    "helix_crowning", "profile_slope", "helix_slope", "profile_twist", "triangular_tip_relief",
-    "triangular_root_relief", "profile_deviation", "helix_deviation", "topographical_modification",
-)  # fmt: skip

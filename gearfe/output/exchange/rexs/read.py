@@ -25,7 +25,7 @@ from xml.parsers import expat
 from ....base.errors import InputError, shown, unknown_name
 from ....base.files import read_bytes
 from .model import Attribute, Component, LoadCase, LoadSpectrum, Model, Relation, whole
-from .schema import CUSTOM, RENAMED_COMPONENTS, VERSIONS, AttributeType, schema
+from .schema import CUSTOM, OLD_ROLES, OLD_SIDE, RENAMED_COMPONENTS, VERSIONS, AttributeType, schema
 from .units import check_unit
 
 FIELD = "REXS file"
@@ -382,10 +382,10 @@ def _relation(head: Mapping[str, Any], refs: list[tuple[str, Any, str]]) -> Rela
         roles[str(role)] = _number(target, f"id of a ref of {where}")
     if not roles:
         raise InputError(where, None, "refers to no component", "export the file again")
-    order = head.get("order")
-    return Relation(
-        number, str(head.get("type", "")), roles, None if order is None else _number(order, f"{where} order")
-    )
+    order, kind = head.get("order"), str(head.get("type", ""))
+    if kind == OLD_SIDE:
+        kind, roles = "side", {OLD_ROLES.get(role, role): target for role, target in roles.items()}
+    return Relation(number, kind, roles, None if order is None else _number(order, f"{where} order"))
 
 
 def _load_case(number: Any, components: Iterable[Component]) -> LoadCase:
@@ -445,7 +445,8 @@ def _typed(component: Component) -> Component:
         unit = (known.unit if known else "none") if raw.unit is None else str(raw.unit)
         if known is not None and value is not None:
             check_unit(unit, known.unit, where)
-        attributes[name] = Attribute(name, value, unit, raw.name, known is not None or name.startswith(CUSTOM))
+        assumed = raw.unit is None and unit != "none"
+        attributes[name] = Attribute(name, value, unit, raw.name, known is not None or name.startswith(CUSTOM), assumed)
     return Component(component.number, kind, component.name, attributes)
 
 

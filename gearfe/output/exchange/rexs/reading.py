@@ -27,6 +27,19 @@ TABLES = {
     "switchable_coupling": "couplings",
     "additional_mass": "machines",
 }
+#: Types of components that modify flanks.
+MODIFICATIONS = (
+    "tip_relief", "root_relief", "end_relief_datum_face", "end_relief_non_datum_face", "profile_crowning",
+    "helix_crowning", "profile_slope", "helix_slope", "profile_twist", "triangular_tip_relief",
+    "triangular_root_relief", "profile_deviation", "helix_deviation", "topographical_modification",
+)  # fmt: skip
+#: Types of components that a job takes something from.
+TAKEN = {
+    *TABLES, *MODIFICATIONS, "gear_unit", "gear_casing", "external_load", "lubricant", "shaft_section", "gear_body",
+    "cylindrical_gear_flank", "cylindrical_stage_gear_data", "cylindrical_gear_manufacturing_settings",
+    "rack_shaped_tool", "cutter_wheel_tool", "rolling_bearing_row", "rolling_element", "planetary_stage",
+    "planet_carrier",
+}  # fmt: skip
 #: Names that this program wrote.
 _NAME = re.compile(r"[^\W_][\w-]{0,79}")
 #: Longest name of a part.
@@ -134,11 +147,16 @@ class Reading:
         return "" if found is None else str(found.value)
 
     def flag(self, component: Component, name: str) -> bool | None:
-        """Return a truth value, of an array the first; None without it."""
+        """Return a truth value, of an array that of the gear that is engaged in the gear unit; None without it."""
         found = self.attribute(component, name)
         if found is None:
             return None
-        return bool(found.value[0]) if isinstance(found.value, list) else bool(found.value)
+        if not isinstance(found.value, list):
+            return bool(found.value)
+        units = self.model.of_kind("gear_unit")
+        engaged = self.attribute(units[0], "gear_shift_index") if units else None
+        number = 1 if engaged is None else int(engaged.value)
+        return bool(found.value[min(max(number, 1), len(found.value)) - 1])
 
     def note(self, kind: str, component: Component | None, attribute: str, key: str = "", rule: str = "") -> None:
         """Add a line to the list.
@@ -215,7 +233,11 @@ class Reading:
         named = {(entry.number, word) for entry in self.entries for word in re.findall(r"\w+", entry.attribute)}
         for number in sorted(self.model.components):
             component = self.model.components[number]
+            if component.kind not in TAKEN:
+                self.note(IGNORED, component, "component", "", f"a job has nothing for a {component.kind}")
             for name, attribute in component.attributes.items():
+                if attribute.assumed and attribute.value is not None:
+                    self.note(DEFAULTED, component, f"unit of {name}", "", f"{attribute.unit}, that of the standard")
                 if (number, name) in named:
                     continue
                 if (number, name) not in self.used:

@@ -17,7 +17,13 @@ VERSIONS = ("1.0", "1.1", "1.2", "1.3", "1.4", "1.5", "1.6", "1.7", "2.0")
 #: Attributes of other programs, which the specification allows beside its own, and those of gearfe.
 CUSTOM, OWN = "custom_", "custom_gearfe_"
 #: Component types that are gone -> type in 2.0.0; of stages and gears that are not cylindrical they stay unknown.
-RENAMED_COMPONENTS = {"flank_geometry": "cylindrical_gear_flank", "stage_gear_data": "cylindrical_stage_gear_data"}
+RENAMED_COMPONENTS = {
+    "flank_geometry": "cylindrical_gear_flank",
+    "stage_gear_data": "cylindrical_stage_gear_data",
+    "fixed_coupling": "coupling",
+}
+#: Relation of version 1.0 that is a ``side`` later, and its roles.
+OLD_SIDE, OLD_ROLES = "coupling", {"side_1": "inner_part", "side_2": "outer_part"}
 
 
 @dataclass(frozen=True)
