@@ -18,7 +18,7 @@ CORNERS = ("tip_low", "tip_high", "root_low", "root_high")
 ALONG_WIDTH = (
     *("helix_crowning_um", "helix_slope_um", "bias_um"),
     *(f"end_relief_{end}_um" for end in ENDS_OF_WIDTH),
-    "triangular_reliefs",
+    *("triangular_reliefs", "topography_csv"),
 )
 #: Keys of which at most one says where a relief starts.
 STARTS = ("length_mm", "start_mm", "start_diameter_mm")
@@ -99,6 +99,11 @@ class FlankTable:
     )
     measured_csv: str | None = quantity(
         None, doc="file with columns roll_length_mm (or diameter_mm), deviation_um, and tooth where teeth differ"
+    )
+    topography_csv: str | None = quantity(
+        None,
+        doc="file with a grid over the flank: roll_length_mm (or diameter_mm), y_mm from the middle of the width, "
+        "deviation_um, and tooth where teeth differ",
     )
     pitch_um: tuple[float, ...] = quantity((), doc="index deviations of all teeth (um), along the reference circle")
     single_pitch_um: tuple[float, ...] = quantity((), doc="or the single pitch deviations (um), which add up to 0")

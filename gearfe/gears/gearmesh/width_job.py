@@ -37,8 +37,10 @@ from ..width import (
     sweep_width,
     wide_compliance,
 )
+from ..width.flanks import Topography
 from .job import Keep, StiffnessJob
 from .positions import ORDER
+from .topography import measured_topography
 
 if TYPE_CHECKING:
     from ...base.tables.loadmap import LoadMapTable
@@ -77,6 +79,7 @@ class FlankTopography:
     face: tuple[float, float]
     bias: float
     corners: tuple[tuple[float, float, float, bool, bool], ...]
+    alike = True
 
     def __call__(self, roll: Array, z: Array, tooth: IntArray) -> Array:  # noqa: ARG002 - alike on all teeth
         """Material (m, > 0: more) at roll lengths (m) and axial coordinates (m)."""
@@ -152,13 +155,13 @@ def wide_flanks(job: StiffnessJob, mesh: WideMesh) -> WideFlanks:
     """Return the driving flanks with their modifications, and the tilt of the axes."""
     sense, profiles = axial_sense(job), NOMINAL
     leads = [LeadModification(), LeadModification()]
-    topographies: list[FlankTopography | None] = [None, None]
+    topographies: list[Topography | None] = [None, None]
     if job.mesh.deviates:
         profiles = deviations_of(job.mesh, job.pair, job.folder)
         for g, face in enumerate(mesh.faces):
             flank = FlankOf(job.mesh, job.pair, g, job.mesh.flank, job.folder)
             leads[g] = lead_modification(flank.own, sense)
-            topographies[g] = _topography(flank.own, flank.gear, face, sense)
+            topographies[g] = _topography(flank, face, sense)
             _check_lengths(flank)
     for key in TILTS:
         if abs(1e-6 * getattr(job.mesh, key)) > MOST_GAP * job.pair.pinion.module:
@@ -184,7 +187,7 @@ def material_along(flank: FlankOf, face: tuple[float, float], roll: Array, y: Ar
         Roll lengths and places along the axes (m), of one shape.
     """
     added = lead_modification(flank.own, 1.0).material(y, face)
-    topography = _topography(flank.own, flank.gear, face, 1.0)
+    topography = _topography(flank, face, 1.0)
     return added if topography is None else added + topography(roll, y, np.zeros(y.shape, dtype=np.int64))
 
 
@@ -224,7 +227,7 @@ def _check_gap(job: StiffnessJob, mesh: WideMesh, flanks: WideFlanks) -> None:
     for g in range(2 if job.mesh.deviates else 0):
         flank = FlankOf(job.mesh, job.pair, g, job.mesh.flank, job.folder)
         for key in ALONG_WIDTH:
-            if key != "triangular_reliefs":
+            if key not in ("triangular_reliefs", "topography_csv"):
                 amounts[f"{flank.where}.{key}"] = getattr(flank.own, key) or 0.0
         for i, relief in enumerate(flank.own.triangular_reliefs):
             amounts[f"{flank.where}.triangular_reliefs[{i}].amount_um"] = relief.amount_um
@@ -248,7 +251,31 @@ def lead_modification(table: FlankTable, sense: float) -> LeadModification:
     return LeadModification(1e-6 * table.helix_crowning_um, 1e-6 * sense * table.helix_slope_um, low, high)
 
 
-def _topography(table: FlankTable, gear: Gear, face: tuple[float, float], sense: float) -> FlankTopography | None:
+@dataclass(frozen=True)
+class SumOfTopographies:
+    """Material of several topographies of one flank."""
+
+    parts: tuple[Topography, ...]
+
+    @property
+    def alike(self) -> bool:
+        """Whether all teeth are alike."""
+        return all(getattr(part, "alike", False) for part in self.parts)
+
+    def __call__(self, roll: Array, z: Array, tooth: IntArray) -> Array:
+        """Material (m) at roll lengths and axial coordinates (m) of teeth."""
+        return np.asarray(sum(part(roll, z, tooth) for part in self.parts))
+
+
+def _topography(flank: FlankOf, face: tuple[float, float], sense: float) -> Topography | None:
+    """Material of a flank that lead modifications do not hold, as z of the solver counts, or None."""
+    most = MOST_GAP * flank.gear.module
+    designed = _designed(flank.own, flank.gear, face, sense)
+    parts = [part for part in (designed, measured_topography(flank, face, sense, most)) if part is not None]
+    return SumOfTopographies(tuple(parts)) if len(parts) > 1 else next(iter(parts), None)
+
+
+def _designed(table: FlankTable, gear: Gear, face: tuple[float, float], sense: float) -> FlankTopography | None:
     if not table.bias_um and not any(relief.amount_um for relief in table.triangular_reliefs):
         return None
     corners = tuple(
@@ -399,7 +426,8 @@ def check_map_job(job: StiffnessJob, table: LoadMapTable) -> None:
     check_width_job(job)
     for torque in table.torques():
         wide_mesh(job).check_torque(torque, f"{table.NAME}.torques_Nm")
-    if table.mesh_cycles is None and not all(flank.alike for flank in deviations_of(job.mesh, job.pair, job.folder)):
+    alike = all(flank.alike for flank in deviations_of(job.mesh, job.pair, job.folder))
+    if table.mesh_cycles is None and not (alike and wide_flanks(job, wide_mesh(job)).alike):
         problem = "is required where teeth differ and the load varies along the face width"
         raise InputError(f"{table.NAME}.mesh_cycles", None, problem, "give the mesh cycles to compute")
 

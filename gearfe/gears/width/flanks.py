@@ -143,8 +143,9 @@ class WideFlanks:
 
     @property
     def alike(self) -> bool:
-        """Whether all mesh cycles are the same, as far as can be known: topographies may differ by tooth."""
-        return all(own.alike for own in self.profiles) and self.topographies == (None, None)
+        """Whether all mesh cycles are the same: topographies may differ by tooth where they do not say `alike`."""
+        alike = (topography is None or getattr(topography, "alike", False) for topography in self.topographies)
+        return all(own.alike for own in self.profiles) and all(alike)
 
     def material(self, gear: int, roll: Array, z: Array, tooth: IntArray, face: tuple[float, float]) -> Array:
         """Material that a gear's modifications add beyond the first tooth's profile (m).
