@@ -68,6 +68,14 @@ def run_along_width(
     )
 
     watch = Stopwatch({"program start": time.perf_counter() - started})
+    shafts = None
+    if mesh.misalignment_from_shafts:
+        from ..base.config import read_toml
+        from ..drivetrain.gearbox import shaft_tilts
+
+        with watch.stage("train at rest"):
+            shafts = shaft_tilts.shaft_tilts(read_toml(args.job), args.job, mesh, getattr(args, "variant", None))
+        mesh = shafts.mesh
     job = stiffness_job(mesh, Path(args.job).parent, pair)
     if loads is None:
         width_job.check_stiffness_job(job)
@@ -75,12 +83,19 @@ def run_along_width(
         width_job.check_map_job(job, loads)
     folder = output_folder(args.out)
     lines = width_job.job_lines(job, watch=watch)
-    sweep = width_job.job_sweep(job, lines, loads, watch)
+    by_shafts = None
+    if shafts is not None:
+        by_shafts = shaft_tilts.job_tilts(job, lines, shafts, loads, watch)
+        sweep, lines = by_shafts.sweep, by_shafts.lines
+    else:
+        sweep = width_job.job_sweep(job, lines, loads, watch)
     wide, name = lines.compliance.mesh, "stiffness" if loads is None else "loadmap"
     flanks = flank_loads(job, wide, sweep)
     tables = {} if loads is None else {loads.NAME: asdict(loads)}
     errors = None
-    if not args.no_estimate and (sweep.status == "converged").any():
+    # each torque of a map has tilts of its own by the shafts
+    known = by_shafts is None or loads is None
+    if known and not args.no_estimate and (sweep.status == "converged").any():
         errors = width_job.estimated_errors(job, lines, sweep, loads, watch)
     roots = None
     if loads is not None and loads.root_stress and (sweep.status == "converged").any():
@@ -89,14 +104,21 @@ def run_along_width(
         with watch.stage("root stress"):
             roots = wide_roots(lines, sweep)
     found = width_summary(job, wide, sweep, watch.seconds, errors=errors, roots=roots, **tables)
+    report, sentences, more = width_lines(found), width_warnings(job, wide, sweep), {}
+    if roots is not None:
+        more["root"] = root_columns(job, sweep, roots)
+    if by_shafts is not None:
+        more["misalignment"] = shaft_tilts.tilt_columns(job, by_shafts)
+        found |= shaft_tilts.tilt_entries(job, by_shafts)
+        report += shaft_tilts.tilt_lines(found)
+        sentences += by_shafts.warnings
     may_write: tuple[str, ...] = (f"{name}*.png", f"{name}*.csv", f"{name}*.vtkhdf")
     if loads is None:
         may_write += ("fields.vtkhdf", "stress_*deg.png", "pressure.*")
     with whole_set(folder, may_write) as made:
         with watch.stage("tables"):
             main, load = sweep_columns(job, wide, sweep, roots), load_columns(job, sweep)
-            over_root = {} if roots is None else {"root": root_columns(job, sweep, roots)}
-            write_csvs(made, {name: main, "load": load, "pattern": pattern_columns(flanks), **over_root})
+            write_csvs(made, {name: main, "load": load, "pattern": pattern_columns(flanks), **more})
             write_flank(made / f"{name}_flank.vtkhdf", job, flanks[-1])
         if not args.no_pictures:
             from ..figures.flank_load import flank_load_picture
@@ -117,5 +139,6 @@ def run_along_width(
         watch.seconds["total"] = time.perf_counter() - started
         write_json(made / ("summary.json" if loads is None else "loadmap.json"), found)
         names = sorted(path.name for path in made.iterdir())
-    print_results(width_lines(found), folder, names, watch.seconds, width_warnings(job, wide, sweep))
-    return 1 if (sweep.status != "converged").any() else 0
+    print_results(report, folder, names, watch.seconds, sentences)
+    unsettled = by_shafts is not None and not by_shafts.settled.all()
+    return 1 if unsettled or (sweep.status != "converged").any() else 0

@@ -81,7 +81,7 @@ def _stiffness(raw: Raw, path: Path, shared: Shared, estimate: bool, mesh: str |
 
     job = _only_mesh(raw, path, mesh)
     if job.mesh.along_width():
-        return _along_width(job, shared, None, estimate=estimate)
+        return _along_width(job, shared, None, (raw, path), estimate=estimate)
     sweep, elastic = job.sweep, job.elastic(_kept(job, shared))
     curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=estimate, **sweep)
     return Answer({"stiffness": curve.columns()}, summary(job, curve, {}), _positions(curve.failed))
@@ -94,17 +94,23 @@ def _loadmap(raw: Raw, path: Path, shared: Shared, _estimate: bool, mesh: str | 
     job = _only_mesh(raw, path, mesh)
     table = job.mesh.loads
     if job.mesh.along_width():
-        return _along_width(job, shared, table)
+        return _along_width(job, shared, table, (raw, path))
     load_map = job_map(job, table, keep=_kept(job, shared))
     return Answer(map_tables(load_map), map_summary(job, table, load_map, {}), _positions(load_map.failed))
 
 
-def _along_width(job: Any, shared: Shared, table: Any, *, estimate: bool = False) -> Answer:
+def _along_width(job: Any, shared: Shared, table: Any, file: tuple[Raw, Path], *, estimate: bool = False) -> Answer:
     """A mesh whose load varies along the face width: [stiffness], or the torques of a load map's table."""
     from ..gears.gearmesh import width_job
     from ..gears.gearmesh.width_report import load_columns, root_columns, sweep_columns, width_summary
     from ..gears.gearmesh.width_root import wide_roots
 
+    shafts = by_shafts = None
+    if job.mesh.misalignment_from_shafts:
+        from ..drivetrain.gearbox import shaft_tilts
+
+        shafts = shaft_tilts.shaft_tilts(*file, job.mesh)
+        job = replace(job, mesh=shafts.mesh)
     if table is None:
         width_job.check_stiffness_job(job)
     else:
@@ -112,15 +118,27 @@ def _along_width(job: Any, shared: Shared, table: Any, *, estimate: bool = False
     gears = [(gear.teeth, gear.form, gear.drawn, gear.y_mm) for gear in job.mesh.gears]
     sizes = job.materials, job.table.coarsen, job.table.flank_coarsen, job.mesh.flank
     lines = width_job.job_lines(job, keep=partial(shared.get, repr((gears, job.mesh.centre_distance_mm, sizes))))
-    sweep, mesh = width_job.job_sweep(job, lines, table), lines.compliance.mesh
-    errors = width_job.estimated_errors(job, lines, sweep, table, Stopwatch()) if estimate else None
+    if shafts is None:
+        sweep = width_job.job_sweep(job, lines, table)
+    else:
+        by_shafts = shaft_tilts.job_tilts(job, lines, shafts, table, None)
+        sweep, lines = by_shafts.sweep, by_shafts.lines
+    mesh = lines.compliance.mesh
+    # each torque of a map has tilts of its own by the shafts
+    known = estimate and (by_shafts is None or table is None)
+    errors = width_job.estimated_errors(job, lines, sweep, table, Stopwatch()) if known else None
     roots = wide_roots(lines, sweep) if table is not None and table.root_stress else None
     name = "stiffness" if table is None else "loadmap"
     rows = {name: sweep_columns(job, mesh, sweep, roots), "load": load_columns(job, sweep)}
     if roots is not None:
         rows["root"] = root_columns(job, sweep, roots)
     summary = width_summary(job, mesh, sweep, {}, errors=errors, roots=roots)
-    return Answer(rows, summary, _positions(sweep.status != "converged"))
+    failed = _positions(sweep.status != "converged")
+    if by_shafts is not None:
+        rows["misalignment"] = shaft_tilts.tilt_columns(job, by_shafts)
+        summary |= shaft_tilts.tilt_entries(job, by_shafts)
+        failed = failed or "; ".join(by_shafts.warnings)
+    return Answer(rows, summary, failed)
 
 
 def _vibration(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:

@@ -53,6 +53,8 @@ DRAWN = ("pitch_diameter_mm", "tip_diameter_mm", "root_diameter_mm", "span_mm", 
 SHARED = (("module_mm", "modules"), ("pressure_angle_deg", "pressure angles"), ("helix_angle_deg", "helix angles"))
 #: Keys of a mesh that tilt its axes.
 TILTS = ("misalignment_um", "misalignment_across_um")
+#: Key of a mesh that lets the shafts of the train tilt its axes.
+FROM_SHAFTS = "misalignment_from_shafts"
 #: Hand of a gear's mate.
 OPPOSITE = {"right": "left", "left": "right"}
 #: Bore of a gear whose entry in [[train.gears]] gives none, times the pitch diameter.
@@ -147,6 +149,8 @@ class NamedMesh:
         [loadmap] alike.
     misalignment_um, misalignment_across_um
         Tilts of the axes over the common face width, in and across the plane of action.
+    misalignment_from_shafts
+        Whether the shafts of the train tilt the gears, too.
     """
 
     name: str
@@ -161,6 +165,7 @@ class NamedMesh:
     loads: LoadMapTable = field(default_factory=LoadMapTable)
     misalignment_um: float = 0.0
     misalignment_across_um: float = 0.0
+    misalignment_from_shafts: bool = False
 
     @property
     def gears(self) -> tuple[NamedGear, NamedGear]:
@@ -185,7 +190,7 @@ class NamedMesh:
         sides
             Flanks whose modifications count, ``left`` and ``right``; none: the driving ones.
         places
-            Whether different places of the gears along the axis count.
+            Whether places of the gears along the axis and tilts by the shafts count: a train has both itself.
         """
         for gear in self.gears:
             if gear.form["helix_angle_deg"]:
@@ -198,6 +203,8 @@ class NamedMesh:
         for key in TILTS:
             if getattr(self, key):
                 return f"{self.tilts_where}.{key}", getattr(self, key)
+        if places and self.misalignment_from_shafts:
+            return f"{self.where}.{FROM_SHAFTS}", True
         if places and self.driven.y_mm != self.driver.y_mm:
             return f"{self.driven.where}.y_mm", self.driven.y_mm
         return None
@@ -493,7 +500,7 @@ def _named_mesh(name: str, table: NamedMeshTable, gears: Mapping[str, NamedGear]
             problem = f"makes {what} of {a:.9g} and {b:.9g} in mesh {name!r}: must be that of gear {one.name!r}"
             value = two.drawn.get(given, b)
             raise InputError(f"{two.where}.{given}", value, problem, f"gears in mesh have equal {what}")
-    tilts = {key: getattr(table, key) for key in TILTS}
+    tilts = {key: getattr(table, key) for key in (*TILTS, FROM_SHAFTS)}
     distance = magnitude(table.centre_distance_mm, one.internal or two.internal, where)
     return NamedMesh(name, where, one, two, distance, where, table.flank, table.tolerance_class, **tilts)
 

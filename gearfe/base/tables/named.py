@@ -66,6 +66,11 @@ class NamedMeshTable(TrainMeshTable):
         doc="tilt of the axes across the plane of action (um over the common face width), > 0: the driven gear "
         "moves to the left of the force on it towards larger y",
     )
+    misalignment_from_shafts: bool = quantity(
+        False,
+        doc="true: shafts, bearings and housing of the train tilt the gears as the torque bends them, beside the "
+        "tilts above; for gearfe stiffness and gearfe loadmap",
+    )
     stiffness: StiffnessTable | None = quantity(  # noqa: RUF009
         None, doc="keys of this mesh that win over those of [stiffness]: load, positions, contact law, sizes"
     )

@@ -138,7 +138,7 @@ def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
     return StiffnessCurve.from_csv(path, mesh_cycle=2.0 * math.pi / teeth)
 
 
-def _carried_torque(train: GearTrain, number: int) -> float:
+def carried_torque(train: GearTrain, number: int) -> float:
     """Torque (N m) at the driven gear of a mesh in steady running, without sign."""
     driven = train.gear(train.meshes[number].driven).gear
     return abs(float(train.kinematics.steady_forces[number])) * driven.base_radius
@@ -155,7 +155,7 @@ def _computed_curve(job: TrainJob, train: GearTrain, number: int, estimate: bool
     if job.table.curves.load in (None, "stiffness"):
         with stage(mesh.name):
             return cached_curve(pair, model, estimate_error=estimate, **tables.sweep)
-    torque = _carried_torque(train, number)
+    torque = carried_torque(train, number)
     if not torque > 0.0:
         problem = 'carries no torque, so train.curves.load = "torque" has no load to compute its curve with'
         raise InputError(f"mesh {mesh.name!r}", None, problem, 'add a load, or write load = "stiffness"')
@@ -228,7 +228,7 @@ def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) 
     pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
     tables = _plain_job(job, number, pair)
     alike = [i for i in range(len(train.meshes)) if _contact(job, train, i) == _contact(job, train, number)]
-    steady = max(_carried_torque(train, i) for i in alike)
+    steady = max(carried_torque(train, i) for i in alike)
     most = table.mesh_model_torque_Nm or ROOM * steady
     if not most > 0.0:
         problem = "carries no torque in steady running, so the range of its mesh law is unknown"

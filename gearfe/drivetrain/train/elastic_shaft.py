@@ -191,12 +191,14 @@ def beam_shaft(train: GearTrain, shaft: Shaft) -> BeamShaft:
 
 def _gear_loads(train: GearTrain, item: ShaftGear) -> tuple[str, ...]:
     """Directions in which meshes load a shaft at a gear: each one costs coordinates and shorter steps."""
-    off = False
+    helical = item.gear.twist_rate != 0.0  # an axial force at the pitch circle tilts, too
+    tilts = helical
     for mesh in (mesh for mesh in train.meshes if item.name in (mesh.driver, mesh.driven)):
         low, high = common_face(train.gear(mesh.driver), train.gear(mesh.driven))
-        # a mesh acts at the middle of the common width
-        off |= abs(0.5 * (low + high) - item.along) > SAME_MIDDLE * item.gear.face_width
-    return ("radial", "tilt", "torsion") if off else ("radial", "torsion")
+        # a mesh acts at the middle of the common width, or all along it
+        off = abs(0.5 * (low + high) - item.along) > SAME_MIDDLE * item.gear.face_width
+        tilts |= off or mesh.moments or mesh.tilting is not None
+    return ("radial", *(("tilt",) if tilts else ()), *(("axial",) if helical else ()), "torsion")
 
 
 def _bore_loads(train: GearTrain, bore: str) -> tuple[str, ...]:

@@ -180,6 +180,8 @@ class GearMesh:
     tilting
         How the driving flanks act along the face width; beside a transmission error on the same phases. None: in the
         middle of the common width, without a stiffness against tilting.
+    moments
+        Whether moments that tilt the gears act in a mesh without `tilting`: elastic shafts then keep what these bend.
     """
 
     driver: str
@@ -195,6 +197,7 @@ class GearMesh:
     name: str = ""
     transmission_error: PeriodicInterpolant | None = None
     tilting: Tilting | None = None
+    moments: bool = False
 
     def __post_init__(self) -> None:
         if not self.name:

@@ -15,17 +15,32 @@ misalignment by deformation of ISO 6336-1; that of ISO counts its amount.
 Of a gear's motion the part of the *housing* is that of the straight line through the bores of its shaft, the part of
 the *bearings* that of the line through the displacements of the shaft against the bores, the part of the *shafts* what
 is left: bending. On a shaft in one bore the lines have the tilts there.
+
+**Loads that vary along the face width** tilt the gears further. Contact at given tilts :math:`t = (\gamma,
+\gamma_\perp)` stores the energy :math:`V(t)`; its moments about the middle of the common width,
+:math:`M = \partial V/\partial t`, push the driven gear, and the driver against it. With R the rows of t in q the train
+is at rest where
+
+.. math::
+    t = R\,K^{-1}(f - R^T M(t)) .
+
+The compliance :math:`R K^{-1} R^T` is positive semi-definite and V convex, so there is one solution.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from ...base.errors import InputError
 from ...base.typing import Array
+from .bearings import shaft_motion
 from .checks import overlap
 from .model import TrainModel, bore_selector
+from .operating import operating_point
 
 #: Squares of frequencies, and loads of modes without any, below this part of the largest are round-off.
 ROUND_OFF = 1e-10
@@ -89,11 +104,7 @@ def _misalignment(model: TrainModel, q: Array, number: int, force: float) -> Mes
     """Misalignment of one mesh with its force (N) in the state q."""
     train, line = model.train, model.meshes[number]
     driver, driven = train.gear(line.given.driver), train.gear(line.given.driven)
-    a, n, axial = train.frame[2], line.direction, line.axial
-    if force < 0.0:  # the back flanks, whose line of action is the mirror image at the line of centres
-        along = np.cross(a, np.array(train.shaft(driven.shaft).point) - np.array(train.shaft(driver.shaft).point))
-        along = along / np.linalg.norm(along)
-        n, axial = n - 2.0 * (n @ along) * along, -axial
+    a, n, axial = train.frame[2], pressed_direction(model, number), line.axial * math.copysign(1.0, force)
     moves = [gear_motion(model, q, gear.name) for gear in (driver, driven)]
     between = moves[0] - moves[1]  # (parts, 6)
     in_plane, across, apart = between[:, 3:] @ np.cross(a, n), between[:, 3:] @ n, -between[:, :3] @ (n + axial * a)
@@ -116,6 +127,130 @@ def _misalignment(model: TrainModel, q: Array, number: int, force: float) -> Mes
     )
 
 
+def pressed_direction(model: TrainModel, number: int) -> Array:
+    """Direction (3,) of the force of a mesh on its driven gear, on the flanks that the steady torques press."""
+    train, line = model.train, model.meshes[number]
+    n, a = line.direction, train.frame[2]
+    if model.kinematics.steady_forces[number] >= 0.0:
+        return n
+    # the line of action of the back flanks is the mirror image at the line of centres
+    driver, driven = (train.shaft(train.gear(name).shaft) for name in (line.given.driver, line.given.driven))
+    along = np.cross(a, np.array(driven.point) - np.array(driver.point))
+    along = along / np.linalg.norm(along)
+    return np.asarray(n - 2.0 * (n @ along) * along)
+
+
+@dataclass(frozen=True)
+class Tilts:
+    """Tilts of a mesh at rest.
+
+    Attributes
+    ----------
+    tilts : ndarray, shape (2,)
+        In the plane of action and across it (rad).
+    compliance : ndarray, shape (2, 2)
+        How far they fall with the moments of the contact (rad/(N m)).
+    """
+
+    tilts: Array
+    compliance: Array
+
+
+@dataclass(frozen=True, eq=False)
+class TiltingTrain:
+    """A train at rest under multiples of its steady torques and the moments that tilt the gears of one mesh.
+
+    Parameters
+    ----------
+    model : TrainModel
+        The train; `GearMesh.moments` of the mesh lets the shafts keep the static deflections by those moments.
+    number : int
+        Of the mesh.
+    """
+
+    model: TrainModel
+    number: int
+
+    @cached_property
+    def rows(self) -> Array:
+        """Tilts in the plane of action and across it for unit coordinates of the system, shape (2, size)."""
+        model, placed = self.model, self.model.placed
+        train, line = model.train, model.meshes[self.number]
+        n = pressed_direction(model, self.number)
+        between = np.zeros((3, placed.size))
+        for sign, name in ((1.0, line.given.driver), (-1.0, line.given.driven)):
+            gear = train.gear(name)
+            shaft = train.shaft_number(gear.shaft)
+            turns = train.frame.T @ placed.bodies[shaft].turn_rows(gear.along)
+            between += sign * placed.whole(shaft, turns)
+        return np.stack([np.cross(train.frame[2], n) @ between, n @ between])
+
+    def at(self, factor: float, moments: Array) -> Tilts:
+        """Tilts under `factor` times the steady torques and moments (N m) in the plane of action and across it.
+
+        Raises
+        ------
+        InputError
+            For a train that moves freely under its torques, and rolling bearings that cannot carry the load.
+        """
+        model, operating = self.model, self.model.operating
+        T, stiffness = model.modal.T, self._stiffness
+        force = factor * _steady_push(model) - self.rows.T @ moments
+        if operating.bearings:
+            point = operating_point(operating.geometry, self._motions, stiffness, T, force)
+            q = point.coordinates
+            for name, state in point.bearings.items():
+                stiffness = stiffness + self._motions[name].T @ state.stiffness @ self._motions[name]
+        solved = _solved(T.T @ stiffness @ T, T.T @ np.column_stack([force, self.rows.T]))
+        if solved is None:
+            problem = "moves freely under the steady torques, so nothing says how far they tilt its gears"
+            raise InputError("train", None, problem, "hold every shaft by bearings, and drive the train")
+        if not operating.bearings:
+            q = T @ solved[:, 0]
+        return Tilts(self.rows @ q, self.rows @ T @ solved[:, 1:])
+
+    @cached_property
+    def _motions(self) -> dict[str, Array]:
+        """Bore -> motion of the shaft against it, of rolling bearings."""
+        return {name: shaft_motion(self.model.train, self.model.placed, name) for name in self.model.operating.bearings}
+
+    @cached_property
+    def _stiffness(self) -> Array:
+        """Of all parts but rolling bearings, held where the train is driven, shape (size, size)."""
+        model = self.model
+        stiffness = model.system.stiffness + model.back_flanks
+        for name, state in model.operating.bearings.items():
+            stiffness = stiffness - self._motions[name].T @ state.stiffness @ self._motions[name]
+        return stiffness + _held(model)
+
+
+def _held(model: TrainModel) -> Array:
+    """Stiffness (size, size) that holds a train which a torque drives where it is driven, whatever the torque there."""
+    row, largest = model.drive_row, float(model.modal.eigenvalues.max(initial=0.0))
+    if model.train.driven.torque is None:
+        return np.zeros((len(row), len(row)))
+    seen = model.modal.T.T @ row
+    return np.asarray(largest / float(seen @ seen) * np.outer(row, row))
+
+
+def _steady_push(model: TrainModel) -> Array:
+    """Force of the torques at their end on the coordinates of the system, shape (size,)."""
+    push = np.zeros(model.system.size)
+    for direction, torque in model.torques:
+        push += direction * float(replace(torque, sines=())(model.torque_end))
+    return push
+
+
+def _solved(K: Array, forces: Array) -> Array | None:
+    """Solutions y of K y = forces (n, k) that move nothing freely; None where the first of these does."""
+    squares, shapes = np.linalg.eigh(K)
+    pushed = shapes.T @ forces
+    free = squares <= ROUND_OFF * max(float(squares.max(initial=0.0)), 1e-300)
+    if np.abs(pushed[free, 0]).max(initial=0.0) > ROUND_OFF * float(np.abs(pushed[:, 0]).max(initial=0.0)):
+        return None
+    return np.asarray(shapes[:, ~free] @ (pushed[~free] / squares[~free, None]))
+
+
 def static_state(model: TrainModel) -> Array | None:
     """Coordinates of the system (size,) at rest under the steady torques; None where these move it freely.
 
@@ -124,20 +259,9 @@ def static_state(model: TrainModel) -> Array | None:
     if model.operating.bearings:
         return model.operating.coordinates
     modal = model.modal
-    push = modal.constant + modal.T.T @ model.preload
-    for direction, torque in model.torques:
-        push += modal.T.T @ direction * float(replace(torque, sines=())(model.torque_end))
-    K = np.diag(modal.eigenvalues) + modal.T.T @ model.back_flanks @ modal.T
-    if model.train.driven.torque is not None:  # held where it is driven, whatever the torque there
-        row = modal.T.T @ model.drive_row
-        K += float(modal.eigenvalues.max(initial=0.0)) / float(row @ row) * np.outer(row, row)
-    squares, shapes = np.linalg.eigh(K)
-    pushed = shapes.T @ push
-    free = squares <= ROUND_OFF * max(float(squares.max(initial=0.0)), 1e-300)
-    if np.abs(pushed[free]).max(initial=0.0) > ROUND_OFF * float(np.abs(pushed).max(initial=0.0)):
-        return None
-    y = shapes[:, ~free] @ (pushed[~free] / squares[~free])
-    return np.asarray(modal.origin + modal.T @ y)
+    push = modal.constant + modal.T.T @ (model.preload + _steady_push(model))
+    y = _solved(np.diag(modal.eigenvalues) + modal.T.T @ (model.back_flanks + _held(model)) @ modal.T, push[:, None])
+    return None if y is None else np.asarray(modal.origin + modal.T @ y[:, 0])
 
 
 def gear_motion(model: TrainModel, q: Array, name: str) -> Array:

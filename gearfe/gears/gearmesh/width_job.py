@@ -325,7 +325,7 @@ def job_lines(job: StiffnessJob, *, keep: Keep | None = None, watch: Stopwatch |
 
 def stiffness_sweep(job: StiffnessJob, lines: ContactLines, watch: Stopwatch | None = None) -> WidthSweep:
     """Return the sweep of [stiffness]: one torque, or one twist, over its angles."""
-    t, angles = job.table, np.radians(job.table.angles_deg(math.degrees(job.pair.mesh_cycle)))
+    t, angles = job.table, stiffness_angles(job)
     load: dict[str, Any] = {"torques": t.torque_Nm} if t.twist_deg is None else {"twists": math.radians(t.twist_deg)}
     try:
         return sweep_width(lines, **load, angles=angles, watch=watch)
@@ -352,6 +352,16 @@ def job_sweep(
         Takes the time of the stages.
     """
     return stiffness_sweep(job, lines, watch) if table is None else map_sweep(job, lines, table, watch)
+
+
+def stiffness_angles(job: StiffnessJob) -> Array:
+    """Return the pinion angles of [stiffness] (rad)."""
+    return np.radians(job.table.angles_deg(math.degrees(job.pair.mesh_cycle)))
+
+
+def map_angles(job: StiffnessJob, table: LoadMapTable) -> Array:
+    """Return the pinion angles of [loadmap] (rad)."""
+    return np.arange(table.positions * (table.mesh_cycles or 1)) * job.pair.mesh_cycle / table.positions
 
 
 def estimated_errors(
@@ -448,5 +458,4 @@ def map_sweep(
     watch
         Takes the time of the stages.
     """
-    angles = np.arange(table.positions * (table.mesh_cycles or 1)) * job.pair.mesh_cycle / table.positions
-    return sweep_width(lines, table.torques(), angles=angles, watch=watch)
+    return sweep_width(lines, table.torques(), angles=map_angles(job, table), watch=watch)
