@@ -254,6 +254,67 @@ def test_shafts_of_a_coupling_do_not_overlap() -> None:
         build_train(changed(made, shafts=inside, rigid_bores=bores))
 
 
+@pytest.mark.parametrize("order", [("in", "s0"), ("s0", "in")])
+def test_two_shafts_have_one_coupling(order: tuple[str, str]) -> None:
+    made = coupled()
+    with pytest.raises(InputError, match=r"coupling 'second' = .*joins the shafts of coupling 'clutch', too"):
+        build_train(changed(made, couplings=(*made.couplings, Coupling("second", order, 1e4))))
+
+
+def test_a_coupling_against_gears_is_refused_by_its_shafts() -> None:
+    """Shafts that gears turn at two speeds, end to end: no coupling turns them alike."""
+    made = coupled()
+    wheel = dataclasses.replace(made.gears[1], name="g9", shaft="in2", along=-0.1)
+    shaft = Shaft("in2", (0.0625, -0.1, 0.0), 0.08, 0.012, ("x+", "x-"))
+    pinion = dataclasses.replace(made.gears[0], name="d9", shaft="in", along=-0.1)
+    bores = {**made.rigid_bores, "x+": (0.0625, -0.07, 0.0), "x-": (0.0625, -0.13, 0.0)}
+    mesh = dataclasses.replace(made.meshes[0], driver="d9", driven="g9", name="m9")
+    twice = changed(
+        made, shafts=(*made.shafts, shaft), gears=(*made.gears, pinion, wheel), meshes=(*made.meshes, mesh),
+        rigid_bores=bores, couplings=(*made.couplings, Coupling("back", ("s1", "in2"), 1e4)),
+    )  # fmt: skip
+    assert [float(r) for r in twice.kinematics.ratios] == pytest.approx([1.0, -2 / 3, 1.0, -2 / 3])
+    other = tuple(dataclasses.replace(g, gear=made.gears[1].gear) if g.name == "d9" else g for g in twice.gears)
+    with pytest.raises(InputError, match="closes a loop that cannot turn"):
+        _ = changed(twice, gears=other).kinematics
+
+
+@pytest.mark.parametrize(("aside", "fits"), [(0.0, False), (0.01, False), (0.03, True)])
+def test_shafts_do_not_overlap(aside: float, fits: bool) -> None:
+    """Rigid shafts without a coupling, on one axis or so near that they cut each other."""
+    made = coupled(couplings=())
+    point, bores = (aside, -0.07, 0.0), {"in+": (aside, -0.06, 0.0), "in-": (aside, -0.08, 0.0)}
+    shafts = tuple(dataclasses.replace(s, point=point) if s.name == "in" else s for s in made.shafts)
+    given = changed(
+        made, shafts=shafts, rigid_bores={**made.rigid_bores, **bores}, gears=made.gears, couplings=(),
+        drive=dataclasses.replace(made.driven, shaft="s0", bore="s0+"),
+    )  # fmt: skip
+    with pytest.raises(InputError) as error:
+        build_train(given)
+    assert ("overlaps shaft" in error.value.problem) is not fits, str(error.value)
+    assert fits or "mm along the axis" in error.value.problem
+
+
+def test_a_shaft_may_run_in_the_bore_of_another() -> None:
+    made = coupled()
+    outer = Section(0.08, 0.06, 0.06, 0.03, 0.03)
+    hollow = tuple(
+        dataclasses.replace(s, sections=(outer,), radius=0.03, point=(0.0, -0.06, 0.0)) if s.name == "in" else s
+        for s in made.shafts
+    )
+    bores = {**made.rigid_bores, "in+": (0.0, -0.05, 0.0), "in-": (0.0, -0.09, 0.0)}
+    drive = dataclasses.replace(made.driven, shaft="s0", bore="s0+")
+    given = changed(made, shafts=hollow, rigid_bores=bores, couplings=(), drive=drive)
+    with pytest.raises(InputError, match="is held by nothing"):  # and not for its room
+        build_train(given)
+    tight = tuple(
+        dataclasses.replace(s, sections=(Section(0.08, 0.06, 0.06, 0.015, 0.015),)) if s.name == "in" else s
+        for s in hollow
+    )
+    with pytest.raises(InputError, match="overlaps shaft"):
+        build_train(changed(given, shafts=tight))
+
+
 def test_gears_of_a_train_by_torque_tilt_as_those_of_one_by_speed() -> None:
     made = chain()
     names = [bore for shaft in made.shafts for bore in shaft.bores]

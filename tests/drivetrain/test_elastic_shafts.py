@@ -17,6 +17,7 @@ from gearfe.drivetrain.modes.whirl import train_modes
 from gearfe.drivetrain.runup.run_up import run_up
 from gearfe.drivetrain.train import (
     Bearing,
+    Coupling,
     Damping,
     Drive,
     GearTrain,
@@ -249,6 +250,43 @@ def test_surfaces_of_shafts_bend_with_them() -> None:
             if np.linalg.norm(before) > 1e-3:
                 angle = math.atan2(frame[2] @ np.cross(before, after), before @ after)
                 assert math.remainder(angle - turned, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("bends", [False, True])
+def test_shafts_without_gears_are_shown(bends: bool) -> None:
+    """A shaft behind a coupling, rigid or elastic: its rings move with its sections and turn with it."""
+    made = train([(20, 30)], stiffness=1e8)
+    piece = {"sections": (section(0.08, 0.024),)} if bends else {}
+    shaft = Shaft("in", (0.0, -0.1, 0.0), 0.08, 0.012, ("in+", "in-"), **piece)
+    bores = {**made.rigid_bores, "in+": (0.0, -0.07, 0.0), "in-": (0.0, -0.13, 0.0)}
+    load = dataclasses.replace(made.loads[0], torque=constant(30.0))
+    made = dataclasses.replace(
+        made, shafts=(*made.shafts, shaft), rigid_bores=bores, drive=Drive("in", "in+", constant(600.0)), loads=(load,),
+        couplings=(Coupling("clutch", ("in", "s0"), 3e4, 0.5),),
+    )  # fmt: skip
+    springs = tuple(Bearing(name, (1e8, 1e8, 1e8, 1e3, 1e3)) for name in bores)
+    model = build_train(dataclasses.replace(made, bearings=springs))
+    response, frame = simulate(model, np.linspace(0.0, 2e-4, 3), tolerance=1e-6), model.train.frame
+    parts = [part for part in solids(model.train, response) if part.shaft == 2]
+    assert len(parts) == 1
+    (part,) = parts
+    assert part.gear == -1
+    assert part.section is not None
+    assert np.ptp(part.points @ frame[2]) == pytest.approx(0.08)
+    points, sections = moved(part, response, frame, 2), response.sections
+    assert sections is not None
+    poses = sections.rows @ response.section_coordinates[2]
+    ring = part.section == part.section[0]
+    centre = sections.centres[part.section[0]]
+    assert points[ring].mean(axis=0) == pytest.approx(centre + poses[part.section[0], :3], abs=1e-9)
+    before, after = part.points[ring][0] - centre, points[ring][0] - points[ring].mean(axis=0)
+    angle = math.atan2(frame[2] @ np.cross(before, after), before @ after)
+    assert angle == pytest.approx(600.0 * 2e-4, abs=1e-3)
+
+
+def test_a_highest_frequency_beyond_all_beams_is_refused_with_its_range() -> None:
+    with pytest.raises(InputError, match=r"shaft 's0' highest_frequency_Hz = 300000000.0: .*must be <= .* Hz"):
+        build_train(with_sections(train([(20, 30)]), section(), highest_hz=3e8))
 
 
 def test_torsion_between_drive_and_gear() -> None:

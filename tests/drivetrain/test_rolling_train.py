@@ -262,13 +262,17 @@ def test_files_report_the_operating_point(tmp_path: Path, capsys: pytest.Capture
         state = model.operating.bearings["s1_left"]
         found = summary["s1_left"]
         np.testing.assert_allclose(found["force_N"], state.load[:3] * [1, 1, -1], rtol=1e-6)
-        np.testing.assert_allclose(np.diag(found["stiffness_matrix"]), np.diag(state.stiffness), rtol=1e-6)
+        by_force = [np.array(found[name]) for name in ("force_by_displacement_N_per_m", "force_by_tilt_N_per_rad")]
+        by_moment = [np.array(found[name]) for name in ("moment_by_displacement_Nm_per_m", "moment_by_tilt_Nm_per_rad")]
+        stiffness = np.block([by_force, by_moment])
+        np.testing.assert_allclose(np.diag(stiffness), np.diag(state.stiffness), rtol=1e-6)
+        np.testing.assert_allclose(stiffness, stiffness.T, rtol=1e-9)
         assert (found["elements"], found["loaded_elements"]) == (8, state.loaded)
         with (folder / "bearing_stiffness.csv").open() as stream:
             row = next(csv.DictReader(stream))
         assert row["bearing"] == "s1_left"
         assert float(row["force_z_N"]) == pytest.approx(found["force_N"][2])
-        assert float(row["stiffness_x_z_N_per_m"]) == pytest.approx(found["stiffness_matrix"][0][2])
+        assert float(row["stiffness_x_z_N_per_m"]) == pytest.approx(found["force_by_displacement_N_per_m"][0][2])
         assert "bearing s1_left: carries" in capsys.readouterr().out
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...base.typing import Array
 from ..train.operating import OperatingPoint
 from .rolling import SIGNS
 
@@ -29,9 +30,25 @@ def bearing_summary(point: OperatingPoint) -> dict[str, dict[str, Any]]:
             "elements": point.geometry[name].count,
             "loaded_elements": state.loaded,
             "largest_element_load_N": float(state.element_loads.max(initial=0.0)),
-            "stiffness_matrix": np.outer(SIGNS, SIGNS) * state.stiffness,
+            **stiffness_blocks(np.outer(SIGNS, SIGNS) * state.stiffness),
         }
     return summary
+
+
+def stiffness_blocks(stiffness: Array) -> dict[str, Array]:
+    """Blocks of a stiffness (5, 5) by their units: forces and moments by displacements and tilts; it is symmetric."""
+    return {
+        "force_by_displacement_N_per_m": stiffness[:3, :3],
+        "force_by_tilt_N_per_rad": stiffness[:3, 3:],
+        "moment_by_displacement_Nm_per_m": stiffness[3:, :3],
+        "moment_by_tilt_Nm_per_rad": stiffness[3:, 3:],
+    }
+
+
+def _whole(row: Mapping[str, Any]) -> Array:
+    """Stiffness (5, 5) of its blocks."""
+    names = list(stiffness_blocks(np.zeros((5, 5))))
+    return np.block([[np.asarray(row[name]) for name in names[:2]], [np.asarray(row[name]) for name in names[2:]]])
 
 
 def bearing_columns(summary: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
@@ -48,7 +65,7 @@ def bearing_columns(summary: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     for i, one in enumerate(freedoms):
         for j, two in enumerate(freedoms[i:], start=i):
             unit = ("N_per_m", "N_per_rad", "Nm_per_rad")[(i > 2) + (j > 2)]
-            columns[f"stiffness_{one}_{two}_{unit}"] = [float(row["stiffness_matrix"][i, j]) for row in rows]
+            columns[f"stiffness_{one}_{two}_{unit}"] = [float(_whole(row)[i, j]) for row in rows]
     return columns
 
 
@@ -57,7 +74,7 @@ def bearing_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
     lines = []
     for name, row in summary.items():
         force = ", ".join(f"{x:.4g}" for x in row["force_N"])
-        diagonal = np.diag(np.asarray(row["stiffness_matrix"]))
+        diagonal = np.diag(_whole(row))
         straight, tilting = (", ".join(f"{x:.3g}" for x in part) for part in (1e-6 * diagonal[:3], diagonal[3:]))
         lines.append(
             f"bearing {name}: carries {force} N, {row['loaded_elements']} of {row['elements']} elements loaded; "

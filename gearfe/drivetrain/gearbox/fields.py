@@ -22,7 +22,7 @@ from ...fem.reduction.modal_body import ModalBody
 from ...gears.geometry.derived import gear_outline
 from ...gears.geometry.spur_gear import Gear
 from ...output.exchange.vtkhdf import VtkHdfSeries
-from ..train.gear_train import GearTrain, ShaftGear
+from ..train.gear_train import GearTrain
 from ..train.response import TrainResponse
 
 #: Steps whose fields are in memory at a time.
@@ -40,7 +40,9 @@ class Solid:
     Attributes
     ----------
     gear
-        Number of the gear whose motion it follows, or of the first one on its shaft.
+        Number of the gear whose motion it follows, or of the first one on its shaft; -1 on a shaft without any.
+    shaft
+        Number of its shaft.
     points : (n, 3)
         At the start of the run (m).
     quads : (f, 4)
@@ -50,6 +52,7 @@ class Solid:
     """
 
     gear: int
+    shaft: int
     points: Array
     quads: IntArray
     triangles: IntArray
@@ -96,19 +99,20 @@ def turned_surface(radii: Array, places: Array) -> tuple[Array, IntArray, IntArr
 
 
 def solids(train: GearTrain, response: TrainResponse, *, per_segment: int = 2) -> tuple[Solid, ...]:
-    """Surfaces of all gears and of the shafts that carry them, where they stand at the start."""
+    """Surfaces of all gears and shafts, where they stand at the start."""
     frame = train.frame
     angles = train.kinematics.angles
     found = []
     carried: set[str] = set()
     for gear in train.gears:
-        number = response.gear_names.index(gear.name)
+        number, shaft = response.gear_names.index(gear.name), train.shaft_number(gear.shaft)
         points, quads = gear_surface(gear.gear, angles[gear.name], per_segment=per_segment)
         none = np.zeros((0, 3), dtype=np.int64)
-        found.append(Solid(number, response.gear_centres[number] + points @ frame, quads, none))
+        found.append(Solid(number, shaft, response.gear_centres[number] + points @ frame, quads, none))
         if gear.shaft not in carried:
             carried.add(gear.shaft)
-            found.append(_shaft(train, gear, number, response))
+            found.append(_shaft(train, shaft, number, response))
+    found += [_shaft(train, i, -1, response) for i, s in enumerate(train.shafts) if s.name not in carried]
     return tuple(found)
 
 
@@ -163,8 +167,7 @@ def _moved_sections(
 
 def _rolled(solid: Solid, train: GearTrain, response: TrainResponse, step: int) -> Array:
     """(n, 3) points of a surface at an output step, had all shafts only rolled with the drive: no vibration."""
-    ratio = float(train.kinematics.ratios[train.shaft_number(train.gears[solid.gear].shaft)])
-    centre = response.gear_centres[solid.gear]
+    ratio, centre = float(train.kinematics.ratios[solid.shaft]), np.array(train.shafts[solid.shaft].point)
     return np.asarray(
         centre + _turned(solid.points - centre, train.frame[2], ratio * float(response.drive_angle[step]))
     )
@@ -330,17 +333,18 @@ def _coordinates(response: TrainResponse) -> tuple[Array, Array]:
     return response.modal, response.modal_acceleration
 
 
-def _shaft(train: GearTrain, gear: ShaftGear, number: int, response: TrainResponse) -> Solid:
-    shaft, sections = train.shaft(gear.shaft), response.sections
-    if not shaft.sections or sections is None:
+def _shaft(train: GearTrain, number: int, gear: int, response: TrainResponse) -> Solid:
+    """Surface of a shaft that follows a gear, or its own cross-sections where it has some."""
+    shaft, sections = train.shafts[number], response.sections
+    mine = np.zeros(0, dtype=np.int64) if sections is None else np.flatnonzero(sections.shaft == number)
+    if sections is None or not len(mine):
         half = 0.5 * shaft.length
         points, quads, triangles = turned_surface(np.full(2, shaft.radius), np.array([-half, half]))
-        return Solid(number, np.array(shaft.point) + points @ train.frame, quads, triangles)
-    mine = np.flatnonzero(sections.shaft == train.shaft_number(gear.shaft))
+        return Solid(gear, number, np.array(shaft.point) + points @ train.frame, quads, triangles)
     places = (sections.centres[mine] - np.array(shaft.point)) @ train.frame[2]
     points, quads, triangles = turned_surface(sections.radii[mine], places)
     belongs = np.concatenate([np.repeat(mine, _ROUND), mine[[0, -1]]])
-    return Solid(number, np.array(shaft.point) + points @ train.frame, quads, triangles, belongs)
+    return Solid(gear, number, np.array(shaft.point) + points @ train.frame, quads, triangles, belongs)
 
 
 def _rounded(factor: float) -> float:

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ...base.errors import InputError
 from ...base.typing import Array
 from ...fem.beams import BeamShaft, Disc, ReducedShaft, Station, reduce_shaft
 from ..bearings import BallBearing, RollerBearing
@@ -158,9 +159,19 @@ def elastic_shaft(train: GearTrain, shaft: Shaft, start_rate: float) -> ElasticS
         One of its shafts, which has sections.
     start_rate : float
         Spin beside rolling at the start (rad/s).
+
+    Raises
+    ------
+    InputError
+        For a highest frequency that takes too many elements.
     """
     frame = tuple(tuple(map(float, row)) for row in train.frame)
-    reduced = reduced_shaft(beam_shaft(train, shaft), frame, shaft.highest_hz, shaft.elements)
+    try:
+        reduced = reduced_shaft(beam_shaft(train, shaft), frame, shaft.highest_hz, shaft.elements)
+    except InputError as error:
+        if error.field != "highest frequency (Hz)":
+            raise
+        raise InputError(f"shaft {shaft.name!r} highest_frequency_Hz", error.value, error.problem, error.cure) from None
     base, beta = np.array(shaft.point, dtype=float), train.damping.beta
     return ElasticShaft(
         reduced, base, shaft.highest_hz, shaft.damping_ratio, beta, start_rate, name=f"shaft {shaft.name}"

@@ -87,7 +87,7 @@ class TrainResponse(ShownTable):
     gear_centres : (g, 3)
         Where the gears' centres are at rest (m).
     section_coordinates : (n, c) or None
-        Coordinates of the elastic shafts; None without any.
+        Coordinates of the shafts with cross-sections; None without any.
     sections : ShaftSections or None
         Their cross-sections, with the motion for these coordinates.
     modal, modal_velocity, modal_acceleration : (n, N) or None

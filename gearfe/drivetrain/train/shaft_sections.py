@@ -1,4 +1,7 @@
-"""Cross-sections of elastic shafts at which their motion is shown, and the way from coordinates to their motion."""
+"""Cross-sections of shafts at which their motion is shown, and the way from coordinates to their motion.
+
+Shafts that bend have them, and those that carry no gear, with which they could be drawn.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ SHOWN = 24
 
 @dataclass(frozen=True, eq=False)
 class ShaftSections:
-    """Cross-sections of all elastic shafts, k of them, two where the diameter steps.
+    """Cross-sections of all elastic shafts and of those without gears, k of them, two where the diameter steps.
 
     Attributes
     ----------
@@ -43,14 +46,14 @@ class ShaftSections:
 
 
 def shaft_sections(train: GearTrain, placed: Shafts) -> ShaftSections | None:
-    """Cross-sections of the elastic shafts of a train, whose bodies are placed in the system; None without any."""
-    axis = train.frame[2]
-    elastic = [number for number, shaft in enumerate(train.shafts) if shaft.sections]
-    if not elastic:
+    """Cross-sections of shafts that are elastic or without gears, placed in the system; None without any."""
+    axis, carrying = train.frame[2], {gear.shaft for gear in train.gears}
+    shown = [number for number, shaft in enumerate(train.shafts) if shaft.sections or shaft.name not in carrying]
+    if not shown:
         return None
-    columns = np.concatenate([placed.first[i] + np.arange(placed.bodies[i].size) for i in elastic])
+    columns = np.concatenate([placed.first[i] + np.arange(placed.bodies[i].size) for i in shown])
     number, centres, radii, rows = list[int](), list[Array](), list[float](), list[Array]()
-    for i in elastic:
+    for i in shown:
         shaft, middle = train.shafts[i], np.array(train.shafts[i].point, dtype=float)
         places, begin = [], len(centres)
         for low, high, first, last in shaft.outline:

@@ -54,8 +54,11 @@ EXTRA = 2
 #: Half-axes of an ellipse (in half element lengths) beyond which a section is uniform.
 NO_POLE = 1e6
 
-#: Elements of a shaft; more are a wrong frequency or a wrong number of elements.
-MOST_ELEMENTS = 2000
+#: Elements of a shaft, and unknowns of its bending in one plane, whose matrices are dense (8 N^2 bytes each); more are
+#: a wrong frequency or a wrong number of elements.
+MOST_ELEMENTS, MOST_UNKNOWNS = 2000, 3000
+#: Lowest frequency that is tried (Hz), and halvings in the search for the highest frequency that a shaft can have.
+LEAST_HZ, SEARCH = 1.0, 12
 
 
 def cowper(poisson: Array | float, ratio: Array) -> Array:
@@ -133,9 +136,30 @@ def divide(
     Raises
     ------
     InputError
-        Values out of range; more than `MOST_ELEMENTS`.
+        Values out of range; more than `MOST_ELEMENTS` or `MOST_UNKNOWNS`, with the highest frequency that fits.
     """
     _check(highest_hz, tolerance, elements, degree)
+    division = _divided(shaft, highest_hz, tolerance, elements, degree)
+    if division is not None:
+        return division
+    problem = f"takes more than {MOST_ELEMENTS} elements, or {MOST_UNKNOWNS} unknowns, of shaft {shaft.name!r}"
+    least = _divided(shaft, LEAST_HZ, tolerance, elements, degree)
+    if least is None:
+        key, value = ("elements", elements) if degree is None else ("degree", degree)
+        raise InputError(key, value, problem, "give less, or leave it out")
+    low, high = math.log(LEAST_HZ), math.log(highest_hz)
+    for _ in range(SEARCH):
+        middle = 0.5 * (low + high)
+        fits = _divided(shaft, math.exp(middle), tolerance, elements, degree) is not None
+        low, high = (middle, high) if fits else (low, middle)
+    problem += f": must be <= {math.exp(low):.2g} Hz"
+    raise InputError("highest frequency (Hz)", highest_hz, problem, "give a lower one: 10 to 50 kHz are usual")
+
+
+def _divided(
+    shaft: BeamShaft, highest_hz: float, tolerance: float, elements: int | None, degree: int | None
+) -> Division | None:
+    """Return the elements, None where they would be too many; see `divide`."""
     ends = shaft.ends
     wanted = [*ends, *(disc.along for disc in shaft.discs), *(station.along for station in shaft.stations)]
     slack = SAME_PLACE * shaft.length
@@ -147,7 +171,7 @@ def divide(
             kept.append(along)
     kept.sort()
     longest = math.inf if elements is None else shaft.length / elements * (1.0 + SAME_PLACE)
-    nodes, sections, degrees = [kept[0]], [], []
+    nodes, sections, degrees, unknowns = [kept[0]], list[int](), list[int](), 0
     for left, right in pairwise(kept):
         number = int(np.clip(np.searchsorted(ends, 0.5 * (left + right)) - 1, 0, len(shaft.sections) - 1))
         section = shaft.sections[number]
@@ -165,10 +189,9 @@ def divide(
                 nodes.append(ends[number] + float(span[1]) * section.length)
                 sections.append(number)
                 degrees.append(p)
-            if len(nodes) + len(spans) > MOST_ELEMENTS:
-                problem = f"takes more than {MOST_ELEMENTS} elements of shaft {shaft.name!r}"
-                field, value = ("highest frequency (Hz)", highest_hz) if elements is None else ("elements", elements)
-                raise InputError(field, value, problem, "give a lower one")
+                unknowns += 2 * p - 1  # deflections and rotations
+            if len(nodes) + len(spans) > MOST_ELEMENTS or unknowns > MOST_UNKNOWNS:
+                return None
         nodes[-1] = right
     return Division(np.array(nodes), np.array(sections), np.array(degrees))
 

@@ -47,8 +47,8 @@ class ElasticVectors:
         How many are modes.
     errors : (n,)
         Estimated relative errors of the frequencies by the elements; NaN for residual vectors.
-    compliance, left_out : (loads,)
-        Static compliance of the free shaft at each load along it, and the part that these vectors do not carry.
+    compliance : (loads,)
+        Static compliance of the free shaft at each load along it.
     """
 
     squares: Array
@@ -56,7 +56,6 @@ class ElasticVectors:
     modes: int
     errors: Array
     compliance: Array
-    left_out: Array
 
 
 def elastic_vectors(
@@ -66,7 +65,6 @@ def elastic_vectors(
     trial: Array,
     loads: Array,
     modes_below_hz: float,
-    residuals_below_hz: float,
 ) -> ElasticVectors:
     """Return the free modes of a family up to a frequency and its residual vectors.
 
@@ -84,8 +82,6 @@ def elastic_vectors(
         Unit loads at the stations.
     modes_below_hz : float
         Highest frequency of the modes (Hz); infinite for all.
-    residuals_below_hz : float
-        Highest frequency of the residual vectors (Hz); infinite for all.
     """
     own = family.own
     stiffness, mass = family.stiffness[:own, :own], family.mass[:own, :own]
@@ -112,34 +108,29 @@ def elastic_vectors(
     response -= basis @ (momentum.T @ response)
     compliance = np.einsum("il,il->l", loads, response)
     response -= modes @ ((modes.T @ loads) / squares[:, None])
-    extra, residual, carried = _principal(mass, loads, response, compliance, residuals_below_hz)
-    left_out = np.maximum(np.einsum("il,il->l", loads, response) - carried, 0.0)
+    extra, residual = _principal(mass, loads, response, compliance)
     return ElasticVectors(
         np.concatenate([squares, residual]),
         np.hstack([modes, extra]),
         len(squares),
         np.concatenate([errors, np.full(len(residual), math.nan)]),
         compliance,
-        left_out,
     )
 
 
-def _principal(
-    mass: Array, loads: Array, response: Array, compliance: Array, residuals_below_hz: float
-) -> tuple[Array, Array, Array]:
-    """Return residual vectors of unit mass, their squares, and what they carry of each load's compliance."""
+def _principal(mass: Array, loads: Array, response: Array, compliance: Array) -> tuple[Array, Array]:
+    """Return residual vectors of unit mass, and their squares."""
     if not loads.shape[1]:
-        return np.zeros((len(loads), 0)), np.zeros(0), np.zeros(0)
+        return np.zeros((len(loads), 0)), np.zeros(0)
     scale = 1.0 / np.sqrt(compliance)
     gram = loads.T @ response * scale[:, None] * scale
     size, axes = linalg.eigh(0.5 * (gram + gram.T))
     kept = size > DEPENDENT
     vectors = response @ (scale[:, None] * axes[:, kept] / np.sqrt(size[kept]))
     values, turned = linalg.eigh(vectors.T @ mass @ vectors)
-    chosen = values > (2.0 * math.pi * residuals_below_hz) ** -2
+    chosen = values > 0.0
     values, turned = values[chosen][::-1], turned[:, chosen][:, ::-1]
-    vectors = vectors @ turned / np.sqrt(values)
-    return vectors, 1.0 / values, np.einsum("il,in->ln", loads, vectors) ** 2 @ values
+    return vectors @ turned / np.sqrt(values), 1.0 / values
 
 
 def _element_errors(family: Family, lengths: Array, modes: Array, squares: Array) -> Array:

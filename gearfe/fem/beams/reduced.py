@@ -89,9 +89,9 @@ class ReducedShaft:
         Degree of the deflection in each element.
     frequency_errors : (n,)
         Estimated relative error of each mode's frequency by the elements; NaN for residual vectors.
-    compliance, compliance_left_out : (stations, 4)
-        Static compliance of the free rotor at each station along its own load, of `LOADS` (m/N or rad/(N m)), and the
-        part that the coordinates do not carry; NaN where the station is not loaded.
+    compliance : (stations, 4)
+        Static compliance of the free rotor at each station along its own load, of `LOADS` (m/N or rad/(N m)); NaN where
+        the station is not loaded.
     coefficients : tuple of four arrays, (E, functions, n) each
         Of deflection, rotation, axial displacement and twist over the functions of `fem.beams.elements.hierarchic`.
     """
@@ -110,7 +110,6 @@ class ReducedShaft:
     degrees: IntArray
     frequency_errors: Array
     compliance: Array
-    compliance_left_out: Array
     coefficients: tuple[Array, ...]
 
     @property
@@ -209,7 +208,6 @@ def reduce_shaft(
     frame: Array,
     modes_below_hz: float,
     *,
-    residuals_below_hz: float = math.inf,
     elements: int | None = None,
     degree: int | None = None,
     tolerance: float = 1e-7,
@@ -224,9 +222,6 @@ def reduce_shaft(
         Rows e1, e2, a: a right-handed frame, the axis last.
     modes_below_hz : float
         Highest frequency of the free modes (Hz).
-    residuals_below_hz : float
-        Highest frequency of the residual vectors (Hz). Infinite keeps all: statics at the stations are then exact.
-        `ReducedShaft.compliance_left_out` says what a lower one leaves out.
     elements : int, optional
         Elements that the length would have if all were equal: no element is longer.
     degree : int, optional
@@ -240,9 +235,7 @@ def reduce_shaft(
         Values out of range, see `divide`.
     """
     division = divide(shaft, modes_below_hz, tolerance, elements, degree)
-    if not residuals_below_hz > 0.0:
-        raise InputError("residuals_below_hz", residuals_below_hz, "must be > 0", "leave it out: all are kept")
-    return _reduced(shaft, _checked(frame), division, modes_below_hz, residuals_below_hz)
+    return _reduced(shaft, _checked(frame), division, modes_below_hz)
 
 
 @one_thread()
@@ -278,7 +271,7 @@ def full_shaft(
         Values out of range, see `divide`.
     """
     division = divide(shaft, accurate_below_hz, tolerance, elements, degree)
-    return _reduced(shaft, _checked(frame), division, math.inf, math.inf)
+    return _reduced(shaft, _checked(frame), division, math.inf)
 
 
 def _checked(frame: Array) -> Array:
@@ -289,10 +282,8 @@ def _checked(frame: Array) -> Array:
     return rows
 
 
-def _reduced(
-    shaft: BeamShaft, frame: Array, division: Division, modes_below_hz: float, residuals_below_hz: float
-) -> ReducedShaft:
-    """Return the coordinates of a divided shaft up to frequencies (Hz) of modes and of residual vectors."""
+def _reduced(shaft: BeamShaft, frame: Array, division: Division, modes_below_hz: float) -> ReducedShaft:
+    """Return the coordinates of a divided shaft: modes up to a frequency (Hz), and all residual vectors."""
     matrices = beam_matrices(shaft, division)
     places = division.nodes - 0.5 * (shaft.start + shaft.end)
     families: dict[str, tuple[Family, Array, Array, tuple[str, ...]]] = {
@@ -300,7 +291,7 @@ def _reduced(
         "axial": (matrices.axial, *_bar_vectors(matrices.axial, places), ("axial",)),
         "torsion": (matrices.torsion, *_bar_vectors(matrices.torsion, places), ("torsion",)),
     }
-    compliance, left_out = np.full((2, len(shaft.stations), len(LOADS)), math.nan)
+    compliance = np.full((len(shaft.stations), len(LOADS)), math.nan)
     elastic: dict[str, ElasticVectors] = {}
     for name, (family, rigid, trial, directions) in families.items():
         cells = [(i, d) for i, s in enumerate(shaft.stations) for d in directions if d in s.loads]
@@ -308,13 +299,10 @@ def _reduced(
         for column, (station, direction) in enumerate(cells):
             node = division.node(shaft.stations[station].along)
             loads[len(directions) * node + directions.index(direction), column] = 1.0
-        vectors = elastic_vectors(
-            family, np.diff(division.nodes), rigid, trial, loads, modes_below_hz, residuals_below_hz
-        )
+        vectors = elastic_vectors(family, np.diff(division.nodes), rigid, trial, loads, modes_below_hz)
         elastic[name] = vectors
-        for cell, whole, rest in zip(cells, vectors.compliance, vectors.left_out, strict=True):
-            place = cell[0], LOADS.index(cell[1])
-            compliance[place], left_out[place] = whole, rest
+        for cell, value in zip(cells, vectors.compliance, strict=True):
+            compliance[cell[0], LOADS.index(cell[1])] = value
 
     order = sorted(
         (
@@ -344,7 +332,6 @@ def _reduced(
         degrees=division.degrees,
         frequency_errors=np.array([elastic[name].errors[number] for *_, name, number in order]),
         compliance=compliance,
-        compliance_left_out=left_out,
         coefficients=tuple(
             _coefficients(families[name][0], field, elastic[name].vectors, [(n, k) for *_, n, k in order], name)
             for name, field in (("bending", 0), ("bending", 1), ("axial", 0), ("torsion", 0))
