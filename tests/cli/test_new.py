@@ -1,5 +1,6 @@
 """Job files that ``gearfe new`` writes: they run as they are, and every optional key in them is a key."""
 
+import json
 import re
 import tomllib
 from dataclasses import fields
@@ -8,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from gearfe.base.config import build, quantity
-from gearfe.base.errors import InputError
 from gearfe.base.tables.examples import JOBS, RUN_BY, job_file
 from gearfe.base.tables.jobs import TABLES, load_job, read_train_tables, table_class
 from gearfe.base.tables.mechanism import BodyTable, MechanismFile, RunTable, read_mechanism_file
@@ -55,14 +55,30 @@ def test_every_optional_key_can_be_switched_on(tmp_path, source):
     assert len(commented) >= 3 or isinstance(source, Path)
 
 
-def test_a_gearbox_takes_the_tables_at_its_end(tmp_path):
-    """Without their ## machines are read; the coupling asks for the shaft that it names."""
+def test_a_gearbox_runs_with_the_tables_at_its_end(tmp_path, capsys):
+    """Without their ##: an elastic input shaft, a motor shaft on ball bearings behind a clutch, a motor and a fan."""
     text = re.sub(r"^## ?", "", job_file("gearbox"), flags=re.MULTILINE)
-    (tmp_path / "job.toml").write_text(text.split("[couplings.")[0])
-    assert read_train_tables(tmp_path / "job.toml")["train"].machines[0].name == "motor"
+    for old, new in (
+        ("duration_ms = 10.0", "duration_ms = 0.2"),
+        ('mesh_model = "potential"', 'mesh_model = "mean_stiffness"'),
+        ('driver = "input_pinion"', 'stiffness_N_per_m = 3e8\ndriver = "input_pinion"'),
+        ('driver = "output_pinion"', 'stiffness_N_per_m = 3e8\ndriver = "output_pinion"'),
+    ):
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
     (tmp_path / "job.toml").write_text(text)
-    with pytest.raises(InputError, match=r"couplings\.clutch\.shafts: unknown name 'a shaft on its axis'"):
-        read_train_tables(tmp_path / "job.toml")
+    assert main(["vibration", str(tmp_path / "job.toml"), "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
+    printed = capsys.readouterr().out
+    for part in ("shaft input: elastic", "shaft motor_shaft: elastic", "bearing M1", "operating point: drive at 150"):
+        assert part in printed, part
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert set(summary["elastic_shafts"]) == {"input", "motor_shaft"}
+    assert set(summary["bearings"]) == {"M1", "M2"}
+    with (tmp_path / "out" / "response.csv").open() as stream:
+        header = stream.readline()
+    assert {"machine_motor_speed_rad_per_s", "machine_fan_torque_Nm", "coupling_clutch_torque_Nm"} <= set(
+        header.strip().split(",")
+    )
 
 
 @pytest.mark.parametrize("kind", JOBS)

@@ -120,6 +120,10 @@ def test_loads_of_gears_and_bores_follow_from_what_acts_there() -> None:
     assert loads(spur)["attachment s0+"] == ("radial", "tilt", "axial")
     moved = tuple(dataclasses.replace(g, along=g.along + 0.002 * (g.name == "g0")) for g in spur.gears)
     assert loads(dataclasses.replace(spur, gears=moved))["gear d0"] == ("radial", "tilt", "torsion")
+    helical = tuple(dataclasses.replace(g, gear=dataclasses.replace(g.gear, helix_angle=0.3)) for g in spur.gears)
+    assert loads(dataclasses.replace(spur, gears=helical))["gear d0"] == ("radial", "tilt", "axial", "torsion")
+    wide = tuple(dataclasses.replace(mesh, moments=True) for mesh in spur.meshes)
+    assert loads(dataclasses.replace(spur, meshes=wide))["gear d0"] == ("radial", "tilt", "torsion")
     for stiffness, expected in (
         ((1e8, 0.0, 1e8, 0.0, 0.0), ("radial",)),
         ((1e8, 1e8, 1e8, 0.0, 0.0), ("radial", "axial")),

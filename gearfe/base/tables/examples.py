@@ -144,17 +144,76 @@ GEARBOX_TRAIN: dict[str, Any] = {
     "damping": {"rayleigh_beta_s": 2e-6},
 }  # fmt: skip
 
-#: Tables that stand commented at the end of a gearbox.
-DRIVELINE: dict[str, dict[str, dict[str, Any]]] = {
-    "machines": {
-        "motor": {
-            "shaft": "input", "inertia_kg_m2": 0.004, "stiffness_Nm_per_rad": 25e3, "damping_Nm_s_per_rad": 1.5,
-        },
-    },
-    "couplings": {
-        "clutch": {"shafts": ["input", "a shaft on its axis"], "stiffness_Nm_per_rad": 3e4},
-    },
-}  # fmt: skip
+#: Tables that stand commented at the end of a gearbox, and run with it when they no longer do.
+EXTENSION = """\
+# The input shaft bends and twists: pieces along +y, as long and thick in all as it is above.
+[[shafts.input.sections]]
+length_mm = 30.0
+outer_diameter_mm = 18.0
+
+[[shafts.input.sections]]
+length_mm = 40.0
+outer_diameter_mm = 20.0
+
+[[shafts.input.sections]]
+length_mm = 30.0
+outer_diameter_mm = 18.0
+
+# A motor shaft on ball bearings beyond it, which a clutch joins to the input shaft, end to end on one axis.
+[shafts.motor_shaft]
+x_mm = 0.0
+y_mm = 85.0
+
+[[shafts.motor_shaft.sections]]
+length_mm = 60.0
+outer_diameter_mm = 20.0
+inner_diameter_mm = 6.0
+
+[bearings.M1]
+shaft = "motor_shaft"
+y_mm = 65.0
+type = "deep_groove_ball"
+elements = 8
+element_diameter_mm = 7.9
+pitch_diameter_mm = 33.5
+radial_clearance_um = -4.0               # diametral; negative: preloaded
+damping = [200.0, 50.0, 200.0, 1.0, 1.0]
+
+[bearings.M2]
+shaft = "motor_shaft"
+y_mm = 100.0
+type = "deep_groove_ball"
+elements = 8
+element_diameter_mm = 7.9
+pitch_diameter_mm = 33.5
+radial_clearance_um = -4.0
+damping = [200.0, 50.0, 200.0, 1.0, 1.0]
+
+[couplings.clutch]
+shafts = ["motor_shaft", "input"]
+stiffness_Nm_per_rad = 3e4
+damping_Nm_s_per_rad = 0.5
+
+# The rotor of the motor. To drive there: shaft = "motor_shaft", machine = "motor" in [train.drive], no attachment.
+[machines.motor]
+shaft = "motor_shaft"
+y_mm = 112.0
+inertia_kg_m2 = 4e-3
+stiffness_Nm_per_rad = 2.5e4
+damping_Nm_s_per_rad = 1.5
+
+# A fan beside the load of the output shaft: its torque grows with the square of its speed.
+[machines.fan]
+shaft = "output"
+inertia_kg_m2 = 9e-3
+stiffness_Nm_per_rad = 4e4
+damping_Nm_s_per_rad = 2.0
+
+[[train.loads]]
+shaft = "output"
+machine = "fan"
+torque_over_speed = "-0.02*speed*abs(speed)"
+"""
 
 MECHANISM: dict[str, Any] = {
     "title": "Crank and rod",
@@ -285,15 +344,15 @@ def job_file(kind: str) -> str:
             _text(name, example, seen)
             for name, example in tables.items()
         )
-        + (_commented(seen) if kind == "gearbox" else "")
+        + (_commented() if kind == "gearbox" else "")
     )
 
 
-def _commented(seen: set[type]) -> str:
-    """Tables of machines and couplings behind ##: a single # stands before keys of the tables above."""
-    text = "\n".join(_text(name, example, seen) for name, example in DRIVELINE.items())
-    lines = [f"## {line}".rstrip() for line in text.splitlines()]
-    return "\n# Tables that you may add; take the ## off (docs/bearings.md).\n" + "\n".join(lines) + "\n"
+def _commented() -> str:
+    """Further tables behind ##: a single # stands before keys of the tables above."""
+    lines = [f"## {line}".rstrip() for line in EXTENSION.splitlines()]
+    head = "# Tables that you may add; take the ## off, of all or of some (docs/shafts.md, docs/bearings.md)."
+    return "\n".join(["", head, *lines, ""])
 
 
 def _text(name: str, example: Mapping[str, Any], seen: set[type]) -> str:

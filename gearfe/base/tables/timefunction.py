@@ -1,4 +1,6 @@
-"""A function of time in a job file: points, smoothed steps, sines and a CSV file that add up, or an expression."""
+"""Functions in job files: of time by points, smoothed steps, sines and a CSV file that add up, or by an expression;
+of speed by points, a CSV file or an expression.
+"""
 
 from __future__ import annotations
 
@@ -57,9 +59,47 @@ class TrainFunctionTable:
         check_rising(f"{where}.points", tuple(time for time, _ in self.points))
 
 
-def check_rising(where: str, times: tuple[float, ...]) -> None:
-    """Times of points rise."""
-    for i, (one, two) in enumerate(itertools.pairwise(times), start=1):
+@dataclass(frozen=True)
+class SpeedFunctionTable:
+    """A torque over speed. A text in its place is an expression."""
+
+    SHORT = "expression"
+
+    points: tuple[tuple[float, float], ...] = quantity(
+        (), doc="list of [speed (rad/s), torque (N m)]; the first and the last torque hold below and above"
+    )
+    csv: str | None = quantity(
+        None, doc="or a CSV file with the columns speed_rad_per_s and torque_Nm, beside the job file"
+    )
+    interpolation: str = quantity(
+        "cubic", choices=("linear", "cubic"), doc="between points: straight lines, or monotone cubics"
+    )
+    expression: str | None = quantity(
+        None, doc="or arithmetic on `speed` (rad/s), pi, abs, min, ... in N m, as -0.01*speed*abs(speed)"
+    )
+    largest_speed_rad_per_s: float | None = quantity(
+        None,
+        above=0.0,
+        doc="of an expression: it holds from minus to plus this speed, its ends beyond; left out: 5 times the speed "
+        "at which [train] turns that shaft",
+    )
+
+    def check(self, where: str) -> None:
+        """One of the three is given; points rise."""
+        given = [key for key in ("points", "csv", "expression") if getattr(self, key)]
+        if not given:
+            raise InputError(where, None, "is an empty function of speed", "give points, csv or an expression")
+        if len(given) > 1:
+            raise InputError(f"{where}.{given[1]}", None, f"stands beside {given[0]}", "leave one out")
+        if self.largest_speed_rad_per_s is not None and self.expression is None:
+            problem = "is of an expression: points hold their first and last torque beyond their ends"
+            raise InputError(f"{where}.largest_speed_rad_per_s", self.largest_speed_rad_per_s, problem, "leave it out")
+        check_rising(f"{where}.points", tuple(speed for speed, _ in self.points), "rad/s")
+
+
+def check_rising(where: str, places: tuple[float, ...], unit: str = "ms") -> None:
+    """Raise `InputError` for times (or speeds, by the unit) of points that do not rise."""
+    for i, (one, two) in enumerate(itertools.pairwise(places), start=1):
         if not one < two:
-            problem = f"must be later than the one before, {one:g} ms"
-            raise InputError(f"{where}[{i}]", two, problem, "let times rise; for a jump write a short ramp")
+            problem = f"must be {'later' if unit == 'ms' else 'more'} than the one before, {one:g} {unit}"
+            raise InputError(f"{where}[{i}]", two, problem, "let them rise; for a jump write a short ramp")

@@ -17,7 +17,7 @@ from .carrier import TrainCarrierTable
 from .driveline import TrainCouplingTable, TrainMachineTable
 from .kinds import GONE_METHODS
 from .pair import FROM_DISTANCE, HANDS, MaterialTable, StiffnessTable, ToothFormTable
-from .timefunction import TrainFunctionTable
+from .timefunction import SpeedFunctionTable, TrainFunctionTable
 
 #: Lengths that count as equal (relative).
 SAME_LENGTH = 1e-6
@@ -398,6 +398,10 @@ class TrainDriveTable:
     torque_Nm: float | TrainFunctionTable | None = quantity(  # noqa: RUF009
         None, doc="torque about +y (N m), or a function of time; left out: the speed is prescribed"
     )
+    torque_over_speed: SpeedFunctionTable | None = quantity(  # noqa: RUF009
+        None,
+        doc="torque about +y over the true speed of shaft or machine (N m over rad/s), beside or without torque_Nm",
+    )
     torque_slope_Nm_s_per_rad: float = quantity(
         0.0, low=0.0, doc="by how much that torque falls with the speed beyond speed_rad_per_s (N m s/rad)"
     )
@@ -408,19 +412,25 @@ class TrainDriveTable:
     )
     damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of that coupling (N m s/rad)")
 
+    @property
+    def by_torque(self) -> bool:
+        """Whether a torque drives, and the speed is free."""
+        return self.torque_Nm is not None or self.torque_over_speed is not None
+
     def check(self, where: str) -> None:
         """A ramp is of a number; a torque leaves the speed free; a machine has its own place."""
         _check_place(where, self.machine, self.y_mm)
         _check_ramp(where, "speed_rad_per_s", self.speed_rad_per_s, self.ramp_width_ms)
-        if self.torque_Nm is None and self.torque_slope_Nm_s_per_rad:
+        if not self.by_torque and self.torque_slope_Nm_s_per_rad:
             problem = "is of a torque, and none is given"
             key = "torque_slope_Nm_s_per_rad"
             raise InputError(
                 f"{where}.{key}", self.torque_slope_Nm_s_per_rad, problem, "add torque_Nm, or leave it out"
             )
         for key in ("stiffness_Nm_per_rad", "damping_Nm_s_per_rad"):
-            if self.torque_Nm is not None and getattr(self, key):
-                problem = "stands beside torque_Nm: nothing prescribes the rotation behind the coupling"
+            if self.by_torque and getattr(self, key):
+                given = "torque_over_speed" if self.torque_Nm is None else "torque_Nm"
+                problem = f"stands beside {given}: nothing prescribes the rotation behind the coupling"
                 cure = "use a machine with a spring ([machines.NAME]), or leave one out"
                 raise InputError(f"{where}.{key}", getattr(self, key), problem, cure)
 
@@ -438,8 +448,12 @@ class TrainLoadTable:
     torque_slope_Nm_s_per_rad: float = quantity(
         0.0, low=0.0, doc="by how much the torque falls with the speed beyond the nominal one (N m s/rad)"
     )
-    torque_Nm: float | TrainFunctionTable = quantity(  # noqa: RUF009
-        doc="torque about +y on the shaft (N m), or a function of time"
+    torque_Nm: float | TrainFunctionTable | None = quantity(  # noqa: RUF009
+        None, doc="torque about +y on the shaft (N m), or a function of time"
+    )
+    torque_over_speed: SpeedFunctionTable | None = quantity(  # noqa: RUF009
+        None,
+        doc="torque about +y over the true speed of shaft or machine (N m over rad/s), beside or without torque_Nm",
     )
     orders: tuple[tuple[float, float, float], ...] = quantity(
         (), doc="sines beside it that follow the speed: list of [order, amplitude (N m), phase (deg)]"
@@ -455,6 +469,11 @@ class TrainLoadTable:
     def check(self, where: str) -> None:
         """A ramp is of a number, a mesh of orders; a machine has its own place."""
         _check_place(where, self.machine, self.y_mm)
+        if self.torque_Nm is None and self.torque_over_speed is None:
+            raise InputError(f"{where}.torque_Nm", None, "is required", "add it, or torque_over_speed")
+        if self.torque_Nm is None and self.ramp_width_ms is not None:
+            problem = "is of torque_Nm, and there is none: a torque over speed has no ramp"
+            raise InputError(f"{where}.ramp_width_ms", self.ramp_width_ms, problem, "leave it out, or add torque_Nm")
         _check_ramp(where, "torque_Nm", self.torque_Nm, self.ramp_width_ms)
         if self.mesh and not self.orders:
             problem = "is the mesh of orders, and there are none"
@@ -467,15 +486,15 @@ def _check_place(where: str, machine: str, y_mm: float | None) -> None:
         raise InputError(f"{where}.y_mm", y_mm, problem, f"give y_mm of the machine {machine!r}, or leave machine out")
 
 
-def _check_ramp(where: str, key: str, value: float | TrainFunctionTable, width: float | None) -> None:
+def _check_ramp(where: str, key: str, value: float | TrainFunctionTable | None, width: float | None) -> None:
     if isinstance(value, TrainFunctionTable) and width is not None:
         problem = f"stands beside a function of time in {key}"
         raise InputError(f"{where}.ramp_width_ms", width, problem, "write the ramp in steps of the function")
 
 
-def value_text(value: float | TrainFunctionTable, unit: str) -> str:
+def value_text(value: float | TrainFunctionTable | None, unit: str) -> str:
     """A number with its unit, or that it changes."""
-    return "changing" if isinstance(value, TrainFunctionTable) else f"{value:g} {unit}"
+    return f"{value:g} {unit}" if isinstance(value, float | int) else "changing"
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,7 @@ from ..train.gear_train import (
     Shaft,
     ShaftGear,
 )
+from .over_speed import with_torques_over_speed
 from .rolling import bearing_of
 from .timefunctions import time_function
 
@@ -87,6 +88,8 @@ class TrainJob:
         [housing], None where the file has none.
     spectrum
         [spectrum], with its defaults where the file has none.
+    operating_speed
+        Of the drive (rad/s), at which torques over speed count as steady; None: see `.over_speed`.
     """
 
     path: Path
@@ -95,6 +98,7 @@ class TrainJob:
     stiffness: StiffnessTable
     housing: HousingTable | None
     spectrum: SpectrumTable = field(default_factory=SpectrumTable)
+    operating_speed: float | None = None
 
     @property
     def meshes(self) -> tuple[NamedMesh, ...]:
@@ -129,7 +133,7 @@ class TrainJob:
         InputError
             For mistakes in the train, and loads that press flanks of which nothing is known.
         """
-        train = _rigid_train(self)
+        train = with_torques_over_speed(_rigid_train(self), self.table, self.path.parent, self.operating_speed)
         _check_rigid(self, train)
         return train
 
@@ -199,8 +203,8 @@ def _rigid_train(job: TrainJob) -> GearTrain:
         ramp = (t.drive.ramp_centre_ms, t.drive.ramp_width_ms)
         speed = _over_time(job, t.drive.speed_rad_per_s, *ramp, "train.drive.speed_rad_per_s")
         torque = None
-        if t.drive.torque_Nm is not None:
-            torque = _over_time(job, t.drive.torque_Nm, 0.0, None, "train.drive.torque_Nm")
+        if t.drive.by_torque:
+            torque = _over_time(job, t.drive.torque_Nm or 0.0, 0.0, None, "train.drive.torque_Nm")
         bore = None if t.drive.attachment is None else str(t.drive.attachment)
         coupling = (t.drive.stiffness_Nm_per_rad, t.drive.damping_Nm_s_per_rad)
         slope = t.drive.torque_slope_Nm_s_per_rad
@@ -218,7 +222,7 @@ def _rigid_train(job: TrainJob) -> GearTrain:
         Load(
             x.shaft,
             None if x.attachment is None else str(x.attachment),
-            _over_time(job, x.torque_Nm, x.ramp_centre_ms, x.ramp_width_ms, f"train.loads[{i}].torque_Nm"),
+            _over_time(job, x.torque_Nm or 0.0, x.ramp_centre_ms, x.ramp_width_ms, f"train.loads[{i}].torque_Nm"),
             tuple((order, amplitude, math.radians(phase)) for order, amplitude, phase in x.orders),
             x.mesh,
             _metres(x.y_mm),

@@ -190,7 +190,7 @@ def _computed_spring(job: TrainJob, train: GearTrain, number: int) -> MeshTable:
         load = {"twist": math.radians(table.twist_deg)} if table.torque_Nm is None else {"torque": table.torque_Nm}
         label = "stiffness.torque_Nm"
     else:
-        load, label = {"torque": _carried_torque(train, number)}, f"mesh {mesh.name!r} torque"
+        load, label = {"torque": carried_torque(train, number)}, f"mesh {mesh.name!r} torque"
         if not load["torque"] > 0.0:
             problem = "carries no torque, so its stiffness along the face width has no load to be computed with"
             raise InputError(f"mesh {mesh.name!r}", None, problem, 'add a load, or write load = "stiffness"')

@@ -1,4 +1,4 @@
-"""Elastic shafts and misaligned gears in the reports of transients and of run-ups."""
+"""Elastic shafts, misaligned gears and torques over speed in the reports of transients and of run-ups."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from ..train.misalignment import PARTS, MeshMisalignment, misalignments
 from ..train.model import TrainModel
+from .over_speed import operating_speed
 
 #: Tilts and displacements (rad, m) below which nothing yields: a rigid train in hinges of a rigid housing.
 STILL = 1e-12
@@ -31,7 +32,24 @@ def shaft_entries(model: TrainModel) -> dict[str, Any]:
         }
         for tilted in yielding(model)
     }
-    return ({"elastic_shafts": entries} if entries else {}) | ({"misalignment": meshes} if meshes else {})
+    found = {"elastic_shafts": entries, "misalignment": meshes, "operating_point": _operating_point(model)}
+    return {name: entry for name, entry in found.items() if entry}
+
+
+def _operating_point(model: TrainModel) -> dict[str, Any]:
+    """Speed of the drive, and the torques over speed there; empty for a train without any."""
+    train, speed = model.train, operating_speed(model.train)
+    if speed is None:
+        return {}
+    torques = {"drive": train.driven.over_speed} | {
+        f"load_{number}": load.over_speed for number, load in enumerate(train.loads, start=1)
+    }
+    known = {name: over for name, over in torques.items() if over is not None}
+    return {
+        "drive_speed_rad_per_s": speed,
+        "torques_over_speed_Nm": {name: over.steady for name, over in known.items()},
+        "torque_slopes_Nm_s_per_rad": {name: over.slope for name, over in known.items()},
+    }
 
 
 def yielding(model: TrainModel) -> tuple[MeshMisalignment, ...]:
@@ -74,6 +92,11 @@ def shaft_lines(summary: Mapping[str, Any]) -> list[str]:
             modes = f"free modes {frequencies} Hz, errors up to {shaft['largest_frequency_error']:.1g}"
         lines.append(
             f"shaft {name}: elastic, {shaft['elements']} elements, {shaft['coordinates']} coordinates; {modes}"
+        )
+    if point := summary.get("operating_point"):
+        torques = ", ".join(f"{name} {torque:.4g} N m" for name, torque in point["torques_over_speed_Nm"].items())
+        lines.append(
+            f"operating point: drive at {point['drive_speed_rad_per_s']:.6g} rad/s; torque over speed {torques}"
         )
     for name, mesh in summary.get("misalignment", {}).items():
         parts = ", ".join(f"{part} {mesh[f'f_sh_by_{part}_um']:.3g}" for part in PARTS)

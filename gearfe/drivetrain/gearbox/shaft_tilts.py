@@ -25,13 +25,13 @@ from ...base.progress import Stopwatch
 from ...base.tables.gearbox import FROM_SHAFTS, Gearbox, NamedMesh
 from ...base.tables.jobs import train_tables
 from ...base.tables.pair import MaterialTable
+from ...base.tables.train import TrainMeshTable, TrainTable
 from ...base.typing import Array
 from ...gears.gearmesh.job import StiffnessJob
 from ...gears.gearmesh.width_job import MOST_GAP, axial_sense, map_angles, stiffness_angles
-from ...gears.geometry.derived import iso_values
 from ...gears.geometry.pair import gear_pair
+from ...gears.rating.stiffness import iso_values
 from ...gears.width import ContactLines, Misalignment, WidthSweep, sweep_width
-from ..train.gear_train import GearTrain
 from ..train.misalignment import TiltingTrain
 from ..train.model import build_train
 from .job import Stiffness, TrainJob, job_train, train_body, train_job
@@ -128,11 +128,10 @@ def shaft_tilts(raw: dict[str, Any], path: str | Path, mesh: NamedMesh, variant:
         problem = "needs the shafts, bearings, drive and loads of a train, and the file has no table [train]"
         raise InputError(where, True, problem, "add it (gearfe new gearbox.toml shows one), or leave this key out")
     job = train_job(path, train_tables(raw, path, variant))
-    job = replace(job, gearbox=_without_flanks(job.gearbox))
+    job = replace(job, gearbox=_without_flanks(job.gearbox), table=_with_springs(job.table))
     number = list(job.gearbox.meshes).index(mesh.name)
     train = job_train(job, _mean_stiffness(job), train_body(job))
-    # at rest nothing rubs, and back flanks that the loads press are as stiff as driving ones
-    meshes = tuple(replace(m, moments=i == number, friction=0.0, backlash=0.0) for i, m in enumerate(train.meshes))
+    meshes = tuple(replace(m, moments=i == number, friction=0.0) for i, m in enumerate(train.meshes))
     model = build_train(replace(train, meshes=meshes))
     torque = carried_torque(model.train, number)
     if not torque > 0.0:
@@ -158,17 +157,27 @@ def _without_flanks(box: Gearbox) -> Gearbox:
     return Gearbox({name: replace(gear, microgeometry=None) for name, gear in box.gears.items()}, meshes)
 
 
+def _with_springs(table: TrainTable) -> TrainTable:
+    """[train] with springs as meshes, whose back flanks, should the loads press them, are as stiff as driving ones."""
+
+    def spring(mesh: TrainMeshTable) -> TrainMeshTable:
+        made = replace(mesh, mesh_model=None, curve=None, mesh_table=None, rigid=False)
+        return replace(made, stiffness_N_per_m=1.0, backlash_um=0.0)
+
+    return replace(table, meshes=tuple(spring(mesh) for mesh in table.meshes))
+
+
 def _mean_stiffness(job: TrainJob) -> tuple[Stiffness, ...]:
     """c_gamma of ISO 6336-1 times the width for each mesh: loops of gears share their torque by it, others do not."""
     train = job_train(job)
 
-    def stiffness(train: GearTrain, number: int, named: NamedMesh) -> float:
+    def stiffness(number: int, named: NamedMesh) -> float:
         mesh = train.meshes[number]
         pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
         moduli = [1e9 * (gear.material or MaterialTable()).youngs_modulus_GPa for gear in named.gears]
         return float(iso_values(pair, moduli[0], moduli[1])["c_gamma_times_width_N_per_m"])
 
-    return tuple(stiffness(train, number, named) for number, named in enumerate(job.meshes))
+    return tuple(stiffness(number, named) for number, named in enumerate(job.meshes))
 
 
 def job_tilts(

@@ -1,4 +1,4 @@
-"""From functions of time in a job file to those that the integrators take: pieces of polynomials and sines.
+"""From functions of time and of speed in a job file to those that the integrators take: pieces of polynomials, sines.
 
 An expression becomes pieces of polynomials of degree `DEGREE` through Chebyshev's points (Trefethen, Approximation
 Theory and Approximation Practice, 2nd ed. 2020, chapters 2 and 8), halved until each has the accuracy `CLOSE`;
@@ -17,7 +17,7 @@ from numpy.polynomial import chebyshev
 from ...base.errors import InputError
 from ...base.expressions import Names, compute, parse
 from ...base.files import read_numbers
-from ...base.tables.timefunction import TrainFunctionTable, check_rising
+from ...base.tables.timefunction import SpeedFunctionTable, TrainFunctionTable, check_rising
 from ...base.typing import Array
 from ...multibody import TimeFunction, constant, sine, smoothed_step
 
@@ -60,19 +60,87 @@ def time_function(value: float | TrainFunctionTable, where: str, folder: Path, e
     return made
 
 
+def speed_function(table: SpeedFunctionTable, where: str, folder: Path, largest: float) -> TimeFunction:
+    """Return the torque over speed that a table describes, constant beyond its ends.
+
+    Parameters
+    ----------
+    table : SpeedFunctionTable
+        The table.
+    where : str
+        Name of the key, for messages.
+    folder : Path
+        Where files lie that it names.
+    largest : float
+        Speed (rad/s) up to which an expression that does not say so holds, both ways; 0: unknown.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read, speeds that do not rise, expressions that are none, jump or have no value.
+    """
+    if table.expression is None:
+        if table.csv is None:
+            return _within(np.array(table.points), table.interpolation)
+        columns = read_numbers(folder / table.csv, f"{where}.csv", ("speed_rad_per_s", "torque_Nm"))
+        points = np.column_stack([columns["speed_rad_per_s"], columns["torque_Nm"]])
+        check_rising(f"{where}.csv speed_rad_per_s", tuple(points[:, 0].tolist()), "rad/s")
+        return _within(points, table.interpolation)
+    end = table.largest_speed_rad_per_s or largest
+    if not end > 0.0:
+        problem = "is required: [train] does not say how fast the shaft turns"
+        raise InputError(f"{where}.largest_speed_rad_per_s", None, problem, "give the largest speed that it may reach")
+    text, key = table.expression, f"{where}.expression"
+    tree = parse(text, key, Names(("speed",)))
+
+    def at(place: Array) -> Array:
+        with np.errstate(all="ignore"):
+            speed = place - end
+            found = np.asarray(compute(tree, {("speed", None): speed}), dtype=float)
+        value = np.broadcast_to(found, place.shape)
+        if not np.isfinite(value).all():
+            bad = float(speed[~np.isfinite(value)][0])
+            problem = f"has no value at {bad:.6g} rad/s"
+            cure = "change it, as 2*M*s*k/(s*s + k*k) for 2*M/(s/k + k/s), or lower largest_speed_rad_per_s"
+            raise InputError(key, text, problem, cure)
+        return value
+
+    fit = fitted(at, 2.0 * end, key, text, unit="rad/s", shift=end)
+    ends = at(np.array([0.0, 2.0 * end]))
+    starts = (-math.inf, -end, *(start - end for start in fit.starts[1:]), end)
+    origins = (-end, *(origin - end for origin in fit.origins), end)
+    return TimeFunction(starts, origins, ((float(ends[0]),), *fit.coefficients, (float(ends[1]),)))
+
+
+def _within(points: Array, interpolation: str) -> TimeFunction:
+    """Through points (n, 2) of speeds (rad/s) and torques (N m), which hold below the first and above the last."""
+    if len(points) == 1:
+        return constant(float(points[0, 1]))
+    pieces = _pieces(points[:, 0], points[:, 1], interpolation)
+    speed = tuple(points[:, 0].tolist())
+    return TimeFunction(
+        (-math.inf, *speed), (speed[0], *speed), ((float(points[0, 1]),), *pieces, (float(points[-1, 1]),))
+    )
+
+
+def _pieces(place: Array, value: Array, interpolation: str) -> list[tuple[float, ...]]:
+    """Polynomials between points, each about the first of its two: straight lines, or monotone cubics."""
+    if interpolation == "cubic" and len(place) > 2:
+        from scipy.interpolate import PchipInterpolator
+
+        pieces = PchipInterpolator(place, value).c[::-1].T
+    else:
+        pieces = np.column_stack([value[:-1], np.diff(value) / np.diff(place)])
+    return [tuple(float(c) for c in row) for row in pieces]
+
+
 def _through(points: Array, interpolation: str) -> TimeFunction:
     """Through points (n, 2) of times (ms) and values, which hold before the first and after the last."""
     time, value = 1e-3 * points[:, 0], points[:, 1]
     if len(time) == 1:
         return constant(float(value[0]))
-    if interpolation == "cubic" and len(time) > 2:
-        from scipy.interpolate import PchipInterpolator
-
-        pieces = PchipInterpolator(time, value).c[::-1].T
-    else:
-        pieces = np.column_stack([value[:-1], np.diff(value) / np.diff(time)])
     starts = [*time.tolist()]
-    rows = [tuple(float(c) for c in row) for row in pieces] + [(float(value[-1]),)]
+    rows = [*_pieces(time, value, interpolation), (float(value[-1]),)]
     if starts[0] <= 0.0:
         starts[0] = -math.inf  # the run begins at 0
         return TimeFunction(tuple(starts), tuple(time.tolist()), tuple(rows))
@@ -102,7 +170,9 @@ def _of_expression(text: str, where: str, end: float) -> TimeFunction:
     return fitted(at, end, where, text)
 
 
-def fitted(at: Callable[[Array], Array], end: float, where: str, text: str) -> TimeFunction:
+def fitted(
+    at: Callable[[Array], Array], end: float, where: str, text: str, *, unit: str = "ms", shift: float = 0.0
+) -> TimeFunction:
     """Fit pieces of polynomials to a function from 0 to the end; see the module.
 
     Parameters
@@ -115,6 +185,10 @@ def fitted(at: Callable[[Array], Array], end: float, where: str, text: str) -> T
         Name of the key in messages.
     text : str
         Its value in messages.
+    unit : str
+        Of places in messages: ms of times in s, or that of the places.
+    shift : float
+        What 0 stands for less, in messages.
 
     Raises
     ------
@@ -137,11 +211,13 @@ def fitted(at: Callable[[Array], Array], end: float, where: str, text: str) -> T
         off = float(np.abs(np.polynomial.polynomial.polyval(between, power) - value).max())
         if off > (CLOSE if halved < HALVINGS else KINK) * max(largest, float(np.abs(value).max())):
             if halved == HALVINGS:
-                problem = f"jumps at {1e3 * middle:.6g} ms"
-                raise InputError(where, text, problem, "let it change over some time, as smoothed steps do")
+                place = 1e3 * middle if unit == "ms" else middle - shift
+                cure = "let it change over some time, as smoothed steps do" if unit == "ms" else "write a steep ramp"
+                raise InputError(where, text, f"jumps at {place:.6g} {unit}", cure)
             if len(pieces) + len(left) > PIECES:
                 problem = f"needs more than {PIECES} pieces of polynomials"
-                raise InputError(where, text, problem, "write slower changes; fast sines belong into sines")
+                cure = "write slower changes" + ("; fast sines belong into sines" if unit == "ms" else "")
+                raise InputError(where, text, problem, cure)
             left += [(middle, stop, halved + 1), (begin, middle, halved + 1)]
             continue
         last = int(np.flatnonzero(power).max(initial=0))

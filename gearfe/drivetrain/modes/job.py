@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -15,6 +16,7 @@ from ...base.typing import Array
 from ..gearbox.inherited import inherited
 from ..gearbox.job import TrainJob, job_train, train_body
 from ..gearbox.mesh_stiffness import train_curves
+from ..gearbox.over_speed import operating_speed
 from ..train import build_train
 from ..train.kinematics import drive_sense, fastest
 from ..train.model import TrainModel
@@ -85,16 +87,26 @@ def at_speed(job: TrainJob, speed: float) -> TrainJob:
     """The job with a constant speed of its drive (rad/s), whose sense decides which flanks drive.
 
     A drive by torque becomes one by speed, and speeds at the start are left out: modes and steady states are those at a
-    speed.
+    speed. Torques of loads over speed keep the operating point that they have in [train].
     """
     if job.table.drive is None:
         return job
     drive = replace(
-        job.table.drive, speed_rad_per_s=speed, ramp_width_ms=None, torque_Nm=None, torque_slope_Nm_s_per_rad=0.0
+        job.table.drive,
+        speed_rad_per_s=speed,
+        ramp_width_ms=None,
+        torque_Nm=None,
+        torque_over_speed=None,
+        torque_slope_Nm_s_per_rad=0.0,
     )
     shafts = tuple(replace(shaft, initial_speed_rad_per_s=None) for shaft in job.table.shafts)
     machines = tuple(replace(machine, initial_speed_rad_per_s=None) for machine in job.table.machines)
-    return replace(job, table=replace(job.table, drive=drive, shafts=shafts, machines=machines))
+    operating = job.operating_speed
+    if any(load.torque_over_speed is not None for load in job.table.loads):
+        operating = math.copysign(operating_speed(job.rigid_train) or 0.0, speed)
+    return replace(
+        job, table=replace(job.table, drive=drive, shafts=shafts, machines=machines), operating_speed=operating
+    )
 
 
 def _running(job: TrainJob) -> float:

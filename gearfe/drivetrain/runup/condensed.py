@@ -108,7 +108,9 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     per_turn = [0.0] * fixed + [float(cycles) for cycles in model.orders]
     waves = zip(model.forces.torques, per_turn, strict=True)
     swinging = [(direction, wave, cycles) for (direction, torque), cycles in waves for wave in torque.sines]
-    used = sorted({*(x for four in reads for x in four if x >= 0), *(direction for direction, *_ in swinging)})
+    over_speed = model.forces.speed_torques
+    acted = [*(direction for direction, *_ in swinging), *(over.direction for over in over_speed)]
+    used = sorted({*(x for four in reads for x in four if x >= 0), *acted})
     freedoms = np.array([[used.index(x) if x >= 0 else -1 for x in four] for four in reads])
     to_modes = modal.T.T @ model.directions
     ends = ((d, float(replace(f, sines=())(model.torque_end))) for d, f in model.torques)
@@ -130,8 +132,10 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     of_flank = np.array([np.where(orders[mesh_of[i]] > 0, [float(t) for t in turns], 0.0) for i in range(len(flanks))])
     whole = np.array([float(t) for t in turns])
     torques = [SwingingTorque(used.index(direction), *wave, whole, cycles) for direction, wave, cycles in swinging]
-    forces = MeshForces(flanks, freedoms, sense * of_flank, rubbing, torques)
-    scale = _scale(model, linear, freedoms, flanks, [torque.freedom for torque in torques])
+    speeding = [replace(over, direction=used.index(over.direction)) for over in over_speed]
+    forces = MeshForces(flanks, freedoms, sense * of_flank, rubbing, torques, speeding)
+    more = [*(torque.freedom for torque in torques), *(over.direction for over in speeding)]
+    scale = _scale(model, linear, freedoms, flanks, more)
     limit = DIVERGED * min(line.module for line in model.meshes) / float(scale[freedoms[:, 0]].max())
     many = tuple(tuple(row) for row in orders.tolist())
     start = linear.rest.copy()

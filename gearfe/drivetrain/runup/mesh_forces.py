@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...base.typing import Array, IntArray
-from ..train.forces import Flank, FlankForces, LawFlank, Slip
+from ..train.forces import Flank, FlankForces, LawFlank, Slip, SpeedTorque
 from ..train.friction import Sliding
 from .balance import Pushes
 
@@ -113,6 +113,8 @@ class MeshForces:
         Friction of each flank, or None.
     torques
         Those that swing.
+    speed_torques
+        Torques over speed, whose directions are numbers of freedoms.
     """
 
     flanks: Sequence[Flank]
@@ -120,6 +122,7 @@ class MeshForces:
     turns: Array
     rubbing: Sequence[Rubbing | None]
     torques: Sequence[SwingingTorque] = ()
+    speed_torques: Sequence[SpeedTorque] = ()
     _pairs: dict[tuple[int, int], Array] = field(default_factory=dict, repr=False)
 
     def flank(self, number: int, theta: Array, speed: float, u: Array, du: Array) -> FlankForces:
@@ -191,4 +194,10 @@ class MeshForces:
                     by_rate[:, on, s] -= at.drag.by_turn_rate[:, i]
         for torque in self.torques:
             value[:, torque.freedom] += torque.at(theta, speed)
+        for over in self.speed_torques:
+            d = over.direction
+            if by_rate is None:
+                by_rate = np.zeros_like(by_place)
+            value[:, d] += over.at(speed, du[:, d])
+            by_rate[:, d, d] += over.slope(speed, du[:, d])
         return Pushes(value, by_place, by_rate, momentum, momentum_by_place)

@@ -19,6 +19,7 @@ from .gear_train import (
     Pin,
     Shaft,
     ShaftGear,
+    SpeedCurve,
 )
 from .model import TrainModel, build_train
 from .response import TrainResponse
@@ -38,6 +39,7 @@ __all__ = [
     "Pin",
     "Shaft",
     "ShaftGear",
+    "SpeedCurve",
     "TrainModel",
     "TrainResponse",
     "build_train",

@@ -368,6 +368,9 @@ def _check_machine(train: GearTrain, label: str, end: Drive | Load) -> None:
     if not (math.isfinite(end.slope) and end.slope >= 0.0):
         problem = "must be finite and >= 0 N m s/rad: a torque that grows with the speed runs away"
         raise InputError(f"{label} slope", end.slope, problem, "write by how much the torque falls with the speed")
+    if end.over_speed is not None and (end.over_speed.function.sines or not math.isfinite(end.over_speed.reference)):
+        problem = "must be pieces of polynomials of the speed, with a finite reference"
+        raise InputError(f"{label} torque over speed", end.over_speed.reference, problem, "leave sines out")
 
 
 def _check_machine_place(train: GearTrain, machine: Machine) -> None:
@@ -402,7 +405,15 @@ def _check_driveline(train: GearTrain) -> None:
                 _known(label, "shaft", name, shafts)
     for machine in train.machines:
         _check_machine_place(train, machine)
+    joined: dict[frozenset[str], str] = {}
     for coupling in train.couplings:
+        both = frozenset(coupling.shafts)
+        if both in joined:
+            problem = f"joins the shafts of coupling {joined[both]!r}, too"
+            raise InputError(
+                f"coupling {coupling.name!r}", list(coupling.shafts), problem, "write one, with both rates"
+            )
+        joined[both] = coupling.name
         one, two = (train.shaft(name) for name in coupling.shafts)
         label, apart = f"coupling {coupling.name!r}", shaft_distance(train, one.name, two.name)
         if one.name == two.name:
@@ -417,6 +428,9 @@ def _check_driveline(train: GearTrain) -> None:
             raise InputError(label, None, problem, "move one along it (y_mm), or shorten it")
     drive = train.driven
     if drive.torque is None:
+        if drive.over_speed is not None:
+            problem = "is of a drive by torque, and this one has a prescribed speed"
+            raise InputError("drive torque over speed", None, problem, "give the steady torque, or leave it out")
         if drive.slope > 0.0:
             problem = "is of a drive by torque, and this one has a prescribed speed"
             raise InputError("drive slope", drive.slope, problem, "give the torque, or leave it out")
@@ -617,7 +631,12 @@ def overlap(one: ShaftGear, two: ShaftGear) -> float:
 
 
 def _check_room(train: GearTrain) -> None:
-    """No two gears in one place, and no gear in another shaft."""
+    """No two gears or shafts in one place, and no gear in another shaft."""
+    # ring gears and carriers are cups about other shafts, and not the cylinders that their lengths and radii say
+    cups = {gear.shaft for gear in train.gears if gear.gear.teeth < 0}
+    for first, second in () if train.carriers else itertools.combinations(train.shafts, 2):
+        if not cups & {first.name, second.name}:
+            _check_shaft_room(train, first, second)
     meshing = {frozenset((m.driver, m.driven)) for m in train.meshes}
     # rings are hollow, and carriers are cages round the gears: their cylinders are of no form that is known
     rims = {gear.shaft for gear in train.gears if gear.gear.teeth < 0} | {c.shaft for c in train.carriers}
@@ -648,6 +667,50 @@ def _check_room(train: GearTrain) -> None:
             if one.gear.tip_radius > room:
                 problem = f"its tip cuts {1e3 * (one.gear.tip_radius - room):.4g} mm into shaft {shaft.name!r}"
                 raise InputError(f"gear {one.name!r}", None, problem, "thinner shaft, smaller gear, or a shorter shaft")
+
+
+def _check_shaft_room(train: GearTrain, one: Shaft, two: Shaft) -> None:
+    """Two shafts are beside each other, one after the other, or one in the bore of the other."""
+    apart = shaft_distance(train, one.name, two.name)
+    if apart >= one.radius + two.radius:
+        return
+    middles = [train.shaft_end(shaft.name, 0.0) for shaft in (one, two)]
+    for low, high in _shared_pieces(one, two, middles):
+        reach = [
+            shaft.radius_within(low - middle, high - middle) for shaft, middle in zip((one, two), middles, strict=True)
+        ]
+        bores = [
+            _bore_within(shaft, low - middle, high - middle) for shaft, middle in zip((one, two), middles, strict=True)
+        ]
+        inside = apart + reach[0] <= bores[1] * (1.0 + SAME) or apart + reach[1] <= bores[0] * (1.0 + SAME)
+        if apart >= sum(reach) * (1.0 - SAME) or inside:
+            continue
+        problem = (
+            f"overlaps shaft {two.name!r} over {1e3 * (high - low):.6g} mm along the axis, from y = {1e3 * low:.6g} to "
+            f"{1e3 * high:.6g} mm"
+        )
+        cure = "move one along the axis (y_mm) or aside (x_mm), shorten it, or give the outer one sections with a bore"
+        raise InputError(f"shaft {one.name!r}", None, problem, cure)
+
+
+def _shared_pieces(one: Shaft, two: Shaft, middles: list[float]) -> list[tuple[float, float]]:
+    """Ranges along the axis (m) that pieces of two shafts share."""
+    ranges, least = [], SAME * max(one.length, two.length)
+    for first, second in itertools.product(one.outline, two.outline):
+        low, high = (
+            max(first[0] + middles[0], second[0] + middles[1]),
+            min(first[1] + middles[0], second[1] + middles[1]),
+        )
+        if high - low > least:
+            ranges.append((low, high))
+    return ranges
+
+
+def _bore_within(shaft: Shaft, low: float, high: float) -> float:
+    """Least bore radius (m) of a shaft between two places along the axis, from its middle; 0 of a solid one."""
+    pieces = zip(shaft.outline, shaft.sections, strict=False)
+    found = [0.5 * min(s.inner_start, s.inner_end) for (start, end, *_), s in pieces if start < high and end > low]
+    return min(found, default=0.0)
 
 
 def _check_damping(train: GearTrain) -> None:

@@ -1,5 +1,5 @@
 """Where a step of a train's series ends: phases and pair forces that leave their cells, flanks that meet or part,
-flanks that slide fast enough for full friction.
+flanks that slide fast enough for full friction, torques over speed that go on to another piece.
 
 The functions see each other and their constants by name, in plain Python and compiled.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ...base.typing import Array, IntArray
 from .friction import UNKNOWN
-from .series import BEFORE, GAP, PAIR, PER_FLANK, PHASE, SLIDE, TOUCH, F, Program
+from .series import BEFORE, GAP, PAIR, PER_FLANK, PHASE, SLIDE, SPEEDING, TOUCH, F, Program
 
 #: Part of a cell's width by which a discontinuity is passed in its prediction, so that the step contains it.
 PAST = 2e-3
@@ -72,6 +72,11 @@ def _bounds(w: int, p: Program, pieces: IntArray) -> tuple[float, float, float]:
     """Return the lower and upper bound of a watched series' cell, and the excess beyond them that is rounding."""
     kind = p.watches[w, 0]
     k = p.watches[w, 1]
+    if kind == SPEEDING:
+        piece = p.speeds.first[k] + pieces[p.speeds.piece[k]]
+        first = p.speeds.start[piece] - p.speeds.origin[piece] if piece > p.speeds.first[k] else -1e300
+        end = p.speeds.start[piece + 1] - p.speeds.origin[piece] if piece + 1 < p.speeds.first[k + 1] else 1e300
+        return first, end, p.speeds.slack[k]
     at = p.places.piece[k]
     law = p.places.law[k]
     if kind == PHASE:
@@ -89,9 +94,8 @@ def _bounds(w: int, p: Program, pieces: IntArray) -> tuple[float, float, float]:
         return -1e300, 0.0, SAME * SMALL
     if kind == SLIDE:
         side = pieces[at + PER_FLANK + p.laws.touch.shape[1] + p.watches[w, 3]]
-        if side == 0:
-            return -1.0, 1.0, SAME
-        return (1.0 if side == 1 else -1e300), (-1.0 if side == -1 else 1e300), SAME
+        low = -1.0 if side == 0 else (1.0 if side == 1 else -1e300)
+        return low, (1.0 if side == 0 else (-1.0 if side == -1 else 1e300)), SAME
     slack = SAME * SMALL if kind == TOUCH else SAME
     return (0.0, 1e300, slack) if pieces[at + 2] >= 0 else (-1e300, 0.0, slack)
 
@@ -100,13 +104,17 @@ def _go_on(w: int, last: int, x: float, reached: bool, p: Program, memory: Array
     """Keep the pair forces at x for the next step; at a discontinuity, go on to the next cell."""
     kind = p.watches[w, 0]
     k = p.watches[w, 1]
-    at = p.places.piece[k]
-    row = p.places.row[k]
-    slot = p.watches[w, 3]
     low, high, slack = _bounds(w, p, pieces)
     value, slope = _polynomial(memory, _watched(w, p, pieces), last, x)
     up = reached and slope > 0.0 and value >= high - slack
     down = reached and slope < 0.0 and value <= low + slack
+    if kind == SPEEDING:
+        if up or down:
+            pieces[p.speeds.piece[k]] += 1 if up else -1
+        return
+    at = p.places.piece[k]
+    row = p.places.row[k]
+    slot = p.watches[w, 3]
     if kind == PAIR:
         part = pieces[at + PER_FLANK + slot]
         law = p.places.law[k]

@@ -15,7 +15,8 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
   against the driven gear;
 - *gyroscopic*: :math:`-J_p\Omega\,(u_{d+1}', -u_d')`, :math:`\Omega = g\psi' + u_s'`, on the tilts d, d + 1 of a
   shaft with the spin s;
-- *torques*: functions of time along a direction.
+- *torques*: functions of time along a direction d, and of the true speed there, :math:`T(g\psi' + u_d') + c\,u_d'`,
+  c the slope that stands in the system's damping.
 
 A mesh has one flank, or two: the back flank has its own approach, along the other line of action, and its law is
 the driving one's at the mirrored phase, behind the backlash j.
@@ -337,6 +338,36 @@ class Gyro:
         return self.euler or self.stiffening != 0.0
 
 
+@dataclass(frozen=True)
+class SpeedTorque:
+    """Torque along a direction over the true speed there.
+
+    Attributes
+    ----------
+    direction
+        Number of the direction, a rotation beside rolling.
+    ratio
+        Speed for unit speed of the drive.
+    function
+        Torque (N m) over speed (rad/s): pieces of polynomials.
+    damping
+        What the system's constant part has along the direction already (N m s/rad).
+    """
+
+    direction: int
+    ratio: float
+    function: TimeFunction
+    damping: float
+
+    def at(self, rate: Array | float, du: Array) -> Array:
+        """Return the torque (N m) at n speeds of the drive and rates beside rolling (rad/s)."""
+        return np.asarray(self.function(self.ratio * rate + du) + self.damping * du)
+
+    def slope(self, rate: Array | float, du: Array) -> Array:
+        """Return its change with the speed (N m s/rad) at the same."""
+        return np.asarray(self.function(self.ratio * rate + du, 1) + self.damping)
+
+
 @dataclass(frozen=True, eq=False)
 class TrainForces:
     """The forces along `size` directions.
@@ -349,6 +380,8 @@ class TrainForces:
         What depends on the motion.
     torques
         Pairs (direction, torque over time in N m).
+    speed_torques
+        Torques over speed.
     """
 
     size: int
@@ -356,6 +389,7 @@ class TrainForces:
     gyros: tuple[Gyro, ...]
     flanks: tuple[Flank, ...]
     torques: tuple[tuple[int, TimeFunction], ...]
+    speed_torques: tuple[SpeedTorque, ...] = ()
 
     @property
     def couples(self) -> tuple[Gyro, ...]:
@@ -401,6 +435,8 @@ class TrainForces:
                 out[:, d + 1] += gyro.stiffening * rate**2 * second + half * first
         for direction, torque in self.torques:
             out[:, direction] += torque(t)
+        for over in self.speed_torques:
+            out[:, over.direction] += over.at(rate, du[:, over.direction])
         return out
 
     @property

@@ -24,7 +24,7 @@ from ...gears.gearmesh.mesh_table import Tilting
 from ...gears.gearmesh.periodic import PeriodicInterpolant
 from ...gears.geometry.mesh_geometry import ContactModel
 from ...gears.geometry.pair import Gear, MeshGeometry
-from ...multibody.series.timefunctions import TimeFunction
+from ...multibody.series.timefunctions import TimeFunction, constant
 from ..bearings import BallBearing, RollerBearing
 from .friction import Lubrication
 from .kinematics import Kinematics, kinematics
@@ -336,6 +336,37 @@ class Coupling:
 
 
 @dataclass(frozen=True)
+class SpeedCurve:
+    """Torque over speed, of a motor or a load.
+
+    Parameters
+    ----------
+    function
+        Torque (N m) by pieces of polynomials, without sines, of the speed (rad/s) where a `TimeFunction` has the time.
+    reference
+        Speed (rad/s) whose torque counts as the steady one; `torque` beside the curve holds it already.
+    """
+
+    function: TimeFunction
+    reference: float
+
+    @property
+    def steady(self) -> float:
+        """Torque at the reference (N m)."""
+        return float(self.function(self.reference))
+
+    @property
+    def change(self) -> TimeFunction:
+        """Torque over speed, less the steady one."""
+        return self.function + constant(-self.steady)
+
+    @property
+    def slope(self) -> float:
+        """By how much the torque falls with the speed at the reference (N m s/rad)."""
+        return -float(self.function(self.reference, 1))
+
+
+@dataclass(frozen=True)
 class Drive:
     """Rotation of a shaft relative to one of its bores as a function of time, or a torque on it.
 
@@ -356,6 +387,8 @@ class Drive:
         Over time (N m), instead of a prescribed rotation.
     slope
         By how much the torque falls with the speed beyond the nominal one (N m s/rad).
+    over_speed
+        Further torque over the true speed; `torque` holds its steady part.
     """
 
     shaft: str
@@ -367,6 +400,7 @@ class Drive:
     machine: str = ""
     torque: TimeFunction | None = None
     slope: float = 0.0
+    over_speed: SpeedCurve | None = None
 
 
 @dataclass(frozen=True)
@@ -390,6 +424,8 @@ class Load:
         Name of a machine of the shaft on which it acts; empty: the shaft itself.
     slope
         By how much the torque falls with the speed beyond rolling with the drive's (N m s/rad).
+    over_speed
+        Further torque over the true speed; `torque` holds its steady part.
     """
 
     shaft: str
@@ -400,6 +436,7 @@ class Load:
     along: float | None = None
     machine: str = ""
     slope: float = 0.0
+    over_speed: SpeedCurve | None = None
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ from .bearings import BearingLoads, bearing_loads, bore_motion, shaft_motion
 from .checks import SAME, check_train, overlap
 from .driveline import Driveline, MachineRotor, driveline, machine_rotors
 from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, pin_rows, planes, rotor
-from .forces import Gyro, TrainForces, derivative
+from .forces import Gyro, SpeedTorque, TrainForces, derivative
 from .gear_train import Carrier, Drive, Five, GearTrain, Load, Pin, Shaft
 from .kinematics import Kinematics, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
@@ -291,7 +291,7 @@ def _operating_point(train: GearTrain) -> OperatingPoint:
         return OperatingPoint()
     at_speed = replace(
         train,
-        drive=replace(train.driven, torque=None, slope=0.0),
+        drive=replace(train.driven, torque=None, slope=0.0, over_speed=None),
         shafts=tuple(replace(shaft, initial_speed=None) for shaft in train.shafts),
         machines=tuple(replace(machine, initial_speed=None) for machine in train.machines),
     )
@@ -333,7 +333,7 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
     lines = lines or mesh_lines(train, placed)
     orders = _orders(train, placed)
     torques = _torques(train, placed, angle) + tuple(order[:2] for order in orders)
-    forces, directions = _forces(train, lines, torques, angle, placed)
+    forces, directions = _forces(train, lines, (torques, _speed_torques(train, placed)), angle, placed)
     series = train_series(forces)
     changing = LocalForce(
         tuple(bodies), directions, forces.at_one_time, series, forces.breaks, forces.pieces if forces.jumps else None,
@@ -425,12 +425,25 @@ def _slopes(train: GearTrain, shafts: Shafts, bodies: list[Element]) -> list[Ele
     made: list[Element] = []
     ends: list[Drive | Load] = [train.driven, *train.loads]
     for number, end in enumerate(ends):
-        if end.slope > 0.0:
+        slope = end.slope + (0.0 if end.over_speed is None else end.over_speed.slope)
+        if slope != 0.0:
             row = _acts(train, end, shafts)
             square = np.outer(row, row)
             name = f"slope of load {number}" if number else "slope of the drive"
-            made.append(LinearForce(tuple(bodies), end.slope * square, 0.0 * square, name))
+            made.append(LinearForce(tuple(bodies), slope * square, 0.0 * square, name))
     return made
+
+
+def _speed_torques(train: GearTrain, shafts: Shafts) -> list[tuple[Array, SpeedTorque]]:
+    """Directions in the system of torques over speed, and these, whose own directions are not numbered yet."""
+    ends: list[Drive | Load] = [train.driven, *train.loads]
+    found = []
+    for end in ends:
+        if end.over_speed is not None:
+            ratio = shafts.ratios[train.shaft_number(end.shaft)]
+            over = SpeedTorque(-1, ratio, end.over_speed.change, end.over_speed.slope)
+            found.append((_acts(train, end, shafts), over))
+    return found
 
 
 def _orders(train: GearTrain, shafts: Shafts) -> list[tuple[Array, TimeFunction, Fraction]]:
@@ -452,10 +465,15 @@ def _orders(train: GearTrain, shafts: Shafts) -> list[tuple[Array, TimeFunction,
 
 
 def _forces(
-    train: GearTrain, lines: tuple[MeshLine, ...], torques: tuple[tuple[Array, TimeFunction], ...],
+    train: GearTrain, lines: tuple[MeshLine, ...],
+    acting: tuple[tuple[tuple[Array, TimeFunction], ...], list[tuple[Array, SpeedTorque]]],
     angle: TimeFunction, shafts: Shafts,
 ) -> tuple[TrainForces, Array]:  # fmt: skip
-    """All that is not constant: of each shaft tilts and spin, of each mesh up to six directions, one a torque."""
+    """All that is not constant: of each shaft tilts and spin, of each mesh up to six directions, one a torque.
+
+    `acting` are the torques over time and those over speed, with their directions in the system.
+    """
+    torques, over_speed = acting
     columns: list[Array] = []
     gyros: list[Gyro] = []
     frames = [train.frame_of(shaft.name) for shaft in train.shafts]
@@ -478,7 +496,10 @@ def _forces(
     at = len(columns)
     columns += [direction for direction, _ in torques]
     numbered = tuple((at + i, function) for i, (_, function) in enumerate(torques))
-    made = TrainForces(len(columns), angle, tuple(gyros), flanks, numbered)
+    at = len(columns)
+    columns += [direction for direction, _ in over_speed]
+    speeds = tuple(replace(over, direction=at + i) for i, (_, over) in enumerate(over_speed))
+    made = TrainForces(len(columns), angle, tuple(gyros), flanks, numbered, speeds)
     return made, np.array(columns).T
 
 

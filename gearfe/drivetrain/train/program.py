@@ -17,7 +17,7 @@ from . import discontinuities, friction, series
 from .discontinuities import SAME
 from .forces import CurveFlank, Flank, LawFlank, TrainForces
 from .friction import UNKNOWN, Sliding
-from .series import Flanks, Gyros, Places, Program, Slides
+from .series import Flanks, Gyros, Places, Program, Slides, Speeds
 
 #: In place of the friction of flanks without any.
 SMOOTH = Sliding(0.0, 1.0, 0, 0, 0.0, 0.0, 0.0, 0.0)
@@ -52,6 +52,8 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
             shifts.append(flank.shifts)
             rows += series.SLOTS + series.PER_SLOT * slots + series.PER_COUPLE * (slots * (slots - 1) // 2)
             pieces += series.PER_FLANK + 2 * slots
+    speeds, more, rows, pieces = _speeds(forces, rows, pieces)
+    watches += more
     curve, law, row, piece = np.array(places, dtype=np.int64).reshape(-1, 4).T.copy()
     program = Program(
         time_arrays([forces.angle, *(torque for _, torque in forces.torques)]),
@@ -64,8 +66,35 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
         curve_arrays(curves),
         *(curve_arrays(tables).cubics for tables in (errors, levers, moments)),
         laws,
+        speeds,
     )
     return program, rows, pieces
+
+
+def _speeds(forces: TrainForces, rows: int, pieces: int) -> tuple[Speeds, list[tuple[int, int, int, int]], int, int]:
+    """Tables of the torques over speed, what ends a step by them, and the rows and whole numbers with theirs."""
+    torques = forces.speed_torques
+    tables, count = time_arrays([over.function for over in torques]), len(torques)
+    width = tables.factor.shape[1]
+    row = rows + width * np.arange(count)
+    speeds = Speeds(
+        np.array([over.direction for over in torques], dtype=np.int64),
+        np.array([over.ratio for over in torques], dtype=float),
+        np.array([over.damping for over in torques], dtype=float),
+        tables.first,
+        tables.start,
+        tables.origin,
+        tables.factor,
+        np.array([SAME * max(1.0, *map(abs, (1.0, *over.function.breaks))) for over in torques], dtype=float),
+        row.astype(np.int64),
+        (pieces + np.arange(count)).astype(np.int64),
+    )
+    watches = [
+        (series.SPEEDING, number, int(row[number]) + series.PLACE, 0)
+        for number, over in enumerate(torques)
+        if over.function.breaks
+    ]
+    return speeds, watches, rows + width * count, pieces + count
 
 
 def _watches(number: int, flank: Flank, row: int, slots: int) -> list[tuple[int, int, int, int]]:
@@ -109,6 +138,9 @@ def train_series(forces: TrainForces) -> SeriesLaw:
     def begin(t: float, sign: float, u: Array, du: Array, memory: Array, pieces: IntArray) -> None:
         """Cells of all flanks, at a node the one that lies ahead, and the pair forces there; not compiled."""
         angle, rate = float(forces.angle(t)), float(forces.angle(t, 1))
+        for over, at in zip(forces.speed_torques, program.speeds.piece, strict=True):
+            speed = over.ratio * rate + du[over.direction]
+            pieces[at] = np.searchsorted(over.function.starts, speed, side="right") - 1
         slots = program.laws.touch.shape[1]
         for flank, at, row in zip(forces.flanks, program.places.piece, program.places.row, strict=True):
             phase, approach = flank.phase_and_approach(np.array([angle]), u[None])

@@ -120,7 +120,7 @@ def _equations(layout: TrainLayout) -> Iterator[_Equation]:
                 _add(left, {mesh.carrier: one}, Fraction(-gear.teeth))
         yield _Equation(f"mesh {mesh.name!r}", left, {}, mesh.driven.shaft)
     for i, j in layout.couplings:
-        yield _Equation(f"coupling of {layout.shafts[i]!r}", {i: one, j: -one}, {}, j)
+        yield _Equation(f"coupling of {layout.shafts[i]!r} and {layout.shafts[j]!r}", {i: one, j: -one}, {}, j)
     for holder, (shaft, _) in enumerate(layout.guided, start=1):
         yield _Equation(f"shaft {layout.shafts[shaft]!r}", {shaft: one}, {holder: one}, shaft)
 
@@ -135,7 +135,8 @@ def _contradiction(layout: TrainLayout, equation: _Equation) -> InputError:
         cure = "leave its speed_ratio out: a planetary stage turns with two of its members held or driven"
         return InputError(f"{equation.label} speed_ratio", float(ratios[0]), problem, cure)
     problem = f"closes a loop that cannot turn: shaft {name!r} would need two speeds"
-    return InputError(equation.label, None, problem, "take a gear out of the loop, or change its teeth")
+    cure = "take a gear or a coupling out of the loop, or change its teeth"
+    return InputError(equation.label, None, problem, cure)
 
 
 def _open(layout: TrainLayout, number: int, name: str) -> InputError:

@@ -35,11 +35,13 @@ COUPLE, NUMBERS, COUPLE_SLOPE, BOTH, PER_COUPLE = range(5)
 #: Rows of a gyroscopic moment: angular momentum, rates of both tilts; of a frame that turns beside these its speed,
 #: its square, half the rate of the momentum, and both places.
 MOMENTUM, TILT, OTHER, TURN, TURN2, EULER, FIRST, SECOND, PER_GYRO = range(9)
+#: Rows of a torque over speed: the speed from the origin of its piece, then Horner's sums of its polynomial.
+PLACE, SUMS = range(2)
 #: Column of the phase of a cell's node, and of F_0 beside the coefficients of t.
 ORIGIN = 4
 #: What a step may not pass: the cell of a phase, touch of a flank with a curve, pull of a damper, the cell of a pair,
-#: the range of its sliding speed.
-PHASE, TOUCH, PULL, PAIR, SLIDE = range(5)
+#: the range of its sliding speed, the piece of a torque over speed.
+PHASE, TOUCH, PULL, PAIR, SLIDE, SPEEDING = range(6)
 #: Whole numbers of a flank: mesh cycle, cell, whether it bears (a curve) or damping acts (>= 0: it does); then the
 #: cells of the slots, -1 for pairs that do not bear; then the ranges of
 #: v/v0, see `gearfe.drivetrain.train.friction.smoothed_sign`.
@@ -99,6 +101,21 @@ class Places(NamedTuple):
     shifts: Array  # of the tooth pairs (m), one flank after the other
 
 
+class Speeds(NamedTuple):
+    """Torques over speed, see `gearfe.drivetrain.train.forces.SpeedTorque`."""
+
+    direction: IntArray  # (n,)
+    ratio: Array  # (n,)
+    damping: Array  # (n,)
+    first: IntArray  # (n + 1,) first piece of each
+    start: Array  # (pieces,) speed at which a piece begins
+    origin: Array  # (pieces,)
+    factor: Array  # (pieces, width) lowest power first
+    slack: Array  # (n,) speed that is round-off
+    row: IntArray  # (n,) first row
+    piece: IntArray  # (n,) whole number: the piece
+
+
 class Program(NamedTuple):
     """The whole."""
 
@@ -114,6 +131,7 @@ class Program(NamedTuple):
     levers: Array  # (all nodes, 4) places along the face width, alike
     moments: Array  # (all nodes, 4) moments along the face width, alike
     laws: Laws
+    speeds: Speeds
 
 
 def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array) -> None:
@@ -170,6 +188,8 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
                 memory[row + EULER, j] = 0.0
             out[d] -= product(j, row + EULER, row + SECOND, memory)
             out[d + 1] += product(j, row + EULER, row + FIRST, memory)
+    for k in range(p.speeds.row.shape[0]):
+        _over_speed(j, k, rate, u, p, memory, pieces, out)
     for k in range(p.places.row.shape[0]):
         row = p.places.row[k]
         d = p.flanks.direction[k]
@@ -204,6 +224,26 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
                 if tilt >= 0:
                     out[tilt] -= product(j, row + OFFSET, row + PRESS, memory)
                 out[d] -= p.flanks.damping[k] * (rate * u[d, j + 1] - late)
+
+
+def _over_speed(
+    j: int, k: int, rate: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array
+) -> None:  # fmt: skip
+    """Add order j of the torque k over speed: the polynomial of its piece, by Horner's rule."""
+    d = p.speeds.direction[k]
+    row = p.speeds.row[k]
+    piece = p.speeds.first[k] + pieces[p.speeds.piece[k]]
+    width = p.speeds.factor.shape[1]
+    memory[row + PLACE, j] = rate * (p.speeds.ratio[k] * memory[0, j + 1] + u[d, j + 1])
+    if j == 0:
+        memory[row + PLACE, 0] -= p.speeds.origin[piece]
+    value = p.speeds.factor[piece, width - 1] if j == 0 else 0.0
+    for power in range(width - 2, -1, -1):
+        memory[row + SUMS + power, j] = value
+        value = product(j, row + SUMS + power, row + PLACE, memory)
+        if j == 0:
+            value += p.speeds.factor[piece, power]
+    out[d] += value + p.speeds.damping[k] * rate * u[d, j + 1]
 
 
 def _cubic(j: int, z: int, numbers: int, column: int, memory: Array) -> float:
@@ -436,5 +476,6 @@ def _pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, 
 
 
 FUNCTIONS = (
-    _step_begins, product, _cubic, _cubic_slope, _contact, _gaps, _friction, smoothed_sign, _pair_forces, time_series,
+    _step_begins, product, _over_speed, _cubic, _cubic_slope, _contact, _gaps, _friction, smoothed_sign, _pair_forces,
+    time_series,
 )  # fmt: skip

@@ -18,6 +18,7 @@ from ...base.typing import Array
 from ...fem.reduction.error import reduction_error
 from ...multibody import IntegrationError, Start, Status, Trajectory, integrate
 from ...multibody.integrators.integrate import chosen_method
+from .gear_train import Drive, Load
 from .model import TrainModel
 from .parting import Parting, apart_in_steps, beyond_law, parted
 from .planetary import mesh_families
@@ -165,6 +166,7 @@ class _Totals:
     least_at: Array = field(default_factory=lambda: np.zeros(0))
     most: Array = field(default_factory=lambda: np.zeros(0))
     parting: list[Parting] = field(default_factory=list)
+    speeds: list[tuple[float, float]] = field(default_factory=list)
 
     def add(self, model: TrainModel, trajectory: Trajectory, moved: TrainStates, seconds: float) -> None:
         """Count steps and seconds, keep each mesh's least force, its time, the largest size, and when teeth part."""
@@ -186,6 +188,26 @@ class _Totals:
             self.least_at = np.where(low < self.least, moved.time[force.argmin(axis=0)], self.least_at)
             self.least = np.minimum(low, self.least)
             self.most = np.maximum(np.abs(force).max(axis=0), self.most)
+            torques, rate = model.forces.speed_torques, model.angle(moved.time, 1)
+            turned = [over.ratio * rate + moved.v @ model.directions[:, over.direction] for over in torques]
+            self.speeds = [
+                (min(low, float(speed.min())), max(high, float(speed.max())))
+                for (low, high), speed in zip(self.speeds or [(np.inf, -np.inf)] * len(torques), turned, strict=True)
+            ]
+
+    def beyond(self, model: TrainModel) -> list[str]:
+        """Sentences about torques over speed whose shafts turn faster than they are known for."""
+        ends: list[Drive | Load] = [model.train.driven, *model.train.loads]
+        ends = [end for end in ends if end.over_speed is not None]
+        found = []
+        for end, over, (low, high) in zip(ends, model.forces.speed_torques, self.speeds, strict=False):
+            known = over.function.breaks
+            if known and (low < known[0] or high > known[-1]):
+                found.append(
+                    f"the torque over speed on shaft {end.shaft} is known from {known[0]:.6g} to {known[-1]:.6g} "
+                    f"rad/s, and the speed went from {low:.6g} to {high:.6g}: beyond, the torque of the end holds"
+                )
+        return found
 
     def statistics(self, model: TrainModel, trajectory: Trajectory) -> dict[str, Any]:
         """Statistics of the response."""
@@ -257,6 +279,7 @@ def _whole(
 ) -> TrainResponse:
     """The last piece with estimates and warnings of the whole run."""
     warnings = model.mesh_notes + model.operating.warnings + totals.pulls(model) + _loose(model)
+    warnings += totals.beyond(model)
     if response.status != "done":
         warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms {ended}")
     estimates: dict[str, float] = {}

@@ -68,6 +68,8 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     drive, row = model.train.driven, model.drive_row
     if drive.torque is not None:
         push = drive.torque(t) - drive.slope * (v @ row)
+        if drive.over_speed is not None:
+            push += drive.over_speed.change(model.angle(t, 1) + v @ row)
     elif drive.stiffness is None:
         push = -multipliers["drive"]
     else:
