@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 import tomllib
+from decimal import Decimal
 
 import pytest
 
@@ -549,16 +551,25 @@ def test_the_planetary_model_balances():
     """Willis: carrier over sun 1 + 61/17 in torque; the planets share it alike."""
     job = gearfe.rexs_job(FVA)
     complete(job)
-    train = job.tables.get("train") or job.left["train", ""][0]
+    train = job.tables["train"]
     assert train["drive"]["shaft"] == "Sonnenwelle"
     load = train["loads"][0]
     assert load["shaft"] == "Steg_1"
     assert load["torque_Nm"] == pytest.approx(-1591.5494309189535 * (1.0 + 61.0 / 17.0), rel=1e-10)
     ring = job.tables["gears"]["Hohlrad"]
     assert (ring["teeth"], ring["rim_diameter_mm"], ring["cutter_teeth"]) == (-61, -280.0, 23)
-    sun = [mesh for mesh in job.tables["meshes"].values() if mesh["driver"] == "Sonnenrad"]
-    shares = [mesh["stiffness"]["torque_Nm"] for mesh in sun]
-    assert shares == pytest.approx(len(shares) * [1591.5494309189535 / 3.0 * 22.0 / 17.0], rel=1e-8)
+    sun, inner = job.tables["meshes"].values()  # written once for the three planets
+    assert (sun["driver"], sun["driven"]) == ("Sonnenrad", "Planetenrad")
+    assert (inner["driver"], inner["driven"]) == ("Planetenrad", "Hohlrad")
+    share = 1591.5494309189535 / 3.0 / 17.0  # N m a tooth
+    assert sun["stiffness"]["torque_Nm"] == pytest.approx(share * 22.0, rel=1e-8)
+    assert inner["stiffness"]["torque_Nm"] == pytest.approx(share * 61.0, rel=1e-8)
+    assert inner["stiffness_N_per_m"] == 20.0e6 * 50.0  # 20 N/(mm um) over 50 mm
+    assert list(job.tables["carriers"].values()) == [{"shaft": "Steg_1", "planets": 3}]
+    assert job.tables["shafts"]["Hohlradwelle"]["speed_ratio"] == 0
+    # the carrier is Steg 1, the shaft between its cheeks and Steg 2: 100, 50 and 8 mm
+    assert [section["length_mm"] for section in job.tables["shafts"]["Steg_1"]["sections"]] == [100.0, 50.0, 8.0]
+    assert len(job.tables["shafts"]) == 4
 
 
 def test_the_command(tmp_path, capsys):
@@ -584,6 +595,31 @@ def test_gears_of_the_published_models_run(tmp_path, capsys, model, said):
     assert main(["new", "--from", str(model), str(target)]) == 0
     assert main(["gear", str(target), "--out", str(tmp_path / "gear"), "--no-pictures"]) == 0
     assert said in capsys.readouterr().out
+
+
+def test_the_planetary_train_is_read(tmp_path):
+    """Three planets with six meshes, and a carrier that turns by 17/(17 + 61) of the sun."""
+    raw = tomllib.loads(gearfe.rexs_job(FVA).text())
+    tables = train_tables(raw, "fva.toml")
+    assert len(tables["gearbox"].meshes) == 6
+    train = tables["train"]
+    planets = [shaft for shaft in train.shafts if shaft.carrier is not None]
+    places = sorted(math.degrees(math.atan2(shaft.z_mm, shaft.x_mm)) % 360.0 for shaft in planets)
+    assert places == pytest.approx([0.0, 120.0, 240.0])
+    assert [math.hypot(shaft.x_mm, shaft.z_mm) for shaft in planets] == pytest.approx(3 * [78.0])
+
+
+def test_planets_that_differ_stay_apart():
+    """One planet with another face width: meshes alone, and the reason in the list."""
+    model = gearfe.read_rexs(FVA)
+    width = model.components[248].attributes["face_width"]
+    model.components[248].attributes["face_width"] = dataclasses.replace(width, value=Decimal(49))
+    job = rexs_job(model)
+    complete(job)
+    assert "carriers" not in job.tables
+    assert len(job.tables["meshes"]) == 6
+    assert "train" not in job.tables
+    assert any("planets differ" in line for line in job.lines("ignored"))
 
 
 def test_tips_of_a_ring_stay_on_the_involutes_of_the_planets():
