@@ -240,9 +240,9 @@ def influence(
     share = min(height / pair.b, 1.0 / 3.0)
     N_F = 1.0 / (1.0 + share + share**2)
 
-    alpha = load.transverse_load_factor
-    K_Halpha = K_Falpha = alpha
-    if alpha is None:
+    if load.transverse_load_factor is not None:
+        K_Halpha = K_Falpha = load.transverse_load_factor
+    else:
         q = c_alpha * (max(f_pb, f_falpha) - y_p) / (mean_load * K_Hbeta)
         gamma = pair.eps_gamma
         if gamma <= 2.0:
