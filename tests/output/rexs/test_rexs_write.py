@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import tomllib
 import zipfile
@@ -13,7 +14,7 @@ import pytest
 import gearfe
 from gearfe.base.errors import InputError
 from gearfe.base.tables.examples import job_file
-from gearfe.base.tables.jobs import gearbox_of
+from gearfe.base.tables.jobs import gearbox_of, train_tables
 from gearfe.cli.main import main
 from gearfe.output.exchange.rexs import read_rexs, rexs_job, write_rexs
 from gearfe.output.exchange.rexs.read import read_model
@@ -21,7 +22,7 @@ from gearfe.output.exchange.rexs.schema import OWN, schema
 from gearfe.output.exchange.rexs.units import UNITS
 from gearfe.output.exchange.rexs.write import rexs_bytes
 from tests.makers.rexs_models import saved, spur_pair, xml_of
-from tests.places import DATA
+from tests.places import DATA, GEOMETRY
 
 EXAMPLES = sorted((DATA / "rexs").glob("*.rexs"))
 
@@ -254,6 +255,28 @@ def test_a_pair_with_its_flanks():
     assert two.driver.microgeometry == one.driver.microgeometry
     assert two.driver.material == one.driver.material
     assert back["loadmap"]["torques_Nm"] == raw["loadmap"]["torques_Nm"]
+
+
+@pytest.mark.parametrize("name", ["gear_train.toml", "helical.toml"])
+def test_lists_of_a_train(name):
+    """[[train.shafts]] and so on become tables by name: what the commands read of both is the same."""
+    raw = tomllib.loads((GEOMETRY / name).read_text(encoding="utf-8"))
+    back = rexs_job(read_model(rexs_bytes(raw), name))
+    assert not back.left
+    one, two = (train_tables(job, name, "") for job in (raw, dict(back.tables)))
+    for gear, other in ((gear, two["gearbox"].gears[key]) for key, gear in one["gearbox"].gears.items() if gear.shaft):
+        for key in ("form", "y_mm", "shaft", "teeth", "density_kg_per_m3", "material", "microgeometry"):
+            assert getattr(gear, key) == getattr(other, key), (gear.name, key)
+    for kind in ("shafts", "bearings", "machines", "couplings", "drive", "loads", "damping", "curves", "variants"):
+        assert getattr(one["train"], kind) == getattr(two["train"], kind), kind
+    for mesh, other in zip(one["train"].meshes, two["train"].meshes, strict=True):
+        same = [item.name for item in dataclasses.fields(mesh) if item.name != "centre_distance_mm"]
+        assert [getattr(mesh, key) for key in same] == [getattr(other, key) for key in same]
+    for key, mesh in one["gearbox"].meshes.items():
+        other = two["gearbox"].meshes.get(key)
+        if other is not None:
+            for value in ("centre_distance_mm", "misalignment_um", "misalignment_across_um"):
+                assert getattr(mesh, value) == getattr(other, value)
 
 
 def test_json_numbers_are_numbers(tmp_path):

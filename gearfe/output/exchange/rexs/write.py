@@ -21,8 +21,8 @@ from ....base.config import read_toml
 from ....base.errors import InputError
 from ....base.files import whole_file
 from ....base.tables.bearing import ANGULAR, CYLINDRICAL, DEEP_GROOVE, TAPERED
-from ....base.tables.gearbox import Gearbox, NamedGear
-from ....base.tables.jobs import gearbox_of, job_tables
+from ....base.tables.gearbox import Gearbox, NamedGear, mesh_name
+from ....base.tables.jobs import gearbox_of, job_tables, train_tables
 from ....base.tables.named import NAMED
 from ....base.tables.pair import FROM_DISTANCE
 from ....base.tables.text import toml_document
@@ -162,8 +162,10 @@ def rexs_bytes(raw: Mapping[str, Any], form: str = "xml", name: str = "job") -> 
 
 
 def _by_name(raw: dict[str, Any], path: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the tables by name of a job, of [pair] and [microgeometry], too, and its other tables."""
-    if "gears" not in raw and "pair" in raw and "shafts" not in raw.get("train", {}):
+    """Return the tables by name of a job, of shorthand, too, and its other tables."""
+    if "gears" not in raw and raw.get("train", {}).get("shafts"):
+        raw = _of_train(raw, path)
+    elif "gears" not in raw and "pair" in raw:
         raw = _of_pair(raw, path)
     if "gears" not in raw:
         problem = "is not there: REXS is written of gears by name, or of [pair]"
@@ -193,6 +195,58 @@ def _of_pair(raw: dict[str, Any], path: str) -> dict[str, Any]:
         others["loadmap"] = loads
     materials = {f"{gear.name}_material": table_dict(gear.material) for gear in mesh.gears if gear.material is not None}
     return {**others, "gears": gears, "meshes": {"pair": keep}, **({"materials": materials} if materials else {})}
+
+
+def _of_train(raw: dict[str, Any], path: str) -> dict[str, Any]:
+    """Tables by name that say what the lists of [train] do, with [pair] and [microgeometry] where gears are theirs."""
+    tables = train_tables(raw, path, "")
+    train, box = tables["train"], tables["gearbox"]
+    bores = {str(bore.attachment): bore for bore in train.rigid_bores}
+    carried = {str(bearing.attachment): bearing for bearing in train.bearings}
+    shafts, bearings, used = {}, {}, set()
+    for shaft in train.shafts:
+        entry = table_dict(shaft)
+        name = entry.pop("name")
+        entry["attachments"] = [hinge for hinge in shaft.attachments if str(hinge) not in carried]
+        for hinge in shaft.attachments:
+            if str(hinge) not in carried:
+                continue
+            bearing = {**table_dict(carried[str(hinge)]), "shaft": name}
+            del bearing["attachment"]
+            if train.housing == "rigid" and str(hinge) in bores:
+                bearing["y_mm"] = bores[str(hinge)].y_mm
+                used.add(str(hinge))
+            bearings[str(hinge)] = bearing
+        if not entry["attachments"]:
+            del entry["attachments"]
+        shafts[name] = entry
+    meshes = {}
+    for mesh in train.meshes:
+        known = box.meshes[mesh_name(mesh.driver, mesh.driven)]
+        keys = {"centre_distance_mm": known.centre_distance_mm, "misalignment_um": known.misalignment_um,
+                "misalignment_across_um": known.misalignment_across_um}  # fmt: skip
+        meshes[known.name] = table_dict(mesh) | {key: value for key, value in keys.items() if value}
+    gears, materials = {}, {}
+    for name, gear in box.gears.items():
+        if not gear.shaft:
+            continue
+        gears[name] = {**_gear_entry(gear), "shaft": gear.shaft, "y_mm": gear.y_mm}
+        materials[f"{name}_material"] = (
+            {"density_kg_per_m3": gear.density_kg_per_m3} if gear.material is None else table_dict(gear.material)
+        )
+        gears[name]["material"] = f"{name}_material"
+    others = {name: table for name, table in raw.items() if name not in ("pair", "microgeometry")}
+    lists = ("shafts", "gears", "meshes", "bearings", "machines", "couplings", "rigid_bores")
+    others["train"] = {key: value for key, value in raw["train"].items() if key not in lists}
+    hinges = [table_dict(bore) for name, bore in bores.items() if name not in used]
+    if hinges:
+        others["train"]["rigid_bores"] = hinges
+    parts = {
+        kind: {item.name: {key: value for key, value in table_dict(item).items() if key != "name"} for item in items}
+        for kind, items in (("machines", train.machines), ("couplings", train.couplings))
+    }
+    made = {"materials": materials, "gears": gears, "meshes": meshes, "shafts": shafts, "bearings": bearings, **parts}
+    return {**{kind: table for kind, table in made.items() if table}, **others}
 
 
 def _gear_entry(gear: NamedGear) -> dict[str, Any]:
