@@ -147,3 +147,27 @@ def test_computed_values_of_a_torque_out_of_range(tmp_path: Path, capsys: pytest
     line = ["rating", str(FZG), "--computed", "--set", "rating.torque_Nm=1e7", "--out", str(tmp_path), "--no-pictures"]
     assert main(line) == 2
     assert "rating.torque_Nm" in capsys.readouterr().err
+
+
+def test_computed_values_where_the_larger_gear_drives(tmp_path: Path) -> None:
+    """B and D change places, as M_1 and M_2 do; gear 1 is the wheel of the pair."""
+    swapped = {
+        "pair.pinion.teeth": 24,
+        "pair.pinion.tip_diameter_mm": 118.35,
+        "pair.pinion.profile_shift": 0.171481,
+        "pair.wheel.teeth": 16,
+        "pair.wheel.tip_diameter_mm": 82.45,
+        "stiffness.torque_Nm": 135.5,
+        "rating.torque_Nm": 203.25,
+        "rating.speed_rpm": 1000,
+    }
+    changes = [word for key, value in swapped.items() for word in ("--set", f"{key}={value}")]
+    assert main(["rating", str(FZG), *changes, "--computed", "--out", str(tmp_path), "--no-pictures"]) == 0
+    made = json.loads((tmp_path / "rating.json").read_text())
+    rows = {row["name"]: row for row in made["computed"]}
+    assert made["gears"]["gear_1"] == "wheel"
+    assert rows["pressure at D"]["standard"] == pytest.approx(1102.1, abs=0.1)
+    assert rows["pressure at B"]["standard"] == pytest.approx(1004.6, abs=0.1)
+    assert rows["pressure at D"]["computed"] > rows["pressure at B"]["computed"]
+    assert rows["root stress wheel"]["standard"] == pytest.approx(187.88, abs=0.01)
+    assert rows["root stress wheel"]["computed"] == pytest.approx(170.0, abs=1.0)

@@ -430,3 +430,13 @@ def test_loss_factor_of_the_fzg_pair_as_printed() -> None:
         for z, x, tip in ((16, 0.1817, 41.228), (24, 0.1715, 59.182))
     ]
     assert loss(pair_data(MeshGeometry(gears[0], gears[1], 91.5e-3))).H_V == pytest.approx(0.1950, abs=5e-5)
+
+
+def test_pressure_of_the_fzg_pair_as_printed() -> None:
+    """p_C 1347.3 MPa at 200 N m on the pinion: that of one pair, without Z_eps."""
+    gears = [
+        Gear(z, 4.5e-3, math.radians(20), 14e-3, 30e-3, profile_shift=x, addendum=tip / 4.5 - z / 2 - x)
+        for z, x, tip in ((16, 0.1817, 41.228), (24, 0.1715, 59.182))
+    ]
+    rating = rate(MeshGeometry(gears[0], gears[1], 91.5e-3), {"torque_Nm": 200.0, "speed_rpm": 1500.0})
+    assert rating.flank.sigma_H0_MPa / rating.flank.Z_eps == pytest.approx(1347.3, abs=0.05)
