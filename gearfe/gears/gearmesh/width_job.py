@@ -366,8 +366,8 @@ def map_angles(job: StiffnessJob, table: LoadMapTable) -> Array:
 
 def estimated_errors(
     job: StiffnessJob, lines: ContactLines, sweep: WidthSweep, table: LoadMapTable | None, watch: Stopwatch
-) -> dict[str, Array]:
-    """Return relative errors of the headline numbers of a sweep, for each load.
+) -> dict[str, list[float]] | dict[str, float]:
+    """Return relative errors of the headline numbers of a sweep: for each load of a map, or of the one of [stiffness].
 
     They are the differences by points doubled, by two more functions along the width, and by coarser sections. Those of
     sections `COARSENING` times coarser count over what the order of convergence makes of them.
@@ -403,7 +403,9 @@ def estimated_errors(
         for name, value in numbers.items():
             with np.errstate(invalid="ignore", divide="ignore"):
                 found[name] += np.where(value != 0.0, np.abs(other[name] - value) / share / np.abs(value), np.nan)
-    return found
+    if table is None:
+        return {name: float(errors[0]) for name, errors in found.items()}
+    return {name: errors.tolist() for name, errors in found.items()}
 
 
 def headline_numbers(sweep: WidthSweep) -> dict[str, Array]:

@@ -310,7 +310,7 @@ def width_summary(
     sweep: WidthSweep,
     timings: Mapping[str, float],
     *,
-    errors: Mapping[str, Array] | None = None,
+    errors: Mapping[str, float | list[float]] | None = None,
     roots: WideRoots | None = None,
     **tables: Any,
 ) -> dict[str, Any]:
@@ -327,7 +327,7 @@ def width_summary(
     timings : mapping
         Name -> time that a part of the work took (s).
     errors : mapping, optional
-        Estimated relative errors of each load, see `.width_job.estimated_errors`.
+        Estimated relative errors, see `.width_job.estimated_errors`.
     roots : WideRoots, optional
         Root stresses.
     tables
@@ -351,7 +351,7 @@ def width_summary(
             "kinematics": "small",
         },
         "by_torque": load_table(job, mesh, sweep, roots),
-        "error_estimate": None if errors is None else {name: values.tolist() for name, values in errors.items()},
+        "error_estimate": None if errors is None else dict(errors),
         "mean_tangent_twist_and_tilts_Nm_per_rad": (np.nanmean(sweep.tangent, axis=1) * along_y).tolist(),
         "statuses": dict(zip(statuses.tolist(), counts.tolist(), strict=True)),
         "timings_s": timings,
@@ -404,7 +404,8 @@ def width_lines(found: Mapping[str, Any]) -> list[str]:
             )
             lines.append(f"  largest root stress: {', '.join(stresses)}")
         if found["error_estimate"] is not None:
-            errors = ", ".join(f"{name} {percent(values[i])}" for name, values in found["error_estimate"].items())
+            of_load = {name: float(np.atleast_1d(values)[i]) for name, values in found["error_estimate"].items()}
+            errors = ", ".join(f"{name} {percent(value)}" for name, value in of_load.items())
             lines.append(f"  estimated errors, by points doubled, two more functions and coarser sections: {errors}")
     lines.append(
         f"ISO 6336 method B, for comparison: c' = {iso['c_prime_N_per_mm_um']:.3g}, "
