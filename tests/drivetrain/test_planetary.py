@@ -170,6 +170,24 @@ def test_bearing_forces_stand_still_in_axes_that_do() -> None:
     np.testing.assert_allclose(np.ptp(angle), 2.0 * math.pi, rtol=1e-3)
 
 
+def test_sidebands_at_the_ring_are_of_orders_that_the_number_of_planets_divides() -> None:
+    """McFadden & Smith (1985): equal planets make only orders N k of the carrier at a point that stands still.
+
+    Ring 101, three planets: the mesh has the order 101 in the frame of the carrier, the bearing of the ring 102.
+    """
+    drive = Drive("sun", "sun", constant(1500.0))
+    train = stage(3, (31, 35), mesh=_rigid_curve, damping=Damping(ratio=0.3), drive=drive)
+    model = build_train(train)
+    turn = 2.0 * math.pi / (1500.0 * float(model.kinematics.ratios[2]))
+    time = turn * np.concatenate([[0.0], 1.0 + np.arange(1024) / 1024.0])
+    response = simulate(model, time, tolerance=1e-9, method="taylor")
+    force = response.bearing_load[1:, response.attachment_names.index("ring"), 0]
+    lines = np.abs(np.fft.rfft(force)) / 512.0
+    assert lines[102] > 0.1
+    others = np.delete(lines[:150], range(0, 150, 3))
+    assert others.max() < 1e-6 * lines[102]
+
+
 def test_coriolis_forces_split_translational_modes_by_the_speed_of_the_carrier() -> None:
     """A free rotor on a spring seen from a frame that turns: its frequencies are w0 - W and w0 + W."""
     train = stage(mesh=1.0, bearing=1e8, loads=())

@@ -7,17 +7,20 @@ import json
 import math
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
+from gearfe.base.spectrum import OrderLine
 from gearfe.base.tables.jobs import train_tables
 from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.job import job_train, train_job
 from gearfe.drivetrain.gearbox.stage_report import stage_entries
 from gearfe.drivetrain.train import GearTrain, build_train
+from gearfe.drivetrain.vibration.report import sideband
 from tests.places import GEOMETRY
 
 SHIPPED = GEOMETRY / "planetary.toml"
@@ -78,6 +81,15 @@ def test_the_summary_has_fractions_phases_and_sidebands() -> None:
     order = entries["orders"][0]
     assert order["order"] == pytest.approx(17 * 61 / 78)
     assert list(order["sidebands"].values()) == pytest.approx([17 * 60 / 78, 17 * 62 / 78])
+
+
+def test_lines_beside_a_mesh_frequency_are_named_by_the_turns_of_the_carrier() -> None:
+    lines = (OrderLine("mesh 1", 1, 300.0), OrderLine("mesh 1", 2, 600.0))
+    response: Any = SimpleNamespace(carrier_frequencies_Hz={"arm": 5.0})
+    assert sideband(305.0, lines, response, 1.0) == "mesh 1 x 1 + 1 x carrier arm"
+    assert sideband(585.0, lines, response, 1.0) == "mesh 1 x 2 - 3 x carrier arm"
+    assert sideband(302.5, lines, response, 1.0) is None
+    assert sideband(305.0, lines, response, 6.0) is None  # the spectrum does not part them
 
 
 def test_shipped_modes_run_from_the_command_line(tmp_path: Path) -> None:

@@ -130,6 +130,8 @@ class TrainResponse(ShownTable):
         Of the train.
     shared_meshes
         Numbers of the meshes among which planets share a load, a tuple for each kind.
+    carrier_frequencies_Hz
+        Turns of each carrier in a second.
     """
 
     time: Array
@@ -174,6 +176,7 @@ class TrainResponse(ShownTable):
     machine_names: tuple[str, ...] = ()
     coupling_names: tuple[str, ...] = ()
     shared_meshes: tuple[tuple[int, ...], ...] = ()
+    carrier_frequencies_Hz: Mapping[str, float] = field(default_factory=dict)
 
     AXES = ("time_s",)
 

@@ -400,6 +400,10 @@ def response_of(
         spring_torque=model.driveline.torques(moved.q, moved.v),
         machine_names=tuple(m.name for m in train.machines),
         coupling_names=tuple(c.name for c in train.couplings),
+        carrier_frequencies_Hz={
+            c.name: abs(float(model.ratios[train.shaft_number(c.shaft)])) * speed / (2 * math.pi)
+            for c in train.carriers
+        },
         shared_meshes=tuple(family.meshes for family in mesh_families(train.layout, train.kinematics.phases)),
     )
 

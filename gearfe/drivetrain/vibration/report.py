@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,8 @@ from .spectra import TrainSpectra
 
 #: Lines that the summary names for each signal.
 NAMED = 5
+#: Multiples of the turns of a carrier by which sidebands are named.
+SIDES = 6
 #: Lines smaller than this part of the largest one are round-off.
 LEAST = 1e-6
 
@@ -43,7 +45,7 @@ def lines_of(response: TrainResponse, highest: float) -> tuple[OrderLine, ...]:
 
 
 def dominant(spectra: TrainSpectra, response: TrainResponse, name: str) -> list[dict[str, Any]]:
-    """Largest lines of a signal, each with the multiple of a mesh frequency within one bin of it, if there is one."""
+    """Largest lines of a signal, each with the multiple of a mesh frequency within one bin of it, or its sideband."""
     spectrum = spectra.spectrum
     lines = lines_of(response, float(spectrum.frequency[-1]))
     drive = float(abs(response.shaft_frequencies_Hz[0])) if settled(response) else 0.0
@@ -55,10 +57,41 @@ def dominant(spectra: TrainSpectra, response: TrainResponse, name: str) -> list[
                 "frequency_Hz": peak.frequency,
                 "amplitude": peak.amplitude,
                 "order_of_first_shaft": peak.frequency / drive if drive > 0.0 else None,
-                "near": None if line is None else f"{line.name} x {line.order}",
+                "near": sideband(peak.frequency, lines, response, spectrum.resolution)
+                if line is None
+                else f"{line.name} x {line.order}",
             }
         )
     return found
+
+
+def sideband(frequency: float, lines: Sequence[OrderLine], response: TrainResponse, resolution: float) -> str | None:
+    """Name the sideband of a planetary stage at a frequency: a multiple of a mesh, less or more turns of a carrier.
+
+    Parameters
+    ----------
+    frequency : float
+        Hz.
+    lines : sequence of OrderLine
+        Multiples of the mesh frequencies.
+    response : TrainResponse
+        The motion.
+    resolution : float
+        Of the spectrum (Hz). Sidebands that are nearer to each other than that have no names.
+
+    Returns
+    -------
+    name
+        As ``mesh 1 x 2 + 1 x carrier arm``; None: no sideband.
+    """
+    for name, turns in response.carrier_frequencies_Hz.items():
+        for times in range(1, SIDES + 1):
+            for sign, text in ((-1.0, "-"), (1.0, "+")):
+                shifted = frequency - sign * times * turns
+                line = nearest_line(shifted, lines, 0.51 * resolution) if turns > resolution else None
+                if line is not None:
+                    return f"{line.name} x {line.order} {text} {times} x carrier {name}"
+    return None
 
 
 def train_summary(
@@ -128,7 +161,11 @@ def train_summary(
             "highest_Hz": spectrum.frequency[-1],
             "motion_sampled_every_us": 1e6 * made.step / made.every,
         }
-        summary["dominant_lines"] = {n: dominant(made, response, n) for n in made.names if _named(n)}
+        summary["dominant_lines"] = {
+            n: dominant(made, response, n)
+            for n in made.names
+            if _named(n) or (response.carrier_frequencies_Hz and n.startswith("bearing_"))
+        }
         if made.power is not None:
             found = peaks(made.power.frequency, made.power.power, NAMED)
             summary["radiated_power"] = {
@@ -149,7 +186,7 @@ def train_summary(
 
 
 def _named(signal: str) -> bool:
-    """Whether the summary names the largest lines of a signal; spectrum.csv has those of all."""
+    """Whether the summary names the largest lines of a signal of any train; spectrum.csv has those of all."""
     return "absolute" not in signal and not signal.startswith("bearing_")
 
 
