@@ -609,6 +609,30 @@ def test_the_planetary_train_is_read(tmp_path):
     assert [math.hypot(shaft.x_mm, shaft.z_mm) for shaft in planets] == pytest.approx(3 * [78.0])
 
 
+def test_the_planetary_model_of_version_1_4():
+    """JSON, power instead of torque, oil, and a part of the carrier without a place or sections."""
+    job = gearfe.rexs_job(EXAMPLES / "FVA_Planetary_stage_-_Minus_gearing_1.4.rexsj")
+    complete(job)
+    load = job.tables["train"]["loads"][0]
+    assert load["torque_Nm"] == pytest.approx(-100e3 / (50.0 * math.pi) * 78.0 / 17.0, rel=1e-10)
+    sun, inner = job.tables["meshes"].values()
+    assert sun["mesh_model"] == "variable_stiffness"  # helix slopes make the load vary along the width
+    assert "oil_viscosity_mPa_s" not in {*sun, *inner}  # springs have no friction of their own
+    assert any("oil_viscosity_mPa_s" in line for line in job.lines("ignored"))
+    # the carrier reaches over its planets, which are 50 mm wide and begin at its end
+    assert [section["length_mm"] for section in job.tables["shafts"]["Plate"]["sections"]] == [100.0, 50.0]
+    assert train_tables(tomllib.loads(job.text()), "fva.toml")["train"].carriers
+
+
+def test_shafts_without_a_place_follow_their_couplings(tmp_path):
+    relation = ("side", {"assembly": 72, "inner_part": 70, "outer_part": 3})
+    coupling = {"u_coordinate_on_shaft_inner_side": 50.0, "u_coordinate_on_shaft_outer_side": -5.0}
+    parts, joints = with_motor("coupling", coupling, relation)
+    parts = [(n, k, name, {} if n == 70 else a) for n, k, name, a in parts]
+    shafts = tables_of(tmp_path, parts, joints)["shafts"]
+    assert (shafts["motor"]["x_mm"], shafts["motor"]["y_mm"]) == (0.0, -30.0)  # its end at -5 mm, 50 mm long
+
+
 def test_planets_that_differ_stay_apart():
     """One planet with another face width: meshes alone, and the reason in the list."""
     model = gearfe.read_rexs(FVA)

@@ -120,6 +120,7 @@ def rexs_job(source: str | Path | Model, *, load_case: int | None = None) -> Rex
     for kind, reasons in (("shafts", left_shafts), ("bearings", left_bearings), ("couplings", left_couplings)):
         left |= {(kind, name): ({}, reason) for name, reason in reasons.items()}
     left |= {("couplings", name): ({}, f"holds {shaft} on the housing") for name, shaft in held.items()}
+    planets.place_coupled(reading, tables)
     _friction(reading, tables)
     _loads(reading, tables, held, cases)
     planets.planetary(reading, tables, held, left)
@@ -719,7 +720,7 @@ def _refuse(
         if gear.pop("shaft", None) is not None:
             rule = f"its place along the axis alone, for there is no train: {reason}"
             reading.derived(reading.part("gears", name), "assembly", f"gears.{name}.shaft", rule)
-    for kind in ("shafts", "bearings", "machines", "couplings"):
+    for kind in ("shafts", "bearings", "machines", "couplings", planets.CARRIERS):
         for name in list(tables.get(kind, {})):
             leave(kind, name, f"there is no train: {reason}")
     for table in ("train", "runup"):

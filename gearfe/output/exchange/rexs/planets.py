@@ -97,7 +97,64 @@ def _stage(
                 reading.derived(part, part.kind, f"{kind}.{groups[0][kind][next(iter(names))]}", f"as {planets[0]}")
         reading.derived(reading.part("shafts", planet), "shaft", f"shafts.{planets[0]}", "a planet of the same set")
     _absorb(reading, tables, main, [*carriers, *pins], left)
+    _reach(reading, shafts, main, shafts[planets[0]])
     return ""
+
+
+def _reach(reading: Reading, shafts: dict[str, Any], main: str, planet: Mapping[str, Any]) -> None:
+    """Lengthen the elastic shaft of a carrier up to the far end of its planets, where the file gives no more of it."""
+    body = shafts[main]
+    if "sections" not in body:
+        return
+    low, high = _ends(body)
+    ends = _ends(planet)
+    if low <= planet["y_mm"] <= high:
+        return
+    up = planet["y_mm"] > high
+    more = ends[1] - high if up else low - ends[0]
+    nearest = body["sections"][-1 if up else 0]
+    key = "end" if up else "start"
+    outer = nearest.get("outer_diameter_mm", nearest.get(f"outer_diameter_{key}_mm"))
+    section = {"length_mm": more, "outer_diameter_mm": outer}
+    body["sections"] = [*body["sections"], section] if up else [section, *body["sections"]]
+    body["y_mm"] += 0.5 * more if up else -0.5 * more
+    rule = f"{more:g} mm more of the last diameter: the carrier reaches over its planets"
+    reading.derived(reading.part("shafts", main), "planet_shaft", f"shafts.{main}.sections", rule)
+
+
+def _ends(shaft: Mapping[str, Any]) -> tuple[float, float]:
+    """Places of the ends of a shaft along the axis (mm)."""
+    sections = shaft.get("sections", ())
+    length = sum(section["length_mm"] for section in sections) if sections else shaft.get("length_mm", 0.0)
+    return shaft["y_mm"] - 0.5 * length, shaft["y_mm"] + 0.5 * length
+
+
+def place_coupled(reading: Reading, tables: dict[str, Any]) -> None:
+    """Put shafts without a place on the axis of those that they are coupled to, after their end.
+
+    The coordinates of the coupling on both shafts say how far, where the file gives them.
+    """
+    shafts = tables["shafts"]
+    placed = {name for name in shafts if reading.numbers["shafts", name] in reading.frames}
+    waiting = [name for name in tables["couplings"] if placed]
+    while True:
+        ready = [name for name in waiting if len(placed & {*tables["couplings"][name]["shafts"]}) == 1]
+        if not ready:
+            return
+        name = ready[0]
+        waiting.remove(name)
+        pair = tables["couplings"][name]["shafts"]
+        known, new = pair if pair[0] in placed else pair[::-1]
+        coupling = reading.part("couplings", name)
+        at = [reading.number(coupling, f"u_coordinate_on_shaft_{side}_side", "mm") for side in ("inner", "outer")]
+        one, two = at if pair[0] == known else at[::-1]
+        low, high = _ends(shafts[known])
+        start = high if one is None or two is None else low + one - two
+        length = _ends(shafts[new])[1] - _ends(shafts[new])[0]
+        shafts[new] |= {"x_mm": shafts[known]["x_mm"], "z_mm": shafts[known]["z_mm"], "y_mm": start + 0.5 * length}
+        placed.add(new)
+        rule = f"on the axis of {known}, " + ("after its end" if one is None or two is None else "by its coordinates")
+        reading.derived(coupling, "side", f"shafts.{new}.x_mm, y_mm, z_mm", rule)
 
 
 def _shafts(reading: Reading, stage: Component, relation: str) -> list[Component]:
@@ -280,3 +337,6 @@ def ring_springs(reading: Reading, tables: dict[str, Any]) -> None:
         else:
             reading.defaulted(stage, key, f"{USUAL_MESH:g} N/(mm um) times the face width")
         entry["stiffness_N_per_m"] = 1e6 * (given or USUAL_MESH) * width
+        for oil in [oil for oil in ("oil_viscosity_mPa_s", "roughness_um") if oil in entry]:
+            del entry[oil]
+            reading.ignored(stage, oil, "friction is of meshes with a potential, and this one is a spring")
