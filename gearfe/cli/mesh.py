@@ -71,11 +71,9 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
 
     from ..gears.geometry.pair import pair_of
-    from ..gears.geometry.validity import check_external
 
     check_alike_along(mesh, "a mesh of finite elements", places=False)
     pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
-    check_external(pair, "a mesh of finite elements")
 
     from ..base.files import output_folder
     from ..gears.gearmesh.job import StiffnessJob
@@ -138,9 +136,9 @@ def _parts(args: argparse.Namespace, job: StiffnessJob, wheel_angle: float) -> d
                     mesh = sector_mesh(gear, recipes[number])
                     made = MeshPart(mesh.points, mesh.triangles, {**mesh.boundaries, "contact": mesh.contact_edges()})
                 else:
-                    most = gear.teeth if args.teeth is None else min(args.teeth, gear.teeth)
+                    most = gear.tooth_count if args.teeth is None else min(args.teeth, gear.tooth_count)
                     made = mixed_gear(gear, recipes[number], teeth_near(gear, turned[number], toward[number], most))
-            parts[name] = _placed(made, turned[number], pair.working_centre_distance * number)
+            parts[name] = _placed(made, turned[number], pair.wheel_centre * number)
     return parts
 
 
@@ -170,16 +168,16 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, MeshPa
     if args.teeth < least:
         problem = "leaves tooth pairs that bear without a contact boundary: the deck would not find equilibrium"
         raise InputError("--teeth", args.teeth, problem, f"give {least} or more, or leave it out ({DECK_TEETH})")
-    parts = _parts(args, job, wheel_angle=float(curve.wheel_angle[0]) - twist)
+    parts = _parts(args, job, wheel_angle=float(curve.wheel_angle[0]) - job.pair.sign * twist)
     pair = job.pair
     width = min(pair.pinion.face_width, pair.wheel.face_width)
     heading = (
         f"gearfe {VERSION}, {job.table.law}: torque {torque:.9g} N m at the wheel's hub, twist {twist:.9g} rad",
-        f"centre of the wheel x = {1e3 * pair.working_centre_distance:.9g} mm, pinion angle {args.angle_deg:g} deg",
+        f"centre of the wheel x = {1e3 * pair.wheel_centre:.9g} mm, pinion angle {args.angle_deg:g} deg",
         "contact acts between the driving flanks of the fine teeth",
     )
     materials = [(m.youngs_modulus, m.poisson_ratio) for m in job.materials]
-    deck = Deck(parts, materials, pair.working_centre_distance, twist, width, job.table.plane, heading)
+    deck = Deck(parts, materials, pair.wheel_centre, pair.sign * twist, width, job.table.plane, heading)
     with stage("writing"):
         write_deck(args.out, deck)
     print(f"run it: ccx {Path(args.out).stem}; torque at the wheel's hub by gearfe: {torque:.6g} N m")

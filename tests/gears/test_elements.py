@@ -48,9 +48,9 @@ def test_forces_and_torques_are_in_equilibrium(law: ContactLaw, name: str, degre
     force = np.array([f.sum() for *_, f in parts])
     on_wheel = sum(f for (gear, *_), f in zip(parts, force, strict=True) if gear == 1)
     assert abs(force.sum()) < 1e-12 * abs(on_wheel)
-    assert found.torque_wheel + found.torque_pinion == pytest.approx(pair.centre_distance * on_wheel.imag, rel=1e-8)
+    assert found.torque_wheel + found.torque_pinion == pytest.approx(pair.wheel_centre * on_wheel.imag, rel=1e-8)
     assert found.contacts.torque_wheel.sum() == pytest.approx(found.torque_wheel, rel=1e-12)
-    reaction = -sum(((x - pair.centre_distance).conj() * f).imag.sum() for gear, _, x, f in parts if gear == 1)
+    reaction = -sum(((x - pair.wheel_centre).conj() * f).imag.sum() for gear, _, x, f in parts if gear == 1)
     assert found.torque_wheel_reaction == pytest.approx(reaction, rel=1e-12)
     assert found.torque_wheel_reaction == pytest.approx(found.torque_wheel, rel=2e-3)
 
@@ -76,9 +76,7 @@ def test_tangent_and_rates_are_derivatives(law: ContactLaw, name: str, degrees: 
     assert here.tangent == pytest.approx(slope, rel=5e-4)
     rates = replace(here, loads=tuple(replace(one, force=one.rate) for one in here.loads))
     by_rates = -sum(
-        ((x - pair.centre_distance).conj() * f).imag.sum()
-        for gear, _, x, f in nodal(pair, rates, angle, at)
-        if gear == 1
+        ((x - pair.wheel_centre).conj() * f).imag.sum() for gear, _, x, f in nodal(pair, rates, angle, at) if gear == 1
     )
     slope = (after.torque_wheel_reaction - before.torque_wheel_reaction) / (2 * step)
     assert by_rates == pytest.approx(slope, rel=5e-4)
@@ -203,7 +201,7 @@ def test_a_sharp_corner_pushes_along_the_normal_of_the_flank_it_bears_on(degrees
     ]  # the pair that comes or goes bears on a corner
     tooth = number if smooth == 0 else -1 - number
     ((points, force),) = (
-        (x - smooth * pair.centre_distance, f)
+        (x - smooth * pair.wheel_centre, f)
         for gear, number, x, f in nodal(pair, found, angle, TWIST)
         if (gear, number) == (smooth, tooth)
     )

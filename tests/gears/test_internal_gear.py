@@ -378,14 +378,15 @@ def test_mistakes_are_named_with_field_range_and_cure(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("command", ["stiffness", "loadmap", "mesh"])
-def test_other_commands_refuse_internal_pairs(tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str) -> None:
-    path = job(
-        tmp_path,
-        ("[meshes.outer]", "[stiffness]\ntorque_Nm = 500.0\n\n[loadmap]\ntorques_Nm = [500.0]\n\n[meshes.outer]"),
+def test_contact_over_the_width_refuses_internal_pairs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    helix = (
+        ("face_width_mm = 50.0", "face_width_mm = 50.0\nhelix_angle_deg = 15.0"),
+        ("\ncentre_distance_mm = -78.0", ""),
     )
-    assert main([command, path, "--out", str(tmp_path / "out")]) == 2
-    assert "takes external gears only" in capsys.readouterr().err
+    other = ("addendum = 0.9\n", "addendum = 0.85\n"), ("rim_diameter_mm = 280.0", "rim_diameter_mm = 300.0")
+    path = job(tmp_path, *helix, *other, ("[meshes.outer]", "[stiffness]\ntorque_Nm = 500.0\n\n[meshes.outer]"))
+    assert main(["stiffness", path, "--out", str(tmp_path / "out")]) == 2
+    assert "contact over the width takes external gears only" in capsys.readouterr().err
 
 
 def test_hands_of_helical_internal_pairs_are_equal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

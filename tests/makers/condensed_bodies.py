@@ -90,7 +90,8 @@ def pressed_pair(lower: GearBody, upper: GearBody, law: ContactLaw, overlap: flo
     centre = left + np.array([CENTRES * size, 0.0])
     pinion = turned(lower, 0.0, left)
     wheel = turned(upper, np.pi - np.pi / TEETH, centre + np.array([0.0, overlap]))
-    gears: Any = SimpleNamespace(working_centre_distance=CENTRES * size, tooth_angle=tooth_angle)
+    apart = CENTRES * size
+    gears: Any = SimpleNamespace(working_centre_distance=apart, wheel_centre=apart, sign=1, tooth_angle=tooth_angle)
     return MeshingPair(gears, pinion, wheel, PairModel(law=law))
 
 
@@ -100,7 +101,7 @@ def pressed(pair: MeshingPair, low: float, high: float, pressure: Callable[[Arra
     loads = []
     for gear, tooth in ((0, 0), (1, -1)):
         flank, axes = pair.bodies[gear].flank, turn(pair.tooth_angle(gear, tooth, 0.0, 0.0))
-        x = (flank.points @ axes.T)[:, 0] + gear * pair.centre_distance - origin
+        x = (flank.points @ axes.T)[:, 0] + gear * pair.wheel_centre - origin
         load = np.where((low < x) & (x < high), pressure(x), 0.0) * np.abs(np.gradient(x)) * pair.width
         force = (2 * gear - 1) * np.stack([0 * load, load], axis=1) @ axes
         loads.append(FlankLoads(zero, zero + tooth, force.reshape(1, -1), force.reshape(1, -1)))

@@ -50,7 +50,7 @@ def nodal(elastic: MeshingPair, position: Positions, angle: float, twist: float)
         for tooth, force in zip(loads.tooth.tolist(), loads.force, strict=True):
             turn = np.exp(1j * elastic.tooth_angle(gear, tooth, angle, twist))
             points = elastic.bodies[gear].flank.points @ [1, 1j]
-            yield gear, tooth, turn * points + gear * elastic.centre_distance, turn * force.view(complex)
+            yield gear, tooth, turn * points + gear * elastic.wheel_centre, turn * force.view(complex)
 
 
 def peak_pressure(position: Positions) -> float:

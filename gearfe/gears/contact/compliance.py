@@ -1,4 +1,4 @@
-r"""Exact compliance between the flanks of a whole elastic gear with a rigid bore, from one meshed tooth.
+r"""Exact compliance between the flanks of a whole elastic gear with a rigid bore or rim, from one meshed tooth.
 
 One sector is condensed onto its flank nodes F and its two cut sides B. With :math:`A = S_{FF}^{-1}` and
 :math:`P = -A S_{FB}`, flank forces f and side displacements b give :math:`u_F = A f + P b`. The sides of neighbouring
@@ -10,11 +10,15 @@ Fourier transform over the teeth splits into one small system per harmonic (Thom
 
 Everything is expressed in the frame of the tooth that it belongs to.
 
-**In mesh.** The pinion's centre is the origin, the wheel's centre lies at (a, 0). At pinion angle 0 the pinion tooth 0
-is centred on the line of centres and a wheel space faces it; angles are counter-clockwise. Pair k joins the left
-flanks of the pinion tooth k and of the wheel tooth -1 - k (tooth 0 of the wheel is the one below the line of centres
-then). Places are global; displacements and forces refer to the axes of the tooth they belong to, in which compliances
-are the same at every position.
+**Free rims.** The nodes of a free rim belong to B, too. Nothing holds them; the mean displacement and the mean turn of
+the rim are zero, as even tractions on it keep them. These three conditions are of the harmonics 0 (the turn) and
+:math:`\pm1` (the displacement) alone, where they border the small system.
+
+**In mesh.** The pinion's centre is the origin, the wheel's centre lies at (a, 0), a < 0 for an internal gear. At pinion
+angle 0 the pinion tooth 0 is centred on the line of centres and a wheel space faces it; angles are counter-clockwise.
+Pair k joins the left flanks of the pinion tooth k and of the wheel tooth -1 - k (tooth 0 of the wheel is the one below
+the line of centres then). Places are global; displacements and forces refer to the axes of the tooth they belong to, in
+which compliances are the same at every position.
 """
 
 from __future__ import annotations
@@ -27,7 +31,7 @@ import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
 from ...base.errors import InputError
-from ...base.typing import Array, IntArray
+from ...base.typing import Array, ComplexArray, IntArray
 from ...fem.multifrontal import Factor, condense
 from ...fem.plane import Material, Plane, element_stiffness, finite_strain_rates
 from ..geometry.face import ToothDeviations
@@ -35,7 +39,7 @@ from ..geometry.first_contact import WAY
 from ..geometry.pair import GearPair
 from ..geometry.spur_gear import Gear
 from ..teeth.tooth_sector import SectorMesh
-from .flank import Flank, edge_shapes, flank_of, normal_stress_rows
+from .flank import Flank, edge_shapes, flank_of, gauss_rule, normal_stress_rows
 from .laws import DEFAULT_MODEL, ContactLaw, PairModel
 from .position import Contacts, FlankLoads, PointPressures, Positions
 
@@ -59,9 +63,9 @@ class GearBody:
     own : ndarray, shape (f, f)
         A: flank displacements for flank forces with the cut sides held (m/N).
     interface : ndarray, shape (f, b)
-        P: flank displacements for displacements of the cut sides (-).
+        P: flank displacements for displacements of the cut sides, and of a free rim (-).
     coupling : ndarray, shape (z, b, b)
-        X_k: displacements of the cut sides of tooth k for forces on the cut sides of tooth 0 (m/N).
+        X_k: displacements of these of tooth k for forces on those of tooth 0 (m/N).
     width
         Width of the contact (m): the mate may be narrower.
     stress_own, stress_interface : ndarray, shapes (e q, f), (e q, b)
@@ -153,16 +157,17 @@ def gear_body(
     """
     flank = flank_of(mesh, points_per_edge)
     width = thickness if width is None else width
-    bore = np.unique(mesh.boundaries["bore"])
-    sides = np.concatenate([mesh.cut_right[:-1], mesh.cut_left[:-1]])  # the last node of a cut lies on the bore
+    held, last = np.unique(mesh.held), None if mesh.free else -1  # the last node of a cut lies on the bore
+    sides = np.concatenate([mesh.cut_right[:last], mesh.cut_left[:last]])
+    around = np.setdiff1d(held, sides) if mesh.free else held[:0]
     coordinates = mesh.points[mesh.triangles]
     condensed = condense(
         mesh.triangles,
         element_stiffness(coordinates, material, plane, thickness),
         coordinates[:, :3].mean(axis=1),
         nodes=len(mesh.points),
-        retained=np.concatenate([flank.nodes, sides]),
-        fixed=bore,
+        retained=np.concatenate([flank.nodes, sides, around]),
+        fixed=held[:0] if mesh.free else held,
     )
     f, stiffness = 2 * len(flank.nodes), condensed.schur
     factor, info = dpotrf(stiffness[:f, :f], lower=1)
@@ -171,7 +176,9 @@ def gear_body(
     interface = -dpotrs(factor, stiffness[:f, f:], lower=1)[0]
     own = dpotri(factor, lower=1)[0]
     own = np.tril(own) + np.tril(own, -1).T
-    coupling = _cyclic_compliance(stiffness[f:, f:] + stiffness[f:, :f] @ interface, mesh.teeth)
+    means = _rim_means(mesh, np.concatenate([sides, around])) if mesh.free else None
+    between = stiffness[f:, f:] + stiffness[f:, :f] @ interface
+    coupling = _cyclic_compliance(between, mesh, len(sides), means)
     stress_own, stress_interface = np.zeros((0, f)), np.zeros((0, len(stiffness) - f))
     if with_stress:
         unknowns, rows = normal_stress_rows(mesh, material, plane, points_per_edge)
@@ -183,22 +190,87 @@ def gear_body(
     return GearBody(mesh, flank, material, plane, thickness, own, interface, coupling, *stressed, condensed, width)
 
 
-def _cyclic_compliance(stiffness: Array, teeth: int) -> Array:
-    """X_k for k = 0 .. z - 1 from the side stiffness of one sector (right side first, then left).
+def _rim_means(mesh: SectorMesh, nodes: IntArray) -> Array:
+    """Integrals along a sector's rim of the displacements x and y, and of the moment of the displacement about the
+    centre, for displacements of `nodes`, shape (3, 2 n)."""
+    xi, weight = gauss_rule(4)
+    shapes, slopes, _ = edge_shapes(xi)
+    rows, number = np.zeros((3, len(nodes), 2)), {int(node): k for k, node in enumerate(nodes)}
+    for edge in mesh.held:
+        corners = mesh.points[edge]
+        lengths = np.linalg.norm(slopes @ corners, axis=1) * weight
+        places = shapes @ corners
+        for a, node in enumerate(edge.tolist()):
+            share = shapes[:, a] * lengths
+            rows[0, number[node], 0] += share.sum()
+            rows[1, number[node], 1] += share.sum()
+            rows[2, number[node]] += share @ np.stack([-places[:, 1], places[:, 0]], axis=1)
+    return rows.reshape(3, -1)
+
+
+def _cyclic_compliance(stiffness: Array, mesh: SectorMesh, sides: int, means: Array | None = None) -> Array:
+    """X_k for k = 0 .. z - 1 from the stiffness of one sector against displacements of its interface.
 
     With v_j the displacement of the right side of sector j in frame j, the sides of sector j move by
     (v_j, R v_{j+1}), R the rotation by the pitch angle. A harmonic n has v_j = v exp(i n j 2 pi / z), so that the
     stiffness against it is A + B exp(i n 2 pi / z) + its adjoint, and the factor shifts answers by a tooth.
+
+    Parameters
+    ----------
+    stiffness : ndarray, shape (b, b)
+        Of the unknowns of the right side, of the left one, then of the nodes of a free rim between them (N/m).
+    mesh : SectorMesh
+        The sector.
+    sides : int
+        Number of nodes on both sides.
+    means : ndarray, shape (3, b), optional
+        Integrals of the displacements x and y of a free rim and of their moments, which are zero round the gear.
     """
-    half = len(stiffness) // 2
-    angle = 2 * np.pi / teeth
-    rotation = np.kron(np.eye(half // 2), turn(angle))
-    phase = np.exp(1j * angle * np.arange(teeth // 2 + 1))[:, None, None]
-    to_next = stiffness[:half, half:] @ rotation
-    own = stiffness[:half, :half] + rotation.T @ stiffness[half:, half:] @ rotation
-    right = np.fft.irfft(np.linalg.inv(own + phase * to_next + phase.conj() * to_next.T), n=teeth, axis=0)
-    ahead = rotation @ right
-    return np.block([[right, np.roll(right, 1, axis=0) @ rotation.T], [np.roll(ahead, -1, axis=0), ahead @ rotation.T]])
+    half, teeth = sides, mesh.teeth
+    rotation = np.kron(np.eye(half // 2), turn(mesh.pitch))
+    phase = np.exp(1j * (2 * np.pi / teeth) * np.arange(teeth // 2 + 1))[:, None, None]
+    left = slice(half, 2 * half)
+    to_next = stiffness[:half, left] @ rotation
+    own = stiffness[:half, :half] + rotation.T @ stiffness[left, left] @ rotation
+    if means is None:
+        system = own + phase * to_next + phase.conj() * to_next.T
+        right = np.fft.irfft(np.linalg.inv(system), n=teeth, axis=0)
+        ahead = rotation @ right
+        return np.block(
+            [[right, np.roll(right, 1, axis=0) @ rotation.T], [np.roll(ahead, -1, axis=0), ahead @ rotation.T]]
+        )
+    rim = slice(2 * half, None)
+    count = len(stiffness) - half
+    system = np.zeros((len(phase), count, count), dtype=complex)
+    system[:, :half, :half] = own + phase * to_next + phase.conj() * to_next.T
+    system[:, :half, half:] = stiffness[:half, rim] + phase.conj() * (rotation.T @ stiffness[left, rim])
+    system[:, half:, :half] = system[:, :half, half:].conj().swapaxes(1, 2)
+    system[:, half:, half:] = stiffness[rim, rim]
+    whole = np.empty_like(system)
+    rows = np.concatenate([means[:, :half] + phase * (means[:, left] @ rotation), _each(means[:, rim], phase)], axis=2)
+    # exp(i j pitch)(x + i y) of sector j adds up to nothing round the gear unless the harmonic turns against the pitch
+    way = 1j if mesh.internal else -1j
+    whole[2:] = np.linalg.inv(system[2:])
+    for n in (0, 1):
+        held = rows[n][2:] if n == 0 else (rows[n][0] + way * rows[n][1])[None]
+        scale = np.abs(system[n]).max() / np.abs(held).max()
+        border = np.block([[system[n], scale * held.conj().T], [scale * held, np.zeros((1, 1))]])
+        whole[n] = np.linalg.inv(border)[:count, :count]
+    found = np.fft.irfft(whole, n=teeth, axis=0)
+    before, after = np.roll(found, 1, axis=0), np.roll(found, -1, axis=0)
+    v, w = slice(half), slice(half, None)
+    return np.block(
+        [
+            [found[:, v, v], before[:, v, v] @ rotation.T, found[:, v, w]],
+            [rotation @ after[:, v, v], rotation @ found[:, v, v] @ rotation.T, rotation @ after[:, v, w]],
+            [found[:, w, v], before[:, w, v] @ rotation.T, found[:, w, w]],
+        ]
+    )
+
+
+def _each(rows: Array, phase: ComplexArray) -> ComplexArray:
+    """The same rows for each of the harmonics."""
+    return np.broadcast_to(rows.astype(complex), (len(phase), *rows.shape))
 
 
 @dataclass(frozen=True)
@@ -232,9 +304,9 @@ class MeshingPair:
         return self.pinion.width
 
     @property
-    def centre_distance(self) -> float:
-        """a (m)."""
-        return self.gears.working_centre_distance
+    def wheel_centre(self) -> float:
+        """x of the wheel's centre (m)."""
+        return self.gears.wheel_centre
 
     @property
     def law(self) -> ContactLaw:
@@ -364,7 +436,8 @@ def flank_loads(
         shares, moved = _nodal(elastic.bodies[g].flank, contacts, g)
         along = (2 * g - 1) * contacts.normal * np.exp(-1j * elastic.tooth_angle(g, tooth, *place))
         # the wheel's axes turn on with the twist
-        rate = contacts.force_rate + 1j * (contacts.normal_rate - g) * contacts.force
+        turning = g * elastic.gears.sign
+        rate = contacts.force_rate + 1j * (contacts.normal_rate - turning) * contacts.force
         force = (contacts.force * along)[:, None] * shares
         change = along[:, None] * (rate[:, None] * shares + contacts.force[:, None] * moved)
         made.append(FlankLoads(contacts.position, tooth, force.view(float), change.view(float)))

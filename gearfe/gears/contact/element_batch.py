@@ -129,7 +129,7 @@ class Batch:
 
     def placed(self, displacement: ComplexArray, turn: ComplexArray) -> ComplexArray:
         """Nodes in their places (m) when displaced (m) and with the windows turned by `turn`, shape (W,)."""
-        hub = self.gear * self.elastic.centre_distance
+        hub = self.gear * self.elastic.wheel_centre
         return np.asarray(turn[self.window] * (self.points + displacement) + hub[self.window])
 
     def slaves(self, placed: ComplexArray, points: IntArray) -> ComplexArray:

@@ -78,7 +78,7 @@ def _positions(batch: Batch, start: State, places: Positions) -> Positions:
     one, contacts = _felt(batch, here, batch.turn)
     work = np.bincount(batch.node_position, (here.forces.conj() * here.displacement).real, batch.size)
     ahead = AHEAD * np.divide(work, one["torque_wheel"], out=np.ones(batch.size), where=one["torque_wheel"] > 0)
-    turn = batch.turn * np.exp(1j * batch.gear * ahead[batch.position])
+    turn = batch.turn * np.exp(1j * batch.elastic.gears.sign * batch.gear * ahead[batch.position])
     there = solve(batch, here, turn, equations)
     two, later = _felt(batch, there, turn)
     tangent = (two["torque_wheel"] - one["torque_wheel"]) / ahead
@@ -127,9 +127,10 @@ def _points(batch: Batch, state: State) -> PointPressures:
 def _felt(batch: Batch, state: State, turn: ComplexArray) -> tuple[dict[str, Array], Contacts]:
     """Moments that the hubs need (N m), shape (B,), and the contact of each tooth pair, without its rates."""
     pairs, gear = batch.pairs, batch.gear[batch.window]
-    force, hub = turn[batch.window] * state.forces, gear * batch.elastic.centre_distance
+    force, hub = turn[batch.window] * state.forces, gear * batch.elastic.wheel_centre
     placed, still = (batch.placed(u, turn) for u in (state.displacement, np.zeros_like(force)))
-    moment, reaction = (-((places - hub).conj() * force).imag for places in (placed, still))
+    against = np.where(gear == 1, -batch.elastic.gears.sign, -1)  # moments that the hubs need; the wheel's by the twist
+    moment, reaction = (against * ((places - hub).conj() * force).imag for places in (placed, still))
 
     def total(values: Array, g: int) -> Array:
         return np.bincount(batch.node_position, np.where(gear == g, values, 0.0), batch.size)
@@ -386,4 +387,4 @@ def _errors(
     off = total(rows.at, rows.area * np.abs(pressure - rows.trial)) / load
     changed = total(of, np.abs(forces - now)) / np.maximum(total(of, np.abs(now)), least)
     stiff = total(rows.at, rows.area * (rows.trial > 0) * batch.parameter[rows.points])
-    return np.maximum(off, changed), np.finfo(float).eps * batch.elastic.centre_distance * stiff / load
+    return np.maximum(off, changed), np.finfo(float).eps * batch.elastic.gears.working_centre_distance * stiff / load

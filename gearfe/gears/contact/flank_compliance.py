@@ -40,10 +40,29 @@ from .panels import ELLIPSE_W, ELLIPSE_X, LEAST_DISTANCE, mean_log, wedge_tensor
 
 #: Half width of a bump, in elements and at least in modules; distance of two stations in half widths.
 BUMP_ELEMENTS, BUMP_MODULES, SPACING = 2.0, 0.2, 0.8
-#: Teeth whose coupling is kept at hand: two in contact at the same time are never further apart.
-REACH = 12
 #: Nearer to an end of the flank than this share of an element there is no station.
 TOO_NEAR = 0.75
+
+
+class FarFields(dict[int, Array]):
+    """H between the stations of teeth so many steps apart, each made when it is first asked for.
+
+    Parameters
+    ----------
+    sides : ndarray, shape (2k, b)
+        Displacements of the stations by those of a tooth's interface (-).
+    body : GearBody
+        The gear.
+    """
+
+    def __init__(self, sides: Array, body: GearBody) -> None:
+        super().__init__()
+        self.sides, self.body = sides, body
+
+    def __missing__(self, step: int) -> Array:
+        made: Array = self.sides @ self.body.coupling[step % self.body.teeth] @ self.sides.T
+        self[step] = made
+        return made
 
 
 @dataclass(frozen=True)
@@ -62,7 +81,7 @@ class FlankCompliance:
         W in the tooth's axes (-).
     stations, bumps : ndarray, shape (k,)
         Arc lengths of the stations and half widths of their bumps (m).
-    far_field : dict of int to ndarray, shape (2k, 2k)
+    far_field : mapping of int to ndarray, shape (2k, 2k)
         Step -> H between the stations of teeth so many steps apart, tooth axes, xy by station (m/N).
     """
 
@@ -72,7 +91,7 @@ class FlankCompliance:
     wedge: Array
     stations: Array
     bumps: Array
-    far_field: dict[int, Array]
+    far_field: FarFields
 
     def distance(self, s: Array) -> Array:
         """Distance y (m) of the flank at arc lengths s (m) from the corner."""
@@ -179,7 +198,7 @@ def flank_compliance(gear: Gear, body: GearBody) -> FlankCompliance:
     stations, bumps, nodal = stations_of(body.flank, float(face.arc[0]), module)
     loads = np.kron(nodal, np.eye(2))
     sides = loads @ body.interface
-    far_field = {step: sides @ body.coupling[step % body.teeth] @ sides.T for step in range(-REACH, REACH + 1)}
+    far_field = FarFields(sides, body)
     made = FlankCompliance(face, inverse_modulus, corner, wedge, stations, bumps, far_field)
     far_field[0] = far_field[0] + loads @ body.own @ loads.T + inverse_modulus / body.width * local_bracket(made)
     body.compliances[gear] = made
@@ -192,9 +211,10 @@ def corner_of(face: Face) -> tuple[complex, Array]:
     point, normal = complex(face.points(end)), complex(face.normals(end))
     tangent, tip = -1j * normal, abs(complex(face.points(np.array(face.end))))
     along = (point * tangent.conjugate()).real
+    sign = -1 if face.internal else 1  # the tip circle's normal points inwards
     if not face.sharp:  # straight on to the tip circle
-        point = point + tangent * (math.sqrt(along**2 - abs(point) ** 2 + tip**2) - along)
-    half_angle = 0.5 * (math.pi - math.acos((normal * point.conjugate()).real / abs(point)))
+        point = point + tangent * (sign * math.sqrt(along**2 - abs(point) ** 2 + tip**2) - along)
+    half_angle = 0.5 * (math.pi - math.acos(sign * (normal * point.conjugate()).real / abs(point)))
     middle = -tangent * np.exp(1j * half_angle)
     direction = np.array([middle.real, middle.imag])
     along_middle = np.outer(direction, direction)

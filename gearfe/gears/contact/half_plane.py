@@ -54,7 +54,7 @@ TWIST_STEPS, FORCE_ROUNDS, SHARPEST = 7, 2, 0.02
 
 def unloaded(contact_model: HalfPlanePair, twists: Array, found: FirstContacts) -> tuple[Setting, State]:
     """Return the unloaded state of all candidate tooth pairs at the twists (rad) of their positions."""
-    frames = found.frames + twists[found.position, None] * np.arange(2)
+    frames = found.frames + twists[found.position, None] * contact_model.turning
     nothing, count = np.zeros(len(found)), len(found)
     return Setting(contact_model, found, np.exp(1j * frames)), State(
         centre=found.point,
@@ -253,7 +253,7 @@ def _finished(
     touch = np.full(len(numbers), np.inf)
     np.minimum.at(touch, couples.position, found.twist)
     ahead = np.maximum(AHEAD * (twists[numbers] - touch), LEAST_AHEAD)
-    further = setting.turn * np.exp(1j * ahead[couples.position, None] * np.arange(2))
+    further = setting.turn * np.exp(1j * ahead[couples.position, None] * setting.contact_model.turning)
     later = replace(found, position=found.position + len(twists))
     both = Setting(setting.contact_model, joined([found, later]), np.concatenate([setting.turn, further]))
     after = joined([start, start])
@@ -283,7 +283,7 @@ def _contacts(setting: Setting, state: State, made: Step) -> Contacts:
         position=setting.found.position,
         pair=setting.found.pair,
         force=force,
-        torque_wheel=-force * cross(one.centre - contact_model.hub[1], state.normal),
+        torque_wheel=-contact_model.pair.sign * force * cross(one.centre - contact_model.hub[1], state.normal),
         point=one.centre,
         normal=state.normal,
         arc=one.arc,
@@ -301,12 +301,12 @@ def _contacts(setting: Setting, state: State, made: Step) -> Contacts:
 
 def _sums(setting: Setting, contacts: Contacts, energy: Array) -> dict[str, Array]:
     """Torques (N m) and energies (J) of the positions, shape (m,), from energies of contacts per width (J/m)."""
-    couples, force, normal = setting.couples, contacts.force, contacts.normal
+    couples, force, normal, sign = setting.couples, contacts.force, contacts.normal, setting.contact_model.pair.sign
     wheel = setting.tables.at(contacts.arc[:, :, None])[0][:, 1, 0] * setting.turn[:, 1]
     return {
         "torque_wheel": couples.total(contacts.torque_wheel),
         "torque_pinion": couples.total(force * cross(contacts.point, normal)),
-        "torque_wheel_reaction": couples.total(-force * cross(wheel, normal)),
+        "torque_wheel_reaction": couples.total(-sign * force * cross(wheel, normal)),
         "energy": couples.total(energy * setting.contact_model.width),
     }
 

@@ -132,7 +132,12 @@ class HalfPlanePair:
     @cached_property
     def hub(self) -> Array:
         """x of the gears' centres (m), shape (2,)."""
-        return np.array([0.0, self.pair.working_centre_distance])
+        return np.array([0.0, self.pair.wheel_centre])
+
+    @cached_property
+    def turning(self) -> Array:
+        """Angles by which a unit of twist turns pinion and wheel (-), shape (2,)."""
+        return np.array([0, self.pair.sign])
 
     @cached_property
     def corner(self) -> ComplexArray:

@@ -265,7 +265,7 @@ class GearRecovery:
         teeth = body.teeth
         every = np.arange(teeth)
         local = sector_displacements(body, position.loads[gear], np.zeros_like(every), every)  # (s, 2, z)
-        turns = angle + 2 * np.pi * np.arange(teeth) / teeth
+        turns = angle + body.mesh.pitch * np.arange(teeth)
         c, s = np.cos(turns), np.sin(turns)
         x, y = local[:, 0], local[:, 1]
         displacement = np.empty((len(whole.points), 2))
@@ -280,7 +280,7 @@ class GearRecovery:
         turned = _turned(sums.swapaxes(0, 1), c, s)
         total = [np.bincount(numbers.T.ravel(), part.ravel(), len(whole.points)) / self.elements for part in turned]
         held = body.material.poisson_ratio if body.plane == "strain" else 0.0
-        points = whole.points @ turn(angle).T + [gear * pair.centre_distance, 0.0]
+        points = whole.points @ turn(angle).T + [gear * pair.wheel_centre, 0.0]
         stress = np.stack([total[0], total[1], held * (total[0] + total[1]), total[2]], axis=1)
         pressure = np.zeros(len(points))
         for one in flank_pressures(pair, position):

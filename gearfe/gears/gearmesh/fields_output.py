@@ -174,7 +174,7 @@ def pressure_table(pair: GearPair, pressures: Sequence[tuple[float, list[FlankPr
             gear = (pair.pinion, pair.wheel)[one.gear]
             for k in one.shown:
                 above = one.radius[k] > gear.base_radius
-                row = (angle, GEARS[one.gear], one.pair, one.tooth % gear.teeth, 2e3 * one.radius[k])
+                row = (angle, GEARS[one.gear], one.pair, one.tooth % gear.tooth_count, 2e3 * one.radius[k])
                 roll = 1e3 * gear.roll_length(float(one.radius[k])) if above else math.nan
                 for name, value in zip(names, (*row, roll, 1e-6 * one.pressure[k]), strict=True):
                     columns[name].append(value)

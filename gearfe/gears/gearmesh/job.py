@@ -168,7 +168,7 @@ class StiffnessJob:
             raise InputError("stiffness.twist_deg", None, "no load: neither twist_deg nor torque_Nm is given", cure)
         if t.twist_deg is not None:
             lost = math.degrees(self.pair.contact_twist) if t.twist_from == "contact" else 0.0
-            most = 180.0 / self.pair.wheel.teeth - lost
+            most = 180.0 / self.pair.wheel.tooth_count - lost
             if not t.twist_deg < most:
                 problem = f"must be < {most:.6g} deg, half a pitch of the wheel"
                 raise InputError("stiffness.twist_deg", t.twist_deg, problem, "0.01 to 0.5 deg is usual")

@@ -48,8 +48,9 @@ HALVINGS = 3
 LEAST_REACH = 1e-7
 #: The law's tables go on to where pairs touch at this many times its reach, so that no pair is loaded at their ends.
 BEYOND = 1.1
-#: Pinion angles at which the approach is searched for that makes the largest force.
-ANGLES = 6
+#: Pinion angles at which the approach is searched for that makes the largest force, and most steps of that search:
+#: internal pairs, stiffer than the first approach is made for, take more than external ones.
+ANGLES, REACH_STEPS = 6, 12
 #: Corners of the first-contact curve are nodes; others are left out so near to them, and of corners so near to each
 #: other one stays (parts of a cell).
 NEAR, SAME = 0.4, 0.02
@@ -239,7 +240,7 @@ def touch_curve(pair: HalfPlanePair, phases: Array) -> TouchCurve:
     value, slope = np.full(len(phases), NO_CONTACT), np.zeros(len(phases))
     at = met.position[own]
     value[at] = radius * (met.twist[own] - geometry.contact_twist)
-    slope[at] = radius * (1.0 / geometry.gear_ratio - met.arm[own, 0] / met.arm[own, 1])
+    slope[at] = radius * (1.0 / abs(geometry.gear_ratio) - met.arm[own, 0] / met.arm[own, 1])
     return TouchCurve(phases, value, slope)
 
 
@@ -291,7 +292,7 @@ def _reach(pair: HalfPlanePair, force: float) -> float:
     angles = geometry.mesh_cycle * np.arange(ANGLES) / ANGLES
     _, first = _first_contacts(pair, angles)
     reach = 1e-2 * geometry.pinion.module
-    for _ in range(4):
+    for _ in range(REACH_STEPS):
         solved = solve_half_plane(pair, angles, first + reach / radius)
         least = float(solved.torque_wheel.min()) / radius
         if not math.isfinite(least):

@@ -30,6 +30,7 @@ import numpy as np
 
 from ...base.typing import Array, BoolArray, IntArray
 from ..geometry.face import NOMINAL
+from ..geometry.validity import CONFORMING
 from .curve import EDGES, ROUNDED, SINGULAR, SOLVED
 
 if TYPE_CHECKING:
@@ -118,6 +119,13 @@ def _rolls(contact_model: HalfPlanePair, flank: IntArray, arc: Array) -> Array:
         on = (u >= 0) & (u <= 1)
         rolls[tuple(axis[on] for axis in places)] = face.flank.roll(u[on])
     return rolls
+
+
+def conforms(loads: PairLoads, count: int) -> BoolArray:
+    """Return which of `count` positions have contacts wider than `CONFORMING` allows, shape (count,)."""
+    radius = np.fmin(*np.abs(loads.roll).T)
+    wide = np.flatnonzero(loads.half_width > CONFORMING * radius)
+    return np.bincount(loads.position[wide], minlength=count) > 0
 
 
 def marks_met(contact_model: HalfPlanePair, flank: IntArray, low: Array, high: Array) -> BoolArray:

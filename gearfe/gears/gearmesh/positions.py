@@ -223,7 +223,7 @@ def at_torques(
         Whether the torque has the effect of finite strain.
     """
     kept = np.arange(len(angles)) if finite else kept
-    first_contact, most = solver.contact_model.first_contact_twists(angles), math.pi / solver.pair.wheel.teeth
+    first_contact, most = solver.contact_model.first_contact_twists(angles), math.pi / solver.pair.wheel.tooth_count
 
     def solve(numbers: IntArray, twists: Array) -> Positions:
         return solver.solve(angles[numbers], twists, np.flatnonzero(np.isin(numbers, kept)))

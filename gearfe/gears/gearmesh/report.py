@@ -201,7 +201,7 @@ def pair_table(load_map: LoadMap) -> dict[str, Array]:
         "torque_Nm": load_map.torque[level],
         "pinion_angle_deg": np.degrees(load_map.pinion_angle)[angle],
         "pinion_tooth": loads.pair % gears.pinion.teeth,
-        "wheel_tooth": (-1 - loads.pair) % gears.wheel.teeth,
+        "wheel_tooth": (-1 - loads.pair) % gears.wheel.tooth_count,
         "roll_length_pinion_mm": 1e3 * loads.roll[:, 0],
         "roll_length_wheel_mm": 1e3 * loads.roll[:, 1],
         "force_N": loads.force,

@@ -104,7 +104,8 @@ def peaks(place: Array, values: Array, other: Array) -> tuple[Array, Array]:
 
 def fillet_radius(gear: Gear) -> float:
     """Smallest radius of curvature of the root fillet (m)."""
-    segment = gear.profile.segment("trochoid")
+    name = "trochoid" if gear.form_diameter is None else "fillet"
+    segment = gear.profile.segment(name)
     t = np.linspace(0.0, 1.0, 201)
     normal = segment.normals(t)
     turned = np.arccos(np.clip((normal[1:] * normal[:-1]).sum(axis=1), -1.0, 1.0))
@@ -163,14 +164,16 @@ def _lengths(corners: Array) -> Array:
 def spread_of(chain: Flank, points: Array) -> Array:
     """Forces on a chain's nodes that do the same work as forces at `points` on the same profile, shape (2 c, 2 n).
 
-    A flank grows outwards from its root, so a point's place on the chain is where the radius is the same.
+    The radius of a flank rises from its root, of an internal gear it falls, so a point's place on the chain is where
+    the radius is the same.
     """
     xi = np.linspace(0.0, 1.0, 65)
     corners = chain.points[edge_nodes(np.arange(chain.edges))]
-    radius = np.linalg.norm(np.einsum("qa,eai->eqi", edge_shapes(xi)[0], corners), axis=-1)
+    sign = -1 if np.linalg.norm(chain.points[-1]) < np.linalg.norm(chain.points[0]) else 1
+    radius = sign * np.linalg.norm(np.einsum("qa,eai->eqi", edge_shapes(xi)[0], corners), axis=-1)
     radius = np.maximum.accumulate(np.append(radius[:, :-1].ravel(), radius[-1, -1]))
     place = np.append((np.arange(chain.edges)[:, None] + xi[:-1]).ravel(), chain.edges)
-    at = np.interp(np.linalg.norm(points, axis=1), radius, place)
+    at = np.interp(sign * np.linalg.norm(points, axis=1), radius, place)
     edge = np.minimum(at.astype(np.int64), chain.edges - 1)
     shapes = edge_shapes(at - edge)[0]  # (n, 3)
     spread = np.zeros((2 * len(chain.nodes), 2 * len(points)))

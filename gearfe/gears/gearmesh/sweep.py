@@ -31,11 +31,11 @@ from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, check_alike, ch
 from ..contact.position import Positions, in_batches, joined, taken
 from ..geometry.face import ToothDeviations
 from ..geometry.pair import GearPair
-from ..geometry.validity import MOST_OVERLAP, check_external, check_spur, overlaps
+from ..geometry.validity import MOST_OVERLAP, check_spur, overlaps
 from ..teeth.tooth_sector import sector_mesh, sector_recipes
 from .curve import BACK, SOLVED, StiffnessCurve
 from .load_map import LoadMap
-from .pair_loads import PairLoads, contact_pressures, pair_loads
+from .pair_loads import PairLoads, conforms, contact_pressures, pair_loads
 from .periodic import distinct_phases
 from .positions import PositionSolver, at_torques, at_twists, checked_contact, curve_error, load_shares, position_solver
 from .root_stress import PairRoots, ToothRoots, pair_roots, root_map
@@ -71,7 +71,6 @@ def elastic_pair(
         Fields of the model to change, such as ``law="nitsche"``; see `PairModel.changed`.
     """
     check_spur(pair, "the law of plane sections")
-    check_external(pair, "the law of plane sections")
     model = model.changed(**changes)
     watch = watch or Stopwatch()
     gears = (pair.pinion, pair.wheel)
@@ -294,7 +293,7 @@ def _checked_load(pair: GearPair, twist: float | None, torque: float | None, twi
         return float(torque)
     if twist is None:
         raise InputError("twist, torque", None, "neither is given", "give exactly one of them")
-    most = math.pi / pair.wheel.teeth - lost
+    most = math.pi / pair.wheel.tooth_count - lost
     if not (math.isfinite(twist) and 0 < twist < most):
         problem = f"must be > 0 and < {most:.6g} rad ({math.degrees(most):.6g} deg, half a pitch of the wheel)"
         raise InputError("twist", twist, problem, "0.01 to 0.5 deg is usual")
@@ -404,6 +403,7 @@ class Grid:
         cycles = np.round((requested - solved.pinion_angle) / pair.mesh_cycle).astype(np.int64)
         leading, shares = load_shares(solved)
         of_pairs = pair_loads(solver, solved)
+        conforming = conforms(of_pairs, len(solved)) if pair.internal else np.zeros(len(solved), dtype=bool)
         curve = StiffnessCurve(
             pinion_angle=requested,
             wheel_angle=pair.wheel_angle_at(requested, total),
@@ -423,7 +423,7 @@ class Grid:
             status=solved.status,
             law=np.full(len(requested), law.name),
             contact_law=law_text(law),
-            beyond_validity=np.where(np.isnan(twist), -1, overlaps(pair, twist) > MOST_OVERLAP),
+            beyond_validity=np.where(np.isnan(twist), -1, (overlaps(pair, twist) > MOST_OVERLAP) | conforming),
             mesh_cycle=pair.mesh_cycle * solver.contact_model.mesh_cycles,
             base_radius=radius,
             lost_motion=lost,
@@ -468,9 +468,10 @@ def _check_contact(load_map: LoadMap, solver: PositionSolver) -> None:
     nearest = int(np.argmin(gap))
     tangent = curve.k_tangent[position[nearest]] * curve.base_radius**2
     k, least = lost[0], load_map.torque[0] + tangent * max(0.0, gap[nearest])
+    tooth = k % geometry.pinion.teeth, (-1 - k) % geometry.wheel.tooth_count
     problem = (
         f"{len(lost)} of {len(expected)} tooth pairs carry nothing on their whole path, among them pinion tooth "
-        f"{k % geometry.pinion.teeth} on wheel tooth {(-1 - k) % geometry.wheel.teeth}: must be > about {least:.3g} N m"
+        f"{tooth[0]} on wheel tooth {tooth[1]}: must be > about {least:.3g} N m"
     )
     cure = "give more torque, or smaller errors of pitch or profile"
     raise InputError("torques", float(load_map.torque[0]), problem, cure)

@@ -177,6 +177,8 @@ def modification(one: FlankOf) -> FlankModification:
     measured: tuple[Deviation, ...] = ()
     if table.points:
         s, h = np.array(table.points).T
+        if gear.internal:  # with the standard's sign, or without
+            s = -np.abs(s)
         extra.append(_covering(1e-3 * s, 1e-6 * h, active, f"{where}.points", straight=True))
     if table.measured_csv is not None:
         found = _measured(table.measured_csv, gear, active, f"{where}.measured_csv", one.folder)
@@ -210,22 +212,24 @@ def _relief(table: FlankTable, gear: Gear, where: str, end: str) -> Relief | Non
     if length is not None:
         roll = gear.profile.tip_roll - 1e-3 * length if end == "tip" else gear.form_roll + 1e-3 * length
     elif start is not None:
-        roll = 1e-3 * start
+        roll = gear.sign * 1e-3 * abs(start)
     else:
-        roll = gear.roll_length(0.5e-3 * diameter)
+        roll = gear.roll_length(0.5e-3 * abs(diameter))
     ends = (gear.form_roll, min(gear.profile.round_roll, gear.profile.tip_roll))
     if not ends[0] < roll < ends[1]:
         if length is not None:
             zero = gear.profile.tip_roll if end == "tip" else gear.form_roll
             limits = [1e3 * abs(one - zero) for one in ends]
         else:
-            limits = [1e3 * one if start is not None else 2e3 * math.hypot(gear.base_radius, one) for one in ends]
+            limits = [1e3 * abs(one) if start is not None else 2e3 * math.hypot(gear.base_radius, one) for one in ends]
         low, high = sorted(limits)
         problem = f"starts off the active flank: must be > {low:.5g} and < {high:.5g} mm"
         value = next(one for one in (length, start, diameter) if one is not None)
         raise InputError(f"{where}.{given}", value, problem, "start it between form point and tip round")
     last, across = (getattr(table, f"{name}_{key}") for key in ENDS)
-    until = gear.roll_length(0.5e-3 * across) if across is not None else None if last is None else 1e-3 * last
+    until = None if last is None else gear.sign * 1e-3 * abs(last)
+    if across is not None:
+        until = gear.roll_length(0.5e-3 * abs(across))
     return Relief(1e-6 * amount, roll, getattr(table, f"{name}_shape"), until)
 
 
@@ -239,11 +243,11 @@ def _index_deviations(table: GearMicrogeometryTable, side: str, gear: Gear, wher
     index = _listed(flank, gear, where, folder)
     if index is None:
         displaced = _listed(table, gear, where, folder)
-        index = np.zeros(gear.teeth) if displaced is None else displaced if side == "left" else -displaced
+        index = np.zeros(gear.tooth_count) if displaced is None else displaced if side == "left" else -displaced
     amplitude, phase = flank.run_out_um, flank.run_out_phase_deg
     if amplitude or phase:  # of these flanks; what they do not give is the gear's
         amplitude, phase = amplitude or table.run_out_um, phase or table.run_out_phase_deg
-        return index + pitch_errors.sine(gear.teeth, 1e-6 * amplitude, math.radians(phase))
+        return index + pitch_errors.sine(gear.tooth_count, 1e-6 * amplitude, math.radians(phase))
     left, right = pitch_errors.run_out(gear, 1e-6 * table.run_out_um, math.radians(table.run_out_phase_deg))
     return index + (left if side == "left" else right)
 
@@ -262,9 +266,9 @@ def _listed(table: FlankTable, gear: Gear, where: str, folder: Path) -> Array | 
         listed = pitch_errors.sampled(gear, table.pitch_class, table.pitch_seed)
     else:
         return None
-    if len(listed) != gear.teeth:
+    if len(listed) != gear.tooth_count:
         key = "pitch_um" if table.pitch_um else "single_pitch_um"
-        problem = f"must have one entry for each of the {gear.teeth} teeth, has {len(listed)}"
+        problem = f"must have one entry for each of the {gear.tooth_count} teeth, has {len(listed)}"
         raise InputError(f"{where}.{key}", list(getattr(table, key)), problem, "give as many as the gear has teeth")
     return listed
 
@@ -275,8 +279,9 @@ def _measured(name: str, gear: Gear, active: tuple[float, float], field: str, fo
     columns = read_numbers(folder / name, field, ("deviation_um",), optional, others=False)
     if "roll_length_mm" in columns:
         roll = 1e-3 * columns["roll_length_mm"]
+        roll = -np.abs(roll) if gear.internal else roll
     elif "diameter_mm" in columns:
-        roll = np.array([gear.roll_length(0.5e-3 * d) for d in columns["diameter_mm"]])
+        roll = np.array([gear.roll_length(0.5e-3 * abs(d)) for d in columns["diameter_mm"]])
     else:
         raise InputError(field, name, "has neither of the columns roll_length_mm and diameter_mm", "add one")
     height = 1e-6 * columns["deviation_um"]
@@ -284,7 +289,9 @@ def _measured(name: str, gear: Gear, active: tuple[float, float], field: str, fo
         return [_covering(roll, height, active, field)]
     teeth = columns["tooth"]
     _teeth(np.unique(teeth), gear, field, name)
-    return [_covering(roll[teeth == t], height[teeth == t], active, f"{field}, tooth {t}") for t in range(gear.teeth)]
+    return [
+        _covering(roll[teeth == t], height[teeth == t], active, f"{field}, tooth {t}") for t in range(gear.tooth_count)
+    ]
 
 
 def _covering(
@@ -308,8 +315,8 @@ def _covering(
 def _teeth(numbers: Array, gear: Gear, field: str, name: str) -> IntArray:
     """Order that sorts the teeth, each of which must be there once."""
     order = np.argsort(numbers, kind="stable")
-    if len(numbers) != gear.teeth or not np.array_equal(numbers[order], np.arange(gear.teeth)):
-        problem = f"must have the teeth 0 to {gear.teeth - 1}, each once: it has {len(numbers)}"
+    if len(numbers) != gear.tooth_count or not np.array_equal(numbers[order], np.arange(gear.tooth_count)):
+        problem = f"must have the teeth 0 to {gear.tooth_count - 1}, each once: it has {len(numbers)}"
         raise InputError(field, name, problem, "list all teeth; tooth 0 stands on the line of centres at angle 0")
     return order
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.typing import Array, BoolArray, ComplexArray, IntArray
-from .curves import Arc, Involute, Trochoid
+from .curves import Arc, Involute, Root
 from .deviation import Deviation
 from .involute import deviated
 from .spur_gear import Gear
@@ -65,7 +65,7 @@ class Face:
 
     flank: Involute
     round_: Arc | None = None
-    root: Trochoid | None = None
+    root: Root | None = None
     undercut: bool = False
 
     @property
@@ -77,6 +77,11 @@ class Face:
     def end(self) -> float:
         """Last parameter."""
         return 1.0 if self.round_ is None else 2.0
+
+    @property
+    def internal(self) -> bool:
+        """Whether it is the flank of an internal gear, whose radii fall towards the tip."""
+        return self.flank.base_radius < 0.0
 
     @property
     def sharp(self) -> bool:
@@ -129,7 +134,7 @@ class Face:
             return above
         return np.where(low, self._in_root(self.root, radius), above)
 
-    def _in_root(self, root: Trochoid, radius: Array) -> Array:
+    def _in_root(self, root: Root, radius: Array) -> Array:
         """Parameter u in the root by Newton's method from a table; the radius grows all along it."""
         v = np.linspace(0.5, 1.0, 65)
         v = np.interp(radius, np.abs(root.point(v) + self.root_offset), v)
@@ -147,10 +152,12 @@ class Face:
         centre = complex(*arc.centre)
         distance = abs(centre)
         cosine = (radius**2 - distance**2 - arc.radius**2) / (2.0 * distance * arc.radius)
-        # the round is passed clockwise from the flank to the tip, on the left of its centre's ray
-        angle = math.atan2(centre.imag, centre.real) + np.arccos(np.clip(cosine, -1.0, 1.0))
+        # the round is passed clockwise from the flank to the tip, on the left of its centre's ray (internal: the right)
+        beside = np.arccos(np.clip(cosine, -1.0, 1.0))
+        angle = math.atan2(centre.imag, centre.real) + (-beside if self.internal else beside)
         along = np.clip((angle - arc.start_angle) / (arc.end_angle - arc.start_angle), 0.0, 1.0)
-        return np.where(radius > self.radii[2], 1.0 + along, u)
+        beyond = radius < self.radii[2] if self.internal else radius > self.radii[2]
+        return np.where(beyond, 1.0 + along, u)
 
     def corners(self, u: Array) -> BoolArray:
         """Whether the face has a corner at u: a sharp tip, an undercut's edge, a kink (where a linear relief starts).
@@ -167,6 +174,8 @@ class Face:
     def turning(self, u: Array) -> tuple[Array, Array]:
         """Curvature at u, and how much the normal turns around u per length, across marks, too (1/m); both are
         infinite at corners.
+
+        Hollows of an external gear's flank count as flat; an internal gear's flank has a negative curvature.
         """
         at = np.minimum(np.maximum(u, self.start), 1.0)
         before, after = np.maximum(at - BESIDE, self.start), np.minimum(at + BESIDE, 1.0)
@@ -178,7 +187,7 @@ class Face:
         around = np.minimum(np.maximum([u - BESIDE, u + BESIDE], self.start), self.end)
         normals = self.normals(np.stack([before, after, *around]))
         turned = np.angle(normals[::2] / normals[1::2])
-        curvature = np.maximum(turned[0], 0.0) / (self.speeds(at) * (after - before))
+        curvature = (turned[0] if self.internal else np.maximum(turned[0], 0.0)) / (self.speeds(at) * (after - before))
         if self.round_ is not None:
             curvature = np.where(u > 1.0, 1.0 / self.round_.radius, curvature)
         made = curvature, np.abs(turned[1]) / np.abs(np.subtract(*self.points(around)))
@@ -368,8 +377,9 @@ class ToothDeviations:
     profile : tuple of int
         Number of each tooth's profile, one entry a tooth, or one for all.
     turn : tuple of float
-        Pitch errors as the turn (rad) of each tooth's flank about the gear's centre, > 0 counter-clockwise: out of the
-        material of the driving flanks, which then touch earlier. One entry a tooth, or one for all.
+        Pitch errors as the turn (rad) of each tooth's flank about the gear's centre, > 0 counter-clockwise (internal
+        gears: clockwise): out of the material of the driving flanks, which then touch earlier. One entry a tooth, or
+        one for all.
     """
 
     profiles: tuple[Deviation | None, ...] = (None,)

@@ -6,9 +6,10 @@ twist, :math:`\varphi_2(r(u))`, that point of the pinion's flank is met at the t
 
 .. math:: D(u) = \varphi_1(u) - \varphi_2(r(u)),
 
-the pair touches at :math:`\varphi_k = \min_u D`. The minimum is smooth on the path of contact and on rounds and
-reliefs, where parabolas close in on it, a kink of D at the kink of a relief, and an end of the range where a sharp tip
-bears before or after the path.
+of an internal gear, which a positive twist turns clockwise, at its negative; the pair touches at
+:math:`\varphi_k = \min_u D`. The minimum is smooth on the path of contact and on rounds and reliefs, where parabolas
+close in on it, a kink of D at the kink of a relief, and an end of the range where a sharp tip bears before or after the
+path.
 
 Each tooth may have deviations of its own: a profile, and a turn about the gear's centre by its pitch error.
 
@@ -44,6 +45,9 @@ _CLOSER = np.linspace(-1.0, 1.0, CLOSER)
 SETTLED = 4e-14
 #: Steps to the place of the pinion's flank that meets a mark of the wheel's: what is left is rounding.
 MARK_STEPS = 6
+#: Least relative curvature (1/m) of an internal pair's flanks, for first guesses: a hollow flank with waves may have
+#: less.
+LEAST_CURVATURE = 1.0
 
 
 @dataclass(frozen=True)
@@ -114,7 +118,7 @@ class ToothFlanks:
         self.pair, self.deviations = pair, deviations
         faces: list[Face] = []
         for gear, own in zip((pair.pinion, pair.wheel), deviations, strict=True):
-            own.check(gear.teeth)
+            own.check(gear.tooth_count)
             faces += [face_of(gear, one) for one in own.profiles]
         self.faces = tuple(faces)
 
@@ -128,7 +132,8 @@ class ToothFlanks:
         shape (n, 2).
         """
         teeth = number, -1 - number
-        errors = (own.turn_of(tooth) for own, tooth in zip(self.deviations, teeth, strict=True))
+        ways = 1, self.pair.sign
+        errors = (way * own.turn_of(tooth) for way, own, tooth in zip(ways, self.deviations, teeth, strict=True))
         angles = (self.pair.tooth_angle(gear, tooth, angle, twist) for gear, tooth in enumerate(teeth))
         return np.stack([one + error for one, error in zip(angles, errors, strict=True)], axis=1)
 
@@ -141,7 +146,8 @@ class ToothFlanks:
 
         Positions are in rising order, and the numbers of each of them.
         """
-        flank, frames, a = self.flank(number), self.frames(angle, number, 0.0), self.pair.working_centre_distance
+        flank, frames, a = self.flank(number), self.frames(angle, number, 0.0), self.pair.wheel_centre
+        sign = self.pair.sign
         least, places = np.full(len(number), np.inf), np.zeros((len(number), 2))
         point: ComplexArray = np.zeros(len(number), dtype=complex)
         normal = np.zeros_like(point)
@@ -158,10 +164,11 @@ class ToothFlanks:
             mate = np.where(mate > wheel.end - AT_AN_END, wheel.end, np.where(np.abs(mate) < AT_AN_END, 0.0, mate))
             (bent, bend), (mate_bent, mate_bend) = pinion.turning(u), wheel.turning(mate)
             # the normal of the flatter face is the surer one; at the mate's corner it is the only one
-            normals = pinion.normals(u) * turn[:, 0], -wheel.normals(mate) * turn[:, 1] * np.exp(1j * twist)
-            normal[rows], curvature[rows] = np.where(bend > mate_bend, *normals[::-1]), bent + mate_bent
+            normals = pinion.normals(u) * turn[:, 0], -wheel.normals(mate) * turn[:, 1] * np.exp(1j * sign * twist)
+            bent = np.maximum(bent + mate_bent, LEAST_CURVATURE) if wheel.internal else bent + mate_bent
+            normal[rows], curvature[rows] = np.where(bend > mate_bend, *normals[::-1]), bent
             least[rows], places[rows] = twist, np.stack([u, mate], axis=1)
-        arm = np.stack([_cross(point, normal), -_cross(point - a, normal)], axis=1)
+        arm = np.stack([_cross(point, normal), -sign * _cross(point - a, normal)], axis=1)
         every = FirstContacts(position, number, angle, least, places, point, normal, arm, curvature, flank, frames)
         return every.take(np.isfinite(least))
 
@@ -173,15 +180,17 @@ def _met_at(pinion: Face, wheel: Face, a: float, frames: Array, u: Array) -> tup
     Parameters
     ----------
     a
-        Centre distance (m).
+        x of the wheel's centre (m).
     frames : ndarray, shape (n, 2)
         Angles of the teeth at zero twist (rad).
     """
     turn = np.exp(1j * frames)
     seen = pinion.points(u) * turn[:, :1] - a
-    radius, (low, *_, high) = np.abs(seen), wheel.radii
+    radius, (low, *_, high) = np.abs(seen), (wheel.radii[::-1] if wheel.internal else wheel.radii)
     mate = wheel.points(wheel.at_radius(radius)) * turn[:, 1:]
-    return np.where((radius >= low) & (radius <= high * (1 + 1e-15)), np.angle(seen / mate), np.inf), radius
+    between = np.angle(mate / seen) if wheel.internal else np.angle(seen / mate)
+    reached = (radius >= low * (1 - 1e-15)) if wheel.internal else (radius >= low)
+    return np.where(reached & (radius <= high * (1 + 1e-15)), between, np.inf), radius
 
 
 def _least(pinion: Face, wheel: Face, a: float, frames: Array) -> tuple[Array, Array]:
@@ -247,7 +256,7 @@ def _marks_below(
     place, met = np.concatenate(goals)[mark], mark >= len(goals[0])
     at, inner, outer = row[met], k[met], k[met] + 1
     ends = [(grid[at, n], radii[at, n]) for n in (inner, outer)]
-    place[met] = _at_radius(pinion, a, frames[at], place[met], *ends)
+    place[met] = _at_radius(pinion, a, frames[at], place[met], *ends, larger=wheel.internal)
     value = _met_at(pinion, wheel, a, frames[row], place[:, None])[0][:, 0]
     low = value - bend < least[row]
     return row[low], place[low], value[low]
@@ -264,12 +273,19 @@ def _going_on(values: Array, row: IntArray, k: IntArray) -> tuple[Array, Array]:
 
 
 def _at_radius(
-    pinion: Face, a: float, frames: Array, goal: Array, inner: tuple[Array, Array], outer: tuple[Array, Array]
-) -> Array:  # fmt: skip
+    pinion: Face,
+    a: float,
+    frames: Array,
+    goal: Array,
+    inner: tuple[Array, Array],
+    outer: tuple[Array, Array],
+    *,
+    larger: bool = False,
+) -> Array:
     """Parameters of the pinion's flank with the radii `goal` about the wheel's centre (m), shape (n,), just within the
-    smaller radii; `inner` and `outer` are parameters on either side with the radii there.
+    smaller radii, or the larger ones; `inner` and `outer` are parameters on either side with the radii there.
     """
-    turn, side = np.exp(1j * frames[:, 0]), np.where(inner[1] < outer[1], -AT_AN_END, AT_AN_END)
+    turn, side = np.exp(1j * frames[:, 0]), np.where((inner[1] < outer[1]) != larger, -AT_AN_END, AT_AN_END)
     (u, off), (u_outer, off_outer) = (inner[0], inner[1] - goal), (outer[0], outer[1] - goal)
     for _ in range(MARK_STEPS if len(goal) else 0):  # regula falsi, by Illinois
         middle = u - off * (u_outer - u) / (off_outer - off)
@@ -299,7 +315,7 @@ def _lowest(u: Array, values: Array, step: float) -> tuple[Array, Array, BoolArr
 
 def candidates(pair: MeshGeometry, angles: Array) -> tuple[IntArray, Array, IntArray]:
     """Pinion teeth whose tip can reach the wheel's tip circle: positions, pinion angles (rad) and tooth numbers."""
-    a, tip1, tip2 = pair.working_centre_distance, pair.pinion.tip_radius, pair.wheel.tip_radius
+    a, tip1, tip2 = pair.wheel_centre, pair.pinion.tip_radius, pair.wheel.tip_radius
     reach = math.acos(min(1.0, max(-1.0, (a * a + tip1 * tip1 - tip2 * tip2) / (2 * a * tip1))))
     reach += pair.pinion.profile.tip_half_angle + 0.5 * pair.mesh_cycle
     half = math.ceil(reach / pair.mesh_cycle)

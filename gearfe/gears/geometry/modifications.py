@@ -9,6 +9,8 @@ and :math:`x = (s - s_0)/(s_1 - s_0)` from where a relief starts to where it has
 - slope: :math:`\tfrac12 f \xi`;
 - waviness: :math:`A \sin(n (s/r_b - 2\pi k/z) + \varphi)` on tooth k: on the path of contact of all pairs, at any time,
   the same phase, n times a turn.
+
+Roll lengths, base radii and numbers of teeth of internal gears are negative.
 """
 
 from __future__ import annotations
@@ -163,7 +165,7 @@ def slope(gear: Gear, amount: float) -> Deviation:
 def wave(gear: Gear, made: Waviness, tooth: int) -> Deviation:
     """Waviness on one tooth."""
     s, _, _ = _whole(gear)
-    per_length = made.waves / gear.base_radius
+    per_length = made.waves / gear.signed_base_radius
     pieces = max(WAVE, math.ceil(WAVE * abs(per_length) * (s[1] - s[0]) / (2 * math.pi)))
     # whole turns do not count: teeth with the same phase have the same profile
     phase = made.phase - 2 * math.pi * ((made.waves * tooth) % gear.teeth) / gear.teeth
@@ -179,7 +181,10 @@ def _whole(gear: Gear) -> tuple[Array, float, float]:
     """Ends of a deviation of the whole flank, its middle and half its length (m)."""
     low, high = ends_of(gear)
     beyond = BEYOND * gear.module
-    return np.array([max(0.0, low - beyond), high + beyond]), 0.5 * (low + high), 0.5 * (high - low)
+    first = low - beyond
+    if not gear.internal:
+        first = max(0.0, first)
+    return np.array([first, high + beyond]), 0.5 * (low + high), 0.5 * (high - low)
 
 
 def tooth_deviations(gear: Gear, made: FlankModification, turn: Sequence[float] = (0.0,)) -> ToothDeviations:
@@ -204,8 +209,8 @@ def tooth_deviations(gear: Gear, made: FlankModification, turn: Sequence[float] 
     if made.slope:
         parts["slope"] = made.slope, slope(gear, made.slope)
     parts |= {f"extra[{i}]": (None, one) for i, one in enumerate(made.extra)}
-    if made.measured and len(made.measured) != gear.teeth:
-        problem = f"must be one for each of the {gear.teeth} teeth"
+    if made.measured and len(made.measured) != gear.tooth_count:
+        problem = f"must be one for each of the {gear.tooth_count} teeth"
         raise InputError("measured", len(made.measured), problem, "give all teeth, or one for all")
     common = total([one for _, one in parts.values()])
     waves = {f"waviness[{i}].amplitude": w for i, w in enumerate(made.waviness) if w.amplitude}
@@ -213,7 +218,7 @@ def tooth_deviations(gear: Gear, made: FlankModification, turn: Sequence[float] 
     profiles: dict[Any, int] = {}
     found: list[Deviation | None] = []
     numbers = []
-    for tooth in range(gear.teeth if several else 1):
+    for tooth in range(gear.tooth_count if several else 1):
         own = made.measured[tooth] if made.measured else None
         key = (tuple((w.waves * tooth) % gear.teeth for w in waves.values()), own)
         if key not in profiles:

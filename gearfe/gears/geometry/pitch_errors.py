@@ -21,6 +21,8 @@ to the tangent, both outwards. The vector along these normals, over :math:`\cos\
 
 both sides of a place on the circle differ in phase by twice the pressure angle, besides the opposite sign, and the
 backlash varies with the distance of the centres. One value a tooth leaves out that the vector turns while it meets.
+Teeth of an internal gear are counted clockwise, its :math:`\theta_j` and :math:`\tau` are negative, and > 0 is towards
+the next tooth, as elsewhere.
 
 Tolerances by class are in `gears.geometry.tolerances`.
 """
@@ -72,8 +74,9 @@ def run_out(gear: Gear, amplitude: float, phase: float = 0.0) -> tuple[Array, Ar
 
     `amplitude` (m) is that of the index deviations, amplitude sin(2 pi j/z + phase) on the left flanks.
     """
-    apart = 2.0 * (gear.transverse_pressure_angle - gear.half_thickness_angle)
-    return sine(gear.teeth, amplitude, phase), -sine(gear.teeth, amplitude, phase + apart)
+    sign, z = gear.sign, gear.tooth_count
+    apart = sign * 2.0 * (gear.transverse_pressure_angle - sign * gear.half_thickness_angle)
+    return sine(z, amplitude, phase), -sine(z, amplitude, phase + apart)
 
 
 def sampled(gear: Gear, class_: int, seed: int) -> Array:
@@ -84,8 +87,8 @@ def sampled(gear: Gear, class_: int, seed: int) -> Array:
     gives the same gear.
     """
     allowed, rng = tolerances(gear, class_), np.random.default_rng(seed)
-    made = sine(gear.teeth, 0.5 * allowed.cumulative, rng.uniform(0, 2 * math.pi))
-    made = made + rng.normal(0.0, 0.25 * allowed.single, gear.teeth)
+    made = sine(gear.tooth_count, 0.5 * allowed.cumulative, rng.uniform(0, 2 * math.pi))
+    made = made + rng.normal(0.0, 0.25 * allowed.single, gear.tooth_count)
     worst = max(np.ptp(made) / allowed.cumulative, np.abs(single_of(made)).max() / allowed.single)
     return np.asarray(made / worst)
 
@@ -105,8 +108,8 @@ def turns(gear: Gear, index: Sequence[float] | Array) -> tuple[float, ...]:
         For a list of the wrong length, or numbers that are none.
     """
     F = np.asarray(index, dtype=float)
-    if F.shape != (gear.teeth,):
-        problem = f"must have one entry for each of the {gear.teeth} teeth"
+    if F.shape != (gear.tooth_count,):
+        problem = f"must have one entry for each of the {gear.tooth_count} teeth"
         raise InputError("pitch errors", len(F), problem, "give as many as the gear has teeth")
     if not (np.isfinite(F).all() and np.ptp(F) <= 0.1 * gear.module):
         most = f"{1e6 * 0.1 * gear.module:.4g} um, a tenth of the module, of each other"

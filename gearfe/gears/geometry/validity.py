@@ -7,6 +7,9 @@
   tooth, 2.25 modules high and 1.8 thick at its root, then yields by d = 0.06 modules: as a cantilever it has the strain
   3 t d/(2 h^2), 3 %, there. Steel would not bear it, and linear elasticity is a first order of it. A torque that
   makes twice that by the standard's stiffness is refused.
+- *Width of contacts* of internal pairs: a half width of up to 0.1 of the smaller radius of curvature. A half-plane's
+  surface is straight: what a contact of the half width b on a cylinder of the radius R has besides is of the order of
+  (b/R)^2 (Johnson, *Contact Mechanics*, 1985, sec. 5.3). Nearly conforming flanks reach it at loads that teeth bear.
 """
 
 from __future__ import annotations
@@ -30,6 +33,8 @@ from .spur_gear import LEAST_ROUND, Gear
 
 #: Largest overlap, times module.
 MOST_OVERLAP = 0.12
+#: Largest half width of a contact of an internal pair, times the smaller radius of curvature.
+CONFORMING = 0.1
 #: Largest yield of a tooth pair (modules) by the standard's stiffness under a given torque.
 MOST_YIELD = 0.25
 #: Penetrations below this many modules are taken for the discretisation of the outlines.
@@ -178,7 +183,7 @@ def missing_addendum(pair: MeshGeometry, names: Sequence[str]) -> float:
         return (rolls - pair.tangent_length) / pair.base_pitch - least
 
     least = least_ratio(pair)
-    return bisect(ratio, 0.0, pair.tangent_length / pair.pinion.module)
+    return bisect(ratio, 0.0, abs(pair.tangent_length) / pair.pinion.module)
 
 
 def least_ratio(pair: MeshGeometry) -> float:
@@ -205,6 +210,8 @@ def _check_ratio(pair: MeshGeometry) -> None:
             cure = "use a smaller centre distance"
             raise InputError("centre_distance", pair.centre_distance, problem, cure, ("<=", 1e3 * most, "mm"))
         name = min(("pinion", "wheel"), key=lambda name: getattr(pair, name).addendum)
+        if pair.internal:  # the ring's tips end at its base circle, whatever its addendum
+            name = "pinion"
         gear = getattr(pair, name)
         limit = (">=", gear.addendum + missing_addendum(pair, (name,)), "")
         raise InputError(f"{name}.addendum", gear.addendum, problem, cure, limit)
@@ -451,6 +458,14 @@ def overlaps(pair: MeshGeometry, twist: ArrayLike) -> Array:
 def overlap_warnings(pair: MeshGeometry, twist: Array, beyond: IntArray) -> list[str]:
     """What is said of the positions flagged as beyond validity, at twists (rad) from where flanks touch."""
     found = overlaps(pair, twist[beyond == 1])
+    if pair.internal and (near := np.count_nonzero(found <= MOST_OVERLAP)):
+        found = found[found > MOST_OVERLAP]
+        said = (
+            f"{near} positions are beyond validity (column beyond_validity): contacts are wider than {CONFORMING:g} of "
+            "the smaller radius of curvature on either side, where flanks conform and half-planes do not hold; use "
+            "less load, or a contact law on elements"
+        )
+        return [said, *(overlap_warnings(pair, twist, beyond * (overlaps(pair, twist) > MOST_OVERLAP)))]
     if not found.size:
         return []
     reason = (

@@ -4,6 +4,9 @@ The outline is cut into edges here (sizes graded along it, nodes at chosen arc l
 it with straight triangles, and the mid-edge nodes are then placed here too: on the exact profile along the outline, in
 the middle elsewhere. gmsh works in millimetres; metres leave this module. Default sizes are in
 proportion to the module.
+
+The sector of an internal gear lies about the -x axis: its tooth points to +x, as others do, and what is its bore side
+is the outside of the rim.
 """
 
 from __future__ import annotations
@@ -33,11 +36,11 @@ FINER, MOST_FILLINGS = 0.7, 12
 #: Sizes of the recipe that cut a curved boundary into edges; the cuts between sectors are straight.
 SIZES = {
     "flank_left": ("flank", "strip"), "flank_right": ("back",), "root_left": ("root",), "root_right": ("root",),
-    "tip": ("back",), "bore": ("bore",),
+    "tip": ("back",), "bore": ("bore",), "rim": ("bore",),
 }  # fmt: skip
 
 #: Boundary of the pieces of a half profile that are no flank.
-GROUPS = {"root_circle": "root", "trochoid": "root", "tip": "tip"}
+GROUPS = {"root_circle": "root", "trochoid": "root", "fillet": "root", "tip": "tip"}
 
 #: Fewer second-order edges round the whole bore stiffen the gear measurably (0.3 % with seven).
 MINIMUM_BORE_EDGES = 24
@@ -60,7 +63,7 @@ class SectorRecipe:
     back
         On the flank that carries nothing.
     root, body, bore
-        On root fillet and root circle, inside the gear body, round the bore.
+        On root fillet and root circle, inside the gear body, round the bore or the rim.
     deepening
         Growth of the size inside the body per depth below the root circle (-): far from the teeth the field is smooth.
     growth
@@ -96,12 +99,16 @@ class SectorMesh:
         Corner nodes counter-clockwise, then the nodes in the middle of edges 01, 12, 20.
     boundaries : dict of str to ndarray, shape (k, 3)
         Outline edges (start, middle, end node), in order counter-clockwise round the sector, under the names
-        ``cut_right``, ``root_right``, ``flank_right``, ``tip``, ``flank_left``, ``root_left``, ``cut_left``, ``bore``.
-        Tip rounds belong to the flanks.
+        ``cut_right``, ``root_right``, ``flank_right``, ``tip``, ``flank_left``, ``root_left``, ``cut_left``, ``bore``
+        (``rim`` of an internal gear). Tip rounds belong to the flanks.
     cut_right, cut_left : ndarray, shape (c,)
         Nodes of the two cut sides from outside to bore; node k of one is node k of the other turned by the pitch angle.
     teeth
         Number of such sectors in the whole gear.
+    internal
+        Whether the next sector lies clockwise.
+    free
+        Whether bore or rim are elastic, and only their mean displacement and turn are held.
     """
 
     points: Array
@@ -110,6 +117,18 @@ class SectorMesh:
     cut_right: IntArray
     cut_left: IntArray
     teeth: int
+    internal: bool = False
+    free: bool = False
+
+    @property
+    def pitch(self) -> float:
+        """Angle (rad) from one sector to the next."""
+        return (-2.0 if self.internal else 2.0) * math.pi / self.teeth
+
+    @property
+    def held(self) -> IntArray:
+        """Edges (start, middle, end node) of the bore, or of the rim of an internal gear, shape (k, 3)."""
+        return self.boundaries["rim" if self.internal else "bore"]
 
     def contact_edges(self) -> IntArray:
         """Edges of the driving (left) flank that can touch the mate, from root to tip, each (root side, middle, tip
@@ -120,7 +139,7 @@ class SectorMesh:
         """
         root = self.boundaries["root_left"]
         ends = self.points[root[:, 2]]
-        depth = np.linalg.norm(self.points[root[0, 0]]) - np.linalg.norm(ends, axis=1)
+        depth = np.abs(np.linalg.norm(self.points[root[0, 0]]) - np.linalg.norm(ends, axis=1))
         reachable = int(np.count_nonzero(depth < 0.5 * depth.max()))
         return np.concatenate([self.boundaries["flank_left"], root[: min(reachable, len(root) - 1)]])[::-1, ::-1]
 
@@ -138,12 +157,12 @@ def sector_mesh(gear: Gear, recipe: SectorRecipe, *, cache: bool = True) -> Sect
         ``False`` neither reads nor writes the cache.
     """
     if not cache:
-        return _unpack(_make(gear, recipe), gear.teeth)
+        return _unpack(_make(gear, recipe), gear)
     plan = {"number": RECIPE_NUMBER, "gear": gear, "sizes": recipe}
-    return _unpack(cached_arrays("tooth-sector", plan, lambda: _make(gear, recipe)), gear.teeth)
+    return _unpack(cached_arrays("tooth-sector", plan, lambda: _make(gear, recipe)), gear)
 
 
-def _unpack(arrays: dict[str, NDArray[np.generic]], teeth: int) -> SectorMesh:
+def _unpack(arrays: dict[str, NDArray[np.generic]], gear: Gear) -> SectorMesh:
     boundaries = {name[3:]: value.astype(np.int64) for name, value in arrays.items() if name.startswith("on_")}
     return SectorMesh(
         points=arrays["points"].astype(np.float64),
@@ -151,7 +170,9 @@ def _unpack(arrays: dict[str, NDArray[np.generic]], teeth: int) -> SectorMesh:
         boundaries=boundaries,
         cut_right=_cut_nodes(boundaries["cut_right"], reverse=True),
         cut_left=_cut_nodes(boundaries["cut_left"], reverse=False),
-        teeth=teeth,
+        teeth=gear.tooth_count,
+        internal=gear.internal,
+        free=gear.rim == "free",
     )
 
 
@@ -164,18 +185,20 @@ def _cut_nodes(edges: IntArray, *, reverse: bool) -> IntArray:
 
 
 def _outline(gear: Gear, recipe: SectorRecipe) -> dict[str, ComplexArray]:
-    """Outline of the sector by boundary name, counter-clockwise from the bore end of the right cut: nodes of its edges,
-    end, middle, end, ..., end, as complex numbers (m).
+    """Outline of the sector by boundary name, counter-clockwise from the bore (or rim) end of the right cut: nodes of
+    its edges, end, middle, end, ..., end, as complex numbers (m).
     """
     left = _half_profile(gear, recipe, fine=True)
     right = _half_profile(gear, recipe, fine=False)
-    half, inner = np.pi / gear.teeth, gear.bore_diameter / 2
-    edges = max(1, round(2 * half * inner / recipe.bore), int(np.ceil(MINIMUM_BORE_EDGES / gear.teeth)))
-    depth = gear.root_radius - inner
+    half, held = np.pi / gear.teeth, gear.held_radius
+    around = 2 * abs(half) * held
+    edges = max(1, round(around / recipe.bore), int(np.ceil(MINIMUM_BORE_EDGES / gear.tooth_count)))
+    depth = abs(gear.root_radius - held)
     place = np.linspace(0, depth, 400)
     size = np.minimum(recipe.body + recipe.deepening * place, depth)
-    size[0], size[-1] = min(recipe.root, depth), min(recipe.bore, 2 * half * inner / edges, depth)
-    radii = gear.root_radius - _nodes(place, _limited(place, size, 2 * recipe.growth))
+    size[0], size[-1] = min(recipe.root, depth), min(recipe.bore, around / edges, depth)
+    # negative radii for an internal gear, whose sector lies about the -x axis
+    radii = gear.sign * gear.root_radius - _nodes(place, _limited(place, size, 2 * recipe.growth))
     cut = _polar(_interleaved(radii, _middles(radii)), half)
     return {
         "cut_right": cut[::-1].conj(),
@@ -185,7 +208,7 @@ def _outline(gear: Gear, recipe: SectorRecipe) -> dict[str, ComplexArray]:
         "flank_left": left["flank"][::-1],
         "root_left": left["root"][::-1],
         "cut_left": cut,
-        "bore": _polar(inner, np.linspace(half, -half, 2 * edges + 1)),
+        "rim" if gear.internal else "bore": _polar(gear.sign * held, np.linspace(half, -half, 2 * edges + 1)),
     }
 
 
@@ -281,7 +304,8 @@ def _make(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:
 def _filled(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:
     chains = _outline(gear, recipe)
     ring = coordinates(np.concatenate([nodes[:-1:2] for nodes in chains.values()]))
-    corners, triangles = _fill(ring, recipe.body + recipe.deepening * (gear.root_radius - gear.bore_diameter / 2))
+    depth = abs(gear.root_radius - gear.held_radius)
+    corners, triangles = _fill(ring, recipe.body + recipe.deepening * depth)
     points, quadratic, edges = second_order(corners, triangles)
     keys = edges[:, 0] * len(corners) + edges[:, 1]
     arrays: dict[str, NDArray[np.generic]] = {}
@@ -356,7 +380,7 @@ def sector_recipes(
     starts = (pair.path["A"].pinion_roll, pair.path["E"].wheel_roll)
     made = []
     for gear, start in zip((pair.pinion, pair.wheel), starts, strict=True):
-        rim = gear.root_radius - 0.5 * gear.bore_diameter
+        rim = abs(gear.root_radius - gear.held_radius)
         recipe = SectorRecipe(
             flank=0.028 * module,
             strip=0.008 * module,
@@ -365,7 +389,7 @@ def sector_recipes(
             back=0.16 * module,
             root=0.12 * module,
             body=0.6 * module,
-            bore=min(math.pi * gear.bore_diameter / BORE_EDGES, RIM_SHARE * rim),
+            bore=min(2.0 * math.pi * gear.held_radius / BORE_EDGES, RIM_SHARE * rim),
         )
         recipe = recipe.scaled(coarsen)
         made.append(replace(recipe, flank=flank_coarsen * recipe.flank, strip=flank_coarsen * recipe.strip))

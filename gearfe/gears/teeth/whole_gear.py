@@ -45,7 +45,7 @@ def _joined(sectors: Sequence[SectorMesh]) -> WholeGear:
     numbers, points = [np.zeros(len(sector.points), dtype=np.int64) for sector in sectors], []
     for k, (sector, kept) in enumerate(zip(sectors, own, strict=True)):
         numbers[k][kept] = np.arange(first[k], first[k + 1])
-        turn = 2.0 * math.pi * k / len(sectors)
+        turn = k * sector.pitch
         (x, y), c, s = sector.points[kept].T, math.cos(turn), math.sin(turn)
         points.append(np.stack([c * x - s * y, s * x + c * y], axis=-1))
     for k, sector in enumerate(sectors):  # the left side of a sector is the right side of the next one
@@ -58,6 +58,7 @@ def _joined(sectors: Sequence[SectorMesh]) -> WholeGear:
         boundaries={
             name: np.concatenate([own[sector.boundaries[part]] for sector, own in numbered for part in parts])
             for name, parts in OUTLINE.items()
+            if parts[0] in sectors[0].boundaries
         },
         contact=[own[sector.contact_edges()] for sector, own in numbered],
         numbers=numbers,
@@ -66,9 +67,9 @@ def _joined(sectors: Sequence[SectorMesh]) -> WholeGear:
 
 #: Flank elements of the coarse teeth (modules): nothing touches them.
 FLANK = 0.28
-#: Boundaries of a gear, each with the pieces that a sector has of it.
+#: Boundaries of a gear, each with the pieces that a sector has of it; a gear has a bore or a rim.
 OUTLINE = {
-    "bore": ("bore",), "root": ("root_right", "root_left"), "flank_right": ("flank_right",),
+    "bore": ("bore",), "rim": ("rim",), "root": ("root_right", "root_left"), "flank_right": ("flank_right",),
     "flank_left": ("flank_left",), "tip": ("tip",),
 }  # fmt: skip
 
@@ -79,7 +80,7 @@ def mixed_gear(gear: Gear, recipe: SectorRecipe, fine: Collection[int]) -> Whole
     Parameters
     ----------
     fine
-        Numbers of teeth, counter-clockwise from tooth 0 on +x.
+        Numbers of teeth, counter-clockwise from tooth 0 on +x; of an internal gear clockwise from -x.
 
     Returns
     -------
@@ -87,15 +88,15 @@ def mixed_gear(gear: Gear, recipe: SectorRecipe, fine: Collection[int]) -> Whole
         With a boundary ``contact`` more: the driving flanks of the fine teeth with their tip rounds and the upper half
         of the fillets, each edge (root side, middle, tip side).
     """
-    mesh, numbered = sector_mesh(gear, recipe), {k % gear.teeth for k in fine}
-    coarse = mesh if len(numbered) == gear.teeth else _coarse(gear, recipe, mesh)
-    made = _joined([mesh if k in numbered else coarse for k in range(gear.teeth)])
+    mesh, numbered = sector_mesh(gear, recipe), {k % gear.tooth_count for k in fine}
+    coarse = mesh if len(numbered) == gear.tooth_count else _coarse(gear, recipe, mesh)
+    made = _joined([mesh if k in numbered else coarse for k in range(gear.tooth_count)])
     contact = np.concatenate([made.contact[k] for k in sorted(numbered)])
     return replace(made, boundaries={**made.boundaries, "contact": contact})
 
 
 def in_mesh(pair: GearPair) -> tuple[float, float]:
-    """Directions (rad) of a pair of teeth, pinion's and wheel's, that touch in the middle of the path of contact.
+    """Angles (rad) of the frames of pinion and wheel teeth that touch in the middle of the path of contact.
 
     The driving flank is the left one: the wheel's tooth stands half a pitch before the space that faces the pinion's.
     """
@@ -118,7 +119,7 @@ def teeth_near(gear: Gear, turned: float, towards: float, count: int) -> set[int
         Number of teeth.
     """
     step = 2.0 * math.pi / gear.teeth
-    off = {k: abs(math.remainder(turned + k * step - towards, 2.0 * math.pi)) for k in range(gear.teeth)}
+    off = {k: abs(math.remainder(turned + k * step - towards, 2.0 * math.pi)) for k in range(gear.tooth_count)}
     return set(sorted(off, key=lambda k: (round(off[k], 9), k))[:count])
 
 

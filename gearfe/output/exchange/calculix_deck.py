@@ -33,13 +33,14 @@ class Deck:
     Attributes
     ----------
     parts
-        Pinion and wheel in their places where the flanks just touch, with boundaries ``bore`` and ``contact`` (m).
+        Pinion and wheel in their places where the flanks just touch, with boundaries ``bore`` (an internal wheel:
+        ``rim``) and ``contact`` (m).
     materials
         Young's modulus (Pa) and Poisson's ratio (-) of pinion and wheel.
     centre
-        Distance of the wheel's centre from the origin (m).
+        x of the wheel's centre (m).
     twist
-        Rotation of the wheel's bore in the step (rad).
+        Rotation of the wheel's bore, or rim, in the step (rad), counter-clockwise.
     width
         Thickness (m).
     plane
@@ -69,18 +70,19 @@ def write_deck(path: str | Path, deck: Deck) -> None:
     lines += ["*STEP, NLGEOM, INC=200", "*STATIC", f"{FIRST:g}, 1.", "*BOUNDARY", "pinion_bore, 1, 2"]
     c, s = math.cos(deck.twist) - 1.0, math.sin(deck.twist)
     wheel, first = deck.parts["wheel"], len(deck.parts["pinion"].points)
-    for node in np.unique(wheel.boundaries["bore"]):
+    held = "rim" if "rim" in wheel.boundaries else "bore"
+    for node in np.unique(wheel.boundaries[held]):
         x, y = 1e3 * (wheel.points[node] - [deck.centre, 0.0])
         number = first + node + 1
         lines += [f"{number}, 1, 1, {c * x - s * y:.12e}", f"{number}, 2, 2, {s * x + c * y:.12e}"]
-    lines += ["*NODE PRINT, NSET=wheel_bore, FREQUENCY=999", "RF"]
+    lines += [f"*NODE PRINT, NSET=wheel_{held}, FREQUENCY=999", "RF"]
     lines += ["*NODE FILE, FREQUENCY=999", "U", "*EL FILE, FREQUENCY=999", "S", "*END STEP"]
     with whole_file(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="ascii", errors="replace", newline="\n")
 
 
 def deck_torque(deck: str | Path, centre: float, twist: float) -> float:
-    """Torque at the wheel's hub (N m) from the reactions that CalculiX printed beside a deck.
+    """Torque at the wheel's hub (N m), counter-clockwise, from the reactions that CalculiX printed beside a deck.
 
     Parameters
     ----------

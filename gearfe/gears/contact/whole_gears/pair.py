@@ -9,10 +9,11 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.spatial import KDTree
 
+from ....base.errors import InputError
 from ....base.typing import Array
 from ....fem.plane import Material, Plane
 from ...geometry.pair import GearPair
-from ...geometry.validity import check_external, check_spur
+from ...geometry.validity import check_spur
 from ...teeth.tooth_sector import SectorMesh, sector_mesh, sector_recipes
 from ...teeth.whole_gear import WholeGear, whole_gear
 from ..laws import ElementLaw, PairModel
@@ -44,7 +45,7 @@ class WholePair:
     pinion, wheel
         Gears.
     centre_distance
-        a (m).
+        |a| (m).
     width
         Common face width (m).
     points_per_edge, quadrature, kinematics
@@ -58,6 +59,16 @@ class WholePair:
     points_per_edge: int = 4
     quadrature: Quadrature = "points"
     kinematics: Kinematics = "small"
+
+    @property
+    def sign(self) -> int:
+        """1; -1 for an internal wheel, whose centre lies on the other side and which a twist turns the other way."""
+        return -1 if self.wheel.mesh.internal else 1
+
+    @property
+    def wheel_centre(self) -> float:
+        """x of the wheel's centre (m)."""
+        return self.sign * self.centre_distance
 
     @cached_property
     def gears(self) -> tuple[WholeGear, WholeGear]:
@@ -80,8 +91,8 @@ class WholePair:
 
         At pinion angle and twist 0 that of the wheel stands half a pitch above the line of centres.
         """
-        z1, z2 = self.pinion.mesh.teeth, self.wheel.mesh.teeth
-        return pinion_angle, twist - pinion_angle * z1 / z2 + np.pi + np.pi / z2
+        z1, z2 = self.pinion.mesh.teeth, self.sign * self.wheel.mesh.teeth
+        return pinion_angle, self.sign * twist - pinion_angle * z1 / z2 + np.pi + np.pi / z2
 
     def problem(self, law: ElementLaw, pinion_angle: float, twist: float) -> ContactProblem | None:
         """Return the contact problem of all flanks that come near each other, or None where none do."""
@@ -91,7 +102,7 @@ class WholePair:
             c, s = np.cos(angle), np.sin(angle)
             turns[of_gear] = [[c, -s], [s, c]]
         places = np.einsum("nij,jn->in", turns, self.bodies.mesh.doflocs)
-        places[0, nodes[1]] += self.centre_distance
+        places[0, nodes[1]] += self.wheel_centre
         mesh = self.bodies.moved(np.ascontiguousarray(places))
         facing = self._facing(places.T, pinion_angle, twist)
         if not facing:
@@ -101,7 +112,8 @@ class WholePair:
             rows, columns = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
             turn = coo_matrix((turns.ravel(), (rows.ravel(), columns.ravel()))).tocsr()
             stiffness = turn @ self.bodies.stiffness @ turn.T
-        bores = [of[np.unique(gear.boundaries["bore"])] for of, gear in zip(nodes, self.gears, strict=True)]
+        rims = ("bore", "rim" if self.wheel.mesh.internal else "bore")
+        bores = [of[np.unique(gear.boundaries[rim])] for of, gear, rim in zip(nodes, self.gears, rims, strict=True)]
         fixed = unknowns[np.concatenate(bores)].ravel()
         return ContactProblem(
             bodies=self.bodies,
@@ -153,7 +165,9 @@ def whole_pair(pair: GearPair, model: PairModel, kinematics: Kinematics = "small
         ``small`` or ``finite`` strain.
     """
     check_spur(pair, "the check on whole gears")
-    check_external(pair, "the check on whole gears")
+    if pair.wheel.rim == "free":
+        problem = "leaves the gear without a support: the check on whole gears holds the rim"
+        raise InputError("wheel.rim", pair.wheel.rim, problem, "check with a bolted rim")
     gears = pair.pinion, pair.wheel
     recipes = sector_recipes(pair, coarsen=model.coarsen, flank_coarsen=model.mesh_flank_coarsen)
     pinion, wheel = (

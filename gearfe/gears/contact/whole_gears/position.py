@@ -132,13 +132,13 @@ def _position(pair: WholePair, problem: ContactProblem, solution: ContactSolutio
     force, internal = solution.state.forces[problem.unknowns], solution.internal[problem.unknowns]
     pinion, wheel = pair.bodies.node_of
     bore = wheel[np.isin(problem.unknowns[wheel, 0], problem.fixed)]
-    from_wheel = placed - [pair.centre_distance, 0.0]
+    from_wheel = placed - [pair.wheel_centre, 0.0]
     loaded = np.bincount(solution.state.points.mate, solution.state.pressure > 0) / problem.points_per_edge
     return WholePosition(
         status="converged",
-        torque_wheel=-_moment(from_wheel[wheel], force[wheel]),
+        torque_wheel=-pair.sign * _moment(from_wheel[wheel], force[wheel]),
         torque_pinion=-_moment(placed[pinion], force[pinion]),
-        torque_wheel_reaction=_moment(from_wheel[bore], internal[bore]),
+        torque_wheel_reaction=pair.sign * _moment(from_wheel[bore], internal[bore]),
         peak_pressure=float(solution.state.pressure.max()),
         elements_per_contact=float(loaded[loaded > 0].min()) if pair.quadrature == "points" else math.nan,
         iterations=iterations,
