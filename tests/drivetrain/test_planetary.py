@@ -11,6 +11,7 @@ import pytest
 
 from gearfe.base.errors import InputError
 from gearfe.drivetrain.modes.whirl import WhirlModes, train_modes
+from gearfe.drivetrain.runup.run_up import steady_state
 from gearfe.drivetrain.train import Damping, Drive, Guide, TrainResponse, build_train, simulate
 from gearfe.drivetrain.train.misalignment import static_state
 from gearfe.drivetrain.train.planetary import mesh_families
@@ -186,6 +187,20 @@ def test_sidebands_at_the_ring_are_of_orders_that_the_number_of_planets_divides(
     assert lines[102] > 0.1
     others = np.delete(lines[:150], range(0, 150, 3))
     assert others.max() < 1e-6 * lines[102]
+
+
+def test_a_steady_state_of_the_run_up_is_what_the_transient_comes_to() -> None:
+    """With planets out of phase and one pin out of place: translational modes swing, Coriolis forces act.
+
+    The run-up leaves out the centrifugal forces, m W^2/k = 3e-5 of the force of a pin here.
+    """
+    train = stage(3, (31, 35), mesh=_rigid_curve, errors=[5e-6, 0.0, 0.0], damping=Damping(ratio=0.2))
+    model = build_train(dataclasses.replace(train, drive=Drive("sun", "sun", constant(300.0))))
+    state = steady_state(model, 300.0, tolerance=1e-4)
+    times = np.arange(40 * 64 + 1) * state.period / 64
+    force = simulate(model, times, tolerance=1e-8, method="taylor").contact_force[-65:-1]
+    np.testing.assert_allclose(state.force.mean(axis=0), force.mean(axis=0), rtol=1e-3)
+    np.testing.assert_allclose(np.ptp(state.force, axis=0), np.ptp(force, axis=0), rtol=1e-2)
 
 
 def test_coriolis_forces_split_translational_modes_by_the_speed_of_the_carrier() -> None:
