@@ -130,6 +130,8 @@ def test_what_is_no_rexs_is_refused(tmp_path):
     refused(saved(tmp_path, XML.replace('version="2.0" app', 'version="3.1" app')), "1.0 to 2.0", "'3.1'")
     refused(saved(tmp_path, "<model version='2.0'/>"), "no components")
     refused(tmp_path / "lost.rexs", "no such file")
+    text = json_of(PARTS, JOINTS).replace('"role": "part"', '"role": [1]', 1)
+    assert "[1]" in read_rexs(saved(tmp_path, text)).relations[0].roles
 
 
 # --- faults of the model ----------------------------------------------------------------------------------------------

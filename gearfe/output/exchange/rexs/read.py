@@ -376,10 +376,11 @@ def _relation(head: Mapping[str, Any], refs: list[tuple[str, Any, str]]) -> Rela
     number = _number(head.get("id"), "id of a relation")
     where = f"relation {number}"
     roles: dict[str, int] = {}
-    for role, target, _ in refs:
+    for given, target, _ in refs:
+        role = str(given)
         if role in roles:
             raise InputError(where, role, "is a role of two components: must be one", "export the file again")
-        roles[str(role)] = _number(target, f"id of a ref of {where}")
+        roles[role] = _number(target, f"id of a ref of {where}")
     if not roles:
         raise InputError(where, None, "refers to no component", "export the file again")
     order, kind = head.get("order"), str(head.get("type", ""))

@@ -45,6 +45,8 @@ ENDINGS = {
 }
 #: Tables that become components; others by name have none in REXS.
 AS_COMPONENTS = ("materials", "gears", "meshes", "shafts", "bearings", "machines", "couplings")
+#: Keys that the reader adds after it has taken those of this program.
+LATE = ("mesh_model", "addendum", "oil_viscosity_mPa_s", "roughness_um")
 #: Type of bearing in a job -> in REXS.
 _TYPES = {kind: name for name, kind in reversed(TYPES.items())}
 #: Shape of a relief in a job -> in REXS.
@@ -146,7 +148,7 @@ def rexs_bytes(raw: Mapping[str, Any], form: str = "xml", name: str = "job") -> 
             part = builder.parts[builder.numbers[kind, key] - 1]
             made = derived.get(kind, {}).get(key, {})
             if made != entry:
-                kept = [k for k, value in entry.items() if k in made and made[k] == value]
+                kept = [k for k, value in entry.items() if k not in LATE and k in made and made[k] == value]
                 keys = {k: value for k, value in entry.items() if k not in kept}
                 part.attributes[OWN_KEYS] = toml_document({"table": kind, "kept": kept, "keys": keys})
             part.attributes[OWN_NAME] = key
