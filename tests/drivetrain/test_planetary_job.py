@@ -117,6 +117,7 @@ def test_shipped_modes_run_from_the_command_line(tmp_path: Path) -> None:
         ({"shafts__planet__speed_ratio": 0}, "whose rotation follows from its meshes"),
         ({"shafts__ring__speed_ratio": "none"}, "is no number"),
         ({"shafts__sun__holding_stiffness_Nm_per_rad": 1e6}, "is of a shaft with speed_ratio"),
+        ({"shafts__planet__attachments": [1]}, "bearings carry it: 1"),
         ({"gears__ring__module_mm": 4.5}, "modules"),
         ({"gears__ring__teeth": -62}, "mm apart"),
         ({"meshes__planet_ring__driver": "ring", "meshes__planet_ring__driven": "planet"}, "swap the gears"),

@@ -590,7 +590,8 @@ def named_train(
     for name, bores in carried.items():
         if shafts[name].carrier is not None:
             if bores:
-                problem = f"is a planet of carrier {shafts[name].carrier!r}, and bearings carry it: {', '.join(bores)}"
+                held_by = ", ".join(map(str, bores))
+                problem = f"is a planet of carrier {shafts[name].carrier!r}, and bearings carry it: {held_by}"
                 raise InputError(f"shafts.{name}", None, problem, "leave out its bearings, or its carrier")
         elif not bores:
             cure = f'add [bearings.NAME] with shaft = "{name}", or attachments = ["1", "2"]'
