@@ -151,7 +151,7 @@ def balance(elastic: MeshingPair, found: Positions, angle: float, twist: float) 
             arm = turn * (elastic.wheel.flank.points @ [1, 1j])
             on_wheel += force.sum()
             moment -= float((arm.conj() * force).imag.sum())
-    wrong = found.torque_wheel + found.torque_pinion - elastic.centre_distance * on_wheel.imag
+    wrong = found.torque_wheel + found.torque_pinion - elastic.wheel_centre * on_wheel.imag
     reaction = found.torque_wheel_reaction - moment
     off = float(np.abs([wrong, reaction]).max() / found.torque_wheel)
     return Check("balance", max(abs(resultant) / abs(on_wheel), off), BALANCE)

@@ -91,7 +91,7 @@ class FlankCompliance:
     wedge: Array
     stations: Array
     bumps: Array
-    far_field: FarFields
+    far_field: dict[int, Array]
 
     def distance(self, s: Array) -> Array:
         """Distance y (m) of the flank at arc lengths s (m) from the corner."""
