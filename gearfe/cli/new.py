@@ -102,7 +102,7 @@ def _from_rexs(args: argparse.Namespace) -> int:
     job = rexs_job(source, load_case=args.load_case)
     _check_free(target, args.force)
     with whole_file(target) as temporary:
-        temporary.write_text(job.text(source.name), encoding="utf-8")
+        temporary.write_text(job.text(source.name), encoding="utf-8", newline="\n")
     print(f"written: {target}")
     print("values of the model: " + ", ".join(f"{job.count(kind)} {kind}" for kind in KINDS) + " (listed in the file)")
     for (kind, name), (_, reason) in job.left.items():

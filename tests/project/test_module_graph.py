@@ -37,6 +37,10 @@ HEAVY = {
     ("gearfe.gears.gearmesh.job", "gearfe.gears.gearmesh.sweep"): "scipy; a curve is read from the cache",
     ("gearfe.drivetrain.gearbox.fields", "gearfe.fem.bodies.mesh_checks"): "sparse matrices",
     (
+        "gearfe.drivetrain.gearbox.mesh_stiffness",
+        "gearfe.gears.gearmesh.width_spring",
+    ): "elastic teeth in space; for loads that vary along the width only",
+    (
         "gearfe.figures.flanks",
         "gearfe.gears.gearmesh.width_job",
     ): "elastic teeth; for modifications along the width only",
