@@ -30,7 +30,7 @@ def tables(**changes: Any) -> dict[str, Any]:
     """The shipped job with given stiffnesses and some keys changed, as ``shafts__ring__speed_ratio``."""
     raw = tomllib.loads(SHIPPED.read_text(encoding="utf-8"))
     raw["meshes"]["sun_planet"] = {"driver": "sun", "driven": "planet", "stiffness_N_per_m": 8e8}
-    raw["meshes"]["planet_ring"].pop("backlash_um")
+    raw["meshes"]["planet_ring"] = {"driver": "planet", "driven": "ring", "stiffness_N_per_m": 1e9}
     for key, value in changes.items():
         *path, last = key.split("__")
         table = raw
