@@ -187,7 +187,9 @@ def _computed_spring(job: TrainJob, train: GearTrain, number: int) -> MeshTable:
     if curves.load == "stiffness":
         width.check_load()
         angles, table = np.radians(width.table.angles_deg(math.degrees(pair.mesh_cycle))), width.table
-        load = {"twist": math.radians(table.twist_deg)} if table.torque_Nm is None else {"torque": table.torque_Nm}
+        load = {} if table.twist_deg is None else {"twist": math.radians(table.twist_deg)}
+        if table.torque_Nm is not None:
+            load = {"torque": table.torque_Nm}
         label = "stiffness.torque_Nm"
     else:
         load, label = {"torque": carried_torque(train, number)}, f"mesh {mesh.name!r} torque"

@@ -28,7 +28,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -200,7 +200,7 @@ class CurveFlank(MeshFlank):
         k, slope = self.curve(phase)
         bears = self.bears(phase, approach)
         late, rise = (0.0, 0.0) if self.error is None else self.error(phase)
-        along: dict[str, Array] = {}
+        along: dict[str, Any] = {}
         if self.tilting is not None:
             lever, more = self.tilting.lever(phase)
             moment, steep = self.tilting.moment(phase)

@@ -53,7 +53,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -348,11 +348,15 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
             always = 0.0 if side or mesh.damps_in_contact else mesh.damping + rayleigh
             if error is not None:
                 curve, error = on_common_nodes(curve, error)
-            parts, along_width = backlash is not None, {}
+            along_width: dict[str, Any] = {}
             if mesh.tilting is not None and sign > 0.0:
                 centred = replace(mesh.tilting, lever=_without_mean(mesh.tilting.lever))
                 along_width = {"tilt": tilt, "tilting": centred}
-            flanks.append(CurveFlank(*place, curve, parts, in_contact[0], mean_damping, error, always, **along_width))
+            flanks.append(
+                CurveFlank(
+                    *place, curve, backlash is not None, in_contact[0], mean_damping, error, always, **along_width
+                )
+            )
     return MeshLine(
         mesh, pair, i, along.direction, along.point, along.axial, along.row, tuple(columns) if flanks else (),
         along.spin, along.tilt, tuple(flanks), rayleigh, reference,

@@ -64,7 +64,9 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
         Places(curve, law, row, piece, np.cumsum([0, *map(len, shifts)]), np.concatenate([np.zeros(0), *shifts])),
         np.array(watches, dtype=np.int64).reshape(-1, 4),
         curve_arrays(curves),
-        *(curve_arrays(tables).cubics for tables in (errors, levers, moments)),
+        curve_arrays(errors).cubics,
+        curve_arrays(levers).cubics,
+        curve_arrays(moments).cubics,
         laws,
         speeds,
     )
