@@ -24,7 +24,8 @@ OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
     r"overlap_ratio|contact_ratio": ("results as keys", "gearfe gear prints the ratios of spur and helical gears"),
     r"internal|(^|_)ring(_|$)|annulus":
         ("internal gears by this name", "those among spur gears and helical gears have a negative number of teeth"),
-    r"planet|carrier|sun(_|$)|epicyclic": ("planetary gears", "spur gears on fixed shafts only"),
+    r"planet|carrier|sun(_|$)|epicyclic":
+        ("planetary gears by this name", "[carriers.NAME] has planets, of spur gears, and shafts name it as carrier"),
     r"bevel|hypoid|cone_(angle|dist)|pitch_cone|miter|spiral|^zerol": ("bevel gears", "spur gears only"),
     r"worm|lead_angle": ("worm gears", "spur gears only"),
     r"crossed|(shaft|axis|axes)_angle|non_parallel": ("shafts that are not parallel", "spur gears only"),

@@ -16,6 +16,7 @@ from gearfe import (
     Search,
     build_train,
     housing_from_job,
+    rate,
     read_study,
     run_study,
     run_up,
@@ -31,7 +32,7 @@ from gearfe.figures.results import PICTURES
 from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.mechanisms import load_mechanism
 from gearfe.multibody import constant, integrate
-from tests.makers import gears, trains
+from tests.makers import gears, rated, trains
 from tests.makers.studies import written
 from tests.places import GEOMETRY, MESHES, ROOT
 
@@ -61,6 +62,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         steady.housing,
         run_up(model, [500.0, 510.0, 520.0], tolerance=1e-2),
         train_modes(model, [0.0, 400.0]),
+        rate(rated.spur_stage(), rated.SPUR),
         integrate(crank.system, np.linspace(0.0, 0.01, 3)),
         run_study(read_study(written(trial, cases=8)), trial / "out", jobs=1),
         amplitude_spectrum(np.column_stack([tone, 2.0 * tone]), 1e-3),
