@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ from .arguments import add_folder, add_job, add_keys, add_mesh, each_mesh, print
 
 if TYPE_CHECKING:
     from ..base.tables.gearbox import NamedMesh
+    from ..base.tables.rating import RatingTable
     from ..gears.gearmesh.rated import Compared
 
 #: Keys of the table [rating] that options stand for.
@@ -42,7 +44,7 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     from ..base.tables.jobs import job_tables, whole_gearbox
 
     raw = read_toml(args.job)
-    table = with_keys(args, job_tables(raw, args.job, ("rating",))["rating"], *KEYS)
+    table = _with_options(args, job_tables(raw, args.job, ("rating",))["rating"])
     box = whole_gearbox(raw, args.job)
 
     from ..gears.geometry.pair import pair_of
@@ -82,3 +84,18 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
         lines += compared_lines(rows)
     print_results(lines, folder, names, {}, found["warnings"])
     return 0
+
+
+def _with_options(args: argparse.Namespace, table: RatingTable) -> RatingTable:
+    """Return the table with the options that were given, which win over the keys of single gears and meshes, too."""
+    given = [key for key in KEYS if getattr(args, key) is not None]
+
+    def without(single: Any) -> Any:
+        return replace(single, **{field.name: None for field in fields(single) if field.name in given})
+
+    changed: RatingTable = with_keys(args, table, *KEYS)
+    return replace(
+        changed,
+        gears={name: without(single) for name, single in table.gears.items()},
+        meshes={name: without(single) for name, single in table.meshes.items()},
+    )

@@ -62,6 +62,18 @@ def test_options_win_over_the_file(tmp_path: Path) -> None:
     assert (made["load"]["torque"], made["edition"]) == (200.0, "ISO 6336:2006")
 
 
+def test_options_win_over_the_keys_of_single_gears_and_meshes(tmp_path: Path) -> None:
+    job = tmp_path / "job.toml"
+    job.write_text(FZG.read_text() + "quality = 8\n\n[rating.meshes.pinion-wheel]\ntorque_Nm = 90.0\nlife_h = 7.0\n")
+    options = ["--torque-Nm", "200", "--quality", "4", "--life-h", "900"]
+    assert main(["rating", str(job), *options, "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
+    rating = json.loads((tmp_path / "out" / "rating.json").read_text())
+    assert (rating["load"]["torque"], rating["load"]["hours"]) == (200.0, 900.0)
+    assert [strength["quality"] for strength in rating["strength"].values()] == [4, 4]
+    assert rating["measures"]["wheel"]["quality"] == 4
+    assert rating["strength"]["wheel"]["flank_roughness"] == 2.5  # no option of it was given
+
+
 def test_the_written_example_runs(tmp_path: Path) -> None:
     (tmp_path / "job.toml").write_text(job_file("rating"))
     assert main(["rating", str(tmp_path / "job.toml"), "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
