@@ -13,7 +13,9 @@ modifications that a load distribution has proven, and 1.2 without modifications
 **Helix angle factor**: :math:`Z_\beta = 1/\sqrt{\cos\beta}`, as ISO 6336-2:2006/Cor 1:2008 and the edition of 2019 have
 it; the text of 2006 had the reciprocal.
 
-**Static load**: :math:`Z_L = Z_v = Z_R = 1` (5.4).
+**Work hardening factor**, clause 13: of the wheel; the pinion has at most 1.
+
+**Static load**: :math:`Z_L = Z_v = Z_R = 1` (5.4), and Z_W at most 1, instead of the standard's own static value of it.
 """
 
 from __future__ import annotations
@@ -192,14 +194,15 @@ def flank(
     R_z10 = 0.5 * sum(s.flank_roughness for s in strengths) * (10.0 / abs(pair.rho_red)) ** (1.0 / 3.0)
     Z_R = (3.0 / R_z10) ** C_ZR
     viscosity = load.viscosity_40
-    Z_W = tuple(
+    of_pinion, of_wheel = (
         work_hardening(s, mate, abs(pair.u), general.v_m_per_s, abs(pair.rho_red), viscosity)
         for s, mate in (strengths, strengths[::-1])
     )
+    Z_W = min(of_pinion, 1.0), of_wheel
     Z_NT, sigma_HG, curves = [], [], []
     for strength, n, hardening in zip(strengths, cycles, Z_W, strict=True):
         curve = flank_life(strength.material, load.long_life, pitting=load.pitting_allowed)
-        static = strength.sigma_H_lim * curve.static * hardening
+        static = strength.sigma_H_lim * curve.static * min(hardening, 1.0)
         reference = strength.sigma_H_lim * Z_L * Z_v * Z_R * hardening
         curves.append(FatigueCurve(curve, static, reference))
         Z_NT.append(curve.at(n))
@@ -222,7 +225,7 @@ def flank(
         Z_v=Z_v,
         R_z10_um=R_z10,
         Z_R=Z_R,
-        Z_W=(Z_W[0], Z_W[1]),
+        Z_W=Z_W,
         Z_X=(1.0, 1.0),
         sigma_HG_MPa=(sigma_HG[0], sigma_HG[1]),
         sigma_HP_MPa=(sigma_HG[0] / load.flank_safety, sigma_HG[1] / load.flank_safety),
