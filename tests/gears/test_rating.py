@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from gearfe import Gear, InputError
+from gearfe.base.config import build
+from gearfe.base.tables.examples import job_file
+from gearfe.base.tables.jobs import whole_gearbox
 from gearfe.base.tables.pair import MaterialTable
+from gearfe.base.tables.rating import RatingTable
 from gearfe.gears.geometry.mesh_geometry import MeshGeometry
 from gearfe.gears.rating import root
 from gearfe.gears.rating.data import Strength, pair_data
@@ -18,7 +23,7 @@ from gearfe.gears.rating.life import FatigueCurve, flank_life, root_life
 from gearfe.gears.rating.load_factors import running_in, running_in_beta
 from gearfe.gears.rating.loss import loss
 from gearfe.gears.rating.materials import stress_number
-from gearfe.gears.rating.rate import Rating, rate
+from gearfe.gears.rating.rate import Rating, rate, rate_mesh
 from gearfe.gears.rating.service import life_hours, miner
 from gearfe.gears.rating.stiffness import single_stiffness
 from tests.makers.rated import (
@@ -33,6 +38,10 @@ from tests.makers.rated import (
     spur_stage,
     stage,
 )
+
+#: A table without the hours that a spectrum adds up, and a part of such a spectrum.
+WITHOUT_LIFE = {key: value for key, value in SPUR.items() if key != "life_h"}
+PART = {"torque_Nm": SPUR["torque_Nm"], "speed_rpm": SPUR["speed_rpm"], "hours": SPUR["life_h"]}
 
 
 def found(rating: Rating) -> dict[str, Any]:
@@ -197,13 +206,85 @@ def test_the_driver_may_be_the_larger_gear() -> None:
     made = spur_stage()
     back = MeshGeometry(made.wheel, made.pinion, made.centre_distance)
     keys = SPUR | {"gears": {"wheel": {"mates": 3}, "pinion": {"alternating_factor": 0.7}}}
-    keys |= {"torque_Nm": 2 * SPUR["torque_Nm"], "speed_rpm": SPUR["speed_rpm"] / 2}
+    # each of the three planets has a third of the torque
+    keys |= {"torque_Nm": 2 * SPUR["torque_Nm"] / 3, "speed_rpm": SPUR["speed_rpm"] / 2}
     one, two = rate(made, SPUR), rate(back, keys)
     assert two.names == ("wheel", "pinion")
     assert two.driver == 1
     assert two.S_H == pytest.approx(one.S_H, rel=1e-12)
     assert two.S_F == pytest.approx(one.S_F, rel=1e-12)
     assert single_stiffness(back, 2e11, 1e11) == pytest.approx(single_stiffness(made, 1e11, 2e11), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("teeth", "driver_is_sun", "torque", "force"),
+    [
+        ((17, 22), False, 300.0, 2000 * 300 / (6 * 22)),  # a planet has its whole torque in one mesh
+        ((40, 22), True, 900.0, 2000 * 900 / (6 * 40) / 3),
+        ((17, 22), True, 900.0, 2000 * 900 / (6 * 17) / 3),
+    ],
+)
+def test_mates_share_the_torque_of_their_own_gear(
+    teeth: tuple[int, int], driver_is_sun: bool, torque: float, force: float
+) -> None:
+    """F_t = 2 T/d of the driver over its number of mates, whichever gear has fewer teeth."""
+    sun, planet = (Gear(z, 6e-3, math.radians(20), 30e-3, 30e-3) for z in teeth)
+    gears, names = ((sun, planet), ("sun", "planet")) if driver_is_sun else ((planet, sun), ("planet", "sun"))
+    keys = {"torque_Nm": torque, "speed_rpm": 100.0, "gears": {"sun": {"mates": 3}}}
+    rating = rate(MeshGeometry(*gears), keys, names=names)
+    assert rating.general.F_t_N == pytest.approx(force, rel=1e-12)
+
+
+def test_tip_relief_of_the_microgeometry_counts() -> None:
+    """It is that of the driving flanks, and adds to that of the tooth form; none is that of running-in."""
+
+    def relief(microgeometry: str, rating: str = "", form: str = "") -> tuple[float | None, ...]:
+        text = f"""
+            pair = {{ module_mm = 4.5, pressure_angle_deg = 20, face_width_mm = 14{form}, material = {{}},
+                pinion = {{ teeth = 20, bore_diameter_mm = 20 }}, wheel = {{ teeth = 30, bore_diameter_mm = 20 }} }}
+            microgeometry = {{ {microgeometry} }}
+            rating = {{ torque_Nm = 100, speed_rpm = 1000{rating} }}
+        """
+        raw = tomllib.loads(" ".join(text.split()).replace("} m", "}\nm").replace("} r", "}\nr"))
+        box = whole_gearbox(raw, "job.toml")
+        (mesh,) = box.meshes.values()
+        rated = rate_mesh(mesh, build(RatingTable, raw["rating"], "rating"), box.gears, box.meshes)
+        return tuple(strength.C_a for strength in rated.strengths)
+
+    wheel = "wheel = { tip_relief_um = 12.0, tip_relief_length_mm = 2 }"
+    assert relief(wheel) == (None, pytest.approx(12.0))
+    assert relief(wheel, ", tip_relief_um = 7") == (7.0, 7.0)
+    form = ", tip_relief_amount_um = 5, tip_relief_length_mm = 2"
+    assert relief(wheel, form=form) == (pytest.approx(5.0), pytest.approx(17.0))
+    sides = "wheel = { left = { tip_relief_um = 12.0, tip_relief_length_mm = 2 } }"
+    assert relief(f"flank = 'right', {sides}") == (None, None)
+    assert relief(f"flank = 'left', {sides}") == (None, pytest.approx(12.0))
+
+
+def test_torque_of_the_stiffness_is_that_of_one_mesh() -> None:
+    text = job_file("rating").replace("torque_Nm = 100.0 ", "# ") + "\n[stiffness]\ntorque_Nm = 75.0\n"
+    raw = tomllib.loads(text)
+    raw["rating"].setdefault("gears", {})["pinion"] = {"mates": 3}
+    box = whole_gearbox(raw, "job.toml")
+    (mesh,) = box.meshes.values()
+    rated = rate_mesh(mesh, build(RatingTable, raw["rating"], "rating"), box.gears, box.meshes)
+    assert rated.general.F_t_N == pytest.approx(2000.0 * 75.0 / 75.0, rel=1e-12)  # d_2 is 75 mm
+    assert rated.load.torque == pytest.approx(3 * 75.0 * 20 / 30)
+
+
+def test_only_the_wheel_is_work_hardened() -> None:
+    """Two through-hardened gears: 1 of a softer pinion, above 1 of a softer wheel, whichever drives."""
+    soft, hard = ({"material": "V", "hardness": value, "yield_strength_MPa": 500.0} for value in (210.0, 320.0))
+    one, two = ({**SPUR, "gears": {"pinion": first, "wheel": last}} for first, last in ((soft, hard), (hard, soft)))
+    assert rate(spur_stage(), one).flank.Z_W == (1.0, 1.0)
+    ratio = 320.0 / 210.0
+    rating = rate(spur_stage(), two)
+    assert rating.flank.Z_W == (1.0, pytest.approx(1.0 + (0.00898 * ratio - 0.00829) * (2.0 - 1.0)))
+    # static load: without the work hardening of the reference load
+    assert rating.flank.curves[1].static == pytest.approx(1.6 * rating.strengths[1].sigma_H_lim)
+    made = spur_stage()
+    back = MeshGeometry(made.wheel, made.pinion, made.centre_distance)
+    assert rate(back, two).flank.Z_W == (1.0, 1.0)  # its driver, "pinion", is the larger gear, and hard
 
 
 def test_auxiliary_factors_are_ratios_of_pressures() -> None:
@@ -340,6 +421,8 @@ def test_allowable_stress_numbers() -> None:
         ({"rim_thickness_mm": 5.0}, r"rim_thickness_mm.*0\.5"),
         ({"quality": 12, "edition": 2019}, r"quality.*1 to 11.*single_pitch_um"),
         ({"hardnes": 700.0}, r"hardness"),
+        ({"spectrum": [{"torque_Nm": 9.0, "speed_rpm": 9.0, "hours": 9.0}]}, r"rating\.life_h = .*leave it out"),
+        ({"spectrum": [PART], "life_h": None, "torque_Nm": None}, r"rating\.speed_rpm = .*leave it out.*torque_Nm"),
     ],
 )
 def test_tables_that_are_refused(keys: dict[str, Any], field: str) -> None:
@@ -392,9 +475,8 @@ def test_damage_and_life_that_the_report_prints() -> None:
 
 
 def test_one_load_is_a_spectrum_of_one_part() -> None:
-    part = {"torque_Nm": SPUR["torque_Nm"], "speed_rpm": SPUR["speed_rpm"], "hours": SPUR["life_h"]}
-    one, two = rate(spur_stage(), SPUR), rate(spur_stage(), SPUR | {"spectrum": [part]})
-    halves = rate(spur_stage(), SPUR | {"spectrum": [part | {"hours": 0.5 * part["hours"]}] * 2})
+    one, two = rate(spur_stage(), SPUR), rate(spur_stage(), WITHOUT_LIFE | {"spectrum": [PART]})
+    halves = rate(spur_stage(), WITHOUT_LIFE | {"spectrum": [PART | {"hours": 0.5 * PART["hours"]}] * 2})
     assert two.service == one.service
     assert halves.service.U_H == pytest.approx(one.service.U_H, rel=1e-9)
     assert one.service.S_H_spectrum == pytest.approx(one.S_H, rel=1e-6)
@@ -408,17 +490,43 @@ def test_a_spectrum_of_two_parts_by_hand() -> None:
         {"torque_Nm": share * SPUR["torque_Nm"], "speed_rpm": SPUR["speed_rpm"], "hours": hours}
         for share, hours in loads
     ]
-    rating = rate(spur_stage(), SPUR | {"spectrum": spectrum})
-    alone = [rate(spur_stage(), SPUR | {"spectrum": [part]}).service.U_H[0] for part in spectrum]
+    rating = rate(spur_stage(), WITHOUT_LIFE | {"spectrum": spectrum})
+    alone = [rate(spur_stage(), WITHOUT_LIFE | {"spectrum": [part]}).service.U_H[0] for part in spectrum]
     assert rating.service.U_H[0] == pytest.approx(sum(alone), rel=1e-9)
-    again = rate(spur_stage(), SPUR | {"spectrum": spectrum, "least_flank_safety": rating.service.S_H_spectrum[0]})
+    again = rate(
+        spur_stage(), WITHOUT_LIFE | {"spectrum": spectrum, "least_flank_safety": rating.service.S_H_spectrum[0]}
+    )
     assert again.service.U_H[0] == pytest.approx(1.0, rel=1e-6)
     assert rating.service.life_flank_h[0] == pytest.approx(101_000.0 / rating.service.U_H[0], rel=1e-9)
 
 
+def test_a_spectrum_is_rated_at_its_largest_torque() -> None:
+    """S_H, S_F and N_L are those of that part over all hours; the torque of [stiffness] is not used."""
+    strong = {"torque_Nm": SPUR["torque_Nm"], "speed_rpm": 10.0, "hours": 100.0}
+    fast = {"torque_Nm": 0.5 * SPUR["torque_Nm"], "speed_rpm": 250.0, "hours": 5000.0}
+    keys = {key: value for key, value in WITHOUT_LIFE.items() if key not in ("torque_Nm", "speed_rpm")}
+    rating = rate(spur_stage(), keys | {"spectrum": [fast, strong]}, torque=1.0)
+    plain = rate(spur_stage(), keys | {"torque_Nm": strong["torque_Nm"], "speed_rpm": 10.0, "life_h": 5100.0})
+    assert (rating.S_H, rating.S_F) == (plain.S_H, plain.S_F)
+    assert rating.flank.N_L == pytest.approx((60.0 * 10.0 * 5100.0 * 3, 60.0 * 10.0 * 5100.0 / 2))
+
+
+def test_safety_factors_of_the_spectrum_are_compared_with_the_required_ones() -> None:
+    part = PART | {"torque_Nm": 3 * SPUR["torque_Nm"], "hours": 100.0}
+    keys = WITHOUT_LIFE | {"torque_Nm": 1000.0, "spectrum": [part]}
+    rating = rate(spur_stage(), keys)
+    assert min(rating.S_H) > 1.25 > max(rating.service.S_H_spectrum)
+    for name, symbol, value, least in (
+        ("pinion", "S_H_spectrum", rating.service.S_H_spectrum[0], 1.25),
+        ("wheel", "S_F_spectrum", rating.service.S_F_spectrum[1], 1.56),
+    ):
+        assert f"{symbol} = {value:.4g} of {name} is below the required {least:g}" in rating.warnings
+    assert not any("_spectrum" in sentence for sentence in rate(spur_stage(), SPUR).warnings)
+
+
 def test_static_overload_has_no_life() -> None:
     part = {"torque_Nm": 20 * SPUR["torque_Nm"], "speed_rpm": 1.0, "hours": 1e-3}
-    rating = rate(spur_stage(), SPUR | {"spectrum": [part]})
+    rating = rate(spur_stage(), WITHOUT_LIFE | {"spectrum": [part]})
     assert rating.service.U_H[0] >= 1e9
     assert rating.service.life_flank_h[0] < 1e-6
 

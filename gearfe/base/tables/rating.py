@@ -66,7 +66,9 @@ class GearRatingTable:
         None, low=0.0, doc="helix slope deviation f_Hbeta (um), instead of that of quality"
     )
     tip_relief_um: float | None = quantity(
-        None, low=0.0, doc="tip relief C_a (um); left out: that of the gear, and without any what running-in makes"
+        None,
+        low=0.0,
+        doc="tip relief C_a (um); left out: that of tooth form and microgeometry, without any that of running-in",
     )
     web_thickness_mm: float | None = quantity(None, above=0.0, doc="web b_s (mm), for C_R; left out: a solid disc")
     rim_thickness_mm: float | None = quantity(
@@ -103,7 +105,7 @@ class MeshRatingTable:
     speed_rpm: float | None = quantity(
         None, above=0.0, doc="speed of the driver (1/min); in planetary gears relative to the carrier"
     )
-    life_h: float | None = quantity(None, above=0.0, doc="required life (h), by default 20,000")
+    life_h: float | None = quantity(None, above=0.0, doc="required life (h), by default 20,000; not with a spectrum")
     application_factor: float | None = quantity(None, low=1.0, doc="application factor K_A, by default 1")
     mesh_load_factor: float | None = quantity(None, low=1.0, doc="mesh load factor K_gamma, by default 1")
     dynamic_factor: float | None = quantity(None, low=1.0, doc="dynamic factor K_v; left out: method B")

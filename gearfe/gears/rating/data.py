@@ -88,7 +88,7 @@ class Strength:
         return self.material in materials.SURFACE_HARDENED
 
 
-def strength_of(table: GearRatingTable, gear: Gear, edition: int, where: str) -> Strength:
+def strength_of(table: GearRatingTable, gear: Gear, edition: int, where: str, relief: float | None = None) -> Strength:
     """Return the strength of a gear that a table describes.
 
     Parameters
@@ -101,6 +101,8 @@ def strength_of(table: GearRatingTable, gear: Gear, edition: int, where: str) ->
         Edition of ISO 6336.
     where : str
         Name of the table, for messages.
+    relief : float, optional
+        Tip relief (um) of the flanks' deviations, which adds to that of the tooth form.
 
     Raises
     ------
@@ -138,9 +140,9 @@ def strength_of(table: GearRatingTable, gear: Gear, edition: int, where: str) ->
         except InputError as error:
             field = "quality" if error.field == "class" else error.field
             raise InputError(f"{where}.{field}", error.value, error.reason, f"add {key} to {where}") from None
-    relief = table.tip_relief_um
-    if relief is None and gear.tip_relief is not None:
-        relief = 1e6 * gear.tip_relief.amount
+    of_form = 0.0 if gear.tip_relief is None else 1e6 * gear.tip_relief.amount
+    # without a relief of design there is that of running-in
+    of_design = of_form + (relief or 0.0) or None
     return Strength(
         material=material,
         sigma_H_lim=number(table.sigma_h_lim_MPa, materials.CONTACT),
@@ -153,7 +155,7 @@ def strength_of(table: GearRatingTable, gear: Gear, edition: int, where: str) ->
         f_pt=found["single_pitch_um"],
         f_falpha=found["profile_form_um"],
         f_Hbeta=found["helix_slope_um"],
-        C_a=relief,
+        C_a=of_design if table.tip_relief_um is None else table.tip_relief_um,
         web=table.web_thickness_mm,
         rim=table.rim_thickness_mm,
         mates=table.mates or 1,
@@ -205,14 +207,23 @@ def load_of(table: MeshRatingTable, where: str, torque: float | None = None) -> 
     Raises
     ------
     InputError
-        For a missing torque or speed, and keys of the shaft that need each other.
+        For a missing torque or speed, keys that a spectrum replaces, and keys of the shaft that need each other.
     """
-    given = torque if table.torque_Nm is None else table.torque_Nm
     spectrum = table.spectrum or ()
-    speed = table.speed_rpm
+    given, speed, hours = table.torque_Nm, table.speed_rpm, table.life_h or LIFE
     if spectrum:
-        given = max(part.torque_Nm for part in spectrum) if given is None else given
-        speed = max(part.speed_rpm for part in spectrum) if speed is None else speed
+        if table.life_h is not None:
+            cure = "leave it out: the hours of the spectrum add up"
+            raise InputError(f"{where}.life_h", table.life_h, "cannot be given together with a spectrum", cure)
+        if speed is not None and given is None:
+            problem = "cannot be given together with a spectrum but without torque_Nm"
+            cure = "leave it out: the part with the largest torque has a speed; or add torque_Nm"
+            raise InputError(f"{where}.speed_rpm", speed, problem, cure)
+        largest = max(spectrum, key=lambda part: (part.torque_Nm, part.speed_rpm))
+        given = largest.torque_Nm if given is None else given
+        speed = largest.speed_rpm if speed is None else speed
+        hours = sum(part.hours for part in spectrum)
+    given = torque if given is None else given
     if given is None:
         cure = "add torque_Nm (N m at the driver) to [rating], or torque_Nm to [stiffness]"
         raise InputError(f"{where}.torque_Nm", None, "no torque is given", cure)
@@ -229,7 +240,7 @@ def load_of(table: MeshRatingTable, where: str, torque: float | None = None) -> 
     return Load(
         torque=given,
         speed=speed,
-        hours=table.life_h or LIFE,
+        hours=hours,
         application_factor=table.application_factor or 1.0,
         mesh_load_factor=table.mesh_load_factor or 1.0,
         dynamic_factor=table.dynamic_factor,

@@ -20,7 +20,8 @@ planets at a sun, counts with :math:`m^*/p` (6.4.7).
 (39), (41), (69), (70), h/b at most 1/3.
 
 **Transverse load factors**, clause 8, method B, with :math:`q_\alpha = c_{\gamma\alpha}(f - y_\alpha)/(F_{tH}/b)` and
-f the larger of :math:`f_{pb}` and :math:`f_{f\alpha}`:
+f the larger of :math:`f_{pb}` and :math:`f_{f\alpha}`. The allowance :math:`y_\alpha` is that of :math:`f_{pb}` in
+either case, as in the published rating of a helical stage in the tests:
 
 .. math::
     K_\alpha = \tfrac{\varepsilon_\gamma}{2}(0.9 + 0.4\,q_\alpha) \ (\varepsilon_\gamma \le 2), \quad
@@ -183,7 +184,7 @@ def influence(
     load : Load
         What the user prescribes.
     torque, speed : float
-        Torque (N m) and speed (1/min) of gear 1.
+        Torque (N m) that gear 1 has in this mesh, and its speed (1/min).
     single : float
         c' of solid discs under at least 100 N/mm (N/(mm um)).
     bores : (float, float)
@@ -194,7 +195,7 @@ def influence(
         Z_eps, for the limit of K_Halpha.
     """
     one, two = strengths
-    F_t = 2000.0 * torque / (pair.d[0] * one.mates)
+    F_t = 2000.0 * torque / pair.d[0]
     v = math.pi * pair.d[0] * speed / 60_000.0
     line_load = F_t * load.application_factor * load.mesh_load_factor / pair.b
     C_R = load.blank_factor if load.blank_factor is not None else _blank(pair, strengths)

@@ -124,7 +124,11 @@ class Rating(ShownTable):
                 f"K_Hbeta = {general.K_Hbeta:.3g} > {NOTABLE:g}: the load is on a part of the width; a computed load "
                 "distribution says more (gearfe rating --computed)"
             )
-        least = {"S_H": (self.S_H, self.load.flank_safety), "S_F": (self.S_F, self.load.root_safety)}
+        flank_safety, root_safety = self.load.flank_safety, self.load.root_safety
+        least = {"S_H": (self.S_H, flank_safety), "S_F": (self.S_F, root_safety)}
+        if self.load.spectrum:
+            least["S_H_spectrum"] = self.service.S_H_spectrum, flank_safety
+            least["S_F_spectrum"] = self.service.S_F_spectrum, root_safety
         for symbol, (values, required) in least.items():
             for name, value in zip(self.names, values, strict=True):
                 if value < required:
@@ -163,7 +167,7 @@ def rate(
     """
     keys = build(RatingTable, table, "rating") if isinstance(table, Mapping) else table
     keys.check("rating")
-    return _rated(pair, keys, materials, names, mesh, torque, dict.fromkeys(names), {mesh: None})
+    return _rated(pair, keys, materials, names, mesh, torque, dict.fromkeys(names), {mesh: None}, (None, None))
 
 
 def rate_mesh(
@@ -197,10 +201,14 @@ def rate_mesh(
             raise InputError(f"{gear.where}.material", None, problem, "write all gears as [gears.NAME]")
     stiffness = mesh.stiffness.torque_Nm
     made = pair_of(mesh) if pair is None else pair
-    torque = None if stiffness is None else stiffness / abs(made.gear_ratio)  # that of [stiffness] is at the wheel
     materials = tuple(gear.material for gear in mesh.gears)
     names = mesh.driver.name, mesh.driven.name
-    return _rated(made, table, materials, names, mesh.name, torque, gears, meshes)
+    torque = None
+    if stiffness is not None:  # that of [stiffness] is at the driven gear, of this mesh alone
+        torque = stiffness / abs(made.gear_ratio) * (table.of_gear(names[0], gears).mates or 1)
+    tables = tuple(gear.microgeometry for gear in mesh.gears)
+    driver, driven = (None if flanks is None else flanks.flank(mesh.flank).tip_relief_um for flanks in tables)
+    return _rated(made, table, materials, names, mesh.name, torque, gears, meshes, (driver, driven))
 
 
 def _rated(
@@ -212,6 +220,7 @@ def _rated(
     torque: float | None,
     gears: Mapping[str, Any],
     meshes: Mapping[str, Any],
+    reliefs: tuple[float | None, float | None],
 ) -> Rating:
     if table.edition not in EDITIONS:
         raise InputError("rating.edition", table.edition, "must be 2006 or 2019", "2019 is the newer one")
@@ -223,13 +232,17 @@ def _rated(
     elastic = tuple(materials[i] for i in order)
     strengths = tuple(
         strength_of(
-            table.of_gear(name, gears), gear, table.edition, f"rating.gears.{name}" if name in table.gears else "rating"
+            table.of_gear(name, gears),
+            gear,
+            table.edition,
+            f"rating.gears.{name}" if name in table.gears else "rating",
+            reliefs[i],
         )
-        for name, gear in zip(names, both, strict=True)
+        for name, gear, i in zip(names, both, order, strict=True)
     )
     data, two = pair_data(pair), (strengths[0], strengths[1])
-    # torque and speed of gear 1 from those of the driver
-    ratio = abs(data.u) if swap else 1.0
+    # torque and speed of gear 1 in this mesh from those of the driver, whose torque its mates share
+    ratio, shares = abs(data.u) if swap else 1.0, two[order.index(0)].mates
     modulus = 1e9 * elastic[0].youngs_modulus_GPa, 1e9 * elastic[1].youngs_modulus_GPa
     single = 1e-9 * single_stiffness(pair, modulus[0], modulus[1])
 
@@ -245,7 +258,7 @@ def _rated(
             data,
             two,
             load,
-            torque=torque / ratio,
+            torque=torque / ratio / shares,
             speed=speed * ratio,
             single=single,
             bores=(2e3 * one.held_radius, 2e3 * other.held_radius),
