@@ -201,6 +201,54 @@ def test_thinning_follows_from_the_generated_profile_shift(tmp_path):
     assert pinion["tooth_thinning_um"] == pytest.approx(2e3 * 0.02 * 2.0 * math.tan(math.radians(20.0)), rel=1e-8)
 
 
+THICKNESS = "normal_tooth_thickness_at_reference_diameter"
+GENERATED = "generated_addendum_modification_coefficient"
+NOMINAL = 2.0 * (0.5 * math.pi + 2.0 * 0.1 * math.tan(math.radians(20.0)))
+
+
+def with_thickness(gear, shift=0.1, generated=None):
+    """A pair whose pinion has these attributes, of a profile shift, and settings of its last step."""
+    parts, joints = spur_pair(**gear)
+    for number in (31, 32):
+        parts = with_attributes(parts, number, addendum_modification_coefficient=shift)
+    settings = {} if generated is None else {GENERATED: generated}
+    parts += [(51, "cylindrical_gear_manufacturing_settings", "", settings), (50, "rack_shaped_tool", "hob", {})]
+    return parts, [*joints, ("manufacturing_step", {"workpiece": 31, "tool": 50, "manufacturing_settings": 51}, 1)]
+
+
+def of_attribute(job, attribute):
+    return [(entry.kind, entry.key, entry.rule) for entry in job.entries if attribute in entry.attribute.split(", ")]
+
+
+@pytest.mark.parametrize(
+    ("gear", "shift", "generated", "attribute", "said"),
+    [
+        ({THICKNESS: NOMINAL + 0.05}, 0.1, None, THICKNESS, "thicker than nominal by 50 um"),
+        ({THICKNESS: 3.1}, None, None, THICKNESS, "needs the profile shift"),
+        ({}, 0.1, 0.12, GENERATED, "thicker than nominal by 29.1"),
+        ({}, None, 0.12, GENERATED, "needs the profile shift"),
+        ({THICKNESS: NOMINAL - 0.1}, 0.1, 0.08, THICKNESS, f"{GENERATED} says it"),
+        ({THICKNESS: NOMINAL - 0.1, "span_measurement": 15.3}, 0.1, None, "span_measurement", f"{THICKNESS} says it"),
+        ({"span_measurement": 15.3}, 0.1, None, "span_measurement", "needs span and number of teeth"),
+    ],
+)
+def test_a_tooth_thickness_that_no_key_holds_is_ignored_in_words(tmp_path, gear, shift, generated, attribute, said):
+    job = job_of(tmp_path, *with_thickness(gear, shift, generated))
+    complete(job)
+    ((kind, _, rule),) = of_attribute(job, attribute)
+    assert (kind, said in rule) == ("ignored", True), rule
+    keys = {entry.key for entry in job.entries if entry.kind == "derived"}
+    assert ("tooth_thinning_um" in job.tables["gears"]["pinion"]) == ("gears.pinion.tooth_thinning_um" in keys)
+
+
+def test_the_thickness_holds_where_the_generated_shift_does_not(tmp_path):
+    parts, joints = with_thickness({THICKNESS: NOMINAL - 0.08}, 0.1, 0.12)
+    job = job_of(tmp_path, parts, joints)
+    assert job.tables["gears"]["pinion"]["tooth_thinning_um"] == pytest.approx(80.0, rel=1e-6)
+    assert of_attribute(job, THICKNESS)[0][0] == "derived"
+    assert of_attribute(job_of(tmp_path, *with_thickness({THICKNESS: NOMINAL})), THICKNESS)[0][0] == "read"
+
+
 def test_a_missing_profile_shift_follows_from_the_centre_distance(tmp_path):
     parts, joints = spur_pair()
     for number in (33, 34):
@@ -352,6 +400,28 @@ def test_oil_makes_friction_where_roughness_is_known(tmp_path):
     job = job_of(tmp_path, rough, joints)
     assert "oil_viscosity_mPa_s" not in job.tables["meshes"]["stage"]
     assert any("needs the roughness" in line for line in job.lines("ignored"))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "density", "temperature"),
+    [
+        (0.1, 0.05, 0.88, 40.0), (0.3, 0.2, 0.88, 40.0), (-5.0, 11.0, 0.88, 40.0), (100.0, 0.0, 0.88, 40.0),
+        (100.0, 11.0, 0.88, -300.0), (100.0, 11.0, -0.88, 40.0), (100.0, 11.0, 0.05, 280.0), (11.0, 100.0, 0.88, 40.0),
+        (9e5, 0.51, 0.88, -49.0), (1e40, 11.0, 0.88, 40.0),
+    ],
+)  # fmt: skip
+def test_what_no_oil_has_is_ignored_in_words(tmp_path, low, high, density, temperature):
+    parts, joints = spur_pair(arithmetic_mean_roughness_flank_iso_4287_1997=0.4)
+    parts = with_attributes(parts, 6, arithmetic_mean_roughness_flank_iso_4287_1997=0.6)
+    parts = with_attributes(parts, 2, temperature_lubricant=temperature)
+    names = "viscosity_at_40_degree_celsius", "viscosity_at_100_degree_celsius", "density_at_15_degree_celsius"
+    parts.append((80, "lubricant", "VG 100", dict(zip(names, (low, high, density), strict=True))))
+    job = job_of(tmp_path, parts, [*joints, ("reference", {"origin": 2, "referenced": 80})])
+    complete(job)
+    assert "oil_viscosity_mPa_s" not in job.tables["meshes"]["stage"]
+    for name in names:
+        ((kind, _, rule),) = of_attribute(job, name)
+        assert (kind, "out of range" in rule) == ("ignored", True)
 
 
 SPECTRUM = """<load_spectrum id="1">

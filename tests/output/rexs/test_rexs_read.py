@@ -100,6 +100,39 @@ def test_sizes_are_bounded(tmp_path, monkeypatch):
     refused(saved(tmp_path, XML), "more than 20 elements")
 
 
+def test_sizes_are_bounded_before_anything_is_built(tmp_path, monkeypatch):
+    """Entries of an archive before its directory is read, whatever its end record says; values of JSON before them."""
+    archive, text = zip_of({f"{i}.txt": "" for i in range(4)}), json_of(PARTS, JOINTS)
+    end = archive.rindex(b"PK\x05\x06")
+    monkeypatch.setattr(reading, "MOST_ENTRIES", 3)
+    monkeypatch.setattr(reading.zipfile, "ZipFile", lambda *_: pytest.fail("the directory was read"))
+    monkeypatch.setattr(reading.json, "loads", lambda *_, **__: pytest.fail("values were built"))
+    refused(saved(tmp_path, archive, "a.rexsz"), "has 4 files")
+    lies = archive[: end + 8] + bytes([1, 0, 1, 0]) + archive[end + 12 :]
+    refused(saved(tmp_path, lies, "a.rexsz"), "has 4 files")
+    monkeypatch.setattr(reading, "MOST_ELEMENTS", 100)
+    refused(saved(tmp_path, text), "more than 100 values")
+
+
+def test_each_key_of_an_object_is_looked_up_once():
+    """A hash table, not a list that each key is counted in: the number of comparisons does not grow with the square."""
+
+    class Key(str):
+        compared = 0
+
+        def __eq__(self, other: object) -> bool:
+            Key.compared += 1
+            return str.__eq__(self, other)
+
+        __hash__ = str.__hash__
+
+    pairs = [(Key(i), i) for i in range(1000)]
+    assert len(reading._once(pairs)) == 1000
+    with pytest.raises(InputError, match="stands twice"):
+        reading._once([*pairs, (Key(999), 0)])
+    assert Key.compared < 10_000
+
+
 @pytest.mark.parametrize("name", ["../evil.rexs", "/etc/model.rexs", "a/../../b.txt", "C:\\model.rexs", "..\\up.txt"])
 def test_paths_outside_of_an_archive_are_refused(tmp_path, name):
     refused(saved(tmp_path, zip_of({"model.rexs": XML, name: "x"}), "a.rexsz"), "outside of the archive", "relative")
@@ -155,6 +188,9 @@ def test_numbers_of_components_are_unique_and_exist(tmp_path):
         ("number_of_teeth", "20.5", ("must be a whole number",)),
         ("normal_module", "two", ("must be a number",)),
         ("normal_module", "nan", ("must be a finite number",)),
+        ("normal_module", "5_0", ("must be a number",)),
+        ("normal_module", "\u0665", ("must be a number",)),
+        ("number_of_teeth", "\u0662\u0660", ("must be a whole number",)),
         ("normal_module", "1e999999", ("must be a finite number",)),
         ("normal_module", "9" * 10_000, ("must be a finite number",)),
         ("normal_module", [1.0, 2.0], ("must be one value",)),

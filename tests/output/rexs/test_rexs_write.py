@@ -257,6 +257,16 @@ def test_a_pair_with_its_flanks():
     assert back["loadmap"]["torques_Nm"] == raw["loadmap"]["torques_Nm"]
 
 
+def test_tables_of_a_mesh_find_that_of_a_pair(tmp_path, capsys):
+    """[rating.meshes.pinion-wheel] of a job with [pair] holds for the mesh that comes back."""
+    source = (GEOMETRY / "fzg_c.toml").read_text() + "\n[rating.meshes.pinion-wheel]\nlife_h = 600.0\n"
+    back = rexs_job(read_model(rexs_bytes(tomllib.loads(source)), "fzg"))
+    assert list(back.tables["meshes"]) == ["pinion-wheel"]
+    (tmp_path / "back.toml").write_text(back.text())
+    assert main(["rating", str(tmp_path / "back.toml"), "--no-pictures", "--out", str(tmp_path / "out")]) == 0
+    assert "error" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", ["gear_train.toml", "helical.toml"])
 def test_lists_of_a_train(name):
     """[[train.shafts]] and so on become tables by name: what the commands read of both is the same."""

@@ -35,6 +35,8 @@ from .schema import CUSTOM, OWN
 OWN_KEYS, OWN_TABLES, OWN_NAME = f"{OWN}keys", f"{OWN}tables", f"{OWN}name"
 #: Largest text of these (characters).
 LONGEST = 2**20
+#: Attributes of an oil that its viscosity in a mesh follows from.
+OIL = ("viscosity_at_40_degree_celsius", "viscosity_at_100_degree_celsius", "density_at_15_degree_celsius")
 #: Damping of a train (s) that REXS does not give, factor of the stiffness.
 RAYLEIGH_BETA_S = 2e-6
 #: Output steps in a period of the fastest mesh, and periods of the slowest one in a transient.
@@ -293,18 +295,26 @@ def _friction(reading: Reading, tables: dict[str, Any]) -> None:
         oil, key = oils[0], f"meshes.{name}.oil_viscosity_mPa_s"
         values = [reading.number(oil, f"viscosity_at_{at}_degree_celsius", "mm^2 / s") for at in (40, 100)]
         density = reading.number(oil, "density_at_15_degree_celsius", "kg / m^3")
+        of_oil = ", ".join(attribute for attribute in OIL if reading.attribute(oil, attribute) is not None)
         gears = [reading.part("gears", entry[role]) for role in ("driver", "driven")]
         rough = [reading.number(gear, "arithmetic_mean_roughness_flank_iso_4287_1997", "um") for gear in gears]
         if None in (*values, density, temperature):
             rule = "needs viscosities at 40 and 100 C, density and temperature_lubricant of the casing"
-            reading.ignored(oil, "viscosity", rule)
+            reading.ignored(oil, of_oil or "viscosity", rule)
             continue
         viscosity = _viscosity(values[0] or 0.0, values[1] or 0.0, density or 0.0, temperature or 0.0)
+        if viscosity is None:
+            rule = (
+                f"out of range at {temperature:g} C: must be 0.5 < viscosity at 100 C < viscosity at 40 C < 1e6 mm2/s, "
+                "density > 0, -50 < temperature < 300 C"
+            )
+            reading.ignored(oil, of_oil, rule)
+            continue
         if None in rough:
             rule = (
                 f"{viscosity:.4g} mPa s at {temperature:g} C: friction needs the roughness of the flanks (roughness_um)"
             )
-            reading.ignored(oil, "viscosity_at_40_degree_celsius", rule)
+            reading.ignored(oil, of_oil, rule)
             continue
         rule = "Ubbelohde-Walther between 40 and 100 C (ASTM D341), density falling by 0.65 kg/m3 a degree"
         reading.derived(oil, "viscosity_at_40_degree_celsius", key, rule)
@@ -316,16 +326,24 @@ def _friction(reading: Reading, tables: dict[str, Any]) -> None:
             reading.derived(gear, "arithmetic_mean_roughness_flank_iso_4287_1997", where, rule)
 
 
-def _viscosity(low: float, high: float, density: float, temperature: float) -> float:
+def _viscosity(low: float, high: float, density: float, temperature: float) -> float | None:
     """Dynamic viscosity (mPa s) at a temperature (C) of an oil with kinematic ones (mm2/s) at 40 and 100 C.
+
+    None for numbers that no oil has: the formula has logarithms of them, and grows without bound.
 
     lg lg(nu + 0.7) is linear in lg T (Ubbelohde-Walther, ASTM D341).
     """
+    if not (0.5 < high < low < 1e6 and -50.0 < temperature < 300.0 and density > 0.0):
+        return None
     one, two = (math.log10(math.log10(value + 0.7)) for value in (low, high))
     logs = [math.log10(at + 273.15) for at in (40.0, 100.0, temperature)]
     between = one + (two - one) * (logs[2] - logs[0]) / (logs[1] - logs[0])
-    kinematic = 10.0**10.0**between - 0.7
-    return kinematic * (density - 0.65 * (temperature - 15.0)) * 1e-3
+    try:
+        kinematic = 10.0**10.0**between - 0.7
+    except OverflowError:
+        return None
+    dynamic = kinematic * (density - 0.65 * (temperature - 15.0)) * 1e-3
+    return dynamic if 0.0 < dynamic < math.inf else None
 
 
 # --- speeds and torques ---------------------------------------------------------------------------------------------

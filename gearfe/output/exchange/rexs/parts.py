@@ -24,6 +24,8 @@ USUAL = 2e8
 STIFFEST_GPA = 1200.0
 #: Material below the root circle of a gear that is cut into its shaft, and that of a gear on a shaft (normal modules).
 RIM = 1.5
+#: Thinning below which teeth have the nominal thickness (um).
+LEAST_THINNING = 1e-3
 #: Rim of a ring without any size in the file (modules).
 USUAL_RIM = 3.0
 #: Type of bearing in REXS -> in a job.
@@ -454,31 +456,49 @@ def _thickness(
     reading: Reading, gear: Component, flanks: dict[str, Component], entry: dict[str, Any], key: str
 ) -> None:
     """Tooth thinning: of the generated profile shift, or of the normal tooth thickness, or of the span."""
-    module, angle = entry.get("module_mm"), math.radians(entry["pressure_angle_deg"])
+    module, tangent = entry.get("module_mm"), math.tan(math.radians(entry["pressure_angle_deg"]))
     shift = entry.get("profile_shift")
-    thinning = None
     settings = [
         item
         for flank in flanks.values()
         for item in reading.parts(flank, "manufacturing_step", "workpiece", "manufacturing_settings")
     ]
-    thickness = reading.number(gear, "normal_tooth_thickness_at_reference_diameter", "mm")
-    for item in settings[-1:]:
-        generated = reading.number(item, "generated_addendum_modification_coefficient", "none")
-        if generated is not None and shift is not None and module:
-            thinning = 2e3 * (shift - generated) * module * math.tan(angle)
-            rule = "2 (x - x_E) m_n tan(alpha_n)"
-            reading.derived(item, "generated_addendum_modification_coefficient", f"{key}.tooth_thinning_um", rule)
-    if thinning is None and thickness is not None and shift is not None and module:
-        thinning = 1e3 * (module * (0.5 * math.pi + 2.0 * shift * math.tan(angle)) - thickness)
-        rule = "m_n (pi/2 + 2 x tan(alpha_n)) less it"
-        reading.derived(gear, "normal_tooth_thickness_at_reference_diameter", f"{key}.tooth_thinning_um", rule)
+    sources = [(item, "generated_addendum_modification_coefficient", "none", "2 (x - x_E) m_n tan(alpha_n)")
+               for item in settings[-1:]]  # fmt: skip
+    thickness = "normal_tooth_thickness_at_reference_diameter"
+    sources.append((gear, thickness, "mm", "m_n (pi/2 + 2 x tan(alpha_n)) less it"))
+    said = ""
+    for item, attribute, unit, rule in sources:
+        value = reading.number(item, attribute, unit)
+        if value is None:
+            continue
+        if said or shift is None or not module:
+            missing = "needs the module" if shift is not None else "needs the profile shift"
+            reading.ignored(item, attribute, f"{said} says it" if said else missing)
+            continue
+        if attribute == thickness:
+            thinning = 1e3 * (module * (0.5 * math.pi + 2.0 * shift * tangent) - value)
+        else:
+            thinning = 2e3 * (shift - value) * module * tangent
+        if thinning < -LEAST_THINNING:
+            reading.ignored(
+                item, attribute, f"thicker than nominal by {-thinning:.4g} um: a job has thinner teeth only"
+            )
+            continue
+        said = attribute
+        if thinning > LEAST_THINNING:
+            entry["tooth_thinning_um"] = float(f"{thinning:.9g}")
+            reading.derived(item, attribute, f"{key}.tooth_thinning_um", rule)
+        else:
+            reading.note(READ, item, attribute, "", "the nominal thickness")
     span = reading.number(gear, "span_measurement", "mm")
     count = reading.integer(gear, "number_of_teeth_for_span_measurement")
-    if thinning is not None:
-        if thinning > 1e-3:
-            entry["tooth_thinning_um"] = float(f"{thinning:.9g}")
-    elif span is not None and count is not None and gear.kind == "cylindrical_gear":
+    given = {"span_measurement": span, "number_of_teeth_for_span_measurement": count}
+    if said or span is None or count is None or gear.kind != "cylindrical_gear":
+        lack = "only of external gears" if gear.kind != "cylindrical_gear" else "needs span and number of teeth"
+        for attribute in (name for name, value in given.items() if value is not None):
+            reading.ignored(gear, attribute, f"{said} says it" if said else lack)
+    else:
         entry["span_mm"], entry["span_teeth"] = span, count
         reading.note(READ, gear, "span_measurement", f"{key}.span_mm")
         reading.note(READ, gear, "number_of_teeth_for_span_measurement", f"{key}.span_teeth")

@@ -29,7 +29,8 @@ from .schema import CUSTOM, OLD_ROLES, OLD_SIDE, RENAMED_COMPONENTS, VERSIONS, A
 from .units import check_unit
 
 FIELD = "REXS file"
-#: Bytes of a model (an archive's after it is unpacked), of an archive, entries in it, and depth and elements of XML.
+#: Bytes of a model (an archive's after it is unpacked), of an archive, entries in it, depth of XML, and elements of it
+#: or values of JSON.
 LARGEST, LARGEST_ARCHIVE, MOST_ENTRIES, DEEPEST, MOST_ELEMENTS = 2**26, 2**28, 1000, 12, 4_000_000
 #: Endings of models in an archive.
 ENDINGS = (".rexs", ".rexsj", ".rexs.xml", ".rexs.json")
@@ -100,11 +101,13 @@ def _with_notes(model: Model, notes: list[str]) -> Model:
 
 def _unpacked(raw: bytes, path: str) -> tuple[bytes, list[str]]:
     """Return the only model of an archive, read in memory, and notes on the other files."""
+    # before ZipFile builds an object for each; an end record may lie, but each entry begins with its signature
+    count = raw.count(b"PK\x01\x02")
+    if count > MOST_ENTRIES:
+        raise InputError(FIELD, path, f"has {count} files: must be {MOST_ENTRIES} or less", "repack it")
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             entries = archive.infolist()
-            if len(entries) > MOST_ENTRIES:
-                raise InputError(FIELD, path, f"has {len(entries)} files: must be {MOST_ENTRIES} or less", "repack it")
             for entry in entries:
                 _check_entry(entry, path)
             models = [entry for entry in entries if entry.filename.lower().endswith(ENDINGS)]
@@ -253,6 +256,9 @@ def _decoded(code: str, text: str, where: str) -> list[Any]:
 
 
 def _from_json(raw: bytes, path: str) -> Model:
+    # before any is built: each value after the first one of all follows one of these, blanks and a key aside
+    if sum(raw.count(mark) for mark in (b",", b"[", b"{")) > MOST_ELEMENTS:
+        raise InputError(FIELD, path, f"has more than {MOST_ELEMENTS} values", "is it the right file?")
     try:
         tree = json.loads(
             raw.decode("utf-8-sig"), parse_float=_decimal_of_json, parse_constant=_no_number, object_pairs_hook=_once
@@ -300,11 +306,12 @@ def _no_number(text: str) -> Any:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    keys = [key for key, _ in pairs]
-    twice = next((key for key in keys if keys.count(key) > 1), None) if len(set(keys)) < len(keys) else None
-    if twice is not None:
-        raise InputError("key of JSON", twice, "stands twice in an object", "correct the file")
-    return dict(pairs)
+    entries: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in entries:
+            raise InputError("key of JSON", key, "stands twice in an object", "correct the file")
+        entries[key] = value
+    return entries
 
 
 def _object(value: Any, name: str) -> Mapping[str, Any]:
@@ -365,7 +372,7 @@ def _model(
 
 
 def _number(value: Any, where: str) -> int:
-    if isinstance(value, str) and re.fullmatch(r"[+-]?\d{1,18}", value.strip()):
+    if isinstance(value, str) and re.fullmatch(r"[+-]?[0-9]{1,18}", value.strip()):
         return int(value)
     if value is None:
         raise InputError(where, None, "is missing", "export the file again")
@@ -488,9 +495,11 @@ def _scalar(kind: str, raw: Any, where: str) -> Any:
 
 
 def _decimal(text: str, where: str) -> Decimal:
-    """Finite number of a text, of a size that a float can have."""
+    """Finite number of a text in ASCII digits, of a size that a float can have."""
     text = text.strip()
     cure = "correct it in the file"
+    if "_" in text or not text.isascii():  # Decimal takes 5_0, and digits of all scripts
+        raise InputError(where, text, "must be a number", cure)
     try:
         number = Decimal(text)
     except InvalidOperation:

@@ -196,7 +196,7 @@ def _of_pair(raw: dict[str, Any], path: str) -> dict[str, Any]:
     if loads and "loadmap" not in others:
         others["loadmap"] = loads
     materials = {f"{gear.name}_material": table_dict(gear.material) for gear in mesh.gears if gear.material is not None}
-    return {**others, "gears": gears, "meshes": {"pair": keep}, **({"materials": materials} if materials else {})}
+    return {**others, "gears": gears, "meshes": {mesh.name: keep}, **({"materials": materials} if materials else {})}
 
 
 def _of_train(raw: dict[str, Any], path: str) -> dict[str, Any]:
