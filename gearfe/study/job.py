@@ -127,7 +127,7 @@ def read_study(path: str | Path) -> Study:
     parameters, cases = study_cases(table, path.parent, tables)
     names = tuple(one.name for one in parameters)
     also = {one.name: one.also for one in parameters}
-    worst_over, least = _worst(table, names, tables)
+    worst_over, least = _worst(table, parameters, tables)
     task = Task(table.job, base, tables, table.estimate, names, table.outputs, also, table.mesh, worst_over, least)
     task.expressions()
     for case in cases[:1]:
@@ -136,7 +136,7 @@ def read_study(path: str | Path) -> Study:
 
 
 def _worst(
-    table: StudyTable, names: Sequence[str], base: Mapping[str, Any]
+    table: StudyTable, varied: Sequence[Parameter], base: Mapping[str, Any]
 ) -> tuple[dict[str, tuple[Any, ...]], tuple[str, ...]]:
     """Values that the worst is taken over by key, and the outputs of which the least is the worst.
 
@@ -157,14 +157,27 @@ def _worst(
             raise InputError(
                 f"study.worst_over.{one.name}", None, "must be a list of values", "write it as [low, high]"
             )
-        if one.name in names:
-            raise InputError(f"study.worst_over.{one.name}", None, "is varied, too", "leave it out of the parameters")
+        for other in varied:
+            for key in (other.name, *other.also):
+                if f"{key}.".startswith(f"{one.name}.") or f"{one.name}.".startswith(f"{key}."):
+                    problem = "is varied, too" if key == one.name else f"is varied, too, by {key}"
+                    if key != other.name:
+                        problem = f"is varied, too: it stands in study.parameters.{other.name}.also"
+                    raise InputError(f"study.worst_over.{one.name}", None, problem, "leave it out of the parameters")
     for name, limit in table.limits.items():
-        if limit.low is not None and limit.high is not None:
+        low, high = limit.low is not None, limit.high is not None
+        if low and high:
             problem = "has two limits, so its worst over other values is open"
             raise InputError(f"study.limits.{name}", [limit.low, limit.high], problem, "make an output for each limit")
-    low = [name for name, limit in table.limits.items() if limit.high is None and name not in table.minimise]
-    return {one.name: tuple(one.values) for one in parameters}, (*table.maximise, *low)
+        for opposite, names, limited in (("minimised", table.minimise, low), ("maximised", table.maximise, high)):
+            if limited and name in names:
+                problem = f"limits what is {opposite} from the other side, so its worst over other values is open"
+                value = limit.low if low else limit.high
+                raise InputError(
+                    f"study.limits.{name}", value, problem, "make an output for the limit, another to rank"
+                )
+    least = [name for name, limit in table.limits.items() if limit.high is None and name not in table.minimise]
+    return {one.name: tuple(one.values) for one in parameters}, (*table.maximise, *least)
 
 
 def check_outputs(study: Study) -> dict[str, float]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,10 @@ import pytest
 
 from gearfe.base.errors import InputError
 from gearfe.gears.gearmesh.job import StiffnessJob, stiffness_job
+from gearfe.gears.gearmesh.topography import measured_topography
 from gearfe.gears.gearmesh.width_job import job_lines, stiffness_sweep, wide_flanks, wide_mesh
+from gearfe.gears.geometry.deviation_job import active_rolls
+from gearfe.gears.geometry.pair import Gear, GearPair
 from tests.gears.test_width_job import job
 
 
@@ -84,6 +89,12 @@ WHOLE = [(s, y, 1.0) for s in (2.0, 16.0) for y in (-5.0, 5.0)]
         ([(*row, 20.0) for row in WHOLE], "roll_length_mm,y_mm,deviation_um,tooth", "must be whole, >= 0 and < 20"),
         ([(*row, 0.5) for row in WHOLE], "roll_length_mm,y_mm,deviation_um,tooth", "must be whole"),
         ([row[1:] for row in WHOLE], "y_mm,deviation_um", "roll_length_mm"),
+        (
+            [(d, y, 1.0) for d in (30.0, 52.0) for y in (-5.0, 5.0)],
+            "diameter_mm,y_mm,deviation_um",
+            "no involute there",
+        ),
+        ([(-d, y, 1.0) for d in (48.0, 52.0) for y in (-5.0, 5.0)], "diameter_mm,y_mm,deviation_um", "no involute"),
     ],
 )
 def test_mistakes_in_a_grid(rows: list[tuple[float, ...]], header: str, message: str, tmp_path: Path) -> None:
@@ -92,3 +103,29 @@ def test_mistakes_in_a_grid(rows: list[tuple[float, ...]], header: str, message:
     with pytest.raises(InputError, match=message) as error:
         wide_flanks(one, wide_mesh(one))
     assert error.value.field.startswith("microgeometry.pinion.topography_csv")
+
+
+PLANET = Gear(22, 4e-3, math.radians(20.0), 0.05, 0.0432, rack_tip_radius=0.25)
+RING = Gear(-61, 4e-3, math.radians(20.0), 0.05, rim_diameter=0.28, cutter_teeth=23, rack_tip_radius=0.0, addendum=0.9)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize("places", ["diameter_mm", "roll_length_mm"])
+def test_a_ring_has_as_many_teeth_as_its_number_without_sign(places: str, sign: float, tmp_path: Path) -> None:
+    """Diameters and roll lengths with the sign of an internal gear or without; tooth 60 is the last one."""
+    rolls = np.sort(np.abs(active_rolls(GearPair(PLANET, RING))[1]))
+    sizes = 1e3 * rolls if places == "roll_length_mm" else 2e3 * np.hypot(RING.base_radius, rolls)
+    half = 0.5e3 * RING.face_width
+    rows = [(sign * s, y, tooth, 1.0 + tooth) for tooth in (0, 60) for s in sizes for y in (-half, half)]
+    name = grid(tmp_path, rows, f"{places},y_mm,tooth,deviation_um")
+    flank: Any = SimpleNamespace(
+        own=SimpleNamespace(topography_csv=name), where="microgeometry.wheel", folder=tmp_path, gear=RING, number=1,
+        active=active_rolls(GearPair(PLANET, RING))[1],
+    )  # fmt: skip
+    made = measured_topography(flank, (-1e-3 * half, 1e-3 * half), 1.0, 1e-3)
+    assert made is not None
+    assert len(made.flank) == 61
+    assert np.abs(made.roll) == pytest.approx(rolls[::-1], rel=1e-9)
+    assert (made.roll < 0.0).all()
+    material = made(np.full(3, made.roll[0]), np.zeros(3), np.array([0, 30, 60]))
+    assert 1e6 * material == pytest.approx([1.0, 31.0, 61.0])

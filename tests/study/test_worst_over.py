@@ -64,11 +64,25 @@ def test_each_output_has_the_worst_of_all_combinations(tmp_path: Path) -> None:
         ),
         ("bodies.b.position_m.0 = [2.0", "bodies.b.mass = [2.0", r"study\.worst_over\.bodies\.b.*mass"),
         ("low = 0.0 }", "low = 0.0, high = 1.0 }", r"study\.limits\.kept.*two limits"),
+        ('minimise = ["far"]', 'minimise = ["kept"]', r"study\.limits\.kept.*minimised"),
+        ("kept = { low = 0.0 }", "near = { high = 0.0 }", r"study\.limits\.near.*maximised"),
+        (
+            "[0.0, 1.0, 2.0]",
+            '{ low = 0.0, high = 2.0, count = 3, also = ["bodies.b.position_m.0"] }',
+            r"study\.worst_over\.bodies\.b\.position_m\.0.*study\.parameters\.bodies\.a\.position_m\.0\.also",
+        ),
+        (
+            "bodies.a.position_m.0 = [0.0, 1.0, 2.0]",
+            "bodies.a.position_m = [[0.0, 1.0]]",
+            r"is varied, too, by bodies\.a\.pos",
+        ),
     ],
 )
 def test_what_the_worst_is_not_taken_over(old: str, new: str, message: str, tmp_path: Path) -> None:
     path = study(tmp_path)
-    path.write_text(path.read_text().replace(old, new))
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
     with pytest.raises(InputError, match=message):
         read_study(path)
 

@@ -13,7 +13,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.files import read_numbers
 from ...base.typing import Array, IntArray
-from ..geometry.deviation_job import FlankOf
+from ..geometry.deviation_job import FlankOf, rolls_at
 from ..geometry.pitch_errors import seen_from_behind
 
 #: Share of the active profile, and of the face width, that a grid covers at least.
@@ -91,22 +91,25 @@ def measured_topography(
     given = [key for key in PLACES if key in columns]
     if len(given) != 1:
         raise InputError(field, name, f"must have one of the columns {' and '.join(PLACES)}", "name the places once")
-    of_roll = 1e-3 * columns[given[0]]
+    gear = flank.gear
     if given[0] == "diameter_mm":
-        of_roll = np.array([flank.gear.roll_length(0.5 * d) for d in of_roll])
+        of_roll = rolls_at(gear, columns["diameter_mm"], field)
+    else:
+        of_roll = 1e-3 * columns["roll_length_mm"]
+        of_roll = -np.abs(of_roll) if gear.internal else of_roll
     roll, i = np.unique(of_roll, return_inverse=True)
     y, j = np.unique(1e-3 * columns["y_mm"], return_inverse=True)
     numbers = columns.get("tooth", np.zeros(len(i)))
     teeth, k = np.unique(numbers, return_inverse=True)
-    if not (np.array_equal(teeth, teeth.astype(np.int64)) and teeth[0] >= 0 and teeth[-1] < flank.gear.teeth):
-        raise InputError(f"{field}, tooth", name, f"must be whole, >= 0 and < {flank.gear.teeth}", "count from 0")
+    if not (np.array_equal(teeth, teeth.astype(np.int64)) and teeth[0] >= 0 and teeth[-1] < gear.tooth_count):
+        raise InputError(f"{field}, tooth", name, f"must be whole, >= 0 and < {gear.tooth_count}", "count from 0")
     shape = len(teeth), len(roll), len(y)
     cell = np.ravel_multi_index((k, i, j), shape)
     if min(shape[1:]) < 2 or len(cell) != np.prod(shape) or len(np.unique(cell)) != len(cell):
         problem = f"is no whole grid: {len(cell)} rows of {len(teeth)} teeth, {len(roll)} places by {len(y)} places"
         raise InputError(field, name, problem, "give every place of each tooth once, two or more along both ways")
     _check_cover(field, name, roll, flank.active, "active profile's roll length")
-    width = flank.gear.face_width
+    width = gear.face_width
     _check_cover(field, name, y, (-0.5 * width, 0.5 * width), "face width, y counted from its middle")
     material = np.zeros(shape)
     material.ravel()[cell] = 1e-6 * columns["deviation_um"]
@@ -116,7 +119,7 @@ def measured_topography(
             f"{field}, deviation_um", worst, f"must be >= {-1e6 * most:.4g} and <= {1e6 * most:.4g} um", "is it in um?"
         )
     order = slice(None, None, 1 if sense > 0.0 else -1)
-    of_teeth = np.full(flank.gear.teeth, len(teeth))
+    of_teeth = np.full(gear.tooth_count, len(teeth))
     if "tooth" in columns:
         of_teeth[teeth.astype(np.int64)] = np.arange(len(teeth))
     if sense < 0.0:

@@ -281,7 +281,7 @@ def _measured(name: str, gear: Gear, active: tuple[float, float], field: str, fo
         roll = 1e-3 * columns["roll_length_mm"]
         roll = -np.abs(roll) if gear.internal else roll
     elif "diameter_mm" in columns:
-        roll = np.array([gear.roll_length(0.5e-3 * abs(d)) for d in columns["diameter_mm"]])
+        roll = rolls_at(gear, columns["diameter_mm"], field)
     else:
         raise InputError(field, name, "has neither of the columns roll_length_mm and diameter_mm", "add one")
     height = 1e-6 * columns["deviation_um"]
@@ -292,6 +292,23 @@ def _measured(name: str, gear: Gear, active: tuple[float, float], field: str, fo
     return [
         _covering(roll[teeth == t], height[teeth == t], active, f"{field}, tooth {t}") for t in range(gear.tooth_count)
     ]
+
+
+def rolls_at(gear: Gear, diameters: Array, field: str) -> Array:
+    """Return the roll lengths (m) at measured diameters (mm), which may be negative on an internal gear.
+
+    Raises
+    ------
+    InputError
+        For diameters without an involute: inside of the base circle, or negative on an external gear.
+    """
+    base = 2e3 * gear.base_radius
+    sizes = np.abs(diameters) if gear.internal else diameters
+    lost = diameters[sizes < base * (1.0 - 1e-9)]
+    if len(lost):
+        problem = f"no involute there: must be >= {base:.6g} mm, the base circle"
+        raise InputError(f"{field}, diameter_mm", float(lost[0]), problem, "is it a diameter in mm?")
+    return np.array([gear.roll_length(0.5e-3 * size) for size in sizes])
 
 
 def _covering(
