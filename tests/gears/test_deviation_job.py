@@ -117,6 +117,8 @@ def test_mistakes_in_the_table(pinion, told, tmp_path) -> None:
         ("roll_length_mm,deviation_um\n5,a", "row 1 must have 2 numbers"),
         ("roll_length_mm,deviation_um,colour\n5,1,2", "unknown name"),
         ("tooth,roll_length_mm,deviation_um\n0,5,0\n0,16,0", "teeth 0 to 19"),
+        ("diameter_mm,deviation_um\n30,0\n54,1", "diameter_mm = 30.*no involute there"),
+        ("diameter_mm,deviation_um\n-48,0\n-54,1", "diameter_mm = -48.*no involute there"),
         ("", "no column"),
     ],
 )
