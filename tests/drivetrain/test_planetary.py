@@ -11,6 +11,7 @@ import pytest
 
 from gearfe.base.errors import InputError
 from gearfe.drivetrain.gearbox.stage_report import centrifugal_warnings
+from gearfe.drivetrain.modes.orders import train_orders
 from gearfe.drivetrain.modes.whirl import WhirlModes, train_modes
 from gearfe.drivetrain.runup.run_up import steady_state
 from gearfe.drivetrain.train import Damping, Drive, Guide, TrainResponse, build_train, simulate
@@ -159,9 +160,10 @@ def test_a_sun_that_moves_shares_the_load_alike_in_spite_of_a_pin_out_of_place()
     assert spreads[1] < 1e-2
 
 
-def test_bearing_forces_stand_still_in_axes_that_do() -> None:
+@pytest.mark.parametrize("bearing", [1e8, None])
+def test_bearing_forces_stand_still_in_axes_that_do(bearing: float | None) -> None:
     """A pin out of place pushes the ring: in the housing this force goes round once a turn of the carrier."""
-    train = stage(errors=[2e-5, 0.0, 0.0], damping=Damping(ratio=0.3))
+    train = stage(errors=[2e-5, 0.0, 0.0], damping=Damping(ratio=0.3), bearing=bearing)
     model = build_train(train)
     turn = 2.0 * math.pi / (SPEED * float(model.kinematics.ratios[2]))
     response = simulate(model, np.linspace(0.0, 1.25 * turn, 501), tolerance=1e-8, method="taylor")
@@ -212,9 +214,13 @@ def test_a_run_up_warns_where_it_leaves_out_what_counts() -> None:
     assert "centrifugal" in warning
 
 
-def test_coriolis_forces_split_translational_modes_by_the_speed_of_the_carrier() -> None:
-    """A free rotor on a spring seen from a frame that turns: its frequencies are w0 - W and w0 + W."""
-    train = stage(mesh=1.0, bearing=1e8, loads=())
+@pytest.mark.parametrize("gyroscopic", [True, False])
+def test_coriolis_forces_split_translational_modes_by_the_speed_of_the_carrier(gyroscopic: bool) -> None:
+    """A free rotor on a spring seen from a frame that turns: its frequencies are w0 - W and w0 + W.
+
+    They act without gyroscopic moments, too.
+    """
+    train = stage(mesh=1.0, bearing=1e8, loads=(), damping=Damping(gyroscopic=gyroscopic))
     model = build_train(train)
     speed = 300.0
     found = train_modes(model, [speed], 4000.0)
@@ -270,3 +276,52 @@ def test_planets_that_collide_are_refused() -> None:
     """Six planets of 36 teeth round a sun of 30 overlap: 2 r_c sin(30 deg) < d_a."""
     with pytest.raises(InputError, match=r"'planet0'.*overlaps gear 'planet1'"):
         build_train(stage(6, (30, 36)))
+
+
+def test_frames_turn_by_nothing_beside_the_mean_motion() -> None:
+    """Coriolis forces take the speed of the frame alone: their spin is a direction without any coordinate."""
+    model = build_train(stage())
+    frames = [gyro.spin for gyro in model.forces.gyros if gyro.euler]
+    assert len(frames) == 2 * 6  # translations and tilts of six shafts
+    assert not model.directions[:, frames].any()
+
+
+def test_a_stage_that_a_torque_drives_goes_round_farther_than_its_teeth_yield() -> None:
+    """Load and drive in balance but for 0.1 %: the carrier runs ahead by millimetres of its planets' way."""
+    given = stage(ring=None)
+    drive = Drive("sun", "sun", constant(SPEED), torque=constant(3.0 * TORQUE), damping=0.0)
+    model = build_train(dataclasses.replace(given, drive=drive, damping=Damping(ratio=0.05)))
+    response = simulate(model, np.linspace(0.0, 0.1, 51), tolerance=1e-6)
+    assert response.status == "done"
+    carrier = response.speed[:, response.shaft_names.index("carrier")]
+    inertia = {name: LIN_PARKER[name][1] * r**2 for name, r in _radii().items()}
+    inertia["carrier"] += 3 * LIN_PARKER["planet"][0] * _radii()["carrier"] ** 2
+    ratios = dict(zip(response.shaft_names, model.ratios, strict=True))
+    of_sun = (
+        inertia["sun"] + inertia["carrier"] * ratios["carrier"] ** 2 + 3 * inertia["planet"] * (ratios["planet0"] ** 2)
+    )
+    rise = 2.0 * TORQUE / of_sun * 0.1 * ratios["carrier"]
+    assert carrier[-1] - carrier[0] == pytest.approx(rise, rel=2e-2)
+    assert any("follow the nominal" in warning for warning in response.warnings)
+
+
+def _radii() -> dict[str, float]:
+    """Radii that the inertias of the stage are over, without the ring."""
+    return {"sun": 15 * MODULE * math.cos(ALPHA), "planet": 18 * MODULE * math.cos(ALPHA), "carrier": 33 * MODULE}
+
+
+def test_a_torque_may_act_on_a_planet() -> None:
+    given = stage()
+    load = dataclasses.replace(given.loads[0], shaft="planet0", bore=None, torque=constant(-1.0))
+    model = build_train(dataclasses.replace(given, loads=(*given.loads, load)))
+    assert static_state(model) is not None
+
+
+def test_a_stage_that_turns_as_one_has_modes_and_no_orders_of_its_meshes() -> None:
+    given = stage()
+    locked = dataclasses.replace(given, guides=(Guide("ring", ratio=Fraction(1)),), loads=())
+    model = build_train(locked)
+    orders = train_orders(model, 3, 2)
+    assert {name for order in orders for name in order.names} == {
+        f"{a} x shaft {shaft.name}" for a in (1, 2) for shaft in locked.shafts
+    }

@@ -21,6 +21,8 @@ from gearfe.drivetrain.gearbox.job import job_train, train_job
 from gearfe.drivetrain.gearbox.stage_report import stage_entries
 from gearfe.drivetrain.train import GearTrain, build_train
 from gearfe.drivetrain.vibration.report import sideband
+from tests.campaigns.toml_text import toml_text
+from tests.makers.files import job_file
 from tests.places import GEOMETRY
 
 SHIPPED = GEOMETRY / "planetary.toml"
@@ -135,3 +137,24 @@ def test_planets_that_collide_are_named() -> None:
     raw = tables(carriers__arm__planets=[0.0, 60.0], carriers__arm__pin_tangential_errors_um=None)
     with pytest.raises(InputError, match=r"'planet_1'.*overlaps gear 'planet_2'"):
         build_train(made(raw))
+
+
+def test_modes_are_drawn_beside_the_orders_of_shafts_that_turn(tmp_path: Path) -> None:
+    """A fixed ring has no order."""
+    path = job_file(tmp_path, toml_text(tables(modes__speeds=2)))
+    assert main(["modes", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert (tmp_path / "out" / "campbell.png").exists()
+    assert "x shaft ring" not in (tmp_path / "out" / "critical_speeds.csv").read_text(encoding="utf-8")
+
+
+def test_phases_of_a_speed_increaser_are_those_of_the_reducer() -> None:
+    """The sense in which the sun turns counts, and not the one in which it pushes."""
+    reducer = tables(train__damping=None)
+    increaser = copy.deepcopy(reducer)
+    increaser["train"]["drive"] |= {"shaft": "carrier", "attachment": "carrier", "speed_rad_per_s": 34.23}
+    increaser["train"]["loads"] = [{"shaft": "sun", "attachment": "sun", "torque_Nm": -1000.0}]
+    phases = [
+        [family["phases_of_a_cycle"] for family in stage_entries(build_train(made(raw)))["planetary"]["meshes"]]
+        for raw in (reducer, increaser)
+    ]
+    np.testing.assert_allclose(phases[0], phases[1], atol=1e-9)

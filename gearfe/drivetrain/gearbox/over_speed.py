@@ -104,7 +104,7 @@ def _balanced(train: GearTrain, functions: list[TimeFunction | None], ratios: li
     for end, function in zip(ends, functions, strict=True):
         ratio = ratios[train.shaft_number(end.shaft)]
         terms.append((ratio, _torque(end, function, ratio * nominal)))
-        breaks |= set() if function is None else {place / ratio for place in function.breaks}
+        breaks |= set() if function is None or not ratio else {place / ratio for place in function.breaks}
     marks = sorted(breaks)
     reach = max(1.0, *map(abs, marks))
     marks = [-2.0 * reach, *marks, 2.0 * reach]
@@ -144,5 +144,6 @@ def operating_speed(train: GearTrain) -> float | None:
     for end in ends:
         if end.over_speed is not None:
             ratio = float(train.kinematics.ratios[train.shaft_number(end.shaft)])
-            return end.over_speed.reference / ratio
+            if ratio:
+                return end.over_speed.reference / ratio
     return None

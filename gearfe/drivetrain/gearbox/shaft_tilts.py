@@ -128,6 +128,9 @@ def shaft_tilts(raw: dict[str, Any], path: str | Path, mesh: NamedMesh, variant:
         problem = "needs the shafts, bearings, drive and loads of a train, and the file has no table [train]"
         raise InputError(where, True, problem, "add it (gearfe new gearbox.toml shows one), or leave this key out")
     job = train_job(path, train_tables(raw, path, variant))
+    if mesh.name not in job.gearbox.meshes:
+        problem = "is a mesh of planets, whose tilts are not computed"
+        raise InputError(where, True, problem, "leave it out; misalignment_um takes a tilt that is known")
     job = replace(job, gearbox=_without_flanks(job.gearbox), table=_with_springs(job.table))
     number = list(job.gearbox.meshes).index(mesh.name)
     train = job_train(job, _mean_stiffness(job), train_body(job))

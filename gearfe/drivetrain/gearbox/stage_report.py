@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..train.kinematics import against, drive_sense
 from ..train.model import TrainModel
 from ..train.planetary import KINDS, MeshFamily, family_facts, mesh_families
 
@@ -30,7 +31,13 @@ def stage_entries(model: TrainModel, mean_forces: Sequence[float] | None = None)
         return {}
     rolled, names = train.kinematics, [mesh.name for mesh in train.meshes]
     shafts = [shaft.name for shaft in train.shafts]
-    families = mesh_families(train.layout, rolled.phases)
+    # phases are in the sense in which the driver pushes; here they are in that in which it turns
+    sense = drive_sense(train.layout.speed) or 1.0
+    turned = [
+        phase * push * sense * math.copysign(1.0, against(mesh, mesh.driver.shaft, rolled.ratios))
+        for mesh, phase, push in zip(train.layout.meshes, rolled.phases, rolled.senses, strict=True)
+    ]
+    families = mesh_families(train.layout, turned)
     entries: dict[str, Any] = {
         "speed_ratios": {name: str(ratio) for name, ratio in zip(shafts, rolled.ratios, strict=True)},
         "torque_ratios": {

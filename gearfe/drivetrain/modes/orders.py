@@ -58,9 +58,9 @@ def train_orders(model: TrainModel, multiples: int, shaft_multiples: int) -> lis
 
     rolled = model.kinematics
     for mesh, cycles in enumerate(rolled.cycles):
-        for a in range(1, multiples + 1):
+        for a in range(1, multiples + 1) if cycles else ():  # gears that stand still against each other excite nothing
             add(a * cycles, f"{a} x mesh {mesh + 1}", meshes=(mesh,))
     for shaft, ratio in enumerate(rolled.ratios):
-        for a in range(1, shaft_multiples + 1):
+        for a in range(1, shaft_multiples + 1) if ratio else ():
             add(a * abs(ratio), f"{a} x shaft {model.train.shafts[shaft].name}", shafts=(shaft,))
     return [found[order] for order in sorted(found)]

@@ -63,8 +63,8 @@ def named_orders(run: RunUp) -> Callable[[tuple[int, ...]], OrderCut]:
             return combined[waves]
         names = [name for cycles, name in of_loads if abs(cycles - order) <= ROUND_OFF * order]
         for ratio, shaft in zip(model.kinematics.ratios, model.train.shafts, strict=True):
-            turns = order / abs(float(ratio))
-            if abs(turns - round(turns)) <= ROUND_OFF * turns:
+            turns = order / abs(float(ratio)) if ratio else 0.0
+            if ratio and abs(turns - round(turns)) <= ROUND_OFF * turns:
                 names.append(f"{round(turns)} x shaft {shaft.name}")
         return OrderCut(waves, order, tuple(names) or (f"order {order:.6g}",), None)
 

@@ -142,7 +142,7 @@ def _check_stages(train: GearTrain) -> None:
         _check_carried_mesh(train, mesh)
     for shaft in train.shafts:
         frames = train.frames_of(shaft.name)
-        if frames:
+        if frames and (shaft.sections or not train.hinged(shaft.name)):
             _check_frame(train, shaft, frames)
 
 

@@ -635,20 +635,28 @@ class GearTrain(Facts):
     def frame_of(self, shaft: str) -> Carrier | None:
         """Carrier in whose frame, which turns with it, the motion of a shaft is described; None: it does not turn.
 
-        It is that of its planets, their carrier, and the gears that these mesh with, except for shafts in hinges,
-        which do not move across the axis.
+        It is that of its planets, their carrier, and the gears that these mesh with. A shaft in hinges, which does not
+        move across the axis, may turn in several frames: it counts as one that stands still.
         """
         carriers = self.frames_of(shaft)
-        return carriers[0] if carriers else None
+        return carriers[0] if carriers and not self.between_frames(shaft) else None
+
+    def between_frames(self, shaft: str) -> bool:
+        """Whether a shaft has gears in the frames of several carriers, or in one and on fixed axes."""
+        gears, carriers = {gear.name for gear in self.gears if gear.shaft == shaft}, self.frames_of(shaft)
+        fixed = (self.mesh_carrier(m) is None for m in self.meshes if gears & {m.driver, m.driven})
+        return len(carriers) > 1 or (bool(carriers) and any(fixed))
+
+    def hinged(self, shaft: str) -> bool:
+        """Whether a hinge holds a shaft."""
+        springs = {bearing.bore for bearing in self.bearings}
+        return any(bore not in springs for bore in self.shaft(shaft).bores)
 
     def frames_of(self, shaft: str) -> list[Carrier]:
-        """Carriers whose frames the motion of a shaft across the axis needs; more than one cannot be."""
+        """Carriers in whose frames loads act on a shaft."""
         own = self.carrier_of(shaft)
         if own is not None:
             return [own]
-        springs = {bearing.bore for bearing in self.bearings}
-        if any(bore not in springs for bore in self.shaft(shaft).bores):
-            return []
         gears = {gear.name for gear in self.gears if gear.shaft == shaft}
         meshes = [self.mesh_carrier(mesh) for mesh in self.meshes if gears & {mesh.driver, mesh.driven}]
         return [c for c in self.carriers if c.shaft == shaft or any(mesh is c for mesh in meshes)]
@@ -705,11 +713,14 @@ class GearTrain(Facts):
     def place(self, end: Drive | Load) -> float:
         """Coordinate along the axis (m) at which a drive or a load acts on its shaft.
 
-        Where it is not given it is that of its bore, or without one of the shaft's first bore.
+        Where it is not given it is that of its bore, without one of the shaft's first bore, of a planet its middle.
         """
         if end.along is not None:
             return end.along
-        return float(self.bore_points[end.bore or self.shaft(end.shaft).bores[0]] @ self.frame[2])
+        bores = [end.bore] if end.bore else self.shaft(end.shaft).bores
+        if not bores:  # a planet
+            return self.shaft_end(end.shaft, 0.0)
+        return float(self.bore_points[bores[0]] @ self.frame[2])
 
     def machine_number(self, name: str) -> int:
         """Number of the machine of that name."""

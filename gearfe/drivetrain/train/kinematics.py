@@ -131,6 +131,8 @@ def mesh_phases(cycles: Sequence[Fraction], most: int) -> list[tuple[Fraction, l
     """
     groups: list[tuple[Fraction, list[int]]] = []
     for mesh, own in enumerate(cycles):
+        if not own:  # gears that stand still against each other
+            continue
         for number, (_, others) in enumerate(groups):
             together = [*(cycles[i] for i in others), own]
             turns = _repeating(together)

@@ -222,6 +222,17 @@ class TrainModel(Facts):
             np.cos(turned)[..., None, None] * across + np.sin(turned)[..., None, None] * right + np.outer(axis, axis)
         )
 
+    def displacements(self, q: Array) -> Array:
+        """Displacements (n, shafts, 3) of shafts (m), of planets against the turned carrier, of states (n, size)."""
+        moved = q[:, [first + i for first in self.first for i in range(3)]].reshape(len(q), -1, 3).copy()
+        for number, body in enumerate(self.shafts):
+            angle, radius, follows = _carried(self.train, self.placed, number)
+            if radius:
+                plane = planes(body, self.train.frame)[0]
+                round_ = math.cos(angle) * plane.second[:3] - math.sin(angle) * plane.first[:3]
+                moved[:, number] -= np.outer(q @ follows, round_)
+        return moved
+
     def fixed_axes(self, t: Array, vectors: Array) -> Array:
         """Vectors (n, bores, k, 3) at the bores, in the frames of their shafts, along axes that stand still."""
         if not self.train.carriers:
@@ -485,13 +496,14 @@ def _forces(
             columns += [shafts.whole(number, couple.tilt), shafts.whole(number, couple.other)]
         columns.append(np.eye(shafts.size)[shafts.first[number] + 5])
     columns += [column for line in lines for column in line.columns]  # numbered as in `mesh_lines`
-    if any(turns):
-        columns.append(np.zeros(shafts.size))  # the frame of a carrier turns by nothing beside the mean motion
-        for number, turn in enumerate(turns):
-            if turn:
-                gyros += _of_frame(train, shafts, number, turn, columns)
     if not train.damping.gyroscopic:
         gyros = []
+    if any(turns):
+        still = len(columns)
+        columns.append(np.zeros(shafts.size))  # the frame of a carrier turns by nothing beside the mean motion
+        for number, turn in enumerate(turns):
+            if turn and not (train.hinged(train.shafts[number].name) and shafts.bodies[number].size == 6):
+                gyros += _of_frame(train, shafts, number, turn, columns, still)
     flanks = tuple(flank for line in lines for flank in line.flanks)
     at = len(columns)
     columns += [direction for direction, _ in torques]
@@ -503,23 +515,18 @@ def _forces(
     return made, np.array(columns).T
 
 
-def _of_frame(train: GearTrain, shafts: Shafts, number: int, turn: float, columns: list[Array]) -> list[Gyro]:
+def _of_frame(
+    train: GearTrain, shafts: Shafts, number: int, turn: float, columns: list[Array], still: int
+) -> list[Gyro]:
     """Coriolis, centrifugal and Euler forces of a shaft whose motion is described in a frame that turns.
 
-    The frame turns `turn` times as fast as the drive; directions are appended to the columns, whose last one is of no
+    The frame turns `turn` times as fast as the drive; directions are appended to the columns, of which `still` is of no
     motion. Those of a planet are radial and tangential, for its mean place is off the axis. Its centrifugal force acts
     along the arm of the carrier, which turns with it: with the rotation of the carrier alone it does no work.
     """
-    still, gyros = len(columns) - 1, list[Gyro]()
-    name, frame = train.shafts[number].name, train.frame
-    own = train.carrier_of(name)
-    angle, radius, follows = 0.0, 0.0, np.zeros(shafts.size)
-    if own is not None:
-        pin = next(pin for pin in own.pins if pin.shaft == name)
-        angle, radius = train.pin_angle(own, pin), float(np.hypot(*train.pin_arm(own, pin)))
-        carrier = train.shaft_number(own.shaft)
-        turning = shafts.bodies[carrier].turn_rows(train.shaft_end(name, 0.0))[2]
-        follows = radius * shafts.whole(carrier, turning)
+    gyros = list[Gyro]()
+    frame = train.frame
+    angle, radius, follows = _carried(train, shafts, number)
     turned = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     for index, plane in enumerate(planes(shafts.bodies[number], frame)):
         first, second = (shafts.whole(number, row) for row in turned @ np.array([plane.first, plane.second]))
@@ -532,6 +539,21 @@ def _of_frame(train: GearTrain, shafts: Shafts, number: int, turn: float, column
         columns += [first, second - moves]
         gyros += [coriolis, centrifugal]
     return gyros
+
+
+def _carried(train: GearTrain, shafts: Shafts, number: int) -> tuple[float, float, Array]:
+    """Angle (rad) and radius (m) of the place of a planet, and its way round with the carrier (system size,).
+
+    All zero for a shaft that no carrier has.
+    """
+    name = train.shafts[number].name
+    own = train.carrier_of(name)
+    if own is None:
+        return 0.0, 0.0, np.zeros(shafts.size)
+    pin = next(pin for pin in own.pins if pin.shaft == name)
+    radius, carrier = float(np.hypot(*train.pin_arm(own, pin))), train.shaft_number(own.shaft)
+    turning = shafts.bodies[carrier].turn_rows(train.shaft_end(name, 0.0))[2]
+    return train.pin_angle(own, pin), radius, radius * shafts.whole(carrier, turning)
 
 
 def bore_selector(train: GearTrain, bore: str) -> Array:

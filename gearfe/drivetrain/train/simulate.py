@@ -26,6 +26,8 @@ from .response import TrainResponse, joined
 from .states import TrainStates, train_states
 from .statics import ROUND_OFF
 
+#: Share of the nominal speed from which on a drive by torque leaves the speed of the frames of carriers.
+OFF_NOMINAL = 0.01
 #: The finer run shares a little of the error; with this factor the estimate covers it.
 SAFETY = 1.5
 #: An approach or a bore's displacement beyond this part of the module means that nothing holds any more.
@@ -279,7 +281,7 @@ def _whole(
 ) -> TrainResponse:
     """The last piece with estimates and warnings of the whole run."""
     warnings = model.mesh_notes + model.operating.warnings + totals.pulls(model) + _loose(model)
-    warnings += totals.beyond(model)
+    warnings += totals.beyond(model) + _frames(model, response)
     if response.status != "done":
         warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms {ended}")
     estimates: dict[str, float] = {}
@@ -288,6 +290,26 @@ def _whole(
         if model.train.housing is not None:
             estimates["reduction"] = reduction_error(model.train.housing, options.band_hz).response
     return replace(response, estimates=estimates, warnings=tuple(warnings))
+
+
+def _frames(model: TrainModel, response: TrainResponse) -> list[str]:
+    """Sentences about what the frames of carriers leave out."""
+    train, said = model.train, list[str]()
+    said += [
+        f"bearing forces of shaft {shaft.name} are sums of parts in frames that turn at different speeds: their size "
+        "and direction across the axis hold for none of them"
+        for shaft in train.shafts
+        if train.carriers and train.between_frames(shaft.name)
+    ]
+    if train.carriers and train.driven.torque is not None and len(response.time):
+        late = response.speed[3 * len(response.time) // 4 :, train.shaft_number(train.driven.shaft)]
+        nominal, mean = model.steady_speed, float(late.mean())
+        if abs(mean - nominal) > OFF_NOMINAL * abs(nominal):
+            said.append(
+                f"the drive turns at {mean:.5g} rad/s in the end, but the frames of the carriers, with Coriolis and "
+                f"centrifugal forces, follow the nominal {nominal:.5g} rad/s: give that speed as speed_rad_per_s"
+            )
+    return said
 
 
 def _loose(model: TrainModel) -> list[str]:
@@ -305,7 +327,7 @@ def _ended(model: TrainModel, trajectory: Trajectory, moved: TrainStates) -> tup
     """Status, the number of output times up to which the results hold, and what moved too far."""
     limit = DIVERGED * min((line.module for line in model.meshes), default=1e-3)
     reach = np.abs(moved.approach) if model.meshes else np.zeros((len(moved.q), 1))
-    shafts = np.abs(moved.q[:, [i + j for i in model.first for j in range(3)]])
+    shafts = np.abs(model.displacements(moved.q)).reshape(len(moved.q), -1)
     worst = np.maximum(reach.max(axis=1), shafts.max(axis=1))
     bad = ~np.isfinite(moved.q).all(axis=1) | ~(worst <= limit)
     if bad.any():
