@@ -34,7 +34,7 @@ def test_transients_meet_an_integration_that_locates_the_touches(acts, method):
     model = build_train(made)
     rows = oscillator(model, mass, damper, torque, speed, acts).run(2e-3, 2.5e-7)
     assert len(set(rows[:, 3])) > 1  # teeth part
-    response = simulate(model, rows[::80, 0], tolerance=1e-7, method=method)
+    response = simulate(model, rows[::80, 0], tolerance=1e-8, method=method)
     size = np.abs(rows[:, 1]).max()
     np.testing.assert_allclose(response.transmission_error[:, 0], rows[::80, 1], rtol=0, atol=3e-6 * size)
 
