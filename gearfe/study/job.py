@@ -162,7 +162,7 @@ def _worst(
                 if f"{key}.".startswith(f"{one.name}.") or f"{one.name}.".startswith(f"{key}."):
                     problem = "is varied, too" if key == one.name else f"is varied, too, by {key}"
                     if key != other.name:
-                        problem = f"is varied, too: it stands in study.parameters.{other.name}.also"
+                        problem = f"is varied, too, by study.parameters.{other.name}.also"
                     raise InputError(f"study.worst_over.{one.name}", None, problem, "leave it out of the parameters")
     for name, limit in table.limits.items():
         low, high = limit.low is not None, limit.high is not None

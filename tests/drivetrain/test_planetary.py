@@ -287,7 +287,7 @@ def test_frames_turn_by_nothing_beside_the_mean_motion() -> None:
 
 
 def test_a_stage_that_a_torque_drives_goes_round_farther_than_its_teeth_yield() -> None:
-    """Load and drive in balance but for 0.1 %: the carrier runs ahead by millimetres of its planets' way."""
+    """Three times the torque that the load needs: the carrier runs ahead by millimetres of its planets' way."""
     given = stage(ring=None)
     drive = Drive("sun", "sun", constant(SPEED), torque=constant(3.0 * TORQUE), damping=0.0)
     model = build_train(dataclasses.replace(given, drive=drive, damping=Damping(ratio=0.05)))

@@ -16,7 +16,7 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
 - *gyroscopic*: :math:`-J_p\Omega\,(u_{d+1}', -u_d')`, :math:`\Omega = g\psi' + u_s'`, on the tilts d, d + 1 of a
   shaft with the spin s;
 - *torques*: functions of time along a direction d, and of the true speed there, :math:`T(g\psi' + u_d') + c\,u_d'`,
-  c the slope that stands in the system's damping.
+  c the slope that the system's damping has already.
 
 A mesh has one flank, or two: the back flank has its own approach, along the other line of action, and its law is
 the driving one's at the mirrored phase, behind the backlash j.

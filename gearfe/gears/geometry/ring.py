@@ -88,11 +88,11 @@ def _depth(points: ComplexArray, half: ComplexArray, gear: Gear) -> float:
     deepest = 0.0
     for part in np.array_split(suspects, 1 + suspects.size // 2000):
         if part.size:
-            deepest = max(deepest, float(_to_line(part, half).max()))
+            deepest = max(deepest, float(to_line(part, half).max()))
     return deepest
 
 
-def _to_line(points: ComplexArray, line: ComplexArray) -> Array:
+def to_line(points: ComplexArray, line: ComplexArray) -> Array:
     """Distances (m) of points to the chords next to the nearest vertex of a polyline."""
     nearest = np.abs(points[:, None] - line).argmin(axis=1)
     best = np.abs(points - line[nearest])

@@ -28,7 +28,7 @@ from .curves import bisect, inv, inverse_inv
 from .gear_data import rounding
 from .involute import largest_rack_tip_radius, least_shift
 from .mesh_geometry import MeshGeometry
-from .ring import CLEAR, radial_clearance, ring_depths
+from .ring import CLEAR, radial_clearance, ring_depths, to_line
 from .spur_gear import LEAST_ROUND, Gear
 
 #: Largest overlap, times module.
@@ -355,20 +355,8 @@ def tip_penetration(gear: Gear, mate: Gear, centre_distance: float, twist: float
     deepest = 0.0
     for part in np.array_split(suspects, 1 + suspects.size // 2000):
         if part.size:
-            deepest = max(deepest, float(_distance(part, outline).max()))
+            deepest = max(deepest, float(to_line(part, outline).max()))
     return deepest
-
-
-def _distance(points: Array, outline: Array) -> Array:
-    """Distance of complex points to the chords next to the nearest vertex of a complex polyline."""
-    nearest = np.abs(points[:, None] - outline).argmin(axis=1)
-    best = np.abs(points - outline[nearest])
-    for step in (-1, 0):
-        first = np.clip(nearest + step, 0, len(outline) - 2)
-        start, chord = outline[first], outline[first + 1] - outline[first]
-        along = np.clip(np.real((points - start) * np.conj(chord)) / np.abs(chord) ** 2, 0.0, 1.0)
-        best = np.minimum(best, np.abs(points - start - along * chord))
-    return best
 
 
 def _outline(gear: Gear) -> Array:

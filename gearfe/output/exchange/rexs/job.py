@@ -1,7 +1,7 @@
 """A job file from a REXS model: tables with the names of the model, and the list of what became of each value.
 
 Order: materials, shafts, gears, meshes, bearings, couplings; from these the speeds and torques of all shafts
-(`balance`), hence drive, loads and the load of each mesh. What a job cannot have stands in it as a comment, with the
+(`balance`), hence drive, loads and the load of each mesh. What a job cannot have is a comment in it, with the
 reason. A file that this program wrote holds in attributes ``custom_gearfe_...`` what REXS has no attribute for.
 """
 
