@@ -6,7 +6,7 @@ import argparse
 import time
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..base.errors import InputError
 from ..base.progress import Stopwatch
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..gears.geometry.pair import GearPair
 
 #: Options of `gearfe stiffness` that are for loads alike along the face width.
-PLANE_OPTIONS = ("check", "fields", "animation", "range")
+PLANE_OPTIONS = ("check", "animation")
 
 
 def run_along_width(
@@ -27,6 +27,7 @@ def run_along_width(
     pair: GearPair,
     started: float,
     loads: LoadMapTable | None = None,
+    fields: list[float] | None = None,
 ) -> int:
     """Compute a mesh whose load varies along the face width and write its files; 1 when a position failed.
 
@@ -40,6 +41,8 @@ def run_along_width(
         `time.perf_counter` when the command began (s).
     loads
         Torques and positions of a load map; without them, those of [stiffness].
+    fields
+        Pinion angles (deg) of which fields are asked for, None for all; where ``--fields`` is given.
 
     Raises
     ------
@@ -51,6 +54,8 @@ def run_along_width(
         if getattr(args, name, None) is not None:
             problem = f"is for loads alike along the face width, which {cause[0] if cause else 'the mesh'} makes vary"
             raise InputError(f"--{name}", getattr(args, name) or None, problem, "leave it out")
+
+    import numpy as np
 
     from ..base.files import output_folder, whole_set, write_csvs, write_json
     from ..gears.gearmesh import width_job
@@ -79,6 +84,10 @@ def run_along_width(
     job = stiffness_job(mesh, Path(args.job).parent, pair)
     if loads is None:
         width_job.check_stiffness_job(job)
+        if fields is not None:
+            from ..gears.gearmesh.fields_output import angle_numbers
+
+            angle_numbers(np.degrees(width_job.stiffness_angles(job)), fields)
     else:
         width_job.check_map_job(job, loads)
     folder = output_folder(args.out)
@@ -120,6 +129,18 @@ def run_along_width(
             main, load = sweep_columns(job, wide, sweep, roots), load_columns(job, sweep)
             write_csvs(made, {name: main, "load": load, "pattern": pattern_columns(flanks), **more})
             write_flank(made / f"{name}_flank.vtkhdf", job, flanks[-1])
+        if getattr(args, "fields", None) is not None:
+            with watch.stage("fields"):
+                from ..gears.gearmesh.fields_output import write_solid_fields
+
+                def draw(cell: tuple[int, int], sections: Any) -> None:
+                    from ..figures.stress import stress_figure
+
+                    place = float(sweep.angle[cell[1]]), float(pair.contact_twist + sweep.twist[cell])
+                    note = f"section at y = {1e3 * sections[0].z:.4g} mm, "
+                    stress_figure(made, pair, place, sections, args.range, note=note)
+
+                write_solid_fields(made, job, lines, sweep, fields, draw=None if args.no_pictures else draw)
         if not args.no_pictures:
             from ..figures.flank_load import flank_load_picture
             from ..figures.style import save

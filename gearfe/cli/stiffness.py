@@ -93,10 +93,7 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     from ..base.errors import InputError
 
     mesh = replace(mesh, stiffness=overridden(mesh.stiffness, args))
-    given = args.fields or []
-    chosen = [value for value in given if value != "all"] or None  # pinion angles (deg); None: all
-    if chosen and len(chosen) < len(given):
-        raise InputError("--fields", given, "must be 'all' or pinion angles (deg), not both")
+    chosen = field_angles(args)
     if args.animation is not None and not 2 <= args.animation <= 1000:
         raise InputError("--animation", args.animation, "must be >= 2 and <= 1000 frames", "40 are usual")
 
@@ -106,7 +103,7 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     if mesh.along_width():
         from .along_width import run_along_width
 
-        return run_along_width(args, mesh, pair, started)
+        return run_along_width(args, mesh, pair, started, fields=chosen)
 
     import numpy as np
 
@@ -157,7 +154,8 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
                 def draw(position: Any, fields: Any) -> None:
                     from ..figures.stress import stress_figure
 
-                    stress_figure(made, job.pair, position, fields, args.range)
+                    place = position.pinion_angle, position.twist
+                    stress_figure(made, job.pair, place, fields, args.range)
 
                 pressures = write_fields(made, elastic, curve, chosen, draw=None if args.no_pictures else draw)
                 if pressures and not args.no_pictures:
@@ -188,6 +186,17 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
 def field_angle(text: str) -> str | float:
     """A value of ``--fields``: all, or a pinion angle (deg)."""
     return text if text == "all" else float(text)
+
+
+def field_angles(args: argparse.Namespace) -> list[float] | None:
+    """Return the pinion angles (deg) of ``--fields``, None for all."""
+    from ..base.errors import InputError
+
+    given = args.fields or []
+    chosen = [value for value in given if value != "all"]
+    if chosen and len(chosen) < len(given):
+        raise InputError("--fields", given, "must be 'all' or pinion angles (deg), not both")
+    return chosen or None
 
 
 def overridden(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:

@@ -171,7 +171,7 @@ def section_integrals(points: Array, triangles: IntArray, material: Material, tu
     first[:, :, 4, :, 0] = first[:, :, 3, :, 1] = first[:, :, 2, :, 2] = values
     zeroth, first = (rows.reshape(*det.shape, 6, 18) for rows in (zeroth, first))
     volume = (weights * det)[..., None, None]
-    stresses = [volume * (_elasticity(material) @ rows) for rows in (zeroth, first)]
+    stresses = [volume * (elasticity(material) @ rows) for rows in (zeroth, first)]
     m = len(triangles)
 
     def product(rows: Array, stress: Array) -> Array:
@@ -181,7 +181,7 @@ def section_integrals(points: Array, triangles: IntArray, material: Material, tu
     return SectionIntegrals(product(zeroth, stresses[0]), product(zeroth, stresses[1]), product(first, stresses[1]))
 
 
-def _elasticity(material: Material) -> Array:
+def elasticity(material: Material) -> Array:
     """Stresses xx, yy, zz, yz, xz, xy (Pa) of strains in this order, shear strains as gamma."""
     lam, mu = material.lame()
     matrix = np.zeros((6, 6))

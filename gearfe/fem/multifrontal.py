@@ -82,22 +82,35 @@ class Factor:
         self._backward(x)
         return self._spread(x).reshape(np.shape(b))
 
-    def recover(self, values: Array) -> Array:
-        """Full displacement of a body without loads on its eliminated unknowns.
+    def recover(self, values: Array, unknowns: IntArray | None = None, loads: Array | None = None) -> Array:
+        """Return the full displacement of a body from that of its retained unknowns.
 
         Parameters
         ----------
         values : ndarray, shape (r, k)
             Displacements of the retained unknowns, k cases (m).
+        unknowns : ndarray, shape (m,), optional
+            Numbers in the matrix of eliminated unknowns that carry loads; without them none does.
+        loads : ndarray, shape (m, k), optional
+            Their loads (N).
 
         Returns
         -------
         ndarray, shape (size, k)
         """
         x = np.zeros((len(self.order), values.shape[1]))
+        if unknowns is not None:
+            x[self._numbers()[unknowns]] = loads
+            self._forward(x)
         x[len(x) - len(values) :] = values
         self._backward(x)
         return self._spread(x)
+
+    def _numbers(self) -> IntArray:
+        """Places of the matrix's unknowns in the order of elimination, for those that are not held."""
+        number = np.empty(self.size, dtype=np.int64)
+        number[self.order] = np.arange(len(self.order))
+        return number
 
     def on_retained(self, rows: Array, unknowns: IntArray) -> Array:
         """What gives linear forms of the full displacement from the retained unknowns alone: B_r - B_e A_ee^-1 A_er.
@@ -141,10 +154,8 @@ class Factor:
         retained : ndarray, shape (r, k)
             Loads that act on the Schur complement (N).
         """
-        number = np.empty(self.size, dtype=np.int64)
-        number[self.order] = np.arange(len(self.order))
         x = np.zeros((len(self.order), values.shape[1]))
-        x[number[unknowns]] = values
+        x[self._numbers()[unknowns]] = values
         self._forward(x)
         cut = len(x) - len(self.schur)
         return x[:cut], x[cut:]

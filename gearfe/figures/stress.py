@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,9 +14,8 @@ from ..base import progress
 from ..base.progress import one_thread
 from ..base.typing import Array, IntArray
 from ..gears.contact.compliance import MeshingPair
-from ..gears.contact.position import Positions
 from ..gears.gearmesh.curve import StiffnessCurve
-from ..gears.gearmesh.fields import GearField, solved_fields, straight_triangles
+from ..gears.gearmesh.fields import solved_fields, straight_triangles
 from ..gears.geometry.derived import zone
 from ..gears.geometry.pair import GearPair
 from .style import new_figure, save, write_film
@@ -35,7 +34,27 @@ class Frame:
     parts: Sequence[Part]
 
 
-def _cut_out(field: GearField, zoom: tuple[float, float, float]) -> Part:
+class SectionOfFields(Protocol):
+    """A section of a gear to draw: n points, m triangles of six nodes."""
+
+    @property
+    def points(self) -> Array:
+        """Undeformed, shape (n, 2) (m)."""
+
+    @property
+    def triangles(self) -> IntArray:
+        """Shape (m, 6)."""
+
+    @property
+    def displacement(self) -> Array:
+        """Shape (n, 2) (m)."""
+
+    @property
+    def von_mises(self) -> Array:
+        """Shape (n,) (Pa)."""
+
+
+def _cut_out(field: SectionOfFields, zoom: tuple[float, float, float]) -> Part:
     """What of a deformed gear is near the zone."""
     x, y, half = zoom
     points = 1e3 * (field.points + field.displacement)
@@ -45,7 +64,13 @@ def _cut_out(field: GearField, zoom: tuple[float, float, float]) -> Part:
 
 
 def stress_figure(
-    folder: Path, pair: GearPair, position: Positions, fields: Sequence[GearField], most: float | None = None
+    folder: Path,
+    pair: GearPair,
+    place: tuple[float, float],
+    fields: Sequence[SectionOfFields],
+    most: float | None = None,
+    *,
+    note: str = "",
 ) -> None:
     """Draw ``stress_<angle>deg.png``: von Mises stress in the meshing zone, deformed.
 
@@ -55,12 +80,14 @@ def stress_figure(
         Folder of the picture.
     pair : GearPair
         The gears.
-    position : Positions
-        The position.
-    fields : sequence of GearField
+    place : pair of float
+        Pinion angle and twist of the wheel (rad).
+    fields : sequence of SectionOfFields
         Fields of pinion and wheel.
     most : float, optional
         End of the colours (MPa).
+    note
+        Words for the title's second line.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -71,12 +98,12 @@ def stress_figure(
     figure = new_figure(8.0, 7.0)
     axes = figure.add_subplot()
     drawn = _draw_zone(axes, shown, zoom, top)
-    angle, twist = math.degrees(position.pinion_angle), math.degrees(position.twist)
+    angle, twist = (math.degrees(part) for part in place)
     title = (
         f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}, pinion at {angle:.6g}°, wheel twisted by {twist:.4g}°, "
         "deformation to scale"
     )
-    axes.set_title(f"{title}\nlargest value {largest:.4g} MPa", loc="left", fontsize=11)
+    axes.set_title(f"{title}\n{note}largest value {largest:.4g} MPa", loc="left", fontsize=11)
     bar = figure.colorbar(drawn, ax=axes, shrink=0.85, extend="max" if largest > top else "neither")
     bar.set_label("von Mises stress (MPa)")
     bar.locator = MaxNLocator(8)

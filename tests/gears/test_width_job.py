@@ -176,7 +176,7 @@ def refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, *line
     ("line", "message"),
     [
         (["stiffness", "--check", "1"], "--check = [1]: is for loads alike along the face width"),
-        (["stiffness", "--fields"], "--fields: is for loads alike along the face width"),
+        (["stiffness", "--fields", "7.7"], "--fields = 7.7: is none of the sweep's angles"),
         (["stiffness", "--animation"], "--animation = 40: is for loads alike along the face width"),
         (["stiffness", "--law", "nitsche"], "stiffness.law = 'nitsche': is for loads alike along the face width"),
         (["stiffness", "--plane", "stress"], "stiffness.plane = 'stress': is for loads alike"),

@@ -100,19 +100,27 @@ def bumped(body: GearBody, position: Positions, gear: int) -> tuple[FlankLoads, 
         own = contacts.pressure[k][::way], contacts.width[k][::way]
         edges = np.append(places - 0.5 * own[1], places[-1] + 0.5 * own[1][-1])
         bump = line * _SHARES / (half * np.diff(EDGES))
-        x, z, tangent = _frame(body, centre)
+        x, z, tangent = flank_frame(body.flank, body.mesh.points, centre)
         stress = half_plane_stress(x, z, edges, own[0] * line / load.sum())
         stress -= half_plane_stress(x, z, half * EDGES, bump)
         stress[2] = -stress[2]  # y out of the material
-        local.append((int(loads.tooth[k]), _turned(stress, tangent.real, tangent.imag)))
+        local.append((int(loads.tooth[k]), turned_stress(stress, tangent.real, tangent.imag)))
     return replace(loads, force=force), local
 
 
-def _frame(body: GearBody, centre: float) -> tuple[Array, Array, complex]:
-    """Places along the flank's tangent at an arc (m) and depths below the flank of all nodes of a sector, shape (n,),
-    and the tangent towards the tip, tooth axes.
+def flank_frame(flank: Flank, nodes: Array, centre: float) -> tuple[Array, Array, complex]:
+    """Return places along the flank's tangent at an arc and depths below the flank, and the tangent towards the tip.
+
+    Parameters
+    ----------
+    flank : Flank
+        The flank.
+    nodes : ndarray, shape (n, 2)
+        Points of its tooth, in its axes (m).
+    centre : float
+        Arc length (m).
     """
-    flank, points = body.flank, body.mesh.points @ np.array([1, 1j])
+    points = nodes @ np.array([1, 1j])
     edge, xi = flank.place(np.array([centre]))
     value, slope, _ = edge_shapes(xi)
     corners = (flank.points @ np.array([1, 1j]))[edge_nodes(edge)][0]
@@ -124,7 +132,7 @@ def _frame(body: GearBody, centre: float) -> tuple[Array, Array, complex]:
     return seen.real, np.maximum(depth, 0.0), tangent
 
 
-def _turned(stress: Array, c: Array | float, s: Array | float) -> Array:
+def turned_stress(stress: Array, c: Array | float, s: Array | float) -> Array:
     """Components xx, yy, xy of plane stresses in axes turned by the angle of cosine c and sine s, shape (3, ...)."""
     xx, yy, xy = stress
     one, other = c * c * xx + s * s * yy - 2 * c * s * xy, s * s * xx + c * c * yy + 2 * c * s * xy
@@ -277,7 +285,7 @@ class GearRecovery:
         counts = self.elements[numbers]
         for tooth, stress in beside:
             sums[:, :, tooth % teeth] += counts[tooth % teeth][:, None] * stress.T
-        turned = _turned(sums.swapaxes(0, 1), c, s)
+        turned = turned_stress(sums.swapaxes(0, 1), c, s)
         total = [np.bincount(numbers.T.ravel(), part.ravel(), len(whole.points)) / self.elements for part in turned]
         held = body.material.poisson_ratio if body.plane == "strain" else 0.0
         points = whole.points @ turn(angle).T + [gear * pair.wheel_centre, 0.0]

@@ -11,15 +11,19 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.files import write_csv
-from ...base.progress import count, one_thread
+from ...base.progress import announce, count, one_thread
 from ...base.typing import Array, IntArray
 from ...output.exchange.vtkhdf import VtkHdfSeries
 from ..contact.compliance import MeshingPair
 from ..contact.position import Positions
 from ..geometry.deviation_job import GEARS
 from ..geometry.pair import GearPair
+from ..width import ContactLines, WidthSweep
 from .curve import StiffnessCurve
 from .fields import FlankPressure, GearField, flank_pressures, solved_fields
+from .job import StiffnessJob
+from .width_fields import SectionField, SolidField, solid_fields
+from .width_job import axial_sense
 
 
 def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) -> IntArray:
@@ -131,6 +135,88 @@ def size_note(elastic: MeshingPair, known_deg: Array, angles_deg: Sequence[float
     return (
         f"{text}; less: --fields {known_deg[0]:.6g} ... {known_deg[first - 1]:.6g}, the {first} angles of one mesh "
         f"cycle, take {less:.3g} MB, a single angle {fields_size(elastic, 1) / 1e6:.3g} MB"
+    )
+
+
+def write_solid_fields(
+    folder: Path,
+    job: StiffnessJob,
+    lines: ContactLines,
+    sweep: WidthSweep,
+    angles_deg: Sequence[float] | None,
+    *,
+    draw: Callable[[tuple[int, int], tuple[SectionField, SectionField]], None] | None,
+) -> None:
+    """Write ``fields.vtkhdf`` of gears with face widths, in space (time: pinion angle in deg).
+
+    The axes are those of the job file: its third coordinate is y along the axes. Without a single solution nothing is
+    written.
+
+    Parameters
+    ----------
+    folder
+        Where to write.
+    job : StiffnessJob
+        Gears and model.
+    lines : ContactLines
+        Their lines of contact.
+    sweep : WidthSweep
+        Solved positions of one load.
+    angles_deg
+        Pinion angles (deg) out of the sweep's; None writes all.
+    draw
+        Called with each position and the sections of both gears nearest to the largest line load; of all positions
+        with the most stressed one alone.
+    """
+    known = np.degrees(sweep.angle)
+    numbers = np.arange(len(known)) if angles_deg is None else np.unique(angle_numbers(known, angles_deg))
+    numbers = numbers[sweep.status[0, numbers] == "converged"]
+    if len(numbers) == 0:
+        return
+    ordered = numbers[np.argsort(known[numbers], kind="stable")]
+    peak, worst = -math.inf, None
+    with VtkHdfSeries(folder / "fields.vtkhdf") as series:
+        cells = [(0, int(number)) for number in ordered]
+        for done, (cell, fields) in enumerate(solid_fields(lines, sweep, cells), start=1):
+            if done == 1 and len(cells) > 1:
+                nodes = sum(field.pressure.size for field in fields)
+                announce(f"fields of {len(cells)} positions take {len(cells) * 56 * nodes / 1e6:.3g} MB and more")
+            seen = fields if axial_sense(job) > 0.0 else (fields[0].mirrored(), fields[1].mirrored())
+            _add_solids(series, float(known[cell[1]]), seen, first=done == 1)
+            most = max(float(field.von_mises.max()) for field in seen)
+            if draw is not None and (angles_deg is not None or most > peak):
+                at = axial_sense(job) * sweep.peak_z[cell]
+                pinion, wheel = (field.section(int(np.abs(field.z - at).argmin())) for field in seen)
+                if angles_deg is not None:
+                    draw(cell, (pinion, wheel))
+                else:
+                    peak, worst = most, (cell, (pinion, wheel))
+            count(done, len(cells), "fields")
+    if worst is not None and draw is not None:
+        draw(*worst)
+
+
+def _add_solids(series: VtkHdfSeries, time: float, fields: tuple[SolidField, SolidField], *, first: bool) -> None:
+    """Both gears in space as one grid; the elements are stored with the first step only."""
+    pinion, wheel = fields
+    cells = {"wedge18": np.concatenate([pinion.wedges, wheel.wedges + pinion.pressure.size])} if first else None
+
+    def both(values: Sequence[Array]) -> Array:
+        flat = [value.reshape(-1, *value.shape[2:]) for value in values]
+        return np.concatenate(flat).astype(np.float32)
+
+    principal = [field.principal for field in fields]
+    series.add(
+        time,
+        np.concatenate([field.points.reshape(-1, 3) for field in fields]),
+        cells,
+        point_data={
+            "displacement_m": both([field.displacement for field in fields]),
+            "von_mises_Pa": both([field.von_mises for field in fields]),
+            **{f"principal_{i + 1}_Pa": both([values[..., i] for values in principal]) for i in range(3)},
+            "contact_pressure_Pa": both([field.pressure for field in fields]),
+        },
+        cell_data={"gear": np.repeat(np.array([0, 1], dtype=np.uint8), [len(field.wedges) for field in fields])},
     )
 
 

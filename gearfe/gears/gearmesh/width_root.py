@@ -245,7 +245,7 @@ def wide_roots(lines: ContactLines, sweep: WidthSweep) -> WideRoots:
     points, positions = sweep.points, sweep.status.shape[1]
     cell = points.load * positions + points.position
     line, of_point = np.unique(np.stack([cell, points.pair]), axis=1, return_inverse=True)
-    forces = [_line_loads(lines, sweep, gear, of_point.ravel(), line.shape[1]) for gear in (0, 1)]
+    forces = [line_loads(lines, sweep, gear, of_point.ravel(), line.shape[1]) for gear in (0, 1)]
     stress, radius = np.zeros((2, line.shape[1], 2, PLACES))
     error, z = np.zeros((line.shape[1], 2)), np.zeros((2, PLACES))
     for gear in (0, 1):
@@ -313,8 +313,22 @@ def roots_along(roots: WideRoots, loads: int) -> tuple[Array, Array, IntArray]:
     return stress, radius, row
 
 
-def _line_loads(lines: ContactLines, sweep: WidthSweep, gear: int, of_point: IntArray, count: int) -> Array:
-    """Loads of lines of contact on one gear by station, axis of the tooth and Legendre function (N)."""
+def line_loads(lines: ContactLines, sweep: WidthSweep, gear: int, of_point: IntArray, count: int) -> Array:
+    """Return loads of lines of contact on one gear by station, axis of the tooth and Legendre function (N).
+
+    Parameters
+    ----------
+    lines : ContactLines
+        The gears.
+    sweep : WidthSweep
+        Their loaded points.
+    gear : int
+        0 for the pinion, 1 for the wheel.
+    of_point : ndarray of int, shape (p,)
+        Number of each point's line of contact.
+    count : int
+        Number of lines.
+    """
     mesh, points = lines.compliance.mesh, sweep.points
     twist = sweep.twist[points.load, points.position]
     angle = sweep.angle[points.position] - 0.5 * mesh.sections.gear_ratio * twist

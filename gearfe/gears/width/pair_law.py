@@ -37,6 +37,7 @@ from ..contact.half_plane_pair import HalfPlanePair
 from ..geometry.face import ToothDeviations
 from ..geometry.first_contact import FirstContacts, ToothFlanks
 from .compliance import TIPS, WideCompliance
+from .mesh import WideMesh
 
 #: Intervals of the table over the pair angle. Linear between its marks, 501 err by 0.04 % of the transmission error,
 #: 2,001 do not.
@@ -121,16 +122,15 @@ def pair_law(compliance: WideCompliance, profiles: tuple[ToothDeviations, ToothD
     """
     mesh = compliance.mesh
     pair, cycle = mesh.sections, mesh.sections.mesh_cycle
-    first = tuple(ToothDeviations((own.profiles[own.profile[0]],)) for own in profiles)
-    teeth = ToothFlanks(pair, (first[0], first[1]))
+    teeth = first_teeth(mesh, profiles)
     sides = compliance.sides[0].local, compliance.sides[1].local
     model = HalfPlanePair(pair, teeth, sides, mesh.width)
     path = pair.path["A"].pinion_angle, pair.path["E"].pinion_angle
     low, high = path[0] - TIPS * cycle, path[1] + TIPS * cycle
     marks = np.unique(np.concatenate([path, _kinks(model)]))
     marks = marks[(marks > low) & (marks < high)]
-    angles, contacts = _contacts(teeth, np.unique(np.concatenate([np.linspace(low, high, ANGLES + 1), marks])))
-    solved_angles, solved = _contacts(teeth, _solved_angles(low, high, marks, cycle))
+    angles, contacts = pair_contacts(teeth, np.unique(np.concatenate([np.linspace(low, high, ANGLES + 1), marks])))
+    solved_angles, solved = pair_contacts(teeth, _solved_angles(low, high, marks, cycle))
     modulus = 2 / sum(side.inverse_modulus for side in sides)
     forces = LOADS * modulus * mesh.module
     with one_thread():
@@ -161,8 +161,14 @@ def pair_law(compliance: WideCompliance, profiles: tuple[ToothDeviations, ToothD
     )
 
 
-def _contacts(teeth: ToothFlanks, angles: Array) -> tuple[Array, FirstContacts]:
-    """Pair angles (rad) at which the flanks of pair 0 meet, and its first contacts there, of those asked for."""
+def first_teeth(mesh: WideMesh, profiles: tuple[ToothDeviations, ToothDeviations]) -> ToothFlanks:
+    """Return the flanks of gears whose teeth all have the profile of the first one."""
+    first = tuple(ToothDeviations((own.profiles[own.profile[0]],)) for own in profiles)
+    return ToothFlanks(mesh.sections, (first[0], first[1]))
+
+
+def pair_contacts(teeth: ToothFlanks, angles: Array) -> tuple[Array, FirstContacts]:
+    """Return the pair angles (rad) at which the flanks of pair 0 meet, of those asked for, and its first contacts."""
     pair = teeth.pair
 
     def met_at(pinion_angle: Array) -> tuple[FirstContacts, Array]:

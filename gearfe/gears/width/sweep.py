@@ -303,11 +303,26 @@ def mean_line_load(points: LinePoints, load: int, along: Array, positions: int) 
     line = np.stack([points.position[of_load], points.pair[of_load]])
     for one in np.unique(line, axis=1).T:
         chosen = of_load[(line == one[:, None]).all(axis=0)]
-        chosen = chosen[np.argsort(points.z[chosen])]
-        z, reach = points.z[chosen], 0.5 * points.weight[chosen]
-        inside = (along >= z[0] - reach[0]) & (along <= z[-1] + reach[-1])
-        mean += np.where(inside, np.interp(along, z, points.line_load[chosen]), 0.0)
+        mean += load_along(points.z[chosen], points.weight[chosen], points.line_load[chosen], along)
     return mean / max(1, positions)
+
+
+def load_along(z: Array, weight: Array, line_load: Array, along: Array) -> Array:
+    """Return the line load of one line of contact at places along the width (N/m), shape (k,).
+
+    It runs straight between the loaded points, over the lengths that these have, and is zero beyond.
+
+    Parameters
+    ----------
+    z, weight, line_load : ndarray, shape (n,)
+        Places of the points, their lengths (m), and their loads (N/m).
+    along : ndarray, shape (k,)
+        Places (m).
+    """
+    order = np.argsort(z)
+    z, reach = z[order], 0.5 * weight[order]
+    inside = (along >= z[0] - reach[0]) & (along <= z[-1] + reach[-1])
+    return np.where(inside, np.interp(along, z, line_load[order]), 0.0)
 
 
 def _load_factors(lines: ContactLines, angles: Array, points: LinePoints, load: int) -> tuple[float, float]:

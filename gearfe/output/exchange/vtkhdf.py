@@ -29,6 +29,7 @@ CELL_TYPES: dict[str, tuple[int, int]] = {
     "wedge": (13, 6),
     "triangle6": (22, 6),
     "tetra10": (24, 10),
+    "wedge18": (32, 18),
 }
 
 #: Values of one step: (points,) or (points, k) arrays by name.
