@@ -57,7 +57,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "gearfe new vibration gearbox.toml",
     ),
     "cache": (
-        "what is kept on disk (meshes, curves, housings, compiled kernels), its size; remove it",
+        "what is kept on disk (meshes, gears, curves, housings, compiled kernels), its size; remove it",
         "gearfe cache",
     ),
     "completion": (

@@ -225,7 +225,7 @@ def each_mesh(
     """
     from ..base.config import read_toml
     from ..base.tables.jobs import meshes_of
-    from ..base.tables.named import check_folders
+    from ..base.tables.names import check_folders
 
     # mistakes in the file show before NumPy, SciPy and the finite elements load
     meshes = meshes_of(read_toml(args.job), args.job, args.mesh, variant)

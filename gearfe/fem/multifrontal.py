@@ -18,7 +18,9 @@ dissection: George, SIAM J. Numer. Anal. 10, 1973), for sparse matrices see `gea
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg.blas import dsyrk, dtrsm
@@ -72,6 +74,32 @@ class Factor:
     def retained(self) -> IntArray:
         """Numbers in the matrix of the retained unknowns, shape (r,)."""
         return self.order[len(self.order) - len(self.schur) :]
+
+    def arrays(self) -> dict[str, Array | IntArray]:
+        """Return its data as few long arrays by name, to be stored."""
+        fronts = self.fronts
+        blocks = [block.ravel(order="F") for front in fronts for block in (front.pivot, front.coupling)]
+        return {
+            "size": np.array(self.size),
+            "order": self.order,
+            "schur": self.schur,
+            "limits": np.array([[front.begin, front.end, len(front.outer)] for front in fronts]).reshape(-1, 3),
+            "outer": np.concatenate([self.order[:0], *(front.outer for front in fronts)]),
+            "blocks": np.concatenate([np.zeros(0), *blocks]),
+        }
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, Any]) -> Factor:
+        """Return the factor of `arrays`; its fronts are views of them."""
+        limits, outer, blocks = arrays["limits"], arrays["outer"], arrays["blocks"]
+        fronts, first, number = [], 0, 0
+        for begin, end, others in limits.tolist():
+            own, whole = end - begin, end - begin + others
+            pivot = blocks[first : first + own * own].reshape((own, own), order="F")
+            coupling = blocks[first + own * own : first + own * whole].reshape((others, own), order="F")
+            fronts.append(Front(begin, end, outer[number : number + others], pivot, coupling))
+            first, number = first + own * whole, number + others
+        return cls(int(arrays["size"]), arrays["order"], tuple(fronts), arrays["schur"])
 
     def solve(self, b: Array) -> Array:
         """(n,) or (n, p) right-hand sides to solutions of the same shape, where nothing is retained; several at a time

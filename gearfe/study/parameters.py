@@ -15,9 +15,8 @@ import numpy as np
 from ..base.config import build, check_size, type_hints
 from ..base.errors import InputError, given, unknown_name
 from ..base.tables.gearbox import NamedGear
-from ..base.tables.jobs import OF_GEARS, TABLES, gearbox_of, table_class
+from ..base.tables.jobs import NAMED, OF_GEARS, TABLES, gearbox_of, table_class
 from ..base.tables.mechanism import MechanismFile
-from ..base.tables.named import NAMED
 from ..base.tables.study import DistributionTable
 from ..base.typing import Array
 from ..gears.geometry.pair import gear_of

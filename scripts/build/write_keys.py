@@ -11,9 +11,8 @@ from typing import Any
 
 from gearfe.base.config import type_hints
 from gearfe.base.tables.bearing import BearingTable
-from gearfe.base.tables.jobs import TABLES, table_class
+from gearfe.base.tables.jobs import NAMED, TABLES, table_class
 from gearfe.base.tables.mechanism import MechanismFile
-from gearfe.base.tables.named import NAMED
 from gearfe.base.tables.pair import GearBodyTable, ToothFormTable
 from gearfe.base.tables.text import inner_table, toml_value
 from gearfe.base.tables.train import ShaftTable, TrainMeshTable
@@ -44,9 +43,9 @@ def reference_page() -> str:
     for table, title in SHARED.items():
         parts += [f"### {title}\n", *_sections(table, title, seen)]
     top = seen | {table_class(name): name for name in TABLES}
-    for kind, table in NAMED.items():
+    for kind in NAMED:
         parts.append(f"## `[{kind}.NAME]`\n")
-        parts += _sections(table, f"{kind}.NAME", top)
+        parts += _sections(table_class(kind), f"{kind}.NAME", top)
     for name in TABLES:
         parts.append(f"## `[{name}]`\n")
         parts += _sections(table_class(name), name, dict(top))

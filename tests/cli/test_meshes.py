@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gearfe.base.errors import InputError
-from gearfe.base.tables.named import check_folders
+from gearfe.base.tables.names import check_folders
 from gearfe.cli.main import main
 from gearfe.output.exchange.tables import read_csv
 from tests.makers.gearboxes import MESHES, pair_text, text

@@ -12,10 +12,10 @@ import pytest
 
 from gearfe.base.config import build
 from gearfe.base.errors import InputError
-from gearfe.base.tables.gearbox import train_gearbox
 from gearfe.base.tables.jobs import load_job
 from gearfe.base.tables.pair import PairTable, StiffnessTable
 from gearfe.base.tables.train import TrainCurvesTable, TrainGearTable
+from gearfe.base.tables.train_gearbox import train_gearbox
 from gearfe.drivetrain.gearbox.job import bore_places, job_train, read_train_job
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.train import build_train, simulate

@@ -99,3 +99,12 @@ def test_cost_of_a_plate_stays_near_linear() -> None:
         fronts = multifrontal(matrix, graph, elimination_order(graph)).fronts
         stored.append(sum(front.pivot.size + front.coupling.size for front in fronts))
     assert np.log(stored[1] / stored[0]) / np.log(4.0) < 1.2
+
+
+def test_a_stored_factor_solves_as_the_first() -> None:
+    matrix = grid((4, 3, 5), 2)
+    factor = sparse_solver.factorize(matrix, block=2)
+    again = Factor.of_arrays(factor.arrays())
+    b = np.random.default_rng(5).standard_normal((matrix.shape[0], 3))
+    np.testing.assert_array_equal(again.solve(b), factor.solve(b))
+    np.testing.assert_allclose(matrix @ again.solve(b), b, atol=1e-10)

@@ -44,6 +44,8 @@ HEAVY = {
         "gearfe.figures.flanks",
         "gearfe.gears.gearmesh.width_job",
     ): "elastic teeth; for modifications along the width only",
+    ("gearfe.base.tables.jobs", "gearfe.base.tables.carrier"): "40 ms for the tables of trains; for trains only",
+    ("gearfe.base.tables.jobs", "gearfe.base.tables.train_gearbox"): "the same; for trains only",
 }
 #: Modules that import by name, and what they name: parts of their own package, of packages below, of other programs.
 BY_NAME = {

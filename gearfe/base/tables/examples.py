@@ -6,9 +6,8 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
-from .jobs import table_class
+from .jobs import NAMED, table_class
 from .mechanism import MechanismFile
-from .named import NAMED
 from .text import table_text
 
 OPTIONAL_KEYS = "Keys behind a # are optional and stand with their defaults; those that are not set have none."
@@ -358,5 +357,7 @@ def _commented() -> str:
 def _text(name: str, example: Mapping[str, Any], seen: set[type]) -> str:
     """TOML of a table, or of the tables by name that it holds."""
     if name in NAMED:
-        return "\n".join(table_text(NAMED[name], entry, f"{name}.{key}", seen=seen) for key, entry in example.items())
+        return "\n".join(
+            table_text(table_class(name), entry, f"{name}.{key}", seen=seen) for key, entry in example.items()
+        )
     return table_text(table_class(name) if name else MechanismFile, example, name)

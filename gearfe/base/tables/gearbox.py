@@ -1,7 +1,7 @@
 """Gears and meshes by name, with all their keys: the one form of what a job file says about them.
 
 A file has [gears.NAME] and [meshes.NAME], or the shorthand of a pair ([pair], [microgeometry]), or the lists of a train
-([[train.gears]], [[train.meshes]]). The three functions `named_gearbox`, `pair_gearbox` and `train_gearbox` turn them
+([[train.gears]], [[train.meshes]]). `named_gearbox`, `pair_gearbox` and `gearfe.base.tables.train_gearbox` turn them
 into a `Gearbox`; nothing below them knows which of the three it was, except the names of keys in messages.
 """
 
@@ -9,19 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, unknown_name
-from .bearing import BearingTable
-from .carrier import CarrierTable, TrainCarrierTable
-from .driveline import CouplingTable, MachineTable, TrainCouplingTable, TrainMachineTable
 from .loadmap import LoadMapTable
 from .microgeometry import FlankTable, GearMicrogeometryTable, MicrogeometryTable
-from .named import NamedBearingTable, NamedGearTable, NamedMeshTable, NamedShaftTable
 from .pair import (
     FROM_DISTANCE,
-    REQUIRED,
     ROUNDING_MM,
     SAME,
     SIGNED,
@@ -37,13 +32,9 @@ from .pair import (
     tooth_form,
     transverse_teeth,
 )
-from .train import (
-    TrainBearingTable,
-    TrainGearTable,
-    TrainRigidBoreTable,
-    TrainShaftTable,
-    TrainTable,
-)
+
+if TYPE_CHECKING:
+    from .named import NamedGearTable, NamedMeshTable
 
 #: Where a value comes from that no table gives.
 DEFAULT = "default"
@@ -305,7 +296,7 @@ def _with_shifts(box: Gearbox) -> Gearbox:
     return Gearbox(gears, meshes)
 
 
-def _with_hands(box: Gearbox) -> Gearbox:
+def with_hands(box: Gearbox) -> Gearbox:
     """The gearbox with hands of all helices, right for the first driver where none is written.
 
     Hands are opposite in a mesh of external gears, the same in that of an internal gear.
@@ -424,7 +415,7 @@ def named_gearbox(
             problem = f"has the gears of [meshes.{twins[both]}], too"
             raise InputError(f"meshes.{name}", None, problem, "two gears have one mesh: leave one out")
         twins[both] = name
-    return _with_shifts(_with_hands(Gearbox(made, found)))
+    return _with_shifts(with_hands(Gearbox(made, found)))
 
 
 def _meshing(meshes: Iterable[NamedMeshTable]) -> list[set[str]]:
@@ -459,7 +450,7 @@ def _named_gear(
             )
         if table.shaft not in shafts:
             raise unknown_name(f"{where}.shaft", table.shaft, shafts)
-    form, places = _form(table, None, "")
+    form, places = tooth_form_of(table, None, "")
     return NamedGear(
         name,
         where,
@@ -505,7 +496,7 @@ def _named_mesh(name: str, table: NamedMeshTable, gears: Mapping[str, NamedGear]
     return NamedMesh(name, where, one, two, distance, where, table.flank, table.tolerance_class, **tilts)
 
 
-def _form(
+def tooth_form_of(
     table: ToothFormTable, shared: ToothFormTable | None, shared_where: str
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Keys of a gear's tooth form with module and bore, and where those come from that it does not give itself."""
@@ -546,163 +537,6 @@ def _drawn(table: GearBodyTable) -> dict[str, Any]:
     return drawn
 
 
-def named_train(
-    table: TrainTable,
-    meshes: Mapping[str, NamedMeshTable],
-    shafts: Mapping[str, NamedShaftTable],
-    bearings: Mapping[str, NamedBearingTable],
-    machines: Mapping[str, MachineTable] | None = None,
-    couplings: Mapping[str, CouplingTable] | None = None,
-    carriers: Mapping[str, CarrierTable] | None = None,
-) -> TrainTable:
-    """Return [train] with the shafts, meshes, bearings, machines, couplings and carriers of their own tables.
-
-    Parameters
-    ----------
-    table : TrainTable
-        [train], without lists of these.
-    meshes, shafts, bearings, machines, couplings, carriers
-        The tables by name, with an entry for each planet.
-
-    Raises
-    ------
-    InputError
-        For lists of [train] that stand beside these tables, and for names that do not exist.
-    """
-    for key in ("shafts", "gears", "meshes", "bearings", "machines", "couplings", "carriers"):
-        if getattr(table, key):
-            problem = f"stands beside [{'shafts' if key == 'gears' else key}.NAME]"
-            raise InputError(f"[[train.{key}]]", None, problem, f"write all {key} as [{key}.NAME], or all as lists")
-    held: dict[str, tuple[str, str]] = {}  # bore -> bearing and shaft
-    for name, bearing in bearings.items():
-        where = f"bearings.{name}"
-        if bearing.shaft not in shafts:
-            raise unknown_name(f"{where}.shaft", bearing.shaft, shafts)
-        bore = _bore(name, bearing)
-        if bore in held:
-            problem = f"is that of [bearings.{held[bore][0]}], too"
-            raise InputError(f"{where}.attachment", bore, problem, "a bore has one bearing")
-        held[bore] = name, bearing.shaft
-    carried = {
-        name: (*(_bore(b, bearing) for b, bearing in bearings.items() if bearing.shaft == name), *shaft.attachments)
-        for name, shaft in shafts.items()
-    }
-    for name, bores in carried.items():
-        if shafts[name].carrier is not None:
-            if bores:
-                held_by = ", ".join(map(str, bores))
-                problem = f"is a planet of carrier {shafts[name].carrier!r}, and bearings carry it: {held_by}"
-                raise InputError(f"shafts.{name}", None, problem, "leave out its bearings, or its carrier")
-        elif not bores:
-            cure = f'add [bearings.NAME] with shaft = "{name}", or attachments = ["1", "2"]'
-            raise InputError(f"shafts.{name}.attachments", None, "no bearing carries the shaft", cure)
-    rows = tuple(
-        TrainShaftTable(
-            name=name, **{f.name: getattr(shaft, f.name) for f in fields(shaft) if f.name != "attachments"},
-            attachments=tuple(map(str, carried[name])),
-        )
-        for name, shaft in shafts.items()
-    )  # fmt: skip
-    springs = tuple(
-        TrainBearingTable(
-            attachment=_bore(name, bearing), **{f.name: getattr(bearing, f.name) for f in fields(BearingTable)}
-        )
-        for name, bearing in bearings.items()
-        if not bearing.hinge
-    )
-    places = tuple(
-        TrainRigidBoreTable(
-            attachment=_bore(name, b), x_mm=shafts[b.shaft].x_mm, y_mm=b.y_mm, z_mm=shafts[b.shaft].z_mm
-        )
-        for name, b in bearings.items()
-        if b.y_mm is not None
-    )
-    if places and table.rigid_bores:
-        problem = "stands beside [bearings.NAME] with y_mm"
-        raise InputError("[[train.rigid_bores]]", None, problem, "leave the list out, or y_mm of the bearings")
-    if places and len(places) < len(bearings):
-        lacking = next(name for name, b in bearings.items() if b.y_mm is None)
-        raise InputError(f"bearings.{lacking}.y_mm", None, "is required: other bearings have one", "give all, or none")
-    made = replace(
-        table, shafts=rows, meshes=tuple(meshes.values()), bearings=springs,
-        machines=_named_rows(TrainMachineTable, machines or {}),
-        couplings=_named_rows(TrainCouplingTable, couplings or {}),
-        carriers=tuple(
-            TrainCarrierTable(
-                name=name, **{f.name: getattr(carrier, f.name) for f in fields(TrainCarrierTable) if f.name != "name"}
-            )
-            for name, carrier in (carriers or {}).items()
-        ),
-    )  # fmt: skip
-    made.check_driveline("machines.{name}", "couplings.{name}")
-    made = replace(made, rigid_bores=places or table.rigid_bores)
-    ends: list[tuple[str, Any]] = [] if made.drive is None else [("train.drive", made.drive)]
-    ends += [(f"train.loads[{i}]", load) for i, load in enumerate(made.loads)]
-    for where, end in ends:
-        if end.shaft not in shafts:
-            raise unknown_name(f"{where}.shaft", end.shaft, shafts)
-        own = [name for name, bearing in bearings.items() if bearing.shaft == end.shaft]
-        if end.attachment is not None and str(end.attachment) not in (*own, *map(str, carried[end.shaft])):
-            raise unknown_name(f"{where}.attachment", str(end.attachment), own or map(str, carried[end.shaft]))
-
-    def at_bore(end: Any) -> Any:
-        name = str(end.attachment)
-        return replace(end, attachment=_bore(name, bearings[name])) if name in bearings else end
-
-    drive = None if made.drive is None else at_bore(made.drive)
-    return replace(made, drive=drive, loads=tuple(map(at_bore, made.loads)))
-
-
-def with_materials(table: TrainTable, materials: Mapping[str, MaterialTable], where: str) -> TrainTable:
-    """Return [train] with the materials of its shafts and their sections, where these name one.
-
-    Parameters
-    ----------
-    table : TrainTable
-        [train].
-    materials : mapping
-        The materials by name.
-    where : str
-        Pattern of a shaft's name in messages, with its number and its name.
-
-    Raises
-    ------
-    InputError
-        For a material that does not exist.
-    """
-
-    def known(part: Any, place: str) -> Any:
-        if not isinstance(part.material, str):
-            return part
-        if not materials:
-            problem = "names a material, and this file has none"
-            cure = (
-                "write its constants, material = { youngs_modulus_GPa = 200.0 }, or add [materials.NAME] beside [gears]"
-            )
-            raise InputError(f"{place}.material", part.material, problem, cure)
-        if part.material not in materials:
-            raise unknown_name(f"{place}.material", part.material, materials)
-        return replace(part, material=materials[part.material])
-
-    shafts = []
-    for number, shaft in enumerate(table.shafts):
-        place = where.format(number=number, name=shaft.name)
-        sections = tuple(known(part, f"{place}.sections[{i}]") for i, part in enumerate(shaft.sections))
-        shafts.append(replace(known(shaft, place), sections=sections))
-    return replace(table, shafts=tuple(shafts))
-
-
-def _named_rows(row: type, tables: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Entries of a list from tables by name."""
-    return tuple(
-        row(name=name, **{f.name: getattr(table, f.name) for f in fields(table)}) for name, table in tables.items()
-    )
-
-
-def _bore(name: str, bearing: NamedBearingTable) -> str:
-    return name if bearing.attachment is None else str(bearing.attachment)
-
-
 # --- [pair] ---------------------------------------------------------------------------------------------------------
 
 
@@ -715,12 +549,12 @@ def pair_gearbox(pair: PairTable, microgeometry: MicrogeometryTable | None = Non
     mesh = NamedMesh(name, "pair", gears[PINION], gears[WHEEL], distance, "pair", **tilts)
     if microgeometry is not None:
         mesh = replace(mesh, flank=microgeometry.flank, tolerance_class=microgeometry.tolerance_class)
-    return _with_shifts(_with_hands(Gearbox(gears, {name: mesh})))
+    return _with_shifts(with_hands(Gearbox(gears, {name: mesh})))
 
 
 def _pair_gear(pair: PairTable, side: str, microgeometry: MicrogeometryTable | None) -> NamedGear:
     table: GearTable = getattr(pair, side)
-    form, places = _form(table, pair, "pair")
+    form, places = tooth_form_of(table, pair, "pair")
     form["module_mm"] = pair.module_mm_of(side)
     material, where = pair.material, "pair.material"
     if table.material is not None:
@@ -741,80 +575,3 @@ def _pair_gear(pair: PairTable, side: str, microgeometry: MicrogeometryTable | N
         f"microgeometry.{side}",
         y_mm=table.y_mm,
     )
-
-
-# --- [[train.gears]], [[train.meshes]] ------------------------------------------------------------------------------
-
-
-def train_gearbox(
-    table: TrainTable, pair: PairTable | None, microgeometry: MicrogeometryTable | None = None
-) -> Gearbox:
-    """Return the gears and meshes of the lists of [train], which take what they lack from [pair].
-
-    Raises
-    ------
-    InputError
-        For gears of a [pair] that is not there, and required keys that neither gives.
-    """
-    shared = None if pair is None else pair_gearbox(pair, microgeometry)
-    gears = {gear.name: _train_gear(gear, f"train.gears[{i}]", pair, shared) for i, gear in enumerate(table.gears)}
-    sides = {gear.name: gear.gear for gear in table.gears}
-    meshes: dict[str, NamedMesh] = {}
-    for i, mesh in enumerate(table.meshes):
-        name, where = mesh_name(mesh.driver, mesh.driven), f"train.meshes[{i}]"
-        internal = any(gears[gear].internal for gear in (mesh.driver, mesh.driven))
-        distance, distance_where = magnitude(mesh.centre_distance_mm, internal, where), where
-        of_pair = {sides[mesh.driver], sides[mesh.driven]} == {PINION, WHEEL}
-        if distance is None and of_pair and pair is not None and pair.centre_distance_mm is not None:
-            distance, distance_where = abs(pair.centre_distance_mm), "pair"
-        tilts: dict[str, Any] = {key: getattr(pair, key) if of_pair else 0.0 for key in TILTS}
-        if name in meshes:
-            raise InputError(where, None, f"has the gears of another mesh, {name!r}", "two gears have one mesh")
-        one, two = gears[mesh.driver], gears[mesh.driven]
-        meshes[name] = NamedMesh(name, where, one, two, distance, distance_where, **tilts)
-    return _with_hands(Gearbox(gears, meshes))
-
-
-def _train_gear(table: TrainGearTable, where: str, pair: PairTable | None, shared: Gearbox | None) -> NamedGear:
-    if table.gear:
-        if shared is None:
-            cure = "add it, or give teeth, module_mm, ..."
-            raise InputError(f"{where}.gear", table.gear, "needs a table [pair]", cure)
-        like = f"[pair.{table.gear}] and [pair]"
-        made = replace(shared.gears[table.gear], name=table.name, shaft=table.shaft, y_mm=table.y_mm, like=like)
-    else:
-        form, places = _form(table, pair, "pair")
-        for key in ("module_mm", *REQUIRED):
-            if form[key] is None:
-                raise InputError(f"{where}.{key}", None, "is required", "add it here, or to a table [pair]")
-        if form["profile_shift"] == FROM_DISTANCE:
-            problem = "follows from a centre distance in [pair], for a gear of [pair] alone"
-            raise InputError(f"{where}.profile_shift", None, problem, "write the number here")
-        teeth = table.teeth or 0
-        bore = table.bore_diameter_mm
-        if bore is None:
-            diameter = form["module_mm"] * transverse_teeth(teeth, form["helix_angle_deg"])
-            bore, places["bore_diameter_mm"] = BORE * diameter, DEFAULT
-        form["bore_diameter_mm"] = bore
-        form["helix_hand"] = table.helix_hand
-        if table.helix_hand is None:
-            places["helix_hand"] = DEFAULT
-        material, material_where = (None, DEFAULT) if pair is None else (pair.material, "pair.material")
-        density = MaterialTable().density_kg_per_m3 if material is None else material.density_kg_per_m3
-        made = NamedGear(
-            table.name,
-            where,
-            teeth,
-            form,
-            {},
-            material,
-            material_where,
-            density,
-            material_where,
-            places,
-            shaft=table.shaft,
-            y_mm=table.y_mm,
-        )
-    if table.density_kg_per_m3 is None:
-        return made
-    return replace(made, density_kg_per_m3=table.density_kg_per_m3, density_where="")

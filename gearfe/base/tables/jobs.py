@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..config import build, read_toml
 from ..errors import InputError, unknown_key, unknown_name
-from .carrier import with_planets
-from .gearbox import Gearbox, NamedMesh, named_gearbox, named_train, pair_gearbox, train_gearbox, with_materials
+from .gearbox import Gearbox, NamedMesh, named_gearbox, pair_gearbox
 from .loadmap import TORQUES, LoadMapTable
-from .named import NAMED, named_tables
+from .names import named_tables
 from .pair import LOADS, StiffnessTable
 
 if TYPE_CHECKING:
@@ -37,6 +36,18 @@ TABLES: dict[str, str] = {
     "runup": "gearfe.base.tables.runup:RunUpTable",
     "spectrum": "gearfe.base.tables.spectrum:SpectrumTable",
     "study": "gearfe.base.tables.study:StudyTable",
+}
+#: Tables of tables by name, [gears.NAME] and so on -> "module:class" of the dataclass of an entry. Like those above,
+#: modules are imported when a file names their table.
+NAMED: dict[str, str] = {
+    "gears": "gearfe.base.tables.named:NamedGearTable",
+    "meshes": "gearfe.base.tables.named:NamedMeshTable",
+    "shafts": "gearfe.base.tables.named:NamedShaftTable",
+    "bearings": "gearfe.base.tables.named:NamedBearingTable",
+    "machines": "gearfe.base.tables.driveline:MachineTable",
+    "couplings": "gearfe.base.tables.driveline:CouplingTable",
+    "carriers": "gearfe.base.tables.carrier:CarrierTable",
+    "materials": "gearfe.base.tables.pair:MaterialTable",
 }
 #: Tables that were: what became of them, and what to write instead.
 REMOVED_TABLES = {
@@ -95,7 +106,7 @@ def job_tables(
     for name, table in raw.items():
         asked = name in needed or name in optional
         if name in NAMED:
-            found = named_tables(name, table, rules=asked)
+            found = named_tables(name, table_class(name), table, rules=asked)
         else:
             found = build(table_class(name), table, name, rules=asked)
         if asked:
@@ -131,9 +142,7 @@ def _check_shorthand(raw: Mapping[str, Any]) -> None:
 
 def table_class(name: str) -> type:
     """Dataclass that describes the table `name` of a job file, or the entries of a table of tables by name."""
-    if name in NAMED:
-        return NAMED[name]
-    module, _, cls = TABLES[name].partition(":")
+    module, _, cls = {**TABLES, **NAMED}[name].partition(":")
     return typing.cast(type, getattr(importlib.import_module(module), cls))
 
 
@@ -286,6 +295,8 @@ def read_train_tables(path: str | Path, variant: str | None = None) -> dict[str,
 
 def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = None) -> dict[str, Any]:
     """The same of tables that are parsed; `path` is named in messages; ``gearbox`` has the gears and meshes."""
+    from .train_gearbox import named_train, train_gearbox, with_materials
+
     raw, tables = planet_tables(raw, path, ("train",), OF_TRAINS)
     table: TrainTable = tables["train"]
     table = table.chosen(table.variant if variant is None else variant)
@@ -334,6 +345,8 @@ def planet_tables(
     planets = any(shaft.carrier is not None for shaft in tables.get("shafts", {}).values())
     if not planets and not tables.get("carriers"):
         return raw, tables
+    from .carrier import with_planets
+
     raw = with_planets(raw, tables.get("carriers", {}))
     return raw, job_tables(raw, path, needed, optional)
 

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...base.tables.gearbox import Gearbox, named_train, with_materials
+from ...base.tables.gearbox import Gearbox
 from ...base.tables.jobs import OF_GEARS, gearbox_of, planet_tables, train_tables
 from ...base.tables.train import TrainTable
+from ...base.tables.train_gearbox import named_train, with_materials
 from ...gears.geometry.pair import gear_of, pair_of
 from .job import bore_places, shaft_of
 

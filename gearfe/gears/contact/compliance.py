@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
+from ...base.cache import cached_arrays, source_hash
 from ...base.errors import InputError
 from ...base.typing import Array, ComplexArray, IntArray
 from ...fem.multifrontal import Factor, condense
@@ -48,6 +49,8 @@ from .position import Contacts, FlankLoads, PointPressures, Positions
 NEIGHBOURS = 1
 #: Positions whose fields are in memory together for it.
 TOGETHER = 24
+#: Contact points on each element edge of a flank.
+POINTS_PER_EDGE = 4
 
 
 @dataclass(frozen=True)
@@ -127,7 +130,7 @@ def gear_body(
     plane: Plane,
     thickness: float,
     *,
-    points_per_edge: int = 4,
+    points_per_edge: int = POINTS_PER_EDGE,
     with_stress: bool = True,
     width: float | None = None,
 ) -> GearBody:
@@ -188,6 +191,42 @@ def gear_body(
         stress_interface = stress[:, :f] @ interface + stress[:, f:]
     stressed = stress_own, stress_interface
     return GearBody(mesh, flank, material, plane, thickness, own, interface, coupling, *stressed, condensed, width)
+
+
+#: Arrays of a gear body that are stored beside the factor's.
+_STORED = ("own", "interface", "coupling", "stress_own", "stress_interface")
+#: Modules whose text decides the arrays of a gear body.
+_MODULES = ("fem/multifrontal", "fem/plane", "gears/contact/compliance", "gears/contact/flank")
+
+
+def stored_gear_body(mesh: SectorMesh, material: Material, plane: Plane, thickness: float, **options: Any) -> GearBody:
+    """Return `gear_body`, from the cache if the same gear was condensed before.
+
+    An entry has some 20 MB and saves some 0.2 s: for jobs that a user repeats, not for the cases of a study.
+
+    Parameters
+    ----------
+    mesh, material, plane, thickness, options
+        See `gear_body`.
+    """
+    recipe = {"mesh": mesh, "material": material, "plane": plane, "thickness": thickness}
+
+    def make() -> dict[str, Any]:
+        body = gear_body(mesh, material, plane, thickness, **options)
+        return {name: getattr(body, name) for name in _STORED} | body.condensed.arrays()
+
+    arrays = cached_arrays("condensed-gear", {**recipe, "options": options, "source": source_hash(*_MODULES)}, make)
+    flank, width = flank_of(mesh, options.get("points_per_edge", POINTS_PER_EDGE)), options.get("width")
+    return GearBody(
+        mesh,
+        flank,
+        material,
+        plane,
+        thickness,
+        condensed=Factor.of_arrays(arrays),
+        width=thickness if width is None else width,
+        **{name: arrays[name] for name in _STORED},
+    )
 
 
 def _rim_means(mesh: SectorMesh, nodes: IntArray) -> Array:

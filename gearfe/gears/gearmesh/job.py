@@ -132,7 +132,7 @@ class StiffnessJob:
         model = self.model
 
         def make() -> MeshingPair:
-            return elastic_pair(self.pair, replace(model, deviations=NOMINAL), watch=watch)
+            return elastic_pair(self.pair, replace(model, deviations=NOMINAL), watch=watch, store=keep is None)
 
         made: MeshingPair = make() if keep is None else keep("elastic", make)
         return replace(made, model=model)

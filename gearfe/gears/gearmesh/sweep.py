@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 from ...base.errors import InputError
 from ...base.progress import Stopwatch, one_thread, stage
 from ...base.typing import Array, IntArray
-from ..contact.compliance import MeshingPair, gear_body
+from ..contact.compliance import MeshingPair, gear_body, stored_gear_body
 from ..contact.half_plane_pair import HalfPlanePair
 from ..contact.laws import COARSENING, DEFAULT_MODEL, PairModel, check_alike, check_torque, law_text, uses_stress
 from ..contact.position import Positions, in_batches, joined, taken
@@ -55,7 +55,12 @@ MOST_CELLS = 200_000
 
 
 def elastic_pair(
-    pair: GearPair, model: PairModel = DEFAULT_MODEL, *, watch: Stopwatch | None = None, **changes: Any
+    pair: GearPair,
+    model: PairModel = DEFAULT_MODEL,
+    *,
+    watch: Stopwatch | None = None,
+    store: bool = False,
+    **changes: Any,
 ) -> MeshingPair:
     """Mesh both gears (or read their meshes from the cache) and condense them to their flanks.
 
@@ -67,6 +72,8 @@ def elastic_pair(
         Materials, contact law, element sizes.
     watch
         Takes the time of the stages.
+    store
+        Whether the cache keeps the condensed gears, too: some 20 MB each.
     changes
         Fields of the model to change, such as ``law="nitsche"``; see `PairModel.changed`.
     """
@@ -79,9 +86,10 @@ def elastic_pair(
         meshes = [sector_mesh(gear, recipe) for gear, recipe in zip(gears, recipes, strict=True)]
     width = min(gear.face_width for gear in gears)
     options: dict[str, Any] = {"points_per_edge": model.points_per_edge, "with_stress": uses_stress(model.law)}
+    condense = stored_gear_body if store else gear_body
     with watch.stage("condensation"), one_thread():
         one, two = (
-            gear_body(mesh, material, model.plane, gear.face_width, width=width, **options)
+            condense(mesh, material, model.plane, gear.face_width, width=width, **options)
             for mesh, material, gear in zip(meshes, model.materials, gears, strict=True)
         )
     return MeshingPair(pair, one, two, model)

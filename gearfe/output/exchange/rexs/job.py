@@ -20,8 +20,7 @@ from typing import Any
 from ....base.config import build
 from ....base.errors import InputError, unknown_name
 from ....base.tables.gearbox import Gearbox
-from ....base.tables.jobs import TABLES, gearbox_of, table_class
-from ....base.tables.named import NAMED
+from ....base.tables.jobs import NAMED, TABLES, gearbox_of, table_class
 from ....base.tables.text import table_text, toml_document
 from . import parts, planets
 from .balance import Row, speeds_of, torques_of
@@ -705,7 +704,7 @@ def _refuse(
     for kind in NAMED:
         for name, entry in list(tables.get(kind, {}).items()):
             try:
-                build(NAMED[kind], entry, f"{kind}.{name}")
+                build(table_class(kind), entry, f"{kind}.{name}")
             except InputError as error:
                 leave(kind, name, str(error))
     for name, gear in list(tables.get("gears", {}).items()):
@@ -873,7 +872,7 @@ def _text(job: RexsJob, source: str) -> str:
                 label = job.labels.get((kind, name), "")
                 remark = _comment(f"REXS: {label}") if label else ""
                 notes = "".join(_comment(f"{line}") for line in _notes(job, f"{kind}.{name}"))
-                blocks.append(remark + notes + _table(NAMED[kind], entry, f"{kind}.{_key(name)}"))
+                blocks.append(remark + notes + _table(table_class(kind), entry, f"{kind}.{_key(name)}"))
         elif kind in TABLES:
             notes = "".join(_comment(line) for line in _notes(job, kind))
             blocks.append(notes + _table(table_class(kind), table, kind))

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from ....base.tables.named import NAMED
+from ....base.tables.jobs import NAMED
 from .ledger import plain
 from .model import Component
 from .parts import RIGID, RIGID_TILT, RIGID_TORSION

@@ -22,8 +22,7 @@ from ....base.errors import InputError
 from ....base.files import whole_file
 from ....base.tables.bearing import ANGULAR, CYLINDRICAL, DEEP_GROOVE, TAPERED
 from ....base.tables.gearbox import Gearbox, NamedGear, mesh_name
-from ....base.tables.jobs import gearbox_of, job_tables, train_tables
-from ....base.tables.named import NAMED
+from ....base.tables.jobs import NAMED, gearbox_of, job_tables, train_tables
 from ....base.tables.pair import FROM_DISTANCE
 from ....base.tables.text import toml_document
 from ....version import VERSION as PROGRAM
