@@ -1,4 +1,4 @@
-"""What is computed once and kept on disk: meshes, condensed gears, curves, mesh laws, reduced housings, compiled kernels.
+"""What is computed once and kept on disk: meshes, condensed gears, curves, laws, reduced housings, compiled kernels.
 
 An entry is a file named by its kind and a hash of everything that decides it: geometry, sizes, versions as plain data.
 Entries are written whole under a temporary name and renamed, so two processes that make the same do no harm; one that
