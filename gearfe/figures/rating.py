@@ -10,10 +10,11 @@ from .style import BLUE, GREY, ORANGE, RED, new_figure, tidy
 
 if TYPE_CHECKING:
     from ..gears.rating.rate import Rating
+    from ..gears.rating.scuffing import Scuffing
 
 
 def rating_picture(rating: Rating, compared: Sequence[Mapping[str, Any]] = ()) -> Any:
-    """Bars of the safety factors with the required ones; of the ratios of computed values to those of the standard.
+    """Bars of safety factors with the required ones; contact temperatures; ratios of computed values to the standard.
 
     Parameters
     ----------
@@ -22,9 +23,10 @@ def rating_picture(rating: Rating, compared: Sequence[Mapping[str, Any]] = ()) -
     compared : sequence of mapping
         Rows with ``name``, ``standard`` and ``computed``.
     """
-    figure = new_figure(9.0 if compared else 5.5, 4.4)
-    panels = figure.subplots(1, 2) if compared else [figure.subplots()]
-    axes, bars = panels[0], safety_bars(rating)
+    count = 1 + bool(compared) + (rating.scuffing is not None)
+    figure = new_figure({1: 5.5, 2: 9.0, 3: 13.0}[count], 4.4)
+    panels = list(figure.subplots(1, count, squeeze=False)[0])
+    axes, bars = panels.pop(0), safety_bars(rating)
     places = range(len(bars))
     colours = [BLUE if value >= least else RED for _, value, least in bars]
     axes.bar(places, [value for _, value, _ in bars], color=colours, width=0.6)
@@ -35,8 +37,10 @@ def rating_picture(rating: Rating, compared: Sequence[Mapping[str, Any]] = ()) -
     axes.set_ylabel("safety factor  (grey: required)")
     axes.set_title(f"ISO 6336:{rating.edition}", loc="left", fontsize=10)
     tidy(axes)
+    if rating.scuffing is not None:
+        _temperatures(panels.pop(0), rating.scuffing)
     if compared:
-        other, rows = panels[1], list(compared)
+        other, rows = panels.pop(0), list(compared)
         spots = range(len(rows))
         other.barh(spots, [row["computed"] / row["standard"] for row in rows], color=ORANGE, height=0.6)
         other.axvline(1.0, color=BLUE, linewidth=1.5)
@@ -45,6 +49,18 @@ def rating_picture(rating: Rating, compared: Sequence[Mapping[str, Any]] = ()) -
         other.set_xlabel("computed over standard")
         tidy(other)
     return figure
+
+
+def _temperatures(axes: Any, heat: Scuffing) -> None:
+    """Contact temperature over the path of contact with the temperatures of bulk and scuffing."""
+    axes.plot(heat.path.gamma, heat.path.contact, color=RED, linewidth=1.5, label="contact")
+    axes.axhline(heat.theta_M_C, color=BLUE, linewidth=1.2, label="bulk")
+    axes.axhline(heat.theta_S_C, color=GREY, linewidth=1.2, linestyle="--", label="scuffing")
+    axes.set_xlabel("place on the path: 0 pitch point, left the pinion's root")
+    axes.set_ylabel("temperature (deg C)")
+    axes.set_title(f"ISO/TS 6336-20, S_B = {heat.S_B:.3g}", loc="left", fontsize=10)
+    axes.legend(fontsize=8)
+    tidy(axes)
 
 
 def rating_plot(rating: Rating) -> Any:

@@ -8,13 +8,27 @@ Prints the table of docs/development/verification.md, in Markdown.
 
 from __future__ import annotations
 
+from typing import Any
+
 from gearfe import rate
 from tests.makers import rated
 
 #: Title, gears, table and printed values of each published rating.
-CASES = (
+CASES: tuple[tuple[str, Any, dict[str, Any], dict[str, str]], ...] = (
     ("spur stage", rated.spur_stage, rated.SPUR, rated.SPUR_PRINTED),
     ("helical stage", rated.helical_stage, rated.HELICAL, rated.HELICAL_PRINTED | rated.HELICAL_LOOSE),
+    (
+        "helical stage, scuffing",
+        rated.helical_stage,
+        rated.HELICAL | rated.HELICAL_OIL,
+        rated.HELICAL_SCUFFING | rated.HELICAL_SCUFFING_LOOSE,
+    ),
+    (
+        "helical stage, friction 0.040915",
+        rated.helical_stage,
+        rated.HELICAL | rated.HELICAL_OIL | {"friction_coefficient": rated.HELICAL_FRICTION},
+        rated.HELICAL_WITH_FRICTION,
+    ),
     ("example 1", rated.example_1, rated.EXAMPLE_1, rated.EXAMPLE_PRINTED),
 )
 

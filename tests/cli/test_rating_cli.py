@@ -24,7 +24,14 @@ def test_the_shipped_pair(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     rows = list(csv.DictReader((tmp_path / "rating.csv").open()))
     by_name = {row["name"]: row for row in rows}
     assert float(by_name["S_F"]["gear_2"]) == made["safety"]["S_F"]["wheel"] == made["root"]["S_F"]["value"]["wheel"]
-    assert all(row["formula"].startswith(("ISO 6336", "ISO/TR 15144")) for row in rows)
+    assert all(
+        row["formula"].startswith(("ISO 6336", "ISO/TR 15144", "ISO/TS 6336", "ASTM D341", "P mu_m H_V"))
+        for row in rows
+    )
+    assert f"{made['safety']['S_B']:.6g}" in printed
+    path = made["scuffing_path"]
+    assert max(path["theta_B_C"]) == pytest.approx(made["scuffing"]["theta_B_C"]["value"], rel=1e-3)
+    assert len(path["Gamma"]) == len(path["X_Gamma"])
     assert made["measures"]["pinion"]["tolerances_um"]["f_pT"] == 7.0
     assert len(made["measures"]["backlash"]["circumferential_mm"]) == 2
 

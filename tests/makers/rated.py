@@ -47,6 +47,14 @@ HELICAL: dict[str, Any] = STAGES | {
     "web_thickness_mm": 90.0,
     "rim_thickness_mm": 70.0,
 }
+#: What the report of the helical stage has for scuffing: R_a, oil at 80 C, load stage 14.
+HELICAL_OIL: dict[str, Any] = {
+    "flank_ra_um": 0.6,
+    "oil_temperature_C": 80.0,
+    "viscosity_100_mm2_per_s": 19.0,
+    "oil_density_kg_per_m3": 890.0,
+    "scuffing_load_stage": 14,
+}
 #: Example 1: K_Hbeta is quoted, R_a 1 um is R_z 6 um.
 EXAMPLE_1: dict[str, Any] = {
     "edition": 2006,
@@ -249,4 +257,41 @@ HELICAL_LOOSE: dict[str, str] = {
     "sigma_F0_MPa": "117.92 127.69",
     "sigma_F_MPa": "195.64 211.85",
     "K_Fbeta": "1.136",
+}
+
+#: Scuffing of the helical stage as printed: factors of both methods, the scuffing temperature, and all of the integral.
+HELICAL_SCUFFING: dict[str, str] = {
+    "K_Bgamma": "1.274",
+    "eta_oil_mPa_s": "30.09",
+    "C_eff_um": "44.74",
+    "Gamma_A": "-0.379",
+    "Gamma_E": "0.529",
+    "X_alphabeta": "1.016",
+    "X_L": "0.843",
+    "theta_S_C": "451.98",
+    "X_BE": "0.230",
+    "X_eps": "0.263",
+    "X_Q": "1.000",
+    "X_Ca": "1.095",
+    "mu_mC": "0.030",
+    "theta_flaint_K": "16.25",
+    "theta_int_C": "115.75",
+    "theta_Sint_C": "455.17",
+    "S_intS": "3.932",
+}
+#: Values that differ by more than their digits: w_Bt has K_v of four digits, X_M has B_M 13.780, and rounding.
+HELICAL_SCUFFING_LOOSE: dict[str, str] = {
+    "w_Bt_N_per_mm": "1119.632",
+    "X_M": "50.058",
+    "theta_MC_C": "91.37",
+    "mu_m": "0.041",
+}
+#: Coefficient of friction that the printed flash temperatures have in common, and they with it.
+HELICAL_FRICTION = 0.040915
+HELICAL_WITH_FRICTION: dict[str, str] = {
+    "mu_m": "0.041",
+    "theta_flm_K": "30.20",
+    "theta_M_C": "94.19",
+    "theta_B_C": "169.50",
+    "S_B": "4.156",
 }

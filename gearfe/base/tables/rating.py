@@ -22,6 +22,9 @@ GRADES = ("ML", "MQ", "ME")
 CORES = ("25", "25_jominy", "30")
 #: Arrangements of ISO 6336-1, Figure 13.
 ARRANGEMENTS = ("a", "b", "c", "d", "e")
+#: Lubricants of ISO/TS 6336-20, and ways of lubrication.
+OILS = (*("mineral", "polyalphaolefin", "polyglycol", "water_soluble_polyglycol", "phosphate_ester", "traction_fluid"),)
+LUBRICATION = ("dip", "spray", "spray_and_dip", "submerged")
 #: Helix modifications of ISO 6336-1, Table 8.
 HELIX_MODIFICATIONS = ("none", "crowning", "crowning_of_load", "correction", "correction_and_crowning", "end_relief")
 
@@ -69,6 +72,18 @@ class GearRatingTable:
         None,
         low=0.0,
         doc="tip relief C_a (um); left out: that of tooth form and microgeometry, without any that of running-in",
+    )
+    flank_ra_um: float | None = quantity(
+        None, above=0.0, doc="R_a of the flanks (um), for scuffing; left out: a sixth of flank_roughness_um"
+    )
+    structure_factor: float | None = quantity(
+        None,
+        above=0.0,
+        high=2.0,
+        doc="structure factor X_W of scuffing: 1 (default) case-hardened, 1.5 nitrided, 0.45 stainless",
+    )
+    thermal_contact: float | None = quantity(
+        None, above=0.0, doc="thermal contact coefficient B_M (N/(mm m^0.5 s^0.5 K)), by default 13.78 (steel)"
     )
     web_thickness_mm: float | None = quantity(None, above=0.0, doc="web b_s (mm), for C_R; left out: a solid disc")
     rim_thickness_mm: float | None = quantity(
@@ -119,6 +134,25 @@ class MeshRatingTable:
     viscosity_40_mm2_per_s: float | None = quantity(
         None, above=0.0, doc="kinematic viscosity of the oil at 40 C (mm2/s), by default 220"
     )
+    oil_temperature_C: float | None = quantity(
+        None, low=-40.0, high=200.0, doc="oil temperature (C); with it scuffing is rated, too"
+    )
+    viscosity_100_mm2_per_s: float | None = quantity(
+        None, above=1.0, doc="kinematic viscosity of the oil at 100 C (mm2/s); needed with oil_temperature_C"
+    )
+    oil_density_kg_per_m3: float | None = quantity(
+        None, low=500.0, high=2000.0, doc="density of the oil at 15 C (kg/m3), by default 890"
+    )
+    oil: str | None = quantity(None, choices=OILS, doc="kind of lubricant, by default mineral")
+    lubrication: str | None = quantity(
+        None, choices=LUBRICATION, doc="way of lubrication, by default dip; spray has X_S = 1.2, submerged 0.2"
+    )
+    scuffing_load_stage: int | None = quantity(
+        None, low=1, high=14, doc="load stage of the oil in the FZG test A/8.3/90 (ISO 14635-1), by default 12"
+    )
+    friction_coefficient: float | None = quantity(
+        None, above=0.0, high=1.0, doc="mean coefficient of friction; left out: from load, speed, oil and roughness"
+    )
     misalignment_um: float | None = quantity(
         None, low=0.0, doc="mesh misalignment of manufacture f_ma (um); left out: from both helix slope deviations"
     )
@@ -148,6 +182,9 @@ class MeshRatingTable:
     )
     least_flank_safety: float | None = quantity(None, above=0.0, doc="required safety S_Hmin, by default 1")
     least_root_safety: float | None = quantity(None, above=0.0, doc="required safety S_Fmin, by default 1.4")
+    least_scuffing_safety: float | None = quantity(
+        None, above=0.0, doc="required safety against scuffing, of both temperatures, by default 2"
+    )
     distance_allowances_um: tuple[float, float] | None = quantity(
         None, doc="upper and lower allowance of the centre distance (um), for the backlash"
     )

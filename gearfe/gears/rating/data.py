@@ -29,6 +29,9 @@ TOLERANCES = {2006: 1995, 2019: 2013}
 MATERIAL, GRADE, CORE = "Eh", "MQ", "25"
 FLANK_ROUGHNESS, ROOT_ROUGHNESS, QUALITY = 4.8, 20.0, 6
 VISCOSITY, LIFE, FLANK_SAFETY, ROOT_SAFETY, LONG_LIFE = 220.0, 20_000.0, 1.0, 1.4, 0.85
+#: Ratio R_z/R_a, ISO 6336-2; thermal contact coefficient of steel (N/(mm m^1/2 s^1/2 K)), ISO/TS 6336-20.
+RZ_OVER_RA, THERMAL_CONTACT = 6.0, 13.78
+OIL_DENSITY, LOAD_STAGE, SCUFFING_SAFETY = 890.0, 12, 2.0
 #: Factor f_ZCa of helical gears without modifications, ISO 6336-2:2019.
 NO_RELIEF = 1.2
 #: HBW of a hardness in HV (ISO 18265: HB = 0.95 HV).
@@ -63,6 +66,10 @@ class Strength:
         Mates that share its torque at the same time.
     alternating
         Y_M.
+    flank_ra
+        R_a of the flanks (um).
+    structure, thermal_contact
+        X_W, and B_M (N/(mm m^1/2 s^1/2 K)).
     """
 
     material: str
@@ -81,6 +88,9 @@ class Strength:
     rim: float | None = None
     mates: int = 1
     alternating: float = 1.0
+    flank_ra: float = FLANK_ROUGHNESS / RZ_OVER_RA
+    structure: float = 1.0
+    thermal_contact: float = THERMAL_CONTACT
 
     @property
     def hardened(self) -> bool:
@@ -160,6 +170,79 @@ def strength_of(table: GearRatingTable, gear: Gear, edition: int, where: str, re
         rim=table.rim_thickness_mm,
         mates=table.mates or 1,
         alternating=table.alternating_factor or 1.0,
+        flank_ra=table.flank_ra_um or (table.flank_roughness_um or FLANK_ROUGHNESS) / RZ_OVER_RA,
+        structure=table.structure_factor or 1.0,
+        thermal_contact=table.thermal_contact or THERMAL_CONTACT,
+    )
+
+
+@dataclass(frozen=True)
+class Oil:
+    """Lubricant of a mesh at work.
+
+    Attributes
+    ----------
+    temperature
+        Of the oil (deg C).
+    viscosity_100
+        Kinematic viscosity at 100 C (mm^2/s).
+    density
+        At 15 C (kg/m^3).
+    kind, lubrication
+        Keys of `gears.rating.scuffing.LUBRICANTS` and of `LUBRICATION`.
+    stage
+        Load stage of the FZG test A/8.3/90.
+    friction
+        Mean coefficient of friction, None: by the formulas.
+    """
+
+    temperature: float
+    viscosity_100: float
+    density: float = OIL_DENSITY
+    kind: str = "mineral"
+    lubrication: str = "dip"
+    stage: int = LOAD_STAGE
+    friction: float | None = None
+
+
+#: Keys that say something about the oil at work only.
+OIL_KEYS = (
+    *("viscosity_100_mm2_per_s", "oil_density_kg_per_m3", "oil", "lubrication", "scuffing_load_stage"),
+    *("friction_coefficient", "least_scuffing_safety"),
+)
+
+
+def oil_of(table: MeshRatingTable, where: str) -> Oil | None:
+    """Return the oil that a table describes, None without oil_temperature_C.
+
+    Raises
+    ------
+    InputError
+        For keys of scuffing without oil_temperature_C, a missing viscosity at 100 C, and one that exceeds that at 40 C.
+    """
+    if table.oil_temperature_C is None:
+        for key in OIL_KEYS:
+            if getattr(table, key) is not None:
+                problem = "has no effect without oil_temperature_C"
+                raise InputError(
+                    f"{where}.{key}", getattr(table, key), problem, "add oil_temperature_C, or leave it out"
+                )
+        return None
+    warm, cold = table.viscosity_100_mm2_per_s, table.viscosity_40_mm2_per_s or VISCOSITY
+    if warm is None:
+        cure = "add the viscosity at 100 C (mm2/s) of the oil's data sheet, or leave out oil_temperature_C"
+        raise InputError(f"{where}.viscosity_100_mm2_per_s", None, "is required with oil_temperature_C", cure)
+    if warm >= cold:
+        problem = f"must be < {cold:g} mm2/s, the viscosity at 40 C"
+        raise InputError(f"{where}.viscosity_100_mm2_per_s", warm, problem, "see the oil's data sheet")
+    return Oil(
+        temperature=table.oil_temperature_C,
+        viscosity_100=warm,
+        density=table.oil_density_kg_per_m3 or OIL_DENSITY,
+        kind=table.oil or "mineral",
+        lubrication=table.lubrication or "dip",
+        stage=table.scuffing_load_stage or LOAD_STAGE,
+        friction=table.friction_coefficient,
     )
 
 
@@ -189,6 +272,8 @@ class Load:
     long_life: float = LONG_LIFE
     flank_safety: float = FLANK_SAFETY
     root_safety: float = ROOT_SAFETY
+    scuffing_safety: float = SCUFFING_SAFETY
+    oil: Oil | None = None
     spectrum: Sequence[SpectrumBinTable] = ()
 
 
@@ -260,6 +345,8 @@ def load_of(table: MeshRatingTable, where: str, torque: float | None = None) -> 
         long_life=table.long_life_factor or LONG_LIFE,
         flank_safety=table.least_flank_safety or FLANK_SAFETY,
         root_safety=table.least_root_safety or ROOT_SAFETY,
+        scuffing_safety=table.least_scuffing_safety or SCUFFING_SAFETY,
+        oil=oil_of(table, where),
         spectrum=spectrum,
     )
 

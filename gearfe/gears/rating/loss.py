@@ -5,6 +5,8 @@ With the load shared evenly where two pairs touch, sliding takes the share :math
 .. math::
     \varepsilon_{1,2} = \frac{z_{1,2}}{2\pi}\,(\tan\alpha_{a1,2} - \tan\alpha_{wt}), \quad
     H_V = \frac{\pi\,(u + 1)}{z_1 u\cos\beta_b}\,(1 - \varepsilon_\alpha + \varepsilon_1^2 + \varepsilon_2^2).
+
+The power lost, :math:`P_V = P\mu_m H_V`, has the mean coefficient of friction of ISO/TS 6336-21.
 """
 
 from __future__ import annotations
@@ -24,14 +26,18 @@ class Loss:
 
     eps: tuple[float, float] = cited("addendum contact ratios", f"{_SOURCE}, loss factor")
     H_V: float = cited("loss factor: sliding takes mu_m H_V of the power", f"{_SOURCE}, loss factor")
+    P_V_W: float | None = cited("power that sliding takes", "P mu_m H_V, mu_m of ISO/TS 6336-21", "W")
 
 
-def loss(pair: PairData) -> Loss:
-    """Return the loss factor of a pair with a transverse contact ratio below 2."""
+def loss(pair: PairData, heat: float | None = None) -> Loss:
+    """Return the loss factor of a pair with a transverse contact ratio below 2.
+
+    `heat`: power of the mesh times the mean coefficient of friction (W), None: not known.
+    """
     one, two = (
         z / (2.0 * math.pi) * (math.sqrt((d_a / d_b) ** 2 - 1.0) - math.tan(pair.alpha_wt))
         for z, d_a, d_b in zip(pair.z, pair.d_a, pair.d_b, strict=True)
     )
     shared = 1.0 - pair.eps_alpha + one**2 + two**2
     H_V = math.pi * (pair.u + 1.0) / (pair.z[0] * pair.u * math.cos(pair.beta_b)) * shared
-    return Loss(eps=(one, two), H_V=H_V)
+    return Loss(eps=(one, two), H_V=H_V, P_V_W=None if heat is None else heat * H_V)

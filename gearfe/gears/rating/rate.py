@@ -20,6 +20,7 @@ from .ledger import Entry, entries
 from .load_factors import Influence, influence, speed_range
 from .loss import Loss, loss
 from .root import NOTCHES, Root, root
+from .scuffing import Scuffing, scuffing
 from .service import Service, service
 from .stiffness import ordered, single_stiffness
 
@@ -45,6 +46,8 @@ class Rating(ShownTable):
         What was rated.
     general, flank, root, service, loss
         Factors of general influence; flanks; roots; life under the spectrum; loss factor.
+    scuffing
+        Temperatures of contact, None: without oil_temperature_C.
     """
 
     edition: int
@@ -58,6 +61,7 @@ class Rating(ShownTable):
     root: Root
     service: Service
     loss: Loss
+    scuffing: Scuffing | None
 
     @property
     def S_H(self) -> tuple[float, float]:
@@ -78,6 +82,8 @@ class Rating(ShownTable):
             "life": self.service,
         }
         groups["loss"] = self.loss
+        if self.scuffing is not None:
+            groups["scuffing"] = self.scuffing
         return [entry for group, results in groups.items() for entry in entries(group, results)]
 
     def facts(self) -> Mapping[str, str]:
@@ -133,6 +139,12 @@ class Rating(ShownTable):
             for name, value in zip(self.names, values, strict=True):
                 if value < required:
                     made.append(f"{symbol} = {value:.4g} of {name} is below the required {required:g}")
+        if self.scuffing is not None:
+            least_scuffing = self.load.scuffing_safety
+            for symbol in ("S_B", "S_intS"):
+                value = getattr(self.scuffing, symbol)
+                if value < least_scuffing:
+                    made.append(f"{symbol} = {value:.4g} against scuffing is below the required {least_scuffing:g}")
         return tuple(made)
 
 
@@ -291,10 +303,24 @@ def _rated(
         sum(hours for _, _, hours in parts),
         {"flank": load.flank_safety, "root": load.root_safety},
     )
+    heated, driver, losses = None, order.index(0), loss(data)
+    if load.oil is not None:
+        heated = scuffing(
+            data,
+            two,
+            load.oil,
+            general,
+            driver=driver,
+            viscosity_40=load.viscosity_40,
+            modulus=(1e-6 * modulus[0], 1e-6 * modulus[1]),
+            poisson=(elastic[0].poisson_ratio, elastic[1].poisson_ratio),
+            eps=losses.eps,
+        )
+        losses = loss(data, general.F_t_N * general.v_m_per_s * heated.mu_mC)
     return Rating(
         edition=table.edition,
         names=names,
-        driver=order.index(0),
+        driver=driver,
         pair=data,
         strengths=two,
         load=load,
@@ -302,5 +328,6 @@ def _rated(
         flank=of_flank,
         root=of_root,
         service=of_service,
-        loss=loss(data),
+        loss=losses,
+        scuffing=heated,
     )

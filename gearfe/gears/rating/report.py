@@ -20,6 +20,8 @@ from .data import QUALITY, TOLERANCES
 from .ledger import Entry
 from .rate import Rating
 
+#: Points of the path of contact in rating.json.
+PATH_POINTS = 200
 #: Roles of the gears of a pair.
 SIDES = ("pinion", "wheel")
 
@@ -56,14 +58,32 @@ def rating_summary(rating: Rating, pair: GearPair, table: RatingTable, mesh: str
         "safety": {
             symbol: dict(zip(rating.names, values, strict=True))
             for symbol, values in (("S_H", rating.S_H), ("S_F", rating.S_F))
-        },
+        }
+        | scuffing_safeties(rating),
         **groups,
+        **_temperatures(rating),
         "strength": {name: asdict(s) for name, s in zip(rating.names, rating.strengths, strict=True)},
         "load": asdict(rating.load),
         "geometry": derived_geometry(pair),
         "measures": measures(pair, names, gear_keys, mesh_keys, rating.edition),
         "warnings": [*pair.warnings, *rating.warnings],
     }
+
+
+def scuffing_safeties(rating: Rating) -> dict[str, float]:
+    """Safety factors against scuffing by their symbols, none without oil_temperature_C."""
+    found = rating.scuffing
+    return {} if found is None else {"S_B": found.S_B, "S_intS": found.S_intS}
+
+
+def _temperatures(rating: Rating) -> dict[str, Any]:
+    """Places, load shares and temperatures along the path of contact."""
+    if rating.scuffing is None:
+        return {}
+    path = rating.scuffing.path
+    step = max(1, len(path.gamma) // PATH_POINTS)
+    columns = {"Gamma": path.gamma, "X_Gamma": path.share, "theta_fl_K": path.flash, "theta_B_C": path.contact}
+    return {"scuffing_path": {name: values[::step].tolist() for name, values in columns.items()}}
 
 
 def _by_name(entry: Entry, names: tuple[str, str]) -> Any:
@@ -158,7 +178,11 @@ PRINTED = {
         *("sigma_F0_MPa", "sigma_F_MPa", "sigma_FP_MPa", "S_F"),
     ),
     "life": ("U_H", "U_F", "life_flank_h", "life_root_h", "S_H_spectrum", "S_F_spectrum"),
-    "loss": ("H_V",),
+    "loss": ("H_V", "P_V_W"),
+    "scuffing": (
+        *("mu_m", "theta_flm_K", "theta_M_C", "theta_B_C", "theta_S_C", "S_B"),
+        *("mu_mC", "theta_flaint_K", "theta_int_C", "theta_Sint_C", "S_intS"),
+    ),
 }
 
 
@@ -181,4 +205,5 @@ def safety_bars(rating: Rating) -> list[tuple[str, float, float]]:
         ("S_F", rating.S_F, rating.load.root_safety),
     ):
         made += [(f"{symbol} {name}", value, least) for name, value in zip(rating.names, values, strict=True)]
+    made += [(symbol, value, rating.load.scuffing_safety) for symbol, value in scuffing_safeties(rating).items()]
     return [bar for bar in made if math.isfinite(bar[1])]
