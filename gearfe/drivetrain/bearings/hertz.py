@@ -23,9 +23,6 @@ from __future__ import annotations
 
 import math
 
-from scipy.optimize import brentq
-from scipy.special import ellipe, ellipk, elliprd
-
 #: Exponents of the force over the approach, of points and of lines.
 POINT, LINE = 1.5, 10.0 / 9.0
 #: c of a line contact (N/m2 with lengths in m): 35948 N/mm2, ISO/TS 16281:2008.
@@ -38,11 +35,15 @@ def axis_ratio(difference: float) -> float:
     """Return the axis ratio a/b >= 1 of the contact ellipse of bodies with a curvature difference in [0, 1)."""
     if difference <= 0.0:
         return 1.0
+    from scipy.optimize import brentq  # 0.25 s, which trains without ball bearings save
+
     return math.exp(brentq(lambda x: _difference(math.exp(x)) - difference, 0.0, _LONGEST, xtol=1e-14, rtol=1e-14))
 
 
 def _difference(ratio: float) -> float:
     """Curvature difference of bodies whose contact ellipse has this axis ratio."""
+    from scipy.special import ellipe, elliprd
+
     complement = ratio**-2.0
     return float(1.0 - 2.0 * elliprd(0.0, complement, 1.0) / 3.0 / (ratio**2 * ellipe(1.0 - complement)))
 
@@ -59,6 +60,8 @@ def point_constant(curvature_sum: float, difference: float, modulus: float) -> f
     modulus
         E' (Pa) of both bodies.
     """
+    from scipy.special import ellipe, ellipk
+
     ratio = axis_ratio(difference)
     m = 1.0 - ratio**-2.0
     first, second = float(ellipk(m)), float(ellipe(m))
