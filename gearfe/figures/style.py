@@ -61,7 +61,7 @@ def literal(figure: Any) -> None:
 
 
 def save(figure: Any, path: str | Path, *, dpi: int = DPI) -> None:
-    """Write a figure whole, as its suffix says; axes are laid out and drawn once, where `savefig` draws twice."""
+    """Write a figure whole, as its suffix says; axes are laid out and drawn once; `savefig` draws twice."""
     literal(figure)
     figure.set_dpi(dpi)
     layout = figure.get_layout_engine()
@@ -69,7 +69,10 @@ def save(figure: Any, path: str | Path, *, dpi: int = DPI) -> None:
         layout.execute(figure)
         figure.set_layout_engine("none")
     with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=dpi, pil_kwargs={"compress_level": 4} if temporary.suffix == ".png" else None)
+        if temporary.suffix == ".png":
+            figure.canvas.print_png(temporary, pil_kwargs={"compress_level": 4})
+        else:
+            figure.savefig(temporary, dpi=dpi)
 
 
 def write_film(path: str | Path, pictures: Sequence[NDArray[np.uint8]], palette: Any, *, ms: int, dither: bool) -> None:
