@@ -48,6 +48,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "gear train over its speed: steady states on all branches, waterfall, orders, critical speeds",
         "gearfe runup gearbox.toml --speeds 100",
     ),
+    "compare": (
+        "results of two or three runs over each other: curves, spectra, differences with their errors",
+        "gearfe compare out/pair/stiffness out/other/stiffness",
+    ),
     "study": (
         "one job in many cases: parameters, designs, statistics, sensitivities; goes on where it was interrupted",
         "gearfe study study.toml --jobs 2",

@@ -272,7 +272,11 @@ def _spectrum_lines(response: TrainResponse, train: GearTrain, written: Written,
     if made.power is not None:
         part = summary.get("headline_errors", {}).get("radiated_power_mean_W")
         decibels = None if part is None else 10.0 * math.log10(1.0 + float(part) / max(made.power.mean, 1e-300))
-        lines.append(f"radiated power: mean {made.power.mean_level:.1f}{with_error(decibels)} dB re 1e-12 W")
+        weighted = summary["radiated_power"]["a_weighted_level_dBA"]
+        lines.append(
+            f"radiated power: mean {made.power.mean_level:.1f}{with_error(decibels)} dB re 1e-12 W, "
+            f"A-weighted up to {made.spectrum.frequency[-1]:.6g} Hz {weighted:.1f} dB(A)"
+        )
     return lines
 
 

@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base.errors import given
+from ..base.octaves import ThirdOctaves, decibels
 from ..base.spectrum import nearest_line, peaks
 from ..base.typing import Array
 from ..drivetrain.gearbox.radiation import RadiatedPower
@@ -123,11 +125,17 @@ def draw_power(
     found = peaks(power.frequency, _inside(power.frequency, power.power, band), 3)
     lowest, highest = _ends(response, made, [1e-3 * p.frequency for p in found], band)
     frequency, loud = largest_lines(1e-3 * power.frequency, power.level, highest)
-    figure = fixed(10.5, 4.6)
+    octaves = given(made.octaves, "octaves")
+    figure = fixed(14.0, 4.8)
     axes = _frequency_axes(
-        figure, f"Equivalent radiated power of the housing\n{title}", response, made, (lowest, highest)
+        figure, f"Equivalent radiated power of the housing\n{title}", response, made, (lowest, highest), width=0.52
     )
-    _note(figure, f"mean power {power.mean_level:.1f} dB, resolution {made.spectrum.resolution:.1f} Hz")
+    weighted = float(decibels(octaves.weighted.sum()))
+    _note(
+        figure,
+        f"mean power {power.mean_level:.1f} dB, A-weighted {weighted:.1f} dB(A); "
+        f"resolution {made.spectrum.resolution:.1f} Hz",
+    )
     shown = (frequency <= highest) & (frequency > lowest) & np.isfinite(loud)
     top = float(loud[shown].max(initial=-300.0)) if shown.any() else 0.0
     bottom = max(top - 60.0, float(loud[shown].min(initial=300.0)) - 3.0) if shown.any() else -10.0
@@ -135,17 +143,42 @@ def draw_power(
     axes.bar(frequency[shown], loud[shown] - bottom, width=width, bottom=bottom, color=BLUE, linewidth=0)
     axes.set_ylim(bottom, top + 0.18 * (top - bottom) + 1.0)
     axes.set_ylabel("radiated power level  (dB re 1 pW)")
+    _draw_octaves(figure.add_axes((0.655, 0.175, 0.335, 0.615)), octaves)
     save(figure, path)
 
 
+def _draw_octaves(axes: Any, octaves: ThirdOctaves) -> None:
+    """Levels in third octaves, plain and A-weighted; bands without a line are empty."""
+    panel(axes, "level  (dB re 1 pW)", "", "")
+    plain, weighted = decibels(octaves.power), decibels(octaves.weighted)
+    top = float(np.nanmax(np.append(plain, -300.0)))
+    bottom, places = top - 60.0, np.arange(len(plain))
+    for values, colour, aside, name in ((plain, BLUE, -0.2, "plain"), (weighted, ORANGE, 0.2, "A-weighted")):
+        heights = np.maximum(values - bottom, 0.0)
+        axes.bar(places + aside, heights, width=0.4, bottom=bottom, color=colour, linewidth=0, label=name)
+    axes.set_ylim(bottom, top + 9.0)
+    axes.set_xlim(-0.7, max(len(plain), 1) - 0.3)
+    axes.set_xticks(places, octaves.names, rotation=60, fontsize=8)
+    axes.set_xlabel("third octave  (Hz)")
+    axes.set_title("third octaves (IEC 61260-1), A-weighting by IEC 61672-1", fontsize=9, loc="left")
+    axes.legend(fontsize=8.5, frameon=False, ncols=2, loc="upper left")
+
+
 def _frequency_axes(
-    figure: Any, title: str, response: TrainResponse, made: TrainSpectra, ends: tuple[float, float]
+    figure: Any,
+    title: str,
+    response: TrainResponse,
+    made: TrainSpectra,
+    ends: tuple[float, float],
+    *,
+    width: float = 0.925,
 ) -> Any:
     """Axes between two frequencies (kHz) with the meshes' lines and multiples, and orders of the first shaft on top.
 
-    The numbers of each mesh's multiples stand in a row of their own.
+    The numbers of each mesh's multiples stand in a row of their own. `width` is that of the axes, in parts of the
+    figure's.
     """
-    axes = figure.add_axes((0.062, 0.175, 0.925, 0.615))
+    axes = figure.add_axes((0.062, 0.175, width, 0.615))
     panel(axes, "", "", "")
     head, _, below = title.partition("\n")
     figure.text(0.062, 0.945, head, fontsize=11)
@@ -182,7 +215,7 @@ def _frequency_axes(
     name, turns = response.shaft_names[0], 1e-3 * float(abs(response.shaft_frequencies_Hz[0]))
     if turns > 0.0 and settled(response):
         above = axes.secondary_xaxis("top", functions=(lambda f: f / turns, lambda order: order * turns))
-        above.set_xlabel(f"order of the shaft {name}", fontsize=9)
+        above.set_xlabel(f'order of shaft "{name}"', fontsize=9)
         above.tick_params(labelsize=8.5)
     return axes
 

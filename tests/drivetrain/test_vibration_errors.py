@@ -20,7 +20,9 @@ from gearfe.drivetrain.vibration.follow import follow
 from gearfe.drivetrain.vibration.report import train_summary
 from gearfe.drivetrain.vibration.spectra import TrainRecord
 from gearfe.gears.gearmesh.curve import StiffnessCurve
-from gearfe.multibody import constant
+from gearfe.multibody import TimeFunction, constant
+from gearfe.output.differences import NUMBERS, difference_error
+from gearfe.output.results import KINDS, Results
 from tests.makers.job_texts import SMALL_TRAIN
 from tests.makers.trains import SHIPPED, base_radius, curve, elastic, train
 
@@ -85,6 +87,40 @@ def test_truth_within_the_softening_is_covered(part: float) -> None:
     assert np.array_equal(np.isfinite(told), lines(summary, "frequency_Hz") <= gear_train.housing.highest_hz)
     # the whole softening is 1 / part of the true one
     assert np.median(np.concatenate([*ratios, told[known] / true[known]])) < 4.0 / part
+
+
+def test_the_error_of_a_difference_in_one_housing() -> None:
+    """Two loads in a housing of one error: the difference is off by what its error says, and less than by the sum."""
+    train_a = softened(elastic(train(SHIPPED, stiffness=curve), uneven=0.2, skew=0.3), 0.0)
+
+    def larger(torque: TimeFunction) -> TimeFunction:
+        pieces = tuple(tuple(1.2 * number for number in piece) for piece in torque.coefficients)
+        return dataclasses.replace(torque, coefficients=pieces)
+
+    loads = tuple(dataclasses.replace(load, torque=larger(load.torque)) for load in train_a.loads)
+    runs = [estimated(one) for one in (train_a, dataclasses.replace(train_a, loads=loads))]
+    summaries = [{**summary, "housing": {"mass_kg": 1.0, "unknowns": 1}} for _, summary, _ in runs]
+    results = [Results(KINDS[3], name, Path(), summary) for name, summary in zip("ab", summaries, strict=True)]
+    numbers = [{number.name: number for number in NUMBERS["vibration"](run)} for run in results]
+    part = 0.6
+    truth = [
+        Results(KINDS[3], "", Path(), again(softened(dataclasses.replace(train_a, loads=own), part)).summary)
+        for (_, _, again), own in zip(runs, (train_a.loads, loads), strict=True)
+    ]
+    true = [{number.name: number.value for number in NUMBERS["vibration"](run)} for run in truth]
+    covered, smaller = [], []
+    for name in numbers[0].keys() & numbers[1].keys() & true[0].keys() & true[1].keys():
+        one, two = numbers[0][name], numbers[1][name]
+        error, off = difference_error(one, two, {"mesh", "reduction"}), 0.0
+        if not np.isfinite(error) or one.error < 1e-9 * abs(one.value):
+            continue
+        off = abs((two.value - one.value) - (true[1][name] - true[0][name]))
+        covered.append(off <= error + 1e-9 * abs(one.value))
+        smaller.append(error / (one.error + two.error))
+    assert len(covered) > 20
+    assert np.mean(covered) >= 0.95
+    assert np.median(smaller) < 0.2  # the response of springs is nearly in proportion to the load
+    assert max(smaller) <= 1.0 + 1e-12
 
 
 def alternating(gear_train: GearTrain) -> Run:

@@ -29,6 +29,7 @@ RUN = (
     "bearings.md",
     "campbell.md",
     "check.md",
+    "compare.md",
     "exchange.md",
     "face_width.md",
     "fields.md",

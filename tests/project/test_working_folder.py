@@ -44,6 +44,7 @@ LINES = {
     "modes": [["box.toml", *BOX, "--fields", "1", "--speed-stop-rad-per-s", "300"]],
     "runup": [["box.toml", *BOX, "--set", "runup={speed_start_rad_per_s=200,speed_stop_rad_per_s=210,speeds=2}"]],
     "study": [["study.toml", "--jobs", "2"], ["search.toml", "--jobs", "2"]],
+    "compare": [["one.csv", "two.csv"]],
     "new": [["vibration", "new.toml"]],
     "cache": [[]],
     "completion": [["bash"]],
@@ -87,6 +88,8 @@ def jobs(folder: Path) -> None:
         shutil.copy(path, folder)
     written(folder)
     (folder / "search.toml").write_text(SEARCH)
+    for name in ("one", "two"):
+        (folder / f"{name}.csv").write_text("pinion_angle_deg,k_mesh_N_per_m\n0,1e8\n9,2e8\n")
 
 
 def program(tmp_path: Path) -> list[str]:

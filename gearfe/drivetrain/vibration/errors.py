@@ -15,6 +15,10 @@ The number is computed again with what may be wrong changed by its own estimate:
 
 The parts are added. Each covers its own source whatever its sign, and nothing says that the signs differ, so only the
 sum is an estimate that covers all; the mesh is by far the largest, so little is given away.
+
+**Differences of two runs.** What may be wrong in the housing's mesh and in the curves is the same in two runs of one
+housing. ``headline_error_changes`` keeps by how much each changed run moves each number, with its sign and with the
+factor of its part; `gearfe.output.differences` takes the largest difference of these changes.
 """
 
 from __future__ import annotations
@@ -73,42 +77,64 @@ def with_errors(
     -------
     dict
         The summary with ``headline_errors`` (name -> estimates like the numbers, not-a-number where unknown),
-        ``headline_error_parts`` (the same of each source), and ``error_estimate`` in each dominant line.
+        ``headline_error_parts`` (the same of each source), ``headline_error_changes`` (signed, of each changed run),
+        and ``error_estimate``, ``error_parts`` and ``error_changes`` in each dominant line.
     """
     summary = dict(run.summary)
     if summary.get("status") != "done" or FORCES[0] not in summary:
         return summary
     base = _numbers(run, run)
-    parts = _parts(run, model, again, base, band_hz)
+    parts, changes = _parts(run, model, again, base, band_hz)
     total = {name: np.sum([part[name] for part in parts.values()], axis=0) for name in base}
     summary["headline_errors"] = _named(total, summary)
     summary["headline_error_parts"] = {source: _named(part, summary) for source, part in parts.items()}
+    summary["headline_error_changes"] = {source: _by_run(change, summary) for source, change in changes.items()}
     if run.spectra is not None:
-        lines = iter(total["lines"].tolist())
+        numbers = iter(range(len(total["lines"])))
         summary["dominant_lines"] = {
-            name: [{**line, "error_estimate": next(lines)} for line in found]
+            name: [{**line, **_line_error(next(numbers), total, parts, changes)} for line in found]
             for name, found in summary["dominant_lines"].items()
         }
     return summary
 
 
+def _by_run(change: Mapping[str, Array], summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Changes of the numbers by each changed run, as the summary names them."""
+    runs = range(len(change[FORCES[0]]))
+    return [_named({name: rows[number] for name, rows in change.items()}, summary) for number in runs]
+
+
+def _line_error(
+    number: int,
+    total: Mapping[str, Array],
+    parts: Mapping[str, Mapping[str, Array]],
+    changes: Mapping[str, Mapping[str, Array]],
+) -> dict[str, Any]:
+    """What a dominant line, by its number among all, says of its error."""
+    return {
+        "error_estimate": float(total["lines"][number]),
+        "error_parts": {source: float(part["lines"][number]) for source, part in parts.items()},
+        "error_changes": {source: change["lines"][:, number].tolist() for source, change in changes.items()},
+    }
+
+
 def _parts(
     run: Run, model: TrainModel, again: Callable[[TrainModel], Run], base: dict[str, Array], band_hz: float
-) -> dict[str, dict[str, Array]]:
-    """Source -> number -> its share of the error."""
+) -> tuple[dict[str, dict[str, Array]], dict[str, dict[str, Array]]]:
+    """Source -> number -> its share of the error; and the signed changes by each changed run, shape (runs, ...)."""
     estimates = run.summary["error_estimates"]
     body = model.train.housing
-    parts = {}
+    parts, changes = {}, {}
     if body is not None:
         softer = [_numbers(again(on_body(model, half)), run) for half in _halves(body)]
-        parts["mesh"] = {
-            name: 2.0 * np.max([abs(abs(x[name]) - abs(base[name])) for x in softer], axis=0) for name in base
-        }
+        changes["mesh"] = {name: 2.0 * np.array([abs(x[name]) - abs(base[name]) for x in softer]) for name in base}
         softest = on_body(model, body.softened()).coupled_frequencies_hz  # these fall all the way
-        parts["mesh"]["coupled_frequencies_Hz"] = base["coupled_frequencies_Hz"] - softest
-        _forget(parts["mesh"], run, body.highest_hz)
+        fall = softest - base["coupled_frequencies_Hz"]
+        changes["mesh"]["coupled_frequencies_Hz"] = np.broadcast_to(fall, (len(softer), *fall.shape)).copy()
+        _forget(changes["mesh"], run, body.highest_hz)
         if not body.softening.any():  # no estimate is not no error
-            parts["mesh"] = {name: np.full(values.shape, math.nan) for name, values in base.items()}
+            changes["mesh"] = {name: np.full_like(values, math.nan) for name, values in changes["mesh"].items()}
+        parts["mesh"] = {name: np.abs(values).max(axis=0) for name, values in changes["mesh"].items()}
         parts["reduction"] = _reduction(run, body, base, band_hz)
         parts["start"] = {name: np.zeros(values.shape) for name, values in base.items()}
         parts["start"][PEAKS] = np.array(list(run.summary[STARTS].values()), dtype=float)
@@ -116,10 +142,11 @@ def _parts(
     if stiffer is not None:
         changed = _numbers(again(build_train(stiffer)), run)
         parts["curve"] = {name: np.abs(changed[name] - base[name]) for name in base}
+        changes["curve"] = {name: np.array([abs(changed[name]) - abs(base[name])]) for name in base}
     parts["integration"] = {
         name: float(estimates.get("integration", math.nan)) * scale for name, scale in _largest(run, base).items()
     }
-    return parts
+    return parts, changes
 
 
 def _halves(body: ModalBody) -> Iterator[ModalBody]:

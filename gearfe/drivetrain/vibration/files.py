@@ -17,6 +17,7 @@ from ...base.spectrum import uniform_step, window_values
 from ...base.typing import Array, IntArray
 from ..gearbox import bearing_report
 from ..gearbox.fields import write_gears, write_housing
+from ..gearbox.radiation import REFERENCE_POWER
 from ..gearbox.report import attachment_to_draw
 from ..gearbox.shaft_report import misalignment_columns, shaft_entries, yielding
 from ..gearbox.stage_report import stage_entries
@@ -38,6 +39,7 @@ MAY_WRITE = (
     "response.png",
     "spectrum.png",
     "radiated_power.png",
+    "third_octaves.csv",
     "transmission_error.png",
     "load_share.png",
     "gears.vtkhdf",
@@ -201,6 +203,8 @@ def write_run(
         with watch.stage("tables"):
             if spectra is not None:
                 write_csv(target / "spectrum.csv", spectra.columns())
+                if (octaves := spectra.octaves) is not None:
+                    write_csv(target / "third_octaves.csv", octaves.columns(REFERENCE_POWER))
             if tilted := yielding(planned.model):
                 write_csv(target / "misalignment.csv", misalignment_columns(tilted))
         attachment = attachment_to_draw(made.curves.attachment_names, choice.attachment, train)

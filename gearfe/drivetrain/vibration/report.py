@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ...base.errors import given
 from ...base.spectrum import OrderLine, nearest_line, order_lines, peaks
 from ...base.typing import Array
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
+from ..gearbox.radiation import power_level
 from ..gearbox.stability import Stability
 from ..train.gear_train import GearTrain
 from ..train.mesh_element import LEAST_REFERENCE, PHASES
@@ -172,6 +174,7 @@ def train_summary(
                 "mean_W": made.power.mean,
                 "mean_level_dB": made.power.mean_level,
                 "mean_below_highest_Hz_W": made.power.power.sum() / spectrum.noise_bandwidth,
+                "a_weighted_level_dBA": float(power_level(given(made.octaves, "octaves").weighted.sum())),
                 "largest_lines": [
                     {"frequency_Hz": p.frequency, "power_W": p.amplitude, "level_dB": made.power.level[p.bin]}
                     for p in found

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.octaves import ThirdOctaves, third_octaves
 from ...base.record_spectrum import FASTEST, RecordSpectrum
 from ...base.spectrum import Spectrum, uniform_step
 from ...base.typing import Array, ComplexArray
@@ -50,6 +51,13 @@ class TrainSpectra:
     def value(self, name: str) -> ComplexArray:
         """(m,) complex amplitudes of a signal."""
         return self.spectrum.value[:, self.names.index(name)]
+
+    @property
+    def octaves(self) -> ThirdOctaves | None:
+        """Radiated power in third octaves, plain and A-weighted; None for a rigid housing."""
+        if self.power is None:
+            return None
+        return third_octaves(self.power.frequency, self.power.power / self.spectrum.noise_bandwidth)
 
     def columns(self) -> dict[str, Array]:
         """Columns of spectrum.csv."""

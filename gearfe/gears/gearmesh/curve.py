@@ -78,8 +78,8 @@ SAME = 1e-11
 #: Problem of a table without a mesh cycle.
 NO_CYCLE = "does not say what its mesh cycle is"
 
-#: Column that a table has where there are estimates, and those of the pairs' shares.
-ESTIMATE, SHARE = "k_mesh_relative_error", "load_share_"
+#: Columns that a table has where there are estimates, and those of the pairs' shares.
+ESTIMATE, CORRECTION, SHARE = "k_mesh_relative_error", "k_mesh_relative_correction", "load_share_"
 
 
 class Column(NamedTuple):
@@ -162,6 +162,9 @@ class StiffnessCurve(ShownTable):
     relative_error
         Estimated discretisation error of k_mesh (-), which covers the true one at about 19 of 20 positions, see
         `gearfe.gears.gearmesh.positions`; NaN where there is none.
+    correction
+        Signed relative change of k_mesh by Richardson's extrapolation (-), for the error of differences; NaN where
+        there is none.
     """
 
     pinion_angle: Array = _column("pinion_angle_deg")
@@ -186,6 +189,7 @@ class StiffnessCurve(ShownTable):
     edge: NDArray[np.str_] = _column("edge", "")
     beyond_validity: IntArray = _column("beyond_validity", -1)
     relative_error: Array = _column(ESTIMATE)
+    correction: Array = _column(CORRECTION)
     load_share: Array = field(default_factory=lambda: np.zeros((0, 0)))
     mesh_cycle: float = _column("mesh_cycle_deg", constant=True)
     base_radius: float = _column("wheel_base_radius_mm", constant=True)
@@ -280,8 +284,9 @@ class StiffnessCurve(ShownTable):
         """Columns of the CSV file as text."""
         own = {column: getattr(self, name) for name, column in COLUMNS.items()}
         each = {column.name: values for column, values in own.items() if not column.constant}
-        if math.isnan(self.worst_error):
-            del each[ESTIMATE]
+        for name in (ESTIMATE, CORRECTION):
+            if not np.isfinite(each[name]).any():
+                del each[name]
         shares = {f"{SHARE}{j + 1}": share for j, share in enumerate(self.load_share.T)}
         whole = {column.name: np.full(len(self), value) for column, value in own.items() if column.constant}
         return {name: as_text(values, name) for name, values in (each | shares | whole).items()}

@@ -166,8 +166,8 @@ def sweep_stiffness(
     curve, _ = grid.cells(solved)
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
-            error = curve_error(grid.solver, coarser(elastic), solved, finite=finite)
-        curve = replace(curve, relative_error=error[grid.source])
+            error, correction = curve_error(grid.solver, coarser(elastic), solved, finite=finite)
+        curve = replace(curve, relative_error=error[grid.source], correction=correction[grid.source])
     return replace(curve, timings=dict(watch.seconds))
 
 

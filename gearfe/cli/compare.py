@@ -1,0 +1,61 @@
+"""``gearfe compare A B [C]``: results of two or three runs over each other, their differences with errors."""
+
+from __future__ import annotations
+
+import argparse
+
+from .arguments import add_json, add_pictures, print_results
+
+#: Files that a comparison can leave.
+FILES = ("compare.csv", "compare.png", "compare.json")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("runs", nargs="+", metavar="RUN", help="two or three folders of results, or files in them")
+    parser.add_argument("--out", metavar="DIR", default="out/compare", help="output folder (default: out/compare)")
+    parser.add_argument(
+        "--names", nargs="+", metavar="NAME", help="short names of the runs (default: those of their folders)"
+    )
+    parser.set_defaults(format="csv")
+    add_json(parser)
+    add_pictures(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compare the runs; write compare.csv, compare.json and compare.png."""
+    from ..base.errors import InputError
+
+    if not 2 <= len(args.runs) <= 3:
+        raise InputError("command line", len(args.runs), "runs to compare", "name two or three folders of results")
+    if args.names is not None and len(args.names) != len(args.runs):
+        raise InputError("--names", args.names, f"must be {len(args.runs)} names", "give one for each run")
+    if args.names is not None and len(set(args.names)) < len(args.names):
+        raise InputError("--names", args.names, "must differ", "give each run a name of its own")
+
+    from ..base.files import output_folder, whole_set, write_csv, write_json
+    from ..base.progress import stage
+    from ..output.differences import compared, comparison_lines
+    from ..output.results import read_results, short_names
+
+    names = args.names or short_names(args.runs)
+    results = [
+        read_results(path, f"run {i}", name) for i, (path, name) in enumerate(zip(args.runs, names, strict=True), 1)
+    ]
+    made = compared(results)
+    folder = output_folder(args.out)
+    with whole_set(folder, FILES) as target:
+        table = made.columns()
+        write_csv(target / "compare.csv", table)
+        rows = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
+        runs = [{"name": one.name, "kind": one.kind.name, "file": str(one.path)} for one in results]
+        write_json(target / "compare.json", {"runs": runs, "differences": rows, "notes": list(made.notes)})
+        if not args.no_pictures and made.panels:
+            from ..figures.compare import comparison_picture
+            from ..figures.style import save
+
+            with stage("drawing"):
+                save(comparison_picture(made), target / "compare.png")
+        written = sorted(path.name for path in target.iterdir())
+    print_results(comparison_lines(made), folder, written, {}, ())
+    return 0

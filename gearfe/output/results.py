@@ -1,0 +1,168 @@
+"""Results of a command as its folder holds them: kind, summary, tables.
+
+A comparison and a report take results from their files alone, so that runs of other days and other machines serve.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..base.errors import InputError
+from ..base.files import read_text
+from ..base.typing import Array
+from .exchange.tables import read_csv
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of results.
+
+    Attributes
+    ----------
+    name
+        Command that writes them.
+    title
+        What they are, in words.
+    table
+        File that only this kind has.
+    summary
+        File with the figures.
+    needed
+        Columns of `table` by which a file of another name is recognised.
+    """
+
+    name: str
+    title: str
+    table: str
+    summary: str
+    needed: tuple[str, ...]
+
+
+#: Kinds in the order in which a folder or a file is recognised.
+KINDS = (
+    Kind("loadmap", "load map", "loadmap.csv", "loadmap.json", ("torque_Nm", "pinion_angle_deg")),
+    Kind("stiffness", "mesh stiffness", "stiffness.csv", "summary.json", ("pinion_angle_deg", "k_mesh")),
+    Kind("runup", "run-up", "runup.csv", "summary.json", ("speed_rad_per_s", "branch")),
+    Kind("vibration", "vibration", "response.csv", "summary.json", ("time_s", "contact_force_1")),
+    Kind("rating", "rating by ISO 6336", "rating.csv", "rating.json", ("group", "name", "formula")),
+    Kind("mechanism", "mechanism", "trajectory.csv", "summary.json", ("time_s",)),
+)
+_KNOWN = ", ".join(kind.name for kind in KINDS)
+
+
+@dataclass(frozen=True)
+class Results:
+    """Results of one run.
+
+    Attributes
+    ----------
+    kind
+        What they are.
+    name
+        Short name, for legends and heads of columns.
+    path
+        The main table.
+    summary
+        Figures; empty for a table that stands alone.
+    """
+
+    kind: Kind
+    name: str
+    path: Path
+    summary: Mapping[str, Any]
+
+    @cached_property
+    def main(self) -> dict[str, Array]:
+        """Columns of the main table."""
+        return read_csv(self.path)
+
+    def table(self, name: str) -> dict[str, Array]:
+        """Columns of another table of the run; empty if there is none."""
+        path = self.path.with_name(name)
+        return read_csv(path) if self.summary and path.exists() else {}
+
+
+def kind_of(folder: Path) -> Kind | None:
+    """Kind of the results that a folder holds."""
+    return next((kind for kind in KINDS if (folder / kind.table).is_file()), None)
+
+
+def read_results(path: str | Path, field: str, name: str = "") -> Results:
+    """Read the results of a folder, or of one of its files.
+
+    Parameters
+    ----------
+    path : path
+        Folder of a run, its summary, its main table, or a copy of that table.
+    field : str
+        What the path is, in messages.
+    name : str
+        Short name of the results; by default that of the path.
+
+    Raises
+    ------
+    InputError
+        If there are no results, or files are damaged.
+    """
+    place = Path(path)
+    if not place.exists():
+        raise InputError(field, str(path), "does not exist", "name a folder that a command wrote")
+    name = name or (place.resolve().name if place.is_dir() else place.stem)
+    if place.suffix == ".json" and place.is_file():
+        place = place.parent
+    if place.is_dir():
+        kind = kind_of(place)
+        if kind is None:
+            inside = sorted({found.parent.name for k in KINDS for found in place.glob(f"*/{k.table}")})
+            cure = f"name one of its folders: {', '.join(inside)}" if inside else f"name a folder of: {_KNOWN}"
+            raise InputError(field, str(path), "holds no results that can be compared", cure)
+        return Results(kind, name, place / kind.table, _summary(place / kind.summary, field))
+    return _of_table(place, field, name)
+
+
+def _of_table(path: Path, field: str, name: str) -> Results:
+    """Results of a main table, with the summary of its folder where it has the name that a command gives it."""
+    known = next((kind for kind in KINDS if kind.table == path.name), None)
+    if known is not None:
+        return Results(known, name, path, _summary(path.with_name(known.summary), field))
+    columns = read_csv(path)
+    for kind in KINDS:
+        if all(any(column.startswith(needed) for column in columns) for needed in kind.needed):
+            return Results(kind, name, path, {})
+    raise InputError(field, str(path), "is no main table of a run", f"name a folder, or a table of: {_KNOWN}")
+
+
+def _summary(path: Path, field: str) -> Mapping[str, Any]:
+    """Figures of a summary; empty if there is none.
+
+    Raises
+    ------
+    InputError
+        For a damaged file.
+    """
+    if not path.is_file():
+        return {}
+    try:
+        content = json.loads(read_text(path, field))
+    except ValueError as error:
+        raise InputError(field, str(path), f"is no summary ({error})", "run the command again") from None
+    if not isinstance(content, dict):
+        raise InputError(field, str(path), "is no summary", "run the command again")
+    return content
+
+
+def short_names(paths: list[str]) -> list[str]:
+    """Distinct short names of results: the last part of each path, with as much before it as tells them apart."""
+    parts = [Path(path).resolve().with_suffix("").parts if Path(path).is_file() else Path(path).resolve().parts
+             for path in paths]  # fmt: skip
+    for count in range(1, max(map(len, parts), default=1) + 1):
+        names = ["/".join(part[-count:]) for part in parts]
+        if len(set(names)) == len(names):
+            return [part[-1] if [p[-1] for p in parts].count(part[-1]) == 1 else name
+                    for part, name in zip(parts, names, strict=True)]  # fmt: skip
+    return [f"{part[-1]} ({number})" for number, part in enumerate(parts, start=1)]

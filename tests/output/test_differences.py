@@ -1,0 +1,180 @@
+"""Comparisons of results: errors of differences against the truth of finer meshes, files, mistakes."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gearfe import StiffnessCurve, sweep_stiffness
+from gearfe.base.errors import InputError
+from gearfe.base.files import write_csv, write_json
+from gearfe.cli.main import main
+from gearfe.output.differences import Number, Row, compared, difference_error
+from gearfe.output.results import read_results, short_names
+from tests.makers import gears
+
+
+def curve(torque: float, coarsen: float, **options: Any) -> StiffnessCurve:
+    return sweep_stiffness(gears.pair(), torque=torque, coarsen=coarsen, **options)
+
+
+def kept(folder: Path, made: StiffnessCurve) -> Path:
+    """Folder with the table of a curve."""
+    folder.mkdir()
+    made.to_csv(folder / "stiffness.csv")
+    return folder
+
+
+def rows_of(*paths: Path) -> dict[str, Row]:
+    results = [read_results(path, "run", f"{number}") for number, path in enumerate(paths)]
+    return {row.name: row for row in compared(results).rows}
+
+
+# ---- errors of differences -------------------------------------------------------------------------------------------
+
+
+def test_the_error_of_a_difference_covers_that_of_finer_meshes_and_is_no_sum(tmp_path: Path) -> None:
+    """Two torques on coarse meshes, against the same on meshes six times finer."""
+    runs = [kept(tmp_path / f"{torque}", curve(torque, 2.0, estimate_error=True)) for torque in (100, 130)]
+    fine = [kept(tmp_path / f"fine {torque}", curve(torque, 0.33)) for torque in (100, 130)]
+    rows, truth = rows_of(*runs), rows_of(*fine)
+    for name in ("mean mesh stiffness", "transmission error, mean", "transmission error, peak to peak"):
+        row = rows[name]
+        off = abs(row.differences[0] - truth[name].differences[0])
+        assert off <= row.difference_errors[0], name
+        assert abs(row.values[0] - truth[name].values[0]) <= row.errors[0], name
+        assert row.difference_errors[0] < 0.5 * sum(row.errors), name
+    assert rows["mean mesh stiffness"].difference_errors[0] < 0.2 * sum(rows["mean mesh stiffness"].errors)
+
+
+def test_the_same_run_twice_differs_by_nothing(tmp_path: Path) -> None:
+    folder = kept(tmp_path / "a", curve(100.0, 3.0, estimate_error=True))
+    for row in rows_of(folder, folder).values():
+        assert row.differences == (0.0,)
+        assert row.difference_errors[0] == 0.0 or "pressure" in row.name  # pressures have no estimate
+
+
+def test_the_parts_of_the_error() -> None:
+    """Common sources by their changes, by the larger size without them; other sources by the sum; unknown stays."""
+    one = Number("n", "N", 10.0, {"mesh": 3.0, "integration": 0.5}, {"mesh": np.array([3.0, -1.0])})
+    two = Number("n", "N", 12.0, {"mesh": 4.0, "integration": 0.25}, {"mesh": np.array([4.0, -2.5])})
+    assert difference_error(one, two, {"mesh"}) == pytest.approx(1.5 + 0.75)
+    assert difference_error(one, two, set()) == pytest.approx(7.0 + 0.75)
+    old = Number("n", "N", 12.0, {"mesh": 4.0, "integration": 0.25})  # a file without signed changes
+    assert difference_error(one, old, {"mesh"}) == pytest.approx(4.0 + 0.75)
+    assert np.isnan(difference_error(one, Number("n", "N", 12.0), {"mesh"}))
+    assert np.isnan(difference_error(one, Number("n", "N", 12.0, {"mesh": np.nan}), {"mesh"}))
+
+
+def response(folder: Path, unknowns: int, force: float, changes: list[list[float]], frequency: float = 500.0) -> Path:
+    """Folder of a vibration whose mean force is known to some error of the housing's mesh."""
+    folder.mkdir()
+    time = np.linspace(0.0, 1.0, 9)
+    write_csv(folder / "response.csv", {"time_s": time, "contact_force_1_N": force + np.sin(time)})
+    size = [max(abs(row[0]) for row in changes)]
+    summary = {
+        "status": "done", "meshes": ["in-out"], "mean_contact_forces_N": [force],
+        "housing": {"mass_kg": 4.0, "coordinates": 12, "modes": 6, "unknowns": unknowns},
+        "headline_error_parts": {"mesh": {"mean_contact_forces_N": size}},
+        "headline_error_changes": {"mesh": [{"mean_contact_forces_N": row} for row in changes]},
+        "dominant_lines": {
+            "contact_force_1_N": [
+                {"frequency_Hz": frequency, "amplitude": 0.1 * force, "near": "mesh 1 x 1", "error_estimate": 0.2,
+                 "error_parts": {"mesh": 0.2}, "error_changes": {"mesh": [0.2, -0.1]}},
+                {"frequency_Hz": frequency + 7.0, "amplitude": 0.05, "near": None, "error_estimate": 0.2},
+            ]
+        },
+    }  # fmt: skip
+    write_json(folder / "summary.json", summary)
+    return folder
+
+
+def test_a_housing_in_common_counts_once_and_another_one_twice(tmp_path: Path) -> None:
+    one = response(tmp_path / "a", 900, 100.0, [[2.0], [-1.0]])
+    two = response(tmp_path / "b", 900, 110.0, [[2.5], [-1.5]], frequency=520.0)
+    other = response(tmp_path / "c", 1100, 110.0, [[2.5], [-1.5]])
+    rows = rows_of(one, two, other)
+    row = rows["mean contact force of in-out"]
+    assert row.differences == (10.0, 10.0)
+    assert row.difference_errors == pytest.approx((0.5, 4.5))
+    line = rows["contact force of mesh 1, line mesh 1 x 1"]  # the same multiple at another speed
+    assert line.differences == pytest.approx((1.0, 1.0))
+    assert line.difference_errors == pytest.approx((0.0, 0.4))
+    notes = compared([read_results(path, "run") for path in (one, two, other)]).notes
+    assert "b and a share the errors of: housing" in notes
+    assert "c and a share no source of error: errors are added" in notes
+    assert any("527 Hz" in note for note in notes)  # a line that the others do not have
+
+
+# ---- files -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_command_writes_table_summary_and_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    paths = [
+        kept(tmp_path / name, curve(torque, 3.0, estimate_error=True))
+        for name, torque in (("x", 50), ("y", 80), ("z", 90))
+    ]
+    out = tmp_path / "out"
+    assert main(["compare", *map(str, paths), "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "mean mesh stiffness: " in said
+    assert "y: +" in said
+    assert sorted(path.name for path in out.iterdir()) == ["compare.csv", "compare.json", "compare.png"]
+    with (out / "compare.csv").open(encoding="utf-8", newline="") as stream:
+        table = list(csv.DictReader(stream))
+    mean = next(row for row in table if row["quantity"] == "mean mesh stiffness")
+    assert mean["unit"] == "N/µm"
+    assert float(mean["z - x"]) == pytest.approx(float(mean["z"]) - float(mean["x"]))
+    assert 0.0 < float(mean["error of z - x"]) < float(mean["error of x"])
+    summary = json.loads((out / "compare.json").read_text(encoding="utf-8"))
+    assert [run["kind"] for run in summary["runs"]] == ["stiffness"] * 3
+    # a copy of a table serves as well as its folder
+    copy = tmp_path / "copy of x.csv"
+    copy.write_bytes((paths[0] / "stiffness.csv").read_bytes())
+    assert main(["compare", str(paths[1]), str(copy), "--out", str(out), "--names", "new", "old", "--no-pictures"]) == 0
+    assert "old: -" in capsys.readouterr().out
+    assert not (out / "compare.png").exists()
+
+
+def test_folders_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    for name in ("one/stiffness", "two/stiffness"):
+        (tmp_path / name).mkdir(parents=True)
+    paths = [str(tmp_path / name) for name in ("one/stiffness", "two/stiffness")]
+    assert short_names(paths) == ["one/stiffness", "two/stiffness"]
+    assert short_names([paths[0], paths[0]]) == ["stiffness (1)", "stiffness (2)"]
+
+
+# ---- mistakes --------------------------------------------------------------------------------------------------------
+
+
+def test_mistakes_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one = kept(tmp_path / "a", curve(50.0, 4.0))
+    two = response(tmp_path / "b", 900, 100.0, [[2.0], [-1.0]])
+    (tmp_path / "empty").mkdir()
+    damaged = kept(tmp_path / "damaged", curve(50.0, 4.0))
+    (damaged / "summary.json").write_text('{"status": ', encoding="utf-8")
+    text = (one / "stiffness.csv").read_text(encoding="utf-8")
+    other = tmp_path / "in other units.csv"
+    other.write_text(text.replace("k_mesh_N_per_m,", "k_mesh_N_per_um,"), encoding="utf-8")
+    for paths, part in (
+        ([one, two], "compare runs of one command"),
+        ([one, other], "in N/µm, and"),
+        ([one, tmp_path / "none"], "does not exist"),
+        ([one, tmp_path / "empty"], "holds no results"),
+        ([one, tmp_path], "name one of its folders"),
+        ([one, damaged], "is no summary"),
+        ([one], "two or three"),
+        ([one, one, one, one], "two or three"),
+        ([one, one, "--names", "x", "x"], "must differ"),
+        ([one, one, "--names", "x"], "must be 2 names"),
+    ):
+        assert main(["compare", *map(str, paths), "--out", str(tmp_path / "out")]) == 2, part
+        assert part in capsys.readouterr().err
+    write_csv(tmp_path / "other.csv", {"x": [1.0], "y": [2.0]})
+    with pytest.raises(InputError, match="is no main table"):
+        read_results(tmp_path / "other.csv", "run 1")
