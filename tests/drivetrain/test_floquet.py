@@ -25,7 +25,7 @@ def around(eigenvalues, damping, gain, period: float, steps: int) -> np.ndarray:
     edges = np.linspace(0.0, period, steps + 1)
     first = np.eye(n)[:, :1]
     strengths = gain(kick_times(edges))[..., None, None]
-    constant = flow(np.array(eigenvalues), np.array(damping), period)
+    constant = flow(np.diag(eigenvalues), np.array(damping), period)
     found = np.linalg.eigvals(monodromy(constant, edges, first, np.vstack([first, 0.0 * first]), strengths))
     return np.asarray(found[np.argsort(-np.abs(found))])
 

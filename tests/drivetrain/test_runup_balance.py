@@ -27,27 +27,37 @@ from tests.makers.oscillators import (
 
 
 @pytest.mark.parametrize("heavy", [0.05, 3.0])
-def test_flexibility_of_a_damped_gyroscopic_system(heavy):
-    """Against the dense dynamic stiffness; some modes are overdamped."""
+@pytest.mark.parametrize("shafts", [1, 3])
+@pytest.mark.parametrize("alike", [False, True])
+def test_flexibility_of_a_damped_gyroscopic_system(heavy, shafts, alike):
+    """Against the dense dynamic stiffness; some modes are overdamped, some alike, as of equal planets.
+
+    Forces that turn with the speed act along few directions, or along more than half as many as there are modes.
+    """
     rng = np.random.default_rng(1)
-    n, m, speed = 7, 3, 40.0
-    squares = rng.uniform(1.0, 50.0, n) ** 2
+    n, m, speed = 10, 3, 4.0
+    squares = rng.uniform(10.0, 50.0, n) ** 2
+    if alike:
+        squares[5:] = squares[:5]
     root = rng.normal(size=(n, n))
-    damping = heavy * root @ root.T
-    places, tilts, momenta = rng.normal(size=(n, m)), rng.normal(size=(n, 4)), np.array([0.3, -0.2])
-    linear = Linear(squares, damping, places, rng.normal(size=n), tilts, momenta)
+    damping = np.diag(heavy * rng.uniform(1.0, 2.0) * np.ones(n)) if alike else heavy * root @ root.T
+    places, tilts = rng.normal(size=(n, m)), rng.normal(size=(n, 2 * shafts))
+    skew = np.kron(np.diag(rng.normal(size=shafts)), np.array([[0.0, -1.0], [1.0, 0.0]]))
+    gyroscopic, stiffening = tilts @ skew @ tilts.T, 0.3 * tilts @ tilts.T
+    linear = Linear(squares, damping, places, rng.normal(size=n), gyroscopic, stiffening, rng.normal(size=n))
     omega = np.array([0.0, 3.0, 20.0, 55.0])
-    swap = np.array([[0.0, -1.0], [1.0, 0.0]])
-    pairs = [tilts[:, :2], tilts[:, 2:]]
-    gyro = sum(speed * h * pair @ swap @ pair.T for h, pair in zip(momenta, pairs, strict=True))
     forces = rng.normal(size=(4, m)) + 1j * rng.normal(size=(4, m))
     forces[0] = forces[0].real
-    made = linear.flexibility(omega, speed), linear.modal(omega, speed, forces)
-    for w, f, H, y in zip(omega, forces, *made, strict=True):
-        Z = np.diag(squares - w**2) + 1j * w * (damping - gyro)
-        assert np.allclose(H, places.T @ np.linalg.solve(Z, places), rtol=1e-9, atol=1e-12)
-        push = places @ f + (linear.constant if w == 0.0 else 0.0)
-        assert np.allclose(y, np.linalg.solve(Z, push), rtol=1e-9, atol=1e-11)
+    for turning in (speed, 0.0, -2.0 * speed):
+        H, modal = linear.flexibility(omega, turning), linear.modal(omega, turning, forces)
+        constant = linear.constant + turning**2 * linear.thrown
+        for number, w in enumerate(omega):
+            Z = np.diag(squares - w**2) - turning**2 * stiffening + 1j * w * (damping - turning * gyroscopic)
+            assert np.allclose(H[number], places.T @ np.linalg.solve(Z, places), rtol=1e-9, atol=1e-12)
+            push = places @ forces[number] + (constant if w == 0.0 else 0.0)
+            assert np.allclose(modal[number], np.linalg.solve(Z, push), rtol=1e-9, atol=1e-11)
+        rest = places.T @ np.linalg.solve(np.diag(squares) - turning**2 * stiffening, constant)
+        assert np.allclose(linear.rest(turning), rest, rtol=1e-11)
 
 
 def test_a_part_that_moves_freely_is_refused():

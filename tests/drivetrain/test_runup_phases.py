@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from gearfe.base.errors import InputError
 from gearfe.cli.main import main
 from gearfe.drivetrain.runup import torus
-from gearfe.drivetrain.runup.balance import Orbit, Oscillator, Pushes, settled, solve
+from gearfe.drivetrain.runup.balance import Orbit, Oscillator, settled, solve
 from gearfe.drivetrain.runup.condensed import CondensedTrain, condense
 from gearfe.drivetrain.runup.instability import instability_map
 from gearfe.drivetrain.runup.linear import Linear
@@ -27,6 +27,7 @@ from gearfe.drivetrain.runup.stability import multipliers, window
 from gearfe.drivetrain.train import TrainModel, build_train, simulate
 from gearfe.drivetrain.train.kinematics import mesh_phases
 from tests.makers.mesh_laws import hertzian_law
+from tests.makers.oscillators import pushes
 from tests.makers.trains import loaded, smooth
 
 HUNTING = [(17, 53), (19, 61)]
@@ -69,7 +70,7 @@ def driven(load: float, cubic: float, damping: float, swings: tuple[float, float
     def forces(theta, speed, u, du):  # type: ignore[no-untyped-def]
         x = u[:, 0]
         push = np.cos(theta) @ np.array(swings) - cubic * x**3
-        return Pushes(push[:, None], -(3.0 * cubic * x**2)[:, None, None], None)
+        return pushes(push, -3.0 * cubic * x**2)
 
     one = np.ones((1, 1))
     linear = Linear(np.ones(1), 2.0 * damping * one, one, load * np.ones(1))
@@ -78,7 +79,7 @@ def driven(load: float, cubic: float, damping: float, swings: tuple[float, float
 
 def found(system: Oscillator, speed: float, tolerance: float) -> Orbit:
     guess = np.zeros((system.harmonics(speed, 0.0) + 1, system.linear.size), dtype=complex)
-    guess[0] = system.linear.rest
+    guess[0] = system.linear.rest()
     return settled(system, *solve(system, speed, guess, tolerance), tolerance)
 
 
@@ -110,7 +111,7 @@ def test_growth_of_a_motion_that_never_repeats() -> None:
 
     def forces(theta, speed, u, du):  # type: ignore[no-untyped-def]
         k = e * np.cos(theta[:, 0]) + 0.1 * np.cos(theta[:, 1])
-        return Pushes(-k[:, None] * u, -k[:, None, None], None)
+        return pushes(-k * u[:, 0], -k)
 
     one = np.ones((1, 1))
     system = Oscillator(
@@ -143,7 +144,7 @@ def forces_at(train: CondensedTrain, orbit: Orbit, times: np.ndarray) -> np.ndar
     theta = times[:, None] * abs(orbit.speed) / np.array(system.turns)
     made = []
     for line, numbers in zip(train.model.meshes, train.flanks_of_mesh, strict=True):
-        force = train.forces.flank(numbers[0], theta, orbit.speed, u, du).force
+        force = train.forces.of_flanks(theta, orbit.speed, u, du)[numbers[0]].force
         made.append(force + (line.damping * du[:, train.forces.freedoms[numbers[0], 0]] if line.law is None else 0.0))
     return np.array(made).T
 
@@ -151,7 +152,7 @@ def forces_at(train: CondensedTrain, orbit: Orbit, times: np.ndarray) -> np.ndar
 def state_of(train: CondensedTrain, speed: float, tolerance: float) -> SteadyState:
     system = train.system
     guess = np.zeros((system.harmonics(speed, 2.0 * math.pi * 5000.0) + 1, system.linear.size), dtype=complex)
-    guess[0] = system.linear.rest
+    guess[0] = system.linear.rest()
     orbit = settled(system, *solve(system, speed, guess, tolerance), tolerance)
     assert orbit.found
     return steady_result(train, orbit, 0, multipliers(system, orbit))

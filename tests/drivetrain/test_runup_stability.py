@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
 from gearfe.base.errors import InputError
-from gearfe.drivetrain.runup.balance import Oscillator, Pushes, settled, solve
+from gearfe.drivetrain.runup.balance import Oscillator, settled, solve
 from gearfe.drivetrain.runup.condensed import condense
 from gearfe.drivetrain.runup.instability import instability_map
 from gearfe.drivetrain.runup.linear import Linear
@@ -19,7 +19,7 @@ from gearfe.drivetrain.runup.run_up import run_up, steady_state
 from gearfe.drivetrain.runup.stability import STABLE, kind_of, multipliers
 from gearfe.drivetrain.runup.train_stability import train_stability
 from gearfe.drivetrain.train import build_train
-from tests.makers.oscillators import duffing, meshing, monodromy, response_curve, settled_at, start_of
+from tests.makers.oscillators import duffing, meshing, monodromy, pushes, response_curve, settled_at, start_of
 from tests.makers.trains import curve as stiffness_curve
 from tests.makers.trains import loaded, smooth
 
@@ -71,7 +71,7 @@ def test_a_sum_resonance_of_two_modes():
 
     def forces(theta, speed, u, du):  # type: ignore[no-untyped-def]
         k = e * np.cos(theta[:, 0])
-        return Pushes(-k[:, None] * u, -k[:, None, None], None)
+        return pushes(-k * u[:, 0], -k)
 
     system = Oscillator(Linear(squares, damping, places, np.zeros(2)), forces, (1.0,), np.ones(1))
     speed = 3.3

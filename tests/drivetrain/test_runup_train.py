@@ -370,16 +370,19 @@ def test_derivatives_of_the_forces(friction, backlash, torque):
     m, rng = system.linear.size, np.random.default_rng(2)
     assert m == (4 if backlash is None else 6)
     theta = np.linspace(0.0, 2 * math.pi, 200, endpoint=False)[:, None]
-    u = system.linear.rest + 0.5 * system.scale * rng.normal(size=(200, m))
+    u = system.linear.rest() + 0.5 * system.scale * rng.normal(size=(200, m))
     du = 600.0 * system.scale * rng.normal(size=(200, m))
     at = system.forces(theta, 600.0, u, du)
     for j in range(m):
         h = 1e-5 * system.scale[j]
         step = h * np.eye(m)[j]
-        for made, change in ((at.by_place, (step, 0.0)), (at.by_rate, (0.0, 600.0 * step))):
+        for rate, change in enumerate(((step, 0.0), (0.0, 600.0 * step))):
+            made = np.zeros((200, m, m))
+            of_rates = at.by.freedoms // m == rate
+            made[:, at.by.forces[of_rates], at.by.freedoms[of_rates] % m] = at.by.values[:, of_rates]
             above = system.forces(theta, 600.0, u + change[0], du + change[1]).value
             below = system.forces(theta, 600.0, u - change[0], du - change[1]).value
-            width = 2 * h * (1.0 if made is at.by_place else 600.0)
+            width = 2 * h * (600.0 if rate else 1.0)
             size = max(np.abs(made[:, :, j]).max(), 1e-6 * np.abs(at.value).max() / width)
             off = np.abs((above - below) / width - made[:, :, j]).max(axis=1) / size
             assert np.median(off) < 1e-6

@@ -38,6 +38,12 @@ def rates(amplitudes: np.ndarray, omega0: float) -> np.ndarray:
     return np.asarray(1j * omega0 * np.arange(len(amplitudes))[:, None] * amplitudes)
 
 
+def pushes(force: np.ndarray, slope: np.ndarray) -> Pushes:
+    """Forces (S,) on one freedom, and their derivatives with it."""
+    first = np.zeros(1, dtype=np.int64)
+    return Pushes(force[:, None], [(first, first, slope[:, None])])
+
+
 @dataclass(frozen=True)
 class Single:
     """``x'' + 2 z x' + force(theta, x) = load + swing cos(theta)``, natural frequency 1 where the force is x."""
@@ -52,7 +58,7 @@ class Single:
     def __call__(self, theta, speed, u, du):  # type: ignore[no-untyped-def]
         x, theta = u[:, 0], theta[:, 0]
         push = self.swing * np.cos(theta + self.phase) + x - self.force(theta + self.phase, x)
-        return Pushes(push[:, None], (1.0 - self.slope(theta + self.phase, x))[:, None, None], None)
+        return pushes(push, 1.0 - self.slope(theta + self.phase, x))
 
     @property
     def oscillator(self) -> Oscillator:
@@ -153,7 +159,7 @@ def start_of(orbit, samples=64):  # type: ignore[no-untyped-def]
 
 def settled_at(system, speed, tolerance=1e-8, harmonics=16):  # type: ignore[no-untyped-def]
     guess = np.zeros((harmonics + 1, 1), dtype=complex)
-    guess[0] = system.linear.rest
+    guess[0] = system.linear.rest()
     return settled(system, *solve(system, speed, guess, tolerance), tolerance)
 
 

@@ -12,8 +12,6 @@ from ..train.planetary import KINDS, MeshFamily, family_facts, mesh_families
 
 #: Multiples of a mesh frequency whose sidebands are listed.
 MULTIPLES = 3
-#: Centrifugal force for a displacement over the force of the pin, above which a run-up warns that it leaves it out.
-CENTRIFUGAL = 1e-3
 
 
 def stage_entries(model: TrainModel, mean_forces: Sequence[float] | None = None) -> dict[str, Any]:
@@ -79,34 +77,6 @@ def _orders(model: TrainModel, family: MeshFamily) -> list[dict[str, Any]]:
             f"{name} {sign} 1 x carrier {carrier.name}": float(order + s * passes) for s, sign in ((-1, "-"), (1, "+"))
         }
         found.append({"name": name, "order": float(order), "sidebands": sides, "sidebands_of_ideal_planets": push})
-    return found
-
-
-def centrifugal_warnings(model: TrainModel, speed: float) -> list[str]:
-    """Return warnings of a run-up, which leaves the centrifugal forces of planets out, up to a speed of the drive.
-
-    Parameters
-    ----------
-    model : TrainModel
-        The train.
-    speed : float
-        Largest speed of the drive (rad/s).
-    """
-    found = []
-    for carrier in model.train.carriers:
-        turning = speed * abs(float(model.ratios[model.train.shaft_number(carrier.shaft)]))
-        for pin in carrier.pins[:1]:
-            if pin.stiffness is None:
-                continue
-            springs = (pin.stiffness,) if isinstance(pin.stiffness, float | int) else pin.stiffness[::2][:2]
-            mass = model.shafts[model.train.shaft_number(pin.shaft)].rotor.mass
-            least = min((spring for spring in springs if spring > 0.0), default=math.inf)
-            part = mass * turning**2 / least
-            if part > CENTRIFUGAL:
-                found.append(
-                    f"carrier {carrier.name}: steady states leave out the centrifugal forces of planets, "
-                    f"{part:.2g} of the stiffness of their pins at {speed:.6g} rad/s: look at it with gearfe vibration"
-                )
     return found
 
 

@@ -128,12 +128,7 @@ def turning_train(model: TrainModel, kinds: Array) -> TurningTrain:
         if line.in_contact:  # its Rayleigh part is in the constant damping already
             along = modal.T.T @ line.row
             damping += line.given.damping * np.outer(along, along)
-    gyroscopic, stiffening = np.zeros_like(damping), np.zeros_like(damping)
-    for couple in model.forces.gyros:
-        tilt, other = modal.T.T @ model.directions[:, couple.direction : couple.direction + 2].T[:, :, None]
-        first, second = tilt[:, 0], other[:, 0]
-        gyroscopic += couple.polar * couple.ratio * (np.outer(second, first) - np.outer(first, second))
-        stiffening += couple.stiffening * (np.outer(first, first) + np.outer(second, second))
+    gyroscopic, stiffening = (modal.T.T @ x @ modal.T for x in model.turning[:2])
     return TurningTrain(modal.eigenvalues, damping, gyroscopic, stiffening, kinds)
 
 

@@ -25,14 +25,14 @@ of the equations with twice the harmonics and four times the samples.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ...base.typing import Array, ComplexArray
+from ...base.typing import Array, ComplexArray, IntArray
 from . import torus
 from .krylov import gmres
 from .linear import Linear
@@ -60,14 +60,70 @@ PLENTY = 256
 MOST_HARMONICS = 8192
 
 
-class Pushes(NamedTuple):
-    """Forces at S places of the phases, and their derivatives."""
+class Changes(NamedTuple):
+    """Derivatives of m forces with m freedoms and their rates at S places of the phases, those not all zero."""
 
-    value: Array  # (S, m)
-    by_place: Array  # (S, m, m): of force i with freedom j
-    by_rate: Array | None  # (S, m, m)
-    momentum: Array | None = None  # (S, m) whose rate of change is a further force: of dampers that act in contact only
-    momentum_by_place: Array | None = None  # (S, m, m)
+    forces: IntArray  # (e,) number of the force, rising
+    freedoms: IntArray  # (e,) number of the freedom, or of the rate behind all m freedoms; each pair is there once
+    values: Array  # (S, e)
+
+    def of_freedoms(self, count: int) -> Changes:
+        """Those with the freedoms alone, m of them."""
+        chosen = self.freedoms < count
+        return Changes(self.forces[chosen], self.freedoms[chosen], self.values[:, chosen])
+
+
+def changes(entries: Sequence[Entries], size: int, samples: int) -> Changes:
+    """Derivatives of m forces (`size`) at S places (`samples`) as the sum of some."""
+    none = np.zeros(0, dtype=np.int64)
+    forces, freedoms = (np.concatenate([none, *(entry[i] for entry in entries)]) for i in range(2))
+    values = np.hstack([np.zeros((samples, 0)), *(entry[2] for entry in entries)])
+    keys, numbers = np.unique(2 * size * forces + freedoms, return_inverse=True)
+    if len(keys) < len(numbers):
+        values = values @ np.eye(len(keys))[numbers]
+    else:
+        values = values[:, np.argsort(numbers)]
+    chosen = values.any(axis=0)
+    keys = keys[chosen]
+    return Changes(keys // (2 * size), keys % (2 * size), values[:, chosen])
+
+
+#: Derivatives of forces: numbers (e,) of forces, numbers (e,) of freedoms or behind them of rates, values (S, e).
+Entries = tuple[IntArray, IntArray, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Pushes:
+    """Forces at S places of the phases, and their derivatives.
+
+    Parameters
+    ----------
+    value : (S, m)
+        Forces.
+    entries
+        Their derivatives, the sum of all.
+    momentum : (S, m), optional
+        Its rate of change is a further force: of dampers that act in contact only.
+    momentum_entries
+        Derivatives of the momentum with the freedoms.
+    """
+
+    value: Array
+    entries: Sequence[Entries]
+    momentum: Array | None = None
+    momentum_entries: Sequence[Entries] = ()
+
+    @cached_property
+    def by(self) -> Changes:
+        """Derivatives of the forces."""
+        return changes(self.entries, self.value.shape[1], len(self.value))
+
+    @cached_property
+    def momentum_by(self) -> Changes | None:
+        """Derivatives of the momentum."""
+        if self.momentum is None:
+            return None
+        return changes(self.momentum_entries, self.value.shape[1], len(self.value))
 
 
 class SteadyForces(Protocol):
@@ -94,7 +150,7 @@ class Oscillator:
     limit
         Largest motion that means something, in parts of the scale.
     start : (m,), optional
-        Freedoms beside those of the state without vibration; those under the constant force alone when left out.
+        Where the search of a first motion begins, beside the freedoms under the constant forces alone.
     """
 
     linear: Linear
@@ -133,6 +189,10 @@ class Oscillator:
     def rounded(self, harmonics: float) -> int:
         """Number whose samples transform quickly, at least the given one, up to the most."""
         return min(8 * math.ceil(harmonics / 8), MOST_HARMONICS)
+
+    def rest(self, speed: float) -> Array:
+        """(m,) freedoms under the constant forces alone."""
+        return self.linear.rest(speed)
 
     def flexibility(self, speed: float, count: int) -> ComplexArray:
         """H at harmonics 0 to `count`, (count + 1, m, m)."""
@@ -217,13 +277,13 @@ def evaluate(
     forces = lattice.analysis(pushes.value)[: len(places)]
     if pushes.momentum is not None:
         forces = forces + turning * lattice.analysis(pushes.momentum)[: len(places)]
-    return Evaluated(places - moved(system, flexibility, forces), forces, pushes, lattice)
+    return Evaluated(places - moved(system, speed, flexibility, forces), forces, pushes, lattice)
 
 
-def moved(system: Oscillator, flexibility: ComplexArray, forces: ComplexArray) -> ComplexArray:
-    """Amplitudes (K + 1, m) of the freedoms under forces of such amplitudes and the constant one."""
+def moved(system: Oscillator, speed: float, flexibility: ComplexArray, forces: ComplexArray) -> ComplexArray:
+    """Amplitudes (K + 1, m) of the freedoms under forces of such amplitudes and the constant ones."""
     made = (flexibility @ forces[..., None])[..., 0]
-    made[0] += system.linear.rest
+    made[0] += system.rest(speed)
     return np.asarray(made)
 
 
@@ -257,21 +317,42 @@ def product(system: Oscillator, speed: float, at: Evaluated, flexibility: Comple
         Change of the amplitudes -> change of the residual; real vectors as of `packed`.
     """
     lattice, scale, count = at.lattice, system.scale, len(at.residual)
-    by, rate, momentum = at.pushes.by_place, at.pushes.by_rate, at.pushes.momentum_by_place
     turning = 1j * system.omega(speed, count - 1)[:, None]
-    if rate is not None:
-        by = np.concatenate([by, rate], axis=2)
+    parts = [_part(at.pushes.by, flexibility, None)]
+    if at.pushes.momentum_by is not None:
+        parts.append(_part(at.pushes.momentum_by, flexibility, turning))
+    used, places = np.unique(np.concatenate([part.freedoms for part in parts]), return_inverse=True)
+    of_rates = used >= len(scale)
+    columns, wheres = used % len(scale), np.split(places, [len(parts[0].freedoms)])
 
     def changed(x: Array) -> Array:
         change = unpacked(x, scale)
-        moves = lattice.synthesis(change if rate is None else np.hstack([change, turning * change]))
-        forces = lattice.analysis(np.matmul(by, moves[..., None])[..., 0])[:count]
-        if momentum is not None:
-            moment = np.matmul(momentum, moves[:, : len(scale), None])[..., 0]
-            forces = forces + turning * lattice.analysis(moment)[:count]
-        return x - packed((flexibility @ forces[..., None])[..., 0], scale)
+        moves = change[:, columns]
+        if of_rates.any():
+            moves[:, of_rates] *= turning
+        sampled = lattice.synthesis(moves)
+        for part, where in zip(parts, wheres, strict=False):
+            forces = lattice.analysis((part.values * sampled[:, where]) @ part.sums)[:count]
+            change -= (part.way @ (forces if part.factor is None else part.factor * forces)[..., None])[..., 0]
+        return packed(change, scale)
 
     return changed
+
+
+class _Part(NamedTuple):
+    """Derivatives of forces, and what these move."""
+
+    freedoms: IntArray  # (e,)
+    values: Array  # (S, e)
+    sums: Array  # (e, r) which entries add up to which force
+    way: ComplexArray  # (K + 1, m, r) flexibility
+    factor: ComplexArray | None  # (K + 1, 1) of the forces
+
+
+def _part(by: Changes, flexibility: ComplexArray, factor: ComplexArray | None) -> _Part:
+    forces, numbers = np.unique(by.forces, return_inverse=True)
+    way = np.ascontiguousarray(flexibility[:, :, forces])
+    return _Part(by.freedoms, by.values, np.eye(len(forces))[numbers], way, factor)
 
 
 def flexibility_of(system: Oscillator, speed: float, count: int) -> ComplexArray:

@@ -116,11 +116,10 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     ends = ((d, float(replace(f, sines=())(model.torque_end))) for d, f in model.torques)
     torque = sum((d * value for d, value in ends), start=np.zeros(len(modal.T)))
     push = modal.constant + modal.T.T @ torque
-    gyros = model.forces.couples
-    tilts = [column for g in gyros for column in (g.direction, g.direction + 1)]
+    turning = model.turning
     linear = Linear(
-        modal.eigenvalues, _damping(model), to_modes[:, used], push, to_modes[:, tilts],
-        np.array([g.polar * g.ratio for g in gyros]),
+        modal.eigenvalues, _damping(model), to_modes[:, used], push, modal.T.T @ turning.gyroscopic @ modal.T,
+        modal.T.T @ turning.stiffening @ modal.T, modal.T.T @ (turning.thrown + turning.stiffening @ modal.origin),
     )  # fmt: skip
     sense = drive_sense(model.train.driven.speed) or 1.0
     steady = model.kinematics.steady_forces
@@ -138,7 +137,7 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     scale = _scale(model, linear, freedoms, flanks, more)
     limit = DIVERGED * min(line.module for line in model.meshes) / float(scale[freedoms[:, 0]].max())
     many = tuple(tuple(row) for row in orders.tolist())
-    start = linear.rest.copy()
+    start = np.zeros(linear.size)
     for numbers, force in zip(of_mesh, steady.tolist(), strict=True):
         if force < 0.0 and len(numbers) == 2:  # statics press the back flanks, which bear behind the backlash
             start[freedoms[list(numbers), 0]] += flanks[numbers[1]].gap * np.array([-1.0, 1.0])
@@ -240,12 +239,13 @@ def _scale(
     model: TrainModel, linear: Linear, freedoms: Array, flanks: Sequence[Flank], torques: Sequence[int]
 ) -> Array:
     """Approach of each mesh under its steady force; rotations that move a base circle so far."""
-    size = max(float(np.abs(linear.rest[np.unique(freedoms[:, 0])]).max()), 1e-9)
+    rest = np.abs(linear.rest())
+    size = max(float(rest[np.unique(freedoms[:, 0])].max()), 1e-9)
     scale = np.full(linear.size, size)
     scale[list(torques)] = size / (0.5 * model.meshes[0].module * 2.0 * math.pi)
     for flank, (d, r, a, s) in zip(flanks, freedoms, strict=True):
         if flank.mean > 0.0:
-            scale[d] = max(abs(float(linear.rest[d])), 0.1 * size)
+            scale[d] = max(float(rest[d]), 0.1 * size)
         for turn in (r, s, a if flank.tilt >= 0 else -1):
             if turn >= 0:
                 scale[turn] = size / (0.5 * model.meshes[0].module * 2.0 * math.pi)

@@ -32,6 +32,9 @@ class Growing(Oscillator):
     def harmonics(self, _part: float, _highest: float, multiples: int = FEW) -> int:
         return super().harmonics(self.speed, 0.0, multiples)
 
+    def rest(self, _part: float) -> Array:
+        return super().rest(self.speed)
+
     def flexibility(self, part: float, count: int) -> ComplexArray:
         whole = self.linear.flexibility(self.omega(part, count), self.speed)
         return np.concatenate([whole[:1], part * whole[1:]])
@@ -62,7 +65,7 @@ def first_motion(system: Oscillator, speed: float, *, tolerance: float, highest:
 
     grows = Growing(system.linear, forces, system.turns, system.scale, system.orders, system.limit, speed=speed)
     places = np.zeros((grows.harmonics(0.0, 0.0) + 1, system.linear.size), dtype=complex)
-    places[0] = system.linear.rest if system.start is None else system.start
+    places[0] = system.rest(speed) + (0.0 if system.start is None else system.start)
     start, _ = solve(grows, 0.0, places, tolerance)
     if not start.found:
         return None

@@ -197,7 +197,7 @@ class _Walk:
         count = self._count(speed, back[-1])
         known = np.array([widened(o.forces, count) for o in back])
         forces = _lagrange(np.array([o.speed for o in back]), known, speed)
-        places = moved(system, flexibility_of(system, speed, count), forces)
+        places = moved(system, speed, flexibility_of(system, speed, count), forces)
         orbit, at = solve(system, speed, places, self.tolerance, near=True)
         if not orbit.found:
             return None

@@ -20,6 +20,7 @@ from ...base.errors import InputError
 from ...base.progress import count, one_thread
 from ...base.typing import Array, ComplexArray
 from ..train.forces import CurveFlank
+from .balance import Changes
 from .condensed import CondensedTrain
 from .stability import LONGEST, around, kicks, steps_of, strengths, window
 
@@ -72,18 +73,18 @@ def instability_map(
     theta = kicks(system, span.turns, steps_of(span))
     with one_thread():
         for i, factor in enumerate(factors):
-            A = _tangents(train, theta, float(factor))
-            kept = strengths(system.linear, A) > REACHED
+            by = _tangents(train, theta, float(factor))
+            kept = strengths(system.linear, by) > REACHED
             for j, speed in enumerate(requested):
-                made[i, j] = around(system, float(speed), A, None, kept, span, damped=False)[0]
+                made[i, j] = around(system, float(speed), by, kept, span, damped=False)[0]
                 count(i * len(requested) + j + 1, made.size, "speeds")
     periods = 2.0 * math.pi * span.turns / np.abs(requested)
     return InstabilityMap(requested, factors, made, np.log(np.abs(made)) / periods)
 
 
-def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Array:
-    """Derivatives of the forces (S, m, m) where each mesh carries its steady force times a factor, without motion."""
-    u = np.tile(train.system.linear.rest, (len(theta), 1))
+def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Changes:
+    """Derivatives of the forces where each mesh carries its steady force times a factor, without motion."""
+    u = np.tile(train.system.linear.rest(), (len(theta), 1))
     for numbers, steady in zip(train.flanks_of_mesh, train.steady, strict=True):
         flank, (along, turn, tilt) = train.forces.flanks[numbers[0]], train.forces.freedoms[numbers[0], :3]
         phase = flank.sense * (flank.ratio * (theta @ train.forces.turns[numbers[0]]) + u[:, turn]) + flank.phase
@@ -92,4 +93,4 @@ def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Array:
             u[:, along] = factor * steady / flank.curve(phase).value - flank.beyond_touch(phase, np.zeros(()), tilts)
         else:
             u[:, along] = flank.gap + flank.law.approach(phase, factor * steady)
-    return train.forces(theta, 1.0, u, np.zeros_like(u)).by_place
+    return train.forces(theta, 1.0, u, np.zeros_like(u)).by.of_freedoms(train.system.linear.size)

@@ -15,15 +15,17 @@ derivatives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ...base.typing import Array, IntArray
 from ..train.forces import Flank, FlankForces, LawFlank, Slip, SpeedTorque
 from ..train.friction import Sliding
-from .balance import Pushes
+from .balance import Entries, Pushes
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,8 @@ class Rubbing:
         return replace(self.sliding, coefficient=mu, speed=self.sliding.speed * abs(speed / self.speed))
 
 
+#: What two flanks may differ in that are evaluated at once: where they act, and when.
+PLACES = ("direction", "turn", "phase", "mean", "gap", "tilt", "across", "spin")
 #: A torque repeats with a phase where its cycles in the phase's period are a whole number to this part.
 WHOLE = 1e-9
 
@@ -125,13 +129,24 @@ class MeshForces:
     speed_torques: Sequence[SpeedTorque] = ()
     _pairs: dict[tuple[int, int], Array] = field(default_factory=dict, repr=False)
 
-    def flank(self, number: int, theta: Array, speed: float, u: Array, du: Array) -> FlankForces:
-        """Return the forces of one flank at S places of the phases.
+    @cached_property
+    def _alike(self) -> list[list[int]]:
+        """Numbers of flanks whose forces follow from phase, approach and rates alike: they are evaluated at once."""
+        groups: list[list[int]] = []
+        for number, (flank, rubs) in enumerate(zip(self.flanks, self.rubbing, strict=True)):
+            for group in groups:
+                if _same(flank, self.flanks[group[0]], PLACES) and _same(rubs, self.rubbing[group[0]], PLACES):
+                    group.append(number)
+                    break
+            else:
+                groups.append([number])
+        return groups
+
+    def of_flanks(self, theta: Array, speed: float, u: Array, du: Array) -> list[FlankForces]:
+        """Return the forces of each flank at S places of the phases.
 
         Parameters
         ----------
-        number : int
-            Number of the flank.
         theta : ndarray, shape (S, n)
             Phases of the motion (rad).
         speed : float
@@ -139,65 +154,113 @@ class MeshForces:
         u, du : ndarray, shape (S, m)
             Freedoms (m, rad) and their rates (m/s, rad/s).
         """
-        flank, rubs = self.flanks[number], self.rubbing[number]
-        along, turn, across, spin = self.freedoms[number]
-        phase = flank.sense * (flank.ratio * (theta @ self.turns[number]) + u[:, turn]) + flank.phase
-        begin = None
-        if isinstance(flank, LawFlank):
-            begin = self._pairs.get((number, len(phase)))
-            if begin is None:
-                begin = self._pairs[number, len(phase)] = np.zeros((len(phase), flank.law.slots))
-        tilt = u[:, across] if flank.tilt >= 0 else 0.0
-        rates = du[:, [along, across, turn if spin < 0 else spin]]
-        slip = Slip(speed, rates, None if rubs is None else rubs.at(speed), tilt)
-        return flank.forces(phase, flank.beyond_touch(phase, u[:, along], tilt), slip, begin)
+        found: dict[int, FlankForces] = {}
+        for group, whole in zip(self._alike, self._of_groups(theta, speed, u, du), strict=True):
+            for place, number in enumerate(group):
+                found[number] = _rows(whole, slice(place * len(theta), (place + 1) * len(theta)))
+        return [found[number] for number in range(len(self.flanks))]
+
+    def _of_groups(self, theta: Array, speed: float, u: Array, du: Array) -> Iterator[FlankForces]:
+        """Forces of the flanks of each group, one flank after the other."""
+        sense, ratio, begin, gap = self._places
+        along, turn, across, spin = self.freedoms.T
+        phases = (sense * ratio)[:, None] * (self.turns @ theta.T) + sense[:, None] * u.T[turn] + begin[:, None]
+        approaches = u.T[along]
+        rates = du.T[np.array([along, across, np.where(spin < 0, turn, spin)])]
+        for group in self._alike:
+            flank, rubs = self.flanks[group[0]], self.rubbing[group[0]]
+            phase, tilt = phases[group].ravel(), u.T[across[group]].ravel() if flank.tilt >= 0 else 0.0
+            later = gap[group] - flank.gap
+            beyond = flank.beyond_touch(phase, (approaches[group] - later[:, None]).ravel(), tilt)
+            pairs = None
+            if isinstance(flank, LawFlank):
+                pairs = self._pairs.get((group[0], len(phase)))
+                if pairs is None:
+                    pairs = self._pairs[group[0], len(phase)] = np.zeros((len(phase), flank.law.slots))
+            slip = Slip(speed, rates[:, group].reshape(3, -1).T, None if rubs is None else rubs.at(speed), tilt)
+            yield flank.forces(phase, beyond, slip, pairs)
+
+    @cached_property
+    def _places(self) -> tuple[Array, ...]:
+        """Senses, ratios, phases at the start (rad) and gaps (m) of the flanks."""
+        rows = [(flank.sense, flank.ratio, flank.phase, flank.gap) for flank in self.flanks]
+        return tuple(np.array(rows, dtype=float).reshape(-1, 4).T)
 
     def __call__(self, theta: Array, speed: float, u: Array, du: Array) -> Pushes:
         """Forces at the freedoms, what the linear part has taken off."""
-        value = np.zeros_like(u)
-        by_place = np.zeros((*u.shape, u.shape[1]))
-        by_rate, momentum, momentum_by_place = None, None, None
-        for number, (flank, (d, r, a, s)) in enumerate(zip(self.flanks, self.freedoms, strict=True)):
-            at = self.flank(number, theta, speed, u, du)
-            value[:, d] += flank.mean * u[:, d] - at.force
-            by_place[:, d, d] += flank.mean - at.tangent
-            by_place[:, d, r] -= flank.sense * at.cross
+        value, momentum, size = np.zeros_like(u), None, u.shape[1]
+        by, momentum_by = list[Entries](), list[Entries]()
+        for group, at in zip(self._alike, self._of_groups(theta, speed, u, du), strict=True):
+            sense, mean = self.flanks[group[0]].sense, np.array([self.flanks[number].mean for number in group])
+            d, r, a, s = self.freedoms[group].T
+
+            def shaped(values: Array | float, count: int = len(group)) -> Array:
+                values = values if isinstance(values, np.ndarray) else np.full(count * len(u), values)
+                return values.reshape(count, -1).T
+
+            force, tangent, cross = shaped(at.force), shaped(at.tangent), shaped(at.cross)
+            value[:, d] += mean * u[:, d] - force  # each flank has its own approach
+            by += [(d, d, mean - tangent), (d, r, -sense * cross)]
             if at.lever is not None and at.couple is not None and at.couple_by_phase is not None:
-                value[:, a] -= at.couple
-                by_place[:, d, a] -= at.tangent * at.lever
-                by_place[:, a, d] -= at.tangent * at.lever
-                by_place[:, a, a] -= at.tangent * at.lever**2
-                by_place[:, a, r] -= flank.sense * at.couple_by_phase
+                lever = shaped(at.lever)
+                _add(value, a, -shaped(at.couple))
+                by += [(d, a, -tangent * lever), (a, d, -tangent * lever), (a, a, -tangent * lever**2)]
+                by.append((a, r, -sense * shaped(at.couple_by_phase)))
             if at.momentum is not None and at.per_rate is not None:
-                if momentum is None or momentum_by_place is None:
-                    momentum, momentum_by_place = np.zeros_like(u), np.zeros_like(by_place)
-                value[:, d] += at.push
-                momentum[:, d] -= at.momentum
-                momentum_by_place[:, d, d] -= at.per_rate
-                momentum_by_place[:, d, r] -= flank.sense * at.momentum_by_phase
+                momentum = np.zeros_like(u) if momentum is None else momentum
+                value[:, d] += shaped(at.push)
+                momentum[:, d] -= shaped(at.momentum)
+                momentum_by += [(d, d, -shaped(at.per_rate)), (d, r, -sense * shaped(at.momentum_by_phase))]
                 continue
-            if by_rate is None and (at.per_rate is not None or at.drag is not None):
-                by_rate = np.zeros_like(by_place)
-            if at.per_rate is not None and by_rate is not None:
-                by_rate[:, d, d] -= at.per_rate
-            if at.moment is not None and at.moment_by_approach is not None:
-                value[:, r] -= flank.sense * at.moment
-                by_place[:, r, d] -= flank.sense * at.moment_by_approach
-                by_place[:, r, r] -= at.bend
-            if at.drag is not None and by_rate is not None:
+            if at.per_rate is not None:
+                by.append((d, size + d, -shaped(at.per_rate)))
+            if at.moment is not None and at.moment_by_approach is not None and at.bend is not None:
+                _add(value, r, -sense * shaped(at.moment))
+                by += [(r, d, -sense * shaped(at.moment_by_approach)), (r, r, -shaped(at.bend))]
+            if at.drag is not None:
                 for i, on in enumerate((a, s)):
-                    value[:, on] -= at.drag.value[:, i]
-                    by_place[:, on, d] -= at.drag.by_approach[:, i]
-                    by_place[:, on, r] -= flank.sense * at.drag.by_phase[:, i]
-                    by_rate[:, on, d] -= at.drag.by_rate[:, i]
-                    by_rate[:, on, a] -= at.drag.by_across_rate[:, i]
-                    by_rate[:, on, s] -= at.drag.by_turn_rate[:, i]
+                    _add(value, on, -shaped(at.drag.value[:, i]))
+                    by += [
+                        (on, d, -shaped(at.drag.by_approach[:, i])),
+                        (on, r, -sense * shaped(at.drag.by_phase[:, i])),
+                    ]
+                    for rate, slope in ((d, at.drag.by_rate), (a, at.drag.by_across_rate), (s, at.drag.by_turn_rate)):
+                        by.append((on, size + rate, -shaped(slope[:, i])))
         for torque in self.torques:
             value[:, torque.freedom] += torque.at(theta, speed)
         for over in self.speed_torques:
             d = over.direction
-            if by_rate is None:
-                by_rate = np.zeros_like(by_place)
             value[:, d] += over.at(speed, du[:, d])
-            by_rate[:, d, d] += over.slope(speed, du[:, d])
-        return Pushes(value, by_place, by_rate, momentum, momentum_by_place)
+            by.append((np.array([d]), np.array([size + d]), over.slope(speed, du[:, d])[:, None]))
+        return Pushes(value, by, momentum, momentum_by)
+
+
+def _add(values: Array, columns: IntArray, more: Array) -> None:
+    """Add (S, f) to columns (f,) of values, of which some may be the same."""
+    for column, each in zip(columns.tolist(), more.T, strict=True):
+        values[:, column] += each
+
+
+def _same(one: Any, two: Any, without: Sequence[str] = ()) -> bool:
+    """Whether two values are equal, arrays and records of them included, except for some fields of records."""
+    if one is two:
+        return True
+    if type(one) is not type(two):
+        return False
+    if isinstance(one, np.ndarray):
+        return np.array_equal(one, two)
+    if is_dataclass(one):
+        names = [item.name for item in fields(one) if item.name not in without]
+        return all(_same(getattr(one, name), getattr(two, name), without) for name in names)
+    return bool(one == two)
+
+
+def _rows(forces: FlankForces, rows: slice) -> FlankForces:
+    """Forces at some of the places."""
+    drag = None if forces.drag is None else type(forces.drag)(*(values[rows] for values in forces.drag))
+    parts = {
+        name: values[rows]
+        for name, values in forces._asdict().items()
+        if isinstance(values, np.ndarray) and values.ndim
+    }
+    return forces._replace(**parts, drag=drag)

@@ -27,6 +27,8 @@ DRIFTS = np.array([*_A, 0.5 - sum(_A), 0.5 - sum(_A), *_A[::-1]])
 PLACES = np.concatenate([[0.0], np.cumsum(DRIFTS)])
 #: Eigenvectors worse conditioned than this are not used; the exponentials then come from the matrix itself.
 WORST_CONDITION = 1e8
+#: Decay of modes within a step, as an exponent, up to which nothing is lost by taking its kicks to its begin.
+CALM = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,22 +55,22 @@ class Flow:
     into: ComplexArray
     out: ComplexArray
 
-    def over(self, length: float) -> Callable[[ComplexArray], ComplexArray]:
-        """The flow over a time (s)."""
+    def over(self, length: float, *, of_rows: bool = False) -> Callable[[ComplexArray], ComplexArray]:
+        """The flow over a time (s), of rows of coordinates (.., k), or of rows that coordinates are multiplied by."""
         if self.values is not None:
-            factors = np.exp(length * self.values)[:, None]
-            return lambda x: factors * x
+            factors = np.exp(length * self.values)
+            return lambda x: x * factors
         from scipy.linalg import expm
 
-        matrix = expm(length * self.matrix)
-        return lambda x: matrix @ x
+        matrix = expm(length * self.matrix).astype(complex)
+        return lambda x: x @ (matrix if of_rows else matrix.T)
 
 
-def flow(eigenvalues: Array, damping: Array, period: float) -> Flow:
-    """Flow of ``y'' = -eigenvalues y - damping y'``."""
-    n = len(eigenvalues)
-    scale = np.maximum(np.sqrt(np.abs(eigenvalues)), 1.0 / period)
-    A = np.block([[np.zeros((n, n)), np.diag(scale)], [np.diag(-eigenvalues / scale), -damping]])
+def flow(stiffness: Array, damping: Array, period: float) -> Flow:
+    """Flow of ``y'' = -stiffness y - damping y'``, matrices of shape (n, n)."""
+    n = len(stiffness)
+    scale = np.maximum(np.sqrt(np.abs(np.diag(stiffness))), 1.0 / period)
+    A = np.block([[np.zeros((n, n)), np.diag(scale)], [-stiffness / scale, -damping]])
     values, V = np.linalg.eig(A)
     if np.isfinite(V).all() and _well_conditioned(V):
         kept = values.imag >= 0.0
@@ -92,6 +94,9 @@ def kick_times(edges: Array) -> Array:
 def monodromy(constant: Flow, edges: Array, directions: Array, reads: Array, strengths: Array) -> Array:
     """Return the map of the state (scale y, v) over the time of the steps.
 
+    Within a step the coordinates are those of its begin: kicks are taken there by the flow, which so acts once. Where
+    modes decay within a step that would lose digits, and the flow acts between kicks.
+
     Parameters
     ----------
     constant : Flow
@@ -114,11 +119,25 @@ def monodromy(constant: Flow, edges: Array, directions: Array, reads: Array, str
     into = constant.into @ np.vstack([np.zeros_like(directions), directions])
     rows = (reads.T / np.concatenate([constant.scale, np.ones(n)])) @ constant.out
     length = (edges[-1] - edges[0]) / (len(edges) - 1)
-    flows = {part: constant.over(length * part) for part in set(DRIFTS)}
-    x = constant.into.copy()
-    for step in strengths * (length * KICKS[:, None, None]):
-        for kick, drift in zip(step, (*DRIFTS, None), strict=True):
-            x += into @ (kick @ (rows @ x).real)
-            if drift is not None:
+    # columns of the map as rows, real and imaginary parts beside each other: products are real
+    x = np.ascontiguousarray(constant.into.T, dtype=complex)
+    calm = constant.values is not None and length * float(np.abs(constant.values.real).max(initial=0.0)) < CALM
+    begins, drifts = (PLACES, [*[0.0] * len(DRIFTS), 1.0]) if calm else (np.zeros(len(PLACES)), [*DRIFTS, 0.0])
+    seen = np.array([_parts(constant.over(length * place, of_rows=True)(rows).conj()).T for place in begins])
+    pushes = [_parts(constant.over(-length * place)(into.T)) for place in begins]
+    flows = {part: constant.over(length * part) for part in set(drifts)}
+    forces, more = np.empty((2 * n, directions.shape[1])), np.empty((2 * n, 2 * x.shape[1]))
+    for step in strengths.transpose(0, 1, 3, 2) * (length * KICKS[:, None, None]):
+        for read, push, drift in zip(seen @ step, pushes, drifts, strict=True):
+            parts = x.view(float)
+            np.dot(parts, read, out=forces)
+            np.dot(forces, push, out=more)
+            parts += more
+            if drift:
                 x = flows[drift](x)
-    return np.asarray((constant.out @ x).real)
+    return np.asarray((x @ constant.out.T).real.T)
+
+
+def _parts(values: ComplexArray) -> Array:
+    """Rows (k, n) as real ones (k, 2n), real and imaginary part of each number beside each other."""
+    return np.ascontiguousarray(values, dtype=complex).view(float)

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...base.typing import Array
 from ...gears.rating.dynamics import dynamic_factor
-from ..gearbox.stage_report import centrifugal_warnings
 from ..modes.report import mode_entries
 from ..modes.report import tables as mode_tables
 from ..train.response import XYZ
@@ -174,7 +173,6 @@ def phases(run: RunUp) -> list[dict[str, Any]]:
 def warnings(run: RunUp) -> list[str]:
     """Sentences about what a reader must know."""
     found = [*run.train.model.mesh_notes, *run.train.model.operating.warnings, *run.notes]
-    found += centrifugal_warnings(run.train.model, float(np.abs(run.speeds).max(initial=0.0)))
     for i, line in enumerate(run.train.model.meshes):
         if line.pulls:
             low = [(float(s.force[:, i].min()), s.speed) for s in run.states]

@@ -138,10 +138,11 @@ def steady_result(
     u, du = lattice.synthesis(orbit.places), lattice.synthesis(1j * omega[:, None] * orbit.places)
     force, approach = np.zeros((samples, len(model.meshes))), np.zeros((samples, len(model.meshes)))
     apart, beyond = np.zeros(len(model.meshes)), False
+    of_flanks = train.forces.of_flanks(theta, orbit.speed, u, du)
     for i, (line, numbers) in enumerate(zip(model.meshes, train.flanks_of_mesh, strict=True)):
         open_ = np.ones(samples, dtype=bool)
         for number, sign in zip(numbers, (1.0, -1.0), strict=False):
-            at = train.forces.flank(number, theta, orbit.speed, u, du)
+            at = of_flanks[number]
             force[:, i] += sign * at.force
             open_ &= at.apart
             beyond |= bool(at.beyond.any())
@@ -168,16 +169,15 @@ def steady_result(
 
 def _bearing(train: CondensedTrain, orbit: Orbit, omega: Array, modal: ComplexArray) -> ComplexArray:
     """Amplitudes of the loads on the bores."""
-    model, linear, turning = train.model, train.system.linear, 1j * omega[:, None]
+    model, turning = train.model, 1j * omega[:, None]
     q = real_times(modal, model.modal.T.T)
     v, a = turning * q, -(omega**2)[:, None] * q
     acting = real_times(orbit.forces, train.directions.T)
     for line in model.meshes:
         if line.in_contact:  # which the constant part has, too
             acting += line.rayleigh * real_times(v, np.outer(line.row, line.row))
-    tilts = [column for g in model.forces.couples for column in (g.direction, g.direction + 1)]
-    along = model.directions[:, tilts]
-    acting += orbit.speed * real_times(v, along @ linear.gyroscopic.T @ along.T)
-    acting[0] += train.torque
     q[0] += model.modal.origin
+    turns = model.turning
+    acting += orbit.speed * real_times(v, turns.gyroscopic.T) + orbit.speed**2 * real_times(q, turns.stiffening)
+    acting[0] += train.torque + orbit.speed**2 * turns.thrown
     return model.bearings(q, v, a, acting)

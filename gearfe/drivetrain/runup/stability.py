@@ -24,7 +24,7 @@ import numpy as np
 
 from ...base.typing import Array, BoolArray, ComplexArray
 from . import torus
-from .balance import Orbit, Oscillator
+from .balance import Changes, Orbit, Oscillator, changes
 from .linear import Linear
 from .monodromy import KICKS, PLACES, flow, kick_times, monodromy
 
@@ -119,29 +119,32 @@ def _multipliers(
     """Multipliers with so many steps, and whether derivatives jump."""
     theta, u, du = _along(system, orbit, span.turns, steps)
     pushes = system.forces(theta, orbit.speed, u, du)
-    A, B = pushes.by_place, pushes.by_rate
+    by = pushes.by
     order = np.argsort(kick_times(np.linspace(0.0, 1.0, steps + 1)).ravel(), kind="stable")  # kicks step back, too
-    changes = np.abs(np.diff(A[order], axis=0)).max(axis=0)
-    jumps = bool((np.diag(changes) * np.diag(system.linear.statics) > JUMP).any())
-    kept = strengths(system.linear, A) >= reached * np.diag(system.linear.damping) / np.sqrt(system.linear.squares)
-    if pushes.momentum_by_place is not None:
+    own = by.forces == by.freedoms
+    steepest = np.abs(np.diff(by.values[order][:, own], axis=0)).max(axis=0)
+    jumps = bool((steepest * np.diag(system.linear.statics)[by.forces[own]] > JUMP).any())
+    kept = strengths(system.linear, by) >= reached * np.diag(system.linear.damping) / np.sqrt(system.linear.squares)
+    if pushes.momentum_by is not None:
         step = 2.0 * math.pi * span.turns / abs(orbit.speed) / steps
-        A, B, touches = _with_momentum(A, B, pushes.momentum_by_place, step)
+        by, touches = _with_momentum(by, pushes.momentum_by, step, system.linear.size)
         jumps |= touches
-    made = around(system, orbit.speed, A, B, kept, span)
+    made = around(system, orbit.speed, by, kept, span)
     return made, jumps
 
 
-def _with_momentum(A: Array, B: Array | None, momentum: Array, step: float) -> tuple[Array, Array, bool]:
+def _with_momentum(by: Changes, momentum: Changes, step: float, size: int) -> tuple[Changes, bool]:
     """Add the derivatives of a force that is the rate of change of a momentum p(u), and say whether p_u jumps.
 
     Its change is p_u u' + p_u' u. Where teeth touch p_u jumps, and p_u' is an impulse, spread over its step (s). It
     is what the saltation matrix of a jump in the acceleration has (Leine & Nijmeijer, Dynamics and Bifurcations of
     Non-Smooth Mechanical Systems, 2004, Ch. 7).
     """
-    by_step = momentum.reshape(-1, len(KICKS), *momentum.shape[1:])
+    by_step = momentum.values.reshape(-1, len(KICKS), momentum.values.shape[1])
     change = (by_step[:, -1] - by_step[:, 0]) / step
-    return A + np.repeat(change, len(KICKS), axis=0), momentum if B is None else B + momentum, bool(change.any())
+    jumped = momentum.forces, momentum.freedoms, np.repeat(change, len(KICKS), axis=0)
+    of_rates = momentum.forces, momentum.freedoms + size, momentum.values
+    return changes([by, jumped, of_rates], size, len(by.values)), bool(change.any())
 
 
 def _along(system: Oscillator, orbit: Orbit, turns: float, steps: int) -> tuple[Array, Array, Array]:
@@ -161,14 +164,15 @@ def kicks(system: Oscillator, turns: float, steps: int) -> Array:
     return 2.0 * math.pi * kick_times(np.linspace(0.0, turns, steps + 1)).reshape(-1, 1) / np.array(system.turns)
 
 
-def strengths(linear: Linear, A: Array) -> Array:
+def strengths(linear: Linear, by: Changes) -> Array:
     """(n,) how much the largest derivatives of the forces change each mode's stiffness, relative to it."""
-    size, places = np.abs(A).max(axis=0), np.abs(linear.places)
-    return np.asarray(np.einsum("ni,ij,nj->n", places, size, places) / linear.squares)
+    by, places = by.of_freedoms(linear.size), np.abs(linear.places)
+    size = np.abs(by.values).max(axis=0, initial=0.0)
+    return np.asarray((places[:, by.forces] * size * places[:, by.freedoms]).sum(axis=1) / linear.squares)
 
 
 def around(
-    system: Oscillator, speed: float, A: Array, B: Array | None, kept: BoolArray, span: Window, *, damped: bool = True
+    system: Oscillator, speed: float, by: Changes, kept: BoolArray, span: Window, *, damped: bool = True
 ) -> ComplexArray:
     """Return the multipliers for given derivatives of the forces at `kicks`, the largest modulus first.
 
@@ -178,10 +182,8 @@ def around(
         The oscillator, for its linear part.
     speed : float
         Speed of the drive (rad/s).
-    A : ndarray, shape (S, m, m)
-        Derivatives of the forces with the freedoms.
-    B : ndarray, shape (S, m, m), or None
-        Derivatives with their rates; None: there are none.
+    by : Changes
+        Derivatives of the forces.
     kept : ndarray of bool, shape (n,)
         Modes that are integrated; the others yield as they do at rest.
     span : Window
@@ -194,25 +196,31 @@ def around(
     multipliers : ndarray of complex, shape (2 n,)
         Of shape (1,) and NaN if the growth over `span` and over half of it disagree.
     """
-    linear, m = system.linear, system.linear.size
+    linear = system.linear
     second = 2.0 * math.pi / abs(speed)  # of one turn
     stages = len(KICKS)
-    edges = np.linspace(0.0, span.turns * second, len(A) // stages + 1)
-    places, tilts = linear.places[kept], linear.tilts[kept]
+    edges = np.linspace(0.0, span.turns * second, len(by.values) // stages + 1)
+    places, others = linear.places[kept], linear.places[~kept]
     D = linear.damping if damped else np.zeros_like(linear.damping)
+    pushed, rows = np.unique(by.forces, return_inverse=True)
+    seen, columns = np.unique(by.freedoms, return_inverse=True)
+    of_freedoms = seen < linear.size
+    both = np.zeros((len(by.values), len(pushed), len(seen)))
+    both[:, rows, columns] = by.values
     # what the other modes yield at once: u = P y + R f, f = A u
-    static = linear.places[~kept].T @ (linear.places[~kept] / linear.squares[~kept, None])
-    A = A @ np.linalg.inv(np.eye(m) - static @ A)
-    both = np.concatenate([A, np.zeros_like(A) if B is None else B], axis=2).reshape(-1, stages, m, 2 * m)
-    none = np.zeros_like(places)
-    reads = np.block([[places, none], [none, places]])
+    yields = others[:, seen[of_freedoms]].T @ (others[:, pushed] / linear.squares[~kept, None])
+    A = both[:, :, of_freedoms]
+    both[:, :, of_freedoms] = np.linalg.solve(np.eye(len(pushed)) - A @ yields, A)
+    both = both.reshape(len(both) // stages, stages, len(pushed), len(seen))
+    reads = places[:, seen % linear.size]
+    reads = np.vstack([reads * of_freedoms, reads * ~of_freedoms])
     free = linear.squares[~kept], np.diag(D)[~kept]
     with np.errstate(over="ignore", invalid="ignore"):
-        turning = speed * tilts @ linear.gyroscopic @ tilts.T
-        constant = flow(linear.squares[kept], D[np.ix_(kept, kept)] - turning, edges[-1])
+        among = np.ix_(kept, kept)
+        constant = flow(linear.stiffness(speed)[among], (D - speed * linear.gyroscopic)[among], edges[-1])
 
         def map_over(first: int, last: int) -> Array:
-            return monodromy(constant, edges[first : last + 1], places, reads, both[first:last])
+            return monodromy(constant, edges[first : last + 1], places[:, pushed], reads, both[first:last])
 
         if span.half is None:
             return _sorted(map_over(0, len(edges) - 1), free, edges[-1])

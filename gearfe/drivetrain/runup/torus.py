@@ -53,20 +53,30 @@ class Lattice(NamedTuple):
     residue: IntArray  # (K + 1,) k . g
     place: IntArray  # (K + 1,) line of the transform
     conjugate: BoolArray  # (K + 1,) which stand there as the conjugate
+    plain: bool  # whether they stand in their own order, none as the conjugate: those of one phase
 
     def synthesis(self, amplitudes: ComplexArray) -> Array:
         """(S, m) values of ``Re sum a_k exp(i k theta)``."""
         samples, count = len(self.theta), len(amplitudes)
-        flip = self.conjugate[:count]
         spectrum = np.zeros((samples // 2 + 1, amplitudes.shape[1]), dtype=complex)
-        spectrum[self.place[:count]] = np.where(flip[:, None], amplitudes.conj(), amplitudes) * (0.5 * samples)
+        if self.plain:
+            spectrum[:count] = amplitudes * (0.5 * samples)
+            spectrum[0] *= 2.0
+            return np.asarray(np.fft.irfft(spectrum, samples, axis=0))
+        spectrum[self.place[:count]] = amplitudes * (0.5 * samples)
+        flipped = self.place[:count][self.conjugate[:count]]
+        if len(flipped):
+            spectrum[flipped] = spectrum[flipped].conj()
         spectrum[0] *= 2.0
         return np.asarray(np.fft.irfft(spectrum, samples, axis=0))
 
     def analysis(self, values: Array) -> ComplexArray:
         """(K + 1, ...) complex amplitudes of values (S, ...)."""
-        made = (np.fft.rfft(values, axis=0) * (2.0 / len(values)))[self.place]
+        lines = np.fft.rfft(values, axis=0)
+        made = (lines[: len(self.place)] if self.plain else lines[self.place]) * (2.0 / len(values))
         made[0] *= 0.5
+        if self.plain:
+            return np.asarray(made)
         np.conjugate(made, out=made, where=self.conjugate.reshape(-1, *[1] * (made.ndim - 1)))
         return np.asarray(made)
 
@@ -142,5 +152,7 @@ def _searched(periods: tuple[float, ...], count: int) -> Lattice:
                 residue = (waves @ step) % samples
                 theta = 2.0 * math.pi * ((np.arange(samples)[:, None] * step) % samples) / samples
                 conjugate = 2 * residue > samples
-                return Lattice(theta, residue, np.where(conjugate, samples - residue, residue), conjugate)
+                place = np.where(conjugate, samples - residue, residue)
+                plain = bool((place == np.arange(len(place))).all() and not conjugate.any())
+                return Lattice(theta, residue, place, conjugate, plain)
         samples = next_fast_len(math.ceil(MORE * samples) + 1, real=True)

@@ -197,8 +197,12 @@ class CurveFlank(MeshFlank):
         begin : ndarray, optional
             Not used: a curve has no pair forces.
         """
-        k, slope = self.curve(phase)
         bears = self.bears(phase, approach)
+        if not bears.any() and self.error is None and self.tilting is None:
+            none = np.zeros(len(phase))
+            damper = {"per_rate": none, "momentum": none, "push": none} if self.damping > 0.0 else {}
+            return FlankForces(none, none, none, ~bears, bears, **damper)
+        k, slope = self.curve(phase)
         late, rise = (0.0, 0.0) if self.error is None else self.error(phase)
         along: dict[str, Any] = {}
         if self.tilting is not None:
@@ -390,11 +394,6 @@ class TrainForces:
     flanks: tuple[Flank, ...]
     torques: tuple[tuple[int, TimeFunction], ...]
     speed_torques: tuple[SpeedTorque, ...] = ()
-
-    @property
-    def couples(self) -> tuple[Gyro, ...]:
-        """Gyroscopic moments and Coriolis forces: those of the gyros that grow with rates."""
-        return tuple(gyro for gyro in self.gyros if gyro.polar)
 
     def of_flanks(self, t: Array, u: Array, du: Array) -> list[FlankForces]:
         """Forces of each flank at the times t (n,), u and du of shape (n, directions)."""

@@ -1,9 +1,10 @@
 r"""Misalignment of the gears in mesh under the steady torques: what shafts, bearings and housing yield.
 
-With the mean stiffness of the meshes the train at rest solves :math:`K q = f`, f the torques that it carries in the
-end, on the flanks that statics press. Gears are rigid discs: their tilts :math:`\theta_1` of the driver and
-:math:`\theta_2` of the driven gear are those of the sections at the middles of their faces. With the axis a and n the
-direction of the force on the driven gear,
+With the mean stiffness of the meshes the train solves :math:`K q = f`, f the torques that it carries in the end, on the
+flanks that statics press: at rest, but in planetary stages with the centrifugal forces of the planets at the speed in
+the end. Gears are rigid discs: their tilts :math:`\theta_1` of the driver and :math:`\theta_2` of the driven gear are
+those of the sections at the middles of their faces. With the axis a and n the direction of the force on the driven
+gear,
 
 .. math::
     \gamma = (\theta_1 - \theta_2)\cdot(a\times n), \qquad \gamma_\perp = (\theta_1 - \theta_2)\cdot n
@@ -195,7 +196,7 @@ class TiltingTrain:
         """
         model, operating = self.model, self.model.operating
         T, stiffness = model.modal.T, self._stiffness
-        force = factor * _steady_push(model) - self.rows.T @ moments
+        force = factor * _steady_push(model) + _thrown(model) - self.rows.T @ moments
         if operating.bearings:
             point = operating_point(operating.geometry, self._motions, stiffness, T, force)
             q = point.coordinates
@@ -218,7 +219,7 @@ class TiltingTrain:
     def _stiffness(self) -> Array:
         """Of all parts but rolling bearings, held where the train is driven, shape (size, size)."""
         model = self.model
-        stiffness = model.system.stiffness + model.back_flanks
+        stiffness = model.system.stiffness + _changed(model)
         for name, state in model.operating.bearings.items():
             stiffness = stiffness - self._motions[name].T @ state.stiffness @ self._motions[name]
         return stiffness + _held(model)
@@ -231,6 +232,16 @@ def _held(model: TrainModel) -> Array:
         return np.zeros((len(row), len(row)))
     seen = model.modal.T.T @ row
     return np.asarray(largest / float(seen @ seen) * np.outer(row, row))
+
+
+def _changed(model: TrainModel) -> Array:
+    """What the stiffness (size, size) of the running train has more than that of its system."""
+    return np.asarray(model.back_flanks - model.steady_speed**2 * model.turning.stiffening)
+
+
+def _thrown(model: TrainModel) -> Array:
+    """Centrifugal forces (size,) of planets at the speed in the end."""
+    return np.asarray(model.steady_speed**2 * model.turning.thrown)
 
 
 def _steady_push(model: TrainModel) -> Array:
@@ -252,15 +263,16 @@ def _solved(K: Array, forces: Array) -> Array | None:
 
 
 def static_state(model: TrainModel) -> Array | None:
-    """Coordinates of the system (size,) at rest under the steady torques; None where these move it freely.
+    """Coordinates of the system (size,) under the steady torques; None where these move it freely.
 
     With rolling bearings they are those of the operating point: their stiffness there does not hold from no load on.
     """
     if model.operating.bearings:
         return model.operating.coordinates
     modal = model.modal
-    push = modal.constant + modal.T.T @ (model.preload + _steady_push(model))
-    y = _solved(np.diag(modal.eigenvalues) + modal.T.T @ (model.back_flanks + _held(model)) @ modal.T, push[:, None])
+    changed = _changed(model) + _held(model)
+    push = modal.constant + modal.T.T @ (model.preload + _steady_push(model) + _thrown(model) - changed @ modal.origin)
+    y = _solved(np.diag(modal.eigenvalues) + modal.T.T @ changed @ modal.T, push[:, None])
     return None if y is None else np.asarray(modal.origin + modal.T @ y[:, 0])
 
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,6 +56,17 @@ from .shaft_sections import ShaftSections, shaft_sections
 MOST_DENOMINATOR = 1000
 #: Eigenvalues below this part of the largest one are those of free rotation, and round-off.
 FREE = 1e-11
+
+
+class Turning(NamedTuple):
+    """Forces on the coordinates of a system that grow with the speed of the drive, in small motions beside rolling.
+
+    They are gyroscopic moments, and Coriolis and centrifugal forces of the frames of carriers.
+    """
+
+    gyroscopic: Array  # (size, size) of rates, times the speed
+    stiffening: Array  # (size, size) of coordinates, times its square
+    thrown: Array  # (size,) constant ones, times its square
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -242,6 +254,18 @@ class TrainModel(Facts):
         return np.asarray(np.einsum("nbij,nbkj->nbki", turns, vectors))
 
     @cached_property
+    def turning(self) -> Turning:
+        """What turns, for unit speed of the drive."""
+        size = self.system.size
+        gyroscopic, stiffening, thrown = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
+        for gyro in self.forces.gyros:
+            first, second = self.directions[:, gyro.direction : gyro.direction + 2].T
+            gyroscopic += gyro.polar * gyro.ratio * (np.outer(second, first) - np.outer(first, second))
+            stiffening += gyro.stiffening * (np.outer(first, first) + np.outer(second, second))
+            thrown += gyro.stiffening * gyro.offset * first
+        return Turning(gyroscopic, stiffening, thrown)
+
+    @cached_property
     def sections(self) -> ShaftSections | None:
         """Cross-sections of the elastic shafts; None without any."""
         return shaft_sections(self.train, self.placed)
@@ -313,9 +337,10 @@ def _operating_point(train: GearTrain) -> OperatingPoint:
     for item in model.train.bearings:
         if item.bore in motions:
             stiffness -= motions[item.bore].T @ item.stiffness_matrix @ motions[item.bore]
-    stiffness += model.back_flanks
+    speed, turning = model.steady_speed, model.turning
+    stiffness += model.back_flanks - speed**2 * turning.stiffening
     end = model.load_end
-    force = model.preload
+    force = model.preload + speed**2 * turning.thrown
     for load in train.loads:
         force += _acts(train, load, placed) * float(replace(load.torque, sines=())(end))
     return operating_point(bearings, motions, stiffness, model.modal.T, force)

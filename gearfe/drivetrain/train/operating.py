@@ -7,7 +7,8 @@ The coordinates q that the constraints allow minimise the energy
 K the stiffness of housing, shafts and meshes (mean stiffness, along the flanks that the loads press), :math:`V_b` the
 energy of a rolling bearing under the motion :math:`R_b q` of its shaft against its bore, f the torques of the loads at
 their end. The energy is convex; Newton's method finds its minimum. There every bearing has its load and its tangent
-stiffness, which is that of the linear train from then on. Weights, speeds and friction are left out.
+stiffness, which is that of the linear train from then on. In planetary stages K and f have the centrifugal forces of
+the planets. Weights, other effects of speed, and friction are left out.
 """
 
 from __future__ import annotations
