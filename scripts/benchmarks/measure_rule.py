@@ -327,20 +327,19 @@ def timed(scene: Scene, method: str, patience: float) -> tuple[float, str]:
     return least, name
 
 
-HEAD = """# The rule of `auto`: measurements
+HEAD = """# Integrator selection: measurements
 
-`method = "auto"` takes collocation where the fastest decay d exceeds {over:g} times the fastest vibration w, and d
-times the duration T exceeds {decayed:g}, in trains {modal:g} ([the rule](../integrators.md)). This page compares that
-rule with both methods.
+On {count} scenes with two methods, `method = "auto"` takes at most {worst:.2f} times the time of the better method. It
+selects collocation if the fastest decay rate d exceeds {over:g} times the fastest vibration w, and d times the
+duration T exceeds {decayed:g}, in trains {modal:g} ([the rule](../integrators.md)).
 
-`scripts/benchmarks/measure_rule.py` writes the table: processor seconds at the same tolerance, kernels loaded before,
-the least of three runs where these are short. "> x" means: ended after x seconds, or earlier without reaching the
-end. Flexible links have one method only (a dash). On {count} scenes with two methods the rule takes at most
-{worst:.2f} times the better one, whole calls included. The numbers of the rule were not chosen on the scenes called
-"held out".
+`scripts/benchmarks/measure_rule.py` writes the table. Times are processor seconds at the same tolerance with compiled
+kernels, the least of three runs if these are short. "> x" means that the run was stopped after x seconds, or ended
+early. Flexible links have only one method (a dash). The numbers of the rule were not chosen on the scenes
+"held out". Times are those of whole calls.
 
-At the bound the methods cost the same only on the average: a damped bar takes 4 ms by series and 13 ms by collocation,
-a linkage of 81 bodies 0.3 s and 0.13 s.
+The bound gives equal times only on average: a damped bar takes 4 ms by series and 13 ms by collocation, a linkage of
+81 bodies 0.3 s and 0.13 s.
 
 | kind | scene | d/w | d T | taylor (s) | implicit (s) | the rule takes | times the better |
 |---|---|---|---|---|---|---|---|

@@ -27,7 +27,7 @@ PEERS: tuple[tuple[str, str, dict[str, str], str, dict[str, int]], ...] = (
 )
 HEAD = """# Accuracy and time
 
-Everything on this page was measured by one command and written by another; do it again with
+One command measures the values on this page, and another writes it:
 
 ```
 python scripts/benchmarks/benchmark.py all --out {folder}
@@ -77,12 +77,11 @@ def _machine(state: dict[str, Any]) -> list[str]:
     gone = ", ".join(name for name, value in versions.items() if value == "missing")
     lines = [
         f"{machine['processor']}, {machine['cores']} cores, {machine['memory_GiB']} GiB, {machine['system']}; "
-        f"one thread a "
-        f"program. {told}." + (f" Not installed: {gone}." if gone else ""),
-        "CPU: processor time, smallest of several runs; wall: elapsed time of the quickest run.",
+        f"one thread per program. {told}." + (f" Not installed: {gone}." if gone else ""),
+        "CPU is processor time, the smallest of several runs; wall is the elapsed time of the quickest run.",
     ]
     if state["quick"]:
-        lines.append("**These are the small settings of a smoke run: they prove nothing about speed.**")
+        lines.append("**These are the small settings of a smoke run, which say nothing about speed.**")
     return lines
 
 
@@ -126,13 +125,12 @@ def summary(tables: dict[str, list[Row]]) -> list[str]:
             rows.append((title, f"{exponent(own, x, y):.2f}", goal))
     if not rows:
         return []
-    head = ["| what | measured | wanted |", "|---|---|---|"]
+    head = ["| comparison | measured | target |", "|---|---|---|"]
     note = (
-        "Times faster: for every run of the other program that came to a result, the quickest run of this one "
-        "with an error that "
-        "is not larger; the range over its runs, worst for us first."
+        "Each run of another program is compared with the quickest run of gearfe whose error is not larger. "
+        "The range is over the runs of that program, with the smallest factor first."
     )
-    return ["## In short", "", note, "", *head, *(f"| {a} | {b} | {c} |" for a, b, c in rows), ""]
+    return ["## Summary", "", note, "", *head, *(f"| {a} | {b} | {c} |" for a, b, c in rows), ""]
 
 
 def _faster(rows: list[Row], peer: str, time: str) -> str:

@@ -91,15 +91,14 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "references",
         "Against references",
-        "Largest difference from every reference there is, and what was promised. Differences of stiffness, "
-        "frequencies and "
+        "Largest difference from every reference, with the target. Differences of stiffness, frequencies and "
         "pressures are relative.",
         {
-            "what": ("what", PLAIN),
+            "what": ("quantity", PLAIN),
             "reference": ("reference", PLAIN),
             "values": ("values", digits),
             "difference": ("difference", digits),
-            "promised": ("promised", digits),
+            "promised": ("target", digits),
             "note": ("note", PLAIN),
         },
         "references",
@@ -108,7 +107,7 @@ SECTIONS: tuple[Section, ...] = (
         "sweep_sizes",
         "Mesh stiffness: element size and law",
         "Shipped pair, 40 positions at 0.05 deg, against the converged curve (`nitsche` at `coarsen` 0.35). Meshes "
-        "come from the cache; the mesher's seconds stand beside.",
+        "come from the cache; the seconds of the mesher are in a separate column.",
         {
             "law": ("law", PLAIN),
             "coarsen": ("`coarsen`", digits),
@@ -123,14 +122,12 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "sweep_peers",
         "Mesh stiffness: other programs",
-        "Sharp 20/30 pair at 4 deg and 0.05 deg of twist, on meshes with the same flanks (theirs: three fine "
-        "teeth a gear, the "
-        "others coarse). Time of one position with its set-up, and of a sweep of 40 (theirs: 40 positions). "
-        "Error: from "
-        "its own finest mesh, for this program from its converged value; the last column tells how far all of "
-        "them are from "
-        "this program's converged value. CalculiX and GetFEM take finite strain in full and any geometry, friction and "
-        "plasticity; this program its first order, frictionless, spur gears only.",
+        "Sharp 20/30 pair at 4 deg and 0.05 deg of twist, on meshes with the same flanks (other programs: three "
+        "fine teeth per gear, the others coarse). Times are for one position with its set-up, and for a sweep of "
+        "40 (other programs: 40 positions). Errors of other programs are from their own finest mesh, those of "
+        "gearfe from its converged value. The last column is the distance of all of them from the converged value "
+        "of gearfe. CalculiX and GetFEM include complete finite strain and allow any geometry, friction and "
+        "plasticity. gearfe includes finite strain to first order, frictionless, for spur gears.",
         {
             "program": ("program", PLAIN),
             "coarsen": ("`coarsen`", digits),
@@ -149,8 +146,8 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "sweep_verification",
         "Mesh stiffness: whole gears",
-        "One position at small strain on gears condensed to their flanks, and on whole gears with all unknowns at "
-        "once (`gearfe.gears.contact.whole_gears`), the same elements.",
+        "One position at small strain, on gears condensed to their flanks and on whole gears with all unknowns at "
+        "once (`gearfe.gears.contact.whole_gears`), with the same elements.",
         {
             "model": ("model", PLAIN),
             "coarsen": ("`coarsen`", digits),
@@ -170,7 +167,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "sweep_positions",
         "Mesh stiffness: number of positions",
-        "Distinct positions in one mesh cycle; set-up not counted.",
+        "Distinct positions in one mesh cycle, without set-up.",
         {
             "positions": ("positions", digits),
             **COST,
@@ -182,8 +179,8 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "sweep_twists",
         "Mesh stiffness: load",
-        "Default settings (the half-plane law), 18 positions: error against the same law at `coarsen` 0.35; and how "
-        "far it is from Nitsche's law on that mesh, where its elements resolve the contact.",
+        "Default settings (the half-plane law), 18 positions. Errors are against the same law at `coarsen` 0.35. "
+        "Another column is the difference from Nitsche's law on that mesh, if its elements resolve the contact.",
         {
             "twist_deg": ("twist (deg)", digits),
             "error_on_path": ("error on the path", percent),
@@ -200,7 +197,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "sweep_kinematics",
         "Mesh stiffness: small and finite strain",
-        "What the first-order effect of finite strain costs and changes.",
+        "Cost and effect of first-order finite strain.",
         {
             "kinematics": ("kinematics", PLAIN),
             "twist_deg": ("twist (deg)", digits),
@@ -213,15 +210,12 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "mechanism_tolerance",
         "Mechanisms: integrators, tolerances and other programs",
-        "Largest error of all angles over the run against binary128; milliseconds of CPU after a first call, "
-        "outputs at the "
-        "reference's times included. exudyn: the tolerance is the step as a part of the run. CVODE and scipy "
-        "integrate the "
-        "index-1 equations in seven absolute angles (two for the slider crank), compiled by numba, IDA the "
-        "stabilised index-2 "
-        "ones: less work than the general bodies and joints that this program takes. On the slider crank they "
-        "leave the "
-        "branch at the fold. They integrate any differential equation, exudyn any multibody system.",
+        "Largest error of all angles over the run against binary128; milliseconds of CPU after a first call, with "
+        "outputs at the times of the reference. For exudyn the tolerance is the step relative to the run. CVODE "
+        "and scipy integrate the index-1 equations in seven absolute angles (two for the slider crank), compiled "
+        "by numba, and IDA the stabilised index-2 equations. These are simpler than the general bodies and joints "
+        "of gearfe. On the slider crank they leave the branch at the fold. They integrate any differential "
+        "equation, exudyn any multibody system.",
         {
             "mechanism": ("mechanism", PLAIN),
             "program": ("program", PLAIN),
@@ -239,9 +233,9 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "mechanism_flexible",
         "Mechanisms with a flexible link: tolerances, and exudyn's cables",
-        "Largest differences to exudyn's extrapolated references (tests/data); its own errors of elements and the "
-        "shear and rotary inertia that its cables lack are part of them. Position of the slider or tip (m) or of the "
-        "crank (rad), deflection in the middle as a part of its largest. CPU seconds after a first call.",
+        "Largest differences from exudyn's extrapolated references (tests/data). They include exudyn's own errors "
+        "of elements, and the shear and rotary inertia that its cables lack. Position of the slider or tip (m) or "
+        "of the crank (rad); deflection in the middle relative to its largest. CPU seconds after a first call.",
         {
             "mechanism": ("mechanism", PLAIN),
             "program": ("program", PLAIN),
@@ -292,15 +286,14 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "housing_sizes",
         "Housing: mesh",
-        "Mesh to reduced body (40 modes, one level of corrections, assembly included); largest error of the "
-        "first 20 frequencies "
-        "against the thinnest elements (last row), and largest error that the estimate tells. "
-        "Times are without mesher and estimate.",
+        "From mesh to reduced body (40 modes, one level of corrections, assembly included). Largest error of the "
+        "first 20 frequencies against the thinnest elements (last row), and largest estimated error. Times are "
+        "without mesher and estimate.",
         {
             "size_mm": ("size (mm)", digits),
             "unknowns": ("unknowns", digits),
             "error": ("error", percent),
-            "told": ("told", percent),
+            "told": ("estimated error", percent),
             **COST,
         },
         "housing",
@@ -309,12 +302,11 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "housing_peers",
         "Housing: other programs on the same mesh",
-        "40 modes with clamped bores on the stored mesh. exudyn gets this program's matrices and adds static "
-        "shapes; CalculiX "
-        "reads the mesh and adds nothing to the modes (its error is against the 4-point mass it uses).",
+        "40 modes with clamped bores on the stored mesh. exudyn gets the matrices of gearfe and adds constraint "
+        "modes. CalculiX reads the mesh and computes modes only (its error is against the 4-point mass it uses).",
         {
             "program": ("program", PLAIN),
-            "what": ("what", PLAIN),
+            "what": ("task", PLAIN),
             "unknowns": ("unknowns", digits),
             "error": ("error", digits),
             **COST,
@@ -338,12 +330,11 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "transient_tolerance",
         "Gear train: integrators, tolerances and other programs",
-        "7 ms of the shipped train; largest error of all contact forces and accelerations, each against its own "
-        "maximum, from a run at 1e-12. Variant parting: a resonance, teeth apart for a sixth of the time; "
-        "scipy restarts at each touch. "
-        "The others get the same right-hand side in the same modal coordinates, compiled. They run the "
-        "damped variants alone, chosen after trials on the undamped one (on a busy machine: scipy DOP853 1.3e-4 in "
-        "0.66 s, LSODA 4.0e-3 in 0.21 s, CVODE 5.8e-5 in 7.1 s; this program 1.2e-6 in 0.018 s).",
+        "7 ms of the shipped train. Largest error of all contact forces and accelerations, each relative to its "
+        "maximum, from a run at 1e-12. Variant parting: a resonance, teeth apart for a sixth of the time; scipy "
+        "restarts at each contact. The other programs get the same right-hand side in the same modal coordinates, "
+        "compiled. They run only the damped variants. Trials on the undamped one, on a busy machine, were: scipy "
+        "DOP853 1.3e-4 in 0.66 s, LSODA 4.0e-3 in 0.21 s, CVODE 5.8e-5 in 7.1 s; gearfe 1.2e-6 in 0.018 s.",
         {
             "variant": ("variant", PLAIN),
             "program": ("program", PLAIN),
@@ -363,9 +354,9 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "transient_modes",
         "Gear train: modes of the housing",
-        "Operating variant, against 160 modes: largest error of the contact forces; rms error of the spectra of the "
-        "attachments' accelerations, sampled every 2.5 us, below 5 kHz and below 14 kHz, half the sampling frequency "
-        "of the shipped job.",
+        "Operating variant, against 160 modes: largest error of the contact forces, and rms error of the spectra "
+        "of the attachments' accelerations. They are sampled every 2.5 us and compared below 5 kHz and below 14 "
+        "kHz, half the sampling frequency of the shipped job.",
         {
             "modes": ("modes", digits),
             "unknowns": ("unknowns", digits),
@@ -379,9 +370,10 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "runup_peers",
         "Gear train: steady running",
-        "One speed of the shipped train in steady running: largest error of the contact forces over a period, from a "
-        "transient of 0.8 s at 1e-10. Harmonic balance from rest, or one of 201 speeds of a run-up; the others "
-        "integrate the same right-hand side, compiled, from rest over the span and are looked at over its last period.",
+        "One speed of the shipped train in steady running: largest error of the contact forces over a period, "
+        "against a transient of 0.8 s at 1e-10. gearfe uses harmonic balance from rest, or takes one of 201 speeds "
+        "of a run-up. The other programs integrate the same right-hand side, compiled, from rest over the span; "
+        "their last period is compared.",
         {
             "variant": ("variant", PLAIN),
             "speed": ("speed (rad/s)", digits),
@@ -399,9 +391,9 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "cold",
         "Whole commands",
-        "What a user waits for: fresh processes, one thread, the smallest of three runs; compiled kernels, meshes, "
-        "curves and housings are in the cache, or kernels alone, or nothing (then the kernels are compiled, too). "
-        "Beside it, where measured, an earlier state.",
+        "Total time of a command: fresh processes, one thread, the smallest of three runs. The cache holds "
+        "compiled kernels, meshes, curves and housings, or only kernels, or nothing (then the kernels are compiled "
+        "as well). Where measured, an earlier state is given for comparison.",
         {
             "what": ("command", PLAIN),
             "cached": ("in the cache", PLAIN),
@@ -415,11 +407,10 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "skipped",
         "What is skipped",
-        "Processor seconds with the omission and without it; the result is the same (`tests/project/test_skipped.py` "
-        "also proves that "
-        "the skipped thing is not touched).",
+        "Processor seconds with the omission and without it. The result is the same "
+        "(`tests/project/test_skipped.py` also proves that the omitted part is not used).",
         {
-            "what": ("what", PLAIN),
+            "what": ("task", PLAIN),
             "skipped_s": ("skipped (s)", digits),
             "not_skipped_s": ("not skipped (s)", digits),
             "times": ("times", digits),
