@@ -13,7 +13,7 @@ class _Spring:
     """A torsional spring with its damper."""
 
     stiffness_Nm_per_rad: float = quantity(above=0.0, doc="torsional stiffness (N m/rad)")
-    damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of the damper beside it (N m s/rad)")
+    damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of the parallel damper (N m s/rad)")
 
 
 @dataclass(frozen=True)

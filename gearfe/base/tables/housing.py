@@ -24,8 +24,8 @@ class ShaftAxisTable:
     x_mm: float = quantity(doc="x of the shaft axis (mm)")
     z_mm: float = quantity(0.0, doc="z of the shaft axis (mm)")
     bore_radius_mm: float = quantity(10.0, low=0.01, doc="radius of the bores (mm)")
-    boss_radius_mm: float = quantity(15.0, above=0.0, doc="outer radius of the bosses round the bores (mm)")
-    boss_height_mm: float = quantity(10.0, low=0.0, doc="how far the bosses stand proud of the outer wall faces (mm)")
+    boss_radius_mm: float = quantity(15.0, above=0.0, doc="outer radius of the bosses around the bores (mm)")
+    boss_height_mm: float = quantity(10.0, low=0.0, doc="height of the bosses above the outer wall faces (mm)")
     walls: str = quantity(
         "both", choices=("both", "plus", "minus"), doc="walls that are bored: both, plus (+y), minus (-y)"
     )
@@ -97,7 +97,7 @@ class HousingMeshTable:
         "the largest edge",
     )
     file: str | None = quantity(
-        None, doc="mesh of the user's own: .msh, .vtu, .inp, .bdf, .med, ... (or .step), beside the job file"
+        None, doc="mesh file: .msh, .vtu, .inp, .bdf, .med, ... (or .step), next to the job file"
     )
     unit: str = quantity("mm", choices=("mm", "cm", "m", "in"), doc="unit of the coordinates in that file")
     axes: tuple[str, str, str] = quantity(
@@ -115,7 +115,8 @@ class HousingMeshTable:
         None,
         low=1000,
         high=2_000_000,
-        doc="refine the file's tetrahedra where they err most, up to so many unknowns (three a node); left out: not",
+        doc="refine the file's tetrahedra where their error is largest, up to about this number of unknowns "
+        "(three per node); left out: no refinement",
     )
 
     def check(self, where: str) -> None:
@@ -138,12 +139,12 @@ UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 25.4e-3}
 
 @dataclass(frozen=True)
 class MeshBoreTable:
-    """A bore of a mesh of the user's own: a cylinder, or a group."""
+    """A bore of a mesh file: a cylinder, or a group."""
 
     name: str | None = quantity(None, doc="of the attachment, by default its number from 1 on")
     group: str | None = quantity(None, doc="named group of its nodes or faces in the mesh, or point_mm and radius_mm")
     point_mm: tuple[float, float, float] | None = quantity(
-        None, doc="a point on the axis (mm); beside a group its reference point, which may then be no cylinder"
+        None, doc="a point on the axis (mm); with group: its reference point; the group then need not be a cylinder"
     )
     direction: tuple[float, float, float] = quantity((0.0, 1.0, 0.0), doc="along the axis, of any length")
     radius_mm: float | None = quantity(None, above=0.0, doc="radius (mm)")
@@ -194,7 +195,7 @@ class AttachmentTable:
 
 @dataclass(frozen=True)
 class SuperelementTable:
-    """Matrices of another program in place of a mesh."""
+    """Matrices of another program instead of a mesh."""
 
     stiffness: str = quantity(
         doc="file of the stiffness: Matrix Market, matrices or substructure of Abaqus, DMIG, OUTPUT2 or OUTPUT4"
@@ -286,10 +287,10 @@ class HousingTable:
     damping: HousingDampingTable = quantity(HousingDampingTable, doc="[housing.damping]")  # noqa: RUF009
     bores: tuple[MeshBoreTable, ...] = quantity((), doc="[[housing.bores]]: bores of a mesh of the user's own")
     held: tuple[HeldTable, ...] = quantity((), doc="[[housing.held]]: held faces of such a mesh; none: a free body")
-    body: str | None = quantity(None, doc="reduced body (housing.npz of gearfe housing) in place of all this")
+    body: str | None = quantity(None, doc="reduced body (housing.npz of gearfe housing) instead of mesh or parameters")
 
     superelement: SuperelementTable | None = quantity(  # noqa: RUF009
-        None, doc="matrices of another program in place of all this"
+        None, doc="matrices of another program instead of mesh or parameters"
     )
 
     def check(self, where: str) -> None:

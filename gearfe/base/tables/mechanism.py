@@ -35,7 +35,7 @@ class BodyTable:
     rate_rad_per_s: float = quantity(0.0, doc="start angular velocity in rad/s")
     points_m: dict[str, Pair] = quantity(dict, doc="named points in the body's frame, [x, y] in m")
     flexible: bool | None = quantity(None, doc="false takes a link with beam or plate as rigid (default: flexible)")
-    beam: BeamTable | None = quantity(None, doc="beam of a flexible link, in place of mass, inertia and centre")
+    beam: BeamTable | None = quantity(None, doc="beam of a flexible link, instead of mass, inertia and centre")
     plate: PlateTable | None = quantity(None, doc="plane finite elements of a flexible link, likewise")
 
     @property
@@ -129,7 +129,7 @@ Load = float | FunctionTable | str
 class ValueTableTable:
     """[tables.NAME]: a function for expressions, from two columns of a CSV file."""
 
-    file: str = quantity(doc="CSV file with a header, beside the mechanism file")
+    file: str = quantity(doc="CSV file with a header, next to the mechanism file")
     x: str = quantity(doc="column of the argument, rising")
     y: str = quantity(doc="column of the value")
     interpolation: str = quantity(
@@ -165,7 +165,7 @@ class JointTable:
     )
     crossed: bool = quantity(False, doc="a crossed belt: the pulleys turn in opposite senses")
     coordinate: str | None = quantity(
-        None, choices=("angle", "rate", "x", "y"), doc="what is prescribed, or follows a cam"
+        None, choices=("angle", "rate", "x", "y"), doc="prescribed coordinate, or the one that follows a cam"
     )
     profile: str | None = quantity(None, doc="table of a cam's lift in m (or rad) over its angle in rad")
     motion: Function | None = quantity(None, doc="rad, rad/s or m: a number or a function of time")
@@ -282,7 +282,7 @@ class FigureTable:
 
     curves: tuple[str, ...] = quantity((), doc="names of outputs to draw (default: all)")
     reference: str | None = quantity(
-        None, doc="CSV file with a column t or time_s (s) and reference columns, beside the job file"
+        None, doc="CSV file with a column t or time_s (s) and reference columns, next to the job file"
     )
     reference_columns: dict[str, str] = quantity(dict, doc="output name = column of the reference file")
     every: int = quantity(10, low=1, doc="draw each so manyth reference point")

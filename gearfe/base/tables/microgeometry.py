@@ -31,7 +31,7 @@ class WavinessTable:
     """A wave on the flanks of all teeth, which goes on from tooth to tooth."""
 
     amplitude_um: float = quantity(doc="amplitude (um)", low=0.0)
-    waves: int = quantity(doc="whole waves round the gear", low=1, high=100_000)
+    waves: int = quantity(doc="whole waves around the gear", low=1, high=100_000)
     phase_deg: float = quantity(0.0, doc="phase (deg)")
 
 

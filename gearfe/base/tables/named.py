@@ -55,14 +55,14 @@ class NamedMeshTable(TrainMeshTable):
     )
     misalignment_from_shafts: bool = quantity(
         False,
-        doc="true: shafts, bearings and housing of the train tilt the gears as the torque bends them, beside the "
-        "tilts above; for gearfe stiffness and gearfe loadmap",
+        doc="true: shafts, bearings and housing of the train tilt the gears as the torque bends them, in addition "
+        "to the tilts above; for gearfe stiffness and gearfe loadmap",
     )
     stiffness: StiffnessTable | None = quantity(  # noqa: RUF009
-        None, doc="keys of this mesh that win over those of [stiffness]: load, positions, contact law, sizes"
+        None, doc="keys of this mesh that override those of [stiffness]: load, positions, contact law, sizes"
     )
     loadmap: LoadMapTable | None = quantity(  # noqa: RUF009
-        None, doc="keys of this mesh that win over those of [loadmap]: torques and angles"
+        None, doc="keys of this mesh that override those of [loadmap]: torques and angles"
     )
 
 

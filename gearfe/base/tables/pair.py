@@ -137,7 +137,7 @@ class GearBodyTable(ToothFormTable):
     )
     rim: str | None = quantity(
         None,
-        doc="how the outer diameter of an internal gear is held: bolted (rigid all round, the default) or free "
+        doc="how the outer diameter of an internal gear is held: bolted (rigid, the default) or free "
         "(elastic; its mean displacement and turn are held)",
         choices=RIMS,
     )
@@ -154,14 +154,14 @@ class GearBodyTable(ToothFormTable):
     form_diameter_mm: float | None = quantity(
         None,
         doc="root form diameter of an internal gear (mm), from which a circular fillet leads to the root circle; left "
-        "out: the root is what the cutter makes it",
+        "out: the root follows from the cutter",
     )
     pitch_diameter_mm: float | None = quantity(None, doc="reference diameter (mm), instead of module_mm")
     tip_diameter_mm: float | None = quantity(None, doc="tip diameter (mm), instead of addendum and tip_shortening")
     root_diameter_mm: float | None = quantity(None, doc="root diameter (mm), instead of dedendum")
     span_mm: float | None = quantity(
         None,
-        doc="span size over span_teeth teeth, of an internal gear over so many spaces, W_k (mm), instead of "
+        doc="span size over span_teeth teeth, of an internal gear over as many spaces, W_k (mm), instead of "
         "tooth_thinning_um",
     )
     span_teeth: int | None = quantity(None, doc="number of teeth k of span_mm", low=2)

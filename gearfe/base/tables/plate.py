@@ -18,7 +18,7 @@ class InterfaceTable:
     centre_m: Pair | None = quantity(None, doc="centre of a round hole, [x, y] in m")
     radius_m: float | None = quantity(None, above=0.0, doc="its radius in m; an outline gets the hole")
     edge_m: tuple[Pair, Pair] | None = quantity(
-        None, doc="in place of a hole a straight part of the edge, its two ends"
+        None, doc="instead of a hole: a straight part of the edge, given by its two ends"
     )
 
     def check(self, where: str) -> None:
@@ -57,12 +57,12 @@ class PlateTable:
     holes_m: tuple[tuple[float, float, float], ...] = quantity(
         (), doc="further round holes, [[x, y, radius], ...] in m"
     )
-    mesh: str | None = quantity(None, doc="in place of an outline a file of triangles, beside the mechanism file")
+    mesh: str | None = quantity(None, doc="instead of an outline: a file of triangles, next to the mechanism file")
     mesh_unit_m: float = quantity(1.0, above=0.0, doc="length of the mesh file's unit in m: 0.001 for mm")
     element_size_m: float | None = quantity(
         None, above=0.0, doc="edge of the elements of an outline in m (default: area / perimeter)"
     )
-    modes: int = quantity(4, low=1, high=40, doc="vibrations with the interfaces held that count, beside static shapes")
+    modes: int = quantity(4, low=1, high=40, doc="vibrations with the interfaces held, in addition to static shapes")
     frame: str = quantity(
         "chord", choices=("chord", "start"), doc="frame of deflections: through the first two interfaces, or the first"
     )

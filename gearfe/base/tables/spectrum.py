@@ -18,7 +18,7 @@ class MeasuredTable:
         doc="CSV with time_s or frequency_Hz and acceleration_m_per_s2, or a universal file (.uff, .unv: dataset 58)"
     )
     attachment: int | str = quantity(doc="attachment that it was measured at")
-    name: str = quantity("measured", doc="what the picture calls it")
+    name: str = quantity("measured", doc="its name in the picture")
     number: int = quantity(1, low=1, doc="which data set of a universal file")
 
 

@@ -29,7 +29,7 @@ class DistributionTable:
         "1328-1",
     )
     count: int | None = quantity(None, low=2, high=100_000, doc="even steps from low to high for a factorial design")
-    tolerance: float = quantity(0.0, low=0.0, doc="+- of manufacture: a search tells the outputs at its ends")
+    tolerance: float = quantity(0.0, low=0.0, doc="+- of manufacture: a search reports the outputs at its ends")
     also: tuple[str, ...] = quantity((), doc="dotted names of further keys that take the same value")
 
     def check(self, where: str) -> None:
@@ -75,7 +75,8 @@ class StudyTable:
 
     job: str = quantity(choices=KINDS, doc="kind of job, the name of its command (a microgeometry is a loadmap)")
     base: str | None = quantity(
-        None, doc="job file that is varied, beside this one; left out: this file, whose other tables are the job"
+        None,
+        doc="job file that is varied, next to this one; left out: the job is in the other tables of this file",
     )
     mesh: str | None = quantity(None, doc="mesh of a stiffness or loadmap job that has several, by its name")
     design: str = quantity(

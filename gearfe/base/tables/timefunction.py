@@ -39,7 +39,7 @@ class TrainFunctionTable:
     points: tuple[tuple[float, float], ...] = quantity(
         (), doc="list of [time (ms), value]; the first and the last value hold before and after"
     )
-    csv: str | None = quantity(None, doc="or a CSV file with the columns time_ms and value, beside the job file")
+    csv: str | None = quantity(None, doc="or a CSV file with the columns time_ms and value, next to the job file")
     interpolation: str = quantity(
         "linear", choices=("linear", "cubic"), doc="between points: straight lines, or monotone cubics"
     )
@@ -69,7 +69,7 @@ class SpeedFunctionTable:
         (), doc="list of [speed (rad/s), torque (N m)]; the first and the last torque hold below and above"
     )
     csv: str | None = quantity(
-        None, doc="or a CSV file with the columns speed_rad_per_s and torque_Nm, beside the job file"
+        None, doc="or a CSV file with the columns speed_rad_per_s and torque_Nm, next to the job file"
     )
     interpolation: str = quantity(
         "cubic", choices=("linear", "cubic"), doc="between points: straight lines, or monotone cubics"

@@ -141,7 +141,10 @@ class ShaftTable:
         None, low=1, high=500, doc="of an elastic shaft: beam elements; left out: as that frequency needs"
     )
     damping_ratio: float = quantity(
-        0.0, low=0.0, below=1.0, doc="of an elastic shaft: damping ratio of its own modes, beside [train.damping]"
+        0.0,
+        low=0.0,
+        below=1.0,
+        doc="of an elastic shaft: damping ratio of its modes, in addition to [train.damping]",
     )
 
     carrier: str | None = quantity(
@@ -149,13 +152,13 @@ class ShaftTable:
     )
     speed_ratio: float | str | None = quantity(
         None,
-        doc='its rotation is prescribed: so many times the speed of the drive, a number or a fraction as "-1/3"; '
+        doc='its rotation is prescribed as a multiple of the speed of the drive, a number or a fraction as "-1/3"; '
         "0: it is fixed; left out: it follows from gears and couplings",
     )
     holding_stiffness_Nm_per_rad: float | None = quantity(
         None, above=0.0, doc="of a torsional spring to that rotation (N m/rad); left out: rigid"
     )
-    holding_damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of the damper beside it (N m s/rad)")
+    holding_damping_Nm_s_per_rad: float = quantity(0.0, low=0.0, doc="of the parallel damper (N m s/rad)")
 
     @property
     def guided(self) -> Fraction | None:
@@ -318,10 +321,10 @@ class TrainMeshTable:
     )
     roughness_um: float | None = quantity(None, above=0.0, doc="mean Ra of both gears' flanks, for that")
     oil_factor: float | None = quantity(None, above=0.0, doc="X_L for that; left out: 1, mineral oil")
-    curve: str | None = quantity(None, doc="CSV file with pinion_angle_deg and k_mesh_N_per_m, beside the job file")
+    curve: str | None = quantity(None, doc="CSV file with pinion_angle_deg and k_mesh_N_per_m, next to the job file")
     mesh_table: str | None = quantity(
         None,
-        doc="CSV file of stiffness and static transmission error over a pitch, beside the job file: "
+        doc="CSV file of stiffness and static transmission error over a pitch, next to the job file: "
         "fraction_of_pitch or driver_angle_deg, k_mesh_N_per_m or k_mesh_N_per_um, and "
         "transmission_error_unloaded_um, or transmission_error_loaded_um with mesh_force_N or torque_driven_Nm",
     )
@@ -393,14 +396,14 @@ class TrainDriveTable:
     )
     machine: str = quantity("", doc="machine of that shaft which is driven; left out: the shaft itself")
     speed_rad_per_s: float | TrainFunctionTable = quantity(  # noqa: RUF009
-        doc="about +y (rad/s), or a function of time; beside torque_Nm the nominal one"
+        doc="about +y (rad/s), or a function of time; with torque_Nm: the nominal speed"
     )
     torque_Nm: float | TrainFunctionTable | None = quantity(  # noqa: RUF009
         None, doc="torque about +y (N m), or a function of time; left out: the speed is prescribed"
     )
     torque_over_speed: SpeedFunctionTable | None = quantity(  # noqa: RUF009
         None,
-        doc="torque about +y over the true speed of shaft or machine (N m over rad/s), beside or without torque_Nm",
+        doc="torque about +y over the true speed of shaft or machine (N m over rad/s), with or without torque_Nm",
     )
     torque_slope_Nm_s_per_rad: float = quantity(
         0.0, low=0.0, doc="by how much that torque falls with the speed beyond speed_rad_per_s (N m s/rad)"
@@ -453,10 +456,10 @@ class TrainLoadTable:
     )
     torque_over_speed: SpeedFunctionTable | None = quantity(  # noqa: RUF009
         None,
-        doc="torque about +y over the true speed of shaft or machine (N m over rad/s), beside or without torque_Nm",
+        doc="torque about +y over the true speed of shaft or machine (N m over rad/s), with or without torque_Nm",
     )
     orders: tuple[tuple[float, float, float], ...] = quantity(
-        (), doc="sines beside it that follow the speed: list of [order, amplitude (N m), phase (deg)]"
+        (), doc="additional sines that follow the speed: list of [order, amplitude (N m), phase (deg)]"
     )
     mesh: str = quantity(
         "",
@@ -569,7 +572,7 @@ class TrainVariantTable:
 
     curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.variants.NAME.curves]")  # noqa: RUF009
     damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.variants.NAME.damping]")  # noqa: RUF009
-    stiffness: StiffnessTable | None = quantity(None, doc="keys that win over those of [stiffness]")  # noqa: RUF009
+    stiffness: StiffnessTable | None = quantity(None, doc="keys that override those of [stiffness]")  # noqa: RUF009
 
 
 @dataclass(frozen=True)
@@ -598,7 +601,7 @@ class TrainTable:
     carriers: tuple[TrainCarrierTable, ...] = quantity((), doc="[[train.carriers]]; or [carriers.NAME]")
     curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.curves]")  # noqa: RUF009
     damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.damping]")  # noqa: RUF009
-    variant: str = quantity("", doc="variant that is simulated when none is asked for; left out: [train] as it stands")
+    variant: str = quantity("", doc="variant that is simulated if none is requested; left out: none")
     variants: dict[str, TrainVariantTable] = quantity(dict, doc="[train.variants.NAME]")  # noqa: RUF009
 
     def check(self, where: str) -> None:

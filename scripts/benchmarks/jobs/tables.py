@@ -370,10 +370,10 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "runup_peers",
         "Gear train: steady running",
-        "One speed of the shipped train in steady running: largest error of the contact forces over a period, "
-        "against a transient of 0.8 s at 1e-10. gearfe uses harmonic balance from rest, or takes one of 201 speeds "
-        "of a run-up. The other programs integrate the same right-hand side, compiled, from rest over the span; "
-        "their last period is compared.",
+        "One speed of the shipped train in steady running. The error is the largest of the contact forces over a "
+        "period, against a transient of 0.8 s at 1e-10. gearfe uses harmonic balance from rest, or takes one of 201 "
+        "speeds of a run-up. The other programs integrate the same right-hand side, compiled, from rest over the "
+        "span; their last period is compared.",
         {
             "variant": ("variant", PLAIN),
             "speed": ("speed (rad/s)", digits),
