@@ -52,6 +52,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "results of two or three runs over each other: curves, spectra, differences with their errors",
         "gearfe compare out/pair/stiffness out/other/stiffness",
     ),
+    "report": (
+        "one page of all results of a job, to print or to send: gears, results, errors, pictures",
+        'gearfe report gearbox.toml --author "A. Designer"',
+    ),
     "study": (
         "one job in many cases: parameters, designs, statistics, sensitivities; goes on where it was interrupted",
         "gearfe study study.toml --jobs 2",

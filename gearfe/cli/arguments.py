@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..base.config import JobFile, check_range, fields_of, type_hints
 from ..base.errors import InputError, MissingLibraryError, nearest, unknown_name
+from ..base.tables.report import ReportTable
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -34,6 +35,8 @@ METAVARS_OF_FILES = {"job": "JOB.toml", "study": "STUDY.toml"}
 #: Formats of ``--format`` beside CSV; their writers are in `gearfe.output.exchange.tables`.
 FORMATS = ("npz", "h5", "mat", "uff")
 REPORT = "report.html"
+#: Keys of [report] that options stand for: option -> key.
+HEADING = {"report_title": "title", "author": "author", "remark": "remark", "report_date": "date"}
 
 _NUMBER = re.compile(r"-(\d|\.\d|inf|nan)", re.IGNORECASE)
 
@@ -257,10 +260,16 @@ def add_folder(parser: argparse.ArgumentParser) -> None:
         help=f"tables also as tables.NAME: {', '.join(FORMATS)}, or several, as mat,h5 (default: csv alone)",
     )
     parser.add_argument(
-        "--report", action="store_true", help=f"pictures, figures, tables and job in one page, {REPORT}"
+        "--report", action="store_true", help=f"gears, results, errors, pictures and job in one page, {REPORT}"
     )
+    add_heading(parser)
     add_json(parser)
     add_pictures(parser)
+
+
+def add_heading(parser: argparse.ArgumentParser) -> None:
+    """Options of the heading of a report."""
+    add_keys(parser, ReportTable, **HEADING)
 
 
 def add_pictures(parser: argparse.ArgumentParser) -> None:

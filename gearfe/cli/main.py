@@ -270,31 +270,40 @@ def _keep(folder: Path, names: list[str], parsed: argparse.Namespace, said: str,
     if not parsed.format and line is None:
         return []
     import shlex
-    import time
     from pathlib import Path
 
     from ..base.files import whole_set
     from ..output.exchange.tables import read_csv, write_tables
-    from ..output.report_page import PICTURES, Report, report_page
-    from .arguments import REPORT, job_of
 
     tables = {Path(name).stem: read_csv(folder / name) for name in names if name.endswith(".csv")}
     with whole_set(folder) as made:
         if parsed.format and tables:
             write_tables(made, tables, parsed.format)
         if line is not None:
-            job = job_of(parsed)
-            page = Report(
-                title=f"gearfe {line[0]}" + ("" if job is None else f": {Path(job).name}"),
-                command=shlex.join(["gearfe", *line]),
-                said=said,
-                summary=_summary(folder, names),
-                tables=tables,
-                pictures=[folder / name for name in names if Path(name).suffix in PICTURES],
-                job=("", "") if job is None else (str(job), Path(job).read_text(encoding="utf-8-sig")),
-            )
-            text = report_page(page, time.strftime("%Y-%m-%d %H:%M"))
-            (made / REPORT).write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+            from ..base.config import read_toml
+            from ..output.report_page import PICTURES, Run
+            from ..output.report_sheets import date_of, run_of
+            from ..output.results import kind_of, read_results
+            from .arguments import job_of
+            from .reporting import heading_of, write_report
+
+            job, command = job_of(parsed), shlex.join(["gearfe", *line])
+            raw = {} if job is None else read_toml(job)
+            if kind_of(folder) is not None:
+                run = run_of(read_results(folder, "--out"), command=command, said=said)
+            else:
+                pictures = [folder / name for name in names if Path(name).suffix in PICTURES]
+                run = Run(
+                    f"gearfe {line[0]}",
+                    command,
+                    said,
+                    summary=_summary(folder, names),
+                    tables=tables,
+                    pictures=pictures,
+                )
+            title = f"gearfe {line[0]}" + ("" if job is None else f": {Path(job).name}")
+            date = date_of(folder / names[0]) if names else ""
+            write_report(made, heading_of(parsed, raw, title, date), [run], raw, None if job is None else str(job))
         return sorted(path.name for path in made.iterdir())
 
 

@@ -1,8 +1,14 @@
-"""The report of a run: pictures, figures, tables, job and versions in one HTML file that opens without a network."""
+"""The report of one run or of a whole gearbox: one HTML file that opens offline and prints to a few pages.
+
+Job files, names and results come from strangers, so every text is escaped. There are no scripts and no external
+resources. What is needed for checking only (all figures, printed lines, first rows of the tables, the job file) is
+folded, and is not printed.
+"""
 
 from __future__ import annotations
 
 import base64
+import hashlib
 import html
 import math
 import platform
@@ -20,19 +26,97 @@ LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio", "numba", "h5py", 
 ROWS, ENTRIES = 10, 12
 PICTURES = {".png": "image/png", ".gif": "image/gif", ".svg": "image/svg+xml"}
 STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #1b1f24; background: #fff }
-body { max-width: 1060px; margin: 2em auto; padding: 0 1.5em }
-h1 { font-size: 1.6em; margin: 0 } h2 { font-size: 1.2em; margin: 2em 0 .5em; border-bottom: 1px solid #d0d7de }
-.under { color: #57606a; margin: .2em 0 1.5em } nav a { margin-right: 1.2em }
-figure { margin: 1.2em 0 } figure img { max-width: 100%; height: auto; border: 1px solid #e4e8ec }
+body { font: 15px/1.45 system-ui, sans-serif; color: #1b1f24; background: #fff }
+body { max-width: 1000px; margin: 2em auto; padding: 0 1.5em }
+h1 { font-size: 1.6em; margin: 0 } h2 { font-size: 1.25em; margin: 1.6em 0 .5em; border-bottom: 1px solid #d0d7de }
+h3 { font-size: 1em; margin: 1em 0 .3em }
+.under { color: #57606a; margin: .2em 0 .4em } .remark { margin: .4em 0 1em; white-space: pre-line }
+figure { margin: .8em 0 } figure img { max-width: 100%; height: auto }
 figcaption, summary { color: #57606a; font-size: .9em }
 table { border-collapse: collapse; font-size: .86em; font-variant-numeric: tabular-nums }
-td, th { border-bottom: 1px solid #e4e8ec; padding: .2em .9em .2em 0; text-align: left; vertical-align: top }
-.wide { overflow-x: auto } .wide td, .wide th { text-align: right } .wide td { white-space: nowrap }
+td, th { border-bottom: 1px solid #e4e8ec; padding: .15em .9em .15em 0; text-align: left; vertical-align: top }
+th { font-weight: 600 } td.n, th.n { text-align: right }
+.side { display: flex; flex-wrap: wrap; gap: 0 2.5em; align-items: flex-start } .side figure { flex: 1 1 420px }
+.wide { overflow-x: auto } .wide td { white-space: nowrap }
 pre { background: #f6f8fa; padding: .8em 1em; font-size: .84em; white-space: pre-wrap; overflow-wrap: anywhere }
-details { margin: .5em 0 } details table { margin-left: 1.2em }
-@media print { body { max-width: none; margin: 0 } figure, tr { break-inside: avoid } }
+details { margin: .4em 0 } details table { margin-left: 1.2em }
+@page { size: A4; margin: 15mm 14mm }
+@media print {
+  body { max-width: none; margin: 0; padding: 0; font-size: 9.5pt }
+  figure img { max-height: 88mm; width: auto } figure, tr, .side { break-inside: avoid }
+  h2, h3 { break-after: avoid } h2 { margin-top: .8em } details { display: none } .wide { overflow: visible }
+}
 """
+
+
+@dataclass(frozen=True)
+class Heading:
+    """Title, author, remark and date of a report."""
+
+    title: str
+    author: str = ""
+    remark: str = ""
+    date: str = ""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A table of a report.
+
+    Attributes
+    ----------
+    title
+        Above it.
+    head
+        Heads of the columns; empty for none.
+    rows
+        Cells as texts.
+    note
+        Below it.
+    """
+
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture: name, kind (MIME) and bytes."""
+
+    name: str
+    kind: str
+    content: bytes
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run in a report.
+
+    Attributes
+    ----------
+    title, command
+        Heading; the line that made the run, if it is known.
+    said
+        What the command printed.
+    sheets
+        Tables of results.
+    summary
+        All figures, as in the summary.
+    tables
+        Name -> columns; their first rows are folded.
+    pictures
+        Files.
+    """
+
+    title: str
+    command: str = ""
+    said: str = ""
+    sheets: Sequence[Sheet] = ()
+    summary: Mapping[str, Any] = field(default_factory=dict)
+    tables: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
+    pictures: Sequence[Path] = ()
 
 
 @dataclass(frozen=True)
@@ -41,63 +125,94 @@ class Report:
 
     Attributes
     ----------
-    title, command
-        Heading, and the line that made the run.
-    said
-        What the command printed.
-    summary
-        Figures, as in ``summary.json``.
-    tables
-        Name -> columns.
-    pictures
-        Files.
+    heading
+        Title, author, remark, date.
+    gears
+        Pictures and tables of the gears.
+    runs
+        The runs.
     job
-        Name and text of the job file.
+        Name and text of the job file; empty without one.
     """
 
-    title: str
-    command: str
-    said: str = ""
-    summary: Mapping[str, Any] = field(default_factory=dict)
-    tables: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
-    pictures: Sequence[Path] = ()
+    heading: Heading
+    gears: tuple[Sequence[Picture], Sequence[Sheet]] = ((), ())
+    runs: Sequence[Run] = ()
     job: tuple[str, str] = ("", "")
 
 
-def report_page(report: Report, made: str) -> str:
-    """The page.
+def picture_of(path: Path) -> Picture:
+    """A picture from a file."""
+    return Picture(path.name, PICTURES[path.suffix], path.read_bytes())
 
-    Parameters
-    ----------
-    report
-        Its content.
-    made
-        When, for the heading.
-    """
-    parts = {
-        "Results": f"<pre>{html.escape(report.said)}</pre>" if report.said else "",
-        "Pictures": "".join(map(_figure, report.pictures)),
-        "Numbers": _mapping(report.summary),
-        "Tables": "".join(_table(name, columns) for name, columns in report.tables.items()),
-        "Job": f"<p>{html.escape(report.job[0])}</p><pre>{html.escape(report.job[1])}</pre>" if report.job[1] else "",
-        "Versions": _mapping({**versions(LIBRARIES), "system": f"{platform.system()} {platform.machine()}"}),
-    }
-    parts = {name: text for name, text in parts.items() if text}
-    links = "".join(f'<a href="#{name.lower()}">{name}</a>' for name in parts)
-    body = "".join(f'<h2 id="{name.lower()}">{name}</h2>\n{text}\n' for name, text in parts.items())
-    title = html.escape(report.title)
+
+def report_page(report: Report) -> str:
+    """Return the page."""
+    pictures, sheets = report.gears
+    gears = "".join(map(_figure, pictures)) + "<div>" + "".join(map(_sheet, sheets)) + "</div>"
+    parts = [("Gears", f'<div class="side">{gears}</div>')] if pictures or sheets else []
+    parts += [(run.title, _run(run)) for run in report.runs]
+    parts.append(("Provenance", _provenance(report)))
+    body = "".join(f"<h2>{html.escape(name)}</h2>\n{text}\n" for name, text in parts)
+    heading = report.heading
+    title = html.escape(heading.title)
+    under = " &middot; ".join(html.escape(text) for text in (heading.author, heading.date) if text)
+    remark = f'<p class="remark">{html.escape(heading.remark)}</p>' if heading.remark else ""
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
         f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head>\n<body><h1>{title}</h1>'
-        f'<p class="under">{html.escape(made)} &middot; <code>{html.escape(report.command)}</code></p>'
-        f"<nav>{links}</nav>\n{body}</body></html>\n"
+        f'<p class="under">{under}</p>{remark}\n{body}</body></html>\n'
     )
 
 
-def _figure(path: Path) -> str:
-    data = base64.b64encode(path.read_bytes()).decode("ascii")
-    name = html.escape(path.name)
-    image = f'<img alt="{name}" src="data:{PICTURES[path.suffix]};base64,{data}">'
+def _run(run: Run) -> str:
+    """Tables and pictures of a run, and folded what is needed for checking."""
+    folded = {
+        "What the command printed": f"<pre>{html.escape(run.said)}</pre>" if run.said else "",
+        "All figures": _mapping(run.summary),
+        "Tables": "".join(_table(name, columns) for name, columns in run.tables.items()),
+    }
+    text = "".join(map(_sheet, run.sheets)) + "".join(_figure(picture_of(path)) for path in run.pictures)
+    if not run.sheets and run.said:
+        text = f"<pre>{html.escape(run.said)}</pre>{text}"
+        del folded["What the command printed"]
+    details = (f"<details><summary>{name}</summary>{inside}</details>" for name, inside in folded.items() if inside)
+    return text + "".join(details)
+
+
+def _provenance(report: Report) -> str:
+    """Versions, the job file with its hash, the commands."""
+    name, text = report.job
+    rows = {"program": f"gearfe {versions()['gearfe']}, {platform.system()} {platform.machine()}"}
+    if text:
+        rows |= {"job file": name, "its SHA-256": hashlib.sha256(text.encode("utf-8")).hexdigest()}
+    rows |= {f"command, {run.title}": run.command for run in report.runs if run.command}
+    libraries = f"<details><summary>Versions</summary>{_mapping(versions(LIBRARIES))}</details>"
+    job = f"<details><summary>Job file</summary><pre>{html.escape(text)}</pre></details>" if text else ""
+    return _mapping(rows) + libraries + job
+
+
+def _sheet(sheet: Sheet) -> str:
+    """A table with its title and note."""
+    head = "".join(f"<th{_right(i)}>{html.escape(cell)}</th>" for i, cell in enumerate(sheet.head))
+    rows = "".join(
+        "<tr>" + "".join(f"<td{_right(i)}>{html.escape(cell)}</td>" for i, cell in enumerate(row)) + "</tr>"
+        for row in sheet.rows
+    )
+    title = f"<h3>{html.escape(sheet.title)}</h3>" if sheet.title else ""
+    note = f'<p class="under">{html.escape(sheet.note)}</p>' if sheet.note else ""
+    return f'{title}<div class="wide"><table>{f"<tr>{head}</tr>" if head else ""}{rows}</table></div>{note}\n'
+
+
+def _right(column: int) -> str:
+    """Numbers stand to the right of the first column."""
+    return ' class="n"' if column else ""
+
+
+def _figure(picture: Picture) -> str:
+    data = base64.b64encode(picture.content).decode("ascii")
+    name = html.escape(picture.name)
+    image = f'<img alt="{name}" src="data:{picture.kind};base64,{data}">'
     return f"<figure>{image}<figcaption>{name}</figcaption></figure>\n"
 
 
@@ -114,11 +229,9 @@ def _mapping(values: Mapping[str, Any]) -> str:
 
 
 def _nested(value: Any) -> bool:
-    return isinstance(value, (Mapping, list)) and (isinstance(value, Mapping) or any(map(_nested_or_list, value)))
-
-
-def _nested_or_list(value: Any) -> bool:
-    return isinstance(value, (Mapping, list))
+    return isinstance(value, Mapping) or (
+        isinstance(value, list) and any(isinstance(x, (Mapping, list)) for x in value)
+    )
 
 
 def _value(value: Any) -> str:

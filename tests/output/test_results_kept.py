@@ -90,7 +90,7 @@ def test_the_report_holds_the_run_and_opens_offline(tmp_path, capsys):
     out, _ = told(capsys, *line)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "also written: report.html" in out
-    assert page.count("<img") == 1
+    assert page.count("<img") == 2  # the gears, the curve
     assert not re.search(r"(?:src|href)=\"(?!data:|#)", page)
     first = out.splitlines()[0]
     for part in (first, "pair.face_width_mm=12", "[pair.pinion]", "k_mesh_N_per_m", "numpy", "python"):

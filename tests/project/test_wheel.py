@@ -32,6 +32,7 @@ new box.toml
 gear pair.toml --export csv,step,brep
 stiffness pair.toml --fields 5 --angles 1 4 9 --coarsen 3 --report --format npz,h5,mat
 compare out/pair/stiffness out/pair/stiffness/stiffness.csv
+report pair.toml
 loadmap map.toml --positions 4 --set stiffness.coarsen=3 --set stiffness.torque_Nm=50
 loadmap relief.toml --set stiffness.coarsen=3 --torques-Nm 50
 study relief.toml --set study.cases=8 --set microgeometry.positions=4 --jobs 1 --no-pictures

@@ -45,6 +45,7 @@ LINES = {
     "runup": [["box.toml", *BOX, "--set", "runup={speed_start_rad_per_s=200,speed_stop_rad_per_s=210,speeds=2}"]],
     "study": [["study.toml", "--jobs", "2"], ["search.toml", "--jobs", "2"]],
     "compare": [["one.csv", "two.csv"]],
+    "report": [["gear_train.toml", "--results", "done"]],
     "new": [["vibration", "new.toml"]],
     "cache": [[]],
     "completion": [["bash"]],
@@ -88,7 +89,8 @@ def jobs(folder: Path) -> None:
         shutil.copy(path, folder)
     written(folder)
     (folder / "search.toml").write_text(SEARCH)
-    for name in ("one", "two"):
+    (folder / "done").mkdir()
+    for name in ("one", "two", "done/stiffness"):
         (folder / f"{name}.csv").write_text("pinion_angle_deg,k_mesh_N_per_m\n0,1e8\n9,2e8\n")
 
 

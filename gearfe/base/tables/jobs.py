@@ -35,6 +35,7 @@ TABLES: dict[str, str] = {
     "modes": "gearfe.base.tables.modes:ModesTable",
     "runup": "gearfe.base.tables.runup:RunUpTable",
     "spectrum": "gearfe.base.tables.spectrum:SpectrumTable",
+    "report": "gearfe.base.tables.report:ReportTable",
     "study": "gearfe.base.tables.study:StudyTable",
 }
 #: Tables of tables by name, [gears.NAME] and so on -> "module:class" of the dataclass of an entry. Like those above,

@@ -1,0 +1,17 @@
+"""Table ``[report]``: what stands at the head of a report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..config import quantity
+
+
+@dataclass(frozen=True)
+class ReportTable:
+    """Heading of a report."""
+
+    title: str = quantity("", doc="title; left out: the command and the job file")
+    author: str = quantity("", doc="author")
+    remark: str = quantity("", doc="remark under the heading")
+    date: str = quantity("", doc="date as it shall stand there; left out: that of the results")

@@ -1,0 +1,70 @@
+"""``gearfe report JOB.toml``: one page of all results of a job: stiffness, load map, vibration, run-up, rating."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .arguments import REPORT, add_heading, add_job, add_json, print_results
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_job(parser, "job", "job file")
+    parser.add_argument(
+        "--results",
+        metavar="DIR",
+        help="folder that holds the folders of results (default: out/JOB, as of all commands)",
+    )
+    parser.add_argument("--out", metavar="DIR", help="folder of report.html (default: that of the results)")
+    parser.set_defaults(format="csv")
+    add_heading(parser)
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Collect the results and write report.html."""
+    from ..base.config import read_toml
+    from ..base.errors import InputError
+    from ..base.files import output_folder, whole_set
+    from ..base.progress import stage
+    from ..output.report_sheets import PICTURES_OF_RUN, PICTURES_OF_SEVERAL, date_of, run_of
+    from ..output.results import KINDS, kind_of, read_results
+    from .reporting import heading_of, write_report
+
+    raw, job = read_toml(args.job), Path(args.job)
+    place = Path(args.results or Path("out") / job.stem)
+    folders = [
+        path
+        for path in (place, *sorted(place.glob("*")), *sorted(place.glob("*/*")))
+        if path.is_dir() and kind_of(path)
+    ]
+    if not folders:
+        known = ", ".join(kind.name for kind in KINDS)
+        raise InputError(
+            "--results", str(place), f"holds no results of {known}", f"run gearfe stiffness {job.name} first"
+        )
+    found = [
+        read_results(folder, "--results", "/".join(folder.relative_to(place).parts) or folder.name)
+        for folder in folders
+    ]
+    found.sort(
+        key=lambda results: (
+            [kind.name for kind in KINDS].index(results.kind.name) if results.kind.name != "rating" else -1
+        )
+    )
+    newest = max((results.path for results in found), key=lambda path: path.stat().st_mtime)
+    old = [results.name for results in found if results.path.stat().st_mtime < job.stat().st_mtime]
+    titles = {
+        results.name: f"{results.kind.title[:1].upper()}{results.kind.title[1:]} ({results.name})" for results in found
+    }
+    most = PICTURES_OF_RUN if len(found) == 1 else PICTURES_OF_SEVERAL
+    runs = [run_of(results, title=titles[results.name], most=most) for results in found]
+    folder = output_folder(args.out or place)
+    with whole_set(folder, (REPORT,)) as made, stage("report"):
+        heading = heading_of(args, raw, job.stem, date_of(newest))
+        write_report(made, heading, runs, raw, str(job))
+    lines = [f"{len(found)} runs: {', '.join(results.name for results in found)}"]
+    warnings = [f"{name} is older than the last change of {job.name}: run it again" for name in old]
+    print_results(lines, folder, [REPORT], {}, warnings)
+    return 0

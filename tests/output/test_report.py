@@ -1,0 +1,152 @@
+"""Reports: what stands in the page, that strangers' texts stay texts, and that nothing is fetched."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfe.base.files import write_csv, write_json
+from gearfe.cli.main import main
+from tests.places import GEOMETRY
+
+HOSTILE = '<script>alert(1)</script><img src="http://example.org/x.png" onerror="x()">'
+COARSE = ["--coarsen", "4", "--angles", "0", "3", "15"]
+
+
+class Page(HTMLParser):
+    """Tags, attributes and text of a page outside of what is folded."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.links: list[str] = []
+        self.printed = ""
+        self._folded = 0
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self._folded += tag == "details"
+        self.links += [value or "" for name, value in attrs if name in ("src", "href") or name.startswith("on")]
+
+    def handle_endtag(self, tag: str) -> None:
+        self._folded -= tag == "details"
+
+    def handle_data(self, data: str) -> None:
+        self.printed += "" if self._folded else data + " "
+
+
+def page_of(path: Path) -> Page:
+    return Page(path.read_text(encoding="utf-8"))
+
+
+def job(folder: Path, **keys: str) -> Path:
+    """The shipped job with a table [report]."""
+    path = folder / "box.toml"
+    table = "".join(f"{key} = '''{value}'''\n" for key, value in keys.items())
+    path.write_text(
+        (GEOMETRY / "gear_train.toml").read_text(encoding="utf-8") + f"\n[report]\n{table}", encoding="utf-8"
+    )
+    return path
+
+
+def test_a_stiffness_report(tmp_path: Path) -> None:
+    """Heading from the job and the options, gears, results with errors, provenance; texts of strangers stay texts."""
+    path = job(tmp_path, title=f"Title {HOSTILE}", remark=HOSTILE, author="nobody")
+    line = ["stiffness", str(path), "--out", str(tmp_path / "out"), *COARSE, "--report", "--author", f"A & B {HOSTILE}"]
+    assert main([*line, "--report-date", "2026-01-02"]) == 0
+    page = page_of(tmp_path / "out" / "report.html")
+    assert "script" not in page.tags
+    assert all(link.startswith("data:image/") for link in page.links)
+    assert page.tags.count("img") == 2
+    for part in (
+        f"Title {HOSTILE}", f"A & B {HOSTILE}", "2026-01-02", "number of teeth", "Young's modulus (GPa)",
+        "contact ratio",
+        "mean mesh stiffness", "±", "N/µm", "transmission error, peak to peak", "largest Hertzian pressure",
+        hashlib.sha256(path.read_text(encoding="utf-8").encode()).hexdigest(), "gearfe 0.1",
+    ):  # fmt: skip
+        assert part in page.printed, part
+    text = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "@page" in text
+    assert not re.search(r"url\(|@import|<link|<iframe", text)
+
+
+def test_a_report_of_all_results_of_a_job(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Runs in folders below, each with its table over load or speed; those older than the job are named."""
+    path = job(tmp_path, title="The box")
+    out = tmp_path / "results"
+    assert main(["stiffness", str(path), "--out", str(out / "stiffness"), *COARSE, "--no-pictures"]) == 0
+    speed = np.array([100.0, 200.0, 300.0])
+    (out / "runup").mkdir()
+    write_csv(
+        out / "runup" / "runup.csv", {"speed_rad_per_s": speed, "branch": [0, 0, 0], "dynamic_factor_1": 1e-2 * speed}
+    )
+    peak = {
+        "speed_rad_per_s": 200.0,
+        "mesh": "m",
+        "dynamic_factor": 2.0,
+        "order": "1 x mesh 1",
+        "frequency_Hz": 640.0,
+        "mode": HOSTILE,
+    }
+    write_json(out / "runup" / "summary.json", {"peaks": [peak], "largest_error_estimate": 1e-3})
+    (out / "loadmap").mkdir()
+    write_csv(out / "loadmap" / "loadmap.csv", {"torque_Nm": [50.0, 80.0], "pinion_angle_deg": [0.0, 0.0]})
+    table = {
+        "torque_Nm": [50.0, 80.0],
+        "transmission_error_peak_to_peak_um": [3.25, 4.5],
+        "root_stress_largest_pinion_MPa": [137.0, 211.0],
+    }
+    write_json(out / "loadmap" / "loadmap.json", {"by_torque": table, "root_stress_error_estimate": 0.003})
+    os.utime(out / "loadmap" / "loadmap.csv", (1e9, 1e9))
+    capsys.readouterr()
+    assert main(["report", str(path), "--results", str(out)]) == 0
+    said = capsys.readouterr()
+    assert "3 runs: loadmap, stiffness, runup" in said.out
+    assert "loadmap is older than the last change of box.toml" in said.err
+    page = page_of(out / "report.html")
+    for part in (
+        "The box",
+        "Results over the load",
+        "root stress, pinion (MPa)",
+        "137",
+        "root stress: error at worst 0.3 %",
+    ):
+        assert part in page.printed, part
+    for part in (
+        "Results over the speed",
+        "dynamic factor of mesh 1",
+        HOSTILE,
+        "640 Hz",
+        "0.1 %",
+        "Load map (loadmap)",
+    ):
+        assert part in page.printed, part
+    assert "script" not in page.tags
+
+
+def test_mistakes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = job(tmp_path)
+    assert main(["report", str(path), "--results", str(tmp_path)]) == 2
+    assert "run gearfe stiffness box.toml first" in capsys.readouterr().err
+    broken = tmp_path / "broken.toml"
+    shutil.copy(path, broken)
+    broken.write_text(broken.read_text(encoding="utf-8") + "autor = 'x'\n", encoding="utf-8")
+    assert main(["gear", str(broken), "--out", str(tmp_path / "g")]) == 2
+    assert "author" in capsys.readouterr().err  # the nearest key
+
+
+def test_a_report_without_gears(tmp_path: Path) -> None:
+    line = ["mechanism", str(GEOMETRY / "slider_crank.toml"), "--until", "0.1", "--out", str(tmp_path), "--no-pictures"]
+    assert main([*line, "--report", "--remark", "short run"]) == 0
+    page = page_of(tmp_path / "report.html")
+    assert "crank angle, at the end" in page.printed
+    assert "short run" in page.printed
+    assert "Gears" not in page.printed
