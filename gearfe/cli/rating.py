@@ -41,11 +41,24 @@ def run(args: argparse.Namespace) -> int:
 def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     """The rating of one mesh."""
     from ..base.config import read_toml
+    from ..base.errors import unknown_name
     from ..base.tables.jobs import job_tables, whole_gearbox
 
     raw = read_toml(args.job)
     table = _with_options(args, job_tables(raw, args.job, ("rating",))["rating"])
     box = whole_gearbox(raw, args.job)
+    if "train" in raw:
+        from ..base.tables.jobs import train_tables
+        from ..drivetrain.gearbox.job import train_job
+        from ..drivetrain.gearbox.mesh_loads import with_train
+
+        for kind, known in (("gears", box.gears), ("meshes", box.meshes)):
+            for name in getattr(table, kind):  # before names of the train are added
+                if name not in known:
+                    raise unknown_name(f"rating.{kind}", name, known)
+        names = mesh.driver.name, mesh.driven.name
+        train = train_job(args.job, train_tables(raw, args.job))
+        table = with_train(table, train, mesh.name, names, mesh.stiffness.torque_Nm is not None)
 
     from ..gears.geometry.pair import pair_of
     from ..gears.rating.rate import rate_mesh
@@ -76,13 +89,13 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
                 save(rating_picture(rating, found.get("computed", ())), made / "rating.png")
         write_json(made / "rating.json", found)
         write_csv(made / "rating.csv", dict(rating.columns()))
-        names = sorted(path.name for path in made.iterdir())
+        files = sorted(path.name for path in made.iterdir())
     lines = rating_lines(rating)
     if rows:
         from ..gears.gearmesh.rated import compared_lines
 
         lines += compared_lines(rows)
-    print_results(lines, folder, names, {}, found["warnings"])
+    print_results(lines, folder, files, {}, found["warnings"])
     return 0
 
 

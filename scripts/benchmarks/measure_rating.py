@@ -29,6 +29,8 @@ CASES: tuple[tuple[str, Any, dict[str, Any], dict[str, str]], ...] = (
         rated.HELICAL | rated.HELICAL_OIL | {"friction_coefficient": rated.HELICAL_FRICTION},
         rated.HELICAL_WITH_FRICTION,
     ),
+    ("planet and ring", rated.spur_ring, rated.SPUR_RING, rated.SPUR_RING_PRINTED),
+    ("planet and ring, first stage", rated.first_ring, rated.FIRST_RING, rated.FIRST_RING_PRINTED),
     ("example 1", rated.example_1, rated.EXAMPLE_1, rated.EXAMPLE_PRINTED),
 )
 

@@ -124,14 +124,39 @@ def test_files_without_the_table_or_the_speed(tmp_path: Path, capsys: pytest.Cap
     assert "speed_rpm" in capsys.readouterr().err
 
 
-def test_internal_gears_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_internal_gears(tmp_path: Path) -> None:
     job = FZG.with_name("internal.toml")
     line = ["rating", str(job), "--set", "rating.speed_rpm=1000", "--set", "rating.torque_Nm=100"]
-    assert main([*line, "--out", str(tmp_path / "out"), "--no-pictures"]) == 2
-    assert "is an internal gear" in capsys.readouterr().err
+    assert main([*line, "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
+    made = json.loads((tmp_path / "out" / "rating.json").read_text())
+    assert made["gears"] == {"gear_1": "planet", "gear_2": "ring"}
+    assert made["root"]["d_en_mm"]["value"]["ring"] < 0.0
     assert main(["gear", *line[1:], "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
     made = json.loads((tmp_path / "out" / "gear_pair.json").read_text())
     assert made["measures"]["ring"]["over_balls_mm"] < 0.0
+
+
+def test_loads_of_a_planetary_train(tmp_path: Path) -> None:
+    """Sun 17, planets 22, ring -61 with 7302 N m at the carrier at 1500 per minute: torques and speeds by Willis."""
+    job = tmp_path / "stage.toml"
+    text = (GEOMETRY / "planetary.toml").read_text().replace("torque_Nm = 530.0", "coarsen = 2.0")
+    job.write_text(text + "\n[rating]\nhardness = 700.0\n[rating.gears.planet]\nalternating_factor = 0.8\n")
+    assert main(["rating", str(job), "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
+    sun, ring = (
+        json.loads((tmp_path / "out" / name / "rating.json").read_text()) for name in ("sun_planet", "planet_ring")
+    )
+    torque, carrier = 7302.0 / (1.0 + 61.0 / 17.0), 1500.0 / (1.0 + 61.0 / 17.0)
+    assert sun["load"]["torque"] == pytest.approx(torque)
+    assert sun["load"]["speed"] == pytest.approx(1500.0 - carrier)
+    assert ring["load"]["torque"] == pytest.approx(torque / 3.0 * 22.0 / 17.0)
+    assert ring["load"]["speed"] == pytest.approx((1500.0 - carrier) * 17.0 / 22.0)
+    turns = 60.0 * 20_000.0
+    assert sun["flank"]["N_L"]["value"]["sun"] == pytest.approx(3.0 * turns * (1500.0 - carrier))
+    assert ring["flank"]["N_L"]["value"]["planet"] == pytest.approx(turns * (1500.0 - carrier) * 17.0 / 22.0)
+    assert ring["flank"]["N_L"]["value"]["ring"] == pytest.approx(3.0 * turns * carrier)
+    assert [sun["strength"][name]["alternating"] for name in ("sun", "planet")] == [1.0, 0.8]
+    assert ring["strength"]["ring"]["fixed"]
+    assert not ring["strength"]["planet"]["fixed"]
 
 
 def test_computed_values_beside_the_standard(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

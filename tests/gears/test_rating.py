@@ -7,6 +7,7 @@ import tomllib
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from gearfe import Gear, InputError
@@ -15,6 +16,7 @@ from gearfe.base.tables.examples import job_file
 from gearfe.base.tables.jobs import whole_gearbox
 from gearfe.base.tables.pair import MaterialTable
 from gearfe.base.tables.rating import RatingTable
+from gearfe.gears.geometry.cutter import ring_root
 from gearfe.gears.geometry.mesh_geometry import MeshGeometry
 from gearfe.gears.rating import root
 from gearfe.gears.rating.data import Strength, pair_data
@@ -29,12 +31,18 @@ from gearfe.gears.rating.stiffness import single_stiffness
 from tests.makers.rated import (
     EXAMPLE_1,
     EXAMPLE_PRINTED,
+    FIRST_RING,
+    FIRST_RING_PRINTED,
     HELICAL,
     HELICAL_PRINTED,
     SPUR,
     SPUR_PRINTED,
+    SPUR_RING,
+    SPUR_RING_PRINTED,
     example_1,
+    first_ring,
     helical_stage,
+    spur_ring,
     spur_stage,
     stage,
 )
@@ -92,6 +100,75 @@ def test_stiffness_and_mass_of_the_spur_stage() -> None:
     assert values["n_E1_per_min"] == pytest.approx(5357, rel=5e-4)
     assert values["N"] == pytest.approx(0.046, abs=5e-4)
     assert values["K_v"] == pytest.approx(1.02, abs=5e-3)
+
+
+# ---- planets and rings of the same gearbox ---------------------------------------------------------------------------
+
+#: K_v, K_Hbeta and C_R of the report have two or three digits, f_pb is rounded, and so are the speeds.
+RING_LOOSE = {
+    "c_prime_N_per_mm_um": 6e-4,
+    "c_gamma_alpha_N_per_mm_um": 6e-4,
+    "y_p_um": 2e-3,
+    "sigma_H_MPa": 1e-3,
+    "sigma_HG_MPa": 1e-4,
+    "sigma_F_MPa": 2e-3,
+    "sigma_FG_MPa": 2e-5,
+    "S_F": 2e-3,
+}
+
+
+@pytest.mark.parametrize(
+    ("pair", "table", "printed"),
+    [(spur_ring, SPUR_RING, SPUR_RING_PRINTED), (first_ring, FIRST_RING, FIRST_RING_PRINTED)],
+)
+def test_planets_and_rings_of_a_published_report(pair: Any, table: dict[str, Any], printed: dict[str, str]) -> None:
+    """Roots of rings by the equivalent rack of their cutter, 30 and 36 teeth, as the edition of 2006 has it."""
+    check(rate(pair(), table), printed, RING_LOOSE)
+
+
+@pytest.mark.parametrize(
+    ("pair", "table", "mass", "speed", "N"),
+    [(spur_ring, SPUR_RING, 1.4684, 993, 0.124), (first_ring, FIRST_RING, 2.4597, 1435, 0.028)],
+)
+def test_a_fixed_ring_has_an_infinite_mass(
+    pair: Any, table: dict[str, Any], mass: float, speed: float, N: float
+) -> None:
+    """m_red of the planet alone, n_E1 and N as the report prints them."""
+    values = found(rate(pair(), {key: value for key, value in table.items() if key != "dynamic_factor"}))
+    assert values["m_red_kg_per_mm"] == pytest.approx(mass, abs=6e-5)
+    assert values["n_E1_per_min"] == pytest.approx(speed, rel=8e-4)
+    assert values["N"] == pytest.approx(N, abs=6e-4)
+
+
+@pytest.mark.parametrize("pair", [spur_ring, first_ring])
+def test_the_root_of_a_ring_is_that_which_its_cutter_leaves(pair: Any) -> None:
+    """Edition of 2019: chord and radius where the tangents of the generated outline enclose 60 degrees with the tooth's
+    middle, found on the outline that the contact has.
+    """
+    mesh = pair()
+    curve = ring_root(mesh.wheel).curve
+    assert curve is not None
+    t = np.linspace(0.0, 1.0, 20001)
+    points, normals = curve.point(t), np.unwrap(np.angle(curve.normal(t)))
+    at = int(np.argmin(np.abs(normals - math.radians(30.0))))
+    form = root.tooth_form(pair_data(mesh), 1)
+    assert form.s_Fn == pytest.approx(2e3 * abs(points[at].imag), rel=1e-4)
+    arc = np.abs(points[at + 1] - points[at - 1]) / (normals[at + 1] - normals[at - 1])
+    assert form.rho_F == pytest.approx(1e3 * arc, rel=1e-3)
+
+
+def test_a_ring_without_a_cutter_is_refused() -> None:
+    mesh = spur_ring()
+    ring = replace(mesh.wheel, cutter_teeth=None, form_diameter=2.0055, dedendum=1.4)
+    with pytest.raises(InputError) as caught:
+        rate(MeshGeometry(mesh.pinion, ring, 0.584), SPUR_RING)
+    assert "cutter_teeth" in str(caught.value)
+
+
+def test_planets_that_share_evenly_are_pointed_out() -> None:
+    table = SPUR | {"mesh_load_factor": 1.0}
+    assert any("K_gamma = 1 for 3 mates: 1.1" in warning for warning in rate(spur_stage(), table).warnings)
+    assert not any("K_gamma" in warning for warning in rate(spur_stage(), SPUR).warnings)
 
 
 # ---- a helical stage of the same report ----------------------------------------------------------------------------

@@ -20,7 +20,9 @@ from tests.makers.rated import (
     HELICAL_SCUFFING,
     HELICAL_WITH_FRICTION,
     SPUR,
+    SPUR_RING,
     helical_stage,
+    spur_ring,
     spur_stage,
 )
 
@@ -51,13 +53,13 @@ def test_flash_temperature_as_printed_with_the_friction_that_it_implies() -> Non
 
 
 def test_flash_temperature_is_that_of_blok() -> None:
-    """1.11 mu w |v1 - v2|/((B1 sqrt v1 + B2 sqrt v2) sqrt(2 b)) with Hertz' half width b, here of spur gears.
+    """1.11 mu w |v1 - v2|/((B1 sqrt v1 + B2 sqrt v2) sqrt(2 b)) with Hertz' half width b, here of spur gears and rings.
 
     The specification rounds the constants of Blok and Hertz, 0.51 times 1.22 for 0.62134, and its angle factor, printed
     as 1.016, exceeds that of the force along the path by sqrt(cos(alpha_t)/cos(alpha_wt)).
     """
-    for pair in (spur_stage(),):
-        rating = rate(pair, SPUR_OIL | {"tip_relief_um": 500.0, "gears": {}})
+    for pair, table in ((spur_stage(), SPUR_OIL), (spur_ring(), SPUR_OIL | SPUR_RING)):
+        rating = rate(pair, table | {"tip_relief_um": 500.0, "gears": {}})
         heat, data = rating.scuffing, rating.pair
         assert heat is not None
         inside = slice(1, -1)  # without load at both ends
@@ -106,6 +108,23 @@ def test_the_driver_decides_on_which_side_contact_begins() -> None:
     right = forward.path.gamma > 0.01
     assert (forward.path.flash[left] > backward.path.flash[left]).all()
     assert (forward.path.flash[right] < backward.path.flash[right]).all()
+
+
+def test_a_path_beside_the_pitch_point_has_a_flash_temperature_alone() -> None:
+    """Planet and ring of the report touch on one side of the pitch point; H_V is the mean of share times sliding."""
+    rating = rate(spur_ring(), SPUR_OIL | SPUR_RING)
+    heat, pair = rating.scuffing, rating.pair
+    assert heat is not None
+    assert heat.Gamma_A > 0.0
+    assert heat.S_B > 1.0
+    assert heat.S_intS is None
+    one, two = rating.loss.eps
+    x = np.linspace(-two, one, 200_001)
+    share = np.where((x > one - 1.0) & (x < 1.0 - two), 1.0, 0.5)
+    mean = np.mean(share * np.abs(x)) * (one + two)
+    expected = 2.0 * math.pi * (pair.u + 1.0) / (pair.z[0] * pair.u) * mean
+    factor = rating.loss.H_V
+    assert factor == pytest.approx(expected, rel=1e-4)
 
 
 def test_viscosity_meets_that_of_the_data_sheet() -> None:

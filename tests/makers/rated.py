@@ -39,6 +39,37 @@ SPUR: dict[str, Any] = STAGES | {
     "face_load_factor": 2.06,
     "gears": {"pinion": {"mates": 3}, "wheel": {"alternating_factor": 0.7}},
 }
+#: Ring of both planetary stages: through-hardened steel, R_z 8 um.
+RING: dict[str, Any] = {
+    "mates": 3,
+    "fixed": True,
+    "material": "V",
+    "hardness": 240.0 / 0.95,  # HBW 240
+    "sigma_h_lim_MPa": 700.0,
+    "sigma_f_lim_MPa": 290.0,
+    "yield_strength_MPa": 1000.0,
+    "flank_roughness_um": 8.0,
+}
+#: Planet and ring of the spur stage: the force of its sun, 285,900.438 N, at the planet; K_v of the report.
+SPUR_RING: dict[str, Any] = STAGES | {
+    "torque_Nm": 285.900438 * 0.5 * 756.0,
+    "speed_rpm": (294.5 - 47.8) * 18.0 / 36.0,
+    "mesh_load_factor": 1.10,
+    "blank_factor": 0.862,
+    "dynamic_factor": 1.06,
+    "face_load_factor": 1.15,
+    "gears": {"pinion": {"alternating_factor": 0.7}, "wheel": RING},
+}
+#: Planet and ring of the first stage: sun of 19 teeth at 47.8 - 12.1 per minute with 999,650.9 N m.
+FIRST_RING: dict[str, Any] = STAGES | {
+    "torque_Nm": 999_650.9 / 3.0 * 17.0 / 19.0,
+    "speed_rpm": (47.8 - 12.1) * 19.0 / 17.0,
+    "mesh_load_factor": 1.10,
+    "blank_factor": 0.862,
+    "dynamic_factor": 1.05,
+    "face_load_factor": 1.15,
+    "gears": {"pinion": {"alternating_factor": 0.7}, "wheel": RING},
+}
 #: Helical stage: K_Hbeta is prescribed, the gears have webs of a quarter of the width and rims of five modules.
 HELICAL: dict[str, Any] = STAGES | {
     "torque_Nm": 40_953.0,
@@ -110,6 +141,44 @@ def spur_stage() -> MeshGeometry:
 def helical_stage() -> MeshGeometry:
     """Output stage: 24/95 teeth, module 14 mm, 10 degrees."""
     return stage((24, 95), 14.0, 10.0, 0.4800, 861.0, width=360.0, bores=(179.10, 1193.32), tip_mm=-0.938)
+
+
+def ring_stage(teeth: tuple[int, int], module: float, shift: float, distance: float, **more: Any) -> MeshGeometry:
+    """Planet and ring (mm): racks 1.25/0.38 and 1.25/0.30, tips of the planet altered by ``tip_mm``.
+
+    ``width``, ``bore`` and ``rim`` are diameters of the bodies, ``cutter`` the teeth of the ring's cutter.
+    """
+    planet = Gear(
+        teeth[0],
+        1e-3 * module,
+        ANGLE,
+        1e-3 * more["width"],
+        1e-3 * more["bore"],
+        profile_shift=shift,
+        rack_tip_radius=0.38,
+        tip_shortening=-more["tip_mm"] / module,
+    )
+    ring = Gear(
+        teeth[1],
+        1e-3 * module,
+        ANGLE,
+        1e-3 * more["width"],
+        rim_diameter=1e-3 * more["rim"],
+        profile_shift=shift_sum(sum(teeth), module, 0.0, -distance) - shift,
+        rack_tip_radius=0.30,
+        cutter_teeth=more["cutter"],
+    )
+    return MeshGeometry(planet, ring, 1e-3 * distance)
+
+
+def spur_ring() -> MeshGeometry:
+    """Planet and ring of the spur stage: 36/-93 teeth, module 21 mm."""
+    return ring_stage((36, -93), 21.0, 0.5039, 584.0, width=550.0, bore=576.96, rim=2148.82, tip_mm=-1.750, cutter=30)
+
+
+def first_ring() -> MeshGeometry:
+    """Planet and ring of the first stage of the same gearbox: 17/-56 teeth, module 45 mm."""
+    return ring_stage((17, -56), 45.0, 0.8021, 863.0, width=491.0, bore=408.99, rim=2994.24, tip_mm=-10.861, cutter=36)
 
 
 def example_1() -> MeshGeometry:
@@ -294,4 +363,75 @@ HELICAL_WITH_FRICTION: dict[str, str] = {
     "theta_M_C": "94.19",
     "theta_B_C": "169.50",
     "S_B": "4.156",
+}
+
+#: Planet and ring of the spur stage as printed.
+SPUR_RING_PRINTED: dict[str, str] = {
+    "c_prime_N_per_mm_um": "14.053",
+    "c_gamma_alpha_N_per_mm_um": "20.563",
+    "y_p_um": "3.142",
+    "K_Fbeta": "1.14",
+    "K_Halpha": "1.00",
+    "Z_H": "2.85",
+    "Z_E": "189.81",
+    "Z_eps": "0.891",
+    "Z_BD": "1.00 1.00",
+    "sigma_H0_MPa": "312.44",
+    "sigma_H_MPa": "404.76 404.76",
+    "Z_L": "1.038",
+    "Z_v": "0.961",
+    "Z_R": "1.026",
+    "Z_W": "1.000 1.135",
+    "Z_NT": "0.905 0.901",
+    "sigma_HG_MPa": "1388.39 732.21",
+    "S_H": "3.43 1.81",
+    "alpha_Fen_deg": "22.21 18.63",
+    "h_Fe_mm": "18.48 30.32",
+    "s_Fn_mm": "47.70 56.76",
+    "rho_F_mm": "8.69 8.78",
+    "Y_F": "1.01 1.20",
+    "Y_S": "2.48 2.34",
+    "sigma_F0_MPa": "61.98 69.12",
+    "sigma_F_MPa": "102.77 114.61",
+    "Y_delta_rel_T": "1.002 1.005",
+    "Y_R_rel_T": "0.957 0.957",
+    "Y_X": "0.840 0.904",
+    "Y_NT": "0.886 0.883",
+    "sigma_FG_MPa": "429.38 444.89",
+    "S_F": "4.18 3.88",
+}
+
+#: Planet and ring of the first stage as printed.
+FIRST_RING_PRINTED: dict[str, str] = {
+    "c_prime_N_per_mm_um": "13.289",
+    "c_gamma_alpha_N_per_mm_um": "16.063",
+    "y_p_um": "5.419",
+    "K_Fbeta": "1.12",
+    "K_Halpha": "1.00",
+    "Z_H": "2.71",
+    "Z_eps": "0.952",
+    "Z_BD": "1.00 1.00",
+    "sigma_H0_MPa": "588.62",
+    "sigma_H_MPa": "758.46 758.46",
+    "Z_L": "1.038",
+    "Z_v": "0.916",
+    "Z_R": "1.025",
+    "Z_W": "1.000 1.135",
+    "Z_NT": "0.937 0.940",
+    "sigma_HG_MPa": "1368.95 727.36",
+    "S_H": "1.80 0.96",
+    "alpha_Fen_deg": "29.87 19.59",
+    "h_Fe_mm": "49.53 78.40",
+    "s_Fn_mm": "104.13 129.40",
+    "rho_F_mm": "17.19 22.24",
+    "Y_F": "1.14 1.27",
+    "Y_S": "2.38 2.13",
+    "sigma_F0_MPa": "95.70 95.32",
+    "sigma_F_MPa": "154.50 153.89",
+    "Y_delta_rel_T": "1.005 1.003",
+    "Y_R_rel_T": "0.957 0.957",
+    "Y_X": "0.800 0.850",
+    "Y_NT": "0.906 0.907",
+    "sigma_FG_MPa": "419.35 429.14",
+    "S_F": "2.71 2.79",
 }

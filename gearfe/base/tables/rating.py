@@ -90,10 +90,19 @@ class GearRatingTable:
         None, above=0.0, doc="rim s_R below the roots (mm), for C_R and Y_B; left out: it is thick"
     )
     mates: int | None = quantity(
-        None, low=1, high=100, doc="mates that share its torque at the same time, as planets at a sun; by default 1"
+        None,
+        low=1,
+        high=100,
+        doc="mates that share its torque, as planets at a sun; left out: those of the train, else 1",
+    )
+    fixed: bool | None = quantity(
+        None, doc="true: held by the casing, as most rings of planetary stages; its mass counts as infinite in K_v"
     )
     alternating_factor: float | None = quantity(
-        None, above=0.0, high=1.0, doc="factor Y_M of the bending number, 0.7 for idlers and planets; by default 1"
+        None,
+        above=0.0,
+        high=1.0,
+        doc="factor Y_M of the bending number; left out: 0.7 for planets and idlers of a train, else 1",
     )
     thickness_allowances_um: tuple[float, float] | None = quantity(
         None, doc="upper and lower allowance of the tooth thickness (um), A_sne and A_sni, for the backlash"
@@ -118,7 +127,9 @@ class MeshRatingTable:
 
     torque_Nm: float | None = quantity(None, above=0.0, doc="torque at the driver (N m)")
     speed_rpm: float | None = quantity(
-        None, above=0.0, doc="speed of the driver (1/min); in planetary gears relative to the carrier"
+        None,
+        above=0.0,
+        doc="speed of the driver (1/min), in planetary gears relative to the carrier; left out: that of the train",
     )
     life_h: float | None = quantity(None, above=0.0, doc="required life (h), by default 20,000; not with a spectrum")
     application_factor: float | None = quantity(None, low=1.0, doc="application factor K_A, by default 1")

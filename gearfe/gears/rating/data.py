@@ -64,6 +64,8 @@ class Strength:
         b_s and s_R (mm), None: a solid disc, a thick rim.
     mates
         Mates that share its torque at the same time.
+    fixed
+        Whether the casing holds it.
     alternating
         Y_M.
     flank_ra
@@ -87,6 +89,7 @@ class Strength:
     web: float | None = None
     rim: float | None = None
     mates: int = 1
+    fixed: bool = False
     alternating: float = 1.0
     flank_ra: float = FLANK_ROUGHNESS / RZ_OVER_RA
     structure: float = 1.0
@@ -169,6 +172,7 @@ def strength_of(table: GearRatingTable, gear: Gear, edition: int, where: str, re
         web=table.web_thickness_mm,
         rim=table.rim_thickness_mm,
         mates=table.mates or 1,
+        fixed=bool(table.fixed),
         alternating=table.alternating_factor or 1.0,
         flank_ra=table.flank_ra_um or (table.flank_roughness_um or FLANK_ROUGHNESS) / RZ_OVER_RA,
         structure=table.structure_factor or 1.0,
@@ -313,7 +317,9 @@ def load_of(table: MeshRatingTable, where: str, torque: float | None = None) -> 
         cure = "add torque_Nm (N m at the driver) to [rating], or torque_Nm to [stiffness]"
         raise InputError(f"{where}.torque_Nm", None, "no torque is given", cure)
     if speed is None:
-        raise InputError(f"{where}.speed_rpm", None, "is required", "add the speed of the driver (1/min)")
+        raise InputError(
+            f"{where}.speed_rpm", None, "is required", "add the speed of the driver (1/min), or a table [train]"
+        )
     span, shaft = table.bearing_span_mm, table.shaft_diameter_mm
     if (span is None) != (shaft is None):
         lacking = "bearing_span_mm" if span is None else "shaft_diameter_mm"
@@ -371,6 +377,8 @@ class PairData:
         Common face width, and the widths that bear at the roots.
     eps_alpha, eps_beta
         Transverse contact ratio and overlap ratio.
+    cutter
+        Virtual number of teeth and profile shift of the pinion-type cutter of an internal gear 2; None: external gears.
     """
 
     z: tuple[int, int]
@@ -393,6 +401,7 @@ class PairData:
     b_F: tuple[float, float]
     eps_alpha: float
     eps_beta: float
+    cutter: tuple[float, float] | None = None
 
     @property
     def u(self) -> float:
@@ -409,6 +418,24 @@ class PairData:
         """Radius of relative curvature at the pitch point, transverse (mm), ISO 6336-2:2006 (46), (47)."""
         one, two = (0.5 * d_b * math.tan(self.alpha_wt) for d_b in self.d_b)
         return one * two / (one + two)
+
+
+def _cutter(gear: Gear) -> tuple[float, float] | None:
+    """Virtual number of teeth and profile shift of the cutter of an internal gear.
+
+    Raises
+    ------
+    InputError
+        For an internal gear whose root is given by its form diameter.
+    """
+    if not gear.internal:
+        return None
+    if gear.form_diameter is not None:
+        problem = "gives the root without a cutter, which the tooth form of ISO 6336-3 needs"
+        cure = "write cutter_teeth instead of form_diameter_mm"
+        raise InputError("form_diameter", 1e3 * gear.form_diameter, problem, cure)
+    teeth = gear.tooth_count // 2 if gear.cutter_teeth is None else gear.cutter_teeth
+    return teeth * gear.virtual_teeth / gear.teeth, gear.cutter_shift
 
 
 def pair_data(pair: MeshGeometry) -> PairData:
@@ -443,4 +470,5 @@ def pair_data(pair: MeshGeometry) -> PairData:
         ),
         eps_alpha=pair.contact_ratio_active,
         eps_beta=pair.overlap_ratio,
+        cutter=_cutter(two),
     )

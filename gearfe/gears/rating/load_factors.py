@@ -3,7 +3,7 @@ r"""Factors of general influence, ISO 6336-1:2006: dynamic factor, face load fac
 **Dynamic factor**, clause 6, method B: see `gears.rating.dynamics`. The reduced mass of two discs without shafts is,
 with the moment of inertia per width of a ring from the bore to the mean of tip and root circle,
 :math:`m_{red} = 1/(1/m_1^* + 1/m_2^*)`, :math:`m^* = 4J^*/d_b^2` (30) to (32). A gear whose torque p mates share, as
-planets at a sun, counts with :math:`m^*/p` (6.4.7).
+planets at a sun, counts with :math:`m^*/p`, and a ring that the casing holds does not count (6.4.7).
 
 **Face load factors**, clause 7, method C:
 
@@ -126,7 +126,11 @@ def run_in_relief(sigma_H_lim: float) -> float:
 
 
 def reduced_mass(
-    pair: PairData, bores: tuple[float, float], density: tuple[float, float], mates: tuple[int, int]
+    pair: PairData,
+    bores: tuple[float, float],
+    density: tuple[float, float],
+    mates: tuple[int, int],
+    fixed: tuple[bool, bool] = (False, False),
 ) -> float:
     """Return the reduced mass per face width of two discs (kg/mm), (30) to (32), with shared torques by 6.4.7.
 
@@ -140,9 +144,13 @@ def reduced_mass(
         Densities (kg/mm^3).
     mates : (int, int)
         Mates that share the torque of each gear.
+    fixed : (bool, bool)
+        Gears that the casing holds: their mass is infinite.
     """
     inverse = 0.0
     for i in (0, 1):
+        if fixed[i]:
+            continue
         mean = 0.5 * abs(pair.d_a[i] + pair.d_f[i])
         inertia = math.pi / 32.0 * density[i] * abs(mean**4 - bores[i] ** 4)
         inverse += mates[i] / (4.0 * inertia / pair.d_b[i] ** 2)
@@ -212,7 +220,7 @@ def influence(
     if K_v is None:
         B_k = 1.0 if max(s.quality for s in strengths) >= COARSE else abs(1.0 - c_prime * relief / line_load)
         B_p, B_f = c_prime * (f_pb - y_p) / line_load, c_prime * (f_falpha - y_f) / line_load
-        mass = reduced_mass(pair, bores, density, (one.mates, two.mates))
+        mass = reduced_mass(pair, bores, density, (one.mates, two.mates), (one.fixed, two.fixed))
         n_E1 = 30_000.0 / (math.pi * pair.z[0]) * math.sqrt(c_alpha / mass)
         N = speed / n_E1
         K_v = max(1.0, float(factor_at(N, (B_p, B_f, B_k), pair.eps_gamma, line_load)))

@@ -6,6 +6,10 @@ With the load shared evenly where two pairs touch, sliding takes the share :math
     \varepsilon_{1,2} = \frac{z_{1,2}}{2\pi}\,(\tan\alpha_{a1,2} - \tan\alpha_{wt}), \quad
     H_V = \frac{\pi\,(u + 1)}{z_1 u\cos\beta_b}\,(1 - \varepsilon_\alpha + \varepsilon_1^2 + \varepsilon_2^2).
 
+That is where one pair alone touches at the pitch point. Elsewhere, as with many planets and rings, the same mean of
+load share times sliding is taken, :math:`H_V = \frac{2\pi(u + 1)}{z_1 u\cos\beta_b}\int X|x|\,dx` over the path from
+:math:`-\varepsilon_2` to :math:`\varepsilon_1` base pitches from the pitch point, X = 1/2 where two pairs touch.
+
 The power lost, :math:`P_V = P\mu_m H_V`, has the mean coefficient of friction of ISO/TS 6336-21.
 """
 
@@ -38,6 +42,12 @@ def loss(pair: PairData, heat: float | None = None) -> Loss:
         z / (2.0 * math.pi) * (math.sqrt((d_a / d_b) ** 2 - 1.0) - math.tan(pair.alpha_wt))
         for z, d_a, d_b in zip(pair.z, pair.d_a, pair.d_b, strict=True)
     )
-    shared = 1.0 - pair.eps_alpha + one**2 + two**2
+
+    def moment(x: float) -> float:
+        """Integral of |x| from 0 (base pitches squared)."""
+        return 0.5 * x * abs(x)
+
+    # half of the load on the whole path, and again half of it where one pair alone touches
+    shared = moment(one) - moment(-two) + moment(1.0 - two) - moment(one - 1.0)
     H_V = math.pi * (pair.u + 1.0) / (pair.z[0] * pair.u * math.cos(pair.beta_b)) * shared
     return Loss(eps=(one, two), H_V=H_V, P_V_W=None if heat is None else heat * H_V)

@@ -26,6 +26,8 @@ from .stiffness import ordered, single_stiffness
 
 #: Steel of the standard (E 206 GPa).
 STEEL_TABLE = MaterialTable(youngs_modulus_GPa=206.0, poisson_ratio=0.3, density_kg_per_m3=7830.0)
+#: Usual K_gamma of 3 and more planets, IEC 61400-4.
+PLANETS = {3: 1.10, 4: 1.25, 5: 1.35, 6: 1.44, 7: 1.47}
 #: Sums of profile shifts that the series of the flexibility holds for.
 SHIFTS = (-0.5, 2.0)
 
@@ -125,6 +127,11 @@ class Rating(ShownTable):
         for name, q_s in zip(self.names, self.root.q_s, strict=True):
             if not NOTCHES[0] <= q_s < NOTCHES[1]:
                 made.append(f"q_s = {q_s:.3g} of {name} is beyond 1 to 8, the range of Y_S in ISO 6336-3")
+        planets = max(strength.mates for strength in self.strengths)
+        if planets in PLANETS and general.K_gamma == 1.0:
+            made.append(
+                f"K_gamma = 1 for {planets} mates: {PLANETS[planets]:g} is usual for planets (mesh_load_factor)"
+            )
         if general.K_Hbeta > NOTABLE:
             made.append(
                 f"K_Hbeta = {general.K_Hbeta:.3g} > {NOTABLE:g}: the load is on a part of the width; a computed load "
@@ -143,7 +150,7 @@ class Rating(ShownTable):
             least_scuffing = self.load.scuffing_safety
             for symbol in ("S_B", "S_intS"):
                 value = getattr(self.scuffing, symbol)
-                if value < least_scuffing:
+                if value is not None and value < least_scuffing:
                     made.append(f"{symbol} = {value:.4g} against scuffing is below the required {least_scuffing:g}")
         return tuple(made)
 

@@ -72,8 +72,10 @@ def rating_summary(rating: Rating, pair: GearPair, table: RatingTable, mesh: str
 
 def scuffing_safeties(rating: Rating) -> dict[str, float]:
     """Safety factors against scuffing by their symbols, none without oil_temperature_C."""
-    found = rating.scuffing
-    return {} if found is None else {"S_B": found.S_B, "S_intS": found.S_intS}
+    heat = rating.scuffing
+    if heat is None:
+        return {}
+    return {"S_B": heat.S_B} | ({} if heat.S_intS is None else {"S_intS": heat.S_intS})
 
 
 def _temperatures(rating: Rating) -> dict[str, Any]:

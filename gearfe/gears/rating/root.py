@@ -26,6 +26,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from ...base.errors import InputError
+from ..geometry.curves import inv, inverse_inv
 from . import materials
 from .data import Load, PairData, Strength
 from .ledger import cited
@@ -111,42 +112,109 @@ def contact_ratio_normal(pair: PairData) -> float:
     return pair.eps_alpha / math.cos(pair.beta_b) ** 2
 
 
-def tooth_form(pair: PairData, i: int) -> ToothForm:
-    """Return the critical section of the teeth of gear i (0 or 1), which a rack without protuberance generates.
+def tooth_form(pair: PairData, i: int, edition: int = 2019) -> ToothForm:
+    """Return the critical section of the teeth of gear i (0 or 1) of the virtual spur gears.
+
+    A rack without protuberance generates external gears. An internal gear has the root of its pinion-type cutter, or,
+    in the edition of 2006, that of an equivalent rack.
 
     Raises
     ------
     InputError
-        For an internal gear, and a tooth whose load at the outer point of single pair contact has no lever.
+        For a tooth whose load at the outer point of single pair contact has no lever.
     """
-    if pair.z[i] < 0:
-        problem = "is an internal gear, whose tooth form by ISO 6336-3 is not among the formulas"
-        raise InputError("teeth", pair.z[i], problem, "rate a mesh of external gears (--mesh)")
     m, alpha, z, x = pair.m_n, pair.alpha_n, pair.z_n[i], pair.x[i]
-    h, rho = pair.h_fP[i], pair.rho_fP[i]
-    E = 0.25 * math.pi * m - h * math.tan(alpha) - (1.0 - math.sin(alpha)) * rho / math.cos(alpha)  # (10)
-    G = rho / m - h / m + x  # (12)
-    H = 2.0 / z * (0.5 * math.pi - E / m) - math.pi / 3.0  # (13)
-    theta = _angle(2.0 * G / z, H)
-    bracket = G / math.cos(theta) - rho / m
-    chord = m * (z * math.sin(math.pi / 3.0 - theta) + math.sqrt(3.0) * bracket)  # (15)
-    fillet = rho + 2.0 * m * G**2 / (math.cos(theta) * (z * math.cos(theta) ** 2 - 2.0 * G))  # (17)
-
+    if pair.z[i] < 0 and edition != 2006:
+        section = _cut_section(pair, i)
+    else:
+        section = _rack_section(pair, i)
     d_n = m * z  # (24)
     d_bn, d_an = d_n * math.cos(alpha), d_n + pair.d_a[i] - pair.d[i]  # (26), (27)
-    step = math.pi * m * math.cos(alpha) * (contact_ratio_normal(pair) - 1.0)
+    step = math.copysign(math.pi * m, z) * math.cos(alpha) * (contact_ratio_normal(pair) - 1.0)
     roll = 0.5 * math.sqrt(max(0.0, d_an**2 - d_bn**2)) - step
-    d_en = 2.0 * math.hypot(roll, 0.5 * d_bn)  # (28)
+    d_en = math.copysign(2.0 * math.hypot(roll, 0.5 * d_bn), z)  # (28)
     alpha_en = math.acos(d_bn / d_en)  # (29)
     half = (0.5 * math.pi + 2.0 * math.tan(alpha) * x) / z  # (30)
     gamma = half + math.tan(alpha) - alpha - math.tan(alpha_en) + alpha_en
     alpha_F = alpha_en - gamma  # (31)
-    lever = (math.cos(gamma) - math.sin(gamma) * math.tan(alpha_F)) * d_en / m
-    lever = 0.5 * m * (lever - z * math.cos(math.pi / 3.0 - theta) - bracket)  # (18)
-    if not (lever > 0.0 and chord > 0.0 and fillet > 0.0):
-        problem = f"gives a lever of {lever:.4g} mm and a chord of {chord:.4g} mm at the root of gear {i + 1}"
+    # (18): from the section to where the load meets the middle of the tooth
+    lever = 0.5 * d_en * (math.cos(gamma) - math.sin(gamma) * math.tan(alpha_F)) - section.place
+    if not (lever > 0.0 and section.chord > 0.0 and section.fillet > 0.0):
+        problem = f"gives a lever of {lever:.4g} mm and a chord of {section.chord:.4g} mm at the root of gear {i + 1}"
         raise InputError("tooth form", None, f"{problem}: both must be > 0", "use a usual rack and tip diameter")
-    return ToothForm(d_en, alpha_F, lever, chord, fillet)
+    return ToothForm(d_en, alpha_F, lever, section.chord, section.fillet)
+
+
+@dataclass(frozen=True)
+class _Section:
+    """Critical section: its chord, its fillet radius and its distance from the axis (mm), < 0 for internal gears."""
+
+    chord: float
+    fillet: float
+    place: float
+
+
+def _rack_section(pair: PairData, i: int) -> _Section:
+    """Section of the root that a rack generates, (10) to (18); of an internal gear that of an equivalent rack.
+
+    The rack of an internal gear has the tip radius rho_fPv, which its cutter has in effect, and tangents of 60 degrees.
+    """
+    m, alpha, z, x = pair.m_n, pair.alpha_n, pair.z_n[i], pair.x[i]
+    h, rho, tangent = pair.h_fP[i], pair.rho_fP[i], math.pi / 3.0
+    if pair.z[i] < 0 and pair.cutter is not None:
+        z_0, x_0 = pair.cutter
+        tangent = math.pi / 6.0
+        rho += m * max(0.0, x_0 + (h - rho) / m) ** 1.95 / (3.156 * 1.036**z_0)
+    E = 0.25 * math.pi * m - h * math.tan(alpha) - (1.0 - math.sin(alpha)) * rho / math.cos(alpha)  # (10)
+    G = rho / m - h / m + x  # (12)
+    H = 2.0 / z * (0.5 * math.pi - E / m) - tangent  # (13)
+    theta = _angle(2.0 * G / z, H)
+    bracket = G / math.cos(theta) - rho / m
+    chord = m * (z * math.sin(tangent - theta) + 2.0 * math.sin(tangent) * bracket)  # (15), (16)
+    place = 0.5 * m * (z * math.cos(tangent - theta) + 2.0 * math.cos(tangent) * bracket)
+    fillet = rho + 2.0 * m * G**2 / (math.cos(theta) * (abs(z) * math.cos(theta) ** 2 - 2.0 * G))  # (17)
+    return _Section(chord, fillet, place)
+
+
+def _cut_section(pair: PairData, i: int) -> _Section:
+    """Section of the root that the pinion-type cutter of an internal gear generates, with tangents of 60 degrees.
+
+    Gear and cutter roll on circles of R and R_0 about centres on one side of the pitch point P. The normal at the
+    angle g to the line of centres passes P and the centre of the cutter's tip round, L = D - R_0 cos(g) from P, with
+    D^2 = r_c^2 - R_0^2 sin^2(g); the gear turns chi' = R_0 L/(R D) times as fast as g grows (Litvin & Fuentes, *Gear
+    Geometry and Applied Theory*, ch. 6).
+    """
+    m, alpha, z, x = pair.m_n, pair.alpha_n, abs(pair.z_n[i]), pair.x[i]
+    z_0, x_0 = pair.cutter or (0.5 * z, 0.0)
+    rho = pair.rho_fP[i] / m
+    working = inverse_inv(inv(alpha) + 2.0 * math.tan(alpha) * (x_0 + x) / (z_0 - z))
+    R, R_0 = (0.5 * number * math.cos(alpha) / math.cos(working) for number in (z, z_0))
+    centre = (
+        0.5 * z + pair.h_fP[i] / m - x - (R - R_0) - rho
+    )  # radius of the centre of the round, from the cutter's axis
+    space = (0.5 * math.pi - 2.0 * math.tan(alpha) * x) / z + inv(alpha) - inv(working)  # half of the space at R
+    base = 0.5 * z_0 * math.cos(alpha)
+    along = math.sqrt(max(0.0, centre**2 - base**2))
+    theta = inv(working) + R / R_0 * space - (along + rho) / base + math.atan2(along, base)
+
+    def at(g: float) -> tuple[float, float, float]:
+        """Distance D and L, and the turn of the gear (rad)."""
+        D = math.sqrt(centre**2 - (R_0 * math.sin(g)) ** 2)
+        L = D - R_0 * math.cos(g)
+        return D, L, R_0 / R * (math.atan2(L * math.sin(g), R_0 + L * math.cos(g)) - theta)
+
+    low, high = 0.0, 0.5 * math.pi - working
+    for _ in range(100):  # the normal is 30 degrees from the middle of the tooth, half a pitch from that of the space
+        middle = 0.5 * (low + high)
+        steep = middle - math.pi / z - at(middle)[2] >= math.pi / 6.0
+        low, high = (low, middle) if steep else (middle, high)
+    D, L, turn = at(high)
+    reach, turning = L + rho, R_0 * L / (R * D)
+    angle = -math.pi / z - turn
+    chord = 2.0 * abs(R * math.sin(angle) + reach * math.sin(high + angle))
+    place = R * math.cos(angle) + reach * math.cos(high + angle)
+    fillet = (reach - turning * (R * math.cos(high) + reach)) / (1.0 - turning)
+    return _Section(m * chord, m * fillet, -m * place)
 
 
 def _angle(slope: float, H: float) -> float:
@@ -304,10 +372,10 @@ def root(
     Raises
     ------
     InputError
-        For internal gears, rims that are too thin, and teeth without a lever.
+        For rims that are too thin, and teeth without a lever.
     """
     both = (0, 1)
-    forms = [tooth_form(pair, i) for i in both]
+    forms = [tooth_form(pair, i, edition) for i in both]
     f_eps, Y_beta = load_distribution(pair, edition), helix_factor(pair, edition)
     ratio = contact_ratio_normal(pair)
     Y_DT = deep_tooth_factor(ratio, max(s.quality for s in strengths))

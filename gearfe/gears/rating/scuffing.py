@@ -27,7 +27,8 @@ helical ones no excess; between both the share is interpolated.
     \Theta_{fla\,int} = \mu_{mC} X_M X_{BE} X_{\alpha\beta} (K_{B\gamma} w_{Bt})^{3/4}
     \frac{v^{1/2}}{|a|^{1/4}}\frac{X_\varepsilon}{X_Q X_{Ca}}.
 
-The friction of run-in flanks, :math:`X_E = 1`, is taken.
+The friction of run-in flanks, :math:`X_E = 1`, is taken. The integral temperature needs a pitch point within the path
+of contact; planets and rings may have none.
 
 .. [#] H. Blok, Theoretical study of temperature rise at surfaces of actual contact under oiliness lubricating
    conditions, Proc. Gen. Disc. Lubrication, IMechE, 1937.
@@ -41,7 +42,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...base.errors import InputError
 from .data import Oil, PairData, Strength
 from .ledger import cited
 from .load_factors import Influence
@@ -67,6 +67,11 @@ FASTEST, LIGHTEST = 50.0, 150.0
 BUTTRESS = 0.3
 #: Points of the path of contact.
 POINTS = 2001
+#: Values of the integral temperature, which needs a pitch point within the path of contact.
+INTEGRAL = (
+    *("X_BE", "X_eps", "X_Q", "X_Ca"),
+    *("theta_flaint_K", "theta_MC_C", "theta_int_C", "theta_Sint_C", "S_intS"),
+)
 
 
 @dataclass(frozen=True)
@@ -111,16 +116,16 @@ class Scuffing:
     Gamma_B_max: float = cited("place of the highest contact temperature", f"{_FLASH}, Gamma")
     theta_S_C: float = cited("scuffing temperature", f"{_FLASH}, Theta_S", "deg C")
     S_B: float = cited("safety factor against scuffing, flash temperature", f"{_FLASH}, S_B")
-    X_BE: float = cited("geometry factor at the pinion's tip", f"{_INTEGRAL}, X_BE")
-    X_eps: float = cited("contact ratio factor", f"{_INTEGRAL}, X_eps")
-    X_Q: float = cited("approach factor", f"{_INTEGRAL}, X_Q")
-    X_Ca: float = cited("tip relief factor", f"{_INTEGRAL}, X_Ca")
+    X_BE: float | None = cited("geometry factor at the pinion's tip", f"{_INTEGRAL}, X_BE")
+    X_eps: float | None = cited("contact ratio factor", f"{_INTEGRAL}, X_eps")
+    X_Q: float | None = cited("approach factor", f"{_INTEGRAL}, X_Q")
+    X_Ca: float | None = cited("tip relief factor", f"{_INTEGRAL}, X_Ca")
     mu_mC: float = cited("mean coefficient of friction of the integral temperature", f"{_INTEGRAL}, mu_mC")
-    theta_flaint_K: float = cited("mean flash temperature", f"{_INTEGRAL}, Theta_flaint", "K")
-    theta_MC_C: float = cited("bulk temperature", f"{_INTEGRAL}, Theta_MC", "deg C")
-    theta_int_C: float = cited("integral temperature", f"{_INTEGRAL}, Theta_int", "deg C")
-    theta_Sint_C: float = cited("integral scuffing temperature", f"{_INTEGRAL}, Theta_intS", "deg C")
-    S_intS: float = cited("safety factor against scuffing, integral temperature", f"{_INTEGRAL}, S_intS")
+    theta_flaint_K: float | None = cited("mean flash temperature", f"{_INTEGRAL}, Theta_flaint", "K")
+    theta_MC_C: float | None = cited("bulk temperature", f"{_INTEGRAL}, Theta_MC", "deg C")
+    theta_int_C: float | None = cited("integral temperature", f"{_INTEGRAL}, Theta_int", "deg C")
+    theta_Sint_C: float | None = cited("integral scuffing temperature", f"{_INTEGRAL}, Theta_intS", "deg C")
+    S_intS: float | None = cited("safety factor against scuffing, integral temperature", f"{_INTEGRAL}, S_intS")
     path: Path = field(kw_only=True)
 
 
@@ -240,6 +245,14 @@ def tip_relief_factor(relief: float, one: float, two: float) -> float:
     return 1.0 + (0.06 + 0.18 * done) * larger + (0.02 + 0.69 * done) * larger**2
 
 
+def tip_geometry_factor(pair: PairData) -> float:
+    """X_BE at the tip of gear 1."""
+    tip = 0.5 * math.sqrt(pair.d_a[0] ** 2 - pair.d_b[0] ** 2)
+    mate = abs(pair.a * math.sin(pair.alpha_wt) - tip)
+    lever = 0.51 * math.sqrt(abs(pair.u + 1.0)) * abs(math.sqrt(tip) - math.sqrt(mate / abs(pair.u)))
+    return lever / (tip * mate) ** 0.25
+
+
 def scuffing(
     pair: PairData,
     strengths: tuple[Strength, Strength],
@@ -272,16 +285,8 @@ def scuffing(
         Young's moduli (N/mm^2) and Poisson's ratios.
     eps : (float, float)
         Addendum contact ratios.
-
-    Raises
-    ------
-    InputError
-        For gears whose path of contact does not hold the pitch point.
     """
     low, high = ends(pair)
-    if not low < 0.0 < high:
-        problem = f"reaches from Gamma = {low:.4g} to {high:.4g}: it must hold the pitch point, 0"
-        raise InputError("path of contact", None, problem, "leave out oil_temperature_C, or change profile shifts")
     loads = general.K_A * general.K_gamma * general.K_v * general.K_Hbeta * general.K_Halpha
     w = general.F_t_N / pair.b * loads
     eta, thin = viscosity(oil, viscosity_40), LUBRICANTS[oil.kind]
@@ -318,21 +323,30 @@ def scuffing(
     X_W = min(s.structure for s in strengths)
     theta_S = 80.0 + (0.85 + 1.4 * X_W) * X_L * oil.stage**2
 
-    tip = 0.5 * math.sqrt(pair.d_a[0] ** 2 - pair.d_b[0] ** 2)
-    mate = abs(pair.a * math.sin(pair.alpha_wt) - tip)
-    X_BE = 0.51 * math.sqrt(abs(pair.u + 1.0)) * abs(math.sqrt(tip) - math.sqrt(mate / abs(pair.u)))
-    X_BE /= (tip * mate) ** 0.25
-    leaving, entering = eps if not driver else eps[::-1]
-    ratio = entering / leaving
-    X_Q = 1.0 if ratio <= 1.5 else 0.6 if ratio >= 3.0 else 1.4 - 4.0 / 15.0 * ratio
-    X_eps, X_Ca = contact_ratio_factor(*eps), tip_relief_factor(relief, *eps)
     X_M = float(thermoelastic_factor(pair, E_r, B_M, 0.0))
-    integral = mu_mC * X_M * X_BE * angle_factor(pair) * (K_Bgamma * w) ** 0.75
-    integral *= math.sqrt(general.v_m_per_s) / abs(pair.a) ** 0.25 * X_eps / (X_Q * X_Ca)
-    theta_MC = oil.temperature + 0.7 * X_S * X_mp * integral
-    T_test, thick = STAGES[oil.stage - 1], (100.0 / viscosity_40) ** 0.02
-    theta_Sint = 80.0 + thin * T_test * (0.23 + 1.5 * X_W * 0.2 * thick)
-    theta_int = theta_MC + 1.5 * integral
+    integral: dict[str, float] = {}
+    if low < 0.0 < high:
+        leaving, entering = eps if not driver else eps[::-1]
+        ratio = entering / leaving
+        integral = {
+            "X_BE": tip_geometry_factor(pair),
+            "X_eps": contact_ratio_factor(*eps),
+            "X_Q": 1.0 if ratio <= 1.5 else 0.6 if ratio >= 3.0 else 1.4 - 4.0 / 15.0 * ratio,
+            "X_Ca": tip_relief_factor(relief, *eps),
+        }
+        heat = mu_mC * X_M * integral["X_BE"] * angle_factor(pair) * (K_Bgamma * w) ** 0.75
+        heat *= math.sqrt(general.v_m_per_s) / abs(pair.a) ** 0.25
+        heat *= integral["X_eps"] / (integral["X_Q"] * integral["X_Ca"])
+        theta_MC = oil.temperature + 0.7 * X_S * X_mp * heat
+        T_test, thick = STAGES[oil.stage - 1], (100.0 / viscosity_40) ** 0.02
+        theta_Sint = 80.0 + thin * T_test * (0.23 + 1.5 * X_W * 0.2 * thick)
+        integral |= {
+            "theta_flaint_K": heat,
+            "theta_MC_C": theta_MC,
+            "theta_int_C": theta_MC + 1.5 * heat,
+            "theta_Sint_C": theta_Sint,
+            "S_intS": theta_Sint / (theta_MC + 1.5 * heat),
+        }
     return Scuffing(
         w_Bt_N_per_mm=w,
         K_Bgamma=K_Bgamma,
@@ -352,15 +366,7 @@ def scuffing(
         Gamma_B_max=float(gamma[hottest]),
         theta_S_C=theta_S,
         S_B=(theta_S - oil.temperature) / (float(contact[hottest]) - oil.temperature),
-        X_BE=X_BE,
-        X_eps=X_eps,
-        X_Q=X_Q,
-        X_Ca=X_Ca,
         mu_mC=mu_mC,
-        theta_flaint_K=integral,
-        theta_MC_C=theta_MC,
-        theta_int_C=theta_int,
-        theta_Sint_C=theta_Sint,
-        S_intS=theta_Sint / theta_int,
+        **{name: integral.get(name) for name in INTEGRAL},
         path=Path(gamma, share, flash, contact),
     )

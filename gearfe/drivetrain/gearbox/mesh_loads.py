@@ -1,0 +1,131 @@
+"""Loads of the meshes of a train in steady running, as a rating takes them.
+
+Torques balance on all shafts without losses (`gearfe.drivetrain.train.kinematics`), speeds are those against the
+carrier of a planetary stage.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from ...base.tables.rating import GearRatingTable, MeshRatingTable, RatingTable
+from ..train.gear_train import GearTrain
+from ..train.kinematics import against, fastest
+from .job import TrainJob
+
+#: Mean stress influence factor of teeth that are loaded on both flanks, ISO 6336-3, annex B: case-hardened idlers.
+BOTH_FLANKS = 0.7
+#: Force of a mesh (N) below which it carries nothing, over the largest of the train.
+IDLE = 1e-9
+
+
+@dataclass(frozen=True)
+class MeshLoad:
+    """Load of a mesh; pairs are of driver and driven gear.
+
+    Attributes
+    ----------
+    torque
+        At the driver, of this mesh alone (N m).
+    speed
+        Of the driver against the carrier of its stage, without sign (1/min).
+    mates
+        Meshes of the gear that load the flank of this one.
+    both_flanks
+        Whether other meshes load the other flank.
+    fixed
+        Whether the gear's shaft is held.
+    """
+
+    torque: float
+    speed: float
+    mates: tuple[int, int]
+    both_flanks: tuple[bool, bool]
+    fixed: tuple[bool, bool]
+
+
+def mesh_loads(train: GearTrain) -> dict[str, MeshLoad]:
+    """Return the load of each mesh by its name."""
+    layout, rolled = train.layout, train.kinematics
+    speed = 30.0 / math.pi * fastest(layout.speed)
+    held = {shaft for shaft, ratio in layout.guided if ratio == 0}
+    largest = max((abs(float(force)) for force in rolled.steady_forces), default=0.0)
+    # torque of each mesh on its gears about the axis, by the gear: its sign is that of the flank
+    flanks: dict[str, list[float]] = {}
+    for mesh, force, sense in zip(layout.meshes, rolled.steady_forces, rolled.senses, strict=True):
+        for gear, side in ((mesh.driver, -1.0), (mesh.driven, 1.0 if mesh.turns_alike else -1.0)):
+            if abs(float(force)) > IDLE * largest:
+                flanks.setdefault(gear.name, []).append(side * sense * float(force))
+    found = {}
+    for mesh, force, sense in zip(layout.meshes, rolled.steady_forces, rolled.senses, strict=True):
+        gears = mesh.driver, mesh.driven
+        own = (-sense * float(force), (1.0 if mesh.turns_alike else -1.0) * sense * float(force))
+        alike = [
+            [other * push > 0.0 for other in flanks.get(gear.name, [])] for gear, push in zip(gears, own, strict=True)
+        ]
+        found[mesh.name] = MeshLoad(
+            torque=abs(float(force)) * mesh.driver.base_radius,
+            speed=speed * abs(float(against(mesh, mesh.driver.shaft, rolled.ratios))),
+            mates=(max(1, sum(alike[0])), max(1, sum(alike[1]))),
+            both_flanks=(not all(alike[0]), not all(alike[1])),
+            fixed=(mesh.driver.shaft in held, mesh.driven.shaft in held),
+        )
+    return found
+
+
+def with_train(table: RatingTable, job: TrainJob, mesh: str, gears: tuple[str, str], given: bool) -> RatingTable:
+    """Return a table [rating] in which a mesh has the load that the train gives it where the file says nothing.
+
+    Parameters
+    ----------
+    table : RatingTable
+        The table.
+    job : TrainJob
+        The train.
+    mesh : str
+        Name of the mesh; one of planets is written once and has the load of the first planet.
+    gears : (str, str)
+        Names of driver and driven gear.
+    given : bool
+        Whether [stiffness] gives the torque.
+
+    Raises
+    ------
+    InputError
+        For mistakes in the train.
+    """
+    loads = mesh_loads(job.rigid_train)
+    load = loads.get(mesh) or loads.get(f"{mesh}_1")
+    if load is None:
+        return table
+    changed = dict(table.gears)
+    for name, mates, both, fixed in zip(gears, load.mates, load.both_flanks, load.fixed, strict=True):
+        own = table.gears.get(name, GearRatingTable())
+        merged = table.of_gear(name, {name: None, **table.gears})
+        more: dict[str, object] = {}
+        if merged.mates is None:
+            more["mates"] = mates
+        if merged.alternating_factor is None and both:
+            more["alternating_factor"] = BOTH_FLANKS
+        if merged.fixed is None and fixed:
+            more["fixed"] = True
+        changed[name] = replace(own, **more)  # type: ignore[arg-type]
+    return replace(table, gears=changed, meshes=_loaded(table, load, mesh, changed[gears[0]].mates, given))
+
+
+def _loaded(
+    table: RatingTable, load: MeshLoad, mesh: str, mates: int | None, given: bool
+) -> Mapping[str, MeshRatingTable]:
+    """Keys of the meshes with torque and speed of one of them, unless the file has them or a load spectrum."""
+    own = table.meshes.get(mesh, MeshRatingTable())
+    merged = table.of_mesh(mesh, {mesh: None, **table.meshes})
+    if merged.spectrum:
+        return dict(table.meshes)
+    more: dict[str, float] = {}
+    if merged.speed_rpm is None and load.speed > 0.0:
+        more["speed_rpm"] = load.speed
+    if merged.torque_Nm is None and not given and load.torque > 0.0:
+        more["torque_Nm"] = load.torque * (mates or table.mates or 1)
+    return {**table.meshes, mesh: replace(own, **more)}
