@@ -31,6 +31,9 @@ CASES: tuple[tuple[str, Any, dict[str, Any], dict[str, str]], ...] = (
     ),
     ("planet and ring", rated.spur_ring, rated.SPUR_RING, rated.SPUR_RING_PRINTED),
     ("planet and ring, first stage", rated.first_ring, rated.FIRST_RING, rated.FIRST_RING_PRINTED),
+    ("FZG C14", rated.fzg_c14, rated.FZG_C14, rated.FZG_C14_PRINTED | rated.FZG_C14_LOOSE),
+    ("FZG C40", rated.fzg_c40, rated.FZG_C40, rated.FZG_C40_PRINTED | rated.FZG_C40_LOOSE),
+    ("polymer pair", rated.polymer_pair, rated.POLYMER, rated.POLYMER_PRINTED),
     ("example 1", rated.example_1, rated.EXAMPLE_1, rated.EXAMPLE_PRINTED),
 )
 

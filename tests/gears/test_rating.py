@@ -33,15 +33,24 @@ from tests.makers.rated import (
     EXAMPLE_PRINTED,
     FIRST_RING,
     FIRST_RING_PRINTED,
+    FZG_C14,
+    FZG_C14_PRINTED,
+    FZG_C40,
+    FZG_C40_PRINTED,
     HELICAL,
     HELICAL_PRINTED,
+    POLYMER,
+    POLYMER_PRINTED,
     SPUR,
     SPUR_PRINTED,
     SPUR_RING,
     SPUR_RING_PRINTED,
     example_1,
     first_ring,
+    fzg_c14,
+    fzg_c40,
     helical_stage,
+    polymer_pair,
     spur_ring,
     spur_stage,
     stage,
@@ -606,6 +615,32 @@ def test_static_overload_has_no_life() -> None:
     rating = rate(spur_stage(), WITHOUT_LIFE | {"spectrum": [part]})
     assert rating.service.U_H[0] >= 1e9
     assert rating.service.life_flank_h[0] < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("pair", "table", "printed", "nominal", "pressure"),
+    [
+        (fzg_c14, FZG_C14, FZG_C14_PRINTED, 1228.89, 1347.3),
+        (fzg_c40, FZG_C40, FZG_C40_PRINTED, 754.69, 827.4),
+    ],
+)
+def test_fzg_pairs_of_14_and_40_mm(
+    pair: Any, table: dict[str, Any], printed: dict[str, str], nominal: float, pressure: float
+) -> None:
+    """Reports C14 and C40 of an open program: DIN 3990 B, whose force is that at the working circle of 36.6 mm.
+
+    Its pressure at the pitch point is that of one pair, without Z_eps.
+    """
+    rating = rate(pair(), table)
+    check(rating, printed)
+    assert rating.flank.sigma_H0_MPa * math.sqrt(36.0 / 36.6) == pytest.approx(nominal, rel=3e-5)
+    assert rating.flank.sigma_H0_MPa / rating.flank.Z_eps == pytest.approx(pressure, abs=0.05)
+    assert rating.root.Y_F == pytest.approx((1.689, 1.583), rel=3e-3)
+    assert rating.root.Y_S == pytest.approx((1.851, 1.917), rel=3e-3)
+
+
+def test_loss_factor_of_the_polymer_pair_as_printed() -> None:
+    check(rate(polymer_pair(), POLYMER), POLYMER_PRINTED)
 
 
 def test_loss_factor_of_the_fzg_pair_as_printed() -> None:

@@ -86,6 +86,12 @@ HELICAL_OIL: dict[str, Any] = {
     "oil_density_kg_per_m3": 890.0,
     "scuffing_load_stage": 14,
 }
+#: FZG pairs as an open program rates them by DIN 3990 B: mineral oil of class 32, polyalphaolefin of class 320; their
+#: viscosities at 40 C follow from the constants of Walther's line in that program.
+FZG_C14: dict[str, Any] = {"edition": 2006, "torque_Nm": 200.0, "speed_rpm": 1500.0, "viscosity_40_mm2_per_s": 31.81}
+FZG_C40: dict[str, Any] = {"edition": 2006, "torque_Nm": 215.513, "speed_rpm": 1800.0, "viscosity_40_mm2_per_s": 311.57}
+#: Pair of plastics; the rating of steel is of no use for it, its geometry is.
+POLYMER: dict[str, Any] = {"edition": 2006, "torque_Nm": 10.0, "speed_rpm": 1000.0}
 #: Example 1: K_Hbeta is quoted, R_a 1 um is R_z 6 um.
 EXAMPLE_1: dict[str, Any] = {
     "edition": 2006,
@@ -179,6 +185,33 @@ def spur_ring() -> MeshGeometry:
 def first_ring() -> MeshGeometry:
     """Planet and ring of the first stage of the same gearbox: 17/-56 teeth, module 45 mm."""
     return ring_stage((17, -56), 45.0, 0.8021, 863.0, width=491.0, bore=408.99, rim=2994.24, tip_mm=-10.861, cutter=36)
+
+
+def fzg(width: float) -> MeshGeometry:
+    """FZG test gears of type C without tip alteration: 16/24 teeth, module 4.5 mm, a width (mm)."""
+    gears = [
+        Gear(
+            z, 4.5e-3, ANGLE, 1e-3 * width, 0.03, profile_shift=x, rack_tip_radius=0.38, addendum=tip / 4.5 - z / 2 - x
+        )
+        for z, x, tip in ((16, 0.1817, 41.318), (24, 0.1715, 59.272))
+    ]
+    return MeshGeometry(gears[0], gears[1], 91.5e-3)
+
+
+def fzg_c14() -> MeshGeometry:
+    """FZG type C, 14 mm wide."""
+    return fzg(14.0)
+
+
+def fzg_c40() -> MeshGeometry:
+    """FZG type C, 40 mm wide."""
+    return fzg(40.0)
+
+
+def polymer_pair() -> MeshGeometry:
+    """30/30 teeth, module 2 mm, 15 mm wide."""
+    gear = Gear(30, 2e-3, ANGLE, 0.015, 0.02, rack_tip_radius=0.38)
+    return MeshGeometry(gear, gear, 0.06)
 
 
 def example_1() -> MeshGeometry:
@@ -435,3 +468,22 @@ FIRST_RING_PRINTED: dict[str, str] = {
     "sigma_FG_MPa": "419.35 429.14",
     "S_F": "2.71 2.79",
 }
+
+#: FZG pairs as printed.
+FZG_C14_PRINTED: dict[str, str] = {
+    "H_V": "0.1986",
+    "Z_E": "189.812",
+    "Z_H": "2.342",
+    "Z_eps": "0.920",
+    "Z_beta": "1.000",
+    "Z_L": "0.922",
+    "Z_v": "0.985",
+    "Y_beta": "1.000",
+    "Y_delta_rel_T": "0.994 0.996",
+    "Y_R_rel_T": "0.957 0.957",
+}
+FZG_C40_PRINTED: dict[str, str] = FZG_C14_PRINTED | {"Z_L": "1.045", "Z_v": "0.990"}
+#: Values that differ: forces at the working circle, and form factors by DIN 3990.
+FZG_C14_LOOSE: dict[str, str] = {"sigma_H0_MPa": "1228.89", "Y_F": "1.689 1.583", "Y_S": "1.851 1.917"}
+FZG_C40_LOOSE: dict[str, str] = FZG_C14_LOOSE | {"sigma_H0_MPa": "754.69"}
+POLYMER_PRINTED: dict[str, str] = {"H_V": "0.1494"}
