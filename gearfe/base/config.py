@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 from .errors import InputError, nearest, unknown_key
 from .files import read_text
+from .other_units import in_known_units, partner
 from .suspects import LARGEST, other_unit
 
 T = TypeVar("T")
@@ -146,6 +147,7 @@ def set_key(tables: dict[str, Any], name: str, value: Any, field: str) -> None:
             else:
                 place = place[int(part)]
         elif last:
+            place.pop(partner(part), None)  # the same speed in the other unit
             place[part] = value
         else:
             place = place.setdefault(part, {})
@@ -193,6 +195,7 @@ def _built(cls: type[T], table: Any, where: str) -> T:
         table = {kind.SHORT: table}
     if not isinstance(table, dict):
         raise InputError(where, table, "must be a table of keys and values", f"write [{where}] and its keys below it")
+    table = in_known_units(table, fields, where)
     hints = type_hints(kind)
     # what chooses among kinds first: a wrong kind brings keys of its own
     for name, spec in fields.items():

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..base.config import JobFile, check_range, fields_of, type_hints
 from ..base.errors import InputError, MissingLibraryError, nearest, unknown_name
+from ..base.other_units import RADIANS, RPM, partner
 from ..base.tables.report import ReportTable
 
 if TYPE_CHECKING:
@@ -175,7 +176,18 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
             options |= {"action": "store_const", "const": True}
         else:
             options |= {"type": kinds[0], "metavar": "|".join(known["choices"] or ()) or METAVARS[kinds[0]]}
+        if name.endswith(RADIANS):
+            place = parser.add_mutually_exclusive_group() if isinstance(parser, argparse.ArgumentParser) else parser
+            place.add_argument(_option(name), **options)
+            help_ = f"the same in 1/min, instead of {_option(name)}"
+            place.add_argument(_option(partner(name)), dest=name, type=_from_rpm, metavar="X", help=help_)
+            continue
         parser.add_argument(_option(name), **options)
+
+
+def _from_rpm(text: str) -> float:
+    """A speed in 1/min as rad/s."""
+    return RPM * float(text)
 
 
 def _default_of(field: Any) -> str:

@@ -24,6 +24,24 @@ PAIR: dict[str, Any] = {
     "material": {"youngs_modulus_GPa": 200.0, "poisson_ratio": 0.3, "density_kg_per_m3": 7850.0},
 }
 
+#: A pair as a drawing has it: module, 20 degrees, tip diameters, and the middles of the tolerances of the span sizes.
+DRAWN: dict[str, Any] = {
+    "module_mm": 2.5,
+    "pressure_angle_deg": 20.0,
+    "face_width_mm": 20.0,
+    "tip_round_mm": 0.1,
+    "centre_distance_mm": 82.5,
+    "pinion": {
+        "teeth": 23, "profile_shift": 0.3, "bore_diameter_mm": 25.0, "tip_diameter_mm": 64.0,
+        "span_teeth": 4, "span_mm": 27.112,
+    },
+    "wheel": {
+        "teeth": 42, "profile_shift": 0.2276, "bore_diameter_mm": 35.0, "tip_diameter_mm": 111.1,
+        "span_teeth": 6, "span_mm": 42.414,
+    },
+    "material": {"youngs_modulus_GPa": 206.0, "poisson_ratio": 0.3, "density_kg_per_m3": 7830.0},
+}  # fmt: skip
+
 STIFFNESS: dict[str, Any] = {"torque_Nm": 100.0, "angle_start_deg": 1.0, "angle_step_deg": 1.0, "angle_stop_deg": 40.0}
 
 RELIEFS: dict[str, Any] = {
@@ -261,7 +279,7 @@ RUNUP: dict[str, Any] = {"speed_start_rad_per_s": 300.0, "speed_stop_rad_per_s":
 #: Kind, which is the command that runs it except for those of `RUN_BY`
 #: -> what the file is about, its tables, and what else its head says.
 JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
-    "stiffness": ("mesh stiffness of a gear pair", {"pair": PAIR, "stiffness": STIFFNESS}, ""),
+    "stiffness": ("mesh stiffness of a gear pair", {"pair": DRAWN, "stiffness": {"torque_Nm": 200.0}}, ""),
     "loadmap": (
         "a pair with its reliefs over angle and torque: transmission error, load share, root stress",
         {"pair": PAIR, "loadmap": LOADMAP, "microgeometry": RELIEFS},
