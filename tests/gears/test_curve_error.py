@@ -10,11 +10,14 @@ import pytest
 from gearfe import sweep_stiffness
 from gearfe.fem.plane import Material
 from gearfe.gears.contact.laws import Nitsche, Penalty
+from gearfe.gears.gearmesh.job import read_stiffness_job
 from gearfe.gears.gearmesh.positions import at_torques, position_solver, unseen_twists
+from gearfe.gears.gearmesh.report import against_iso_line, body_flexibility, summary
 from gearfe.gears.gearmesh.sweep import elastic_pair
 from gearfe.gears.geometry.face import face_of
 from tests.makers import gears
 from tests.makers.solving import solve_positions
+from tests.places import GEOMETRY
 
 SHARP = gears.pair(20, 30, bore=0.35)
 
@@ -120,3 +123,28 @@ def test_tabulated_flanks_miss_the_exact_ones_by_what_is_told():
     off = np.abs(((exact - point) * face.normals(u).conj()).real)
     assert (off < 1.1 * face.misses + 5e-17).all()
     assert np.median(off / face.misses) > 0.9
+
+
+def test_the_twist_of_the_bodies_is_what_a_smaller_bore_adds(tmp_path) -> None:
+    """The closed form of a disc in torsion against finite elements: a smaller bore adds its twist."""
+    text = (GEOMETRY / "gear_train.toml").read_text(encoding="utf-8")
+    found = []
+    for number, factor in enumerate((1.0, 0.7)):
+        path = tmp_path / f"{number}.toml"
+        changed = text.replace("bore_diameter_mm = 10.0", f"bore_diameter_mm = {10.0 * factor}")
+        path.write_text(
+            changed.replace("bore_diameter_mm = 15.0", f"bore_diameter_mm = {15.0 * factor}"), encoding="utf-8"
+        )
+        job = read_stiffness_job(path)
+        curve = sweep_stiffness(job.pair, job.model, torque=100.0, kinematics="small")
+        found.append((float((1.0 / curve.k_mesh).mean()), body_flexibility(job), summary(job, curve, {})))
+    (one, twist, made), (smaller, more, _) = found
+    assert smaller - one > 2e-9  # m/N
+    assert more - twist == pytest.approx(smaller - one, rel=0.03)
+    iso = made["iso_6336"]
+    assert iso["share_of_body_twist"] == pytest.approx(0.43, abs=0.01)
+    assert 1.0 / iso["mean_without_body_twist_N_per_m"] == pytest.approx(
+        1.0 / made["mesh_stiffness"]["mean_N_per_m"] - twist
+    )
+    (line,) = against_iso_line(iso)
+    assert "39 % below" in line

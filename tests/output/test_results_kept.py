@@ -46,13 +46,45 @@ def test_formats_hold_the_numbers_of_the_tables(tmp_path, capsys):
             for found in (npz[f"stiffness/{name}"], h5[f"stiffness/{name}"][()], mat[name]):
                 np.testing.assert_array_equal(found, values, err_msg=name)
         assert list(h5["stiffness/status"].asstr()[()]) == list(mat["status"]) == list(table["status"])
-    sets = {made["id1"].strip(): made for made in pyuff.UFF(str(tmp_path / "tables.uff")).read_sets()}
+    first, *made = pyuff.UFF(str(tmp_path / "tables.uff")).read_sets()
+    assert (first["type"], first["length"], first["force"]) == (164, 1.0, 1.0)  # all values are in SI units
+    sets = {one["id1"].strip(): one for one in made}
     rest = {n: v for n, v in numbers.items() if n != "pinion_angle_deg" and np.isfinite(v).sum() > 1}
-    assert sets.keys() == rest.keys()
+    si = {"_um": ("_m", 1e-6), "_mm": ("_m", 1e-3), "_MPa": ("_Pa", 1e6), "_deg": ("_rad", np.pi / 180.0)}
+    named = {}
     for name, values in rest.items():
-        np.testing.assert_array_equal(sets[name]["data"], values[np.isfinite(values)])
-        x = table["pinion_angle_deg"][np.isfinite(values)]
-        np.testing.assert_allclose(sets[name]["x"], x, rtol=1e-9, atol=1e-9 * x.max())
+        end, factor = next(((new, f) for old, (new, f) in si.items() if name.endswith(old)), ("", 1.0))
+        named[name.rpartition("_")[0] + end if end else name] = (name, factor * values)
+    assert sets.keys() == named.keys()
+    for si_name, (name, values) in named.items():
+        np.testing.assert_allclose(sets[si_name]["data"], values[np.isfinite(values)], rtol=1e-15)
+        x = np.radians(table["pinion_angle_deg"][np.isfinite(values)])
+        np.testing.assert_allclose(sets[si_name]["x"], x, rtol=1e-9, atol=1e-9 * x.max(), err_msg=name)
+
+
+#: Column -> specific data type, exponents of length and force, unit: Universal File Format, data set 58, addendum A.
+KINDS = {
+    "transmission_error_1_um": (8, 1, 0, "m"),
+    "speed_out_rad_per_s": (11, 0, 0, "rad/s"),
+    "case_acceleration_m_per_s2": (12, 1, 0, "m/s^2"),
+    "contact_force_1_N": (9, 0, 1, "N"),
+    "drive_torque_Nm": (9, 1, 1, "N m"),
+    "peak_pressure_MPa": (15, -2, 1, "Pa"),
+    "load_share_1": (0, 0, 0, "NONE"),
+}
+
+
+def test_universal_files_say_kind_and_unit(tmp_path):
+    pyuff = pytest.importorskip("pyuff", reason="pip install 'gearfe[exchange]'")
+    columns = {"frequency_Hz": np.arange(4.0), **{name: np.arange(4.0) + 1.0 for name in KINDS}}
+    write_tables(tmp_path, {"spectrum": columns}, ("uff",))
+    _, *sets = pyuff.UFF(str(tmp_path / "tables.uff")).read_sets()
+    for made, (name, (kind, length, force, unit)) in zip(sets, KINDS.items(), strict=True):
+        assert made["abscissa_spec_data_type"] == 18, name
+        assert made["ordinate_spec_data_type"] == kind, name
+        assert (made["ordinate_len_unit_exp"], made["ordinate_force_unit_exp"]) == (length, force), name
+        assert made["ordinate_axis_units_lab"].strip() == unit, name
+    assert [made["id2"].strip() for made in sets][:2] == ["transmission error of mesh 1", 'speed of shaft "out"']
 
 
 def test_universal_files_leave_out_gaps_and_know_time_and_acceleration(tmp_path):
@@ -61,7 +93,7 @@ def test_universal_files_leave_out_gaps_and_know_time_and_acceleration(tmp_path)
     signal = np.array([1.0, np.nan, 3e-7, 4.0, 5.0, np.nan, 7.0])
     write_csv(tmp_path / "response.csv", {"time_s": time, "case_acceleration_m_per_s2": signal})
     write_tables(tmp_path, {"response": read_csv(tmp_path / "response.csv")}, ("uff",))
-    (made,) = [pyuff.UFF(str(tmp_path / "tables.uff")).read_sets()]
+    _, made = pyuff.UFF(str(tmp_path / "tables.uff")).read_sets()
     np.testing.assert_array_equal(made["x"], time[np.isfinite(signal)])
     np.testing.assert_array_equal(made["data"], signal[np.isfinite(signal)])
     assert (made["func_type"], made["abscissa_spec_data_type"], made["ordinate_spec_data_type"]) == (1, 17, 12)

@@ -4,8 +4,8 @@
 tables.npz  NumPy; arrays called ``table/column``
 tables.h5   HDF5; a group a table, a dataset a column
 tables.mat  MATLAB 5; a structure a table, a field a column (names of more than 63 characters are cut)
-tables.uff  universal file, binary datasets 58; a function for each column over the first one, where that one rises;
-            rows without a number are left out
+tables.uff  universal file, binary datasets 58 in SI units with kind of quantity and unit; a function for each column
+            over the first one, where that one rises; rows without a number are left out
 =========== ============================================================================================================
 
 The CSV files carry 17 significant digits, so what is read from them is what was written.
@@ -22,15 +22,22 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import InputError, MissingLibraryError
+from ...base.quantities import UNITS, parted, unit_of, words
 from ...base.typing import Array
 
 Tables = Mapping[str, Mapping[str, Array]]
-#: Dataset 58: function type (1 time response, 0 general) and data type of the abscissa by the first column's name
-#: (17 time, 18 frequency, 0 unknown).
-ABSCISSAS = {"time_s": (1, 17, "s"), "frequency_Hz": (0, 18, "Hz")}
-#: Unit at the end of a column's name -> ordinate's data type (8 displacement, 9 reaction force, 11 velocity,
-#: 12 acceleration) and text.
-ORDINATES = {"_m_per_s2": (12, "m/s^2"), "_m_per_s": (11, "m/s"), "_N": (9, "N"), "_m": (8, "m")}
+#: Dataset 58, specific data types: kind of quantity -> code, exponents of length and force (the Universal File Format's
+#: addendum A; general, 1, where it has no code of its own). Values are in SI, as dataset 164 of the file says.
+QUANTITIES = {
+    "length": (8, 1, 0), "angle": (8, 0, 0), "velocity": (11, 1, 0), "angular velocity": (11, 0, 0),
+    "acceleration": (12, 1, 0), "angular acceleration": (12, 0, 0), "force": (9, 0, 1), "moment": (9, 1, 1),
+    "pressure": (15, -2, 1), "stiffness": (1, -1, 1), "rotational stiffness": (1, 1, 1), "power": (1, 1, 1),
+    "energy": (1, 1, 1), "mass": (16, -1, 1), "time": (17, 0, 0), "frequency": (18, 0, 0), "rate": (1, 0, 0),
+}  # fmt: skip
+#: Columns without a unit that are kinds of their own: order 20.
+ORDER = ("order", 20)
+#: Function types: time response, and general.
+TIME_RESPONSE, GENERAL = 1, 0
 #: Longest name of a field in a MATLAB file.
 LONGEST = 63
 
@@ -127,25 +134,53 @@ def write_uff(path: Path, tables: Tables) -> None:
         x = columns[first]
         if x.dtype.kind == "U" or len(x) < 2 or not (np.diff(x) > 0).all():
             continue
-        kind, abscissa, unit = ABSCISSAS.get(first, (0, 0, ""))
+        kind = TIME_RESPONSE if unit_of(first).quantity == "time" else GENERAL
         for name in others:
             y = columns[name]
             known = np.zeros(0, dtype=bool) if y.dtype.kind == "U" else np.isfinite(y)  # the format has no gaps
             if known.sum() < 2:
                 continue
-            data_type, label = next((known for end, known in ORDINATES.items() if name.endswith(end)), (0, ""))
+            places = unit_of(first).factor * x[known]
             made = pyuff.prepare_58(
-                binary=1, id1=name, id2=f"gearfe {table}.csv over {first}", func_type=kind, rsp_node=len(sets) + 1,
-                rsp_dir=0, ref_node=0, ref_dir=0, data=y[known], x=x[known], abscissa_spacing=int(_even(x[known])),
-                abscissa_spec_data_type=abscissa, abscissa_axis_units_lab=unit, ordinate_spec_data_type=data_type,
-                ordinate_axis_units_lab=label, orddenom_spec_data_type=0, z_axis_spec_data_type=0, load_case_id=0,
-                rsp_ent_name="NONE", ref_ent_name="NONE",
+                binary=1, id1=_si_name(name), id2=_ascii(words(name)), id3=f"gearfe {table}.csv over {first}",
+                func_type=kind, rsp_node=len(sets) + 1, rsp_dir=0, ref_node=0, ref_dir=0,
+                data=unit_of(name).factor * y[known], x=places, abscissa_spacing=int(_even(places)), load_case_id=0,
+                rsp_ent_name="NONE", ref_ent_name="NONE", orddenom_spec_data_type=0, z_axis_spec_data_type=0,
+                **_axis("abscissa", first), **_axis("ordinate", name),
             )  # fmt: skip
             sets.append(made)
     if not sets:
         raise InputError("--format", "uff", "holds functions, and no table of this run is one", "take csv, h5 or mat")
+    units = pyuff.prepare_164(
+        units_code=1, units_description="SI", temp_mode=1, length=1.0, force=1.0, temp=1.0, temp_offset=273.15
+    )
     path.unlink(missing_ok=True)
-    pyuff.UFF(str(path)).write_sets(sets, mode="add")
+    pyuff.UFF(str(path)).write_sets([units, *sets], mode="add")
+
+
+def _ascii(text: str) -> str:
+    """A text as a line of the file holds it."""
+    return text.encode("ascii", "replace").decode()[:80]
+
+
+def _si_name(column: str) -> str:
+    """Name of a column in SI units: transmission_error_um -> transmission_error_m."""
+    stem, unit = parted(column)
+    return f"{stem}_{unit.si}" if unit.si else stem
+
+
+def _axis(axis: str, column: str) -> dict[str, Any]:
+    """Kind of quantity and unit of an axis: records 8 and 9 of data set 58."""
+    unit = unit_of(column)
+    code, length, force = QUANTITIES.get(unit.quantity, (ORDER[1], 0, 0) if column == ORDER[0] else (0, 0, 0))
+    symbol = UNITS[unit.si].symbol.replace("²", "^2") if unit.si else "NONE"  # the file is ASCII
+    return {
+        f"{axis}_spec_data_type": code,
+        f"{axis}_len_unit_exp": length,
+        f"{axis}_force_unit_exp": force,
+        f"{axis}_temp_unit_exp": 0,
+        f"{axis}_axis_units_lab": symbol[:20],
+    }
 
 
 def _even(x: Array) -> bool:
