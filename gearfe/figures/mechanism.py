@@ -234,16 +234,14 @@ def _plates(path: Path, mechanism: Mechanism, results: Results) -> None:
     figure = new_figure(9, sum(heights) + 0.8 * count)
     rows = figure.subplots(count, 1, squeeze=False, height_ratios=heights)[:, 0]
     for axes, (name, link) in zip(rows, mechanism.plates.items(), strict=True):
-        stresses = np.array([link.von_mises(stress) for stress in results.sections[name]])
-        when = int(stresses.max(axis=1).argmax())
+        when = int(link.largest_von_mises(results.sections[name]).argmax())
+        stress = link.von_mises(results.sections[name][when])
         factor = mechanism.file.figure.magnification
         moved = factor * link.displacements(results.trajectory.q[when : when + 1])[0]
         places = link.part.plate.points + moved
         t = link.part.plate.triangles
         small = np.concatenate([t[:, [0, 3, 5]], t[:, [3, 1, 4]], t[:, [5, 4, 2]], t[:, [3, 4, 5]]])
-        drawn = axes.tripcolor(
-            places.real, places.imag, small, 1e-6 * stresses[when], shading="gouraud", cmap="viridis"
-        )
+        drawn = axes.tripcolor(places.real, places.imag, small, 1e-6 * stress, shading="gouraud", cmap="viridis")
         axes.set_aspect("equal")
         figure.colorbar(drawn, ax=axes, label="von Mises (MPa)", shrink=0.9)
         note = "" if factor == 1.0 else f", displacements x {factor:g}"

@@ -301,7 +301,7 @@ def _of_elements(mechanism: Mechanism, results: Results, name: str) -> dict[str,
     link, q = mechanism.plates[name], results.trajectory.q
     nodes, elements = link.mesh
     plate = link.part.plate
-    largest = float(max(link.von_mises(stress).max() for stress in results.sections[name]))
+    largest = float(link.largest_von_mises(results.sections[name]).max())
     table = mechanism.file.bodies[name].plate
     assert table is not None  # it makes the link flexible
     return {

@@ -123,7 +123,7 @@ def write_plates(folder: Path, mechanism: Mechanism, trajectory: Trajectory) -> 
 def _fields(link: PlateLink, q: Any, stress: Any) -> dict[str, Any]:
     """Stresses and displacements at the nodes, in the axes of the link's own frame."""
     moved = link.displacements(q)[0]
-    by_part = link.part.plate.stresses @ stress
+    by_part = link.nodal_stresses(stress)
     return {
         "von_mises_Pa": link.von_mises(stress),
         "stress_xx_Pa": by_part[:, 0],

@@ -197,7 +197,7 @@ class Mechanism:
             cure = f"use largest_von_mises({name}), or the reactions of its joints"
             raise InputError(f"expression {kind}({what})", None, f"link {name!r} is no beam", cure)
         stresses = link.stresses(q, v) if sections is None else sections[name]
-        return np.array([link.von_mises(stress).max() for stress in stresses])
+        return link.largest_von_mises(stresses)
 
     def _point_values(self, kind: str, where: str, q: Any, v: Any, a: Any) -> tuple[Array, Array]:
         body, (lx, ly) = self.point(where, "expression")

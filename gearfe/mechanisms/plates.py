@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.cache import cached_arrays, source_hash, versions
 from ..base.errors import InputError, given, unknown_name
 from ..base.progress import stage
 from ..base.tables.mechanism import BodyTable
@@ -21,9 +23,12 @@ from ..multibody.planar.floating import Floating, FloatingBody, frame_joint
 from ..multibody.planar.linkage import Linkage
 
 if TYPE_CHECKING:
+    from ..fem.plane import Material
     from ..fem.reduction.plate import Interface, Plate
 
 Point = tuple[float, float]
+#: Times whose stresses are in memory together.
+TOGETHER = 64
 #: How far from an interface its nodes and points may lie, in parts of the link's size.
 NEAR = 1e-6
 
@@ -142,10 +147,20 @@ class PlateLink:
         """Stresses of the core in states of the system, shape (times, s)."""
         return np.array([self.element.stress(a[self.own], b[self.own]) for a, b in zip(q, v, strict=True)])
 
+    def nodal_stresses(self, stress: Array) -> Array:
+        """Return stresses xx, yy, xy at the nodes (Pa), shape (..., n, 3), from those of the core, shape (..., s)."""
+        recovery = self.part.plate.stresses
+        return np.asarray(stress @ recovery.reshape(-1, recovery.shape[2]).T).reshape(*stress.shape[:-1], -1, 3)
+
     def von_mises(self, stress: Array) -> Array:
-        """Von Mises' stress at the nodes (Pa), shape (n,), by the stresses of the core, shape (s,)."""
-        x, y, shear = np.moveaxis(self.part.plate.stresses @ stress, -1, 0)
+        """Return von Mises' stress at the nodes (Pa), shape (..., n), from stresses of the core, shape (..., s)."""
+        x, y, shear = np.moveaxis(self.nodal_stresses(stress), -1, 0)
         return np.asarray(np.sqrt(x**2 - x * y + y**2 + 3.0 * shear**2))
+
+    def largest_von_mises(self, stresses: Array) -> Array:
+        """Return the largest of von Mises' stress over the nodes (Pa), shape (times,), from those of the core."""
+        blocks = range(0, len(stresses), TOGETHER)
+        return np.concatenate([self.von_mises(stresses[k : k + TOGETHER]).max(axis=1) for k in blocks])
 
     def places(self, q: Array) -> np.ndarray:
         """Places of the nodes as complex numbers, shape (times, n)."""
@@ -197,6 +212,12 @@ class PlateLink:
         return len(self.part.plate.points), len(self.part.plate.triangles)
 
 
+#: Modules whose text decides a reduced plate.
+_MODULES = ("fem/reduction/plate", "fem/plane", "fem/meshing/plate_mesh", "mechanisms/plates")
+#: Numbers of a plate that are stored as arrays of no dimension.
+_NUMBERS = {"size": float, "mass": float, "centre": complex, "inertia": float}
+
+
 def part_of_plate(name: str, table: BodyTable, folder: Path) -> PlatePart:
     """A link from its tables; the finite elements are condensed once for all links of the same shape and material."""
     plate = given(table.plate, f"bodies.{name}.plate")
@@ -221,8 +242,29 @@ class _Shape:
 
 
 @lru_cache(maxsize=16)
-def _reduced(shape: _Shape, written: int) -> Plate:  # noqa: ARG001 - a mesh file that is written anew is another
+def _reduced(shape: _Shape, written: int) -> Plate:
+    """Return the reduced plate of a table, from the cache if the same was reduced before."""
     from ..fem.plane import Material
+    from ..fem.reduction.plate import Plate
+
+    table, made = shape.table, []
+    material = Material(1e9 * table.youngs_modulus_GPa, table.poisson_ratio, density=table.density_kg_per_m3)
+
+    def make() -> dict[str, Any]:
+        made.append(_reduce(shape, material))
+        return {own.name: np.asarray(getattr(made[0], own.name)) for own in fields(Plate)}
+
+    mesh = hashlib.sha256(shape.source.read_bytes()).hexdigest() if written and shape.source else ""
+    code = [source_hash(*_MODULES), versions()]
+    # keys of a recipe have no order, but the frame goes with the first interface
+    recipe = {"table": table, "interfaces": list(table.interfaces), "mesh": mesh, "code": code}
+    arrays = cached_arrays("plate", recipe, make)
+    if made:
+        return made[0]
+    return Plate(**{name: _NUMBERS.get(name, np.asarray)(value) for name, value in arrays.items()})
+
+
+def _reduce(shape: _Shape, material: Material) -> Plate:
     from ..fem.reduction.plate import reduce_plate
 
     table = shape.table
@@ -233,7 +275,6 @@ def _reduced(shape: _Shape, written: int) -> Plate:  # noqa: ARG001 - a mesh fil
         if table.modes > free // 4:
             problem = f"are too many for a mesh with {free} displacements beside its interfaces"
             raise InputError(f"{shape.where}.modes", table.modes, problem, f"take at most {free // 4}, or a finer mesh")
-        material = Material(1e9 * table.youngs_modulus_GPa, table.poisson_ratio, density=table.density_kg_per_m3)
         return reduce_plate(points, triangles, table.thickness_m, material, interfaces, table.modes)
 
 

@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import re
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,14 @@ from scipy.sparse.linalg import eigsh
 from skfem.helpers import ddot, dot, eye, sym_grad, trace
 
 from gearfe.base.errors import InputError
+from gearfe.base.tables.mechanism import BodyTable
+from gearfe.base.tables.plate import InterfaceTable, PlateTable
 from gearfe.cli.main import main
 from gearfe.fem.meshing.plate_mesh import mesh_outline
 from gearfe.fem.plane import Material
 from gearfe.fem.reduction.plate import Interface, Plate, reduce_plate
 from gearfe.mechanisms import evaluate, load_mechanism
-from gearfe.mechanisms.plates import floating_body
+from gearfe.mechanisms.plates import PlateLink, PlatePart, _reduced, floating_body, part_of_plate
 from gearfe.multibody import (
     Body,
     Fixed,
@@ -46,6 +49,20 @@ from gearfe.multibody.planar.turning import TurningFrame
 from tests.makers.elastica import elastica
 from tests.makers.files import mechanism_file
 from tests.places import GEOMETRY
+
+#: An arm 0.2 m long, held at both ends.
+COARSE: dict[str, Any] = {
+    "interfaces": {
+        "left": InterfaceTable(edge_m=((0.0, -0.01), (0.0, 0.01))),
+        "right": InterfaceTable(edge_m=((0.2, -0.01), (0.2, 0.01))),
+    },
+    "thickness_m": 0.01,
+    "youngs_modulus_GPa": 200.0,
+    "density_kg_per_m3": 7850.0,
+    "outline_m": ((0.0, -0.01), (0.2, -0.01), (0.2, 0.01), (0.0, 0.01)),
+    "element_size_m": 0.02,
+    "modes": 2,
+}
 
 
 def bar(height: float, count: int, material: Material, length: float = 1.0, across: int = 1) -> Plate:
@@ -461,3 +478,35 @@ def test_methods_with_tiny_steps_are_refused(tmp_path: Path, capsys: pytest.Capt
     path = mechanism_file(tmp_path, ARM)
     assert main(["mechanism", str(path), "--out", str(tmp_path / "out"), "--method", "taylor"]) == 2
     assert "flexible links" in capsys.readouterr().err
+
+
+def test_a_stored_plate_is_the_reduced_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second process reads it; another table or another text of the mesh file has an entry of its own."""
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path / "cache"))
+    table, folder = PlateTable(**COARSE), tmp_path
+    _reduced.cache_clear()
+    first = part_of_plate("arm", BodyTable(plate=table), folder).plate
+    _reduced.cache_clear()
+    monkeypatch.setattr("gearfe.fem.reduction.plate.reduce_plate", None)
+    second = part_of_plate("arm", BodyTable(plate=table), folder).plate
+    for own in fields(Plate):
+        np.testing.assert_array_equal(getattr(second, own.name), getattr(first, own.name))
+        assert type(getattr(second, own.name)) is type(getattr(first, own.name))
+    monkeypatch.undo()
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path / "cache"))
+    part_of_plate("arm", BodyTable(plate=replace(table, thickness_m=0.02)), folder)
+    turned = replace(table, interfaces=dict(reversed(table.interfaces.items())))
+    assert part_of_plate("arm", BodyTable(plate=turned), folder).plate.centres[0] == pytest.approx(0.2)
+    assert len(list((tmp_path / "cache").glob("plate-*"))) == 3
+    _reduced.cache_clear()
+
+
+def test_nodal_stresses_of_many_times_are_those_of_each(slender: Plate) -> None:
+    part = PlatePart("rod", PlateTable(**COARSE), slender, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    link = PlateLink(part, None, None, {}, slice(0, 0), np.zeros((2, 3), dtype=np.int64))  # type: ignore[arg-type]
+    stress = np.random.default_rng(1).standard_normal((150, slender.stresses.shape[2]))
+    nodal = np.einsum("ncs,ts->tnc", slender.stresses, stress)
+    np.testing.assert_allclose(link.nodal_stresses(stress), nodal, rtol=1e-9, atol=1e-12 * np.abs(nodal).max())
+    xx, yy, xy = np.moveaxis(nodal, -1, 0)
+    largest = np.sqrt(xx**2 - xx * yy + yy**2 + 3 * xy**2).max(axis=1)
+    np.testing.assert_allclose(link.largest_von_mises(stress), largest, rtol=1e-12)

@@ -204,16 +204,21 @@ class Floating(Element):
         """Elastic energy and that of the weight (J) in states (..., size)."""
         return np.asarray(self.elastic_energy(q) - q @ self._weight)
 
+    def _products(self, one: Array, two: Array) -> Array:
+        """Q(one, two) of shares (..., r), shape (..., s), as one matrix product."""
+        pairs = (one[..., :, None] * two[..., None, :]).reshape(*one.shape[:-1], -1)
+        return np.asarray(pairs @ self.body.quadratic.reshape(len(self.body.quadratic), -1).T)
+
     def elastic_energy(self, q: Array) -> Array:
         """1/2 e . e (J) in states (..., size)."""
         eta = self.shares(q)
-        strains = eta @ self.body.linear.T + 0.5 * np.einsum("skl,...k,...l->...s", self.body.quadratic, eta, eta)
+        strains = eta @ self.body.linear.T + 0.5 * self._products(eta, eta)
         return np.asarray(0.5 * (strains**2).sum(axis=-1))
 
     def loss(self, q: Array, v: Array) -> Array:
         """Power that damping takes (W) in states (..., size)."""
         eta, rates = self.shares(q), self._share_rates(q, v)
-        strains = rates @ self.body.linear.T + np.einsum("skl,...k,...l->...s", self.body.quadratic, eta, rates)
+        strains = rates @ self.body.linear.T + self._products(eta, rates)
         return np.asarray(self.body.damping * (strains**2).sum(axis=-1))
 
 
