@@ -296,14 +296,22 @@ class TrainMeshTable:
         None,
         choices=MESH_MODELS,
         gone=GONE_MODELS,
-        doc="potential: mesh law with transmission error and separation, of loads alike along the face width; "
-        "variable_stiffness: k(phi) delta, of other loads with their transmission error; "
+        doc="potential: mesh law with transmission error and separation, of loads that vary along the face width with "
+        "moments and tilts; "
+        "variable_stiffness: k(phi) delta, of such loads with their transmission error; "
         "mean_stiffness: the mean of k over the mesh cycle; left out: that of [train.curves]",
     )
     mesh_model_torque_Nm: float | None = quantity(
         None,
         above=0.0,
         doc="largest torque at the driven gear that the potential is made for; left out: 5 times the steady one",
+    )
+    mesh_model_tilt_um: float | None = quantity(
+        None,
+        low=0.0,
+        high=500.0,
+        doc="largest tilt of the gears in the plane of action, over the common face width (um), that the potential of "
+        "loads that vary along it is made for; left out: twice what shafts and bearings yield under the steady torques",
     )
     backlash_um: float | None = quantity(
         None,
@@ -368,6 +376,11 @@ class TrainMeshTable:
             problem = "needs a mesh law: a stiffness does not say how tooth pairs share the load"
             cure = 'write mesh_model = "potential", or leave friction out'
             raise InputError(f"{where}.{key}", getattr(self, key), problem, cure)
+        for key in ("mesh_model_torque_Nm", "mesh_model_tilt_um"):
+            if getattr(self, key) is not None and (given or self.mesh_model in (VARIABLE, MEAN)):
+                problem = "says how far a mesh law is known, and this mesh has none"
+                cure = 'write mesh_model = "potential", or leave it out'
+                raise InputError(f"{where}.{key}", getattr(self, key), problem, cure)
         if self.backlash_um is not None and self.backlash_um < 0.0:
             problem = "must be >= 0 um: less is a wedged mesh, whose flanks all bear without a load"
             raise InputError(

@@ -18,16 +18,14 @@ import numpy as np
 
 from ...base.errors import InputError, given
 from ...base.tables.carrier import TrainCarrierTable
-from ...base.tables.gearbox import Gearbox, NamedMesh, check_alike_along
+from ...base.tables.gearbox import Gearbox, NamedMesh
 from ...base.tables.housing import HousingTable
 from ...base.tables.jobs import read_train_tables
 from ...base.tables.pair import MaterialTable, StiffnessTable
 from ...base.tables.spectrum import SpectrumTable
 from ...base.tables.timefunction import TrainFunctionTable
 from ...base.tables.train import (
-    MEAN,
     POTENTIAL,
-    VARIABLE,
     ShaftSectionTable,
     TrainMeshTable,
     TrainShaftTable,
@@ -37,6 +35,7 @@ from ...base.typing import Array
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.mesh_table import MeshTable
+from ...gears.gearmesh.width_law import WidthLaw
 from ...gears.geometry.deviation_job import pitch_errors_of
 from ...gears.geometry.pair import Gear, gear_of, gear_pair, pair_of
 from ...multibody import TimeFunction, smoothed_step
@@ -67,7 +66,7 @@ if TYPE_CHECKING:
 
 #: Radii that differ by no more are equal (relative).
 ROUNDING = 1e-6
-Stiffness = MeshLaw | StiffnessCurve | MeshTable | float | None
+Stiffness = MeshLaw | WidthLaw | StiffnessCurve | MeshTable | float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +114,7 @@ class TrainJob:
             For gears that cannot be made, and gears that cannot run together.
         """
         made: dict[str, Gear] = {}
-        for table, mesh in zip(self.table.meshes, self.meshes, strict=True):
-            if self.table.model_of(table) == POTENTIAL:
-                cure = f'write mesh_model = "{VARIABLE}" (or "{MEAN}") in the mesh or in [train.curves]'
-                what = f'mesh_model = "{POTENTIAL}" of mesh {mesh.name!r}'
-                check_alike_along(mesh, what, sides=("left", "right"), places=False, cure=cure)
+        for mesh in self.meshes:
             pair = pair_of(mesh)
             made |= {mesh.driver.name: pair.pinion, mesh.driven.name: pair.given_wheel}
         return made | {name: gear_of(named) for name, named in self.gearbox.gears.items() if name not in made}

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.progress import stage
-from ...base.tables.gearbox import NamedMesh
+from ...base.tables.gearbox import NamedGear, NamedMesh
 from ...base.tables.train import MEAN, POTENTIAL
 from ...gears.contact.laws import HalfPlane, PairModel, check_alike, check_deviations, check_torque
 from ...gears.gearmesh.curve import NO_CYCLE, StiffnessCurve
@@ -21,6 +21,7 @@ from ...gears.gearmesh.job import StiffnessJob, cached_curve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.law_store import cached_law
 from ...gears.gearmesh.mesh_table import MeshTable, read_mesh_table
+from ...gears.gearmesh.width_law import WidthLaw
 from ...gears.geometry.deviation_job import deviations_of
 from ...gears.geometry.face import NOMINAL, ToothDeviations
 from ...gears.geometry.pair import GearPair, gear_pair
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
 
 #: A mesh law is made for so many times the torque in steady running: vibration has room.
 ROOM = 5.0
+#: Tilt for which a law over the face width is made, in those that the steady torque makes, and that it makes with a
+#: moment of the force on a sixth of the width; least one that counts (m over the width).
+TILT_ROOM, LEAST_TILT = 2.0, 1e-8
 #: Positions at which the error of a law's stiffness is estimated.
 ESTIMATED = 8
 #: Positions of a curve at the carried torque.
@@ -76,6 +80,8 @@ def train_curves(
         elif mesh.curve is not None:
             with _key_in_messages(f"{tables[number]}.curve", mesh.curve):
                 found.append(_read_curve(job.path.parent / mesh.curve, teeth))
+        elif _law_over_width(job, number):
+            found.append(_computed_width_law(job, train, number))
         elif job.table.model_of(mesh) == POTENTIAL:
             found.append(_computed_law(job, train, number, estimate))
         elif _driving(job, train, number).along_width(places=False) is not None:
@@ -204,6 +210,63 @@ def _computed_spring(job: TrainJob, train: GearTrain, number: int) -> MeshTable:
         return mesh_spring(states, pair.mesh_cycle, mean=mean, method=curves.interpolation)
 
 
+def _law_over_width(job: TrainJob, number: int) -> bool:
+    """Whether a mesh has a law over the face width; raise `InputError` for a tilt of a law that has none."""
+    table, named = job.table.meshes[number], job.meshes[number]
+    if job.table.model_of(table) != POTENTIAL:
+        return False
+    varies = named.along_width(("left", "right"), places=False) is not None
+    if table.mesh_model_tilt_um is not None and not varies:
+        where = f"mesh {named.name!r} mesh_model_tilt_um"
+        problem = "is for loads that vary along the face width, and that of this mesh does not"
+        raise InputError(where, table.mesh_model_tilt_um, problem, "leave it out")
+    return varies
+
+
+def _computed_width_law(job: TrainJob, train: GearTrain, number: int) -> WidthLaw:
+    """Law over the face width of a mesh with the driver as pinion; of its back flanks where they are others."""
+    from ...gears.gearmesh.width_job import wide_mesh  # teeth in three dimensions, for these meshes
+    from ...gears.gearmesh.width_law_store import cached_width_law
+
+    mesh, table = train.meshes[number], job.table.meshes[number]
+    pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
+    driving, back = (
+        StiffnessJob(replace(job.meshes[number], flank=flank), pair, job.path.parent)
+        for flank in _flanks(train, number)
+    )
+    most = table.mesh_model_torque_Nm or ROOM * carried_torque(train, number)
+    label = f"mesh {mesh.name!r} mesh_model_torque_Nm"
+    if not most > 0.0:
+        problem = "carries no torque in steady running, so the range of its mesh law is unknown"
+        raise InputError(label, None, problem, "give mesh_model_torque_Nm")
+    wide = wide_mesh(driving)
+    try:
+        wide.check_torque(most, label)
+    except InputError as error:
+        problem = f"is the largest of its law ({ROOM:g} times the steady one where none is given): {error.problem}"
+        raise InputError(label, float(f"{most:.6g}"), problem, "give a smaller load, or mesh_model_torque_Nm") from None
+    if table.mesh_model_tilt_um is None:
+        tilt = _usual_tilt(job, number, wide.width)
+    else:
+        tilt = 1e-6 * table.mesh_model_tilt_um / wide.width
+    with stage(mesh.name):
+        law = cached_width_law(driving, most / pair.wheel.base_radius, tilt)
+        if back_flanks(job, train, number) and _flanks_differ(driving.mesh):
+            law = replace(law, back=cached_width_law(back, most / pair.wheel.base_radius, 0.0))
+    return law
+
+
+def _usual_tilt(job: TrainJob, number: int, width: float) -> float:
+    """Tilt (rad) that a mesh of a common width (m) needs in its law: by shafts, bearings and housing."""
+    from .springs_train import tilting_train
+
+    statics = tilting_train(job, number)
+    force = float(abs(statics.model.kinematics.steady_forces[number]))
+    at = statics.at(1.0, np.zeros(2))
+    tilt = TILT_ROOM * (abs(float(at.tilts[0])) + float(at.compliance[0, 0]) * force * width / 6.0)
+    return float(f"{tilt:.3g}") if tilt * width > LEAST_TILT else 0.0
+
+
 def _driving(job: TrainJob, train: GearTrain, number: int) -> NamedMesh:
     """The mesh with the flanks that its sense of rotation lets drive."""
     return replace(job.meshes[number], flank=_flanks(train, number)[0])
@@ -217,10 +280,21 @@ def _flanks(train: GearTrain, number: int) -> tuple[str, str]:
 def _check_back_flanks(mesh: NamedMesh) -> None:
     """Raise `InputError` for back flanks with other modifications, for which a spring is not computed."""
     for gear in mesh.gears:
-        if gear.microgeometry is not None and gear.microgeometry.flank("left") != gear.microgeometry.flank("right"):
+        if _sides_differ(gear):
             problem = f"left and right flanks differ, but mesh {mesh.name!r} has one stiffness for both"
             cure = "make them alike, or leave backlash_um out"
             raise InputError(gear.microgeometry_where, None, problem, cure)
+
+
+def _sides_differ(gear: NamedGear) -> bool:
+    """Whether left and right flanks of a gear have different modifications."""
+    given = gear.microgeometry
+    return given is not None and given.flank("left") != given.flank("right")
+
+
+def _flanks_differ(mesh: NamedMesh) -> bool:
+    """Whether the back flanks of a mesh are no mirror image of the driving ones."""
+    return any(_sides_differ(gear) for gear in mesh.gears)
 
 
 def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> MeshLaw:

@@ -22,20 +22,16 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.progress import Stopwatch
-from ...base.tables.gearbox import FROM_SHAFTS, Gearbox, NamedMesh
+from ...base.tables.gearbox import FROM_SHAFTS, NamedMesh
 from ...base.tables.jobs import train_tables
-from ...base.tables.pair import MaterialTable
-from ...base.tables.train import TrainMeshTable, TrainTable
 from ...base.typing import Array
 from ...gears.gearmesh.job import StiffnessJob
 from ...gears.gearmesh.width_job import MOST_GAP, axial_sense, map_angles, stiffness_angles
-from ...gears.geometry.pair import gear_pair
-from ...gears.rating.stiffness import iso_values
 from ...gears.width import ContactLines, Misalignment, WidthSweep, sweep_width
 from ..train.misalignment import TiltingTrain
-from ..train.model import build_train
-from .job import Stiffness, TrainJob, job_train, train_body, train_job
+from .job import train_job
 from .mesh_stiffness import carried_torque
+from .springs_train import tilting_train
 
 if TYPE_CHECKING:
     from ...base.tables.loadmap import LoadMapTable
@@ -131,56 +127,16 @@ def shaft_tilts(raw: dict[str, Any], path: str | Path, mesh: NamedMesh, variant:
     if mesh.name not in job.gearbox.meshes:
         problem = "is a mesh of planets, whose tilts are not computed"
         raise InputError(where, True, problem, "leave it out; misalignment_um takes a tilt that is known")
-    job = replace(job, gearbox=_without_flanks(job.gearbox), table=_with_springs(job.table))
     number = list(job.gearbox.meshes).index(mesh.name)
-    train = job_train(job, _mean_stiffness(job), train_body(job))
-    meshes = tuple(replace(m, moments=i == number, friction=0.0) for i, m in enumerate(train.meshes))
-    model = build_train(replace(train, meshes=meshes))
+    statics = tilting_train(job, number)
+    model = statics.model
     torque = carried_torque(model.train, number)
     if not torque > 0.0:
         problem = "needs a torque that bends the shafts, and the mesh carries none in steady running of the train"
         raise InputError(where, True, problem, "add a load ([[train.loads]])")
     kinematics = model.kinematics
     left = kinematics.senses[number] * kinematics.steady_forces[number] > 0.0
-    return ShaftTilts(replace(mesh, flank="left" if left else "right"), TiltingTrain(model, number), torque)
-
-
-def _without_flanks(box: Gearbox) -> Gearbox:
-    """The gears without deviations and tilts, which statics do not feel."""
-    meshes = {
-        name: replace(
-            mesh,
-            misalignment_um=0.0,
-            misalignment_across_um=0.0,
-            driver=replace(mesh.driver, microgeometry=None),
-            driven=replace(mesh.driven, microgeometry=None),
-        )
-        for name, mesh in box.meshes.items()
-    }
-    return Gearbox({name: replace(gear, microgeometry=None) for name, gear in box.gears.items()}, meshes)
-
-
-def _with_springs(table: TrainTable) -> TrainTable:
-    """[train] with springs as meshes, whose back flanks, should the loads press them, are as stiff as driving ones."""
-
-    def spring(mesh: TrainMeshTable) -> TrainMeshTable:
-        made = replace(mesh, mesh_model=None, curve=None, mesh_table=None, rigid=False)
-        return replace(made, stiffness_N_per_m=1.0, backlash_um=0.0)
-
-    return replace(table, meshes=tuple(spring(mesh) for mesh in table.meshes))
-
-
-def _mean_stiffness(job: TrainJob) -> tuple[Stiffness, ...]:
-    """c_gamma of ISO 6336-1 times the width for each mesh: loops of gears share their torque by it, others do not."""
-    train = job_train(job)
-
-    def stiffness(number: int, named: NamedMesh) -> float:
-        mesh = train.meshes[number]
-        pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
-        moduli = [1e9 * (gear.material or MaterialTable()).youngs_modulus_GPa for gear in named.gears]
-        return float(iso_values(pair, moduli[0], moduli[1])["c_gamma_times_width_N_per_m"])
-
-    return tuple(stiffness(number, named) for number, named in enumerate(job.meshes))
+    return ShaftTilts(replace(mesh, flank="left" if left else "right"), statics, torque)
 
 
 def job_tilts(

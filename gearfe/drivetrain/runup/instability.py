@@ -19,7 +19,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.progress import count, one_thread
 from ...base.typing import Array, ComplexArray
-from ..train.forces import CurveFlank
+from ..train.forces import CurveFlank, WidthFlank
 from .balance import Changes
 from .condensed import CondensedTrain
 from .stability import LONGEST, around, kicks, steps_of, strengths, window
@@ -88,8 +88,10 @@ def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Changes:
     for numbers, steady in zip(train.flanks_of_mesh, train.steady, strict=True):
         flank, (along, turn, tilt) = train.forces.flanks[numbers[0]], train.forces.freedoms[numbers[0], :3]
         phase = flank.sense * (flank.ratio * (theta @ train.forces.turns[numbers[0]]) + u[:, turn]) + flank.phase
-        if isinstance(flank, CurveFlank):
-            tilts = u[:, tilt] if flank.tilt >= 0 else 0.0
+        tilts = u[:, tilt] if flank.tilt >= 0 else np.zeros(())
+        if isinstance(flank, WidthFlank):
+            u[:, along] = flank.gap + flank.law.approach(phase, factor * steady, tilts)
+        elif isinstance(flank, CurveFlank):
             u[:, along] = factor * steady / flank.curve(phase).value - flank.beyond_touch(phase, np.zeros(()), tilts)
         else:
             u[:, along] = flank.gap + flank.law.approach(phase, factor * steady)

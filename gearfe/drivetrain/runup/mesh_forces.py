@@ -201,11 +201,13 @@ class MeshForces:
             force, tangent, cross = shaped(at.force), shaped(at.tangent), shaped(at.cross)
             value[:, d] += mean * u[:, d] - force  # each flank has its own approach
             by += [(d, d, mean - tangent), (d, r, -sense * cross)]
-            if at.lever is not None and at.couple is not None and at.couple_by_phase is not None:
-                lever = shaped(at.lever)
+            if at.couple is not None and at.couple_by_phase is not None:
                 _add(value, a, -shaped(at.couple))
-                by += [(d, a, -tangent * lever), (a, d, -tangent * lever), (a, a, -tangent * lever**2)]
+                slopes = ((d, a, at.by_tilt), (a, d, at.couple_by_approach), (a, a, at.couple_by_tilt))
+                by += [(row, column, -shaped(slope)) for row, column, slope in slopes if slope is not None]
                 by.append((a, r, -sense * shaped(at.couple_by_phase)))
+                if at.moment_by_tilt is not None:
+                    by.append((r, a, -sense * shaped(at.moment_by_tilt)))
             if at.momentum is not None and at.per_rate is not None:
                 momentum = np.zeros_like(u) if momentum is None else momentum
                 value[:, d] += shaped(at.push)

@@ -186,7 +186,7 @@ def warnings(run: RunUp) -> list[str]:
     if beyond:
         found.append(
             f"at {len(beyond)} of {len(run.states)} states, the first at {beyond[0]:.6g} rad/s, a mesh goes beyond "
-            "what its law is known for: write a larger mesh_model_torque_Nm in [[train.meshes]]"
+            "what its law is known for: write a larger mesh_model_torque_Nm, or mesh_model_tilt_um, in [[train.meshes]]"
         )
     held = {s.speed for s in run.states if s.stable is not False}
     lost = sorted({s.speed for s in run.states} & set(run.speeds.tolist()) - held, key=abs)

@@ -14,6 +14,7 @@ from ...base.tables.bearing import check_matrix
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant
+from ...gears.gearmesh.width_law import WidthLaw
 from ...gears.geometry.gear_data import rounding
 from ...gears.geometry.mesh_geometry import ContactModel
 from ...gears.geometry.pair import Gear, gear_pair, in_keys
@@ -517,7 +518,7 @@ def _check_damper(mesh: GearMesh) -> None:
     label, acts = f"mesh {mesh.name!r} damping_acts", mesh.damping_acts
     if acts not in (None, ALWAYS, IN_CONTACT):
         raise InputError(label, acts, f"must be {ALWAYS!r} or {IN_CONTACT!r}", "leave it out for the default")
-    if acts == IN_CONTACT and not isinstance(mesh.stiffness, MeshLaw) and mesh.backlash is None:
+    if acts == IN_CONTACT and not mesh.has_law and mesh.backlash is None:
         problem = (
             "needs teeth that part, and a mesh without a law and without a backlash is a spring that acts both ways"
         )
@@ -533,8 +534,11 @@ def _check_pitch_errors(label: str, gear: ShaftGear, law: bool) -> None:
     """Pitch errors are one a tooth, at meshes that know their tooth pairs."""
     for errors in gear.pitch_errors:
         if errors and not law:
-            problem = f"has teeth with pitch errors on gear {gear.name!r}, which curves and rigid meshes do not know"
-            cure = 'take a mesh law (mesh_model = "potential"), or leave the pitch errors out'
+            problem = (
+                f"has teeth with pitch errors on gear {gear.name!r}, which curves, laws over the face width and rigid "
+                "meshes do not know"
+            )
+            cure = 'take a mesh law (mesh_model = "potential") of loads alike along the width, or leave them out'
             raise InputError(label, None, problem, cure)
         if len(errors) not in (0, gear.gear.teeth) or not np.isfinite(errors).all():
             problem = f"must be finite, one for each of the {gear.gear.teeth} teeth of gear {gear.name!r}, or none"
@@ -553,7 +557,7 @@ def _check_error(mesh: GearMesh, teeth: int) -> None:
     if error is None:
         return
     label = f"mesh {mesh.name!r} transmission_error"
-    if mesh.stiffness is None or isinstance(mesh.stiffness, MeshLaw):
+    if mesh.stiffness is None or mesh.has_law:
         problem = "stands beside a rigid mesh or a mesh law, which has its own"
         raise InputError(label, None, problem, "give a stiffness, or leave it out")
     if abs(error.period - pitch) > SAME * pitch or not np.isfinite(error.cubics).all():
@@ -585,7 +589,7 @@ def check_curve(mesh: GearMesh, teeth: int, wheel: Gear) -> None:
         curve.period
         if isinstance(curve, PeriodicInterpolant)
         else curve.cycle
-        if isinstance(curve, MeshLaw)
+        if isinstance(curve, MeshLaw | WidthLaw)
         else curve.mesh_cycle
     )
     expected = 2.0 * math.pi / teeth
@@ -593,7 +597,7 @@ def check_curve(mesh: GearMesh, teeth: int, wheel: Gear) -> None:
         needs = f"the driver of {teeth} teeth needs {math.degrees(expected):.9g} deg"
         problem = f"has a period of {math.degrees(period):.9g} deg, {needs}"
         raise InputError(label, None, problem, "take the curve of these gears, the driver as pinion")
-    if isinstance(curve, MeshLaw):
+    if isinstance(curve, MeshLaw | WidthLaw):
         if abs(curve.sides[1].cycle - expected) > SAME * expected:
             problem = f"has a law of the back flanks with a period of {math.degrees(curve.sides[1].cycle):.9g} deg"
             raise InputError(label, None, problem, "take that of the same gears, seen from behind")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ...base.typing import Array, IntArray
 from .friction import UNKNOWN
-from .series import BEFORE, GAP, PAIR, PER_FLANK, PHASE, SLIDE, SPEEDING, TOUCH, F, Program
+from .series import BEFORE, GAP, OVERLAP, PAIR, PER_FLANK, PHASE, SLIDE, SPEEDING, TILTED, TOUCH, F, Program
 
 #: Part of a cell's width by which a discontinuity is passed in its prediction, so that the step contains it.
 PAST = 2e-3
@@ -83,21 +83,41 @@ def _bounds(w: int, p: Program, pieces: IntArray) -> tuple[float, float, float]:
         if p.places.curve[k] >= 0:
             node = p.curves.first[p.places.curve[k]] + pieces[at + 1]
             width = p.curves.nodes[node + 1] - p.curves.nodes[node]
+        elif p.places.curve[k] == -2:
+            width = p.wide.nodes[law, pieces[at + 1] + 1] - p.wide.nodes[law, pieces[at + 1]]
         else:
             width = p.laws.nodes[law, pieces[at + 1] + 1] - p.laws.nodes[law, pieces[at + 1]]
         return 0.0, width, SAME * width
+    if kind in (OVERLAP, TILTED):
+        return _wide_bounds(kind, law, pieces[at + PER_FLANK + (1 if kind == TILTED else 0)], p)
     if kind == PAIR:
         part = pieces[at + PER_FLANK + p.watches[w, 3]]
-        if part >= 0:
-            width = p.laws.forces[law, part + 1] - p.laws.forces[law, part]
-            return 0.0, (width if part < p.laws.parts[law] - 1 else 1e300), SAME * width
-        return -1e300, 0.0, SAME * SMALL
+        width = SMALL if part < 0 else p.laws.forces[law, part + 1] - p.laws.forces[law, part]
+        high = 0.0 if part < 0 else (width if part < p.laws.parts[law] - 1 else 1e300)
+        return (-1e300 if part < 0 else 0.0), high, SAME * width
     if kind == SLIDE:
         side = pieces[at + PER_FLANK + p.laws.touch.shape[1] + p.watches[w, 3]]
         low = -1.0 if side == 0 else (1.0 if side == 1 else -1e300)
         return low, (1.0 if side == 0 else (-1.0 if side == -1 else 1e300)), SAME
     slack = SAME * SMALL if kind == TOUCH else SAME
     return (0.0, 1e300, slack) if pieces[at + 2] >= 0 else (-1e300, 0.0, slack)
+
+
+def _wide_bounds(kind: int, law: int, cell: int, p: Program) -> tuple[float, float, float]:
+    """Return bounds and rounding of a cell of x (-1: apart), or of the tilt, of a law over the face width."""
+    below = 0 if kind == TILTED else -1
+    last = p.wide.sides[law] if kind == TILTED else p.wide.parts[law] - 1
+    width = 1e300
+    slack = SAME * SMALL
+    if kind == TILTED:
+        slack = SAME * (p.wide.tilts[law, 1] - p.wide.tilts[law, 0])
+    if cell == below:
+        return -1e300, 0.0, slack
+    if cell < last:
+        width = p.wide.overlaps[law, cell + 1] - p.wide.overlaps[law, cell]
+        if kind == TILTED:
+            width = p.wide.tilts[law, cell] - p.wide.tilts[law, cell - 1]
+    return 0.0, width, slack
 
 
 def _go_on(w: int, last: int, x: float, reached: bool, p: Program, memory: Array, pieces: IntArray) -> None:
@@ -123,6 +143,9 @@ def _go_on(w: int, last: int, x: float, reached: bool, p: Program, memory: Array
             pieces[at + PER_FLANK + slot] = part + 1 if up else part - 1
             if part == 0 and down:
                 pieces[at + PER_FLANK + p.laws.touch.shape[1] + slot] = UNKNOWN
+    elif kind in (OVERLAP, TILTED):
+        if up or down:
+            pieces[at + PER_FLANK + (1 if kind == TILTED else 0)] += 1 if up else -1
     elif kind == SLIDE:
         if up or down:
             pieces[at + PER_FLANK + p.laws.touch.shape[1] + slot] += 1 if up else -1
@@ -130,7 +153,9 @@ def _go_on(w: int, last: int, x: float, reached: bool, p: Program, memory: Array
         if up or down:
             pieces[at + 2] = 0 if up else -1
     elif up or down:
-        cells = p.laws.cells[p.places.law[k]] if p.places.curve[k] < 0 else 0
+        cells = p.laws.cells[p.places.law[k]] if p.places.curve[k] == -1 else 0
+        if p.places.curve[k] == -2:
+            cells = p.wide.cells[p.places.law[k]]
         if p.places.curve[k] >= 0:
             cells = p.curves.first[p.places.curve[k] + 1] - 1 - p.curves.first[p.places.curve[k]]
         pieces[at + 1] += 1 if up else -1
@@ -138,7 +163,7 @@ def _go_on(w: int, last: int, x: float, reached: bool, p: Program, memory: Array
             return
         pieces[at + 1] = 0 if up else cells - 1
         pieces[at] += 1 if up else -1
-        if p.places.curve[k] < 0:  # each pair goes on to the next slot
+        if p.places.curve[k] == -1:  # each pair goes on to the next slot
             slots = p.laws.touch.shape[1]
             for i in range(slots):
                 to = slots - 1 - i if up else i
@@ -249,4 +274,4 @@ def _polynomial(memory: Array, row: int, last: int, x: float) -> tuple[float, fl
     return value, slope
 
 
-FUNCTIONS = (_watched, _bounds, _go_on, leaves, _turning, _crossing, _polynomial)
+FUNCTIONS = (_watched, _bounds, _wide_bounds, _go_on, leaves, _turning, _crossing, _polynomial)

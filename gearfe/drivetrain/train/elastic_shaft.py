@@ -208,7 +208,7 @@ def _gear_loads(train: GearTrain, item: ShaftGear) -> tuple[str, ...]:
         low, high = common_face(train.gear(mesh.driver), train.gear(mesh.driven))
         # a mesh acts at the middle of the common width, or all along it
         off = abs(0.5 * (low + high) - item.along) > SAME_MIDDLE * item.gear.face_width
-        tilts |= off or mesh.moments or mesh.tilting is not None
+        tilts |= off or mesh.moments or mesh.acts_along_width
     return ("radial", *(("tilt",) if tilts else ()), *(("axial",) if helical else ()), "torsion")
 
 

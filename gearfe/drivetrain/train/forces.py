@@ -13,6 +13,8 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
   :math:`-s M` along r, the driver's rotation relative to the line of centres; with *friction* (`train.friction`)
   :math:`-\sum\mu N_k s(v_k/v_0)` across the line of action, and that times :math:`e_k` along the driver's turn
   against the driven gear;
+- of a *flank with a law over the face width* (`gears.gearmesh.width_law`): the same of F and M, and
+  :math:`-(G - \kappa_0 u_t)` along the tilt, whose mean stiffness :math:`\kappa_0` the system has, too;
 - *gyroscopic*: :math:`-J_p\Omega\,(u_{d+1}', -u_d')`, :math:`\Omega = g\psi' + u_s'`, on the tilts d, d + 1 of a
   shaft with the spin s;
 - *torques*: functions of time along a direction d, and of the true speed there, :math:`T(g\psi' + u_d') + c\,u_d'`,
@@ -36,6 +38,7 @@ from ...base.typing import Array, BoolArray, IntArray
 from ...gears.gearmesh.law import MeshForces, MeshLaw
 from ...gears.gearmesh.mesh_table import Tilting
 from ...gears.gearmesh.periodic import PeriodicInterpolant
+from ...gears.gearmesh.width_law import WidthLaw
 from ...multibody.series.timefunctions import TimeFunction
 from .friction import Sliding, smooth_sign
 
@@ -71,9 +74,12 @@ class FlankForces(NamedTuple):
     momentum: Array | None = None  # N s: its rate of change is the damper's part of the force, which jumps at the touch
     momentum_by_phase: Array | float = 0.0  # N s/rad
     push: Array | float = 0.0  # N: the damper's part of the force
-    lever: Array | None = None  # m: approach per tilt of the gears, and moment on it per spring force
     couple: Array | None = None  # N m on the tilt
+    by_tilt: Array | None = None  # N/rad: of the force
+    couple_by_approach: Array | None = None  # N m/m
+    couple_by_tilt: Array | None = None  # N m/rad
     couple_by_phase: Array | None = None  # N m/rad
+    moment_by_tilt: Array | None = None  # N m/rad
 
 
 class Slip(NamedTuple):
@@ -103,10 +109,12 @@ class MeshFlank(ABC):
 
     Flanks also have a `mean_damping` (N s/m), which the system's constant part has along the approach already, and a
     `damping` that acts while their teeth bear. `tilt` is the number of the tilt of the gears among the directions, of
-    flanks that act along the face width, else -1.
+    flanks that act along the face width, else -1; `against` is the stiffness against it (N m/rad) that the system's
+    constant part has and the flank's own moment, too.
     """
 
     tilt = -1
+    against = 0.0
 
     direction: int
     turn: int
@@ -212,7 +220,9 @@ class CurveFlank(MeshFlank):
         force, tangent, cross = (np.where(bears, x, 0.0) for x in (k * approach, k, slope * approach - k * closing))
         if self.tilting is not None:
             by_phase = more * force + lever * cross + steep
-            along = {"lever": lever, "couple": lever * force + moment, "couple_by_phase": by_phase}
+            by_tilt = lever * tangent
+            along = {"couple": lever * force + moment, "by_tilt": by_tilt, "couple_by_approach": by_tilt}
+            along |= {"couple_by_tilt": lever * by_tilt, "couple_by_phase": by_phase}
         never = np.zeros(len(phase), dtype=bool)
         if not (self.damping > 0.0 or (self.error is not None and self.always > 0.0)):
             return FlankForces(force, tangent, cross, ~bears, never, **along)
@@ -300,7 +310,56 @@ class LawFlank(MeshFlank):
         )  # fmt: skip
 
 
-Flank = CurveFlank | LawFlank
+@dataclass(frozen=True, eq=False)
+class WidthFlank(MeshFlank):
+    """A law over the face width; `damping` is chi (s/m). Without a number of the tilt it acts as without a tilt."""
+
+    sliding: ClassVar[None] = None
+    always: ClassVar[float] = 0.0
+    law: WidthLaw
+    damping: float
+    mean_damping: float = 0.0
+    tilt: int = -1
+    against: float = 0.0
+
+    def beyond_touch(self, phase: Array, approach: Array, tilt: Array | float) -> Array:
+        """Approach beyond the touch (m) at phases (rad), approaches (m) and tilts of the gears (rad), (n,)."""
+        return np.asarray(approach - self.gap - self.law.first_contact(phase, tilt))
+
+    def bears(self, phase: Array, approach: Array) -> BoolArray:  # noqa: ARG002
+        """Whether its teeth touch at phases (rad) and approaches beyond the touch (m), (n,)."""
+        return np.asarray(approach > 0.0)
+
+    def forces(self, phase: Array, approach: Array, slip: Slip, begin: Array | None = None) -> FlankForces:  # noqa: ARG002
+        """Return the forces of a law over the face width, with damping, at n times.
+
+        Parameters
+        ----------
+        phase : ndarray, shape (n,)
+            Phase of the mesh (rad).
+        approach : ndarray, shape (n,)
+            Approach beyond the touch (m).
+        slip : Slip
+            Rates of the motion, and the tilt.
+        begin : ndarray, optional
+            Not used: the law has no pair forces.
+        """
+        at = self.law.at(phase, approach, np.broadcast_to(slip.tilt, phase.shape))
+        push = 1.0 + self.damping * slip.rates[:, 0]
+        more = np.where(push > 0.0, self.damping, 0.0)
+        push = np.maximum(push, 0.0)
+        along: dict[str, Any] = {}
+        if self.tilt >= 0:
+            along = {"couple": at.couple - self.against * slip.tilt, "by_tilt": at.by_tilt * push}
+            along |= {"couple_by_approach": at.by_tilt, "couple_by_tilt": at.against - self.against}
+            along |= {"couple_by_phase": at.twist, "moment_by_tilt": at.twist}
+        return FlankForces(
+            at.force * push, at.tangent * push, at.cross * push, approach <= 0.0, at.beyond,
+            at.force * more if self.damping > 0.0 else None, at.moment, at.cross, at.bend, **along,
+        )  # fmt: skip
+
+
+Flank = CurveFlank | LawFlank | WidthFlank
 
 
 @dataclass(frozen=True)

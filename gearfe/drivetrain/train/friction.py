@@ -178,5 +178,6 @@ def check_friction(label: str, friction: float | Lubrication, has_law: bool) -> 
         cure = "0.03 to 0.08 is usual for lubricated steel gears"
         raise InputError(f"{label} friction", friction, f"must be 0 to {MOST:g}", cure)
     if friction != 0.0 and not has_law:
-        problem = "needs a mesh law: a stiffness does not say how tooth pairs share the load"
-        raise InputError(f"{label} friction", None, problem, 'write mesh_model = "potential", or leave friction out')
+        problem = "needs a mesh law of tooth pairs: neither a stiffness nor a law over the face width has their forces"
+        cure = 'write mesh_model = "potential" for loads alike along the width, or leave friction out'
+        raise InputError(f"{label} friction", None, problem, cure)

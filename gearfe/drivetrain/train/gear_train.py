@@ -22,6 +22,7 @@ from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.mesh_table import Tilting
 from ...gears.gearmesh.periodic import PeriodicInterpolant
+from ...gears.gearmesh.width_law import WidthLaw
 from ...gears.geometry.mesh_geometry import ContactModel
 from ...gears.geometry.pair import Gear, MeshGeometry
 from ...multibody.series.timefunctions import TimeFunction, constant
@@ -150,10 +151,10 @@ class GearMesh:
     driver, driven
         Names of gears.
     stiffness
-        A mesh law, a curve over the driver's rotation, its interpolant (N/m over rad), a constant (N/m; along the line
-        of action, of helical gears in the transverse section), the model from
-        which `gearfe.compute_meshes` computes the law (materials of driver and driven gear, element sizes), or None for
-        the ideal rigid mesh: a constraint whose multiplier is the contact force.
+        A mesh law (also one over the face width), a curve over the driver's rotation, its interpolant (N/m over rad), a
+        constant (N/m; along the line of action, of helical gears in the transverse section), the model from which
+        `gearfe.compute_meshes` computes the law (materials of driver and driven gear, element sizes), or None for the
+        ideal rigid mesh: a constraint whose multiplier is the contact force.
     phase
         Angle of the driver (rad), counted in its driving sense, at which it starts; 0: a driver's tooth stands on the
         line of centres. None: from the teeth of the connected gears, the first of whose meshes has 0; see
@@ -186,7 +187,7 @@ class GearMesh:
 
     driver: str
     driven: str
-    stiffness: MeshLaw | StiffnessCurve | PeriodicInterpolant | ContactModel | float | None
+    stiffness: MeshLaw | WidthLaw | StiffnessCurve | PeriodicInterpolant | ContactModel | float | None
     phase: float | None = None
     damping: float = 0.0
     interpolation: str = "cubic"
@@ -217,8 +218,19 @@ class GearMesh:
     def damps_in_contact(self) -> bool:
         """Whether its damper acts only while teeth bear."""
         if self.damping_acts is None:
-            return isinstance(self.stiffness, MeshLaw)
+            return self.has_law
         return self.damping_acts == IN_CONTACT
+
+    @property
+    def has_law(self) -> bool:
+        """Whether it has a mesh law, of loads that are alike along the face width or not."""
+        return isinstance(self.stiffness, MeshLaw | WidthLaw)
+
+    @property
+    def acts_along_width(self) -> bool:
+        """Whether tilts of its gears change its forces, and moments act on them."""
+        law = self.stiffness
+        return self.tilting is not None or (isinstance(law, WidthLaw) and law.tilting)
 
     def interpolant(self) -> PeriodicInterpolant:
         """Stiffness over the driver's rotation, of a mesh without a law; a constant becomes a flat curve."""

@@ -29,7 +29,9 @@ positive where the driven gear stays behind; on the back flanks, behind the back
 
 A spring whose load varies along the face width (`gears.gearmesh.mesh_table.Tilting`) acts at P moved along the axis by
 :math:`\ell(\varphi)`, whose mean is in the rows, and has a moment and a stiffness against the tilt
-:math:`\gamma = (\theta_1 - \theta_2)\cdot(a\times n)` of the gears.
+:math:`\gamma = (\theta_1 - \theta_2)\cdot(a\times n)` of the gears. A law over the width (`gears.gearmesh.width_law`)
+counts approach and moment about the mean lever of its tangent under :math:`F_0`, too. Its back flanks, as those of a
+spring, are the mirror image in the middle of the width, which tilts do not move.
 
 A mesh law (`gears.gearmesh.law`) replaces :math:`k\,\delta`. Its phase is the driver's rotation relative to the
 line of centres, whose turn is :math:`t\cdot(u_2 - u_1)/a` with the displacements of the gears' centres, and its moment
@@ -60,10 +62,11 @@ import numpy as np
 from ...base.typing import Array, IntArray
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.periodic import PeriodicInterpolant, on_common_nodes
+from ...gears.gearmesh.width_law import Linearised, WidthLaw
 from ...gears.geometry.pair import GearPair, gear_pair
 from ...multibody import Element, LinearJoint
 from .elements import Gyration, LinearForce, ShaftBody
-from .forces import CurveFlank, Flank, LawFlank
+from .forces import CurveFlank, Flank, LawFlank, WidthFlank
 from .friction import CREEP, NEAR, Lubrication, Sliding
 from .gear_train import GearMesh, GearTrain, common_face
 from .kinematics import fastest
@@ -109,6 +112,8 @@ class MeshLine:
         which then is damped alike in all modes, and the forces of the flanks take it off again.
     reference
         F0 (N) of a law.
+    along
+        Stiffness, lever, moment and stiffness against tilting, means over the mesh cycle; None of a rigid mesh.
     """
 
     given: GearMesh
@@ -124,6 +129,7 @@ class MeshLine:
     flanks: tuple[Flank, ...]
     rayleigh: float
     reference: float
+    along: Linearised | None
 
     @property
     def name(self) -> str:
@@ -146,9 +152,9 @@ class MeshLine:
         return next((flank.curve for flank in self.flanks if isinstance(flank, CurveFlank)), None)
 
     @property
-    def law(self) -> MeshLaw | None:
+    def law(self) -> MeshLaw | WidthLaw | None:
         """Mesh law of the driving flanks, or None."""
-        return next((flank.law for flank in self.flanks if isinstance(flank, LawFlank)), None)
+        return next((flank.law for flank in self.flanks if isinstance(flank, LawFlank | WidthFlank)), None)
 
     @property
     def backlash(self) -> float | None:
@@ -219,16 +225,15 @@ class MeshLine:
         square = np.outer(self.row, self.row)
         damping = self.rayleigh if self.in_contact else self.damping
         C, K = damping * square, self.mean * square
-        if self.given.tilting is not None:
-            against = self.given.tilting.stiffness * np.outer(self.tilt, self.tilt)
+        if self.along is not None and self.along.against > 0.0:
+            against = self.along.against * np.outer(self.tilt, self.tilt)
             C, K = C + self.rayleigh / self.mean * against, K + against
         return LinearForce(tuple(bodies), C, K, f"mesh {self.name}")
 
     @property
     def preload(self) -> Array:
         """Generalised force (system size,) of the mean moment that its spring has along the face width without tilt."""
-        tilting = self.given.tilting
-        return np.zeros_like(self.tilt) if tilting is None else -tilting.moment.mean * self.tilt
+        return np.zeros_like(self.tilt) if self.along is None else -self.along.moment * self.tilt
 
 
 @dataclass(frozen=True)
@@ -313,8 +318,9 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
     i, j = train.shaft_number(driver.shaft), train.shaft_number(driven.shaft)
     ratio, pair = float(rolled.drivers[number]), gear_pair(driver.gear, driven.gear, mesh.centre_distance)
     carrier = train.mesh_carrier(mesh)
-    along = _directions(train, mesh, pair, sense, shafts)
-    law, backlash, mean, reference = _stiffness(mesh, force)
+    law, backlash, spring, reference = _stiffness(mesh, force)
+    mean = math.inf if spring is None else spring.stiffness
+    along = _directions(train, mesh, pair, sense, shafts, 0.0 if spring is None else spring.lever)
     rayleigh = 0.0 if mesh.stiffness is None else train.damping.beta * mean
     in_contact = (mesh.damping + rayleigh, rayleigh) if mesh.damps_in_contact else (0.0, 0.0)
     turned = ratio - shafts.ratios[i]
@@ -329,7 +335,7 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
         turn = first + len(columns)
         columns.append(along.spin)
     tilt = -1
-    if mesh.tilting is not None:
+    if mesh.acts_along_width:
         tilt = first + len(columns)
         columns.append(along.tilt)
     if law is not None:
@@ -339,7 +345,12 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
             columns += [along.across[0], along.spins, along.across[1]][: 1 + len(ends)]
     for side, (sign, stiffness, gap, mean_damping) in enumerate(ends):
         place = (first + side, turn, ratio, sign * sense, sign * rolled.phases[number], stiffness, gap)
-        if law is not None:
+        if isinstance(law, WidthLaw) and spring is not None:
+            chi = in_contact[0] / reference
+            tilts = (tilt, spring.against) if sign > 0.0 and tilt >= 0 else (-1, 0.0)
+            moved = law.about(spring.lever) if sign > 0.0 else law.sides[1]
+            flanks.append(WidthFlank(*place, moved, chi, mean_damping, *tilts))
+        elif isinstance(law, MeshLaw):
             rubs = None if sliding is None else replace(sliding, across=turn + 1 + 2 * side, spin=turn + 2)
             chi = in_contact[0] / reference
             flanks.append(LawFlank(*place, law.sides[side], chi, rubs, shifts[side], mean_damping))
@@ -359,7 +370,7 @@ def _mesh_line(train: GearTrain, number: int, shafts: Shafts, first: int) -> Mes
             )
     return MeshLine(
         mesh, pair, i, along.direction, along.point, along.axial, along.row, tuple(columns) if flanks else (),
-        along.spin, along.tilt, tuple(flanks), rayleigh, reference,
+        along.spin, along.tilt, tuple(flanks), rayleigh, reference, spring,
     )  # fmt: skip
 
 
@@ -368,20 +379,30 @@ def _without_mean(curve: PeriodicInterpolant) -> PeriodicInterpolant:
     return replace(curve, cubics=curve.cubics - curve.mean * np.array([1.0, 0.0, 0.0, 0.0]))
 
 
-def _stiffness(mesh: GearMesh, force: float) -> tuple[MeshLaw | None, float | None, float, float]:
-    """Law and backlash (m) of a mesh, or None; its mean stiffness (N/m); F0 (N) under a steady force (N)."""
-    law = mesh.stiffness
+def _stiffness(
+    mesh: GearMesh, force: float
+) -> tuple[MeshLaw | WidthLaw | None, float | None, Linearised | None, float]:
+    """Law and backlash (m) of a mesh, or None; its mean spring, None if rigid; F0 (N) under a steady force (N)."""
+    law, tilting = mesh.stiffness, mesh.tilting
     if law is None:
-        return None, mesh.backlash, math.inf, 1.0
-    if not isinstance(law, MeshLaw):
-        return None, mesh.backlash, mesh.interpolant().mean, 1.0
+        return None, mesh.backlash, None, 1.0
+    if not isinstance(law, MeshLaw | WidthLaw):
+        lever, moment, against = (0.0, 0.0, 0.0)
+        if tilting is not None:
+            lever, moment, against = tilting.lever.mean, tilting.moment.mean, tilting.stiffness
+        return None, mesh.backlash, Linearised(mesh.interpolant().mean, lever, moment, against), 1.0
     reference = min(max(abs(force), LEAST_REFERENCE * law.largest_force), law.largest_force)
     backlash = law.backlash if mesh.backlash is None and law.backlash > 0.0 else mesh.backlash
-    return law, backlash, mean_tangent(law, reference), reference
+    if isinstance(law, WidthLaw):
+        spring = law.linearised(reference)
+        return law, backlash, spring if law.tilting else Linearised(spring.stiffness, 0.0, 0.0, 0.0), reference
+    return law, backlash, Linearised(mean_tangent(law, reference), 0.0, 0.0, 0.0), reference
 
 
-def _directions(train: GearTrain, mesh: GearMesh, pair: GearPair, sense: float, shafts: Shafts) -> _Directions:
-    """Directions of a mesh whose driver pushes in a sense (+1 or -1)."""
+def _directions(
+    train: GearTrain, mesh: GearMesh, pair: GearPair, sense: float, shafts: Shafts, lever: float
+) -> _Directions:
+    """Directions of a mesh whose driver pushes in a sense (+1 or -1), so far from the middle of the width (m)."""
     driver, driven = train.gear(mesh.driver), train.gear(mesh.driven)
     i, j = train.shaft_number(driver.shaft), train.shaft_number(driven.shaft)
     a, alpha = train.frame[2], pair.working_pressure_angle
@@ -407,7 +428,7 @@ def _directions(train: GearTrain, mesh: GearMesh, pair: GearPair, sense: float, 
     slides = relative(np.cross(a, line), point, point), relative(np.cross(a, back), point, point)
     axial = -sense * pair.pinion.twist_rate * pair.pinion.base_radius
     tilt = relative(line, point + a, point + a) - relative(line, point, point)
-    place = point if mesh.tilting is None else point + mesh.tilting.lever.mean * a
+    place = point + lever * a
     rows = relative(line + axial * a, place, place), relative(back - axial * a, point, point)
     return _Directions(line, point, axial, *rows, turn, slides, spin, spins, tilt)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.typing import Array, BoolArray
 from ...multibody import Trajectory
-from .forces import LawFlank
+from .forces import LawFlank, WidthFlank
 from .model import TrainModel
 from .states import TrainStates
 
@@ -86,12 +86,25 @@ def beyond_law(model: TrainModel, moved: TrainStates) -> tuple[int, str] | None:
     u = moved.q @ model.directions
     for i, line in enumerate(model.meshes):
         for flank in line.flanks:
-            if not isinstance(flank, LawFlank):
-                continue
             phase, approach = flank.phase_and_approach(model.angle(moved.time), u)
-            past = approach > flank.law.first_contact(phase, flank.shifts_at(phase)) + flank.law.reach
+            tilts = np.broadcast_to(flank.tilt_of(u), phase.shape)
+            if isinstance(flank, LawFlank):
+                past = approach > flank.law.first_contact(phase, flank.shifts_at(phase)) + flank.law.reach
+            elif isinstance(flank, WidthFlank):
+                past = flank.law.past(approach, tilts)
+            else:
+                continue
             if past.any() and (first is None or int(np.argmax(past)) < first[0]):
                 at = int(np.argmax(past))
+                if isinstance(flank, WidthFlank) and approach[at] <= flank.law.reach:
+                    size, most = (1e6 * flank.law.width * x for x in (abs(tilts[at]), flank.law.tilts[-1]))
+                    why = (
+                        f"; at {1e3 * moved.time[at]:.6g} ms the gears of mesh {line.name} tilt by {size:.4g} um over "
+                        f"their width, and its law is known up to {most:.4g} um: write mesh_model_tilt_um = "
+                        f"{1.5 * size:.3g} in [[train.meshes]]"
+                    )
+                    first = at, why
+                    continue
                 force, most = abs(float(moved.contact_force[at, i])), flank.law.largest_force
                 radius = flank.law.base_radii[1]
                 why = (

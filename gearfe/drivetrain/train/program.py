@@ -11,11 +11,12 @@ import numpy as np
 from ...base.typing import Array, IntArray
 from ...gears.gearmesh.law import stacked_laws
 from ...gears.gearmesh.periodic import PeriodicInterpolant, curve_arrays
+from ...gears.gearmesh.width_law import stacked_width_laws
 from ...multibody import SeriesLaw
 from ...multibody.series.timefunctions import time_arrays
 from . import discontinuities, friction, series
 from .discontinuities import SAME
-from .forces import CurveFlank, Flank, LawFlank, TrainForces
+from .forces import CurveFlank, Flank, LawFlank, TrainForces, WidthFlank
 from .friction import UNKNOWN, Sliding
 from .series import Flanks, Gyros, Places, Program, Slides, Speeds
 
@@ -30,6 +31,8 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
     distinct = list({id(f.law): f.law for f in forces.flanks if isinstance(f, LawFlank)}.values())
     laws, order = stacked_laws(distinct), [id(law) for law in distinct]
     slots = laws.touch.shape[1]
+    over_width = list({id(f.law): f.law for f in forces.flanks if isinstance(f, WidthFlank)}.values())
+    wide_order = [id(law) for law in over_width]
     rows, pieces = 1 + len(forces.torques) + series.PER_GYRO * len(forces.gyros), 0
     places, shifts, watches = [], [], []
     curves: list[PeriodicInterpolant] = []
@@ -47,6 +50,10 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
             levers.append(none if flank.tilting is None else flank.tilting.lever)
             moments.append(none if flank.tilting is None else flank.tilting.moment)
             rows, pieces = rows + series.PER_CURVE, pieces + series.PER_FLANK
+        elif isinstance(flank, WidthFlank):
+            places.append((-2, wide_order.index(id(flank.law)), rows, pieces))
+            shifts.append(np.zeros(1))
+            rows, pieces = rows + series.PER_WIDE, pieces + series.PER_WIDE_FLANK
         else:
             places.append((-1, order.index(id(flank.law)), rows, pieces))
             shifts.append(flank.shifts)
@@ -68,6 +75,7 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
         curve_arrays(levers).cubics,
         curve_arrays(moments).cubics,
         laws,
+        stacked_width_laws(over_width),
         speeds,
     )
     return program, rows, pieces
@@ -104,6 +112,11 @@ def _watches(number: int, flank: Flank, row: int, slots: int) -> list[tuple[int,
     if isinstance(flank, CurveFlank):
         phase = (series.PHASE, number, row + series.Z, 0)
         return [phase, (series.TOUCH, number, row + series.DELTA, 0)] if flank.parts else [phase]
+    if isinstance(flank, WidthFlank):
+        ends = [(series.OVERLAP, number, row + series.WIDE_X, 0)]
+        ends += [(series.TILTED, number, row + series.WIDE_TILT, 0)] if flank.tilt >= 0 else []
+        ends += [(series.PULL, number, row + series.WIDE_DAMPED, 0)] if flank.damping > 0.0 else []
+        return [*ends, (series.PHASE, number, row + series.Z, 0)]
     own = [(slot, row + series.SLOTS + series.PER_SLOT * slot) for slot in range(slots)]
     made = [(series.PAIR, number, pair, slot) for slot, pair in own]
     if flank.damping > 0.0:
@@ -151,6 +164,14 @@ def train_series(forces: TrainForces) -> SeriesLaw:
                 pieces[at : at + 2] = ahead_of(flank.curve.nodes, float(phase[0]), speed)
                 bears = approach[0] > 0.0 or (approach[0] == 0.0 and sign * du[flank.direction] > 0.0)
                 pieces[at + 2] = 0 if bears or not flank.parts else -1
+                continue
+            if isinstance(flank, WidthFlank):
+                pieces[at : at + 2] = ahead_of(flank.law.nodes, float(phase[0]), speed)
+                pieces[at + 2] = 0 if 1.0 + flank.damping * du[flank.direction] > 0.0 else -1
+                tilts = np.broadcast_to(flank.tilt_of(u[None]), phase.shape)
+                _, part, side = flank.law.cells(phase, approach, tilts)
+                pieces[at + series.PER_FLANK] = part[0] if approach[0] > 0.0 else -1
+                pieces[at + series.PER_FLANK + 1] = side[0]
                 continue
             turn, cell = ahead_of(flank.law.nodes, float(phase[0]), speed)
             pieces[at : at + 3] = turn, cell, 0 if 1.0 + flank.damping * du[flank.direction] > 0.0 else -1

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from ...base.typing import Array, IntArray
 from ...gears.gearmesh.law import Laws
 from ...gears.gearmesh.periodic import Curves
+from ...gears.gearmesh.width_law import WidthLaws
 from ...multibody.series.recurrences import time_series
 from ...multibody.series.timefunctions import Times
 from .friction import product, smoothed_sign
@@ -25,6 +26,15 @@ from .friction import product, smoothed_sign
 #: delta', J, forces at the end of the step before, sliding for unit e.
 Z, Z2, Z3, DELTA, CELL, STIFFNESS, ERROR, RISES, TURNING, TIPPED, OFFSET, OFFSETS, MOMENTS, PRESS, PER_CURVE = range(15)
 DAMPED, JACOBIAN, BEFORE, SPIN, SLOTS = range(STIFFNESS, STIFFNESS + 5)
+#: Rows of a flank with a law over the face width, after the cell of its phase: 1 + chi delta', tilt, x, then force and
+#: the slopes of t with phase and tilt, Horner's sums over the tilt (of t, of its slopes) and over x, those of the
+#: energy's polynomials over the tilt for each power of x, of their slopes with the tilt, and with the phase.
+WIDE_DAMPED, WIDE_TILT, WIDE_X, WIDE_FORCE, RISE_Z, RISE_Y = range(STIFFNESS, STIFFNESS + 6)
+WIDE_SUMS = RISE_Y + 1
+WIDE_POWERS, WIDE_CUBIC = 6, 4
+WIDE_X_SUMS = WIDE_SUMS + 3 * WIDE_CUBIC
+WIDE_INNER = WIDE_X_SUMS + 3 * WIDE_POWERS
+PER_WIDE = WIDE_INNER + 3 * WIDE_CUBIC * WIDE_POWERS
 #: Rows of a slot: f = F - F_0, F, gap of a pair that does not bear, Lambda's inner polynomials (Horner), coefficients
 #: of t (then F_0), and of the energy; t', inner polynomials of the energy's slope, normal force; of friction e with its
 #: coefficients, v/v0, its smoothed sign with what makes it, force.
@@ -40,12 +50,15 @@ PLACE, SUMS = range(2)
 #: Column of the phase of a cell's node, and of F_0 beside the coefficients of t.
 ORIGIN = 4
 #: What a step may not pass: the cell of a phase, touch of a flank with a curve, pull of a damper, the cell of a pair,
-#: the range of its sliding speed, the piece of a torque over speed.
-PHASE, TOUCH, PULL, PAIR, SLIDE, SPEEDING = range(6)
+#: the range of its sliding speed, the piece of a torque over speed, the cells of x and of the tilt of a law over the
+#: face width.
+PHASE, TOUCH, PULL, PAIR, SLIDE, SPEEDING, OVERLAP, TILTED = range(8)
 #: Whole numbers of a flank: mesh cycle, cell, whether it bears (a curve) or damping acts (>= 0: it does); then the
 #: cells of the slots, -1 for pairs that do not bear; then the ranges of
 #: v/v0, see `gearfe.drivetrain.train.friction.smoothed_sign`.
 PER_FLANK = 3
+#: And of a flank with a law over the face width: the cell of x, -1 apart, and that of the tilt.
+PER_WIDE_FLANK = PER_FLANK + 2
 #: Most Newton steps for order 0 of the pair forces, and their relative change in the last one.
 NEWTON, CHANGED = 50, 1e-9
 
@@ -76,6 +89,7 @@ class Flanks(NamedTuple):
     mean_damping: Array
     always: Array
     tilt: IntArray
+    against: Array
 
 
 class Slides(NamedTuple):
@@ -93,8 +107,8 @@ class Slides(NamedTuple):
 class Places(NamedTuple):
     """Which tables and rows belong to each flank."""
 
-    curve: IntArray  # (f,) number of the curve, -1 for one with a mesh law
-    law: IntArray  # (f,) number of the mesh law
+    curve: IntArray  # (f,) number of the curve, -1 for one with a mesh law, -2 for one over the face width
+    law: IntArray  # (f,) number of the mesh law, or of the law over the face width
     row: IntArray  # (f,) first row
     piece: IntArray  # (f,) first whole number
     shifted: IntArray  # (f + 1,) first of the shifts of each flank
@@ -131,6 +145,7 @@ class Program(NamedTuple):
     levers: Array  # (all nodes, 4) places along the face width, alike
     moments: Array  # (all nodes, 4) moments along the face width, alike
     laws: Laws
+    wide: WidthLaws
     speeds: Speeds
 
 
@@ -202,8 +217,10 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
         memory[row + Z3, j] = product(j, row + Z2, row + Z, memory)
         out[d] += p.flanks.mean[k] * u[d, j]
         out[d] += p.flanks.mean_damping[k] * rate * u[d, j + 1]
-        if p.places.curve[k] < 0:
+        if p.places.curve[k] == -1:
             _contact(j, k, rate, u, p, memory, pieces, out)
+        elif p.places.curve[k] == -2:
+            _over_width(j, k, rate, u, p, memory, pieces, out)
         else:
             memory[row + STIFFNESS, j] = _cubic(j, row, row + CELL, 0, memory)
             memory[row + DELTA, j] -= _cubic(j, row, row + ERROR, 0, memory)
@@ -311,6 +328,106 @@ def _contact(
         _friction(j, k, rate, u, p, memory, pieces, out)
 
 
+def _over_width(
+    j: int, k: int, rate: float, u: Array, p: Program, memory: Array, pieces: IntArray, out: Array
+) -> None:  # fmt: skip
+    """Add order j of the forces of flank k with a law over the face width: polynomials of phase, x and tilt."""
+    row = p.places.row[k]
+    at = p.places.piece[k]
+    law = p.places.law[k]
+    d = p.flanks.direction[k]
+    tilt = p.flanks.tilt[k]
+    cell = pieces[at + 1]
+    part = pieces[at + PER_FLANK]
+    side = pieces[at + PER_FLANK + 1]
+    if tilt >= 0:
+        out[tilt] += p.flanks.against[k] * u[tilt, j]
+        memory[row + WIDE_TILT, j] = u[tilt, j]
+    else:
+        memory[row + WIDE_TILT, j] = 0.0
+    if j == 0:
+        memory[row + WIDE_TILT, 0] -= p.wide.tilts[law, max(side - 1, 0)]
+    memory[row + WIDE_DAMPED, j] = p.flanks.damping[k] * rate * u[d, j + 1]
+    if j == 0:
+        memory[row + WIDE_DAMPED, 0] += 1.0
+    touch = p.wide.touch[law, cell, side]
+    sums = row + WIDE_SUMS
+    memory[row + WIDE_X, j] = memory[row + DELTA, j] - _bicubic(j, row, touch, sums, memory)
+    if j == 0 and part >= 0:
+        memory[row + WIDE_X, 0] -= p.wide.overlaps[law, part]
+    if part < 0:
+        return
+    memory[row + RISE_Z, j] = _bicubic_by_phase(j, row, touch, sums + WIDE_CUBIC, memory)
+    memory[row + RISE_Y, j] = _bicubic_by_tilt(j, row, touch, sums + 2 * WIDE_CUBIC, memory)
+    force = 0.0
+    turning = 0.0
+    tilting = 0.0
+    for power in range(WIDE_POWERS - 1, -1, -1):  # Horner over x
+        inner = row + WIDE_INNER + 3 * WIDE_CUBIC * power
+        over = row + WIDE_X_SUMS + power
+        numbers = p.wide.energies[law, cell, part, side * WIDE_POWERS + power]
+        if power > 0:
+            force += power * _bicubic(j, row, numbers, inner, memory)
+            if power > 1:
+                memory[over, j] = force
+                force = product(j, over, row + WIDE_X, memory)
+        turning += _bicubic_by_phase(j, row, numbers, inner + WIDE_CUBIC, memory)
+        tilting += _bicubic_by_tilt(j, row, numbers, inner + 2 * WIDE_CUBIC, memory)
+        if power > 0:
+            memory[over + WIDE_POWERS, j] = turning
+            turning = product(j, over + WIDE_POWERS, row + WIDE_X, memory)
+            memory[over + 2 * WIDE_POWERS, j] = tilting
+            tilting = product(j, over + 2 * WIDE_POWERS, row + WIDE_X, memory)
+    memory[row + WIDE_FORCE, j] = force
+    turning -= product(j, row + WIDE_FORCE, row + RISE_Z, memory)
+    tilting -= product(j, row + WIDE_FORCE, row + RISE_Y, memory)
+    if pieces[at + 2] >= 0:
+        out[d] -= product(j, row + WIDE_FORCE, row + WIDE_DAMPED, memory)
+    out[p.flanks.turn[k]] -= p.flanks.sense[k] * turning
+    if tilt >= 0:
+        out[tilt] -= tilting
+
+
+def _over_phase(j: int, row: int, numbers: Array, memory: Array) -> float:
+    """Return order j of a cubic of the phase of a flank."""
+    value = numbers[1] * memory[row + Z, j] + numbers[2] * memory[row + Z2, j] + numbers[3] * memory[row + Z3, j]
+    return value + numbers[0] if j == 0 else value
+
+
+def _slope_over_phase(j: int, row: int, numbers: Array, memory: Array) -> float:
+    """Return order j of the slope of a cubic of the phase of a flank."""
+    value = 2.0 * numbers[2] * memory[row + Z, j] + 3.0 * numbers[3] * memory[row + Z2, j]
+    return value + numbers[1] if j == 0 else value
+
+
+def _bicubic(j: int, row: int, numbers: Array, sums: int, memory: Array) -> float:
+    """Return order j of a polynomial of tilt and phase of a flank, by Horner's rule over the tilt."""
+    value = _over_phase(j, row, numbers[3], memory)
+    for power in range(2, -1, -1):
+        memory[sums + power, j] = value
+        value = product(j, sums + power, row + WIDE_TILT, memory) + _over_phase(j, row, numbers[power], memory)
+    return value
+
+
+def _bicubic_by_phase(j: int, row: int, numbers: Array, sums: int, memory: Array) -> float:
+    """Return order j of the derivative of `_bicubic` with the phase."""
+    value = _slope_over_phase(j, row, numbers[3], memory)
+    for power in range(2, -1, -1):
+        memory[sums + power, j] = value
+        value = product(j, sums + power, row + WIDE_TILT, memory) + _slope_over_phase(j, row, numbers[power], memory)
+    return value
+
+
+def _bicubic_by_tilt(j: int, row: int, numbers: Array, sums: int, memory: Array) -> float:
+    """Return order j of the derivative of `_bicubic` with the tilt."""
+    value = 3.0 * _over_phase(j, row, numbers[3], memory)
+    for power in range(2, 0, -1):
+        memory[sums + power, j] = value
+        value = product(j, sums + power, row + WIDE_TILT, memory)
+        value += power * _over_phase(j, row, numbers[power], memory)
+    return value
+
+
 def _gaps(j: int, slots: int, memory: Array, row: int, pieces: IntArray, at: int) -> None:
     """Write order j of the residual of each pair's equation, with the pair forces known so far."""
     for slot in range(slots):
@@ -394,6 +511,10 @@ def _step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray
                 memory[row + MOMENTS, a] = p.moments[first + cell, a]
             continue
         law = p.places.law[k]
+        if p.places.curve[k] == -2:
+            cycle = p.wide.nodes[law, p.wide.cells[law]] - p.wide.nodes[law, 0]
+            memory[row + CELL, ORIGIN] = p.wide.nodes[law, cell] + pieces[at] * cycle
+            continue
         cycle = p.laws.nodes[law, p.laws.cells[law]] - p.laws.nodes[law, 0]
         memory[row + CELL, ORIGIN] = p.laws.nodes[law, cell] + pieces[at] * cycle
         couple = row + SLOTS + PER_SLOT * slots + NUMBERS
@@ -477,5 +598,5 @@ def _pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, 
 
 FUNCTIONS = (
     _step_begins, product, _over_speed, _cubic, _cubic_slope, _contact, _gaps, _friction, smoothed_sign, _pair_forces,
-    time_series,
+    time_series, _over_width, _over_phase, _slope_over_phase, _bicubic, _bicubic_by_phase, _bicubic_by_tilt,
 )  # fmt: skip

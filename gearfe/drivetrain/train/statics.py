@@ -17,6 +17,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.typing import Array, BoolArray
 from ...gears.gearmesh.law import MeshLaw
+from ...gears.gearmesh.width_law import WidthLaw
 from ...gears.geometry.validity import MOST_YIELD
 from .elements import rotor
 from .gear_train import GearMesh, GearTrain
@@ -52,7 +53,8 @@ def check_flanks(train: GearTrain, single: BoolArray) -> None:
 
 def one_sided(train: GearTrain) -> BoolArray:
     """For each mesh, whether nothing is known of its back flanks."""
-    own = [isinstance(mesh.stiffness, MeshLaw) and mesh.stiffness.backlash > 0.0 for mesh in train.meshes]
+    laws = (mesh.stiffness for mesh in train.meshes)
+    own = [isinstance(law, MeshLaw | WidthLaw) and law.backlash > 0.0 for law in laws]
     return np.array(
         [mesh.backlash is None and not has for mesh, has in zip(train.meshes, own, strict=True)], dtype=bool
     )
@@ -108,7 +110,7 @@ def check_yields(train: GearTrain) -> None:
     A stiffness in another unit (N/um or N/mm for N/m) is the usual cause. Mesh laws know their range themselves.
     """
     for mesh, force in zip(train.meshes, train.kinematics.steady_forces.tolist(), strict=True):
-        if mesh.stiffness is None or isinstance(mesh.stiffness, MeshLaw):
+        if mesh.stiffness is None or mesh.has_law:
             continue
         stiffness = float(mesh.interpolant().values.min())
         module = train.gear(mesh.driver).gear.module
@@ -141,7 +143,7 @@ def _approach(mesh: GearMesh, force: float, phase: Array, shifts: tuple[Array, A
     law, gap = mesh.stiffness, mesh.backlash
     if law is None:
         return None
-    if isinstance(law, MeshLaw):
+    if isinstance(law, MeshLaw | WidthLaw):
         gap = law.backlash or None if gap is None else gap
         if force < 0.0 and gap is None:
             return None
@@ -149,7 +151,8 @@ def _approach(mesh: GearMesh, force: float, phase: Array, shifts: tuple[Array, A
         acting, own = law.sides[side], shifts[side]
 
         def late(x: Array) -> Array:
-            return np.asarray(own[acting.pair_numbers(x) % len(own)])
+            """Shifts of the pairs, of a law that has pairs."""
+            return np.zeros(()) if isinstance(acting, WidthLaw) else own[acting.pair_numbers(x) % len(own)]
 
         place = phase if force >= 0.0 else -phase
         if (abs(force) > acting.most(place, late(place))).any():

@@ -35,6 +35,7 @@ from ...fem.reduction.error import reduction_error
 from ...fem.reduction.modal_body import ModalBody
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
+from ...gears.gearmesh.width_law import WidthLaw
 from ..train import build_train
 from ..train.gear_train import GearTrain
 from ..train.model import TrainModel, on_body
@@ -234,7 +235,7 @@ def _stiffer(train: GearTrain) -> GearTrain | None:
     meshes, changed = [], False
     for mesh in train.meshes:
         curve = mesh.stiffness
-        if isinstance(curve, MeshLaw) and math.isfinite(curve.error):
+        if isinstance(curve, MeshLaw | WidthLaw) and math.isfinite(curve.error):
             meshes.append(replace(mesh, stiffness=curve.stiffer(curve.error)))
             changed = True
         elif isinstance(curve, StiffnessCurve) and math.isfinite(curve.worst_error):

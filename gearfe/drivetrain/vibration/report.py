@@ -12,6 +12,7 @@ from ...base.spectrum import OrderLine, nearest_line, order_lines, peaks
 from ...base.typing import Array
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
+from ...gears.gearmesh.width_law import WidthLaw
 from ..gearbox.radiation import power_level
 from ..gearbox.stability import Stability
 from ..train.gear_train import GearTrain
@@ -231,7 +232,7 @@ def stiffness_ranges(train: GearTrain) -> dict[str, tuple[float | None, float | 
         given = mesh.stiffness
         if given is None or isinstance(given, float | int):
             found[mesh.name] = (given, given)
-        elif isinstance(given, MeshLaw):
+        elif isinstance(given, MeshLaw | WidthLaw):
             force = max(abs(float(steady)), LEAST_REFERENCE * given.largest_force)
             angles = given.nodes[0] + given.cycle * np.linspace(0.0, 1.0, PHASES)
             tangent = given(angles, given.approach(angles, force)).tangent

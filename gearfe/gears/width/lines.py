@@ -60,6 +60,8 @@ AT_END = 0.3
 STIFFEST = 0.05
 #: Least twist beyond the first touch that points are placed for, in those of a usual stiffness.
 LEAST_AHEAD = 0.1
+#: Gauss points over the load of what a contact stores.
+ENERGY_POINTS = 5
 #: Places on a line at which its gap is looked at.
 LOOKS = 33
 
@@ -531,3 +533,14 @@ def _tangent(law: PairLaw, points: Points, moment: Array) -> Array:
     system.flat[:: len(i) + 1] += rate[i] / points.weight[i]
     levers = points.levers[i]
     return np.asarray(levers.T @ np.linalg.solve(system, levers))
+
+
+def stored_energy(law: PairLaw, solution: Solution) -> float:
+    """Return the elastic energy of a solved position (J): of the contacts themselves, and by the influence."""
+    points, moment = solution.points, solution.moment
+    x, w = _gauss(ENERGY_POINTS)
+    per_width = moment / points.weight
+    parts = zip(0.5 * (x + 1.0), 0.5 * w, strict=True)
+    complementary = sum((b * own_twists(law, points, a * per_width)[0] for a, b in parts), np.zeros(len(points)))
+    own = own_twists(law, points, per_width)[0] - complementary
+    return float(own @ moment + 0.5 * moment @ points.influence @ moment)
