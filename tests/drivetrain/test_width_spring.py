@@ -167,10 +167,6 @@ def test_a_mean_has_the_force_of_the_load() -> None:
 
 
 REFUSED = [
-    (
-        text("potential").replace("[train.curves]\npositions = 24\n", ""),
-        'pair.misalignment_um = 10.0: makes the load vary.*"potential"',
-    ),
     (text().replace("torque_Nm = 75.0", "torque_Nm = 0.0"), "carries no torque, so its stiffness along the face"),
     (text().replace("torque_Nm = 75.0", "torque_Nm = 7e5"), "must be <="),
     (text().replace("coarsen = 2.0", 'plane = "stress"'), "stiffness.plane = 'stress': is for loads alike along"),

@@ -308,7 +308,7 @@ class TrainMeshTable:
     )
     mesh_model_tilt_um: float | None = quantity(
         None,
-        low=0.0,
+        above=0.0,
         high=500.0,
         doc="largest tilt of the gears in the plane of action, over the common face width (um), that the potential of "
         "loads that vary along it is made for; left out: twice what shafts and bearings yield under the steady torques",

@@ -229,8 +229,7 @@ class GearMesh:
     @property
     def acts_along_width(self) -> bool:
         """Whether tilts of its gears change its forces, and moments act on them."""
-        law = self.stiffness
-        return self.tilting is not None or (isinstance(law, WidthLaw) and law.tilting)
+        return self.tilting is not None or isinstance(self.stiffness, WidthLaw)
 
     def interpolant(self) -> PeriodicInterpolant:
         """Stiffness over the driver's rotation, of a mesh without a law; a constant becomes a flat curve."""

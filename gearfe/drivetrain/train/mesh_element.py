@@ -394,8 +394,7 @@ def _stiffness(
     reference = min(max(abs(force), LEAST_REFERENCE * law.largest_force), law.largest_force)
     backlash = law.backlash if mesh.backlash is None and law.backlash > 0.0 else mesh.backlash
     if isinstance(law, WidthLaw):
-        spring = law.linearised(reference)
-        return law, backlash, spring if law.tilting else Linearised(spring.stiffness, 0.0, 0.0, 0.0), reference
+        return law, backlash, law.linearised(reference), reference
     return law, backlash, Linearised(mean_tangent(law, reference), 0.0, 0.0, 0.0), reference
 
 

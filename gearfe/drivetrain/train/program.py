@@ -114,7 +114,9 @@ def _watches(number: int, flank: Flank, row: int, slots: int) -> list[tuple[int,
         return [phase, (series.TOUCH, number, row + series.DELTA, 0)] if flank.parts else [phase]
     if isinstance(flank, WidthFlank):
         ends = [(series.OVERLAP, number, row + series.WIDE_X, 0)]
-        ends += [(series.TILTED, number, row + series.WIDE_TILT, 0)] if flank.tilt >= 0 else []
+        ends += (
+            [(series.TILTED, number, row + series.WIDE_TILT, 0)] if flank.tilt >= 0 and len(flank.law.tilts) > 1 else []
+        )
         ends += [(series.PULL, number, row + series.WIDE_DAMPED, 0)] if flank.damping > 0.0 else []
         return [*ends, (series.PHASE, number, row + series.Z, 0)]
     own = [(slot, row + series.SLOTS + series.PER_SLOT * slot) for slot in range(slots)]

@@ -103,8 +103,8 @@ class WidthLaw:
     overlaps : ndarray, shape (m,)
         First x of each cell (m), from 0; the last cell begins at the reach and goes on from there.
     tilts : ndarray, shape (g,)
-        Rising tilts (rad) of the nodes; cell 0 lies before the first, cell i goes on from node i - 1. One: the law does
-        not depend on the tilt.
+        Rising tilts (rad) of the nodes; cell 0 lies before the first, cell i goes on from node i - 1. One: E is
+        linear in the tilt, for gears that cannot tilt.
     touch : ndarray, shape (n, g + 1, 4, 4)
         Coefficients of t on a cell: power of the tilt, of the phase (m, ...).
     energies : ndarray, shape (n, m, g + 1, 6, 4, 4)
@@ -151,11 +151,6 @@ class WidthLaw:
     def reach(self) -> float:
         """Largest x (m) for which the law is known."""
         return float(self.overlaps[-1])
-
-    @property
-    def tilting(self) -> bool:
-        """Whether it depends on the tilt."""
-        return len(self.tilts) > 1
 
     def stiffer(self, part: float) -> WidthLaw:
         """All forces larger by a part of themselves at the same approach and tilt."""
@@ -227,7 +222,7 @@ class WidthLaw:
     def past(self, overlap: Array, tilt: Array) -> BoolArray:
         """Whether x (m) or tilt (rad) are farther than the law is known, shape (n,)."""
         past = overlap > self.reach
-        if self.tilting:
+        if len(self.tilts) > 1:
             past = past | ((overlap > 0.0) & ((tilt < self.tilts[0]) | (tilt > self.tilts[-1])))
         return np.asarray(past)
 
@@ -341,12 +336,11 @@ def law_coefficients(table: WidthTable, cycle: float) -> tuple[Array, Array]:
     """
     nodes = np.append(table.angles, table.angles[0] + cycle)
     tilts, jets = table.tilts, np.stack([table.energy, table.force, table.tangent])
-    if len(tilts) == 1:
-        rise, slopes = np.zeros_like(table.touch), np.zeros_like(jets)
-    else:
+    rise, stiffening = np.zeros_like(table.touch), np.zeros_like(table.tangent)
+    if len(tilts) > 1:
         rise, stiffening = (CubicSpline(tilts, x, axis=-1)(tilts, 1) for x in (table.touch, table.tangent))
-        moved = rise[:, None, :]  # of the first contact: slopes are those at a fixed x
-        slopes = np.stack([table.couple + table.force * moved, table.by_tilt + table.tangent * moved, stiffening])
+    moved = rise[:, None, :]  # of the first contact: slopes are those at a fixed x
+    slopes = np.stack([table.couple + table.force * moved, table.by_tilt + table.tangent * moved, stiffening])
     energies = _over_tilt(tilts, *(_over_overlap(table.overlaps, values) for values in (jets, slopes)))
     touch = _over_tilt(tilts, table.touch, rise)
     return _over_phase(nodes, touch), np.moveaxis(_over_phase(nodes, energies), 2, 3)

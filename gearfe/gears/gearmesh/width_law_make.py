@@ -32,6 +32,8 @@ TOLERANCE = 4e-3
 MOST = 12_000
 #: Contacts half way between the nodes of each direction, and contacts that say the error.
 HALF_WAY, CHECKS = 32, 160
+#: Least root of the part of the reach at which errors are checked.
+LEAST_CHECKED = 0.1
 #: Force in parts of the largest of the law below which errors are parts of this one, as for other mesh laws.
 LEAST_PART = 0.1
 #: Phases at which the reach is looked for, and what it is beyond the approach of the largest force there.
@@ -114,7 +116,16 @@ def first_contact(lines: ContactLines, angle: float, tilt: float = 0.0) -> float
 
 
 def contact_at(lines: ContactLines, angle: float, approach: float, tilt: float = 0.0) -> Contact:
-    """Solve the contact at a pinion angle (rad), an approach (m) and a further tilt in the plane of action (rad).
+    """Solve the contact at one place.
+
+    Parameters
+    ----------
+    lines : ContactLines
+        The gears.
+    angle, approach : float
+        Pinion angle (rad), and approach in the middle of the width (m).
+    tilt : float
+        Tilt in the plane of action beside that of the lines (rad), > 0 where it closes the gap towards larger z.
 
     Raises
     ------
@@ -172,7 +183,7 @@ def width_law(
     force : float
         Mesh force (N) up to which the law is asked for.
     tilt : float
-        Largest tilt (rad) either way; 0: the law does not depend on the tilt.
+        Largest tilt (rad) either way; 0: for gears that cannot tilt.
     sense : float
         -1 where tilts are counted towards smaller z of the lines, else 1.
     tolerance : float
@@ -199,8 +210,8 @@ def width_law(
             if halved is None:
                 break
             cells[halved] *= 2
-        places = [(rng.uniform(0, a), math.sqrt(rng.uniform(0.01, 1.0)) * b, rng.uniform(0, c))
-                  for a, b, c in [grid.finest] * CHECKS]  # fmt: skip
+        ends = ((0.0, grid.finest[0]), (LEAST_CHECKED * grid.finest[1], grid.finest[1]), (0.0, grid.finest[2]))
+        places = [[rng.uniform(*end) for end in ends] for _ in range(CHECKS)]
         found = np.array([_error(grid, law, *place) for place in places])
     return replace(law, error=float(found.max()), rms_error=float(np.sqrt(np.mean(found**2))))
 

@@ -40,7 +40,7 @@ def cached_width_law(job: StiffnessJob, force: float, tilt: float) -> WidthLaw:
     force : float
         Mesh force (N) up to which the law is asked for.
     tilt : float
-        Largest tilt (rad) of the gears either way, beside that of the file; 0: they do not tilt.
+        Largest tilt (rad) of the gears either way, beside that of the file; 0: they cannot tilt.
 
     Raises
     ------
