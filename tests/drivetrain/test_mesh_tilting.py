@@ -19,6 +19,7 @@ from gearfe.gears.gearmesh.mesh_table import Tilting
 from gearfe.gears.gearmesh.periodic import PeriodicInterpolant, periodic_interpolant
 from gearfe.multibody import constant, integrate
 from tests.makers.helical_trains import HIGH, LOW, helical_pair
+from tests.makers.pushes import slopes_of
 
 TEETH, K, TORQUE, AGAINST = 20, 2e8, 60.0, 8e3
 PITCH = 2.0 * math.pi / TEETH
@@ -140,7 +141,7 @@ def test_derivatives_of_the_forces() -> None:
     scale = np.array([1e-5] * m)
     u, du = scale * rng.normal(size=(6, m)), np.zeros((6, m))
     theta = rng.uniform(0.0, 6.0, size=(6, 1))
-    found = forces(theta, 100.0, u, du).by_place
+    found, _ = slopes_of(forces(theta, 100.0, u, du))
     for i in range(m):
         step = 1e-10 * np.eye(m)[i]
         low, high = (forces(theta, 100.0, u + sign * step, du).value for sign in (-1.0, 1.0))

@@ -28,6 +28,7 @@ from tests.drivetrain.test_mesh_tilting import bearing_forces, settled
 from tests.drivetrain.test_width_spring import text
 from tests.makers.files import job_file
 from tests.makers.helical_trains import HIGH, LOW, helical_pair
+from tests.makers.pushes import slopes_of
 from tests.makers.width_laws import Slices, sliced_law
 
 TEETH = 20
@@ -67,18 +68,15 @@ def test_derivatives_of_the_forces() -> None:
     for flank in (0, 1):
         u[6 * flank : 6 * flank + 6, forces.freedoms[flank, 0]] = 4e-5
     theta = rng.uniform(0.0, 6.0, size=(12, 1))
-    found = forces(theta, 100.0, u, du)
+    by_place, by_rate = slopes_of(forces(theta, 100.0, u, du))
     for i in range(m):
         step = 1e-10 * np.eye(m)[i]
-        low, high = (forces(theta, 100.0, u + sign * step, du).value for sign in (-1.0, 1.0))
-        np.testing.assert_allclose(
-            found.by_place[:, :, i], (high - low) / 2e-10, rtol=1e-4, atol=1e-5 * np.abs(found.by_place).max()
-        )
-        low, high = (forces(theta, 100.0, u, du + 1e4 * sign * step).value for sign in (-1.0, 1.0))
-        assert found.by_rate is not None
-        np.testing.assert_allclose(
-            found.by_rate[:, :, i], (high - low) / 2e-6, rtol=1e-4, atol=1e-5 * np.abs(found.by_rate).max()
-        )
+        for found, (du_step, u_step) in ((by_place, (0.0, 1.0)), (by_rate, (1e4, 0.0))):
+            low, high = (
+                forces(theta, 100.0, u + sign * u_step * step, du + sign * du_step * step).value for sign in (-1.0, 1.0)
+            )
+            slope = (high - low) / (2e-10 * max(u_step, du_step))
+            np.testing.assert_allclose(found[:, :, i], slope, rtol=1e-4, atol=1e-5 * np.abs(found).max())
 
 
 def test_energy_is_kept_while_teeth_part_and_meet() -> None:
