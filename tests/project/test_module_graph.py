@@ -41,6 +41,23 @@ HEAVY = {
         "gearfe.gears.gearmesh.width_spring",
     ): "elastic teeth in space; for loads that vary along the width only",
     (
+        "gearfe.drivetrain.gearbox.mesh_stiffness",
+        "gearfe.gears.gearmesh.width_job",
+    ): "elastic teeth in space; for loads that vary along the width only",
+    (
+        "gearfe.drivetrain.gearbox.mesh_stiffness",
+        "gearfe.gears.gearmesh.width_law_store",
+    ): "the same",
+    (
+        "gearfe.drivetrain.gearbox.mesh_stiffness",
+        "gearfe.drivetrain.gearbox.springs_train",
+    ): "statics and ratings; for such loads only",
+    ("gearfe.gears.gearmesh.width_law_store", "gearfe.gears.width"): "scipy; a law is read from the cache",
+    (
+        "gearfe.gears.gearmesh.width_law_store",
+        "gearfe.gears.gearmesh.width_law_make",
+    ): "scipy; a law is read from the cache",
+    (
         "gearfe.figures.flanks",
         "gearfe.gears.gearmesh.width_job",
     ): "elastic teeth; for modifications along the width only",
