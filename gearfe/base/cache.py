@@ -35,6 +35,8 @@ PACKAGES = ("numpy", "scipy", "gmsh")
 KEPT_SHARE = 0.8
 #: One new entry in so many looks at the size of all: a look costs milliseconds.
 LOOK = 16
+#: Arrays larger than this share of the limit are not kept: they would push out everything else.
+LARGEST_SHARE = 0.1
 
 
 def cache_folder() -> Path | None:
@@ -121,7 +123,7 @@ def cached_arrays(
     recipe : object
         Everything that decides the arrays, see `cache_key`.
     make : callable
-        Makes the arrays by name.
+        Makes the arrays by name. They are not kept if they exceed `LARGEST_SHARE` of the cache's limit.
     folder : Path, optional
         Folder of the cache; the user's by default.
     """
@@ -138,6 +140,8 @@ def cached_arrays(
         return arrays if str(arrays.pop("_key", "")) == key else None
 
     def write(arrays: dict[str, Any], path: Path) -> None:
+        if sum(np.asarray(values).nbytes for values in arrays.values()) > LARGEST_SHARE * limit():
+            return
         with whole_file(path) as temporary:
             np.savez(temporary, _key=np.array(key), **arrays)
 

@@ -6,6 +6,7 @@ import dataclasses
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +118,14 @@ def test_a_new_entry_keeps_the_size_below_the_limit(tmp_path: Path, monkeypatch:
             write=lambda text, path: path.write_text(text),
         )  # fmt: skip
     assert sum(entry.size for entry in entries(tmp_path)) <= 50_000
+
+
+def test_arrays_that_would_push_out_the_others_are_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GEARFE_CACHE_LIMIT_MB", "1")
+    for number, count in enumerate((12_000, 13_000)):  # of 8 bytes each: below and above a tenth
+        assert len(cached_arrays("thing", number, partial(dict, x=np.zeros(count)), tmp_path)["x"]) == count
+    (entry,) = entries(tmp_path)
+    assert 90_000 < entry.size < 100_000
 
 
 def test_command_tells_and_cleans(
