@@ -181,6 +181,7 @@ SYNONYMS = {
     **dict.fromkeys(("theta", "phi", "alpha", "beta", "psi", "rotation", "rot"), "angle"),
     **dict.fromkeys(("omega", "w", "angular_velocity", "thetadot", "theta_dot", "phidot", "phi_dot"), "rate"),
     **{
+        "tutorial": "undamped_springs",  # variant of the shipped train, by what it is
         "t": "time",
         "ln": "log",
         "fabs": "abs",

@@ -96,13 +96,14 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
             write_csvs(made, map_tables(load_map))
         if not args.no_pictures:
             from ..figures.flanks import flank_picture
-            from ..figures.load_map import load_map_picture
+            from ..figures.load_map import load_map_picture, load_picture
             from ..figures.style import save
 
             with watch.stage("pictures"):
                 gears = f"Gear pair {pair.pinion.teeth}/{pair.wheel.teeth}"
                 title = f"{gears}, {load_map.span}, plane {job.table.plane}, law {job.table.law}"
                 save(load_map_picture(load_map, title), made / "loadmap.png", dpi=110)
+                save(load_picture(load_map, title), made / "loadmap_load.png", dpi=110)
                 if mesh.deviates:
                     picture = flank_picture(mesh, pair, beside)
                     save(picture, made / "loadmap_flanks.png", dpi=110)

@@ -1,8 +1,9 @@
-"""Picture of a load map: what changes with angle, place on the path of contact, order, and torque."""
+"""Pictures of a load map: over the pinion angle; over the torque, along the path of contact and by orders."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,50 +16,78 @@ from .style import BLUE, ORANGE, RED, headed, labelled, new_figure, shades, some
 MOST_LINES = 24
 
 
-def load_map_picture(made: LoadMap, title: str = "") -> Any:
-    """Panels coloured by torque over the pinion angle and along the path of contact, orders, and means over torque."""
-    angle, label, panels = _over_the_angle(made)
-    torque = made.torque
-    count = len(panels) + 2 + 2 * bool(made.pairs) + bool(made.mesh_cycles)
-    columns = -(-count // 2)
-    figure = new_figure(3.9 * columns + 0.9, 6.6)
-    every: list[Any] = figure.subplots(2, columns, squeeze=False).ravel().tolist()
-    for axes in every[count:]:
+#: Panels beside each other, and their size (inches).
+COLUMNS, WIDE, TALL = 2, 5.6, 3.5
+
+
+class _Frame(NamedTuple):
+    """Figure with panels, colour of a torque, its scale, whether torques are on a logarithmic axis."""
+
+    figure: Any
+    panels: list[Any]
+    colour: Callable[[float], Any]
+    scale: Any
+    logarithmic: bool
+
+
+def _framed(made: LoadMap, count: int, title: str) -> _Frame:
+    torque, rows = made.torque, -(-count // COLUMNS)
+    figure = new_figure(WIDE * min(COLUMNS, count) + 0.9, TALL * rows + 0.5)
+    panels: list[Any] = figure.subplots(rows, min(COLUMNS, count), squeeze=False).ravel().tolist()
+    for axes in panels[count:]:
         axes.set_visible(False)
-    places = iter(every)
     logarithmic = len(torque) > 2 and torque[-1] / torque[0] > 10 and _is_geometric(torque)
     low, high = float(torque[0]), float(torque[-1] if len(torque) > 1 else 1.01 * torque[0])
-    colour, scale = shades(low, high, logarithmic=logarithmic)
-    shown = some_of(len(torque), MOST_LINES)
+    headed(figure, title)
+    return _Frame(figure, panels, *shades(low, high, logarithmic=logarithmic), logarithmic)
+
+
+def _with_bar(frame: _Frame) -> Any:
+    """The figure with the scale of the torques beside its panels."""
+    bar = frame.figure.colorbar(frame.scale, ax=frame.panels, shrink=0.85, aspect=35, pad=0.015)
+    if frame.logarithmic:
+        _plain_ticks(bar.ax.yaxis)
+    bar.set_label("torque at the wheel (N m)")
+    return frame.figure
+
+
+def load_map_picture(made: LoadMap, title: str = "") -> Any:
+    """Panels over the pinion angle, coloured by torque: stiffness, transmission error, share, pressure, root stress."""
+    angle, label, panels = _over_the_angle(made)
+    frame = _framed(made, len(panels), title)
+    shown = some_of(len(made.torque), MOST_LINES)
     style: dict[str, Any] = {"marker": "." if len(angle) < 60 else "", "markersize": 3, "linewidth": 1.1}
-    for (name, values), axes in zip(panels.items(), places, strict=False):
+    for (name, values), axes in zip(panels.items(), frame.panels, strict=False):
         labelled(axes, name, label)
         if name.startswith("transmission error"):  # Harris map
             axes.plot(angle, _closed(1e6 * made.transmission_error_unloaded, angle), color=RED, label="rigid", **style)
             axes.legend(fontsize=8, frameon=False)
         for row in shown:
-            axes.plot(angle, values[row], color=colour(torque[row]), **style)
+            axes.plot(angle, values[row], color=frame.colour(made.torque[row]), **style)
         axes.set_xlim(angle[0], angle[-1])
-    if made.pairs:
-        _along_the_path(next(places), next(places), made, shown, colour)
-    if made.mesh_cycles:
-        _orders(next(places), made)
+    return _with_bar(frame)
+
+
+def load_picture(made: LoadMap, title: str = "") -> Any:
+    """Panels along the path of contact, over orders and over the torque."""
     over = {
         "mean stiffness  (N/µm)": (1e-6 * made.quantity("k_mesh").mean(axis=1), BLUE),
         "transmission error, peak to peak  (µm)": (1e6 * made.peak_to_peak, ORANGE),
     }
+    frame = _framed(made, len(over) + 2 * bool(made.pairs) + bool(made.mesh_cycles), title)
+    places = iter(frame.panels)
     for (name, (means, color)), axes in zip(over.items(), places, strict=False):
         labelled(axes, name, "torque at the wheel (N m)")
-        axes.plot(torque, means, "o-", color=color, markersize=3.5, linewidth=1.4)
-        if logarithmic:
+        axes.plot(made.torque, means, "o-", color=color, markersize=3.5, linewidth=1.4)
+        if frame.logarithmic:
             axes.set_xscale("log")
             _plain_ticks(axes.xaxis)
-    bar = figure.colorbar(scale, ax=every, shrink=0.85, aspect=35, pad=0.015)
-    if logarithmic:
-        _plain_ticks(bar.ax.yaxis)
-    bar.set_label("torque at the wheel (N m)")
-    headed(figure, title)
-    return figure
+    if made.pairs:
+        shown = some_of(len(made.torque), MOST_LINES)
+        _along_the_path(next(places), next(places), made, shown, frame.colour)
+    if made.mesh_cycles:
+        _orders(next(places), made)
+    return _with_bar(frame)
 
 
 def _over_the_angle(made: LoadMap) -> tuple[Array, str, dict[str, Array]]:

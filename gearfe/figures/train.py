@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +63,10 @@ class TrainPictures:
         """
         response = made.curves
         _draw_response(folder / "response.png", response, attachment, self.title, made.mean_force)
+        if is_long(response):
+            zoom = last_part(response)
+            ends = f"{1e3 * zoom.time[0]:.5g} to {1e3 * zoom.time[-1]:.5g} ms"
+            _draw_response(folder / "response_zoom.png", zoom, attachment, f"{self.title}; {ends}", made.mean_force)
         if train.drive is not None and any(mesh.stiffness is not None for mesh in train.meshes):
             _draw_transmission(folder / "transmission_error.png", train, response, self.title)
         if train.carriers:
@@ -109,6 +113,50 @@ class TrainPictures:
         return draw_scene(path, frames(train, response, steps), self.title, self.most)
 
 
+#: Points of a curve over time that are drawn as a line; of more, the band between least and largest of neighbours is.
+TRACED = 3000
+#: Periods of the slowest mesh from which on a response is long, and those that the picture of its last part shows.
+LONG, ZOOMED = 60.0, 6.0
+
+
+def is_long(response: TrainResponse) -> bool:
+    """Whether single periods of the meshes cannot be told apart in a picture of the whole response."""
+    slowest = float(np.min(np.abs(response.mesh_frequencies_Hz), initial=np.inf))
+    return bool(np.isfinite(slowest) and (response.time[-1] - response.time[0]) * slowest > LONG)
+
+
+def last_part(response: TrainResponse) -> TrainResponse:
+    """The last periods of the slowest mesh of a response."""
+    slowest = float(np.abs(response.mesh_frequencies_Hz).min())
+    first = int(np.searchsorted(response.time, response.time[-1] - ZOOMED / slowest))
+    first, count = min(first, len(response.time) - 2), len(response.time)
+    cut = {
+        field.name: values[first:]
+        for field in fields(response)
+        if isinstance(values := getattr(response, field.name), np.ndarray) and values.shape[:1] == (count,)
+    }
+    return replace(response, **cut)
+
+
+def envelope(x: Array, y: Array, most: int = TRACED // 4) -> tuple[Array, Array, Array]:
+    """Middles of groups of neighbours of a curve, and the least and the largest value of each, which touch the next."""
+    group = -(-len(x) // most)
+    starts = np.arange(0, len(x), group)
+    low, high = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
+    after = np.append(y[starts[1:]], y[-1])
+    ends = np.minimum(starts + group, len(x)) - 1
+    return 0.5 * (x[starts] + x[ends]), np.minimum(low, after), np.maximum(high, after)
+
+
+def _trace(axes: Any, x: Array, y: Array, colour: str, name: str | None = None) -> None:
+    """Draw a curve, or where it has more points than can be seen, the band that holds it."""
+    if len(x) <= TRACED:
+        axes.plot(x, y, color=colour, linewidth=1.2, label=name)
+        return
+    middle, low, high = envelope(x, y)
+    axes.fill_between(middle, low, high, color=colour, alpha=0.6, linewidth=0.3, label=name)
+
+
 def _draw_response(path: Path, response: TrainResponse, attachment: str, title: str, mean: Array) -> None:
     """Contact forces, speeds, angular accelerations, and the acceleration at an attachment over the drive's rotation.
 
@@ -117,18 +165,21 @@ def _draw_response(path: Path, response: TrainResponse, attachment: str, title: 
     sense = float(np.sign(response.drive_angle[-1])) or 1.0
     signs = np.where(np.sign(response.speed.mean(axis=0)) * sense < 0.0, -1.0, 1.0)
     drive = sense if len(signs) else 1.0
-    labels = [n if s > 0.0 else f"{n} (sign reversed)" for n, s in zip(response.shaft_names, signs, strict=True)]
+    labels = [
+        f'"{n}"' if s > 0.0 else f'"{n}" (sign reversed)' for n, s in zip(response.shaft_names, signs, strict=True)
+    ]
     means = [f", mean {m / 1e3:.4g} kN" if np.isfinite(m) else "" for m in mean]
     names = [f"mesh {i + 1}{text}" for i, text in enumerate(means)]
     angle, forces = np.degrees(response.drive_angle) * drive, 1e-3 * response.contact_force.T
     speeds, accelerations = (response.speed * signs).T, (response.acceleration * signs).T
     scale, unit = (1e-3, "1000") if np.abs(accelerations).max(initial=0.0) < 1e6 else (1e-6, "10⁶")
     figure = fixed(11.5, 7.6)
-    figure.suptitle(title, fontsize=12, x=0.012, y=0.985, ha="left")
+    long = "; bands: least to largest value of neighbours" if len(angle) > TRACED else ""
+    figure.suptitle(title + long, fontsize=12, x=0.012, y=0.985, ha="left")
     grid = figure.add_gridspec(2, 2, left=0.062, right=0.985, top=0.905, bottom=0.068, hspace=0.3, wspace=0.16)
     axes = [panel(figure.add_subplot(grid[0, 0]), "contact force  (kN)", "a", "contact forces")]
     for colour, name, values, level in zip(CYCLE, names, forces, mean, strict=False):
-        axes[0].plot(angle, values, color=colour, linewidth=1.3, label=name)
+        _trace(axes[0], angle, values, colour, name)
         if np.isfinite(level):
             axes[0].axhline(1e-3 * level, color=colour, linewidth=0.9, dashes=(6, 4))
     _bars(axes[0], _apart(response, drive))
@@ -139,7 +190,7 @@ def _draw_response(path: Path, response: TrainResponse, attachment: str, title: 
     for number, (colour, label, values) in enumerate(zip(CYCLE, labels, speeds, strict=False)):
         part = figure.add_subplot(rows[number])
         panel(part, "", "b" if number == 0 else "", "shaft speeds" if number == 0 else "")
-        part.plot(angle, values, color=colour, linewidth=1.2)
+        _trace(part, angle, values, colour)
         half = max(0.55 * float(np.ptp(values)), 2e-3 * float(np.abs(values).max()), 1e-9)
         middle = 0.5 * float(values.max() + values.min())
         part.set_ylim(middle - 1.15 * half, middle + 1.15 * half)
@@ -152,13 +203,13 @@ def _draw_response(path: Path, response: TrainResponse, attachment: str, title: 
         figure.add_subplot(grid[1, 0]), f"angular acceleration  ({unit} rad/s²)", "c", "angular accelerations"
     )
     for colour, label, values in zip(CYCLE, labels, scale * accelerations, strict=False):
-        turning.plot(angle, values, color=colour, linewidth=1.1, label=label)
+        _trace(turning, angle, values, colour, label)
     turning.legend(fontsize=8.5, frameon=False, ncols=max(1, min(4, len(accelerations))), loc="upper right")
     turning.margins(y=0.14)
     normal = panel(
         figure.add_subplot(grid[1, 1]), "acceleration  (m/s²)", "d", f"normal acceleration at attachment {attachment}"
     )
-    normal.plot(angle, attachment_acceleration(response, attachment), color=BLUE, linewidth=1.1)
+    _trace(normal, angle, attachment_acceleration(response, attachment), BLUE)
     normal.axhline(0.0, color=GREY, linewidth=0.8)
     axes += [turning, normal]
     for part in axes:

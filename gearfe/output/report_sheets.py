@@ -20,7 +20,7 @@ from .results import Results
 #: Rows of a table at most, and pictures of a kind in this order; others follow up to `PICTURES_OF_RUN`.
 MOST_ROWS, PICTURES_OF_RUN, PICTURES_OF_SEVERAL = 14, 4, 2
 FIRST = (
-    "stiffness.png", "loadmap.png", "loadmap_path.png", "response.png", "spectrum.png", "radiated_power.png",
+    "stiffness.png", "loadmap.png", "loadmap_load.png", "response.png", "spectrum.png", "radiated_power.png",
     "meshes.png", "waterfall.png", "campbell.png", "rating.png",
 )  # fmt: skip
 #: Data of a gear: key of the derived geometry -> words.

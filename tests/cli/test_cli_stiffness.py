@@ -172,7 +172,7 @@ def test_a_failed_position_is_told_and_in_the_table(tmp_path, capsys, monkeypatc
 def test_the_load_of_a_variant_of_the_train(tmp_path, capsys):
     """The published one of the shipped job: 0.5 degrees by Nitsche's law, as with these options."""
     options = ["--coarsen", "3", "--angles", "2", "6", "14", "--no-estimate", "--no-pictures"]
-    assert main(["stiffness", str(JOB), "--out", str(tmp_path / "a"), "--variant", "tutorial", *options]) == 0
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path / "a"), "--variant", "undamped_springs", *options]) == 0
     given = ["--twist-deg", "0.5", "--law", "nitsche"]
     assert main(["stiffness", str(JOB), "--out", str(tmp_path / "b"), *given, *options]) == 0
     assert (tmp_path / "a" / "stiffness.csv").read_text() == (tmp_path / "b" / "stiffness.csv").read_text()
@@ -182,7 +182,7 @@ def test_the_load_of_a_variant_of_the_train(tmp_path, capsys):
     capsys.readouterr()
     assert main(["stiffness", str(JOB), "--variant", "tutorals"]) == 2
     assert "unknown name 'tutorals'" in (said := capsys.readouterr().err)
-    assert "did you mean 'tutorial'" in said
+    assert "did you mean 'undamped_springs'" in said
 
 
 def test_a_position_without_contact_is_told(tmp_path, capsys):

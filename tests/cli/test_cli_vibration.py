@@ -183,7 +183,7 @@ def test_the_script(job, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("variant", ["standard", "tutorial", "operating"])
+@pytest.mark.parametrize("variant", ["standard", "undamped_springs", "operating"])
 def test_the_shipped_job(tmp_path, capsys, variant):
     """All variants, whole chain; the second run is made from the caches and says the same."""
     outs = [tmp_path / name for name in ("first", "second")]

@@ -339,7 +339,7 @@ def by_name(raw: dict[str, Any]) -> dict[str, Any]:
     return raw
 
 
-@pytest.mark.parametrize("variant", ["standard", "tutorial", "operating"])
+@pytest.mark.parametrize("variant", ["standard", "undamped_springs", "operating"])
 def test_the_shipped_train_by_name_is_the_shipped_train(variant: str, tmp_path: Path) -> None:
     """In its elastic housing: gears, shafts, bores, kinematics, contact models, sweeps."""
     raw = by_name(tomllib.loads((GEOMETRY / "gear_train.toml").read_text(encoding="utf-8")))

@@ -44,15 +44,16 @@ def test_the_shipped_job_is_what_it_says() -> None:
 
 
 def test_variants_differ_in_curves_and_damping() -> None:
-    standard, tutorial, operating = (read_train_job(SHIPPED, name).table for name in (None, "tutorial", "operating"))
+    names = (None, "undamped_springs", "operating")
+    standard, undamped, operating = (read_train_job(SHIPPED, name).table for name in names)
     assert (standard.curves, standard.damping.ratio) == (TrainCurvesTable(), 0.0)  # mesh laws are the default
-    models = [table.curves.mesh_model for table in (standard, tutorial, operating)]
+    models = [table.curves.mesh_model for table in (standard, undamped, operating)]
     assert models == ["potential", "variable_stiffness", "variable_stiffness"]
     assert math.pi * 2000.0 * standard.damping.rayleigh_beta_s == pytest.approx(0.01, rel=0.01)  # 1 % at 2 kHz
-    assert (tutorial.curves.interpolation, tutorial.curves.load, tutorial.damping.ratio) == ("linear", "stiffness", 0.0)
+    assert (undamped.curves.interpolation, undamped.curves.load, undamped.damping.ratio) == ("linear", "stiffness", 0.0)
     assert (operating.curves.interpolation, operating.curves.load, operating.damping.ratio) == ("cubic", "torque", 0.01)
-    with pytest.raises(InputError, match="did you mean 'tutorial'"):
-        read_train_job(SHIPPED, "tutorals")
+    with pytest.raises(InputError, match="did you mean 'undamped_springs'"):
+        read_train_job(SHIPPED, "undamped_spring")
 
 
 def test_the_other_commands_read_the_same_file() -> None:
@@ -205,11 +206,11 @@ def test_keys_of_a_variant_win_over_those_of_the_stiffness_table(tmp_path: Path)
         read_train_job(job_file(tmp_path, BARE_TRAIN + BORES + both))
 
 
-def test_the_shipped_tutorial_is_the_published_load_by_nitsche() -> None:
+def test_the_undamped_springs_have_the_published_load_by_nitsche() -> None:
     """0.5 degrees; the curve's positions and the gears are shared with [stiffness], whose law is the default."""
-    shared, tutorial = (read_train_job(SHIPPED, name).stiffness for name in ("", "tutorial"))
+    shared, undamped = (read_train_job(SHIPPED, name).stiffness for name in ("", "undamped_springs"))
     assert (shared.torque_Nm, shared.twist_deg, shared.law) == (100.0, None, "half_plane")
-    assert tutorial == dataclasses.replace(shared, torque_Nm=None, twist_deg=0.5, law="nitsche")
+    assert undamped == dataclasses.replace(shared, torque_Nm=None, twist_deg=0.5, law="nitsche")
 
 
 def test_missing_bores_are_named(tmp_path: Path) -> None:

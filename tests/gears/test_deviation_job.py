@@ -159,7 +159,7 @@ def test_the_command(tmp_path, capsys) -> None:
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {
         *(f"loadmap{part}.csv" for part in ("", "_torques", "_pairs", "_orders")),
-        "loadmap.png", "loadmap_flanks.png", "loadmap.json",
+        "loadmap.png", "loadmap_load.png", "loadmap_flanks.png", "loadmap.json",
     }  # fmt: skip
     with (tmp_path / "out" / "loadmap.csv").open() as stream:
         rows = list(csv.DictReader(stream))

@@ -170,6 +170,7 @@ def test_the_command(tmp_path, capsys):
         "loadmap.csv",
         "loadmap.json",
         "loadmap.png",
+        "loadmap_load.png",
         "loadmap_orders.csv",
         "loadmap_pairs.csv",
         "loadmap_torques.csv",

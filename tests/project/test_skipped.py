@@ -88,7 +88,7 @@ def test_fields_only_where_asked(tmp_path):
 RIGID = """
 from scripts.benchmarks.jobs.subject import train_model, train_times
 from gearfe.drivetrain.train import simulate
-made = simulate(train_model("tutorial", quick=True), train_times(True))
+made = simulate(train_model("undamped_springs", quick=True), train_times(True))
 print(made.contact_force[-1, 0])
 """
 

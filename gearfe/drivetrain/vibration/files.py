@@ -37,6 +37,7 @@ MAY_WRITE = (
     "spectrum.csv",
     "misalignment.csv",
     "response.png",
+    "response_zoom.png",
     "spectrum.png",
     "radiated_power.png",
     "third_octaves.csv",

@@ -120,7 +120,7 @@ def _process(code: str, **extra: str) -> float:
 RIGID = """
 from gearfe.drivetrain.train import simulate
 from scripts.benchmarks.jobs.subject import train_model, train_times
-simulate(train_model("tutorial", quick=True), train_times(True))
+simulate(train_model("undamped_springs", quick=True), train_times(True))
 """
 
 

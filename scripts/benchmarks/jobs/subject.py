@@ -89,7 +89,7 @@ def train_model(variant: str, *, quick: bool = False, modes: int | None = None, 
     Parameters
     ----------
     variant
-        ``tutorial`` or ``operating``; ``parting``: the latter at a resonance, with backlash, so that teeth part.
+        ``undamped_springs`` or ``operating``; ``parting``: the latter at a resonance, with backlash.
     modes
         Of the housing with held bores, in place of the job's choice by frequency.
     speed

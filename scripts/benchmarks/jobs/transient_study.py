@@ -22,7 +22,7 @@ from .record import Record
 from .subject import train_model, train_times
 from .timing import measured
 
-VARIANTS = ("tutorial", "operating", "parting")
+VARIANTS = ("undamped_springs", "operating", "parting")
 #: The damped ones: without damping every error of a fast mode stays for ever, and low orders never get right.
 PEERS_VARIANTS = ("operating", "parting")
 TOLERANCES, QUICK_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10), (1e-3, 1e-5)
