@@ -57,7 +57,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         'gearfe report gearbox.toml --author "A. Designer"',
     ),
     "study": (
-        "one job in many cases: parameters, designs, statistics, sensitivities; goes on where it was interrupted",
+        "one job in many cases: parameters, designs, statistics, sensitivities; continues after an interruption",
         "gearfe study study.toml --jobs 2",
     ),
     "new": (

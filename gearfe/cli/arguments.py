@@ -60,7 +60,7 @@ class CommandParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> Any:
         """Tell a mistake in the words of ``argparse``."""
-        raise InputError("command line", None, message, f"{self.prog} --help tells the options")
+        raise InputError("command line", None, message, f"{self.prog} --help lists the options")
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Namespace of the arguments.
@@ -76,7 +76,7 @@ class CommandParser(argparse.ArgumentParser):
                 raise unknown_name("command line", rest[0].split("=")[0], self._option_string_actions)
             word, option = next(iter(self._refused.items()), (rest[0], ""))
             problem = f"is no value of {option}" if option else "is one argument too many"
-            raise InputError("command line", word, problem, f"{self.prog} --help tells the usage")
+            raise InputError("command line", word, problem, f"{self.prog} --help shows the usage")
         return made
 
     def _sorted(self, args: Sequence[str]) -> list[str]:
@@ -206,7 +206,7 @@ def add_job(parser: argparse.ArgumentParser, dest: str, help_: str) -> None:
         default=[],
         dest="changes",
         metavar="KEY=VALUE",
-        help="another value for a key of the file, as table.key=21; may stand several times",
+        help="another value for a key of the file, as table.key=21; may be given several times",
     )
 
 
@@ -317,7 +317,7 @@ def parser_of(module: Any, name: str, summary: str, example: str) -> CommandPars
     module.add_arguments(parser)
     group = parser.add_mutually_exclusive_group()
     group.add_argument("-q", "--quiet", action="store_true", help="print warnings and errors only")
-    group.add_argument("-v", "--verbose", action="store_true", help="tell each stage of the work as it begins")
+    group.add_argument("-v", "--verbose", action="store_true", help="print a line for each stage of the work")
     return parser
 
 

@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     if args.names is not None and len(args.names) != len(args.runs):
         raise InputError("--names", args.names, f"must be {len(args.runs)} names", "give one for each run")
     if args.names is not None and len(set(args.names)) < len(args.names):
-        raise InputError("--names", args.names, "must differ", "give each run a name of its own")
+        raise InputError("--names", args.names, "must differ", "give each run a different name")
 
     from ..base.files import output_folder, whole_set, write_csv, write_json
     from ..base.progress import stage

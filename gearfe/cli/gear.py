@@ -178,7 +178,7 @@ def _exports(text: str) -> list[str]:
     for name in (word.strip() for word in text.split(",") if word.strip() not in ("", REXS)):
         if name not in (*EXPORTS, *FILES):
             problem = f"must be {', '.join(EXPORTS)}, {REXS}, or a file of one gear, as pinion.dxf"
-            raise InputError("--export", name, problem, nearest(name, FILES) or "--out tells the folder")
+            raise InputError("--export", name, problem, nearest(name, FILES) or "--out names the folder")
         made += [file for file in FILES if name in (file, Path(file).suffix[1:])]
     return sorted(set(made))
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Why a frequency has no estimate.
 _COARSE, _FEW = "the mesh is too coarse for one", "keep more modes (modes_below_Hz)"
-_UNKNOWN = "matrices tell none"
+_UNKNOWN = "there is none for matrices"
 #: Share of an estimated error above which the report says what makes it smaller.
 _LARGE = 0.1
 #: Modes drawn.
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--compare",
         metavar="FILE",
-        help="modes of a test (.csv, .uff) or another reduced body (.npz): frequencies, MAC, damping beside those here",
+        help="modes of a test (.csv, .uff) or another reduced body (.npz): comparison of frequencies, MAC, damping",
     )
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from types import FrameType
     from typing import Any, TextIO
 
-USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' tells a command's options)"
+USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' lists the options of a command)"
 
 #: Commands that were, and where they went.
 MOVED = {

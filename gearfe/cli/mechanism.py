@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sensitivity",
         action="append",
         metavar="KEY",
-        help="write the slopes of all outputs by this key, as bodies.rod.mass_kg; may stand several times",
+        help="write the slopes of all outputs by this key, as bodies.rod.mass_kg; may be given several times",
     )
     parser.add_argument("--no-estimate", action="store_true", help="leave out the finer runs that estimate the error")
     parser.add_argument("--animation", action="store_true", help="write animation.gif")

@@ -166,7 +166,7 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, MeshPa
     least = int(np.sum(curve.load_share[0] > 0.0))
     args.teeth = max(DECK_TEETH, least) if args.teeth is None else args.teeth
     if args.teeth < least:
-        problem = "leaves tooth pairs that bear without a contact boundary: the deck would not find equilibrium"
+        problem = "leaves loaded tooth pairs without contact boundary: the deck would have no equilibrium"
         raise InputError("--teeth", args.teeth, problem, f"give {least} or more, or leave it out ({DECK_TEETH})")
     parts = _parts(args, job, wheel_angle=float(curve.wheel_angle[0]) - job.pair.sign * twist)
     pair = job.pair

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("kind", nargs="?", metavar="KIND", help=f"{', '.join(JOBS)}, or a shipped job, as housing.toml")
     parser.add_argument("file", nargs="?", metavar="FILE", help="file to write (default: KIND.toml)")
-    parser.add_argument("--list", action="store_true", help="tell the kinds and the shipped jobs")
+    parser.add_argument("--list", action="store_true", help="list the kinds and the shipped jobs")
     parser.add_argument(
         "--from",
         dest="source",
@@ -94,7 +94,7 @@ def _from_rexs(args: argparse.Namespace) -> int:
 
     if args.file is not None or args.list:
         given = args.file if args.file is not None else "--list"
-        raise InputError("file", given, "is too much beside --from", "write gearfe new --from MODEL.rexs [FILE]")
+        raise InputError("file", given, "conflicts with --from", "write gearfe new --from MODEL.rexs [FILE]")
     source = Path(args.source)
     target = Path(args.kind or f"{source.name.partition('.')[0] or 'rexs'}.toml")
     if target.is_dir():

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--computed",
         action="store_true",
-        help="also stiffness, pressure and root stress by finite elements beside them",
+        help="also compute stiffness, pressure and root stress by finite elements",
     )
 
 

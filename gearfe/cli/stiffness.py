@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs=2,
         action="append",
         metavar=("NAME", "X"),
-        help="parameter of a law of another package; may stand several times",
+        help="parameter of a law of another package; may be given several times",
     )
     add_removed(parser, {**StiffnessTable.REMOVED, "animate": ("has another name", "write --animation")})
     parser.add_argument(

@@ -26,9 +26,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_job(parser, "study", "file with a table [study], and the job or its name in it")
     add_folder(parser)
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one a processor); 1: none beside")
+    parser.add_argument(
+        "--jobs", type=int, metavar="N", help="processes (default: one per processor); 1: this process only"
+    )
     parser.add_argument("--dask", metavar="ADDRESS", help="run the cases on the Dask cluster with this scheduler")
-    parser.add_argument("--restart", action="store_true", help="begin anew, whatever the folder holds")
+    parser.add_argument("--restart", action="store_true", help="start again, regardless of the content of the folder")
     parser.add_argument("--row", type=int, metavar="CASE", help="write the job file of a case to --write, and stop")
     parser.add_argument("--write", metavar="FILE", help="where --row writes; files of the job stay and are found")
     parser.add_argument("--parquet", action="store_true", help="also the rows as study.parquet")
@@ -108,7 +110,7 @@ def _goes_on() -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        announce("finished cases are kept in the output folder: the same command goes on from there")
+        announce("finished cases are kept in the output folder: the same command continues from there")
         raise
 
 
@@ -134,7 +136,7 @@ def _cluster(address: str, stack: ExitStack) -> dict[str, Any]:
     def check() -> None:
         if client.status != "running":
             problem = f"does not answer any more ({client.status})"
-            raise InputError("--dask", address, problem, "rows are kept: start it anew and give the same command")
+            raise InputError("--dask", address, problem, "rows are kept: restart it and give the same command")
 
     return {"executor": client.get_executor(pure=False), "workers": workers, "check": check}
 
@@ -144,7 +146,7 @@ def _write_row(study: Any, number: int, path: Path) -> int:
 
     if not study.cases:
         problem = "is of no case: a search has none beforehand"
-        raise InputError("--row", number, problem, f"{BEST} beside its study.csv is its best point")
+        raise InputError("--row", number, problem, f"{BEST} next to its study.csv is its best point")
     if not 0 <= number < len(study.cases):
         raise InputError("--row", number, f"must be >= 0 and <= {len(study.cases) - 1}", "see the column case")
     _write_case(study, number, study.cases[number], path, path.absolute().parent)

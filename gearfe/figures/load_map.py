@@ -120,7 +120,7 @@ def _closed(values: Array, angle: Array) -> Array:
 def _along_the_path(share: Any, pressure: Any, made: LoadMap, shown: Any, colour: Any) -> None:
     """Load share and pressure of the tooth pairs over the pinion's roll length."""
     labelled(share, "load share of a tooth pair  (–)", "roll length of the pinion (mm)")
-    labelled(pressure, "pressure (MPa); x: beside an edge", "roll length of the pinion (mm)")
+    labelled(pressure, "pressure (MPa); x: next to an edge", "roll length of the pinion (mm)")
     for row in shown:
         own, color = made.pairs[row], colour(made.torque[row])
         roll, sharp = 1e3 * own.roll[:, 0], own.edge > 0
@@ -140,7 +140,7 @@ def _orders(axes: Any, made: LoadMap) -> None:
     axes.set_xticks(mesh_order * np.arange(5))
     axes.set_ylim(bottom=0)
     axes.legend(fontsize=8, frameon=False)
-    labelled(axes, "orders of the transmission error (µm)", "order of the pinion's turn; grid: mesh")
+    labelled(axes, "orders of the transmission error (µm)", "order of the pinion's rotation; grid: mesh")
 
 
 def _is_geometric(torque: Array) -> bool:

@@ -56,7 +56,7 @@ def _temperatures(axes: Any, heat: Scuffing) -> None:
     axes.plot(heat.path.gamma, heat.path.contact, color=RED, linewidth=1.5, label="contact")
     axes.axhline(heat.theta_M_C, color=BLUE, linewidth=1.2, label="bulk")
     axes.axhline(heat.theta_S_C, color=GREY, linewidth=1.2, linestyle="--", label="scuffing")
-    axes.set_xlabel("place on the path: 0 pitch point, left the pinion's root")
+    axes.set_xlabel("position on the path: 0 pitch point, left the pinion's root")
     axes.set_ylabel("temperature (deg C)")
     axes.set_title(f"ISO/TS 6336-20, S_B = {heat.S_B:.3g}", loc="left", fontsize=10)
     axes.legend(fontsize=8)

@@ -82,7 +82,7 @@ def _draw(job: Path, target: Path) -> None:
     values, name = stored["gear_values"], "vibration (um)"
     gears = pyvista.PolyData(stored["gear_points"][0], cells)
     gears[name] = values[0]
-    far = bar | {"title": "gears: vibration beside smooth rolling (µm)\n", "position_x": 0.58}
+    far = bar | {"title": "gears: vibration without rolling (µm)\n", "position_x": 0.58}
     look = {
         "cmap": "viridis",
         "clim": (0.0, _round(float(values.max()) or 1.0)),

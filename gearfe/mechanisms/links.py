@@ -45,7 +45,7 @@ def doubts(file: MechanismFile) -> list[str]:
         if speed > FASTEST_SOUND:
             key = f"bodies.{name}.{'plate' if body.beam is None else 'beam'}.youngs_modulus_GPa"
             problem = f"makes sound faster ({speed:.2g} m/s) than in any material ({FASTEST_SOUND:.2g} m/s)"
-            cure = f"give it in GPa, beside the density of {table.density_kg_per_m3:g} kg/m3 (steel: 210, 7850)"
+            cure = f"give it in GPa, with the density of {table.density_kg_per_m3:g} kg/m3 (steel: 210, 7850)"
             problems.append(f"{key} = {table.youngs_modulus_GPa:g}: {problem}; {cure}")
     return problems
 
@@ -144,7 +144,9 @@ class FlexibleLink:
         """Largest normal stress |N|/A + |M| e/I over the section (Pa)."""
         section = self.beam.link.section
         if section.edge is None:
-            raise InputError(label, None, f"link {self.beam.link.name!r} has no edge_m", "give the outer fibre's place")
+            raise InputError(
+                label, None, f"link {self.beam.link.name!r} has no edge_m", "give the position of the outer fibre"
+            )
         bending = np.abs(resultants[..., 2]) * section.edge / section.second_moment
         return np.asarray(np.abs(resultants[..., 0]) / section.area + bending, dtype=float)
 

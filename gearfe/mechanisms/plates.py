@@ -273,7 +273,7 @@ def _reduce(shape: _Shape, material: Material) -> Plate:
         interfaces = _interfaces(points, table, shape.where)
         free = 2 * (len(points) - sum(len(interface.nodes) for interface in interfaces))
         if table.modes > free // 4:
-            problem = f"are too many for a mesh with {free} displacements beside its interfaces"
+            problem = f"are too many for a mesh with {free} displacements besides its interfaces"
             raise InputError(f"{shape.where}.modes", table.modes, problem, f"take at most {free // 4}, or a finer mesh")
         return reduce_plate(points, triangles, table.thickness_m, material, interfaces, table.modes)
 

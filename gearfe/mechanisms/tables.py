@@ -118,7 +118,7 @@ def read_table(name: str, table: ValueTableTable, folder: Path) -> ValueTable:
     if not (np.diff(x) > 0.0).all():
         raise InputError(f"{label}.x", table.x, "must rise from row to row", "sort the rows and drop doubles")
     if table.interpolation == "periodic" and not (len(x) > 2 and abs(y[-1] - y[0]) <= 1e-9 * np.ptp(y)):
-        raise InputError(f"{label}.y", table.y, "must end with the value that it begins with", "close the period")
+        raise InputError(f"{label}.y", table.y, "must end with its first value", "close the period")
     if table.interpolation == "periodic":
         y[-1] = y[0]
     return ValueTable(x, y, table.interpolation)

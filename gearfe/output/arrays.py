@@ -54,7 +54,7 @@ def load_arrays(path: str | Path) -> dict[str, Array]:
     except FileNotFoundError:
         raise InputError("file", str(path), "there is no such file", "check the path") from None
     except (OSError, ValueError, zipfile.BadZipFile, EOFError, struct.error) as error:
-        raise InputError("file", str(path), f"cannot be read ({error})", "make it anew") from error
+        raise InputError("file", str(path), f"cannot be read ({error})", "make it again") from error
 
 
 def _mapped(path: Path, stream: Any, member: zipfile.ZipInfo, size: int) -> Array:

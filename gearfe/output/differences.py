@@ -290,7 +290,7 @@ def _notes(results: Sequence[Results], common: Sequence[set[str]], left_out: Seq
             )  # fmt: skip
     for run in results:
         if not run.summary:
-            yield f"{run.name}: no {run.kind.summary} beside the table, so its figures and their errors are missing"
+            yield f"{run.name}: no {run.kind.summary} next to the table, so its numbers and their errors are missing"
         status = run.summary.get("status")
         if status not in (None, "done"):
             yield f"{run.name}: the run ended early ({status})"

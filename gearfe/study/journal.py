@@ -61,8 +61,8 @@ NO_LOCKS = (sqlite3.SQLITE_IOERR_LOCK, sqlite3.SQLITE_IOERR_RDLOCK)
 #: Seconds between two exports while cases run, and the largest share of the time that exports take.
 EXPORT_S, EXPORT_SHARE = 2.0, 0.05
 #: What to do about a file that is not the journal of the study, and about a damaged one.
-ELSEWHERE = "choose another --out, or give --restart to begin anew"
-REPAIR = "put a copy of it back, or give --restart to begin anew"
+ELSEWHERE = "choose another --out, or give --restart to start again"
+REPAIR = "restore a copy of it, or give --restart to start again"
 
 
 @contextmanager
@@ -446,7 +446,7 @@ def _refused(folder: Path, error: sqlite3.Error | OSError) -> InputError:
         return _damaged(folder / DATABASE, str(error))
     path = getattr(error, "filename", None) or str(folder / DATABASE)
     reason = getattr(error, "strerror", None) or str(error)
-    cure = "rows that were finished are kept: see to room and rights there, and give the same command"
+    cure = "finished rows are kept: check space and permissions there, and give the same command"
     return InputError("--out", str(path), f"cannot be written ({reason})", cure)
 
 

@@ -218,7 +218,7 @@ def _flat(given: Mapping[str, Any], above: str) -> dict[str, Any]:
 def _once(found: Mapping[str, Any], more: dict[str, Any]) -> dict[str, Any]:
     for name in more:
         if name in found:
-            raise InputError(f"{WHERE}.{name}", None, "stands there twice, quoted and as tables", "leave one out")
+            raise InputError(f"{WHERE}.{name}", None, "occurs twice, quoted and as tables", "leave one out")
     return more
 
 

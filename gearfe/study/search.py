@@ -160,7 +160,7 @@ class Search(Facts):
         for point in points:
             if set(point) != set(names):
                 wrong = sorted(set(point) ^ set(names))
-                raise InputError("points", wrong[0], "stands in a point or in the study alone", f"name {names}")
+                raise InputError("points", wrong[0], "is only in a point or only in the study", f"name {names}")
             values = tuple(_plain(point[name]) for name in names)
             key = tuple(map(cell_text, values))
             keys.append(key)

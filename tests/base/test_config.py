@@ -107,7 +107,7 @@ def test_rules_of_another_job_are_left_to_its_command(tmp_path):
     job = tmp_path / "job.toml"
     job.write_text("[loadmap]\ntorques_Nm = [10.0]\ntorque_start_Nm = 5.0\n", encoding="utf-8")
     assert load_job(job, ()) == {}
-    with pytest.raises(InputError, match=r"loadmap.torque_start_Nm = 5.0: stands beside torques_Nm"):
+    with pytest.raises(InputError, match=r"loadmap.torque_start_Nm = 5.0: conflicts with torques_Nm"):
         load_job(job, ("loadmap",))
     job.write_text("[loadmap]\ntorques_Nm = 10.0\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"loadmap.torques_Nm = 10.0: must be a list"):

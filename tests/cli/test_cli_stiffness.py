@@ -202,7 +202,7 @@ def test_a_position_without_contact_is_told(tmp_path, capsys):
     ("changes", "message"),
     [
         ({"torque_Nm": None}, "no load: neither twist_deg nor torque_Nm"),
-        ({"twist_deg": 0.5}, "stands beside twist_deg"),
+        ({"twist_deg": 0.5}, "conflicts with twist_deg"),
         ({"twist_deg": -0.5}, "stiffness.twist_deg = -0.5: must be finite and > 0"),
         ({"twist_deg": "true"}, "must be a number"),
         ({"twsit_deg": 0.5}, "did you mean 'twist_deg'?"),

@@ -366,7 +366,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
         "load on 's1' orders: follow a prescribed speed",
     ),
     ({"drive": Drive("s0", "s0+", constant(1.0), slope=1.0)}, "drive slope = 1.0: is of a drive by torque"),
-    ({"drive": Drive("s0", "s0+", constant(1.0), 1e4, torque=constant(1.0))}, "drive stiffness.*stands beside a torq"),
+    ({"drive": Drive("s0", "s0+", constant(1.0), 1e4, torque=constant(1.0))}, "drive stiffness.*conflicts with a torq"),
     (
         {"drive": Drive("s0", "s0+", constant(1.0), torque=constant(1.0)), "damping": Damping(alpha=1.0)},
         "damping alpha = 1.0: would brake the rotation itself",
@@ -458,18 +458,18 @@ WRONG_KEYS: list[tuple[dict[str, Any], str]] = [
     ({"train__drive__machine": "saw"}, r"train\.drive\.machine: unknown name 'saw'.*motor"),
     (
         {"train__drive": {"shaft": "s1", "machine": "motor", "speed_rad_per_s": 1.0, "y_mm": 7.0}},
-        r"train\.drive\.y_mm = 7.0: stands beside machine",
+        r"train\.drive\.y_mm = 7.0: conflicts with machine",
     ),
-    ({"train__loads": [{**LOAD, "machine": "saw", "y_mm": 7.0}]}, r"loads\[0\]\.y_mm = 7.0: stands beside machine"),
+    ({"train__loads": [{**LOAD, "machine": "saw", "y_mm": 7.0}]}, r"loads\[0\]\.y_mm = 7.0: conflicts with machine"),
     ({"train__loads": [{**LOAD, "machine": "x"}]}, r"train\.loads\[0\]\.machine: unknown name 'x'"),
     ({"train__drive__torque_slope_Nm_s_per_rad": 1.0}, r"torque_slope_Nm_s_per_rad = 1.0: is of a torque"),
     (
         {"train__drive__torque_Nm": 1.0, "train__drive__stiffness_Nm_per_rad": 1e4},
-        r"train\.drive\.stiffness_Nm_per_rad = 10000.0: stands beside torque_Nm",
+        r"train\.drive\.stiffness_Nm_per_rad = 10000.0: conflicts with torque_Nm",
     ),
     (
         {"train__machines": [{"name": "m", "shaft": "s1", "inertia_kg_m2": 1.0, "stiffness_Nm_per_rad": 1.0}]},
-        r"\[\[train\.machines\]\]: stands beside \[machines\.NAME\]",
+        r"\[\[train\.machines\]\]: conflicts with \[machines\.NAME\]",
     ),
 ]  # fmt: skip
 

@@ -265,7 +265,7 @@ def test_a_body_whose_entries_do_not_fit(entry, change, matrices, tmp_path) -> N
         arrays = dict(stored)
     arrays[entry] = change(arrays[entry])
     np.savez(tmp_path / "b.npz", **arrays)
-    with pytest.raises(InputError, match=r"reduced model = .*b\.npz.*make it anew"):
+    with pytest.raises(InputError, match=r"reduced model = .*b\.npz.*make it again"):
         ModalBody.load(tmp_path / "b.npz")
 
 

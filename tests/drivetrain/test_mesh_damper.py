@@ -135,8 +135,8 @@ def test_the_damper_of_a_mesh_law(acts):
     [
         ({"damping_acts": "sometimes"}, "must be 'always' or 'in_contact'"),
         ({"damping_acts": "in_contact"}, "a spring that acts both ways"),
-        ({"damping_acts": "always", "stiffness": None}, "nothing damps it"),
-        ({"damping": 5.0, "stiffness": None}, "nothing damps it"),
+        ({"damping_acts": "always", "stiffness": None}, "no deflection to damp"),
+        ({"damping": 5.0, "stiffness": None}, "no deflection to damp"),
     ],
 )
 def test_what_a_mesh_cannot_do_is_refused(changes, words):

@@ -274,5 +274,5 @@ def test_the_key_of_a_mesh_names_the_table(tmp_path: Path) -> None:
     error = line.flanks[0].error
     assert float(error(PITCH / 4).value) == pytest.approx(1e-6, rel=1e-9)
     job.write_text(JOB.format(keys='mesh_table = "mesh.csv", stiffness_N_per_m = 1e8'))
-    with pytest.raises(InputError, match="stands beside mesh_table"):
+    with pytest.raises(InputError, match="conflicts with mesh_table"):
         read_train_job(job)

@@ -156,8 +156,8 @@ WRONG_GEARS: list[tuple[dict[str, Any], str]] = [
         r"microgeometry\.tip_relief_length_mm",
     ),
     ({"gears__sun__profile_shift": "from centre distance"}, r"gears\.sun\.profile_shift .*needs a mesh with centre_"),
-    ({"pair": {"pinion": GEAR, "wheel": GEAR}}, r"\[pair\]: stands beside \[gears\.NAME\]"),
-    ({"microgeometry": {}}, r"\[microgeometry\]: stands beside .*write \[gears\.NAME\.microgeometry\]"),
+    ({"pair": {"pinion": GEAR, "wheel": GEAR}}, r"\[pair\]: conflicts with \[gears\.NAME\]"),
+    ({"microgeometry": {}}, r"\[microgeometry\]: conflicts with .*write \[gears\.NAME\.microgeometry\]"),
     (
         {"train__gears": [{"name": "g", "shaft": "s1", "y_mm": 0.0, "teeth": 20}]},
         r"shaft: unknown name 's1'|stands bes",
@@ -182,7 +182,7 @@ WRONG_MESHES: list[tuple[dict[str, Any], str]] = [
     ({"meshes__in__friction": 0.9}, r"meshes\.in\.friction = 0.9: must be"),
     ({"meshes__in__friction": 0.05}, r"meshes\.in\.friction.*needs a mesh law"),
     ({"meshes__in__backlash_um": -3.0}, r"meshes\.in\.backlash_um = -3.0"),
-    ({"meshes__in__rigid": True, "meshes__in__stiffness_N_per_m": 1e8}, r"meshes\.in\.rigid = True: stands beside"),
+    ({"meshes__in__rigid": True, "meshes__in__stiffness_N_per_m": 1e8}, r"meshes\.in\.rigid = True: conflicts with"),
     ({"meshes": {}}, r"\[meshes\]: is empty"),
     ({"meshes": None}, r"\[meshes\]: is missing"),
     ({"meshes__in.out": {"driver": "sun", "driven": "idler"}}, r"name in \[meshes\] = 'in.out': must have letters"),
@@ -213,12 +213,12 @@ WRONG_BEARINGS: list[tuple[dict[str, Any], str]] = [
     ({"bearings__s1_left__shaft": "s0"}, r"bearings\.s1_left\.shaft: unknown name 's0'; known names: s1, s2, s3, s4"),
     ({"bearings__s1_left__stiffness": [1e8]}, r"bearings\.s1_left\.stiffness = \[.*\]: must have 5 entries"),
     ({"bearings__s1_left__stiffness": [-1e8, 0.0, 0.0, 0.0, 0.0]}, r"bearings\.s1_left\.stiffness\[0\] = -1"),
-    ({"bearings__s1_left__damping": [1.0, 0.0, 0.0, 0.0, 0.0]}, r"bearings\.s1_left\.damping.*beside no stiffness"),
+    ({"bearings__s1_left__damping": [1.0, 0.0, 0.0, 0.0, 0.0]}, r"bearings\.s1_left\.damping.*needs a stiffness"),
     ({"bearings__s1_left__clearance_um": 3.0}, r"bearings\.s1_left: unknown name 'clearance_um'"),
     ({"bearings__s1_left__y_mm": 70.0}, r"attachment 's1_left': lies 25 mm beyond the end of shaft 's1'"),
     ({"bearings__s1_left__y_mm": None}, r"bearings\.s1_left\.y_mm: is required: other bearings have one"),
     ({"bearings__s1_left__attachment": "s1_right"}, r"bearings\.s1_right\.attachment = 's1_right': is that of \[bear"),
-    ({"train__housing": "elastic"}, r"bearings\.s1_left\.y_mm = -40.0: stands beside an elastic housing.*attachment"),
+    ({"train__housing": "elastic"}, r"bearings\.s1_left\.y_mm = -40.0: conflicts with an elastic housing.*attachment"),
     ({"bearings": {}}, r"\[bearings\]: is empty"),
     ({"bearings": None}, r"shafts\.s1\.attachments: no bearing carries the shaft"),
     ({"bearings__7 b": {"shaft": "s1", "y_mm": 0.0}}, r"name in \[bearings\] = '7 b'"),
@@ -228,9 +228,9 @@ WRONG_BEARINGS: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"train__bearings": [{"attachment": 1, "stiffness": [1.0] * 5}]},
-        r"\[\[train\.bearings\]\]: stands beside \[bear",
+        r"\[\[train\.bearings\]\]: conflicts with \[bear",
     ),
-    ({"train__rigid_bores": [{"attachment": 1, "x_mm": 0.0, "y_mm": 0.0}]}, r"rigid_bores\]\]: stands beside"),
+    ({"train__rigid_bores": [{"attachment": 1, "x_mm": 0.0, "y_mm": 0.0}]}, r"rigid_bores\]\]: conflicts with"),
 ]
 WRONG_MATERIALS: list[tuple[dict[str, Any], str]] = [
     ({"materials__steel__youngs_modulus_GPa": 206e9}, r"materials\.steel\.youngs_modulus_GPa = 2060+.*must be finite"),
@@ -259,8 +259,8 @@ BOTH = {
     "gears__wheel_2__profile_shift": "from centre distance",
 }
 WRONG_TOGETHER: list[tuple[dict[str, Any], str]] = [
-    ({"pair": {"pinion": {"teeth": 20}}}, r"\[pair\]: stands beside \[gears\.NAME\]"),
-    ({"meshes__in__mesh_table": "r.csv", "meshes__in__rigid": True}, r"meshes\.in\.rigid = True: .*beside mesh_table"),
+    ({"pair": {"pinion": {"teeth": 20}}}, r"\[pair\]: conflicts with \[gears\.NAME\]"),
+    ({"meshes__in__mesh_table": "r.csv", "meshes__in__rigid": True}, r"meshes\.in\.rigid = True: .*with mesh_table"),
     (
         {"meshes__in__mesh_table": "r.csv", "meshes__in__mesh_model": "potential"},
         r"meshes\.in\.mesh_model = .*mesh_tab",

@@ -332,13 +332,13 @@ def test_mistakes_in_bulk_data(text, told, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("keys", "told"),
     [
-        ({"mesh": "a.msh", "bores": BORES, "inner_gap_mm": 40.0}, "inner_gap_mm: stands beside mesh"),
+        ({"mesh": "a.msh", "bores": BORES, "inner_gap_mm": 40.0}, "inner_gap_mm: conflicts with mesh"),
         ({"mesh": "a.msh"}, r"bores: is required with a mesh"),
         ({"bores": BORES}, "belongs to a mesh of the user's own"),
         ({"mesh": "a.msh", "bores": [{"name": "1"}]}, r"bores\[0\]\.point_mm: is required without a group"),
-        ({"mesh": "a.msh", "bores": [{"group": "b", "radius_mm": 3.0}]}, "stands beside group"),
+        ({"mesh": "a.msh", "bores": [{"group": "b", "radius_mm": 3.0}]}, "conflicts with group"),
         ({"mesh": "a.msh", "bores": BORES, "held": [{}]}, r"held\[0\]\.group: must be given, or point_mm"),
-        ({"body": "a.npz", "mesh": "a.msh"}, "mesh: stands beside body"),
+        ({"body": "a.npz", "mesh": "a.msh"}, "mesh: conflicts with body"),
         ({"body": "a.npz", "reduction": {"modes": 4}}, "reduction: a reduced body has its modes"),
         ({"mesh": {"file": "a.msh", "unit": "ft"}, "bores": BORES}, "must be one of mm, cm, m, in"),
         ({"mesh": {"file": "a.msh", "axes": ["x", "z", "y"]}, "bores": BORES}, r'right-handed; shafts along z: \["x"'),

@@ -91,7 +91,7 @@ def test_material_of_a_rigid_shaft(tmp_path: Path) -> None:
         ("attachments = [1, 2]", "elements = 0\nattachments = [1, 2]", "shafts[0].elements", ">= 1"),
         ("outer_diameter_mm = 20.0", "", "sections[1].outer_diameter_mm", "is required"),
         ("outer_diameter_mm = 20.0", "outer_diameter_mm = -20.0", "sections[1].outer_diameter_mm", "> 0"),
-        ("outer_diameter_end_mm = 14.0", "", "sections[2].outer_diameter_end_mm", "is required beside"),
+        ("outer_diameter_end_mm = 14.0", "", "sections[2].outer_diameter_end_mm", "is required with"),
         (
             "outer_diameter_end_mm = 14.0",
             "outer_diameter_end_mm = 14.0\nouter_diameter_mm = 1.0",

@@ -267,7 +267,7 @@ def test_the_start_is_left_out(tmp_path):
         ('spectrum_from = "stedy"', "spectrum.spectrum_from"),
         ("short_time_ms = 500.0", "spectrum.short_time_ms"),
         ("order_turns = 500.0", "makes 1.9"),
-        ("orders = [20.0]", "order_turns: is required beside orders"),
+        ("orders = [20.0]", "order_turns: is required with orders"),
         ('window = "han"', "did you mean 'hann'"),
         ('[[spectrum.measured]]\nfile = "none.csv"\nattachment = "c"', "there is no such file"),
         ('[[spectrum.measured]]\nfile = "none.csv"\nattachment = "x"', "spectrum.measured[0].attachment"),

@@ -246,12 +246,12 @@ WRONG: list[tuple[dict[str, Any], dict[str, Any], str, str]] = [
     (at("expression", "-5*speed/abs(speed + 1e-9)"), {}, "torque_over_speed.expression", "jumps at"),
     (at("expression", "-time"), {}, "torque_over_speed.expression", "time"),
     (at("points", [[0.0, 1.0], [0.0, 2.0]]), {}, "torque_over_speed.points[1]", "rad/s"),
-    ({"torque_over_speed": {"points": [[0.0, 1.0]], "expression": "1"}}, {}, "expression", "stands beside points"),
+    ({"torque_over_speed": {"points": [[0.0, 1.0]], "expression": "1"}}, {}, "expression", "conflicts with points"),
     ({"torque_over_speed": {"points": [[0.0, 1.0]], "largest_speed_rad_per_s": 9.0}}, {}, "largest_speed", "leave it"),
     (at("csv", "none.csv"), {}, "torque_over_speed.csv", "none.csv"),
     ({**FAN, "ramp_width_ms": 1.0}, {}, "ramp_width_ms", "has no ramp"),
     (FAN, {"speed_rad_per_s": 0.0, "torque_Nm": 10.0}, "largest_speed_rad_per_s", "is required"),
-    (FAN, {**FAN, "stiffness_Nm_per_rad": 1e4}, "drive.stiffness_Nm_per_rad", "stands beside torque_over_speed"),
+    (FAN, {**FAN, "stiffness_Nm_per_rad": 1e4}, "drive.stiffness_Nm_per_rad", "conflicts with torque_over_speed"),
 ]  # fmt: skip
 
 

@@ -119,12 +119,12 @@ def built(path: Path) -> None:
         ("teeth = 27", "teeth = 27\ntip_relief_amount_um = 9.0", "gears\\[1\\].tip_relief_length_mm: is required"),
         ("teeth = 27", "teeth = 27\ntip_round_mm = 5.0", "gears\\[1\\].tip_round_mm = 5.0: "),
         ("stiffness_N_per_m = 2e8", "", "has no stiffness: there is no table"),
-        ("stiffness_N_per_m = 2e8", "stiffness_N_per_m = 2e8\nrigid = true", "stands beside"),
+        ("stiffness_N_per_m = 2e8", "stiffness_N_per_m = 2e8\nrigid = true", "conflicts with"),
         ("ratio = 0.05", "ratio = -0.05", "must be finite and >= 0"),
         ("step_us = 100.0", "step_us = 3000.0", "is longer than duration_ms"),
         ('housing = "rigid"', 'housing = "elastic"', "needs a table \\[housing\\]"),
         ("attachments = [3, 4]", "attachments = [3, 5]", "unknown attachment '5'"),
-        ("teeth = 27\n", 'gear = "wheel"\n', "stands beside gear"),
+        ("teeth = 27\n", 'gear = "wheel"\n', "conflicts with gear"),
         (
             "stiffness_N_per_m = 2e8",
             "[train.curves]\nload = 'torque'",
@@ -141,11 +141,11 @@ def built(path: Path) -> None:
             "friction = 0.06\n[train.curves]\nmesh_model = 'variable_stiffness'",
             "needs a mesh law, but",
         ),
-        ("stiffness_N_per_m = 2e8", "roughness_um = 0.5", "oil_viscosity_mPa_s: is required beside roughness_um"),
+        ("stiffness_N_per_m = 2e8", "roughness_um = 0.5", "oil_viscosity_mPa_s: is required with roughness_um"),
         (
             "stiffness_N_per_m = 2e8",
             "oil_viscosity_mPa_s = 20.0\nroughness_um = 0.5\nfriction = 0.05",
-            "stands beside friction = 0.05",
+            "conflicts with friction = 0.05",
         ),
     ],
 )
@@ -202,7 +202,7 @@ def test_keys_of_a_variant_win_over_those_of_the_stiffness_table(tmp_path: Path)
     with pytest.raises(InputError, match=r"train.variants.A.stiffness.coarsen = 9.0: must be finite and >= 0.2"):
         read_train_job(job_file(tmp_path, BARE_TRAIN + BORES + "[train.variants.A.stiffness]\ncoarsen = 9.0\n"))
     both = "[train.variants.A.stiffness]\ntwist_deg = 0.3\ntorque_Nm = 1.0\n"
-    with pytest.raises(InputError, match=r"train.variants.A.stiffness.torque_Nm = 1.0: stands beside twist_deg"):
+    with pytest.raises(InputError, match=r"train.variants.A.stiffness.torque_Nm = 1.0: conflicts with twist_deg"):
         read_train_job(job_file(tmp_path, BARE_TRAIN + BORES + both))
 
 

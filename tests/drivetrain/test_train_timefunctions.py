@@ -71,7 +71,7 @@ def test_expressions_become_polynomials(text, exact, pieces):
     [
         ({}, "empty function"),
         ({"points": [[0, 1.0], [0, 2.0]]}, r"points\[1\] = 0.0: must be later"),
-        ({"points": [[0, 1.0]], "csv": "a.csv"}, "stands beside points"),
+        ({"points": [[0, 1.0]], "csv": "a.csv"}, "conflicts with points"),
         ({"csv": "none.csv"}, "there is no such file"),
         ({"csv": "wrong.csv"}, "has no column value"),
         ({"expression": "600 +"}, "not an expression"),
@@ -125,7 +125,7 @@ def test_a_mistake_in_a_job_is_told_with_its_key(tmp_path, capsys):
     assert "train.drive.speed_rad_per_s.expression" in capsys.readouterr().err
     path = job(tmp_path, "speed_rad_per_s = { points = [[0, 1.0]] }\nramp_width_ms = 1.0")
     assert main(["vibration", str(path), "--out", str(tmp_path / "out")]) == 2
-    assert "train.drive.ramp_width_ms = 1.0: stands beside a function of time" in capsys.readouterr().err
+    assert "train.drive.ramp_width_ms = 1.0: conflicts with a function of time" in capsys.readouterr().err
     path = job(tmp_path, load='torque_Nm = "20 - 30*sin(3000*time)"')
     assert main(["vibration", str(path), "--out", str(tmp_path / "out")]) == 2
     assert "back flanks" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Default accuracy at the cause: face widths, and the error estimate that stands beside a curve."""
+"""Default accuracy at the cause: face widths, and the error estimate of a curve."""
 
 from __future__ import annotations
 

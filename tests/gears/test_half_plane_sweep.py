@@ -1,4 +1,4 @@
-"""The half-plane law in sweeps, at torques, in load maps and fields: it stands beside the laws on the mesh."""
+"""The half-plane law in sweeps, at torques, in load maps and fields, next to the laws on the mesh."""
 
 from __future__ import annotations
 

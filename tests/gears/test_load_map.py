@@ -226,4 +226,4 @@ def test_torques_must_be_given(tmp_path, capsys):
     assert "no torques are given" in capsys.readouterr().err
     (tmp_path / "job.toml").write_text(head + "\n[loadmap]\ntorques_Nm = [10.0]\ntorque_stop_Nm = 20.0\n")
     assert main(["loadmap", str(tmp_path / "job.toml"), "--out", str(tmp_path / "out")]) == 2
-    assert "stands beside torques_Nm" in capsys.readouterr().err
+    assert "conflicts with torques_Nm" in capsys.readouterr().err

@@ -226,8 +226,8 @@ def test_mesh_laws_take_no_misalignment(
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        ("end_relief_low_um = 4.0", "end_relief_low_length_mm: is required beside end_relief_low_um"),
-        ("end_relief_high_length_mm = 4.0", "end_relief_high_um: is required beside end_relief_high_length_mm"),
+        ("end_relief_low_um = 4.0", "end_relief_low_length_mm: is required with end_relief_low_um"),
+        ("end_relief_high_length_mm = 4.0", "end_relief_high_um: is required with end_relief_high_length_mm"),
         ("end_relief_high_um = -4.0", "end_relief_high_um = -4.0: must be"),
         ('triangular_reliefs = [{ corner = "top", amount_um = 4.0, width_mm = 2.0, roll_length_mm = 1.0 }]', "tip_low"),
         ("lead_crowning_um = 4.0", "helix_crowning_um"),

@@ -144,7 +144,7 @@ def test_a_free_cam_turns_as_its_energy_says(
     ("old", "new", "turn", "text"),
     [
         ('"periodic"', '"cubic"', 2 * math.pi, "must be periodic over one turn"),
-        ("", "", math.pi, "must end with the value"),
+        ("", "", math.pi, "must end with its first value"),
         ("", "", 4 * math.pi, "must be periodic over one turn"),
         ('profile = "lift"', 'profile = "left"', 2 * math.pi, "left"),
         ('to = "cam"\n', "", 2 * math.pi, "name the other body"),

@@ -205,7 +205,7 @@ def test_ctrl_c_prints_the_best_point_and_the_same_command_goes_on(tmp_path) -> 
     least = min(rows, key=lambda row: float(row[3]))
     assert told[2] == least[0]
     assert float(told[3]) == pytest.approx(float(least[3]), rel=1e-5)
-    assert "the same command goes on" in run.stderr
+    assert "the same command continues" in run.stderr
     again = ran(path, out, "--no-pictures")
     whole = ran(path, tmp_path / "whole", "--no-pictures")
     assert rows_of(out) == rows_of(tmp_path / "whole")

@@ -492,6 +492,6 @@ def test_ctrl_c_keeps_the_cases_and_says_how_to_go_on(tmp_path):
     program.send_signal(signal.SIGINT)
     _, said = program.communicate(timeout=300.0)
     assert program.returncode == 130
-    assert "finished cases are kept in the output folder: the same command goes on" in said
+    assert "finished cases are kept in the output folder: the same command continues" in said
     assert "Traceback" not in said
     assert rows_of(out)[1:] == stored_rows(out) != []

@@ -48,7 +48,7 @@ OUTPUT = 'y = "'
     [
         (PLACE, "bodies.a.postion_m.0 = {", "did you mean 'position_m'"),
         (PLACE, "bodies.c.mass_kg = [1]\nbodies.a.position_m.0 = {", "unknown name 'c'; known names: a, b"),
-        (PLACE, '"bodies.a.position_m.1" = [0.0]\nbodies.a.position_m.0 = {', "stands there twice"),
+        (PLACE, '"bodies.a.position_m.1" = [0.0]\nbodies.a.position_m.0 = {', "occurs twice"),
         (PLACE, "bodies.a.position_m = [0.0]\nbodies.a.position_m.0 = {", "TOML"),
         (PLACE, "bodies.a.position_m.7 = {", "has 2 entries, 0 to 1"),
         ("bodies.b.position_m.0 = {", "bodies.b = {", "is a table, not a key"),

@@ -117,15 +117,15 @@ class BearingTable:
         """One source of the stiffness, and the geometry of one type."""
         sources = [key for key in ("stiffness", "stiffness_matrix", "type") if getattr(self, key) is not None]
         if len(sources) > 1:
-            problem = f"stands beside {sources[0]}: a bearing has one stiffness"
+            problem = f"conflicts with {sources[0]}: a bearing has one stiffness"
             raise InputError(f"{where}.{sources[1]}", getattr(self, sources[1]), problem, "leave one out")
         if any(self.damping) and self.damping_matrix is not None:
-            problem = "stands beside damping"
+            problem = "conflicts with damping"
             raise InputError(f"{where}.damping_matrix", None, problem, "leave one out")
         for key in ("damping_matrix", "damping"):
             value = getattr(self, key)
             if not sources and value is not None and any(x for x in value if x):
-                problem = "stands beside no stiffness: a hinge does not yield, so nothing damps it"
+                problem = "needs a stiffness: a hinge is rigid and has nothing to damp"
                 raise InputError(f"{where}.{key}", value, problem, "give the stiffness, or leave it out")
         for key in ("stiffness_matrix", "damping_matrix"):
             if getattr(self, key) is not None:
@@ -140,8 +140,8 @@ class BearingTable:
             value = getattr(self, key)
             if value is not None and key not in allowed:
                 of = [t for t in TYPES if key in (*ALWAYS, *NEEDED[t], *FURTHER[t])]
-                beside = "no type" if kind is None else f"type = {kind!r}"
-                problem = f"stands beside {beside}: it is of {', '.join(of)}"
+                beside = "a bearing without type" if kind is None else f"type = {kind!r}"
+                problem = f"conflicts with {beside}: it belongs to {', '.join(of)}"
                 raise InputError(f"{where}.{key}", value, problem, "leave it out, or give the type")
             if value is None and key in allowed and key not in FURTHER[kind or DEEP_GROOVE]:
                 raise InputError(f"{where}.{key}", None, f"is required of type = {kind!r}", "add it")
@@ -153,9 +153,7 @@ class BearingTable:
         """Rows with a contact angle say which way they carry."""
         angled = self.type in (ANGULAR, TAPERED)
         if angled and self.row_distance_mm is not None and self.arrangement is None:
-            raise InputError(
-                f"{where}.arrangement", None, "is required beside row_distance_mm", 'add "O", "X", "tandem"'
-            )
+            raise InputError(f"{where}.arrangement", None, "is required with row_distance_mm", 'add "O", "X", "tandem"')
         if self.arrangement is not None and self.row_distance_mm is None:
             problem = "is of two rows, and there is one"
             raise InputError(f"{where}.arrangement", self.arrangement, problem, "add row_distance_mm, or leave it out")
@@ -164,7 +162,7 @@ class BearingTable:
             cure = 'add carries = "+y" or "-y"'
             raise InputError(f"{where}.carries", None, "is required: such rows carry one way along the axis", cure)
         if both and self.carries is not None:
-            problem = f"stands beside arrangement = {self.arrangement!r}, which carries both ways"
+            problem = f"conflicts with arrangement = {self.arrangement!r}, which carries both directions"
             raise InputError(f"{where}.carries", self.carries, problem, "leave one out")
 
     def _check_sizes(self, where: str) -> None:
@@ -191,7 +189,7 @@ class BearingTable:
             if play >= room > 0.0:
                 sign = "" if key == "radial_clearance_um" else "-"
                 problem = (
-                    f"is more than the grooves have room for: must be {'<' if not sign else '>'} {sign}{room:.4g} um"
+                    f"is more than the clearance of the grooves: must be {'<' if not sign else '>'} {sign}{room:.4g} um"
                 )
                 raise InputError(f"{where}.{key}", getattr(self, key), problem, "correct it, or the osculations")
 

@@ -82,7 +82,7 @@ class CarrierTable(_Pins):
         turned = sorted(angle % 360.0 for angle in angles or ())
         if any(not math.isfinite(angle) for angle in angles or ()) or len(set(turned)) < len(turned):
             problem = "must be finite angles (deg), each once"
-            raise InputError(f"{where}.planets", list(angles or ()), problem, "give each planet a place of its own")
+            raise InputError(f"{where}.planets", list(angles or ()), problem, "give each planet a different position")
         for key in ("pin_radial_errors_um", "pin_tangential_errors_um"):
             errors = getattr(self, key)
             if errors and len(errors) != count:

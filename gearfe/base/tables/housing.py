@@ -161,7 +161,7 @@ class MeshBoreTable:
             )
         for key in ("radius_mm", "range_mm"):
             if self.group is not None and getattr(self, key) is not None:
-                problem = "stands beside group, whose nodes tell it"
+                problem = "conflicts with group, whose nodes define it"
                 raise InputError(f"{where}.{key}", getattr(self, key), problem, "leave one of them out")
         if not any(self.direction):
             raise InputError(f"{where}.direction", list(self.direction), "must not be zero", "give the axis")
@@ -188,7 +188,7 @@ class AttachmentTable:
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that contradict each other."""
         if self.rows is not None and self.node is not None:
-            raise InputError(f"{where}.node", self.node, "stands beside rows", "leave one of them out")
+            raise InputError(f"{where}.node", self.node, "conflicts with rows", "leave one of them out")
         if not any(self.direction):
             raise InputError(f"{where}.direction", list(self.direction), "must not be zero", "give the axis")
 
@@ -223,7 +223,7 @@ class HeldTable:
     def check(self, where: str) -> None:
         """Raise `InputError` unless exactly one of both is given."""
         if (self.group is None) == (self.point_mm is None):
-            problem = "must be given, or point_mm" if self.group is None else "stands beside point_mm"
+            problem = "must be given, or point_mm" if self.group is None else "conflicts with point_mm"
             raise InputError(f"{where}.group", self.group, problem, "give one of them")
         if not any(self.normal):
             raise InputError(f"{where}.normal", list(self.normal), "must not be zero", "give the normal of the plane")
@@ -341,7 +341,7 @@ class HousingTable:
         for field in dataclasses.fields(self):
             default = field.default_factory() if callable(field.default_factory) else field.default
             if field.name not in taken and getattr(self, field.name) != default:
-                problem = f"stands beside {source}, which has it"
+                problem = f"conflicts with {source}, which defines it"
                 raise InputError(f"{where}.{field.name}", None, problem, "leave one of them out")
         if not self.reduced and not self.bores:
             raise InputError(f"{where}.bores", None, "is required with a mesh", "add [[housing.bores]]")

@@ -125,7 +125,7 @@ def _check_shorthand(raw: Mapping[str, Any]) -> None:
         ("microgeometry", "write [gears.NAME.microgeometry]; flank and tolerance_class in [meshes.NAME]"),
     ):
         if name in raw:
-            raise InputError(f"[{name}]", None, f"stands beside [{named}.NAME], which says the same by name", cure)
+            raise InputError(f"[{name}]", None, f"conflicts with [{named}.NAME], which is the form with names", cure)
     pairs = (
         ("meshes", "gears"),
         ("gears", "meshes"),
@@ -138,7 +138,7 @@ def _check_shorthand(raw: Mapping[str, Any]) -> None:
     )
     for kind, needs in pairs:
         if kind in raw and needs not in raw:
-            raise InputError(f"[{needs}]", None, f"is missing beside [{kind}]", f"add [{needs}.NAME]")
+            raise InputError(f"[{needs}]", None, f"is missing, but required by [{kind}]", f"add [{needs}.NAME]")
 
 
 def table_class(name: str) -> type:
@@ -308,7 +308,7 @@ def train_tables(raw: dict[str, Any], path: str | Path, variant: str | None = No
         bearings = tables.get("bearings", {})
         placed = next((name for name, bearing in bearings.items() if bearing.y_mm is not None), None)
         if table.housing == "elastic" and placed is not None:
-            problem = "stands beside an elastic housing, whose bores have places of their own"
+            problem = "conflicts with an elastic housing, which defines the positions of its bores"
             cure = 'name the bore (attachment) instead, or write housing = "rigid" in [train]'
             raise InputError(f"bearings.{placed}.y_mm", bearings[placed].y_mm, problem, cure)
         parts = {kind: tables.get(kind, {}) for kind in ("machines", "couplings", "carriers")}

@@ -37,7 +37,7 @@ class LoadMapTable:
         if self.torques_Nm is not None:
             if start is not None or stop is not None:
                 name, value = ("torque_start_Nm", start) if start is not None else ("torque_stop_Nm", stop)
-                raise InputError(f"{where}.{name}", value, "stands beside torques_Nm", "leave one of them out")
+                raise InputError(f"{where}.{name}", value, "conflicts with torques_Nm", "leave one of them out")
             if not self.torques_Nm:
                 raise InputError(f"{where}.torques_Nm", [], "is empty", "give at least one torque")
         elif (start is None) != (stop is None):

@@ -128,15 +128,15 @@ class FlankTable:
             given = [f"{name}_{key}" for key in keys if getattr(self, f"{name}_{key}") is not None]
             if len(given) > 1:
                 value = getattr(self, given[1])
-                raise InputError(f"{where}.{given[1]}", value, f"stands beside {given[0]}", "leave one of them out")
+                raise InputError(f"{where}.{given[1]}", value, f"conflicts with {given[0]}", "leave one of them out")
         for amount, length in ((f"end_relief_{end}_um", f"end_relief_{end}_length_mm") for end in ENDS_OF_WIDTH):
             if (getattr(self, amount) is None) != (getattr(self, length) is None):
                 lacking, there = (amount, length) if getattr(self, amount) is None else (length, amount)
-                raise InputError(f"{where}.{lacking}", None, f"is required beside {there}", "add it, or leave out both")
+                raise InputError(f"{where}.{lacking}", None, f"is required with {there}", "add it, or leave out both")
         pitch = [key for key in ("pitch_um", "single_pitch_um", "pitch_csv", "pitch_class") if getattr(self, key)]
         if len(pitch) > 1:
             value = getattr(self, pitch[1])
-            raise InputError(f"{where}.{pitch[1]}", value, f"stands beside {pitch[0]}", "leave one of them out")
+            raise InputError(f"{where}.{pitch[1]}", value, f"conflicts with {pitch[0]}", "leave one of them out")
 
 
 @dataclass(frozen=True)

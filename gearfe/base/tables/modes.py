@@ -36,7 +36,7 @@ class ModesTable:
             return
         if start * stop < 0.0:
             problem = f"makes a range, {start:g} to {stop:g} rad/s, that changes sign"
-            cure = "take both of one sign, or one of them zero: the sense of the drive decides which flanks bear"
+            cure = "take both of one sign, or one of them zero: the sense of the drive determines the loaded flanks"
             raise InputError(f"{where}.speed_stop_rad_per_s", stop, problem, cure)
         if start == stop:
             raise InputError(f"{where}.speed_stop_rad_per_s", stop, "is the first speed, too", "give a range")

@@ -34,7 +34,7 @@ class NamedGearTable(GearBodyTable):
         """Raise `InputError` for keys that are missing or contradict each other."""
         check_gear(self, where)
         if self.shaft is not None and self.y_mm is None:
-            raise InputError(f"{where}.y_mm", None, "is required beside shaft", "add it, or leave out both")
+            raise InputError(f"{where}.y_mm", None, "is required with shaft", "add it, or leave out both")
 
 
 @dataclass(frozen=True)

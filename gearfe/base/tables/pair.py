@@ -502,7 +502,7 @@ class StiffnessTable:
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that contradict each other."""
         if self.twist_deg is not None and self.torque_Nm is not None:
-            raise InputError(f"{where}.torque_Nm", self.torque_Nm, "stands beside twist_deg", "leave one of them out")
+            raise InputError(f"{where}.torque_Nm", self.torque_Nm, "conflicts with twist_deg", "leave one of them out")
         check_flank_coarsen(self.coarsen, self.flank_coarsen, f"{where}.flank_coarsen")
         check_law(f"{where}.law", self.law)
         if self.angle_stop_deg is not None and self.angle_stop_deg < self.angle_start_deg:

@@ -62,4 +62,4 @@ class SpectrumTable:
             cure = f'write milliseconds, or "{STEADY}"'
             raise InputError(f"{where}.spectrum_from", self.spectrum_from, "is no time", cure)
         if self.orders and self.order_turns is None:
-            raise InputError(f"{where}.order_turns", None, "is required beside orders", "write order_turns = 4")
+            raise InputError(f"{where}.order_turns", None, "is required with orders", "write order_turns = 4")

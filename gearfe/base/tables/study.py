@@ -37,21 +37,21 @@ class DistributionTable:
         if self.iso_class is not None:
             for name in ("low", "high", "deviation", "count"):
                 if getattr(self, name) is not None:
-                    problem = "stands beside iso_class"
+                    problem = "conflicts with iso_class"
                     raise InputError(
                         f"{where}.{name}", getattr(self, name), problem, "the class gives it: leave it out"
                     )
             return
         for one, other in (("mean", "deviation"), ("deviation", "mean")):
             if getattr(self, one) is not None and getattr(self, other) is None:
-                raise InputError(f"{where}.{other}", None, f"is required beside {one}", "add it")
+                raise InputError(f"{where}.{other}", None, f"is required with {one}", "add it")
         if self.mean is None:
             for name in ("low", "high"):
                 if getattr(self, name) is None:
                     cure = "give low and high, mean and deviation, or a list of values"
                     raise InputError(f"{where}.{name}", None, "is required", cure)
         elif self.count is not None:
-            raise InputError(f"{where}.count", self.count, "stands beside mean", "steps are even between low and high")
+            raise InputError(f"{where}.count", self.count, "conflicts with mean", "steps are even between low and high")
         if self.low is not None and self.high is not None and not self.low < self.high:
             raise InputError(f"{where}.high", self.high, f"must be > low = {self.low:g}", "swap them")
 
@@ -114,7 +114,7 @@ class StudyTable:
     def check(self, where: str) -> None:
         """Rules that join several keys."""
         if self.mesh is not None and self.job not in ("stiffness", "loadmap"):
-            problem = f"stands beside job = {self.job!r}, which has all meshes"
+            problem = f"conflicts with job = {self.job!r}, which has all meshes"
             raise InputError(f"{where}.mesh", self.mesh, problem, "leave it out")
         if not self.outputs:
             raise InputError(f"{where}.outputs", None, "is empty", "name at least one output")
@@ -128,15 +128,15 @@ class StudyTable:
                     raise unknown_name(f"{where}.{key}", name, self.outputs)
         for name in self.minimise:
             if name in self.maximise:
-                raise InputError(f"{where}.maximise", name, "stands in minimise, too", "leave one of them out")
+                raise InputError(f"{where}.maximise", name, "is also in minimise", "leave one of them out")
         rows = self.design == "rows"
         if rows and self.rows_csv is None:
             raise InputError(f"{where}.rows_csv", None, 'is required with design = "rows"', "name the CSV file")
         if rows and self.parameters:
-            problem = 'stands beside design = "rows"'
+            problem = 'conflicts with design = "rows"'
             raise InputError(f"{where}.parameters", None, problem, "the CSV file's columns are the parameters")
         if not rows and self.rows_csv is not None:
-            problem = f"stands beside design = {self.design!r}"
+            problem = f"conflicts with design = {self.design!r}"
             raise InputError(f"{where}.rows_csv", self.rows_csv, problem, 'use design = "rows"')
         if not rows and not self.parameters:
             raise InputError(f"{where}.parameters", None, "is empty", "vary at least one key of the job")

@@ -52,7 +52,7 @@ class TrainFunctionTable:
     def check(self, where: str) -> None:
         """Something is given; points rise."""
         if self.points and self.csv is not None:
-            raise InputError(f"{where}.csv", self.csv, "stands beside points", "leave one out")
+            raise InputError(f"{where}.csv", self.csv, "conflicts with points", "leave one out")
         parts = (self.constant, self.points, self.csv, self.steps, self.sines, self.expression)
         if not any(part or part == 0.0 for part in parts[1:]) and not self.constant:
             raise InputError(where, None, "is an empty function of time", "give points, steps, sines or an expression")
@@ -90,7 +90,7 @@ class SpeedFunctionTable:
         if not given:
             raise InputError(where, None, "is an empty function of speed", "give points, csv or an expression")
         if len(given) > 1:
-            raise InputError(f"{where}.{given[1]}", None, f"stands beside {given[0]}", "leave one out")
+            raise InputError(f"{where}.{given[1]}", None, f"conflicts with {given[0]}", "leave one out")
         if self.largest_speed_rad_per_s is not None and self.expression is None:
             problem = "is of an expression: points hold their first and last torque beyond their ends"
             raise InputError(f"{where}.largest_speed_rad_per_s", self.largest_speed_rad_per_s, problem, "leave it out")

@@ -88,10 +88,10 @@ class ShaftSectionTable:
             uniform, start, end = (getattr(self, f"{name}{part}_mm") for part in ("", "_start", "_end"))
             if uniform is not None and (start is not None or end is not None):
                 key, value = (f"{name}_start_mm", start) if start is not None else (f"{name}_end_mm", end)
-                raise InputError(f"{where}.{key}", value, f"stands beside {name}_mm", "leave one out")
+                raise InputError(f"{where}.{key}", value, f"conflicts with {name}_mm", "leave one out")
             if (start is None) != (end is None):
                 lacking, given = ("start", "end") if start is None else ("end", "start")
-                problem = f"is required beside {name}_{given}_mm"
+                problem = f"is required with {name}_{given}_mm"
                 raise InputError(f"{where}.{name}_{lacking}_mm", None, problem, f"add it, or write {name}_mm alone")
         if self.outer_diameter_mm is None and self.outer_diameter_start_mm is None:
             raise InputError(f"{where}.outer_diameter_mm", None, "is required", "add it (outer diameter, mm)")
@@ -179,7 +179,7 @@ class ShaftTable:
         """Without sections length and radius are required; with them all follows from them."""
         self._check_guided(where)
         if self.material is not None and self.density_kg_per_m3 is not None:
-            problem = "stands beside material, which has a density"
+            problem = "conflicts with material, which has a density"
             raise InputError(f"{where}.density_kg_per_m3", self.density_kg_per_m3, problem, "leave one out")
         if not self.sections:
             for key, what in (("length_mm", "length (mm)"), ("radius_mm", "radius (mm)")):
@@ -202,7 +202,7 @@ class ShaftTable:
                 raise InputError(f"{where}.{key}", given, problem, "leave it out, or change a section")
         for key in ("mass_kg", "polar_inertia_kg_m2", "transverse_inertia_kg_m2"):
             if getattr(self, key) is not None:
-                problem = "stands beside sections, from which it follows with the gears"
+                problem = "conflicts with sections, from which it follows together with the gears"
                 raise InputError(
                     f"{where}.{key}", getattr(self, key), problem, "leave it out, or leave the sections out"
                 )
@@ -257,7 +257,7 @@ class TrainGearTable(ToothFormTable):
         ]
         if self.gear and own:
             raise InputError(
-                f"{where}.{own[0]}", getattr(self, own[0]), f"stands beside gear = {self.gear!r}", "leave one out"
+                f"{where}.{own[0]}", getattr(self, own[0]), f"conflicts with gear = {self.gear!r}", "leave one out"
             )
         if self.profile_shift == FROM_DISTANCE:
             problem = "is for a gear of [pair] with centre_distance_mm there"
@@ -359,18 +359,18 @@ class TrainMeshTable:
         ]
         if len(given) > 1:
             raise InputError(
-                f"{where}.{given[1]}", getattr(self, given[1]), f"stands beside {given[0]}", "leave one out"
+                f"{where}.{given[1]}", getattr(self, given[1]), f"conflicts with {given[0]}", "leave one out"
             )
         if given and self.mesh_model is not None and (given[0], self.mesh_model) != ("curve", VARIABLE):
             cure = f"leave mesh_model out, or leave {given[0]} out: a mesh model is computed from contact solutions"
             raise InputError(f"{where}.mesh_model", self.mesh_model, f"contradicts {given[0]}", cure)
         oil = [k for k in ("oil_viscosity_mPa_s", "roughness_um", "oil_factor") if getattr(self, k) is not None]
         if oil and self.friction is not None:
-            problem = f"stands beside friction = {self.friction:g}"
+            problem = f"conflicts with friction = {self.friction:g}"
             raise InputError(f"{where}.{oil[0]}", getattr(self, oil[0]), problem, "give the coefficient or the oil")
         for key in ("oil_viscosity_mPa_s", "roughness_um"):
             if oil and getattr(self, key) is None:
-                raise InputError(f"{where}.{key}", None, f"is required beside {oil[0]}", "add it")
+                raise InputError(f"{where}.{key}", None, f"is required with {oil[0]}", "add it")
         if (oil or self.friction) and (given or self.mesh_model in (VARIABLE, MEAN)):
             key = oil[0] if oil else "friction"
             problem = "needs a mesh law: a stiffness does not say how tooth pairs share the load"
@@ -382,16 +382,16 @@ class TrainMeshTable:
                 cure = 'write mesh_model = "potential", or leave it out'
                 raise InputError(f"{where}.{key}", getattr(self, key), problem, cure)
         if self.backlash_um is not None and self.backlash_um < 0.0:
-            problem = "must be >= 0 um: less is a wedged mesh, whose flanks all bear without a load"
+            problem = "must be >= 0 um: less is a wedged mesh, with all flanks loaded without torque"
             raise InputError(
                 f"{where}.backlash_um", self.backlash_um, problem, "thin the teeth, or move the shafts apart"
             )
         if self.backlash_um is not None and self.rigid:
-            problem = "stands beside rigid = true: rigid teeth never part"
+            problem = "conflicts with rigid = true: rigid teeth never separate"
             raise InputError(f"{where}.backlash_um", self.backlash_um, problem, "leave one out")
         for key in ("damping_N_s_per_m", "damping_acts"):
             if getattr(self, key) and self.rigid:
-                problem = "stands beside rigid = true: a rigid mesh does not yield, so nothing damps it"
+                problem = "conflicts with rigid = true: a rigid mesh has no deflection to damp"
                 raise InputError(f"{where}.{key}", getattr(self, key), problem, "leave one out")
 
 
@@ -446,7 +446,7 @@ class TrainDriveTable:
         for key in ("stiffness_Nm_per_rad", "damping_Nm_s_per_rad"):
             if self.by_torque and getattr(self, key):
                 given = "torque_over_speed" if self.torque_Nm is None else "torque_Nm"
-                problem = f"stands beside {given}: nothing prescribes the rotation behind the coupling"
+                problem = f"conflicts with {given}: nothing prescribes the rotation behind the coupling"
                 cure = "use a machine with a spring ([machines.NAME]), or leave one out"
                 raise InputError(f"{where}.{key}", getattr(self, key), problem, cure)
 
@@ -498,13 +498,13 @@ class TrainLoadTable:
 
 def _check_place(where: str, machine: str, y_mm: float | None) -> None:
     if machine and y_mm is not None:
-        problem = "stands beside machine, which has a place of its own"
+        problem = "conflicts with machine, which has its own position"
         raise InputError(f"{where}.y_mm", y_mm, problem, f"give y_mm of the machine {machine!r}, or leave machine out")
 
 
 def _check_ramp(where: str, key: str, value: float | TrainFunctionTable | None, width: float | None) -> None:
     if isinstance(value, TrainFunctionTable) and width is not None:
-        problem = f"stands beside a function of time in {key}"
+        problem = f"conflicts with a function of time in {key}"
         raise InputError(f"{where}.ramp_width_ms", width, problem, "write the ramp in steps of the function")
 
 

@@ -55,11 +55,11 @@ def named_train(
     Raises
     ------
     InputError
-        For lists of [train] that stand beside these tables, and for names that do not exist.
+        For lists of [train] together with these tables, and for names that do not exist.
     """
     for key in ("shafts", "gears", "meshes", "bearings", "machines", "couplings", "carriers"):
         if getattr(table, key):
-            problem = f"stands beside [{'shafts' if key == 'gears' else key}.NAME]"
+            problem = f"conflicts with [{'shafts' if key == 'gears' else key}.NAME]"
             raise InputError(f"[[train.{key}]]", None, problem, f"write all {key} as [{key}.NAME], or all as lists")
     held: dict[str, tuple[str, str]] = {}  # bore -> bearing and shaft
     for name, bearing in bearings.items():
@@ -106,7 +106,7 @@ def named_train(
         if b.y_mm is not None
     )
     if places and table.rigid_bores:
-        problem = "stands beside [bearings.NAME] with y_mm"
+        problem = "conflicts with [bearings.NAME] with y_mm"
         raise InputError("[[train.rigid_bores]]", None, problem, "leave the list out, or y_mm of the bearings")
     if places and len(places) < len(bearings):
         lacking = next(name for name, b in bearings.items() if b.y_mm is None)

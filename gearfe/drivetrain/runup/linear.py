@@ -30,7 +30,7 @@ REMEMBERED = 256
 
 
 class Poles(NamedTuple):
-    """Eigenvalues and vectors of the first-order form; conjugate ones stand beside each other.
+    """Eigenvalues and vectors of the first-order form; conjugate ones are next to each other.
 
     A pair of poles gives the flexibility ``(a s + b) / (s**2 - (l1 + l2) s + l1 l2)``, a partial fraction of it.
     """

@@ -134,7 +134,7 @@ def _check_stages(train: GearTrain) -> None:
     if not train.carriers:
         return
     if train.housing is not None:
-        problem = "stands beside an elastic housing: planets pass it, which changes what they move"
+        problem = "conflicts with an elastic housing: moving planets change the masses that it supports"
         raise InputError("train.housing", "elastic", problem, 'write housing = "rigid" in [train]')
     carried: dict[str, str] = {}
     for carrier in train.carriers:
@@ -289,7 +289,7 @@ def _check_sections(shaft: Shaft) -> None:
             raise InputError(f"{label} {key}", getattr(shaft, key), problem, "give that of the sections")
     for key in ("mass", "polar_inertia", "transverse_inertia"):
         if getattr(shaft, key) is not None:
-            problem = "stands beside sections, from which it follows with the gears"
+            problem = "conflicts with sections, from which it follows together with the gears"
             raise InputError(f"{label} {key}", getattr(shaft, key), problem, "leave one out")
     if not (math.isfinite(shaft.damping_ratio) and 0.0 <= shaft.damping_ratio < 1.0):
         problem = "must be >= 0 and < 1"
@@ -437,7 +437,7 @@ def _check_driveline(train: GearTrain) -> None:
             raise InputError("drive slope", drive.slope, problem, "give the torque, or leave it out")
         return
     if drive.stiffness is not None:
-        problem = "stands beside a torque: nothing prescribes the rotation behind the coupling"
+        problem = "conflicts with a torque: nothing prescribes the rotation behind the coupling"
         raise InputError("drive stiffness", drive.stiffness, problem, "use a machine with a spring, or leave one out")
     if train.damping.alpha > 0.0:
         problem = "would brake the rotation itself of a train that is driven by a torque"
@@ -524,7 +524,7 @@ def _check_damper(mesh: GearMesh) -> None:
         )
         raise InputError(label, acts, problem, "give backlash_um, or leave it out: such a damper acts always")
     if mesh.stiffness is None and (acts or mesh.damping):
-        problem = "stands beside a rigid mesh, which does not yield, so nothing damps it"
+        problem = "conflicts with a rigid mesh, which has no deflection to damp"
         raise InputError(
             label if acts else label.replace("damping_acts", "damping"), acts or mesh.damping, problem, "leave it out"
         )
@@ -558,7 +558,7 @@ def _check_error(mesh: GearMesh, teeth: int) -> None:
         return
     label = f"mesh {mesh.name!r} transmission_error"
     if mesh.stiffness is None or mesh.has_law:
-        problem = "stands beside a rigid mesh or a mesh law, which has its own"
+        problem = "conflicts with a rigid mesh or a mesh law, which includes it"
         raise InputError(label, None, problem, "give a stiffness, or leave it out")
     if abs(error.period - pitch) > SAME * pitch or not np.isfinite(error.cubics).all():
         problem = f"has a period of {math.degrees(error.period):.9g} deg, a pitch has {math.degrees(pitch):.9g} deg"
@@ -572,13 +572,13 @@ def check_curve(mesh: GearMesh, teeth: int, wheel: Gear) -> None:
         raise InputError(label, None, "is a model that is not computed yet", "call gearfe.compute_meshes(train) first")
     _check_error(mesh, teeth)
     if mesh.backlash is not None and not (math.isfinite(mesh.backlash) and mesh.backlash >= 0.0):
-        problem = "must be finite and >= 0 m: less is a wedged mesh, whose flanks all bear without a load"
+        problem = "must be finite and >= 0 m: less is a wedged mesh, with all flanks loaded without torque"
         raise InputError(
             f"mesh {mesh.name!r} backlash", mesh.backlash, problem, "thin the teeth, or move the shafts apart"
         )
     if curve is None:
         if mesh.backlash is not None:
-            problem = "stands beside a rigid mesh, whose teeth never part"
+            problem = "conflicts with a rigid mesh, whose teeth never separate"
             raise InputError(f"mesh {mesh.name!r} backlash", mesh.backlash, problem, "leave one out")
         return
     if isinstance(curve, (int, float)):

@@ -248,7 +248,7 @@ def _stiffer(train: GearTrain) -> GearTrain | None:
 
 
 def _named(values: Mapping[str, Array], summary: Mapping[str, Any]) -> dict[str, Any]:
-    """As the summary names them; the lines stand beside their amplitudes."""
+    """As the summary names them; the lines are next to their amplitudes."""
     found: dict[str, Any] = {name: value for name, value in values.items() if name not in (PEAKS, "lines")}
     found[PEAKS] = dict(zip(summary[PEAKS], values[PEAKS].tolist(), strict=True))
     return found

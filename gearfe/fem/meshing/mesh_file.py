@@ -70,7 +70,7 @@ class MeshFile(NamedTuple):
             )
             more = f" and {len(self.groups) - LISTED} more" if len(self.groups) > LISTED else ""
             problem = f"there is no such group in the mesh; it has: {listed}{more}"
-            cure = "name groups in the mesher, or tell the place by point_mm in place of group"
+            cure = "name groups in the mesher, or give the position by point_mm instead of group"
             raise InputError(field, name, problem, nearest(name, self.groups) or cure)
         nodes = np.intersect1d(self.groups[name], self.tets)
         if not len(nodes):
@@ -106,7 +106,7 @@ def read_mesh_file(path: str | Path, field: str, size: float) -> MeshFile:
     path = Path(path)
     if not path.is_file():
         problem = "is a folder, not a file" if path.is_dir() else "there is no such file"
-        raise InputError(field, str(path), problem, "check the path; it is looked for beside the job file")
+        raise InputError(field, str(path), problem, "check the path, which is relative to the job file")
     if path.suffix.lower() in CAD:
         return MeshFile(*mesh_cad_file(path, field, size))
     if path.suffix.lower() in SURFACES:
@@ -173,7 +173,7 @@ def source_fingerprint(path: Path, field: str) -> str:
             content = file.read_bytes()
         except OSError as error:
             reason = error.strerror or str(error)
-            cure = "check the path; it is looked for beside the job file"
+            cure = "check the path, which is relative to the job file"
             raise InputError(field, str(file), f"cannot be read ({reason})", cure) from None
         found.update(hashlib.sha256(content).digest())
     return found.hexdigest()

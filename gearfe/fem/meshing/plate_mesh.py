@@ -83,14 +83,16 @@ def read_plate(path: Path, field: str, unit: float) -> PlateMesh:
         When there is no such file, it cannot be read, has other elements than triangles, or is not plane.
     """
     if not path.is_file():
-        raise InputError(field, str(path), "there is no such file", "check the path; it is beside the mechanism file")
+        raise InputError(
+            field, str(path), "there is no such file", "check the path, which is relative to the mechanism file"
+        )
     mesh = read_source(path, field)
     points = mesh.points
     faces = {kind: nodes for kind, nodes in mesh.cells.items() if not kind.startswith(("vertex", "line"))}
     kind = next((k for k in ("triangle6", "triangle") if k in faces), None)
     if kind is None or len(faces) > 1:
         listed = ", ".join(f"{len(data)} {name}" for name, data in faces.items()) or "no faces"
-        raise InputError(field, path.name, f"must have triangles of one order only, but has {listed}", "mesh it anew")
+        raise InputError(field, path.name, f"must have triangles of one order only, but has {listed}", "mesh it again")
     if points.shape[1] == 3 and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points):
         raise InputError(field, path.name, "is not plane: z differs", "lay the part into the x-y plane")
     used, triangles = np.unique(faces[kind], return_inverse=True)
@@ -98,7 +100,7 @@ def read_plate(path: Path, field: str, unit: float) -> PlateMesh:
     points = unit * points[used, :2]
     if kind == "triangle":
         points, triangles, _ = second_order(points, triangles)
-    return _sound(points, triangles, field, "mesh it anew")
+    return _sound(points, triangles, field, "mesh it again")
 
 
 def _sound(points: Array, triangles: IntArray, field: str, cure: str) -> PlateMesh:
@@ -112,7 +114,7 @@ def _sound(points: Array, triangles: IntArray, field: str, cure: str) -> PlateMe
     if not (least_jacobian(points, triangles) > 0.0).all():
         raise InputError(field, None, "gives elements that are folded or without area", cure)
     if _pieces(len(points), triangles) > 1:
-        raise InputError(field, None, "is in several pieces that do not hang together", "give each a body of its own")
+        raise InputError(field, None, "is in several pieces that do not hang together", "give each a separate body")
     return PlateMesh(points, triangles)
 
 
@@ -144,7 +146,7 @@ def check_outline(outline: Sequence[Point], holes: Sequence[tuple[str, float, fl
             beside = j == i + 1 or (i == 0 and j == n - 1)
             if not beside and _meet(corners[i], ends[i], corners[j], ends[j]):
                 problem = f"crosses itself: the side from corner {i + 1} meets that from corner {j + 1}"
-                raise InputError(where, None, problem, "give the corners in the order in which one walks round")
+                raise InputError(where, None, problem, "give the corners in order around the part")
     for k, (name, x, y, radius) in enumerate(holes):
         centre = np.array([x, y])
         side = ends - corners

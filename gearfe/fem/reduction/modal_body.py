@@ -248,10 +248,10 @@ class ModalBody(Reduction, Shown):
         stored = load_arrays(path)
         made: dict[str, Any] = {}
         if not np.array_equal(stored.get("format", np.array(-1)), FORMAT):
-            raise InputError("reduced model", str(path), "was written by another version", "make it anew")
+            raise InputError("reduced model", str(path), "was written by another version", "make it again")
         for field in dataclasses.fields(cls):
             if field.name not in stored:
-                raise InputError("reduced model", str(path), f"has no entry {field.name!r}", "make it anew")
+                raise InputError("reduced model", str(path), f"has no entry {field.name!r}", "make it again")
             value = stored[field.name]
             if field.type in ("int", "float", "bool", "str"):
                 made[field.name] = value.item()
@@ -265,7 +265,7 @@ def _check_consistent(values: dict[str, Any], path: str | Path) -> None:
     """Raise `InputError` where the entries of a file do not fit each other: no program of this project wrote them."""
 
     def refuse(name: str, problem: str) -> InputError:
-        return InputError("reduced model", str(path), f"its entry {name!r} {problem}", "make it anew")
+        return InputError("reduced model", str(path), f"its entry {name!r} {problem}", "make it again")
 
     for name, value in values.items():
         if isinstance(value, np.ndarray) and value.dtype.kind not in "fiu":

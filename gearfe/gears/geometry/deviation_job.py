@@ -204,7 +204,7 @@ def _relief(table: FlankTable, gear: Gear, where: str, end: str) -> Relief | Non
     given = next((f"{name}_{key}" for key in STARTS if getattr(table, f"{name}_{key}") is not None), None)
     if amount is None:
         if given is not None:
-            raise InputError(f"{where}.{name}_um", None, f"is required beside {given}", "add the amount")
+            raise InputError(f"{where}.{name}_um", None, f"is required with {given}", "add the amount")
         return None
     if given is None:
         cure = f"add {name}_length_mm, {name}_start_mm or {name}_start_diameter_mm"

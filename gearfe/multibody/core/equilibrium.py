@@ -82,7 +82,7 @@ def equilibrium(system: System, start: Start) -> Equilibrium:
     left = _left(system, t, q, active)
     if far < ROUNDING:
         problem = "is not stable where the start rests: something moves there without force"
-        cure = "disturb the start position, or add what holds it"
+        cure = "disturb the start position, or add a support"
     else:
         problem = f"was not found in {step} steps: a force of {left:.3g} N is left"
         cure = "look for loads that nothing carries, or give a start that is nearer"

@@ -320,7 +320,7 @@ _MESSAGES = {
     Status.NO_BRANCH: "the start is a singular position and its velocity selects no branch",
     Status.NOT_FINITE: "the state is not finite",
     Status.NOT_SOLVED: "the equations could not be solved in a step",
-    Status.SINGULAR_START: "the start is beside a singular position",
+    Status.SINGULAR_START: "the start is next to a singular position",
     Status.ENDLESS: "the steps became so short that the rest would take more than can be made",
     Status.STIFF: "a force damps the motion so fast that it limits the steps",
     Status.REDUNDANT_NOT_MET: "constraints that were taken for redundant at the start are not met by the motion",

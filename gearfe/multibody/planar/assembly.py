@@ -80,7 +80,7 @@ def body_numbers(bodies: tuple[Body, ...], joints: tuple[Joint, ...], forces: tu
     index: dict[str, int] = {GROUND: len(bodies)}
     for i, body in enumerate(bodies):
         if body.name in index:
-            raise InputError("body name", body.name, "is used twice", "give every body a name of its own")
+            raise InputError("body name", body.name, "is used twice", "give every body a different name")
         index[body.name] = i
     for k, part in enumerate((*joints, *forces)):
         label = label_of(part, k)

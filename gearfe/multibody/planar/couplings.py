@@ -267,5 +267,5 @@ class _Bearings:
         bearers = sorted(self.bearers(cam.b))
         if bearers and GROUND not in bearers:
             problem = f"turns on {bearers[0]!r}, but a cam's angle and its follower's coordinate are those in space"
-            cure = "hinge the cam on the ground, or where that body does not turn write carrier = 'ground'"
+            cure = "hinge the cam on the ground, or if that body does not rotate write carrier = 'ground'"
             raise InputError(f"cam {cam.name!r} carrier", None, problem, cure)

@@ -88,7 +88,7 @@ def register(load: StateFunction | SpanFunction, number: object) -> int:
     """Number of the register that a load has written, refused where it is none."""
     if isinstance(number, int):
         return number
-    cure = "return what the tape's operations give; a load that no tape holds is a gearfe.multibody.LocalForce"
+    cure = "return the result of the tape's operations; other loads are a gearfe.multibody.LocalForce"
     raise InputError(f"{type(load).__name__}.write", None, "gives no number of a register", cure)
 
 

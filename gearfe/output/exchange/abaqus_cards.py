@@ -92,7 +92,7 @@ def cards(lines: Iterable[Line], fault: Fault, refused: Mapping[str, tuple[str, 
             yield card
         card, begun = _card(begun, fault, refused), None
     if begun is not None:
-        raise fault.at(begun, "the card goes on after its last comma, but the file ends", "is the file whole?")
+        raise fault.at(begun, "the card continues after its last comma, but the file ends", "is the file whole?")
     if card is not None:
         yield card
 

@@ -192,7 +192,7 @@ class _Reader:
         if "LIBRARY" in card.keys:
             raise self.fault.at(card.line, "the instance is of another run (LIBRARY)", "write its part into the file")
         if key in self.spaces:
-            raise self.fault.at(card.line, f"the instance {title} is defined twice", "give each a name of its own")
+            raise self.fault.at(card.line, f"the instance {title} is defined twice", "give each a different name")
         if part.casefold() not in self.parts:
             known = ", ".join(self.parts) or "none"
             raise self.fault.at(card.line, f"there is no part {part!r} before its instance; there are: {known}")

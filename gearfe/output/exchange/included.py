@@ -106,7 +106,7 @@ def _expanded(path: Path, field: str, inclusion: Callable[[str], Inclusion | Non
 def _found(name: str, including: Path, root: Path, field: str, where: str) -> Path:
     """An included file, looked for beside the including one, then beside the first."""
     if not name or "\0" in name:
-        raise InputError(field, root.name, f"{where}: no name of a file", "name a file beside the mesh")
+        raise InputError(field, root.name, f"{where}: no name of a file", "name a file next to the mesh")
     outside = False
     for folder in (including.parent, root):
         for text in dict.fromkeys((name, name.replace("\\", "/"))):
@@ -123,5 +123,5 @@ def _found(name: str, including: Path, root: Path, field: str, where: str) -> Pa
     if outside:
         cure = "put the file into the folder of the mesh, and name it by a relative path"
         raise InputError(field, including.name, f"{where}, which is outside of the folder of the mesh", cure)
-    cure = "put it beside the file that includes it, or write the mesh into one file"
+    cure = "put it next to the file that includes it, or write the mesh into one file"
     raise InputError(field, including.name, f"{where}, but there is no such file", cure)

@@ -67,7 +67,7 @@ def curves(axes: Any, rows: dict[str, list[Row]], x: str, y: str, parameter: str
     Parameters
     ----------
     parameter
-        Column whose value stands beside each point; without it, none.
+        Column whose value conflicts with each point; without it, none.
     """
     taken: dict[str, int] = {}
     for number, (label, own) in enumerate(rows.items()):

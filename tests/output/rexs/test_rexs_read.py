@@ -128,7 +128,7 @@ def test_each_key_of_an_object_is_looked_up_once():
 
     pairs = [(Key(i), i) for i in range(1000)]
     assert len(reading._once(pairs)) == 1000
-    with pytest.raises(InputError, match="stands twice"):
+    with pytest.raises(InputError, match="occurs twice"):
         reading._once([*pairs, (Key(999), 0)])
     assert Key.compared < 10_000
 
@@ -158,7 +158,7 @@ def test_what_is_no_rexs_is_refused(tmp_path):
     refused(saved(tmp_path, '{"model": {"version": "2.0", "components": [}'), "no valid JSON")
     refused(saved(tmp_path, "{}"), "must be an object")
     refused(saved(tmp_path, '{"model": ' + "[" * 100_000 + "}"), "too deep")
-    refused(saved(tmp_path, '{"model": {"version": "2.0", "version": "1.0"}}'), "stands twice")
+    refused(saved(tmp_path, '{"model": {"version": "2.0", "version": "1.0"}}'), "occurs twice")
     refused(saved(tmp_path, '{"model": {"version": "2.0", "components": [{"id": NaN}]}}'), "no finite number")
     refused(saved(tmp_path, XML.replace('version="2.0" app', 'version="3.1" app')), "1.0 to 2.0", "'3.1'")
     refused(saved(tmp_path, "<model version='2.0'/>"), "no components")
@@ -214,7 +214,7 @@ def test_truth_values_are_true_or_false(tmp_path):
 def test_an_attribute_stands_once(tmp_path):
     text = XML.replace('<attribute id="number_of_teeth"', '<attribute id="number_of_teeth" unit="none">7</attribute>'
                        + '<attribute id="number_of_teeth"', 1)  # fmt: skip
-    refused(saved(tmp_path, text), "number_of_teeth of cylindrical_gear 5", "stands twice")
+    refused(saved(tmp_path, text), "number_of_teeth of cylindrical_gear 5", "occurs twice")
 
 
 def test_circles_of_references_are_refused(tmp_path):

@@ -354,10 +354,10 @@ def test_own_attributes_of_strangers_are_checked(tmp_path, text, words):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("train = 3", "must be a table"),
+        ("train = 3", "must be a separate table"),
         ("[nonsense]\na = 1", "nonsense"),
         ("[train]\nnonsense = 1", "nonsense"),
-        ("[gears.x]\nteeth = 20", "table of its own"),
+        ("[gears.x]\nteeth = 20", "separate table"),
     ],
 )
 def test_own_tables_of_strangers_are_checked(tmp_path, text, words):

@@ -667,7 +667,7 @@ def _own(reading: Reading, tables: dict[str, Any]) -> None:
             if name not in TABLES and name not in NAMED:
                 raise unknown_name(where, name, (*TABLES, *NAMED))
             if not isinstance(table, dict) or (name in NAMED and tables.get(name)):
-                raise InputError(f"{where}, {name}", None, "must be a table of its own", "write the file again")
+                raise InputError(f"{where}, {name}", None, "must be a separate table", "write the file again")
             if name in TABLES:
                 build(table_class(name), table, name, rules=False)
         for name in [name for name in tables if name not in NAMED]:
@@ -735,7 +735,7 @@ def _refuse(
     # gears and meshes alone: shafts would be a train
     for name, gear in tables.get("gears", {}).items():
         if gear.pop("shaft", None) is not None:
-            rule = f"its place along the axis alone, for there is no train: {reason}"
+            rule = f"only its position along the axis, because there is no train: {reason}"
             reading.derived(reading.part("gears", name), "assembly", f"gears.{name}.shaft", rule)
     for kind in ("shafts", "bearings", "machines", "couplings", planets.CARRIERS):
         for name in list(tables.get(kind, {})):
@@ -863,7 +863,7 @@ def _text(job: RexsJob, source: str) -> str:
         "Look at it: gearfe gear FILE. Its meshes: gearfe stiffness FILE. Its train: gearfe modes FILE, gearfe "
         "vibration FILE, gearfe runup FILE.",
         "y runs along u of the gear unit, z along v, x along w; speeds and torques count positive about +y.",
-        f"Values of the model: {counts}. The whole list stands at the end.",
+        f"Values of the model: {counts}. The complete list is at the end.",
     ]
     blocks = ["".join(_comment(line) for line in head)]
     for kind, table in job.tables.items():
@@ -880,7 +880,7 @@ def _text(job: RexsJob, source: str) -> str:
             blocks.append(f"[{kind}]\n{toml_document(table, kind)}")
     text = "\n".join(block.rstrip("\n") + "\n" for block in blocks)
     if job.left:
-        text += "\n" + _comment("What a job of today cannot have:")
+        text += "\n" + _comment("Not supported in a job:")
         for (kind, name), (entry, reason) in job.left.items():
             text += "#\n" + _comment(f"{kind} {name}: {plain(reason)}")
             if entry:

@@ -46,7 +46,7 @@ def microgeometry(reading: Reading, gear: Component, flanks: dict[str, Component
         rule = "left and right as seen on the datum face, which is that of larger y"
     else:
         sides = {"left": sides.get("right", {}), "right": sides.get("left", {})}
-        rule = "left and right seen from larger y: the datum face is that of smaller y, so they change places"
+        rule = "left and right seen from larger y: the datum face is that of smaller y, so they are exchanged"
     reading.derived(gear, "flank", f"{key}.microgeometry.left, right", rule)
     return {side: table for side, table in sides.items() if table}
 

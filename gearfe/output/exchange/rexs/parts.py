@@ -116,7 +116,7 @@ def shafts(reading: Reading, material: dict[str, Any]) -> tuple[dict[str, dict[s
                 continue
         x, y, z = place or (0.0, 0.0, 0.0)
         if place is None:
-            reading.defaulted(item, f"{key}.x_mm", "0: the file gives it no place")
+            reading.defaulted(item, f"{key}.x_mm", "0: the file gives no position")
         else:
             reading.derived(item, "support_vector", f"{key}.x_mm, y_mm, z_mm", "y along u, z along v, x along w")
         entry: dict[str, Any] = {"x_mm": x + 0.0, "z_mm": z + 0.0}
@@ -580,7 +580,7 @@ def bearings(reading: Reading) -> tuple[dict[str, dict[str, Any]], dict[str, str
     for item in reading.model.of_kind(*BEARINGS):
         sides = next(reading.model.joined("side", "assembly", item.number), None)
         if sides is None:
-            reading.ignored(item, "bearing", "no side relation says what it carries")
+            reading.ignored(item, "bearing", "no side relation names its part")
             continue
         reading.relations.add(sides.number)
         parts = {role: reading.model.components[number] for role, number in sides.roles.items() if role != "assembly"}
@@ -824,7 +824,7 @@ def couplings(reading: Reading) -> tuple[dict[str, dict[str, Any]], dict[str, st
             left[name] = "is not engaged"
             continue
         if sides is None:
-            left[name] = "no side relation says what it couples"
+            left[name] = "no side relation names its shafts"
             continue
         reading.relations.add(sides.number)
         parts = [reading.model.components[number] for role, number in sides.roles.items() if role != "assembly"]

@@ -74,7 +74,7 @@ def _stage(
     main = next((name for name in carriers if name in carried), carriers[0])
     angles = _angles(shafts, main, planets)
     if angles is None:
-        return "its planets are not on a circle round the carrier"
+        return "its planets are not on a circle around the carrier"
     planets = [name for _, name in sorted(zip(angles, planets, strict=True))]
     angles = sorted(angles)
     groups = [_group(tables, name) for name in planets]
@@ -86,7 +86,9 @@ def _stage(
     even = all(abs(angle - 360.0 * k / count) < 1e-6 for k, angle in enumerate(angles))
     tables.setdefault(CARRIERS, {})[name] = {"shaft": main, "planets": count if even else angles}
     where = f"carriers.{name}"
-    reading.derived(stage, "planet_shaft", f"{where}.planets", "places of the planets round the axis of the carrier")
+    reading.derived(
+        stage, "planet_shaft", f"{where}.planets", "positions of the planets around the axis of the carrier"
+    )
     _pins(reading, tables[CARRIERS][name], planets[0], where)
     shafts[planets[0]]["carrier"] = name
     for planet, group in zip(planets[1:], groups[1:], strict=True):

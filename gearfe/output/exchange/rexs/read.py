@@ -309,7 +309,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     entries: dict[str, Any] = {}
     for key, value in pairs:
         if key in entries:
-            raise InputError("key of JSON", key, "stands twice in an object", "correct the file")
+            raise InputError("key of JSON", key, "occurs twice in an object", "correct the file")
         entries[key] = value
     return entries
 
@@ -419,7 +419,7 @@ def _checked(model: Model) -> Model:
         seen: set[int] = set()
         for case in spectrum.cases:
             if case.number in seen:
-                raise InputError("id of a load case", case.number, "stands twice", "export the file again")
+                raise InputError("id of a load case", case.number, "occurs twice", "export the file again")
             seen.add(case.number)
         cases = [
             LoadCase(
@@ -447,7 +447,7 @@ def _typed(component: Component) -> Component:
         name = table.current(kind, raw.name)
         where = f"{name} of {component.label}"
         if name in attributes:
-            raise InputError(where, None, "stands twice", "keep one of them")
+            raise InputError(where, None, "occurs twice", "keep one of them")
         known = table.attribute(kind, name)
         value = _value(known, raw.value, where)
         unit = (known.unit if known else "none") if raw.unit is None else str(raw.unit)
