@@ -14,7 +14,7 @@ from gearfe.drivetrain.runup.run_up import steady_state
 from gearfe.drivetrain.train import GearTrain, TrainModel, build_train, simulate
 from gearfe.drivetrain.train.misalignment import misalignments, static_state
 from gearfe.drivetrain.train.states import train_states
-from gearfe.multibody import integrate
+from gearfe.multibody import constant, integrate
 from tests.makers.helical_trains import (
     BETA,
     FIXED,
@@ -285,6 +285,41 @@ def test_a_shaft_that_nothing_holds_along_its_axis(shaft: str) -> None:
     with pytest.raises(InputError, match=rf"shaft '{shaft}' bearings.*held by nothing along its axis"):
         build_train(floating(helical_pair(), shaft))
     build_train(floating(helical_pair(beta=0.0), shaft))  # spur gears do not push it
+
+
+def by_torque(train: GearTrain, torque: float = 40.0) -> GearTrain:
+    """The train with a torque that drives it, which falls with the speed."""
+    return dataclasses.replace(train, drive=dataclasses.replace(train.drive, torque=constant(torque), slope=0.1))
+
+
+@pytest.mark.parametrize("shaft", ["s0", "s1"])
+def test_a_shaft_that_nothing_holds_while_a_torque_drives(shaft: str) -> None:
+    """Rolling is free there, too, and accelerates; the push along the axis is no part of it."""
+    for torque in (40.0, 55.0):
+        with pytest.raises(InputError, match=rf"shaft '{shaft}' bearings.*held by nothing along its axis"):
+            build_train(by_torque(floating(helical_pair(), shaft), torque))
+    build_train(by_torque(floating(helical_pair(beta=0.0), shaft)))
+    build_train(by_torque(helical_pair()))
+    with pytest.raises(InputError, match="held by nothing along its axis"):
+        build_train(by_torque(floating(helical_pair(stiffness=None), shaft)))  # a rigid mesh
+
+
+@pytest.mark.parametrize("drives", ["speed", "torque"])
+def test_a_shaft_that_nothing_holds_against_tilting(drives: str) -> None:
+    """One bearing without a stiffness against tilting, the gear beside it."""
+    for beta in (0.0, BETA):
+        train = helical_pair(beta=beta)
+        shafts = (train.shafts[0], dataclasses.replace(train.shafts[1], bores=("s1 high",)))
+        bearings = tuple(one for one in train.bearings if one.bore != "s1 low")
+        places = {name: place for name, place in train.rigid_bores.items() if name != "s1 low"}
+        train = dataclasses.replace(train, shafts=shafts, bearings=bearings, rigid_bores=places)
+        with pytest.raises(InputError, match=r"shaft 's1' bearings.*held by nothing against tilting"):
+            build_train(train if drives == "speed" else by_torque(train))
+        stiff = tuple(
+            dataclasses.replace(one, stiffness=(*FIXED[:3], 1e4, 1e4)) if one.bore == "s1 high" else one
+            for one in bearings
+        )
+        build_train(dataclasses.replace(train, bearings=stiff))
 
 
 def test_a_floating_shaft_between_two_meshes() -> None:

@@ -56,6 +56,8 @@ from .shaft_sections import ShaftSections, shaft_sections
 MOST_DENOMINATOR = 1000
 #: Eigenvalues below this part of the largest one are those of free rotation, and round-off.
 FREE = 1e-11
+#: Part of the mean push of mesh forces along the axes and on tilts that, on free motions, is round-off.
+UNHELD = 1e-6
 
 
 class Turning(NamedTuple):
@@ -297,25 +299,34 @@ def build_train(train: GearTrain) -> TrainModel:
 
 
 def _check_held(model: TrainModel) -> None:
-    """Raise `InputError` for a shaft that the axial forces of helical gears move freely along its axis.
+    """Raise `InputError` for a shaft that mesh forces in steady running move along its axis or tilt, held by nothing.
 
-    Such a motion yields to no spring, turns the gears so that no flank closes, and the loads work on it.
+    Such a motion closes no flank and yields to no spring: what the forces do along the axes and by tilts, loads take
+    back by turning. Rolling itself has neither part, so that trains that a torque drives are looked at alike.
     """
-    if model.train.driven.torque is not None or not any(line.axial for line in model.meshes):
-        return
-    modal = model.modal
-    push = sum((modal.T.T @ row * float(replace(f, sines=())(model.torque_end)) for row, f in model.torques), 0.0)
+    modal, axis = model.modal, model.train.frame[2]
+    push = np.zeros(model.system.size)
+    for line, force in zip(model.meshes, model.kinematics.steady_forces.tolist(), strict=True):
+        pressed = line.columns[1] if force < 0.0 and line.backlash is not None else math.copysign(1.0, force) * line.row
+        for first in model.first.tolist():
+            push[first : first + 3] += abs(force) * (pressed[first : first + 3] @ axis) * axis
+            push[first + 3 : first + 5] += abs(force) * pressed[first + 3 : first + 5]
+    along_modes = modal.T.T @ push
     free = modal.eigenvalues <= FREE * float(modal.eigenvalues.max(initial=0.0))
-    push = np.where(free, push, 0.0) if np.ndim(push) else np.zeros(len(free))
-    if not np.abs(push).max(initial=0.0) > FREE:
+    unheld = np.where(free, along_modes, 0.0)
+    if not np.linalg.norm(unheld) > UNHELD * np.linalg.norm(along_modes):
         return
-    moved = modal.T @ push
-    along = [abs(float(moved[i : i + 3] @ model.train.frame[2])) for i in model.first.tolist()]
-    if not max(along) > FREE * float(np.abs(moved).max()):
-        return
-    shaft = model.train.shafts[int(np.argmax(along))]
+    moved = modal.T @ unheld
+    slides = np.array([abs(float(moved[first : first + 3] @ axis)) for first in model.first.tolist()])
+    tilts = np.array([float(np.linalg.norm(moved[first + 3 : first + 5])) for first in model.first.tolist()])
+    tilts *= [0.5 * shaft.length for shaft in model.train.shafts]
+    sliding = slides.max() >= tilts.max()
+    shaft = model.train.shafts[int(np.argmax(slides if sliding else tilts))]
     problem = "is held by nothing along its axis, and the axial force of its helical gears moves it without end"
     cure = "give one of its bearings a stiffness along the axis, or leave it out for a hinge"
+    if not sliding:
+        problem = "is held by nothing against tilting, and the forces of its gears tilt it without end"
+        cure = "give it a second bearing, or one of its bearings a stiffness against tilting"
     raise InputError(f"shaft {shaft.name!r} bearings", list(shaft.bores), problem, cure)
 
 
