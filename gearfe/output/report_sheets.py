@@ -240,7 +240,24 @@ def _of_rating(results: Results) -> list[Sheet]:
     """Safety factors of both gears, and the factors of the mesh."""
     main, gears = results.main, results.summary.get("gears") or {}
     names = [str(gears.get(key, key.replace("_", " "))) for key in ("gear_1", "gear_2")]
-    wanted = ("S_H", "S_F", "sigma_H", "sigma_F", "K_A", "K_v", "K_H_beta", "K_Hbeta", "K_H_alpha", "K_Halpha", "F_t_N")
+    wanted = (
+        "S_H",
+        "S_F",
+        "S_B",
+        "S_intS",
+        "sigma_H",
+        "sigma_F",
+        "K_A",
+        "K_v",
+        "K_H_beta",
+        "K_Hbeta",
+        "K_H_alpha",
+        "K_Halpha",
+        "F_t_N",
+        "theta_B_C",
+        "H_V",
+        "P_V_W",
+    )
     rows = [
         [f"{key}: {meaning}", *(_cell(value) for value in values), "" if unit == "-" else str(unit)]
         for key, unit, meaning, *values in zip(

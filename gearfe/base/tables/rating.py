@@ -107,6 +107,9 @@ class GearRatingTable:
     thickness_allowances_um: tuple[float, float] | None = quantity(
         None, doc="upper and lower allowance of the tooth thickness (um), A_sne and A_sni, for the backlash"
     )
+    thickness_series: str | None = quantity(
+        None, doc='series of DIN 3967 for the tooth thickness, as "cd25", instead of thickness_allowances_um'
+    )
     ball_diameter_mm: float | None = quantity(
         None, above=0.0, doc="diameter of the balls of M_dK (mm); left out: one that touches near d + 2 x m_n"
     )

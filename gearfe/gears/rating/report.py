@@ -15,6 +15,7 @@ from ..geometry.balls import ball_diameter, over_balls
 from ..geometry.derived import derived_geometry
 from ..geometry.measures import backlash_limits, span_of
 from ..geometry.pair import Gear, GearPair
+from ..geometry.thickness_series import thickness_allowances
 from ..geometry.tolerances import tolerances_um
 from .data import QUALITY, TOLERANCES
 from .ledger import Entry
@@ -117,11 +118,12 @@ def measures(
         Edition of ISO 6336, with which one of ISO 1328-1 goes.
     """
     made: dict[str, Any] = {}
-    allowances = [gears[name].thickness_allowances_um for name in names]
+    limits = {name: _thickness(getattr(pair, side), gears[name]) for side, name in zip(SIDES, names, strict=True)}
+    allowances = [limits[name] for name in names]
     for side, name in zip(SIDES, names, strict=True):
         gear, keys = getattr(pair, side), gears[name]
         quality = QUALITY if keys.quality is None else keys.quality
-        allowance = keys.thickness_allowances_um
+        allowance = limits[name]
         thinning = [] if allowance is None else [-1e-6 * value for value in allowance]
         k = gear.span_teeth
         sizes: dict[str, Any] = {"span_teeth": k, "span_mm": 1e3 * gear.span_size(k)}
@@ -143,6 +145,16 @@ def measures(
             "normal_mm": [1e3 * value for value in found.normal],
         }
     return made
+
+
+def _thickness(gear: Gear, keys: GearRatingTable) -> tuple[float, float] | None:
+    """Upper and lower allowance of the tooth thickness (um), None: not given."""
+    if keys.thickness_series is None:
+        return keys.thickness_allowances_um
+    if keys.thickness_allowances_um is not None:
+        problem = "cannot be given together with thickness_allowances_um"
+        raise InputError("rating.thickness_series", keys.thickness_series, problem, "leave out one of both")
+    return thickness_allowances(keys.thickness_series, 2e3 * gear.reference_radius, "rating.thickness_series")
 
 
 def _balls(gear: Gear, given_mm: float | None, thinning: list[float]) -> dict[str, Any]:

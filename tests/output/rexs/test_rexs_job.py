@@ -724,3 +724,32 @@ def test_tips_of_a_ring_stay_on_the_involutes_of_the_planets():
 def test_meshes_whose_load_varies_along_the_width_are_springs():
     models = [mesh.get("mesh_model") for mesh in gearfe.rexs_job(SEW).tables["meshes"].values()]
     assert models == 3 * ["variable_stiffness"]
+
+
+def test_a_rating_of_the_model(tmp_path):
+    """Hardness, yield strength, roughness, quality, series of DIN 3967 and oil become [rating]."""
+    gear = {
+        "arithmetic_mean_roughness_flank_iso_4287_1997": 0.5,
+        "global_tolerance_class_iso_1328_2013": "5",
+        "tooth_thickness_deviation_tolerance_series_din_3967_1978": "cd25",
+    }
+    parts, joints = spur_pair(**gear)
+    oil = {
+        "viscosity_at_40_degree_celsius": 220.0,
+        "viscosity_at_100_degree_celsius": 19.0,
+        "density_at_15_degree_celsius": 0.89,
+    }
+    parts = with_attributes(parts, 2, temperature_lubricant=80.0)
+    parts = with_attributes(parts, 10, surface_hardness_vickers=720.0, yield_strength=900.0)
+    parts.append((80, "lubricant", "oil", oil))
+    job = job_of(tmp_path, parts, [*joints, ("reference", {"origin": 2, "referenced": 80})])
+    complete(job)
+    table = job.tables["rating"]
+    assert table["viscosity_40_mm2_per_s"] == 220.0
+    assert table["viscosity_100_mm2_per_s"] == 19.0
+    assert table["oil_temperature_C"] == 80.0
+    assert table["oil_density_kg_per_m3"] == pytest.approx(890.0)
+    pinion, wheel = table["gears"]["pinion"], table["gears"]["wheel"]
+    assert wheel == {"material": "Eh", "hardness": 720.0, "yield_strength_MPa": 900.0}
+    rough = {"quality": 5, "flank_ra_um": 0.5, "flank_roughness_um": 3.0, "thickness_series": "cd25"}
+    assert pinion == wheel | rough

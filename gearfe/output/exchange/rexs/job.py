@@ -22,10 +22,11 @@ from ....base.errors import InputError, unknown_name
 from ....base.tables.gearbox import Gearbox
 from ....base.tables.jobs import NAMED, TABLES, gearbox_of, table_class
 from ....base.tables.text import table_text, toml_document
-from . import parts, planets
+from . import parts, planets, rated
 from .balance import Row, speeds_of, torques_of
 from .ledger import DEFAULTED, DERIVED, IGNORED, KINDS, READ, Entry, lines_of, plain
 from .model import Attribute, Component, LoadCase, Model
+from .rated import dynamic_viscosity
 from .read import read_rexs
 from .reading import Reading
 from .schema import CUSTOM, OWN
@@ -130,6 +131,9 @@ def rexs_job(source: str | Path | Model, *, load_case: int | None = None) -> Rex
     _own(reading, tables)
     _refuse(reading, tables, left)
     _models(reading, tables)
+    if not any(unit.attributes.get(OWN_TABLES) for unit in model.of_kind("gear_unit")):
+        rating = rated.rating(reading, tables)
+        tables |= {"rating": rating} if rating else {}
     reading.leftovers(_why)
     labels = {
         (kind, name): model.components[number].label
@@ -301,7 +305,7 @@ def _friction(reading: Reading, tables: dict[str, Any]) -> None:
             rule = "needs viscosities at 40 and 100 C, density and temperature_lubricant of the casing"
             reading.ignored(oil, of_oil or "viscosity", rule)
             continue
-        viscosity = _viscosity(values[0] or 0.0, values[1] or 0.0, density or 0.0, temperature or 0.0)
+        viscosity = dynamic_viscosity(values[0] or 0.0, values[1] or 0.0, density or 0.0, temperature or 0.0)
         if viscosity is None:
             rule = (
                 f"out of range at {temperature:g} C: must be 0.5 < viscosity at 100 C < viscosity at 40 C < 1e6 mm2/s, "
@@ -323,26 +327,6 @@ def _friction(reading: Reading, tables: dict[str, Any]) -> None:
             rule = "mean of both gears"
             where = f"meshes.{name}.roughness_um"
             reading.derived(gear, "arithmetic_mean_roughness_flank_iso_4287_1997", where, rule)
-
-
-def _viscosity(low: float, high: float, density: float, temperature: float) -> float | None:
-    """Dynamic viscosity (mPa s) at a temperature (C) of an oil with kinematic ones (mm2/s) at 40 and 100 C.
-
-    None for numbers that no oil has: the formula has logarithms of them, and grows without bound.
-
-    lg lg(nu + 0.7) is linear in lg T (Ubbelohde-Walther, ASTM D341).
-    """
-    if not (0.5 < high < low < 1e6 and -50.0 < temperature < 300.0 and density > 0.0):
-        return None
-    one, two = (math.log10(math.log10(value + 0.7)) for value in (low, high))
-    logs = [math.log10(at + 273.15) for at in (40.0, 100.0, temperature)]
-    between = one + (two - one) * (logs[2] - logs[0]) / (logs[1] - logs[0])
-    try:
-        kinematic = 10.0**10.0**between - 0.7
-    except OverflowError:
-        return None
-    dynamic = kinematic * (density - 0.65 * (temperature - 15.0)) * 1e-3
-    return dynamic if 0.0 < dynamic < math.inf else None
 
 
 # --- speeds and torques ---------------------------------------------------------------------------------------------
@@ -861,7 +845,7 @@ def _text(job: RexsJob, source: str) -> str:
     head = [
         f"Gearbox from {Path(source).name or 'a REXS model'} (REXS {job.model.version}{program}).",
         "Look at it: gearfe gear FILE. Its meshes: gearfe stiffness FILE. Its train: gearfe modes FILE, gearfe "
-        "vibration FILE, gearfe runup FILE.",
+        "vibration FILE, gearfe runup FILE. Its load capacity: gearfe rating FILE.",
         "y runs along u of the gear unit, z along v, x along w; speeds and torques count positive about +y.",
         f"Values of the model: {counts}. The complete list is at the end.",
     ]

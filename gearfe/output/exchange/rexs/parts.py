@@ -502,10 +502,6 @@ def _thickness(
         entry["span_mm"], entry["span_teeth"] = span, count
         reading.note(READ, gear, "span_measurement", f"{key}.span_mm")
         reading.note(READ, gear, "number_of_teeth_for_span_measurement", f"{key}.span_teeth")
-    series = reading.text(gear, "tooth_thickness_deviation_tolerance_series_din_3967_1978")
-    if series:
-        rule = f"{series}: the program has no table of DIN 3967; add tooth_thinning_um for backlash"
-        reading.ignored(gear, "tooth_thickness_deviation_tolerance_series_din_3967_1978", rule)
 
 
 def _bore(reading: Reading, gear: Component, entry: dict[str, Any], shaft: dict[str, Any] | None, where: str) -> None:
