@@ -180,8 +180,8 @@ def test_the_load_of_a_variant_of_the_train(tmp_path, capsys):
     job = json.loads((tmp_path / "a" / "summary.json").read_text())["job"]["stiffness"]
     assert (job["twist_deg"], job["torque_Nm"], job["law"]) == (0.5, None, "nitsche")
     capsys.readouterr()
-    assert main(["stiffness", str(JOB), "--variant", "tutorals"]) == 2
-    assert "unknown name 'tutorals'" in (said := capsys.readouterr().err)
+    assert main(["stiffness", str(JOB), "--variant", "undamped_spring"]) == 2
+    assert "unknown name 'undamped_spring'" in (said := capsys.readouterr().err)
     assert "did you mean 'undamped_springs'" in said
 
 

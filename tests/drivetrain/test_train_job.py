@@ -54,6 +54,8 @@ def test_variants_differ_in_curves_and_damping() -> None:
     assert (operating.curves.interpolation, operating.curves.load, operating.damping.ratio) == ("cubic", "torque", 0.01)
     with pytest.raises(InputError, match="did you mean 'undamped_springs'"):
         read_train_job(SHIPPED, "undamped_spring")
+    with pytest.raises(InputError, match="did you mean 'undamped_springs'"):  # its former name
+        read_train_job(SHIPPED, "tutorial")
 
 
 def test_the_other_commands_read_the_same_file() -> None:
