@@ -81,9 +81,9 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     try:
         tables = tomllib.loads(text)
     except RecursionError:
-        raise InputError("job file", str(path), "is not valid TOML (lists within lists too deep)", "mend it") from None
+        raise InputError("job file", str(path), "is not valid TOML (lists within lists too deep)", "fix it") from None
     except tomllib.TOMLDecodeError as error:
-        raise InputError("job file", str(path), f"is not valid TOML ({error})", "mend that line") from None
+        raise InputError("job file", str(path), f"is not valid TOML ({error})", "fix that line") from None
     except ValueError:  # Python reads no whole number of more than some thousand digits
         problem = "holds a whole number with thousands of digits"
         raise InputError("job file", str(path), problem, "write it as 1e300") from None

@@ -257,7 +257,9 @@ def _item(column: Any, index: Any, label: str) -> Any:
     place = np.asarray(index)
     if place.ndim == 0 and place.dtype.kind == "f":
         if not float(place).is_integer():
-            raise InputError(label, float(place), "is no place in a column", "count from 0, or from the end with -1")
+            raise InputError(
+                label, float(place), "is not an index of a column", "count from 0, or from the end with -1"
+            )
         return as_numbers(column)[int(place)]
     return as_numbers(column)[np.asarray(place, dtype=bool)]
 

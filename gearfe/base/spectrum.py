@@ -71,7 +71,7 @@ class Spectrum(ShownTable):
             "lines": f"{len(self.frequency)}, 0 to {self.frequency[-1]:.6g} Hz, each {self.resolution:.4g} Hz",
             "signals": str(1 if self.value.ndim == 1 else self.value.shape[1]),
             "window": self.window,
-            "largest amplitude": f"{highest:.4g} in the unit of the signal, beside the constant",
+            "largest amplitude": f"{highest:.4g} in the unit of the signal, without the constant",
         }
 
     def columns(self) -> dict[str, Array]:

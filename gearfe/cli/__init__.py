@@ -49,7 +49,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "gearfe runup gearbox.toml --speeds 100",
     ),
     "compare": (
-        "results of two or three runs over each other: curves, spectra, differences with their errors",
+        "comparison of two or three runs: curves, spectra, differences with their errors",
         "gearfe compare out/pair/stiffness out/other/stiffness",
     ),
     "report": (
@@ -65,7 +65,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "gearfe new vibration gearbox.toml",
     ),
     "cache": (
-        "what is kept on disk (meshes, gears, curves, housings, compiled kernels), its size; remove it",
+        "list or remove cached data: meshes, gears, curves, housings, compiled kernels",
         "gearfe cache",
     ),
     "completion": (

@@ -215,7 +215,7 @@ def add_mesh(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mesh",
         metavar="NAME",
-        help="a mesh of the file by its name, in a folder of that name (default: that of [pair], or all)",
+        help="one mesh of the file, in a folder of its name (default: that of [pair], or all)",
     )
 
 
@@ -269,7 +269,7 @@ def add_folder(parser: argparse.ArgumentParser) -> None:
         "--format",
         metavar="NAME",
         default="csv",
-        help=f"tables also as tables.NAME: {', '.join(FORMATS)}, or several, as mat,h5 (default: csv alone)",
+        help=f"tables also as tables.NAME: {', '.join(FORMATS)}, or several, as mat,h5 (default: only csv)",
     )
     parser.add_argument(
         "--report", action="store_true", help=f"gears, results, errors, pictures and job in one page, {REPORT}"
@@ -291,7 +291,7 @@ def add_pictures(parser: argparse.ArgumentParser) -> None:
 
 def add_json(parser: argparse.ArgumentParser) -> None:
     """``--json``: the summary in the output folder, or what a command that has none leaves in ``args.summary``."""
-    parser.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
+    parser.add_argument("--json", action="store_true", help="print only the summary, as JSON")
 
 
 def command_module(name: str) -> Any:

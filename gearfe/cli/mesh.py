@@ -42,13 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--teeth",
         type=int,
         metavar="N",
-        help=f"fine flanks at the N teeth of each gear in mesh alone (default: all, of a deck {DECK_TEETH})",
+        help=f"fine flanks only at the N teeth of each gear in mesh (default: all, of a deck {DECK_TEETH})",
     )
     parser.add_argument("--angle-deg", type=float, default=0.0, metavar="X", help="pinion angle (deg, default: 0)")
     parser.add_argument(
         "--deck",
         action="store_true",
-        help="an input deck that CalculiX runs as it is: contact at the load of [stiffness] (.inp)",
+        help="an input deck that CalculiX runs unchanged: contact at the load of [stiffness] (.inp)",
     )
     add_pictures(parser)
     add_json(parser)

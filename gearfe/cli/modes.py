@@ -23,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_train(parser, "job file with the table [train]", ModesTable, *KEYS, attachment=False)
     parser.add_argument(
         "--fields", nargs="*", type=int, metavar="N",
-        help="write modes by their numbers as motion for ParaView (VTKHDF series); without numbers those in which "
-        "shafts move by themselves or meshes strain",
+        help="write animated modes by their numbers for ParaView (VTKHDF series); without numbers those in which "
+        "shafts move or meshes deform",
     )  # fmt: skip
 
 

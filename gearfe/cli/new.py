@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--load-case",
         type=int,
         metavar="N",
-        help="load case of that file whose loads and speeds hold (default: the first)",
+        help="load case of that file whose loads and speeds are used (default: the first)",
     )
     parser.add_argument("--force", action="store_true", help="replace files that exist")
 

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_train(parser, "job file with the tables [train] and [runup]", RunUpTable, *KEYS)
     parser.add_argument("--no-stability", action="store_true", help="leave out the Floquet multipliers")
     parser.add_argument(
-        "--fields", action="store_true", help="the modes that the meshes swing in, for ParaView (VTKHDF series)"
+        "--fields", action="store_true", help="modes with strain energy in the meshes, for ParaView (VTKHDF series)"
     )
 
 

@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_job(parser, "job", "job file with the tables [pair] and [stiffness]")
     add_mesh(parser)
     add_folder(parser)
-    parser.add_argument("--variant", metavar="NAME", help="variant of [train] whose [stiffness] holds")
+    parser.add_argument("--variant", metavar="NAME", help="variant of [train] whose [stiffness] is used")
     add_keys(parser.add_mutually_exclusive_group(), StiffnessTable, *LOADS)
     parser.add_argument("--angles", type=float, nargs=3, metavar=("START", "STEP", "STOP"), help="pinion angles (deg)")
     add_keys(parser, StiffnessTable, *KEYS)

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dask", metavar="ADDRESS", help="run the cases on the Dask cluster with this scheduler")
     parser.add_argument("--restart", action="store_true", help="start again, regardless of the content of the folder")
     parser.add_argument("--row", type=int, metavar="CASE", help="write the job file of a case to --write, and stop")
-    parser.add_argument("--write", metavar="FILE", help="where --row writes; files of the job stay and are found")
+    parser.add_argument("--write", metavar="FILE", help="file for --row; it finds the files of the job")
     parser.add_argument("--parquet", action="store_true", help="also the rows as study.parquet")
 
 

@@ -66,9 +66,9 @@ def add_train(parser: argparse.ArgumentParser, help_: str, table: type, *keys: s
     """
     add_job(parser, "job", help_)
     add_folder(parser)
-    parser.add_argument("--variant", metavar="NAME", help="a variant that the job file describes")
+    parser.add_argument("--variant", metavar="NAME", help="a variant of the job file")
     parser.add_argument(
-        "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one a mesh"
+        "--curve", nargs="+", metavar="FILE", default=(), help="stiffness curves (CSV): one, or one per mesh"
     )
     add_keys(parser, table, *keys)
     if attachment:

@@ -202,7 +202,7 @@ def test_outputs_are_arithmetic_on_tables(text, value):
         ("(lambda: 1)()", "cannot read"),
         ("mean(te_um, 2)", "takes 1 argument"),
         ("1 / summary.zero", "1 / 0 has no value"),
-        ("summary.by[0.5]", "no place in a column"),
+        ("summary.by[0.5]", "not an index of a column"),
         ("mean(", "is not an expression"),
         ("summary.by[7]", "has no value"),
     ],

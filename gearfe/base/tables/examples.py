@@ -10,7 +10,7 @@ from .jobs import NAMED, table_class
 from .mechanism import MechanismFile
 from .text import table_text
 
-OPTIONAL_KEYS = "Keys behind a # are optional and stand with their defaults; those that are not set have none."
+OPTIONAL_KEYS = "Keys behind a # are optional and show their defaults; those without a value have none."
 
 PAIR: dict[str, Any] = {
     "pressure_angle_deg": 25.0,
@@ -161,9 +161,9 @@ GEARBOX_TRAIN: dict[str, Any] = {
     "damping": {"rayleigh_beta_s": 2e-6},
 }  # fmt: skip
 
-#: Tables that stand commented at the end of a gearbox, and run with it when they no longer do.
+#: Optional tables at the end of a gearbox, commented out; they run when the marks are removed.
 EXTENSION = """\
-# The input shaft bends and twists: pieces along +y, as long and thick in all as it is above.
+# An elastic input shaft: sections along +y, with the total length of the shaft above.
 [[shafts.input.sections]]
 length_mm = 30.0
 outer_diameter_mm = 18.0
@@ -176,7 +176,7 @@ outer_diameter_mm = 20.0
 length_mm = 30.0
 outer_diameter_mm = 18.0
 
-# A motor shaft on ball bearings beyond it, which a clutch joins to the input shaft, end to end on one axis.
+# A motor shaft on ball bearings, coaxial with the input shaft and joined to it by a clutch.
 [shafts.motor_shaft]
 x_mm = 0.0
 y_mm = 85.0
@@ -211,7 +211,7 @@ shafts = ["motor_shaft", "input"]
 stiffness_Nm_per_rad = 3e4
 damping_Nm_s_per_rad = 0.5
 
-# The rotor of the motor. To drive there: shaft = "motor_shaft", machine = "motor" in [train.drive], no attachment.
+# The rotor of the motor. To drive it: shaft = "motor_shaft", machine = "motor" in [train.drive], no attachment.
 [machines.motor]
 shaft = "motor_shaft"
 y_mm = 112.0
@@ -219,7 +219,7 @@ inertia_kg_m2 = 4e-3
 stiffness_Nm_per_rad = 2.5e4
 damping_Nm_s_per_rad = 1.5
 
-# A fan beside the load of the output shaft: its torque grows with the square of its speed.
+# A fan in addition to the load of the output shaft: its torque grows with the square of its speed.
 [machines.fan]
 shaft = "output"
 inertia_kg_m2 = 9e-3
@@ -277,7 +277,7 @@ RATING: dict[str, Any] = {
 RUNUP: dict[str, Any] = {"speed_start_rad_per_s": 300.0, "speed_stop_rad_per_s": 1200.0, "speeds": 100}
 
 #: Kind, which is the command that runs it except for those of `RUN_BY`
-#: -> what the file is about, its tables, and what else its head says.
+#: -> subject of the file, its tables, and further text of its head.
 JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
     "stiffness": ("mesh stiffness of a gear pair", {"pair": DRAWN, "stiffness": {"torque_Nm": 200.0}}, ""),
     "loadmap": (
@@ -312,7 +312,7 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
             "modes": {},
             "runup": RUNUP,
         },
-        "Over its speed: gearfe runup FILE, gearfe modes FILE. Shafts run along y; speeds and torques count positive "
+        "Over its speed: gearfe runup FILE, gearfe modes FILE. Shafts run along y; speeds and torques are positive "
         "about +y. ",
     ),
     "runup": (
@@ -330,9 +330,9 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
             "modes": {},
             "runup": {"speed_start_rad_per_s": 50.0, "speed_stop_rad_per_s": 400.0, "speeds": 50},
         },
-        "Look at it first: gearfe gear FILE. Its meshes alone: gearfe stiffness FILE, gearfe loadmap FILE (--mesh "
+        "Check it first: gearfe gear FILE. Its meshes only: gearfe stiffness FILE, gearfe loadmap FILE (--mesh "
         "NAME: one of them). Over its speed: gearfe runup FILE, gearfe modes FILE. Shafts run along y; speeds and "
-        "torques count positive about +y. ",
+        "torques are positive about +y. ",
     ),
     "housing": (
         "an elastic housing: frequencies, modes, reduced body",
@@ -368,7 +368,7 @@ def job_file(kind: str) -> str:
 def _commented() -> str:
     """Further tables behind ##: a single # stands before keys of the tables above."""
     lines = [f"## {line}".rstrip() for line in EXTENSION.splitlines()]
-    head = "# Tables that you may add; take the ## off, of all or of some (docs/shafts.md, docs/bearings.md)."
+    head = "# Optional tables: remove the ## of those that you need (docs/shafts.md, docs/bearings.md)."
     return "\n".join(["", head, *lines, ""])
 
 

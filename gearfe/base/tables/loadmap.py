@@ -27,9 +27,9 @@ class LoadMapTable:
     torque_spacing: str = quantity("even", doc="how these torques are spaced: even or log", choices=("even", "log"))
     positions: int = quantity(18, doc="pinion angles in one mesh cycle", low=1, high=100_000)
     mesh_cycles: int | None = quantity(
-        None, doc="mesh cycles; by default 1 where the teeth are alike, else the full period", low=1, high=100_000
+        None, doc="mesh cycles; by default 1 if all teeth are alike, otherwise the full period", low=1, high=100_000
     )
-    root_stress: bool = quantity(False, doc="true: also the tension at the tooth roots")
+    root_stress: bool = quantity(False, doc="true: also compute the tension at the tooth roots")
 
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that contradict each other."""

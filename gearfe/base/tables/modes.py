@@ -20,14 +20,16 @@ class ModesTable:
     speed_stop_rad_per_s: float | None = quantity(
         None, doc="last speed (rad/s), of the same sign; left out: that of [runup], or twice that of the drive"
     )
-    speeds: int = quantity(25, low=2, high=10_000, doc="how many speeds, even between these")
+    speeds: int = quantity(25, low=2, high=10_000, doc="number of speeds, evenly spaced")
     band_Hz: float | None = quantity(
         None,
         above=0.0,
         doc="modes below this frequency (Hz); left out: that of [runup] or [housing.reduction], or 5000",
     )
     multiples: int = quantity(5, low=0, high=50, doc="multiples of each mesh frequency among the orders")
-    shaft_multiples: int = quantity(2, low=0, high=50, doc="multiples of the turns of each shaft among the orders")
+    shaft_multiples: int = quantity(
+        2, low=0, high=50, doc="multiples of the rotation frequency of each shaft among the orders"
+    )
 
     def check(self, where: str) -> None:
         """Rules that join several keys."""

@@ -454,7 +454,7 @@ class StiffnessTable:
     torque_Nm: float | None = quantity(None, doc="torque at the wheel's hub (N m), or give twist_deg", above=0.0)
     twist_from: Literal["contact", "centred"] = quantity(
         "contact",
-        doc="where twist_deg counts from: contact (where unmodified driving flanks touch) or centred (a wheel space "
+        doc="reference of twist_deg: contact (where unmodified driving flanks touch) or centred (a wheel space "
         "faces the pinion tooth; half the backlash is then lost motion)",
         choices=("contact", "centred"),
     )
@@ -494,9 +494,9 @@ class StiffnessTable:
     flank_coarsen: float = quantity(
         1.0, doc="factor on the element sizes of the driving flanks, besides coarsen", low=0.1, high=10.0
     )
-    solve_all: bool = quantity(False, doc="true: solve also positions that differ by whole mesh cycles")
+    solve_all: bool = quantity(False, doc="true: also solve positions that differ by whole mesh cycles")
     interpolation: str = quantity(
-        "cubic", doc="how the curve runs between its positions: cubic (monotone) or linear", choices=("cubic", "linear")
+        "cubic", doc="interpolation between the positions: cubic (monotone) or linear", choices=("cubic", "linear")
     )
 
     def check(self, where: str) -> None:

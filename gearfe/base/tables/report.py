@@ -14,4 +14,4 @@ class ReportTable:
     title: str = quantity("", doc="title; left out: the command and the job file")
     author: str = quantity("", doc="author")
     remark: str = quantity("", doc="remark under the heading")
-    date: str = quantity("", doc="date as it shall stand there; left out: that of the results")
+    date: str = quantity("", doc="date under the heading; left out: that of the results")

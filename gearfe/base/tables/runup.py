@@ -16,16 +16,19 @@ class RunUpTable:
 
     speed_start_rad_per_s: float = quantity(doc="first speed of the drive (rad/s)")
     speed_stop_rad_per_s: float = quantity(doc="last speed (rad/s), of the same sign")
-    speeds: int = quantity(200, low=2, high=100_000, doc="how many speeds, even between these")
+    speeds: int = quantity(200, low=2, high=100_000, doc="number of speeds, evenly spaced")
     tolerance: float = quantity(
-        1e-3, low=1e-6, high=0.1, doc="error of the meshes' approaches, in parts of those under the steady force"
+        1e-3, low=1e-6, high=0.1, doc="error of the mesh deflections, relative to those under the steady force"
     )
     band_Hz: float | None = quantity(
         None, above=0.0, doc="highest frequency of interest (Hz); left out: that of [housing.reduction], or 5000"
     )
     multiples: int = quantity(5, low=1, high=50, doc="multiples of each mesh frequency that are cut out as orders")
     shaft_multiples: int = quantity(
-        2, low=0, high=50, doc="multiples of the turns of each shaft in the Campbell diagram and the critical speeds"
+        2,
+        low=0,
+        high=50,
+        doc="multiples of the rotation frequency of each shaft in the Campbell diagram and the critical speeds",
     )
 
     instability_loads: tuple[float, ...] = quantity(

@@ -30,7 +30,7 @@ class SpectrumTable:
         "none", choices=("none", "hann", "hamming", "blackman", "flattop"), doc="window of the spectrum"
     )
     spectrum_from: float | str = quantity(
-        0.0, low=0.0, doc='begin of the record (ms); "steady" in a job file: where the start-up has died away'
+        0.0, low=0.0, doc='start of the record (ms); "steady" in a job file: after the start-up has decayed'
     )
     spectrum_ms: float | None = quantity(None, above=0.0, doc="duration of the record (ms); left out: to the end")
     short_time_ms: float | None = quantity(

@@ -102,7 +102,7 @@ class SteadyState:
 
     @property
     def error(self) -> float:
-        """Estimate of the error of the meshes' approaches, in parts of those under the steady force."""
+        """Estimate of the error of the mesh deflections, relative to those under the steady force."""
         return self.orbit.error
 
     def rms(self, band_hz: float) -> Array:
