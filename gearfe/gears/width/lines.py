@@ -62,6 +62,11 @@ STIFFEST = 0.05
 LEAST_AHEAD = 0.1
 #: Gauss points over the load of what a contact stores.
 ENERGY_POINTS = 5
+#: How often points are placed at a twist: each time the ends of the load are nearer by a factor of ten and more, and
+#: with them the torque: after five it is within 1e-8.
+TWIST_PLACINGS = 5
+#: Points of a stretch without load, and the least length (widths) of a stretch that ends where the load does.
+FREE_POINTS, LEAST_STRETCH = 2, 1e-3
 #: Places on a line at which its gap is looked at.
 LOOKS = 33
 
@@ -228,7 +233,7 @@ def mean_arm(lines: ContactLines, rows: Rows) -> Array:
     return np.asarray(0.5 * (rows.arm + lines.compliance.mesh.sections.gear_ratio * rows.pinion_arm))
 
 
-def place_points(lines: ContactLines, angle: float, twist: float) -> Points:
+def place_points(lines: ContactLines, angle: float, twist: float, before: Solution | None = None) -> Points:
     """Place points on all lines that may bear.
 
     Parameters
@@ -237,11 +242,14 @@ def place_points(lines: ContactLines, angle: float, twist: float) -> Points:
         The gears.
     angle, twist : float
         Pinion angle and twist of the wheel (rad).
+    before : Solution, optional
+        With points at a twist nearby: lines are broken where their load ends there.
     """
     mesh, law = lines.compliance.mesh, lines.law
     cycle, turn = mesh.sections.mesh_cycle, mesh.turns[0]
     middle = angle - 0.5 * mesh.sections.gear_ratio * twist
     looks = look_at(lines, middle)
+    breaks = {} if before is None else load_ends(before)
     z, weight, pair = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=np.int64)]
     for k, gap in zip(looks.pair.tolist(), looks.gap.tolist(), strict=True):
         reached = _reached(law, twist - gap)
@@ -252,12 +260,37 @@ def place_points(lines: ContactLines, angle: float, twist: float) -> Points:
             stretch = _stretch(start, end, middle + k * cycle, turn, mesh.zone, tip)
             if stretch is None:
                 continue
-            a, b = stretch
-            x, w = _gauss(_count(lines, (b - a) / mesh.width, tip=tip and turn != 0.0))
-            z.append(0.5 * (a + b) + 0.5 * (b - a) * x)
-            weight.append(0.5 * (b - a) * w)
-            pair.append(np.full(len(x), k))
+            apart = LEAST_STRETCH * mesh.width
+            inner = [(at, loaded) for at, loaded in breaks.get(k, ()) if stretch[0] + apart < at < stretch[1] - apart]
+            ends = [stretch[0], *(at for at, _ in inner), stretch[1]]
+            loaded = [True] * (len(inner) + 1)
+            for i, (_, before_it) in enumerate(inner):
+                loaded[i], loaded[i + 1] = before_it, not before_it
+            for (a, b), bears in zip(itertools.pairwise(ends), loaded, strict=True):
+                share = (b - a) / mesh.width
+                x, w = _gauss(_count(lines, share, tip=tip and turn != 0.0) if bears else FREE_POINTS)
+                z.append(0.5 * (a + b) + 0.5 * (b - a) * x)
+                weight.append(0.5 * (b - a) * w)
+                pair.append(np.full(len(x), k))
     return _points(lines, middle, twist, np.concatenate(z), np.concatenate(weight), np.concatenate(pair))
+
+
+def load_ends(solution: Solution) -> dict[int, list[tuple[float, bool]]]:
+    """Return where the load ends on each line, by tooth pair: z (m), rising, and whether it bears at smaller z.
+
+    The approach that is left to the contact itself vanishes there; it is straight between two points.
+    """
+    points = solution.points
+    left = solution.twist - points.touch - points.influence @ solution.moment
+    found: dict[int, list[tuple[float, bool]]] = {}
+    for k in np.unique(points.pair).tolist():
+        of_pair = np.flatnonzero(points.pair == k)
+        of_pair = of_pair[np.argsort(points.z[of_pair])]
+        z, approach = points.z[of_pair], left[of_pair]
+        i = np.flatnonzero((approach[:-1] > 0.0) != (approach[1:] > 0.0))
+        at = z[i] + (z[i + 1] - z[i]) * approach[i] / (approach[i] - approach[i + 1])
+        found[k] = list(zip(at.tolist(), (approach[i] > 0.0).tolist(), strict=True))
+    return found
 
 
 def _reached(law: PairLaw, twist: float) -> tuple[float, float] | None:
@@ -432,20 +465,26 @@ def solve_position(
     """
     if torque is None:
         assert twist is not None
-        return _newton(lines, place_points(lines, angle, twist), twist=twist, torque=None)
+        at_twist: Solution | None = None
+        for _ in range(TWIST_PLACINGS):
+            points = place_points(lines, angle, twist, at_twist)
+            at_twist = _newton(lines, points, twist=twist, torque=None, before=at_twist)
+        assert at_twist is not None
+        return at_twist
     least = look_at(lines, angle).least
     if not math.isfinite(least):
         return Solution(_nowhere(lines), math.nan, np.zeros(0), np.zeros((3, 3)), False, 0)
     ahead = guess - least if guess > least else torque / lines.compliance.mesh.usual_stiffness
     steps, settled, before = 0, False, None
     for number in range(PLACINGS):
-        points = place_points(lines, angle, least + ahead)
+        points = place_points(lines, angle, least + ahead, before)
         solution = _newton(lines, points, torque=torque, twist=None, before=before)
         steps, before = steps + solution.steps, solution
         # between the places that are looked at, a line may touch a little earlier
         new = max(solution.twist - least, LEAST_AHEAD * torque / lines.compliance.mesh.usual_stiffness)
         free = number < FREE_PLACINGS
-        settled = solution.converged and (abs(new - ahead) <= PLACED * new or (not free and new <= ahead))
+        near = abs(new - ahead) <= PLACED * new or (not free and new <= ahead)
+        settled = solution.converged and number > 0 and near
         if settled:
             break
         ahead = new if free else max(new, ahead)
@@ -468,19 +507,17 @@ def _newton(
 ) -> Solution:
     """Solve the complementary problem of the points at a torque (N m) or a twist (rad).
 
-    It begins with the loads of the solution `before` where that has as many points on the same lines.
+    It begins with the loads along the lines of the solution `before`.
     """
     law, n, weight = lines.law, len(points), points.weight
     loaded: BoolArray = np.ones(n, dtype=bool)
-    if torque is None:
+    moment = np.zeros(n) if before is None else _density(before, points) * weight
+    if moment.any():
+        loaded = moment > 0
+    elif torque is None:
         loaded = points.touch < twist
         start = np.where(loaded, twist - points.touch, 0.0) * weight
         moment = start * lines.compliance.mesh.usual_stiffness / lines.compliance.mesh.width
-    elif before is not None and np.array_equal(before.points.pair, points.pair):
-        moment = before.moment * weight / before.points.weight
-        loaded = moment > 0
-        if not loaded.any():
-            loaded[:] = True
     else:
         moment = torque * weight / max(weight.sum(), 1e-300)
     at, steps, converged = math.nan if twist is None else twist, 0, n == 0 and torque is None
@@ -521,6 +558,18 @@ def _newton(
             converged = torque is None and not (overlap > closed).any()
             loaded = points.touch <= points.touch.min()
     return Solution(points, at, moment, _tangent(law, points, moment), converged, steps)
+
+
+def _density(before: Solution, points: Points) -> Array:
+    """Moments per width of a solution at other points, straight along its lines (N), shape (n,)."""
+    density = before.moment / before.points.weight
+    found = np.zeros(len(points))
+    for k in np.unique(points.pair).tolist():
+        of_pair, known = np.flatnonzero(points.pair == k), np.flatnonzero(before.points.pair == k)
+        if len(known):
+            known = known[np.argsort(before.points.z[known])]
+            found[of_pair] = np.interp(points.z[of_pair], before.points.z[known], density[known])
+    return found
 
 
 def _tangent(law: PairLaw, points: Points, moment: Array) -> Array:
