@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..base.tables.gearbox import NamedMesh
     from ..base.tables.loadmap import LoadMapTable
     from ..gears.geometry.pair import GearPair
+    from ..gears.width import ContactLines, WidthSweep
 
 #: Options of `gearfe stiffness` that are for loads alike along the face width.
 PLANE_OPTIONS = ("check", "animation")
@@ -92,9 +93,13 @@ def run_along_width(
         width_job.check_map_job(job, loads)
     folder = output_folder(args.out)
     lines = width_job.job_lines(job, watch=watch)
-    by_shafts = None
+    by_shafts, untilted, solve = None, lines, None
     if shafts is not None:
         by_shafts = shaft_tilts.job_tilts(job, lines, shafts, loads, watch)
+
+        def solve(changed: ContactLines) -> WidthSweep:
+            return shaft_tilts.job_tilts(job, changed, shafts, loads, None).sweep
+
         sweep, lines = by_shafts.sweep, by_shafts.lines
     else:
         sweep = width_job.job_sweep(job, lines, loads, watch)
@@ -102,10 +107,8 @@ def run_along_width(
     flanks = flank_loads(job, wide, sweep)
     tables = {} if loads is None else {loads.NAME: asdict(loads)}
     errors = None
-    # each torque of a map has tilts of its own by the shafts
-    known = by_shafts is None or loads is None
-    if known and not args.no_estimate and (sweep.status == "converged").any():
-        errors = width_job.estimated_errors(job, lines, sweep, loads, watch)
+    if not args.no_estimate and (sweep.status == "converged").any():
+        errors = width_job.estimated_errors(job, untilted, sweep, loads, watch, solve)
     roots = None
     if loads is not None and loads.root_stress and (sweep.status == "converged").any():
         from ..gears.gearmesh.width_root import wide_roots

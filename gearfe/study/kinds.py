@@ -118,15 +118,18 @@ def _along_width(job: Any, shared: Shared, table: Any, file: tuple[Raw, Path], *
     gears = [(gear.teeth, gear.form, gear.drawn, gear.y_mm) for gear in job.mesh.gears]
     sizes = job.materials, job.table.coarsen, job.table.flank_coarsen, job.mesh.flank
     lines = width_job.job_lines(job, keep=partial(shared.get, repr((gears, job.mesh.centre_distance_mm, sizes))))
+    untilted, solve = lines, None
     if shafts is None:
         sweep = width_job.job_sweep(job, lines, table)
     else:
         by_shafts = shaft_tilts.job_tilts(job, lines, shafts, table, None)
         sweep, lines = by_shafts.sweep, by_shafts.lines
+
+        def solve(changed: Any) -> Any:
+            return shaft_tilts.job_tilts(job, changed, shafts, table, None).sweep
+
     mesh = lines.compliance.mesh
-    # each torque of a map has tilts of its own by the shafts
-    known = estimate and (by_shafts is None or table is None)
-    errors = width_job.estimated_errors(job, lines, sweep, table, Stopwatch()) if known else None
+    errors = width_job.estimated_errors(job, untilted, sweep, table, Stopwatch(), solve) if estimate else None
     roots = wide_roots(lines, sweep) if table is not None and table.root_stress else None
     name = "stiffness" if table is None else "loadmap"
     rows = {name: sweep_columns(job, mesh, sweep, roots), "load": load_columns(job, sweep)}

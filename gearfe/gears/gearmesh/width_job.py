@@ -325,7 +325,16 @@ def job_lines(job: StiffnessJob, *, keep: Keep | None = None, watch: Stopwatch |
 
 def stiffness_sweep(job: StiffnessJob, lines: ContactLines, watch: Stopwatch | None = None) -> WidthSweep:
     """Return the sweep of [stiffness]: one torque, or one twist, over its angles."""
-    t, angles = job.table, stiffness_angles(job)
+    return _at_angles(job, lines, stiffness_angles(job), watch)
+
+
+def position_sweep(job: StiffnessJob, lines: ContactLines, angle: float) -> WidthSweep:
+    """Return the contact at one pinion angle (rad) under the load of [stiffness]."""
+    return _at_angles(job, lines, np.array([angle]), None)
+
+
+def _at_angles(job: StiffnessJob, lines: ContactLines, angles: Array, watch: Stopwatch | None) -> WidthSweep:
+    t = job.table
     load: dict[str, Any] = {"torques": t.torque_Nm} if t.twist_deg is None else {"twists": math.radians(t.twist_deg)}
     try:
         return sweep_width(lines, **load, angles=angles, watch=watch)
@@ -365,7 +374,12 @@ def map_angles(job: StiffnessJob, table: LoadMapTable) -> Array:
 
 
 def estimated_errors(
-    job: StiffnessJob, lines: ContactLines, sweep: WidthSweep, table: LoadMapTable | None, watch: Stopwatch
+    job: StiffnessJob,
+    lines: ContactLines,
+    sweep: WidthSweep,
+    table: LoadMapTable | None,
+    watch: Stopwatch,
+    solve: Callable[[ContactLines], WidthSweep] | None = None,
 ) -> dict[str, list[float]] | dict[str, float]:
     """Return relative errors of the headline numbers of a sweep: for each load of a map, or of the one of [stiffness].
 
@@ -384,6 +398,8 @@ def estimated_errors(
         Of the load map, see `job_sweep`.
     watch
         Takes the time.
+    solve : callable, optional
+        Gives the sweep of other lines of contact where `job_sweep` does not: of gears that their shafts tilt.
     """
     mesh, flanks = lines.compliance.mesh, lines.flanks
     numbers = headline_numbers(sweep)
@@ -399,7 +415,7 @@ def estimated_errors(
                 changed = replace(lines, density=2.0 * lines.density)
             else:
                 changed = contact_lines(wide_compliance(variant), flanks)
-            other = headline_numbers(job_sweep(job, changed, table))
+            other = headline_numbers(job_sweep(job, changed, table) if solve is None else solve(changed))
         for name, value in numbers.items():
             with np.errstate(invalid="ignore", divide="ignore"):
                 found[name] += np.where(value != 0.0, np.abs(other[name] - value) / share / np.abs(value), np.nan)
