@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Teeth of each gear whose flanks are fine in a deck, by default.
 DECK_TEETH = 3
+#: Most layers of elements along the width.
+MOST_LAYERS = 200
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,6 +52,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="an input deck that CalculiX runs unchanged: contact at the load of [stiffness] (.inp)",
     )
+    parser.add_argument(
+        "--layers",
+        type=int,
+        metavar="N",
+        help="layers of elements along the width of gears whose load varies along it (default: by their width)",
+    )
     add_pictures(parser)
     add_json(parser)
     add_keys(parser, StiffnessTable, "coarsen", "flank_coarsen")
@@ -58,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the file and name its groups."""
     from ..base.config import read_toml
-    from ..base.tables.gearbox import check_alike_along
+    from ..base.errors import InputError
     from ..base.tables.jobs import only_mesh
 
     out = Path(args.out) if args.out else Path("out") / Path(args.job).stem / "mesh"
@@ -72,8 +80,14 @@ def run(args: argparse.Namespace) -> int:
 
     from ..gears.geometry.pair import pair_of
 
-    check_alike_along(mesh, "a mesh of finite elements", places=False)
     pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
+    if mesh.along_width(places=False):
+        from .solid_mesh import write_solid_mesh
+
+        return write_solid_mesh(args, mesh, table, pair)
+    if args.layers is not None:
+        problem = "is for gears whose load varies along the face width: these are meshed in the plane"
+        raise InputError("--layers", args.layers, problem, "leave it out")
 
     from ..base.files import output_folder
     from ..gears.gearmesh.job import StiffnessJob
@@ -109,6 +123,8 @@ def _check(args: argparse.Namespace) -> None:
 
     if args.teeth is not None and args.teeth < 1:
         raise InputError("--teeth", args.teeth, "must be >= 1", "3 reach as far as a common pair meshes")
+    if args.layers is not None and not 1 <= args.layers <= MOST_LAYERS:
+        raise InputError("--layers", args.layers, f"must be >= 1 and <= {MOST_LAYERS}", "5 to 20 are usual")
     if args.teeth is not None and args.sector:
         raise InputError("--teeth", args.teeth, "goes with whole gears", "leave out --sector")
     if args.deck and (args.sector or args.gear != "both"):

@@ -182,8 +182,8 @@ def refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, *line
         (["stiffness", "--plane", "stress"], "stiffness.plane = 'stress': is for loads alike"),
         (["stiffness", "--points-per-edge", "5"], "stiffness.points_per_edge = 5: is for loads alike"),
         (["stiffness", "--torque-Nm", "1e6"], "stiffness.torque_Nm = 1000000.0: must be <="),
-        (["mesh", "--sector"], "pair.misalignment_um = 5.0: makes the load vary along the face width: a mesh"),
-        (["mesh", "--deck"], "pair.misalignment_um = 5.0: makes the load vary along the face width: a mesh"),
+        (["mesh", "--layers", "0"], "--layers = 0: must be >= 1"),
+        (["mesh", "--deck", "--set", "stiffness.plane='stress'"], "stiffness.plane = 'stress': is for loads alike"),
     ],
 )
 def test_what_does_not_take_a_load_along_the_width(

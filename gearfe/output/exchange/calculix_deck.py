@@ -1,7 +1,8 @@
 """A CalculiX (Abaqus) deck of a gear pair in contact that runs as it is, and the torque from what it prints.
 
-Plane elements of second order, linear elastic, large rotations (NLGEOM), contact surface to surface with a linear
-pressure of `PENALTY`; the bore of the pinion is held, that of the wheel turned by the twist. Millimetres, N, MPa.
+Elements of second order in the plane or in space, linear elastic, large rotations (NLGEOM), contact surface to surface
+with a linear pressure of `PENALTY`; the bore of the pinion is held, that of the wheel turned by the twist, and of gears
+in space neither moves along the axis. Millimetres, N, MPa.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ...base.files import read_text, whole_file
 from ...base.typing import Array
 from .abaqus_cards import Fault, cards, real, split
 from .included import lines_of
-from .mesh_export import MeshPart, abaqus_mesh
+from .mesh_export import Part, SolidPart, abaqus_mesh, boundary_elements
 
 #: Contact stiffness (N/mm3): stiffer ones change the torque by less than 1e-4 and cost iterations.
 PENALTY = 1e8
@@ -42,14 +43,14 @@ class Deck:
     twist
         Rotation of the wheel's bore, or rim, in the step (rad), counter-clockwise.
     width
-        Thickness (m).
+        Thickness of gears in the plane (m).
     plane
-        ``strain`` or ``stress``.
+        ``strain`` or ``stress``, of gears in the plane.
     heading
         Lines for the head of the deck.
     """
 
-    parts: Mapping[str, MeshPart]
+    parts: Mapping[str, Part]
     materials: Sequence[tuple[float, float]]
     centre: float
     twist: float
@@ -62,19 +63,23 @@ def write_deck(path: str | Path, deck: Deck) -> None:
     """Write the deck; ``ccx NAME`` (without .inp) runs it and leaves the reactions of the wheel's bore in NAME.dat."""
     lines = ["*HEADING", "gear pair in contact, by gearfe; mm, N, MPa", *(f"** {text}" for text in deck.heading)]
     lines += abaqus_mesh(deck.parts, deck.plane)
+    wheel, first = deck.parts["wheel"], len(deck.parts["pinion"].points)
+    solid = isinstance(wheel, SolidPart)
     for name, (youngs_modulus, poisson_ratio) in zip(deck.parts, deck.materials, strict=True):
         lines += [f"*MATERIAL, NAME=M_{name}", "*ELASTIC", f"{1e-6 * youngs_modulus:.9g}, {poisson_ratio:.9g}"]
-        lines += [f"*SOLID SECTION, ELSET={name}, MATERIAL=M_{name}", f"{1e3 * deck.width:.9g}"]
+        lines.append(f"*SOLID SECTION, ELSET={name}, MATERIAL=M_{name}")
+        lines += [] if solid else [f"{1e3 * deck.width:.9g}"]
     lines += ["*SURFACE INTERACTION, NAME=TOUCH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{PENALTY:g}"]
     lines += ["*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE", "S_wheel_contact, S_pinion_contact"]
-    lines += ["*STEP, NLGEOM, INC=200", "*STATIC", f"{FIRST:g}, 1.", "*BOUNDARY", "pinion_bore, 1, 2"]
+    lines += ["*STEP, NLGEOM, INC=200", "*STATIC", f"{FIRST:g}, 1.", "*BOUNDARY"]
+    lines.append(f"pinion_bore, 1, {3 if solid else 2}")
     c, s = math.cos(deck.twist) - 1.0, math.sin(deck.twist)
-    wheel, first = deck.parts["wheel"], len(deck.parts["pinion"].points)
     held = "rim" if "rim" in wheel.boundaries else "bore"
-    for node in np.unique(wheel.boundaries[held]):
-        x, y = 1e3 * (wheel.points[node] - [deck.centre, 0.0])
+    for node in np.unique(boundary_elements(wheel, held)[1]):
+        x, y = 1e3 * (wheel.points[node, :2] - [deck.centre, 0.0])
         number = first + node + 1
         lines += [f"{number}, 1, 1, {c * x - s * y:.12e}", f"{number}, 2, 2, {s * x + c * y:.12e}"]
+    lines += [f"wheel_{held}, 3, 3"] if solid else []
     lines += [f"*NODE PRINT, NSET=wheel_{held}, FREQUENCY=999", "RF"]
     lines += ["*NODE FILE, FREQUENCY=999", "U", "*EL FILE, FREQUENCY=999", "S", "*END STEP"]
     with whole_file(path) as temporary:
