@@ -124,9 +124,10 @@ def test_right_flanks_drive_where_the_driver_turns_backwards(tmp_path: Path) -> 
             read(tmp_path, text(pair="misalignment_um = 8.0")),
         )
     )
-    for other in (two, tilted):
-        np.testing.assert_allclose(other.stiffness.values, one.stiffness.values, rtol=1e-4)
-        np.testing.assert_allclose(other.transmission_error.values, one.transmission_error.values, atol=1e-9)
+    # a tilt displaces flanks by n.e of what a slope does: where tips bear, that is a little less
+    for other, rel, near in ((two, 1e-12, 1e-15), (tilted, 1e-4, 2e-9)):
+        np.testing.assert_allclose(other.stiffness.values, one.stiffness.values, rtol=rel)
+        np.testing.assert_allclose(other.transmission_error.values, one.transmission_error.values, atol=near)
         np.testing.assert_allclose(other.tilting.lever.values, one.tilting.lever.values, atol=1e-6)
         assert other.tilting.stiffness == pytest.approx(one.tilting.stiffness, rel=1e-3)
     assert one.tilting.lever.values.min() > 0.0  # the loaded end, for both senses of rotation
