@@ -62,9 +62,9 @@ STIFFEST = 0.05
 LEAST_AHEAD = 0.1
 #: Gauss points over the load of what a contact stores.
 ENERGY_POINTS = 5
-#: How often points are placed at a twist: each time the ends of the load are nearer by a factor of ten and more, and
-#: with them the torque: after five it is within 1e-8.
-TWIST_PLACINGS = 5
+#: Change of the torque in parts of itself that ends the placing of points at a twist: what is left is a tenth of it,
+#: since the ends of the load come nearer by that each time.
+TWIST_PLACED = 1e-4
 #: Points of a stretch without load, and the least length (widths) of a stretch that ends where the load does.
 FREE_POINTS, LEAST_STRETCH = 2, 1e-3
 #: Places on a line at which its gap is looked at.
@@ -465,11 +465,13 @@ def solve_position(
     """
     if torque is None:
         assert twist is not None
-        at_twist: Solution | None = None
-        for _ in range(TWIST_PLACINGS):
+        at_twist = _newton(lines, place_points(lines, angle, twist), twist=twist, torque=None)
+        for _ in range(PLACINGS):
+            torque_before = at_twist.moment.sum()
             points = place_points(lines, angle, twist, at_twist)
             at_twist = _newton(lines, points, twist=twist, torque=None, before=at_twist)
-        assert at_twist is not None
+            if abs(at_twist.moment.sum() - torque_before) <= TWIST_PLACED * torque_before:
+                break
         return at_twist
     least = look_at(lines, angle).least
     if not math.isfinite(least):
