@@ -16,6 +16,26 @@ from .gears import pair as gear_pair
 SPUR = gear_pair(tip_round=1e-4)
 
 
+#: A job file of a small helical pair: 14/16 teeth of 2.5 mm, 15 degrees, 5 mm wide.
+HELICAL_JOB = """
+[pair]
+module_mm = 2.5
+pressure_angle_deg = 20.0
+helix_angle_deg = 15.0
+face_width_mm = 5.0
+tip_round_mm = 0.1
+[pair.pinion]
+teeth = 14
+profile_shift = 0.3
+bore_diameter_mm = 20.0
+[pair.wheel]
+teeth = 16
+bore_diameter_mm = 24.0
+[stiffness]
+torque_Nm = 40.0
+"""
+
+
 def helical_mesh(hand: float = 1.0, *, teeth: tuple[int, int] = (23, 47), swapped: bool = False) -> WideMesh:
     """Helical gears of normal module 2 mm, 15 degrees, 20 mm wide, on coarse sections."""
     beta, module, width = math.radians(15.0), 2e-3, 20e-3
