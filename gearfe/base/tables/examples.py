@@ -232,6 +232,54 @@ machine = "fan"
 torque_over_speed = "-0.02*speed*abs(speed)"
 """
 
+_STAGE_GEAR: dict[str, Any] = {"module_mm": 4.0, "pressure_angle_deg": 20.0, "face_width_mm": 50.0}
+_STAGE_MESH: dict[str, Any] = {"mesh_model": "variable_stiffness", "backlash_um": 100.0}
+
+#: A planetary stage with three planets; planets and their meshes are written once.
+PLANETARY: dict[str, dict[str, Any]] = {
+    "gears": {
+        "sun": {"teeth": 17, "bore_diameter_mm": 30.0, **_STAGE_GEAR, "shaft": "sun", "y_mm": 0.0},
+        "planet": {"teeth": 22, "bore_diameter_mm": 40.0, **_STAGE_GEAR, "shaft": "planet", "y_mm": 0.0},
+        "ring": {
+            "teeth": -61, "rim_diameter_mm": 290.0, "addendum": 0.85, **_STAGE_GEAR, "shaft": "ring", "y_mm": 0.0,
+        },
+    },
+    "meshes": {
+        "sun_planet": {"driver": "sun", "driven": "planet", **_STAGE_MESH},
+        "planet_ring": {"driver": "planet", "driven": "ring", **_STAGE_MESH},
+    },
+    "shafts": {
+        "sun": {"x_mm": 0.0, "length_mm": 120.0, "radius_mm": 15.0},
+        "planet": {"x_mm": 78.0, "length_mm": 60.0, "radius_mm": 20.0, "carrier": "arm"},
+        "ring": {
+            "x_mm": 0.0, "length_mm": 60.0, "radius_mm": 100.0, "mass_kg": 8.0, "polar_inertia_kg_m2": 0.14,
+            "transverse_inertia_kg_m2": 0.08, "speed_ratio": 0, "holding_stiffness_Nm_per_rad": 2e7,
+        },
+        "carrier": {"x_mm": 0.0, "length_mm": 100.0, "radius_mm": 60.0},
+    },
+    "carriers": {"arm": {"shaft": "carrier", "planets": 3, "pin_stiffness_N_per_m": 4e8}},
+    "bearings": {
+        name: {"shaft": name, "y_mm": y, "stiffness": [across, along, across, tilts, tilts]}
+        for name, y, across, along, tilts in (
+            ("sun", -50.0, 1e7, 1e8, 1e6), ("ring", 0.0, 1e9, 1e9, 1e7), ("carrier", 40.0, 5e8, 5e8, 5e6),
+        )
+    },
+}  # fmt: skip
+
+PLANETARY_TRAIN: dict[str, Any] = {
+    "housing": "rigid",
+    "duration_ms": 60.0,
+    "step_us": 20.0,
+    "drive": {"shaft": "sun", "attachment": "sun", "speed_rad_per_s": 150.0},
+    "loads": [
+        {
+            "shaft": "carrier", "attachment": "carrier", "torque_Nm": -3000.0, "ramp_centre_ms": 4.0,
+            "ramp_width_ms": 6.0,
+        },
+    ],
+    "damping": {"rayleigh_beta_s": 2e-6},
+}  # fmt: skip
+
 MECHANISM: dict[str, Any] = {
     "title": "Crank and rod",
     "run": {"end_s": 10.0, "step_s": 0.005, "tolerance": 1e-9},
@@ -334,6 +382,18 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
         "NAME: one of them). Over its speed: gearfe runup FILE, gearfe modes FILE. Shafts run along y; speeds and "
         "torques are positive about +y. ",
     ),
+    "planetary": (
+        "a planetary stage: sun, three planets and a ring",
+        {
+            **PLANETARY,
+            "stiffness": {"torque_Nm": 300.0, "kinematics": "small"},
+            "train": PLANETARY_TRAIN,
+            "modes": {},
+            "runup": {"speed_start_rad_per_s": 40.0, "speed_stop_rad_per_s": 240.0, "speeds": 60},
+        },
+        "Look at it first: gearfe gear FILE. Over its speed: gearfe runup FILE, gearfe modes FILE. Planets, their "
+        "gears and meshes are written once; a ring has a negative number of teeth; speed_ratio = 0 holds a shaft. ",
+    ),
     "housing": (
         "an elastic housing: frequencies, modes, reduced body",
         {"housing": HOUSING},
@@ -344,7 +404,7 @@ JOBS: dict[str, tuple[str, dict[str, Mapping[str, Any]], str]] = {
 
 
 #: Kinds that another command runs.
-RUN_BY = {"gearbox": "vibration"}
+RUN_BY = {"gearbox": "vibration", "planetary": "vibration"}
 
 
 def job_file(kind: str) -> str:
