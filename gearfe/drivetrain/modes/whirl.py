@@ -239,6 +239,7 @@ def train_modes(model: TrainModel, speeds: ArrayLike, highest_hz: float = 5000.0
         For speeds that change sign, are not sorted, or turn against the drive of the model, and for a train that
         cannot vibrate.
     """
+    model.check_constant("modes do not take")
     given = _checked(model, speeds)
     sense = float(np.sign(given[np.argmax(np.abs(given))])) or drive_sense(model.train.driven.speed) or 1.0
     forms = train_forms(model, sense)

@@ -281,7 +281,23 @@ def evaluate(
 
 
 def moved(system: Oscillator, speed: float, flexibility: ComplexArray, forces: ComplexArray) -> ComplexArray:
-    """Amplitudes (K + 1, m) of the freedoms under forces of such amplitudes and the constant ones."""
+    """Return amplitudes of the freedoms under forces and the constant ones.
+
+    Parameters
+    ----------
+    system : Oscillator
+        The oscillator.
+    speed : float
+        Speed of the drive (rad/s).
+    flexibility : ndarray of complex, shape (K + 1, m, m)
+        H at the harmonics, see `flexibility_of`.
+    forces : ndarray of complex, shape (K + 1, m)
+        Amplitudes of the forces (N, N m).
+
+    Returns
+    -------
+    places : ndarray of complex, shape (K + 1, m)
+    """
     made = (flexibility @ forces[..., None])[..., 0]
     made[0] += system.rest(speed)
     return np.asarray(made)

@@ -171,6 +171,7 @@ def _directions(flank: Flank) -> tuple[int, int, int, int]:
 def _check(model: TrainModel) -> None:
     if not model.meshes:
         raise InputError("train.meshes", None, "is empty: nothing excites the train", "add a mesh")
+    model.check_constant("steady states do not take")
     for line in model.meshes:
         if line.rigid:
             problem = "is a constraint without a stiffness, which excites nothing"

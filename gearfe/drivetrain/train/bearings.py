@@ -8,6 +8,7 @@ forces that are left open those of least squares are taken.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -33,15 +34,21 @@ class BearingLoads:
     ----------
     of_forces, of_places, of_rates, of_accelerations : (size, 6 bores)
         Of the train's forces on the coordinates, the coordinates and their rates.
+    of_still_places, of_still_rates : (size, 6 bores)
+        Of the bores' own motion in bearings whose shaft is in a frame that turns.
     """
 
     of_forces: Array
     of_places: Array
     of_rates: Array
     of_accelerations: Array
+    of_still_places: Array
+    of_still_rates: Array
 
     def __call__(self, q: Values, v: Values, a: Values, acting: Values) -> Values:
         """Force (N) and moment (N m) on each bore about its reference point, along x, y, z; shape (n, bores, 6).
+
+        Bearings of shafts in frames that turn, in an elastic housing, have it where these are as at the start.
 
         Parameters
         ----------
@@ -50,12 +57,28 @@ class BearingLoads:
         acting : (n, size)
             Forces of the train on the coordinates, those of `TrainForces`.
         """
+        turning, still = self.parts(q, v, a, acting)
+        return turning + still
+
+    def parts(self, q: Values, v: Values, a: Values, acting: Values) -> tuple[Values, Values]:
+        """Return the loads in two parts: along axes of the frames of the shafts, and along axes that stand still.
+
+        Parameters
+        ----------
+        q, v, a, acting : (n, size)
+            As of a call.
+
+        Returns
+        -------
+        turning, still : (n, bores, 6)
+        """
         found = acting @ self.of_forces + q @ self.of_places + v @ self.of_rates + a @ self.of_accelerations
-        return found.reshape(len(found), -1, 6)
+        still = q @ self.of_still_places + v @ self.of_still_rates
+        return found.reshape(len(found), -1, 6), still.reshape(len(found), -1, 6)
 
 
 def bearing_loads(
-    train: GearTrain, system: System, shafts: Shafts, bores: tuple[str, ...], *, shared: bool
+    train: GearTrain, system: System, shafts: Shafts, bores: tuple[str, ...], *, shared: bool, turning: Sequence[bool]
 ) -> BearingLoads:
     """Loads on the bores that carry shafts.
 
@@ -67,6 +90,8 @@ def bearing_loads(
         Names of the bores, in the order of the results.
     shared
         Whether statics leave open how the hinges of a shaft share its load.
+    turning
+        For each shaft, whether it is described in a frame that turns.
     """
     e1, e2, axis = train.frame
     to_global = np.zeros((5, 6))
@@ -81,33 +106,57 @@ def bearing_loads(
                 counts[row + 3 : row + 5] = MOMENT
     multipliers = np.linalg.pinv(G / counts[:, None]) / counts
     springs = {bearing.bore: bearing for bearing in train.bearings}
-    parts = [np.zeros((system.size, 6 * len(bores))) for _ in range(3)]
+    parts = [np.zeros((system.size, 6 * len(bores))) for _ in range(5)]
     for number, bore in enumerate(bores):
         at = slice(6 * number, 6 * number + 6)
         if bore not in springs:
             row = first[f"hinge {bore}"]
             parts[0][:, at] = multipliers[:, row : row + 5] @ to_global
             continue
-        rows = shaft_motion(train, shafts, bore)
-        stiffness, damping = springs[bore].stiffness_matrix, springs[bore].damping_matrix
-        parts[1][:, at] = rows.T @ (stiffness @ to_global)
-        parts[2][:, at] = rows.T @ ((damping + train.damping.beta * stiffness) @ to_global)
-    hinges, places, rates = parts
+        shaft = next(i for i, shaft in enumerate(train.shafts) if bore in shaft.bores)
+        of_shaft, of_bore = motion_parts(train, shafts, shaft, bore)
+        stiffness = springs[bore].stiffness_matrix
+        damping = springs[bore].damping_matrix + train.damping.beta * stiffness
+        for first_part, rows in ((1, of_shaft), (3 if turning[shaft] else 1, -of_bore)):
+            for part, matrix in enumerate((stiffness, damping), start=first_part):
+                parts[part][:, at] += rows.T @ (matrix @ to_global)
+    hinges, places, rates, still_places, still_rates = parts
     return BearingLoads(
-        hinges, places - system.stiffness.T @ hinges, rates - system.damping.T @ hinges, -system.mass.T @ hinges
-    )
+        hinges, places - system.stiffness.T @ hinges, rates - system.damping.T @ hinges, -system.mass.T @ hinges,
+        still_places, still_rates,
+    )  # fmt: skip
 
 
 def shaft_motion(train: GearTrain, shafts: Shafts, bore: str) -> Array:
     """Motion of a shaft against its bore for unit coordinates of the system, (5, size); see `bore_rows`."""
-    number = next(i for i, shaft in enumerate(train.shafts) if bore in shaft.bores)
+    of_shaft, of_bore = motion_parts(
+        train, shafts, next(i for i, shaft in enumerate(train.shafts) if bore in shaft.bores), bore
+    )
+    return of_shaft - of_bore
+
+
+def motion_parts(train: GearTrain, shafts: Shafts, number: int, bore: str) -> tuple[Array, Array]:
+    """Return the motion of a shaft at a bore, and that of the bore, for unit coordinates of the system.
+
+    Parameters
+    ----------
+    train, shafts
+        The train, and its shafts in the system.
+    number
+        Of the shaft.
+    bore
+        Its name.
+
+    Returns
+    -------
+    of_shaft, of_bore : ndarray, shape (5, size)
+        See `bore_rows`.
+    """
     selector = None if train.housing is None else np.eye(train.housing.size)[:, train.housing.attachment(bore)]
     local = bore_rows(shafts.bodies[number], train.bore_points[bore], train.frame, selector)
-    rows, first = np.zeros((5, shafts.size)), int(shafts.first[number])
-    own = shafts.bodies[number].size
-    rows[:, first : first + own] = local[:, :own]
-    rows[:, : local.shape[1] - own] += local[:, own:]
-    return rows
+    own, of_bore = shafts.bodies[number].size, np.zeros((5, shafts.size))
+    of_bore[:, : local.shape[1] - own] = -local[:, own:]
+    return shafts.whole(number, local[:, :own]), of_bore
 
 
 def bore_motion(housing: ModalBody | None, bores: tuple[str, ...], size: int) -> Array:

@@ -68,7 +68,11 @@ def check_layout(train: GearTrain) -> None:
         _check_mesh(train, mesh)
     _check_room(train)
     _check_damping(train)
-    _ = train.kinematics  # which refuses trains that cannot roll or be assembled
+    ratios = train.kinematics.ratios  # which refuses trains that cannot roll or be assembled
+    if train.housing is not None:
+        for carrier in train.carriers:
+            if ratios[train.shaft_number(carrier.shaft)]:
+                _check_passes(train, carrier)
 
 
 def _names(kind: str, names: list[str], *, some: bool = True) -> None:
@@ -133,9 +137,6 @@ def _check_stages(train: GearTrain) -> None:
                 raise InputError(f"{label} holding {key}", value, "must be finite and > 0", "give it in SI units")
     if not train.carriers:
         return
-    if train.housing is not None:
-        problem = "conflicts with an elastic housing: moving planets change the masses that it supports"
-        raise InputError("train.housing", "elastic", problem, 'write housing = "rigid" in [train]')
     carried: dict[str, str] = {}
     for carrier in train.carriers:
         _check_carrier(train, carrier, carried)
@@ -192,6 +193,21 @@ def _check_carried_mesh(train: GearTrain, mesh: GearMesh) -> None:
             problem = f"shaft {shaft!r} is {1e3 * off:.6g} mm off the axis of carrier {carrier.name!r}"
             cure = "move the shaft onto that axis (x_mm, z_mm): its gear meshes with planets that go round it"
             raise InputError(label, None, problem, cure)
+
+
+def _check_passes(train: GearTrain, carrier: Carrier) -> None:
+    """In an elastic housing, shafts of a stage whose carrier turns are held by springs, and dampers are of parts."""
+    for shaft in train.shafts:
+        if carrier in train.frames_of(shaft.name) and shaft.bores and train.hinged(shaft.name):
+            problem = f"is held by a hinge in an elastic housing, and turns there with carrier {carrier.name!r}"
+            cure = f"give its bearings a stiffness: {', '.join(shaft.bores)}"
+            raise InputError(f"shaft {shaft.name!r} bearings", list(shaft.bores), problem, cure)
+    if np.any(train.damping.ratio):
+        problem = (
+            f"is of modes, and carrier {carrier.name!r} that turns in an elastic housing changes them all the time"
+        )
+        cure = "leave it out: damp by rayleigh_beta, meshes, bearings and the housing's own damping ratio"
+        raise InputError("train damping ratio", train.damping.ratio, problem, cure)
 
 
 def _check_frame(train: GearTrain, shaft: Shaft, frames: list[Carrier]) -> None:

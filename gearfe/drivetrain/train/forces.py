@@ -17,6 +17,9 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
   :math:`-(G - \kappa_0 u_t)` along the tilt, whose mean stiffness :math:`\kappa_0` the system has, too;
 - *gyroscopic*: :math:`-J_p\Omega\,(u_{d+1}', -u_d')`, :math:`\Omega = g\psi' + u_s'`, on the tilts d, d + 1 of a
   shaft with the spin s;
+- *turned springs and dampers* between a shaft in the frame of a carrier and a bore of an elastic housing: with its two
+  directions b of the bore, the w of the shaft times the stiffness, and the rotation R of the frame,
+  :math:`(R - 1)\,u_w` along b and :math:`(R^T - 1)\,u_b` along w, for R = 1 at the start is in the system's stiffness;
 - *torques*: functions of time along a direction d, and of the true speed there, :math:`T(g\psi' + u_d') + c\,u_d'`,
   c the slope that the system's damping has already.
 
@@ -402,6 +405,36 @@ class Gyro:
 
 
 @dataclass(frozen=True)
+class Turned:
+    """What the rotation of a frame changes of the forces between two motions in a plane, one of them in the frame.
+
+    Attributes
+    ----------
+    still, turning
+        Numbers of the directions of the motion that stands still, and of the other one times a stiffness or a damping
+        constant; the second of each is the next.
+    ratio
+        Speed of the frame over that of the drive.
+    of_rates
+        Whether it is a damper.
+    """
+
+    still: int
+    turning: int
+    ratio: float
+    of_rates: bool
+
+    def add(self, angle: Array, motion: Array, out: Array) -> None:
+        """Add its forces at rotations (n,) of the drive (rad), motion and forces of shape (n, directions)."""
+        b, w = self.still, self.turning
+        cosine, sine = np.cos(self.ratio * angle) - 1.0, np.sin(self.ratio * angle)
+        out[:, b] += cosine * motion[:, w] - sine * motion[:, w + 1]
+        out[:, b + 1] += sine * motion[:, w] + cosine * motion[:, w + 1]
+        out[:, w] += cosine * motion[:, b] + sine * motion[:, b + 1]
+        out[:, w + 1] += cosine * motion[:, b + 1] - sine * motion[:, b]
+
+
+@dataclass(frozen=True)
 class SpeedTorque:
     """Torque along a direction over the true speed there.
 
@@ -445,6 +478,8 @@ class TrainForces:
         Pairs (direction, torque over time in N m).
     speed_torques
         Torques over speed.
+    turned
+        Springs and dampers between frames of carriers and an elastic housing.
     """
 
     size: int
@@ -453,6 +488,7 @@ class TrainForces:
     flanks: tuple[Flank, ...]
     torques: tuple[tuple[int, TimeFunction], ...]
     speed_torques: tuple[SpeedTorque, ...] = ()
+    turned: tuple[Turned, ...] = ()
 
     def of_flanks(self, t: Array, u: Array, du: Array) -> list[FlankForces]:
         """Forces of each flank at the times t (n,), u and du of shape (n, directions)."""
@@ -491,6 +527,9 @@ class TrainForces:
                 half = 0.5 * gyro.euler * gyro.polar * gyro.ratio * self.angle(t, 2)
                 out[:, d] += gyro.stiffening * rate**2 * first - half * second
                 out[:, d + 1] += gyro.stiffening * rate**2 * second + half * first
+        angle = self.angle(t)
+        for spring in self.turned:
+            spring.add(angle, du if spring.of_rates else u, out)
         for direction, torque in self.torques:
             out[:, direction] += torque(t)
         for over in self.speed_torques:

@@ -34,11 +34,11 @@ from ...multibody import (
 )
 from ...multibody.core.elimination import ModalCoordinates, modal_coordinates
 from ...multibody.series.timefunctions import sine
-from .bearings import BearingLoads, bearing_loads, bore_motion, shaft_motion
+from .bearings import BearingLoads, bearing_loads, bore_motion, motion_parts, shaft_motion
 from .checks import SAME, check_train, overlap
 from .driveline import Driveline, MachineRotor, driveline, machine_rotors
 from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, pin_rows, planes, rotor
-from .forces import Gyro, SpeedTorque, TrainForces, derivative
+from .forces import Gyro, SpeedTorque, TrainForces, Turned, derivative
 from .gear_train import Carrier, Drive, Five, GearTrain, Load, Pin, Shaft
 from .kinematics import Kinematics, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
@@ -218,7 +218,8 @@ class TrainModel(Facts):
     def bearings(self) -> BearingLoads:
         """Loads on the bores that carry shafts."""
         shared = len(self.start.freedoms.redundant) > 0
-        return bearing_loads(self.train, self.system, self.placed, self.bores, shared=shared)
+        turning = [bool(ratio) for ratio in self.frame_ratios]
+        return bearing_loads(self.train, self.system, self.placed, self.bores, shared=shared, turning=turning)
 
     @cached_property
     def frame_ratios(self) -> Array:
@@ -254,6 +255,15 @@ class TrainModel(Facts):
         held = {bore: number for number, shaft in enumerate(self.train.shafts) for bore in shaft.bores}
         turns = self.frame_turns(t, [held[bore] for bore in self.bores])
         return np.asarray(np.einsum("nbij,nbkj->nbki", turns, vectors))
+
+    def check_constant(self, what: str) -> None:
+        """Raise `InputError` for a train whose linear part changes all the time, which `what` does not take."""
+        if not self.forces.turned:
+            return
+        names = [c.name for c in self.train.carriers if self.ratios[self.train.shaft_number(c.shaft)]]
+        problem = f"changes what holds the shafts of carrier {names[0]!r} as it turns, which {what}"
+        cure = 'look at it with gearfe vibration, or write housing = "rigid"'
+        raise InputError("train.housing", "elastic", problem, cure)
 
     @cached_property
     def turning(self) -> Turning:
@@ -389,7 +399,7 @@ def _assembled(train: GearTrain, lines: tuple[MeshLine, ...] = ()) -> TrainModel
     spin = np.array([_turning(train, placed, shaft.name) for shaft in train.shafts])
     springs = driveline(train, placed)
     elements = [
-        *bodies, *_supports(train, placed, housing, rotors), *_stages(train, placed),
+        *bodies, *_supports(train, placed, housing, rotors), *_stages(train, placed, housing),
         *(line.element(bodies) for line in lines),
         *springs.elements(train, placed, rotors, train.damping), *_slopes(train, placed, bodies), changing,
     ]  # fmt: skip
@@ -547,8 +557,27 @@ def _forces(
     at = len(columns)
     columns += [direction for direction, _ in over_speed]
     speeds = tuple(replace(over, direction=at + i) for i, (_, over) in enumerate(over_speed))
-    made = TrainForces(len(columns), angle, tuple(gyros), flanks, numbered, speeds)
+    turned = [spring for n, turn in enumerate(turns) if turn for spring in _turned(train, shafts, n, turn, columns)]
+    made = TrainForces(len(columns), angle, tuple(gyros), flanks, numbered, speeds, tuple(turned))
     return made, np.array(columns).T
+
+
+def _turned(train: GearTrain, shafts: Shafts, number: int, turn: float, columns: list[Array]) -> list[Turned]:
+    """Bearings of a shaft in a frame that turns `turn` times as fast as the drive, in an elastic housing."""
+    if train.housing is None:
+        return []
+    found = list[Turned]()
+    bearings = {bearing.bore: bearing for bearing in train.bearings}
+    for bore in train.shafts[number].bores:
+        of_shaft, of_bore = motion_parts(train, shafts, number, bore)
+        stiffness = bearings[bore].stiffness_matrix
+        damping = bearings[bore].damping_matrix + train.damping.beta * stiffness
+        for of_rates, matrix in enumerate((stiffness, damping)):
+            pushes = matrix @ of_shaft
+            for plane in ([0, 2], [3, 4]) if matrix.any() else ():  # across the axis, and tilts
+                found.append(Turned(len(columns), len(columns) + 2, turn, bool(of_rates)))
+                columns += [*of_bore[plane], *pushes[plane]]
+    return found
 
 
 def _of_frame(
@@ -640,7 +669,7 @@ def _supports(
     return made
 
 
-def _stages(train: GearTrain, shafts: Shafts) -> list[Element]:
+def _stages(train: GearTrain, shafts: Shafts, housing: ModalBlocks | None) -> list[Element]:
     """Pins of planets, and what fixes or guides shafts."""
     made: list[Element] = []
     for carrier in train.carriers:
@@ -662,12 +691,16 @@ def _stages(train: GearTrain, shafts: Shafts) -> list[Element]:
         number = train.shaft_number(guide.shaft)
         body = shafts.bodies[number]
         row = body.turn_rows(train.shaft_end(guide.shaft, 0.0))[2:]
+        touched: tuple[Element, ...] = (body,)
+        if housing is not None and train.shafts[number].bores:  # which its torque reacts on
+            selector = bore_selector(train, train.shafts[number].bores[0])
+            row, touched = np.hstack([row, -(selector[:, 3:] @ train.frame[2])[None, :]]), (body, housing)
         name = f"hold of {guide.shaft}"
         if guide.stiffness is None:
-            made.append(LinearJoint((body,), row, np.zeros(1), name=name))
+            made.append(LinearJoint(touched, row, np.zeros(1), name=name))
             continue
         square, rate = row.T @ row, guide.damping + train.damping.beta * guide.stiffness
-        made.append(LinearForce((body,), rate * square, guide.stiffness * square, name))
+        made.append(LinearForce(touched, rate * square, guide.stiffness * square, name))
     return made
 
 
@@ -789,7 +822,7 @@ def _turning(train: GearTrain, shafts: Shafts, name: str, along: float | None = 
 def _spin_reference(train: GearTrain, spin: Array) -> Array:
     rows = spin.copy()
     for i, shaft in enumerate(train.shafts):
-        if train.housing is not None:
+        if train.housing is not None and shaft.bores:
             bore = bore_selector(train, _measured_against(train, shaft.name)[0])
             rows[i, : len(bore)] -= bore[:, 3:] @ train.frame[2]
     return rows

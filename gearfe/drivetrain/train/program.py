@@ -18,7 +18,7 @@ from . import discontinuities, friction, series
 from .discontinuities import SAME
 from .forces import CurveFlank, Flank, LawFlank, TrainForces, WidthFlank
 from .friction import UNKNOWN, Sliding
-from .series import Flanks, Gyros, Places, Program, Slides, Speeds
+from .series import Flanks, Gyros, Places, Program, Slides, Speeds, Turneds
 
 #: In place of the friction of flanks without any.
 SMOOTH = Sliding(0.0, 1.0, 0, 0, 0.0, 0.0, 0.0, 0.0)
@@ -59,6 +59,14 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
             shifts.append(flank.shifts)
             rows += series.SLOTS + series.PER_SLOT * slots + series.PER_COUPLE * (slots * (slots - 1) // 2)
             pieces += series.PER_FLANK + 2 * slots
+    turned = Turneds(
+        np.array([spring.still for spring in forces.turned], dtype=np.int64),
+        np.array([spring.turning for spring in forces.turned], dtype=np.int64),
+        np.array([spring.ratio for spring in forces.turned], dtype=float),
+        np.array([spring.of_rates for spring in forces.turned], dtype=np.int64),
+        (rows + series.PER_TURNED * np.arange(len(forces.turned))).astype(np.int64),
+    )
+    rows += series.PER_TURNED * len(forces.turned)
     speeds, more, rows, pieces = _speeds(forces, rows, pieces)
     watches += more
     curve, law, row, piece = np.array(places, dtype=np.int64).reshape(-1, 4).T.copy()
@@ -66,6 +74,7 @@ def train_program(forces: TrainForces) -> tuple[Program, int, int]:
         time_arrays([forces.angle, *(torque for _, torque in forces.torques)]),
         np.array([direction for direction, _ in forces.torques], dtype=np.int64),
         _columns(Gyros, forces.gyros),
+        turned,
         _columns(Flanks, forces.flanks),
         _columns(Slides, [flank.sliding or SMOOTH for flank in forces.flanks]),
         Places(curve, law, row, piece, np.cumsum([0, *map(len, shifts)]), np.concatenate([np.zeros(0), *shifts])),

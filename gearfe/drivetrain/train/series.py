@@ -9,6 +9,7 @@ Whole numbers tell on which cells of their laws the flanks are; a step ends wher
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from ...base.typing import Array, IntArray
@@ -45,6 +46,9 @@ COUPLE, NUMBERS, COUPLE_SLOPE, BOTH, PER_COUPLE = range(5)
 #: Rows of a gyroscopic moment: angular momentum, rates of both tilts; of a frame that turns beside these its speed,
 #: its square, half the rate of the momentum, and both places.
 MOMENTUM, TILT, OTHER, TURN, TURN2, EULER, FIRST, SECOND, PER_GYRO = range(9)
+#: Rows of a turned spring: cosine less 1 and sine of the frame's rotation, motion of both directions that stand still
+#: and of both that turn.
+COSINE, SINE, STILL1, STILL2, TURNS1, TURNS2, PER_TURNED = range(7)
 #: Rows of a torque over speed: the speed from the origin of its piece, then Horner's sums of its polynomial.
 PLACE, SUMS = range(2)
 #: Column of the phase of a cell's node, and of F_0 beside the coefficients of t.
@@ -73,6 +77,16 @@ class Gyros(NamedTuple):
     stiffening: Array
     euler: Array
     offset: Array
+
+
+class Turneds(NamedTuple):
+    """Turned springs and dampers, see `gearfe.drivetrain.train.forces.Turned`."""
+
+    still: IntArray
+    turning: IntArray
+    ratio: Array
+    of_rates: IntArray
+    row: IntArray  # (n,) first row
 
 
 class Flanks(NamedTuple):
@@ -136,6 +150,7 @@ class Program(NamedTuple):
     times: Times  # psi and the torques
     torques: IntArray  # directions
     gyros: Gyros
+    turned: Turneds
     flanks: Flanks
     slides: Slides
     places: Places
@@ -203,6 +218,8 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
                 memory[row + EULER, j] = 0.0
             out[d] -= product(j, row + EULER, row + SECOND, memory)
             out[d + 1] += product(j, row + EULER, row + FIRST, memory)
+    for k in range(p.turned.row.shape[0]):
+        _turned(j, k, rate, u, p, memory, out)
     for k in range(p.speeds.row.shape[0]):
         _over_speed(j, k, rate, u, p, memory, pieces, out)
     for k in range(p.places.row.shape[0]):
@@ -241,6 +258,45 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
                 if tilt >= 0:
                     out[tilt] -= product(j, row + OFFSET, row + PRESS, memory)
                 out[d] -= p.flanks.damping[k] * (rate * u[d, j + 1] - late)
+
+
+def _turned(j: int, k: int, rate: float, u: Array, p: Program, memory: Array, out: Array) -> None:
+    """Add order j of the forces of the turned spring or damper k."""
+    row = p.turned.row[k]
+    b = p.turned.still[k]
+    w = p.turned.turning[k]
+    for i in range(2):
+        if p.turned.of_rates[k] != 0:
+            memory[row + STILL1 + i, j] = rate * u[b + i, j + 1]
+            memory[row + TURNS1 + i, j] = rate * u[w + i, j + 1]
+        else:
+            memory[row + STILL1 + i, j] = u[b + i, j]
+            memory[row + TURNS1 + i, j] = u[w + i, j]
+    out[b] += product(j, row + COSINE, row + TURNS1, memory) - product(j, row + SINE, row + TURNS2, memory)
+    out[b + 1] += product(j, row + SINE, row + TURNS1, memory) + product(j, row + COSINE, row + TURNS2, memory)
+    out[w] += product(j, row + COSINE, row + STILL1, memory) + product(j, row + SINE, row + STILL2, memory)
+    out[w + 1] += product(j, row + COSINE, row + STILL2, memory) - product(j, row + SINE, row + STILL1, memory)
+
+
+def _rotation_begins(k: int, p: Program, memory: Array) -> None:
+    """Write all orders of cosine less 1 and sine of the rotation of the frame of turned spring k, from that of psi.
+
+    With c = cos z and s = sin z: j c_j is less the sum of i z_i s_(j-i), and j s_j that of i z_i c_(j-i).
+    """
+    row = p.turned.row[k]
+    ratio = p.turned.ratio[k]
+    memory[row + COSINE, 0] = math.cos(ratio * memory[0, 0])
+    memory[row + SINE, 0] = math.sin(ratio * memory[0, 0])
+    for j in range(1, memory.shape[1]):
+        cosine = 0.0
+        sine = 0.0
+        for i in range(1, j + 1):
+            part = i * ratio * memory[0, i] / j
+            cosine -= part * memory[row + SINE, j - i]
+            sine += part * memory[row + COSINE, j - i]
+        memory[row + COSINE, j] = cosine
+        memory[row + SINE, j] = sine
+    memory[row + COSINE, 0] -= 1.0
 
 
 def _over_speed(
@@ -494,6 +550,8 @@ def _step_begins(t: float, s: float, p: Program, memory: Array, pieces: IntArray
         for i in range(memory.shape[1]):
             memory[k, i] *= scale
             scale *= s
+    for k in range(p.turned.row.shape[0]):
+        _rotation_begins(k, p, memory)
     slots = p.laws.touch.shape[1]
     for k in range(p.places.row.shape[0]):
         row = p.places.row[k]
@@ -597,6 +655,7 @@ def _pair_forces(j: int, slots: int, memory: Array, row: int, pieces: IntArray, 
 
 
 FUNCTIONS = (
-    _step_begins, product, _over_speed, _cubic, _cubic_slope, _contact, _gaps, _friction, smoothed_sign, _pair_forces,
-    time_series, _over_width, _over_phase, _slope_over_phase, _bicubic, _bicubic_by_phase, _bicubic_by_tilt,
+    _step_begins, product, _turned, _rotation_begins, _over_speed, _cubic, _cubic_slope, _contact, _gaps, _friction,
+    smoothed_sign, _pair_forces, time_series, _over_width, _over_phase, _slope_over_phase, _bicubic, _bicubic_by_phase,
+    _bicubic_by_tilt,
 )  # fmt: skip

@@ -82,8 +82,9 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     speed = model.angle(t, 1)[:, None] * ratios + v @ turning.T
     arms = rows[np.arange(len(rows)), [int(model.first[i]) + 5 for i in drivers]]
     power = speed * (arms * force + drag)
-    loads = model.fixed_axes(t, model.bearings(q, v, a, acting).reshape(len(t), -1, 2, 3))
-    return TrainStates(t, q, v, a, force, q @ rows.T, apart, push, power, loss, loads.reshape(len(t), -1, 6))
+    turning, still = model.bearings.parts(q, v, a, acting)
+    loads = model.fixed_axes(t, turning.reshape(len(t), -1, 2, 3)).reshape(len(t), -1, 6) + still
+    return TrainStates(t, q, v, a, force, q @ rows.T, apart, push, power, loss, loads)
 
 
 def _contact_forces(
