@@ -1,1 +1,1 @@
-"""What every package may use: mistakes of users, files, tables of job files, expressions, spectra, progress."""
+"""Provide the basis of all packages: user errors, files, tables of job files, expressions, spectra, progress."""

@@ -1,8 +1,8 @@
-"""What is computed once and kept on disk: meshes, condensed gears, curves, laws, reduced housings, compiled kernels.
+"""Keep computed objects on disk: meshes, condensed gears, curves, laws, reduced housings, compiled kernels.
 
 An entry is a file named by its kind and a hash of everything that decides it: geometry, sizes, versions as plain data.
 Entries are written whole under a temporary name and renamed, so two processes that make the same do no harm; one that
-cannot be read, is cut short or belongs to another key is ignored and written anew. A folder that cannot be written to
+cannot be read, is cut short or belongs to another key is ignored and written again. A folder that cannot be written to
 costs only the keeping. Entries that were not used for the longest time go when all together exceed a limit.
 """
 
@@ -99,7 +99,7 @@ def kept(
             os.utime(path)  # used now
         return found
     made = make()
-    # who was first wins, so that two processes that make the same go on with the same digits
+    # who was first wins, so that two processes that make the same continue with the same digits
     found = read(path) if path.exists() else None
     if found is not None:
         return found

@@ -234,7 +234,7 @@ def _check_rules(made: Any, where: str) -> None:
 
 
 def _written(hint: Any, label: str) -> str:
-    """How a missing key is written: a table, one of several, or as its neighbours."""
+    """Return the TOML form of a missing key: a table, one of several, or like its neighbours."""
     inner = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else hint
     if not dataclasses.is_dataclass(inner):
         return "it"
@@ -273,7 +273,7 @@ def _convert(hint: Any, value: Any, label: str, meta: Any) -> Any:
 
 
 def _written_like(hint: Any, value: Any) -> bool:
-    """Whether a value of this kind is written in TOML as `value` is: a list, a table, a text, a number."""
+    """Return whether a value of this kind is written in TOML as `value` is: a list, a table, a text, a number."""
     if isinstance(value, list):
         return typing.get_origin(hint) is tuple
     if isinstance(value, dict):

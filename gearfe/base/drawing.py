@@ -1,4 +1,4 @@
-"""How a result comes to its picture.
+"""Find the picture function of a result.
 
 Pictures stand above all results, and results must not name what is above them. So the package itself, which is above
 both (`gearfe/__init__.py`), puts the function here that `gearfe.base.shown.Shown.plot` calls.

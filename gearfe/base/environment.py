@@ -64,7 +64,7 @@ def limit() -> int:
 
 
 def interpreted() -> bool:
-    """Whether numba's switch `NUMBA_DISABLE_JIT` leaves the kernels as Python functions.
+    """Return whether numba's switch `NUMBA_DISABLE_JIT` leaves the kernels as Python functions.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Errors that a user can mend: each names the field, the value, what is allowed and the cure."""
+"""Errors that a user can fix: each names the field, the value, what is allowed and the cure."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def cut(text: str) -> str:
 
 
 class InputError(ValueError):
-    """A request that cannot be met as it stands; the message says which value is wrong and how to mend it.
+    """A request that cannot be met as it stands; the message says which value is wrong and how to fix it.
 
     Parameters
     ----------

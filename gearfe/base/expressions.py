@@ -110,7 +110,7 @@ class Names:
 
     @property
     def columns(self) -> bool:
-        """Whether names are columns of tables."""
+        """Return whether names are columns of tables."""
         return self.plain is None
 
     @property

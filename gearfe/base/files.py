@@ -100,7 +100,7 @@ def _single_bytes(raw: bytes) -> tuple[str, str]:
 
 
 def _encoding_problem(raw: bytes, at: int) -> tuple[str, str]:
-    """What bytes that are no UTF-8 are, and the cure; the first wrong one stands at `at`."""
+    """Describe bytes that are not UTF-8, with the cure; the first wrong byte is at `at`."""
     line = raw.count(b"\n", 0, at) + 1
     name, codec = _single_bytes(raw)
     letter = raw[at : at + 1].decode(codec, "replace")
@@ -297,7 +297,7 @@ class Table:
 def csv_table(path: str | Path, *, gaps: bool = True) -> Iterator[Table]:
     """Yield a table; the file appears whole at the end.
 
-    Columns with infinite numbers are reported by a `NotFiniteWarning`; without `gaps`, where not-a-number says nothing
+    Columns with infinite numbers are reported by a `NotFiniteWarning`; without `gaps`, where NaN says nothing
     that the table means, those with such numbers too.
     """
     found: dict[str, list[int]] = {}  # column -> how many, and the first row
@@ -344,7 +344,7 @@ def _listed(values: Any) -> Sequence[Any]:
 
 
 def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
-    """Write a summary file; numpy scalars and arrays become plain numbers and lists, not-a-number becomes null."""
+    """Write a summary file; numpy scalars and arrays become plain numbers and lists, NaN becomes null."""
     with whole_file(path) as temporary:
         temporary.write_text(
             json.dumps(_plain(content), indent=2, allow_nan=False) + "\n", encoding="utf-8", newline="\n"

@@ -25,7 +25,7 @@ SILENT, LOOK, SETTLED = 2.0, 0.2, 1.0
 STEADY, STRETCH = 1.5, 1.2
 #: Times left of more days than this are not given as a number.
 MOST_DAYS = 100.0
-#: Seconds after which a stage that still goes on is shown again where lines stay; doubled each time.
+#: Seconds after which a stage that still continues is shown again where lines stay; doubled each time.
 AGAIN = 60.0
 
 
@@ -45,7 +45,7 @@ class _Stage:
 
     @property
     def is_counted(self) -> bool:
-        """Whether it says how far it is."""
+        """Return whether the progress is counted."""
         return self.total is None or self.total > 0.0
 
     def mark(self, now: float) -> None:
@@ -54,7 +54,7 @@ class _Stage:
             self.marks.append((now, self.done))
 
     def _steady(self, now: float) -> float:
-        """What is done in a second; 0 where that changes so much that no time left would be honest."""
+        """Return the work per second; 0 if it varies too much to predict the remaining time."""
         made = self.done - self.first
         rates = [made / (now - self.counted)]
         halves = [mark for mark in self.marks if mark[1] - self.first <= 0.5 * made and mark[0] < now]
@@ -173,7 +173,7 @@ class Display:
         apart = max((i for i, at in enumerate(self._stages) if at.apart), default=0)
         inner = self._stages[apart:]
         counted = next((i for i, at in enumerate(inner) if at.is_counted), len(inner) - 1)
-        stages = self._stages[: apart + counted + 1]  # what goes on inside of a count is a part of it
+        stages = self._stages[: apart + counted + 1]  # what continues inside of a count is a part of it
         text = ": ".join([*(s.name for s in stages[:-1]), stages[-1].text(now)])
         if self._rewritten:
             width = shutil.get_terminal_size().columns - 1
@@ -225,7 +225,7 @@ _displays: list[Display] = []
 
 
 def _display() -> Display | None:
-    """What shows the work of this thread."""
+    """Return the display of this thread's work."""
     return _displays[-1] if _displays and threading.current_thread() is threading.main_thread() else None
 
 

@@ -146,7 +146,7 @@ _OF_SHAFTS = (
 
 
 def words(column: str) -> str:
-    """What a column holds, in words without the unit: ``speed_out_rad_per_s`` is: speed of shaft "out"."""
+    """Describe a column in words without the unit: ``speed_out_rad_per_s`` is: speed of shaft "out"."""
     stem, unit = parted(column)
     for pattern, quantity, text in _OF_SHAFTS:
         if unit.quantity == quantity and pattern.match(stem):

@@ -33,7 +33,7 @@ from .typing import Array, ComplexArray
 #: Sampling frequency of the motion, in parts of twice the highest natural frequency, at least: with 2 the leakage of a
 #: fast mode through the ends of a record is within 1e-3 of the largest line; on lines of the record it would need 1.
 OVERSAMPLING = 2.0
-#: Modes beyond this (Hz) are springs in place of constraints: their motion follows that of the others.
+#: Modes beyond this (Hz) are springs instead of constraints: their motion follows that of the others.
 FASTEST = 1e6
 #: Half length of the filter in kept samples, and the attenuation (dB) that has this length by Kaiser's formulas.
 REACH, STOP_BAND_DB = 10, 145.0
@@ -42,7 +42,7 @@ _BETA = 0.1102 * (STOP_BAND_DB - 8.7)
 
 
 def samples_per_step(step: float, highest: float) -> int:
-    """How many samples a step of the output (s) needs for modes up to `highest` (Hz): 1, or an even number.
+    """Return the samples per output step (s) for modes up to `highest` (Hz): 1, or an even number.
 
     Half the sampling frequency then lies `OVERSAMPLING` times above the highest mode, of those up to `FASTEST`.
     """
@@ -64,7 +64,7 @@ def finer(times: Array, highest: float) -> tuple[Array, int]:
 
 
 def subdivided(times: Array, every: int) -> Array:
-    """Equally spaced times (n,) with `every` steps in place of each one."""
+    """Equally spaced times (n,) with `every` steps instead of each one."""
     count = len(times) - 1
     made = times[0] + float(times[-1] - times[0]) / (every * count) * np.arange(every * count + 1)
     made[::every] = times
@@ -109,7 +109,7 @@ class RecordSpectrum:
 
     @property
     def complete(self) -> bool:
-        """Whether all samples have arrived."""
+        """Return whether all samples have arrived."""
         return self._next == self._last + 1
 
     def add(self, first: int, samples: Array) -> None:

@@ -1,4 +1,4 @@
-"""How results show themselves: a line at the prompt, a table in a notebook, a data frame, a picture."""
+"""Display results: a line at the prompt, a table in a notebook, a data frame, a picture."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ def percent(share: float, digits: int = 2) -> str:
 
 
 class Facts:
-    """What describes itself in a few words: `facts` are a class's own."""
+    """Mix-in for results that describe themselves by the class's own `facts`."""
 
     def facts(self) -> Mapping[str, str]:
-        """What the result is, in a few words: name -> value with its unit."""
+        """Describe the result in a few words: name -> value with its unit."""
         raise NotImplementedError
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}: " + ", ".join(f"{name} {value}" for name, value in self.facts().items())
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
+        """Return the table that a notebook shows."""
         import html
 
         cell = '<td style="text-align:left">{}</td>'

@@ -108,7 +108,7 @@ def other_unit(key: str, number: float) -> str:
 
 
 def beyond(key: str, number: float) -> str:
-    """What is said of a value of a material that lies beyond its bounds."""
+    """Return the remark on a material value beyond its bounds."""
     known = MATERIALS[key]
     return known.below if number < known.low else known.above
 

@@ -231,7 +231,7 @@ def each_mesh(
     run_mesh : callable
         What computes a mesh, with the arguments whose ``out`` is its folder; returns 0, or 1 where a part failed.
     variant : str, optional
-        Variant of [train] whose keys win over [stiffness].
+        Variant of [train] whose keys override [stiffness].
 
     Returns
     -------

@@ -115,7 +115,7 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
 
 
 def _overridden_model(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:
-    """The table with the command's options in place of the file's values, checked like these."""
+    """The table with the command's options instead of the file's values, checked like these."""
     if args.law is not None:
         check_law("--law", args.law)
     made = with_keys(args, table, *MODEL)
@@ -124,7 +124,7 @@ def _overridden_model(table: StiffnessTable, args: argparse.Namespace) -> Stiffn
 
 
 def _with_loads(args: argparse.Namespace, table: LoadMapTable) -> LoadMapTable:
-    """The table with the options of loads in place of the file's values, checked like these."""
+    """The table with the options of loads instead of the file's values, checked like these."""
     from ..base.errors import InputError
 
     more: dict[str, Any] = {}

@@ -100,7 +100,7 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
 
 
 def _with_options(args: argparse.Namespace, table: RatingTable) -> RatingTable:
-    """Return the table with the options that were given, which win over the keys of single gears and meshes, too."""
+    """Return the table with the options that were given, which override the keys of single gears and meshes, too."""
     given = [key for key in KEYS if getattr(args, key) is not None]
 
     def without(single: Any) -> Any:

@@ -200,7 +200,7 @@ def field_angles(args: argparse.Namespace) -> list[float] | None:
 
 
 def overridden(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTable:
-    """The table with the command's options in place of the file's values, checked like these."""
+    """The table with the command's options instead of the file's values, checked like these."""
     if args.law is not None:
         check_law("--law", args.law)
     if any(getattr(args, key) is not None for key in LOADS):

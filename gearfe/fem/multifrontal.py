@@ -141,7 +141,7 @@ class Factor:
         return number
 
     def on_retained(self, rows: Array, unknowns: IntArray) -> Array:
-        """What gives linear forms of the full displacement from the retained unknowns alone: B_r - B_e A_ee^-1 A_er.
+        """Return linear forms of the full displacement in the retained unknowns: B_r - B_e A_ee^-1 A_er.
 
         Parameters
         ----------
@@ -372,7 +372,7 @@ def elimination_order(
 
 
 def _owners(elements: IntArray, centres: Array, nodes: int, leaf: int) -> IntArray:
-    """Where each mesh node goes in the tree of halves (heap numbering, root 1): the smallest with all its elements.
+    """Return the smallest subtree of halves (heap numbering, root 1) with all elements of each mesh node.
 
     The smallest halves have `leaf` elements at most.
     """

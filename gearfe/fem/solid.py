@@ -115,7 +115,7 @@ def jacobian_determinants(nodes: Array, tets: IntArray) -> Array:
 
 
 class _Pattern(NamedTuple):
-    """Where each element entry goes in the node-by-node sparse matrix."""
+    """Map from element entries to the node-by-node sparse matrix."""
 
     starts: NDArray[np.int32]
     columns: NDArray[np.int32]

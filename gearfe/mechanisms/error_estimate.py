@@ -1,4 +1,4 @@
-"""How far a run is from the exact motion, estimated from two more runs with finer steps and perturbed starts.
+"""Estimate the error of a run from two more runs with finer steps and perturbed starts.
 
 With an error that falls with the tolerance, the difference to a finer run is the error of the coarser one up to the
 share of the finer one, 1/`SHARPER`. Rounding does not fall with the tolerance, and runs share part of it. It is

@@ -38,7 +38,7 @@ LINEAR = 0.02
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was done: whether the end was reached with finite outputs, a text for people, the summary, warnings."""
+    """Result of a job: completion with finite outputs, printed text, summary, warnings."""
 
     complete: bool
     text: str
@@ -187,7 +187,7 @@ def summarise(
     mechanism : Mechanism
         The mechanism.
     start : Start
-        Start of the run, with the count of freedoms.
+        Start of the run, with the count of degrees of freedom.
     results : Results
         The run with its outputs.
     tolerance : float
@@ -255,7 +255,7 @@ def summarise(
 
 
 def _net_of_rigid(mechanism: Mechanism, start: Start) -> int:
-    """Net freedoms of the mechanism whose links do not bend: what the joints leave."""
+    """Net degrees of freedom of the mechanism whose links do not bend: what the joints leave."""
     if not mechanism.elastic:
         return start.freedoms.net
     return mechanism.with_rigid_links().start(start.time).freedoms.net
@@ -278,7 +278,7 @@ def undriven_bodies(mechanism: Mechanism, trajectory: Trajectory) -> list[str]:
 
 
 def _flexible(mechanism: Mechanism, results: Results, name: str) -> dict[str, Any]:
-    """What the summary says of a flexible link: its mesh, its largest deflection and stress at the output times."""
+    """Return the summary of a flexible link: mesh, largest deflection and stress at the output times."""
     link = mechanism.links[name]
     data = link.beam.link
     made: dict[str, Any] = {
@@ -297,7 +297,7 @@ def _flexible(mechanism: Mechanism, results: Results, name: str) -> dict[str, An
 
 
 def _of_elements(mechanism: Mechanism, results: Results, name: str) -> dict[str, Any]:
-    """What the summary says of a link of finite elements."""
+    """Return the summary of a link of finite elements."""
     link, q = mechanism.plates[name], results.trajectory.q
     nodes, elements = link.mesh
     plate = link.part.plate
@@ -345,7 +345,7 @@ def _link_line(link: dict[str, Any]) -> str:
 
 
 def _undriven_line(f: dict[str, Any]) -> str:
-    """Freedoms that no joint drives: what a joint too few leaves, what a free motion has, and the shapes of links."""
+    """Describe degrees of freedom that no joint drives: missing joints, free motions, and shapes of links."""
     names, drives, left = f["undriven_bodies"], f["prescribed"], f["net_with_rigid_links"]
     listed = ", ".join(names[:MOST_NAMES]) + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
     counted = f"{_freedoms(f['net'])} driven by no joint"

@@ -26,7 +26,7 @@ Leaf = Callable[[tuple[str, str | None]], int]
 
 
 class Quantities(Protocol):
-    """What a load asks of the mechanism that it acts in (`mechanisms.model.Mechanism`)."""
+    """Interface of loads to the mechanism in which they act (`mechanisms.model.Mechanism`)."""
 
     def angle_of(self, what: str, label: str) -> list[tuple[int, float]]:
         """Moving bodies, with signs, whose angles add up to a named one."""
@@ -77,7 +77,7 @@ class Formula:
 
 
 def divides(node: Node) -> bool:
-    """Whether it divides by what may vary."""
+    """Return whether it divides by a variable."""
     own = node.parts[1] if node.kind == "/" else node.parts[0] if node.kind == "**" else node
     below = node.kind == "/" or (node.kind == "**" and node.parts[1].kind == "negative")
     return (below and bool(quantities(own))) or node.value == "tan" or any(divides(part) for part in node.parts)
@@ -134,7 +134,7 @@ class ExpressionLoad(Formula, StateFunction):
         return f"{self.described} at {t:.6g} s: grows beyond {value:.0e}{why}"
 
     def write(self, bodies: BodyVariables) -> int:
-        """Its register on a tape."""
+        """Return the register of the load on a tape."""
         return write_expression(self.node, bodies.tape, lambda name: self._quantity(bodies, name))
 
     def _quantity(self, bodies: BodyVariables, name: tuple[str, str | None]) -> int:
@@ -162,7 +162,7 @@ class ExpressionTension(Formula, SpanFunction):
         return self.missing(t, _of_span(t, length, rate))
 
     def write(self, tape: Tape, length: int, rate: int) -> int:
-        """Its register on a tape."""
+        """Return the register of the load on a tape."""
         known = {"length": length, "length_rate": rate}
         return write_expression(self.node, tape, lambda name: known[name[0]] if name[0] in known else clock(tape))
 

@@ -303,7 +303,7 @@ class Mechanism:
         return Forced(text, target - offset, position, rate_slope)
 
     def _offset(self, node: Node, needed: set[tuple[str, str | None]], label: str) -> float:
-        """What the expression of a velocity adds to its linear part; refuses one that is not linear."""
+        """Return the constant part of a velocity expression; raise for one that is not linear."""
         random = np.random.default_rng(2)
         q = np.broadcast_to(self.system.start_q, (5, self.system.size))
         v = random.standard_normal((5, self.system.size)) * self.system.units

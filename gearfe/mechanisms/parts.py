@@ -169,7 +169,7 @@ def part_of(
 
 
 def _selects_section(file: MechanismFile, table: JointTable | ForceTable, where: str) -> bool:
-    """Whether a point of `where` only says whose angle is meant: that of a link's section, or interface, there."""
+    """Return whether a point of `where` only selects the section or interface whose angle is meant."""
     body = file.bodies.get(where.partition(".")[0])
     return body is not None and body.shape is not None and getattr(table, "coordinate", None) in ("angle", "rate")
 

@@ -231,7 +231,7 @@ def part_of_plate(name: str, table: BodyTable, folder: Path) -> PlatePart:
 
 @dataclass(frozen=True)
 class _Shape:
-    """What decides a plate; equal by what its table says."""
+    """Data that determine a plate; equal for equal tables."""
 
     table: PlateTable
     source: Path | None

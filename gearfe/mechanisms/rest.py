@@ -131,7 +131,7 @@ def summarise_rest(
     mechanism : Mechanism
         The mechanism.
     start : Start
-        Start, with the count of freedoms.
+        Start, with the count of degrees of freedom.
     rest : Equilibrium
         The state of rest.
     results : Results

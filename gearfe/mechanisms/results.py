@@ -1,4 +1,4 @@
-"""What a run of a mechanism yields: named outputs, energies, joint reactions."""
+"""Evaluate a run of a mechanism: named outputs, energies, joint reactions."""
 
 from __future__ import annotations
 

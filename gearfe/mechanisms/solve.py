@@ -33,7 +33,7 @@ TOGETHER = 16
 
 @dataclass(frozen=True)
 class Solution:
-    """What an analysis yields.
+    """Result of an analysis.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ def sweep(
     executor
         Any of `concurrent.futures`; None: one case after the other, here.
     run
-        In place of the file's [run].
+        Instead of the file's [run].
     """
     one = partial(_case, read_toml(file), Path(file), run)
     return list(map(one, cases) if executor is None else executor.map(one, list(cases), chunksize=TOGETHER))

@@ -28,7 +28,7 @@ class ValueTable:
         Points, x rising.
     kind
         "cubic": monotone cubics (Fritsch & Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304); "linear";
-        "periodic": a cubic spline that goes on beyond its ends, for which the last y is the first.
+        "periodic": a cubic spline that continues beyond its ends, for which the last y is the first.
     """
 
     x: Array
@@ -36,7 +36,7 @@ class ValueTable:
     kind: str = "cubic"
 
     def covers(self, x: Any) -> Any:
-        """Where it has a value."""
+        """Return whether the table has a value there."""
         return (self.kind == "periodic") | ((self.x[0] <= x) & (x <= self.x[-1]))
 
     @cached_property
@@ -59,7 +59,7 @@ class ValueTable:
 
     @property
     def period(self) -> float:
-        """Its period, 0 for none."""
+        """Return the period, 0 for none."""
         return float(self.x[-1] - self.x[0]) if self.kind == "periodic" else 0.0
 
     def write(self, tape: Tape, coordinate: int) -> int:
@@ -80,7 +80,7 @@ class ValueTable:
         return x - self.x[k], k
 
     def __call__(self, x: Array) -> Array:
-        """y at x, not-a-number beyond the table."""
+        """y at x, NaN beyond the table."""
         return np.where(self.covers(x), self.value(x), np.nan)
 
     def value(self, x: Array) -> Any:

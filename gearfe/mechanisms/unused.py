@@ -32,7 +32,7 @@ def unused(file: MechanismFile) -> list[str]:
 
 
 def _given(table: RunTable | FigureTable, key: str) -> bool:
-    """Whether a key differs from its default."""
+    """Return whether a key differs from its default."""
     return bool(getattr(table, key) != fields_of(type(table))[key].default)
 
 

@@ -274,13 +274,13 @@ def _common(first: Results, other: Results) -> set[str]:
 
 
 def _alike(one: Any, two: Any) -> bool:
-    """Whether two entries of a summary are the same but for rounding."""
+    """Return whether two entries of a summary are equal except for rounding."""
     numbers = isinstance(one, (int, float)) and isinstance(two, (int, float))
     return math.isclose(one, two, rel_tol=1e-9) if numbers else one == two
 
 
 def _notes(results: Sequence[Results], common: Sequence[set[str]], left_out: Sequence[str]) -> Iterator[str]:
-    """How the errors were taken together, and what only one run has."""
+    """Describe the combination of errors, and list quantities of only one run."""
     if results[0].kind.name == "vibration":
         for other, shared in zip(results[1:], common, strict=True):
             same = [text for text, keys in (("housing", HOUSING), ("gear meshes", CURVE)) if set(keys) <= shared]

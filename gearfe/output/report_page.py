@@ -121,7 +121,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Report:
-    """What a report holds.
+    """Content of a report.
 
     Attributes
     ----------

@@ -148,7 +148,7 @@ def _of_numbers(results: Results) -> list[Sheet]:
 
 
 def _note(results: Results, rows: Sequence[Sequence[str]]) -> str:
-    """What a reader of the numbers must know: warnings and the meaning of the errors."""
+    """Return notes on the numbers: warnings and the meaning of the errors."""
     warnings = [str(text) for text in results.summary.get("warnings") or ()]
     unknown = any("?" in row[2] for row in rows)
     return "; ".join([*(["± ?: no estimate of the error"] if unknown else []), *warnings])

@@ -35,7 +35,7 @@ HERE = Shared()
 
 @dataclass(frozen=True)
 class Task:
-    """What every case of a study has in common; light, for it travels with each group of cases.
+    """Common data of all cases of a study; small, because each group of cases carries it.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Row:
-    """Result of a case: outputs are not-a-number where it has none."""
+    """Result of a case: outputs are NaN where it has none."""
 
     case: int
     outputs: tuple[float, ...]
@@ -142,7 +142,7 @@ def solve_case(task: Task, number: int, values: Sequence[Any], shared: Shared) -
         message = answer.problem
     except InputError as error:
         status, found, message = INVALID, nothing, str(error)
-    except Exception as error:  # a study of thousands goes on
+    except Exception as error:  # a study of thousands continues
         status, found, message = ERROR, nothing, f"{type(error).__name__}: {error}"
     return Row(number, found, status, " ".join(message.split()), time.perf_counter() - began)
 

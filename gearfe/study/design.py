@@ -1,4 +1,4 @@
-"""Which cases a study has: the values of its parameters, case by case, the same for a seed wherever it runs."""
+"""Make the cases of a study: values of its parameters, the same for a seed on every machine."""
 
 from __future__ import annotations
 

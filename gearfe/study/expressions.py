@@ -1,4 +1,4 @@
-"""What one case of a study gives, and outputs: arithmetic over its columns and its summary (`base.expressions`)."""
+"""Evaluate the outputs of a case: arithmetic over its columns and its summary (`base.expressions`)."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class Study:
 
     @property
     def head(self) -> dict[str, Any]:
-        """What decides the rows: study, base job, rows of a file, and the content of the files that these name."""
+        """Return the data that determine the rows: study, base job, rows and content of the named files."""
         head: dict[str, Any] = {"study": asdict(self.table), "base": dict(self.task.raw)}
         if self.table.design == "rows":
             head["rows"] = [list(row) for row in self.cases]
@@ -209,7 +209,7 @@ def run_study(
     study : Study
         The study.
     folder
-        Of ``study.db`` and its export ``study.csv``: a study that was interrupted goes on.
+        Of ``study.db`` and its export ``study.csv``: a study that was interrupted continues.
     jobs
         Processes; None: as many as there are processors; 1: in this process.
     executor
@@ -219,7 +219,7 @@ def run_study(
     check
         Called now and then while the executor works; raises when that will not answer any more.
     restart
-        Begin anew, whatever the folder holds.
+        Begin again, whatever the folder holds.
 
     Raises
     ------

@@ -109,7 +109,7 @@ class Journal:
     folder
         Where the files are.
     head
-        What decides the rows: a study with another one does not go on here.
+        What decides the rows: a study with another one does not continue here.
     versions
         Of program and libraries.
     parameters, outputs
@@ -117,7 +117,7 @@ class Journal:
     cases
         Values of the parameters by number of the case: rows in the folder must have them. None: not known beforehand.
     restart
-        Begin anew, whatever the folder holds.
+        Begin again, whatever the folder holds.
 
     Raises
     ------
@@ -327,7 +327,7 @@ class Journal:
 
     @contextmanager
     def _reading(self) -> Iterator[None]:
-        """What cannot be read is damaged, or something else."""
+        """Convert read failures to errors: the file is damaged, or another kind of file."""
         try:
             yield
         except InputError:
@@ -414,12 +414,12 @@ def _code(error: BaseException) -> int:
 
 
 def _there(path: Path) -> bool:
-    """Whether a name is taken; a link that leads nowhere takes it, too."""
+    """Return whether a name is taken; a link that leads nowhere takes it, too."""
     return os.path.lexists(path)
 
 
 def _regular(path: Path) -> bool:
-    """Whether a name is free or a file's: SQLite would follow a link, and wait at a pipe."""
+    """Return whether a name is free or a file's: SQLite would follow a link, and wait at a pipe."""
     return not _there(path) or stat.S_ISREG(path.lstat().st_mode)
 
 
@@ -429,7 +429,7 @@ def _beside(path: Path, end: str) -> Path:
 
 @contextmanager
 def _stored(folder: Path) -> Iterator[None]:
-    """What cannot be written is refused with what to do: a disk that is full, say."""
+    """Convert write failures to errors with a cure, for example for a full disk."""
     try:
         yield
     except InputError:

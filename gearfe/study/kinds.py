@@ -30,14 +30,14 @@ Raw = dict[str, Any]
 
 
 class Shared:
-    """What the last case made and the next may use: pure functions of the key."""
+    """Objects of the last case that the next may use: pure functions of the key."""
 
     def __init__(self) -> None:
         self._key = ""
         self._made: dict[str, Any] = {}
 
     def get(self, key: str, name: str, make: Callable[[], Any]) -> Any:
-        """What `make` makes, kept under `name` until another key comes."""
+        """Return the result of `make`, kept under `name` until the key changes."""
         if key != self._key:
             self._key, self._made = key, {}
         if name not in self._made:
@@ -220,7 +220,7 @@ def _only_mesh(raw: Raw, path: Path, mesh: str | None) -> Any:
 
 
 def _kept(job: Any, shared: Shared) -> Keep:
-    """What decides the condensed gears is the key of all that cases share."""
+    """Return the shared objects for the data that determine the condensed gears."""
     gears = [(gear.teeth, gear.form, gear.drawn) for gear in job.mesh.gears]
     key = gears, job.mesh.centre_distance_mm, replace(job.model, deviations=NOMINAL)
     return partial(shared.get, repr(key))

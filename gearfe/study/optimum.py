@@ -1,4 +1,4 @@
-"""A search as a study has it: its best point, the points round that within the tolerances, and how both are told."""
+"""Run the search of a study: its best point, the points around it within the tolerances, and their report."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .statistics import StudyResult
 #: Members of the population for each parameter at most; fewest points of differential evolution (scipy's), its share
 #: of the points of a search and its generations where these allow; more tolerances than this have no worst corner.
 POPULATION, FEWEST, EVOLVED, GENERATIONS, CORNERS = 8, 5, 0.6, 4, 6
-#: A parameter nearer to an end than this share of its range is told to be there.
+#: A parameter nearer to an end than this share of its range is reported to be there.
 AT_END = 1e-3
 
 Outputs = Mapping[str, float]
@@ -25,7 +25,7 @@ Outputs = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Optimum:
-    """What a search found.
+    """Result of a search.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Optimum:
     best
         The best point.
     beside
-        Parameter -> outputs where it is less and where it is more by its tolerance; not-a-number where no job can be.
+        Parameter -> outputs where it is less and where it is more by its tolerance; NaN where no job can be.
     corners
         Outputs at all corners of the tolerances.
     """
@@ -93,7 +93,7 @@ def report_lines(summary: Mapping[str, Any]) -> list[str]:
 
 
 def interrupted_line(search: Search) -> str:
-    """What a search that is interrupted has so far."""
+    """Return the best point so far of an interrupted search."""
     best = search.best()
     if best is None:
         return f"none of {len(search)} points so far has an answer within the limits"

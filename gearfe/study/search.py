@@ -48,7 +48,7 @@ class Optimiser(Protocol):
         """Points to solve side by side, parameter -> value; none: it has ended."""
 
     def tell(self, points: Sequence[Point], outputs: Sequence[Mapping[str, float]]) -> None:
-        """Outputs of these points, not-a-number where a point has no answer."""
+        """Outputs of these points, NaN where a point has no answer."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class Search(Facts):
         return len(self._asked)
 
     def solve(self, points: Sequence[Point]) -> list[dict[str, float]]:
-        """Outputs at these points, in their order; not-a-number where a point has no answer.
+        """Outputs at these points, in their order; NaN where a point has no answer.
 
         Raises
         ------
@@ -242,7 +242,7 @@ class Search(Facts):
         return min(good, key=lambda one: (sign * one.outputs[name], one.case), default=None)
 
     def _excess(self, outputs: Mapping[str, float]) -> float:
-        """How far the worst output is beyond its limits; infinite where one has no value."""
+        """Return the largest violation of a limit; infinite if an output has no value."""
         worst = -math.inf
         for name, limit in self.study.table.limits.items():
             value = outputs[name]
@@ -264,7 +264,7 @@ class Search(Facts):
         return [one.ends for one in self.study.parameters]
 
     def _resolutions(self) -> Array:
-        """How well each parameter is to be found, in its unit."""
+        """Return the required resolution of each parameter, in its unit."""
         return np.array(
             [
                 TOLERANCE_SHARE * d.tolerance if d is not None and d.tolerance > 0.0 else RANGE_SHARE * (high - low)
@@ -283,7 +283,7 @@ class Search(Facts):
         population
             Members for each parameter.
         seed
-            The same seed gives the same points: a search that was interrupted goes on where it stood.
+            The same seed gives the same points: a search that was interrupted continues where it stood.
 
         Returns
         -------
@@ -382,7 +382,7 @@ class Search(Facts):
         return StudyResult(self.study.table, self._journal.finish(), self._base)
 
     def first_problem(self) -> str:
-        """What is told of the first point without an answer, after a colon; empty where all have one."""
+        """Return the message of the first point without an answer, after a colon; empty if there is none."""
         return next((f"; the first one: {row.message}" for row in self._rows if row.message), "")
 
 

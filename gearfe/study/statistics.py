@@ -1,4 +1,4 @@
-"""What many cases say: quantiles, yield, sensitivities, Sobol's indices, the Pareto set; and the lines to print."""
+"""Evaluate many cases: quantiles, yield, sensitivities, Sobol's indices, the Pareto set; and the lines to print."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class StudyResult(ShownTable):
         return np.array([status == DONE for status in self.cells["status"]])
 
     def output(self, name: str) -> Array:
-        """(n,) values of an output, not-a-number where a case has none."""
+        """(n,) values of an output, NaN where a case has none."""
         return np.array([float(cell) for cell in self.cells[name]])
 
     def numbers(self) -> dict[str, Array]:
@@ -119,7 +119,7 @@ class StudyResult(ShownTable):
         return made
 
     def effects(self, name: str) -> dict[str, Any]:
-        """How an output follows the parameters over their ranges, from a linear model of the solved cases.
+        """Return the changes of an output over the parameters, from a linear model of the solved cases.
 
         ``change``: parameter -> change of the output from the 5 to the 95 % quantile of the parameter; ``explained``:
         share R^2 of the variance that the linear model explains; ``rank_correlation``: Spearman's.
@@ -246,7 +246,7 @@ def spread(values: Array) -> dict[str, Any]:
 
 
 def within(values: Array, limit: LimitTable) -> BoolArray:
-    """Which values are good."""
+    """Return which values are within the limits."""
     low = -math.inf if limit.low is None else limit.low
     high = math.inf if limit.high is None else limit.high
     return (low <= values) & (values <= high)

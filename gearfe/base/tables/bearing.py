@@ -42,7 +42,7 @@ ROUND_OFF = 1e-4
 
 @dataclass(frozen=True)
 class BearingTable:
-    """What a bearing yields by: one of `stiffness`, `stiffness_matrix`, and `type` with the geometry inside it."""
+    """Elasticity of a bearing: one of `stiffness`, `stiffness_matrix`, and `type` with its inner geometry."""
 
     stiffness: Five | None = quantity(  # noqa: RUF009
         None, low=0.0, doc="along x, y, z (N/m) and for tilt about x, z (N m/rad)"
@@ -195,7 +195,7 @@ class BearingTable:
 
     @property
     def hinge(self) -> bool:
-        """Whether the bearing does not yield."""
+        """Return whether the bearing is rigid."""
         return self.stiffness is None and self.stiffness_matrix is None and self.type is None
 
 

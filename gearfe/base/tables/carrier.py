@@ -92,7 +92,7 @@ class CarrierTable(_Pins):
 
 @dataclass(frozen=True)
 class _Named:
-    """What an entry of a list is called."""
+    """Name of an entry of a list."""
 
     name: str = quantity(doc="name, by which the shafts of its planets call it (carrier)")
 
@@ -181,7 +181,7 @@ def _each(
 
 
 def _place(entry: dict[str, Any], carrier: Mapping[str, Any], angle_deg: float) -> dict[str, Any]:
-    """A planet's shaft, turned about +y round the axis of its carrier."""
+    """A planet's shaft, turned about +y around the axis of its carrier."""
     x, z = float(carrier["x_mm"]), float(carrier.get("z_mm", 0.0))
     along, up = float(entry["x_mm"]) - x, z - float(entry.get("z_mm", 0.0))  # along e1 = +x and e2 = -z
     turns = round(angle_deg / 90.0)

@@ -18,7 +18,7 @@ class _Spring:
 
 @dataclass(frozen=True)
 class _MachinePlace:
-    """What a machine is, and where."""
+    """Data and position of a machine."""
 
     shaft: str = quantity(doc="name of the shaft that it is coupled to")
     y_mm: float | None = quantity(
@@ -55,7 +55,7 @@ class CouplingTable(_Spring, _CoupledShafts):
 
 @dataclass(frozen=True)
 class _Named:
-    """What an entry of a list is called."""
+    """Name of an entry of a list."""
 
     name: str = quantity(doc="name, used in the names of columns")
 

@@ -107,7 +107,7 @@ class NamedGear:
 
     @property
     def internal(self) -> bool:
-        """Whether it is an internal gear."""
+        """Return whether it is an internal gear."""
         return self.teeth < 0
 
     def written(self, key: str) -> str:
@@ -165,7 +165,7 @@ class NamedMesh:
 
     @property
     def deviates(self) -> bool:
-        """Whether the file says anything of deviations of the flanks."""
+        """Return whether the file has deviations of the flanks."""
         return any(gear.microgeometry is not None for gear in self.gears)
 
     @property

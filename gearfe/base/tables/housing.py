@@ -235,7 +235,7 @@ MOST_ELEMENTS = 100_000
 
 @dataclass(frozen=True)
 class HousingReductionTable:
-    """What is kept of the full model."""
+    """Modes that the reduced model keeps."""
 
     REMOVED: ClassVar[dict[str, tuple[str, str]]] = {"solver": ("is gone: there is one solver", "leave it out")}
 
@@ -325,11 +325,11 @@ class HousingTable:
 
     @property
     def reduced(self) -> bool:
-        """Whether the body comes reduced, without a mesh."""
+        """Return whether the body comes reduced, without a mesh."""
         return self.body is not None or self.superelement is not None
 
     def _check_own(self, where: str) -> None:
-        """What has no meaning beside a mesh of the user's own, or a reduced body."""
+        """Raise `InputError` for keys that conflict with a mesh file or a reduced body."""
         taken = {"mesh", "bores", "held", "material", "reduction", "damping"}
         source = "mesh"
         if self.reduced:

@@ -165,7 +165,7 @@ def gearbox_of(raw: dict[str, Any], path: str | Path, variant: str | None = None
     path : path
         Its file, named in messages.
     variant : str, optional
-        Variant of [train] whose keys win over [stiffness].
+        Variant of [train] whose keys override [stiffness].
 
     Raises
     ------
@@ -197,7 +197,7 @@ def meshes_of(
     name : str, optional
         Name of a mesh.
     variant : str, optional
-        Variant of [train] whose keys win over [stiffness].
+        Variant of [train] whose keys override [stiffness].
     field : str
         What names the mesh, for messages.
 
@@ -360,7 +360,7 @@ def stiffness_of(raw: Mapping[str, Any], variant: str | None = None, mesh: str |
     raw : mapping
         The parsed job.
     variant : str, optional
-        Name of a variant, whose keys win over all.
+        Name of a variant, whose keys override all.
     mesh : str, optional
         Name of a mesh of [meshes.NAME].
 

@@ -13,7 +13,7 @@ GONE_METHODS = {"explicit": 'explicit was removed: leave the method out, or writ
 
 
 class Kind(NamedTuple):
-    """How a type of joint or force is written."""
+    """Keys of a type of joint or force."""
 
     reference: str  # "module:Class"
     fields: Mapping[str, str]  # key of the table -> field of the class

@@ -40,12 +40,12 @@ class BodyTable:
 
     @property
     def shape(self) -> str | None:
-        """What its mass follows from: "beam" or "plate"; None for a rigid body."""
+        """Source of its mass: "beam" or "plate"; None for a rigid body."""
         return "beam" if self.beam is not None else "plate" if self.plate is not None else None
 
     @property
     def bends(self) -> bool:
-        """Whether it is a flexible link."""
+        """Return whether it is a flexible link."""
         return self.shape is not None and self.flexible is not False
 
     @property

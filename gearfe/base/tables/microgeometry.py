@@ -28,7 +28,7 @@ ENDS = ("end_mm", "end_diameter_mm")
 
 @dataclass(frozen=True)
 class WavinessTable:
-    """A wave on the flanks of all teeth, which goes on from tooth to tooth."""
+    """A wave on the flanks of all teeth, which continues from tooth to tooth."""
 
     amplitude_um: float = quantity(doc="amplitude (um)", low=0.0)
     waves: int = quantity(doc="whole waves around the gear", low=1, high=100_000)
@@ -150,7 +150,7 @@ class GearMicrogeometryTable(FlankTable):
     right: FlankTable | None = quantity(None, doc="of the right flanks")  # noqa: RUF009
 
     def flank(self, side: str) -> FlankTable:
-        """What holds on the flanks `side` (left or right)."""
+        """Return the deviations of the flanks `side` (left or right)."""
         own, default = getattr(self, side), FlankTable()
         made = {f.name: getattr(self, f.name) for f in fields(FlankTable)}
         if own is not None:

@@ -75,7 +75,7 @@ class NamedShaftTable(ShaftTable):
 
 @dataclass(frozen=True)
 class _BearingPlace:
-    """Where a bearing is."""
+    """Position of a bearing."""
 
     shaft: str = quantity(doc="name of the shaft that it carries")
     attachment: int | str | None = quantity(None, doc="bore (attachment) of the housing; left out: the bearing's name")

@@ -168,7 +168,7 @@ class GearBodyTable(ToothFormTable):
 
     @property
     def internal(self) -> bool:
-        """Whether it is an internal gear."""
+        """Return whether it is an internal gear."""
         return self.teeth < 0
 
     def size(self, key: str) -> float | None:

@@ -44,7 +44,7 @@ LAW_REMOVED: Removed = (
 
 @dataclass(frozen=True)
 class _Named:
-    """What an entry of a list is called."""
+    """Name of an entry of a list."""
 
     name: str = quantity(doc="name of the shaft, used in the names of columns")
 
@@ -162,7 +162,7 @@ class ShaftTable:
 
     @property
     def guided(self) -> Fraction | None:
-        """Its speed over that of the drive where it is prescribed."""
+        """Prescribed speed over that of the drive."""
         return None if self.speed_ratio is None else Fraction(str(self.speed_ratio))
 
     @property
@@ -430,7 +430,7 @@ class TrainDriveTable:
 
     @property
     def by_torque(self) -> bool:
-        """Whether a torque drives, and the speed is free."""
+        """Return whether a torque drives and the speed is free."""
         return self.torque_Nm is not None or self.torque_over_speed is not None
 
     def check(self, where: str) -> None:
@@ -544,7 +544,7 @@ class TrainRigidBoreTable:
 
 @dataclass(frozen=True)
 class TrainCurvesTable:
-    """What computed meshes are made of: mesh laws, or stiffness curves and how these are computed and read."""
+    """Models of computed meshes: mesh laws, or stiffness curves with their computation and interpolation."""
 
     mesh_model: str = quantity(
         POTENTIAL,
@@ -581,7 +581,7 @@ class TrainDampingTable:
 
 @dataclass(frozen=True)
 class TrainVariantTable:
-    """A named alternative to [train.curves] and [train.damping]; keys of its `stiffness` win over [stiffness]."""
+    """A named alternative to [train.curves] and [train.damping]; keys of its `stiffness` override [stiffness]."""
 
     curves: TrainCurvesTable = quantity(TrainCurvesTable, doc="[train.variants.NAME.curves]")  # noqa: RUF009
     damping: TrainDampingTable = quantity(TrainDampingTable, doc="[train.variants.NAME.damping]")  # noqa: RUF009

@@ -176,7 +176,7 @@ class BeamShaft:
         return self.end - self.start
 
     def covers(self, along: float) -> bool:
-        """Whether an axial position (m) is on the shaft."""
+        """Return whether an axial position (m) is on the shaft."""
         slack = SAME_PLACE * self.length
         return self.start - slack <= along <= self.end + slack
 

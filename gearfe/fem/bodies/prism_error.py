@@ -1,4 +1,4 @@
-r"""How much too stiff extruded elements of order 3 make a body: what those of order 4 would let it do.
+r"""Estimate the excess stiffness of extruded elements of order 3 from those of order 4.
 
 The estimate is that of `fem.bodies.mesh_error`, :math:`\sum_i r_i^T K_i^{-1} r_i` over the functions s_i that the
 next order adds. Hierarchical functions of a prism are products of those of a triangle (of corners, edges and the

@@ -1,1 +1,1 @@
-"""Meshes from geometry: the only room that talks to gmsh and meshio. Millimetres inside gmsh, metres on the way out."""
+"""Meshes from geometry: the only package that calls gmsh and meshio. Millimetres inside gmsh, metres on the way out."""

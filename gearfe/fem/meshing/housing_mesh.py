@@ -28,7 +28,7 @@ from .session import gmsh_session
 _TRIANGLE, _BAMG, _NO_POINTS_INSIDE = 21, 7.0, 3
 #: Edges round a bore at least; rings thinner than this many times `Sizes.across` take one element across.
 _LEAST_ROUND, _THIN = 6, 2.0
-#: Smallest volume ratio in a curved triangle against the mean; with less, the bores are meshed anew with smaller sizes.
+#: Smallest volume ratio in a curved triangle against the mean; below it the bores are meshed again with smaller sizes.
 _LEAST_RATIO, _FINER, _TRIALS = 0.05, 0.7, 6
 #: The same triangle seen from behind.
 REVERSED = np.array([0, 2, 1, 8, 7, 6, 5, 4, 3, 9])

@@ -78,7 +78,7 @@ class MeshFile(NamedTuple):
         return nodes
 
     def _text_of(self, name: str, nodes: IntArray) -> str:
-        """A group; one that has a number in place of a name with its place."""
+        """A group; one that has a number instead of a name with its place."""
         if not name.isdigit():
             return name
         low, high = self.nodes[nodes].min(axis=0), self.nodes[nodes].max(axis=0)

@@ -171,7 +171,7 @@ def _meet(a: Array, b: Array, c: Array, d: Array) -> bool:
 
 
 def _inside(point: Array, corners: Array, ends: Array) -> bool:
-    """Whether a ray to the right leaves the polygon an odd number of times."""
+    """Return whether a ray to the right leaves the polygon an odd number of times."""
     crosses = (corners[:, 1] > point[1]) != (ends[:, 1] > point[1])
     with np.errstate(divide="ignore", invalid="ignore"):
         at = corners[:, 0] + (point[1] - corners[:, 1]) / (ends[:, 1] - corners[:, 1]) * (ends - corners)[:, 0]

@@ -23,7 +23,7 @@ _LOCK = threading.RLock()
 
 
 def import_gmsh() -> ModuleType:
-    """Import gmsh, with an error that says how to mend a bare system.
+    """Import gmsh, with an error that says how to fix a bare system.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def _pipes_as_before() -> Iterator[None]:
 def gmsh_session(name: str = "gearfe", *, options: Mapping[str, float] | None = None) -> Iterator[Any]:
     """Yield the gmsh module with a fresh model called `name`; quiet, on one thread, closed again on the way out.
 
-    With one thread meshes are the same on every run, but for those of its anisotropic mesher (the housing's), which
+    With one thread meshes are the same on every run, except for those of its anisotropic mesher (the housing's), which
     depend on where its vertices lie in memory.
 
     Where the caller's own program has gmsh open already, only the model is added and removed again, and that

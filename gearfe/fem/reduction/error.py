@@ -1,4 +1,4 @@
-r"""How far a reduced body is from the housing: what the reduction leaves out, and what the mesh does.
+r"""Estimate the errors of a reduced body: those of the reduction and of the mesh.
 
 **Reduction.** With the bound of `gearfe.fem.reduction.craig_bampton` on the interfaces' dynamic stiffness,
 ``dD(w) <= E(w)``, follow

@@ -74,7 +74,7 @@ def lowest_modes(
     at_least
         Least number of modes, even above the limit.
     at_most
-        Number of modes below the limit with which the search is given up; by default it goes on.
+        Number of modes below the limit with which the search is given up; by default it continues.
     shift
         s >= 0 (rad^2/s^2), for pairs whose K is singular.
     block

@@ -125,7 +125,7 @@ class ModalBody(Reduction, Shown):
 
     @property
     def has_mesh(self) -> bool:
-        """Whether there is more to show than points: elements, and a surface that radiates."""
+        """Return whether the body has elements and a radiating surface, not only points."""
         return len(self.elements) > 0
 
     @property

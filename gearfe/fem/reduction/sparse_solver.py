@@ -92,7 +92,7 @@ def multifrontal(blocks: Any, graph: Any, order: IntArray, *, leaf_nodes: int = 
 
 
 def node_graph(blocks: Any) -> Any:
-    """Which nodes a matrix in blocks (BSR) couples: CSR, without the diagonal."""
+    """Return the graph of nodes that a block matrix (BSR) couples: CSR, without the diagonal."""
     nodes = len(blocks.indptr) - 1
     rows = np.repeat(np.arange(nodes, dtype=np.int32), np.diff(blocks.indptr))
     off = rows != blocks.indices

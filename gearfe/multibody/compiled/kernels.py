@@ -72,7 +72,7 @@ def cache_folder(functions: Iterable[Callable[..., Any]]) -> Path | None:
 
 
 def _folders(functions: Iterable[Callable[..., Any]]) -> Iterator[Path]:
-    """Where the compiled forms of `functions` may be, best first; they need not exist."""
+    """Return the possible folders of the compiled forms of `functions`, best first; they need not exist."""
     options = tuple(f"{k}={v}" for k, v in sorted(os.environ.items()) if k.startswith("NUMBA_"))
     for root in _roots():
         yield root / ("kernels-" + _key(str(root), tuple(functions), options))
@@ -80,7 +80,7 @@ def _folders(functions: Iterable[Callable[..., Any]]) -> Iterator[Path]:
 
 @lru_cache(maxsize=64)
 def _key(root: str, functions: tuple[Callable[..., Any], ...], options: tuple[str, ...]) -> str:
-    """What decides compiled code, as a name; neither sources nor the machine change while a program runs."""
+    """Return the key of compiled code, as a name; sources and machine do not change while a program runs."""
     key = "\n".join((root, *_made_by(), *options, _text(functions)))
     return hashlib.sha256(os.fsencode(key)).hexdigest()[:16]  # folders may have names that are no text
 
@@ -104,7 +104,7 @@ def _roots() -> list[Path]:
 
 
 def _made_by() -> Iterator[str]:
-    """What decides compiled code beside its source: Python, the compiler, the processor."""
+    """Return the versions that determine compiled code besides its source: Python, compiler, processor."""
     yield sys.version
     for maker in sorted(Path(__file__).parent.glob("*.py")):
         yield maker.read_text(encoding="utf-8")
@@ -125,7 +125,7 @@ def _made_by() -> Iterator[str]:
 
 
 def is_cached(functions: Iterable[Callable[..., Any]], entry: str) -> bool:
-    """Whether a compiled form of the function named `entry` waits in the cache, for this machine and these sources."""
+    """Return whether the cache holds a compiled form of `entry` for this machine and these sources."""
     folder = next((f for f in _folders(functions) if f.is_dir()), None)
     return folder is not None and any(folder.glob(f"{entry}-*.o"))
 
@@ -210,12 +210,12 @@ class Kernels:
 
     @cached_property
     def compiled(self) -> SimpleNamespace:
-        """Their entries, compiled or from the cache at their first call."""
+        """Return the entries of the kernels, compiled or from the cache at their first call."""
         return bind(self.functions, self.names, entries=self.entries, inline=self.inline, alias=self.alias)
 
     @property
     def ready(self) -> bool:
-        """Whether compiled ones are loaded already or wait in the cache."""
+        """Return whether compiled kernels are loaded or in the cache."""
         return self.loaded or interpreted() or is_cached(self.functions, self.entries[0])
 
     def load(self, run: Callable[[], object]) -> float:

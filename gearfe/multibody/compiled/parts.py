@@ -39,7 +39,7 @@ def part_options() -> dict[str, Any]:
 
 
 def _part_compiler() -> Any:
-    """Numba's compiler of functions, but for what happens to LLVM's code."""
+    """Numba's compiler of functions, except for what happens to LLVM's code."""
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
     from numba.core.compiler_machinery import LoweringPass, register_pass

@@ -133,7 +133,7 @@ def _number_type(kind: Any) -> Any:  # noqa: ARG001
 
 
 def _larger(builder: Any, x: Any, y: Any) -> Any:
-    """Not-a-number where one is. (LLVM's own maximum cannot be lowered for x86 before version 18.)"""
+    """NaN where one is. (LLVM's own maximum cannot be lowered for x86 before version 18.)"""
     first = builder.or_(builder.fcmp_unordered("uno", x, x), builder.fcmp_ordered(">", x, y))
     return builder.select(first, x, y)
 

@@ -136,11 +136,11 @@ class Element:
         return ""
 
     def load_pole(self, t: float, q: Array, v: Array) -> str:  # noqa: ARG002
-        """Which of its forces grows beyond all bounds at a state, or an empty string."""
+        """Return the name of the force that is unbounded at a state, or an empty string."""
         return ""
 
     def pole_between(self, before: tuple[float, Array, Array], after: tuple[float, Array, Array]) -> str:  # noqa: ARG002
-        """Which of its forces has a pole between two states (t, q, v), or an empty string."""
+        """Return the name of the force with a pole between two states (t, q, v), or an empty string."""
         return ""
 
     def load_values(self, t: float, q: Array, v: Array) -> list[tuple[str, float]]:  # noqa: ARG002
@@ -232,8 +232,8 @@ class SeriesLaw:
         j of u and up to j + 1 for u'.
     discontinuity
         ``discontinuity(last, limit, parameters, memory, pieces, ahead)``: where x, up to `limit`, leaves a
-        smooth piece, 2 when it does not; the pieces then go on to the next. With `ahead` from orders 0 and 1 a little
-        past that place, for the length of the step; pieces stay.
+        smooth piece, 2 when it does not; the pieces then continue to the next. With `ahead` from orders 0 and 1 a
+        little past that place, for the length of the step; pieces stay.
     helpers
         Functions that they call by name.
     parameters
@@ -286,7 +286,7 @@ class LocalForce(Element):
 
     @property
     def pieced(self) -> bool:
-        """Whether its law has kinks or jumps."""
+        """Return whether the law has kinks or jumps."""
         return self.piece_numbers is not None
 
     def pieces(self, t: float | Array, q: Array, v: Array) -> IntArray:

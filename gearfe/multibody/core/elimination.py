@@ -66,7 +66,7 @@ class ModalCoordinates:
 
 
 def is_linear(system: System) -> bool:
-    """Whether every joint is linear with constant coefficients."""
+    """Return whether every joint is linear with constant coefficients."""
     return all(e.constant_jacobian for e, _ in system.joints)
 
 

@@ -1,4 +1,4 @@
-"""Freedoms that the gradients of the constraints leave, and the constraints hold all the same.
+"""Degrees of freedom that the gradients of the constraints leave, and the constraints hold all the same.
 
     W^T G = 0,    G V = 0,    g'' = G a + H(v, v) + ...
 
@@ -31,7 +31,7 @@ ALLOWED = 1e-9
 
 
 def hidden_freedoms(system: System, time: float, q: Array) -> tuple[int, int]:
-    """Freedoms that the gradients leave in a closed position, and how many of them the constraints hold."""
+    """Degrees of freedom that the gradients leave in a closed position, and how many of them the constraints hold."""
     free, forms = _forms(system, time, q)
     count = free.shape[1]
     sizes = np.linalg.svd(forms.reshape(-1, count), compute_uv=False) if forms.size else np.zeros(0)

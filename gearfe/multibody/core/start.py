@@ -1,4 +1,4 @@
-"""Consistent start and freedoms: projection onto the constraints, forced values, redundant and
+"""Consistent start and degrees of freedom: projection onto the constraints, forced values, redundant and
 passing-singular rows."""
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Freedoms:
     """Count of coordinates and constraints, and the rows that add nothing.
 
     `redundant` rows depend on the others in every position near the start, `passing` ones only at the start itself.
-    `hidden` freedoms are left by the gradients alone: rows `barely` hold them to second order, in every position.
+    `hidden` degrees of freedom exist in the gradients only: rows `barely` hold them to second order, everywhere.
     """
 
     coordinates: int
@@ -51,13 +51,13 @@ class Freedoms:
 
     @property
     def net(self) -> int:
-        """Net freedom: coordinates less independent constraints."""
+        """Net degree of freedom: coordinates less independent constraints."""
         return self.coordinates - self.constraints + len(self.redundant) - self.hidden
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A consistent state: time, coordinates, velocities, freedoms; `active` marks the rows that are not redundant.
+    """A consistent state: time, coordinates, velocities, degrees of freedom; `active` marks the independent rows.
 
     `added_mass`, shape (size,) or (0,), is the mass by which the elimination raises light links
     (`multibody.core.mass_regularisation`).
@@ -120,7 +120,7 @@ def consistent_start(
 
 
 def count_freedoms(system: System, time: float, q: Array) -> Freedoms:
-    """Redundant rows: dependent at the start and at neighbours on the constraint manifold; freedoms that are hidden."""
+    """Find redundant rows, dependent at the start and at its neighbours, and hidden degrees of freedom."""
     here = _dependent_rows(system, time, q)
     if not here and _regular(system, time, q):
         return Freedoms(system.size, system.rows)
@@ -153,7 +153,7 @@ def count_freedoms(system: System, time: float, q: Array) -> Freedoms:
 
 
 def _regular(system: System, time: float, q: Array) -> bool:
-    """Whether no singular value of the gradients is nearly zero."""
+    """Return whether no singular value of the gradients is nearly zero."""
     if system.rows == 0:
         return True
     B = _comparable_rows(system, time, q)
@@ -184,7 +184,7 @@ def _comparable_rows(system: System, time: float, q: Array) -> Array:
 
 
 def _independent(B: Array) -> bool:
-    """Whether rows are clearly independent."""
+    """Return whether rows are clearly independent."""
     try:
         return bool((np.diagonal(np.linalg.cholesky(B @ B.T)) > 1e-4).all())
     except np.linalg.LinAlgError:
@@ -276,13 +276,13 @@ def close(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tu
 
 
 def _forced_unit(system: System, forced: Forced, q: Array) -> float:
-    """What a forced value changes by when the coordinates change by their units."""
+    """Return the change of a forced value when the coordinates change by their units."""
     change = float(np.abs(forced.gradient(q) * system.units).max(initial=0.0))
     return change if change > 0.0 else max(abs(forced.value(q)), abs(forced.target)) or 1.0
 
 
 def closes(system: System, q: Array, gap: Array) -> bool:
-    """Whether gaps (in units of the rows) are nothing but rounding, of coordinates far from the origin, too."""
+    """Return whether gaps (in units of the rows) are only rounding, also for coordinates far from the origin."""
     far = float(np.abs(q / system.units).max(initial=0.0))
     return bool(gap.max(initial=0.0) <= CLOSED + 8 * np.finfo(float).eps * far)
 

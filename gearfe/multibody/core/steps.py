@@ -1,6 +1,6 @@
-"""Where steps begin and end: lengths from errors, breaks of the forces, the end of the run, and why it ended.
+"""Control steps: lengths from errors, breaks of the forces, the end of the run, and its reason.
 
-An integrator asks for a step, tries it, and tells what came of it:
+An integrator asks for a step, tries it, and reports the outcome:
 
     while (step := control.next_step()) is not None:
         ...
@@ -41,7 +41,7 @@ ENDLESS, STEADY_ENDLESS, SURE = 100.0, 3.0, (4096, 16384)
 
 @dataclass(frozen=True)
 class StepLaw:
-    """What distinguishes methods.
+    """Step-control parameters of a method.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class StepLaw:
 class Pace:
     """The number of steps that a run needs, extrapolated from the steps so far.
 
-    The times in which the number of steps doubles go on as the geometric series of the last four: they double at a
+    The times in which the number of steps doubles continue as the geometric series of the last four: they double at a
     steady pace, stay where a force feeds the motion, grow by 2**(1/p) where the number is as time to the power p. Of
     the ratios of successive times the largest counts. One change to shorter steps lowers two of the three, so neither
     that nor a burst of short steps ends a run.

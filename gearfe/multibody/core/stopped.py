@@ -40,7 +40,7 @@ STEEPER = 0.76
 
 
 def locked(system: System, time: float, q: Array, active: BoolArray) -> str:
-    """Return why the prescribed motion cannot go on from a state, or an empty string.
+    """Return why the prescribed motion cannot continue from a state, or an empty string.
 
     Parameters
     ----------

@@ -127,7 +127,7 @@ class System:
 
     @property
     def algebraic(self) -> bool:
-        """Whether all elements are algebraic (`gearfe.multibody.core.contract`)."""
+        """Return whether all elements are algebraic (`gearfe.multibody.core.contract`)."""
         return all(element.algebraic for element in self.elements)
 
     def coordinates(self, element: Element) -> np.ndarray:
@@ -204,7 +204,7 @@ class System:
 
     @cached_property
     def pieced(self) -> bool:
-        """Whether forces may have kinks."""
+        """Return whether forces may have kinks."""
         return any(getattr(element, "pieced", False) for element in self.elements)
 
     def pieces(self, t: float | Array, q: Array, v: Array) -> IntArray:
@@ -215,7 +215,7 @@ class System:
 
     @cached_property
     def has_knots(self) -> bool:
-        """Whether rows follow profiles with knots."""
+        """Return whether rows follow profiles with knots."""
         return any(getattr(element, "has_knots", False) for element in self.elements)
 
     def knots(self, q: Array) -> IntArray:
@@ -290,7 +290,7 @@ class System:
         return [name for e in self.elements for name in e.coordinate_names or e.numbered("{}_{}", e.size)]
 
     def row_names(self) -> list[str]:
-        """What each constraint holds, for messages."""
+        """Return a description of each constraint, for messages."""
         return [name for e, _ in self.joints for name in e.row_names or e.numbered("{} ({})", e.rows)]
 
     def acceleration(
@@ -393,7 +393,7 @@ def solve_semidefinite(S: Array, right: Array) -> Array:
 
 
 def regular(S: Array, least: float) -> bool:
-    """Whether the pivots of all matrices S (..., m, m) are above the share `least` of their diagonals' roots."""
+    """Return whether the pivots of all matrices S (..., m, m) are above the share `least` of their diagonals' roots."""
     try:
         pivots = np.diagonal(np.linalg.cholesky(S), axis1=-2, axis2=-1)
     except np.linalg.LinAlgError:
@@ -404,7 +404,7 @@ def regular(S: Array, least: float) -> bool:
 def least_norm_solution(S: Array, right: Array, least: float) -> Array:
     """Solution of S x = right of least norm in rows of equal size; singular values below the share `least` are zero.
 
-    Not-a-number where S or `right` is not finite: the integrators then tell the state, LAPACK would raise.
+    NaN where S or `right` is not finite: the integrators then tell the state, LAPACK would raise.
     """
     if not (np.isfinite(S).all() and np.isfinite(right).all()):
         return np.full(right.shape, np.nan)

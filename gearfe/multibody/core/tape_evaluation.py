@@ -216,7 +216,7 @@ class TapeValues:
 
     # registers ------------------------------------------------------------------------------------------------
     def registers(self, t: float | Array, q: Array, v: Array) -> Array:
-        """Values of all registers, shape (k + 1, ...), the last one 0; not-a-number beyond the ends of tables."""
+        """Values of all registers, shape (k + 1, ...), the last one 0; NaN beyond the ends of tables."""
         z = self.variables(q)
         R = np.zeros((len(self.program.code.op) + 1, *q.shape[:-1]))
         with np.errstate(all="ignore"):
@@ -261,7 +261,7 @@ class TapeValues:
         return self._along(R, self.variables(q).slope).T + self.program.constant
 
     def force_slopes(self, q: Array, v: Array, R: Array) -> tuple[Array, Array]:
-        """Their derivatives by q and v in one state, shapes (n, n)."""
+        """Return the derivatives of the forces by q and v in one state, shapes (n, n)."""
         z, n = self.variables(q), self.size
         made = self._along(self.slopes(q, v, R), z.slope[:, None])
         return made[:, :n] + np.diag(self._along(R, z.bend)), made[:, n:]
@@ -280,7 +280,7 @@ class TapeValues:
 
     @property
     def has_knots(self) -> bool:
-        """Whether rows follow profiles, whose third derivative jumps at knots."""
+        """Return whether rows follow profiles, whose third derivative jumps at knots."""
         return bool(self._profiles)
 
     def knots(self, q: Array) -> IntArray:
@@ -301,7 +301,7 @@ class TapeValues:
         return switches.knot[part], switches.entry[part][:-1], float(switches.period[switch])
 
     def _place(self, switch: int, R: Array) -> tuple[Any, Any]:
-        """Distance of a switch's register from the knot below, and the number of its piece; not-a-number beyond."""
+        """Distance of a switch's register from the knot below, and the number of its piece; NaN beyond."""
         x, (knots, _, period) = R[self.program.switches.register[switch]], self._table(switch)
         if not len(knots):
             return x, x >= 0.0
@@ -340,12 +340,12 @@ class TapeElement(Element):
     """An element whose rows follow from what it writes on a tape."""
 
     def write(self, tape: Tape, places: IntArray) -> bool:
-        """Its rows and forces on a tape, `places` being the numbers of the local coordinates."""
+        """Write rows and forces on a tape; `places` are the numbers of the local coordinates."""
         raise NotImplementedError
 
     @cached_property
     def values(self) -> TapeValues:
-        """What it writes, on a tape of its own."""
+        """Return the written values, on a separate tape."""
         size = self.size + sum(other.size for other in self.touches)
         tape = Tape(size)
         self.write(tape, np.arange(size))

@@ -1,4 +1,4 @@
-"""What an integration returns: times, states, status, statistics, and dense output between the steps."""
+"""Define the result of an integration: times, states, status, statistics, dense output."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Trajectory(Shown):
     dense: Dense = field(repr=False)
 
     def facts(self) -> dict[str, str]:
-        """How far the run came, its size and method."""
+        """Return end time, size and method of the run."""
         ends = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else "none"
         return {
             "status": f"{self.message} at {self.reached:g} s",
@@ -173,7 +173,7 @@ class Trajectory(Shown):
         return self.multipliers_at(self.time)
 
     def multipliers_at(self, times: Array) -> Array:
-        """Multipliers from M a = f - G^T lambda at the given times; not-a-number where they are beyond all numbers.
+        """Multipliers from M a = f - G^T lambda at the given times; NaN where they are beyond all numbers.
 
         Of the integrator's stages where it has them, with flexible links.
         """

@@ -1,7 +1,7 @@
-"""Where forces leave their smooth pieces within a step of collocation.
+"""Locate kinks and jumps of forces within a step of collocation.
 
 A step that crosses a kink has an error that no estimate sees as it is. Such a step is made again, up to just before
-the kink; from there a short one goes over it, and the method begins anew behind it. Jumps are passed like this, too;
+the kink; from there a short one goes over it, and the method begins again behind it. Jumps are passed like this, too;
 poles and ends of tables are not.
 """
 
@@ -51,21 +51,21 @@ class Discontinuities:
         self.control = control
         self.system = system if system is not None and system.pieced else None
         self.profiled = system if system is not None and system.has_knots else None
-        #: Which load has no value, or grows beyond all bounds, where the run cannot go on.
+        #: Which load has no value, or grows beyond all bounds, where the run cannot continue.
         self.load_problem = ""
         self.near = max(PASSING * tolerance, 1e-12) * max(control.span, abs(control.t))
 
     @property
     def cutting(self) -> bool:
-        """Whether the path of a step is to be shown to `cut`."""
+        """Return whether the path of a step must be passed to `cut`."""
         return self.system is not None or self.profiled is not None
 
     def passing(self, h: float) -> bool:
-        """Whether a step is one over a kink, after which the method begins anew."""
+        """Return whether a step crosses a kink, after which the method restarts."""
         return self.system is not None and abs(h) <= 4.0 * self.near
 
     def cut(self, t: float, h: float, path: Path) -> bool:
-        """Whether the step h from t is not to stand: the control then knows that the next ends before a kink."""
+        """Return whether the step h from t is rejected; the next one then ends before a kink."""
         system = self.system
         if self.profiled is not None and not self.passing(h) and (share := _knot(self.profiled, path)) < 1.0:
             self.control.end_at(t + share * h)

@@ -153,7 +153,7 @@ def _cause(system: System, start: Start, dense: Dense, goal: float, load_problem
 
 
 def _dropped_rows_hold(system: System, start: Start, dense: Dense, tolerance: float) -> bool:
-    """Whether all rows are met along the run, whichever of a redundant set was left out on the way."""
+    """Return whether all rows are met along the run, whichever of a redundant set was left out on the way."""
     left_out = ~start.active
     if not left_out.any() or len(dense.times) < 2 or is_linear(system):  # constant rows hold as they did at the start
         return True
@@ -181,7 +181,7 @@ def chosen_method(system: System, start: Start, duration: float) -> str:
 
 
 def _stiff(system: System, start: Start, end: float, t: float, step: float, q: Array, v: Array) -> bool:
-    """Whether a decay limits the mean step (s) of series at a state, and the rest of the run is long for it."""
+    """Return whether a decay limits the mean step (s) of series at a state, and the rest of the run is long for it."""
     left = abs(end - t)
     if not left > MANY_LEFT * step:
         return False
@@ -191,12 +191,12 @@ def _stiff(system: System, start: Start, end: float, t: float, step: float, q: A
 
 
 def _has_series(system: System) -> bool:
-    """Whether motions are Taylor series: on a tape, or in modal coordinates under a force whose law has one."""
+    """Return whether motions are Taylor series: on a tape, or in modal coordinates under a force whose law has one."""
     return series_force(system) is not None if _modal(system) else system.series is not None
 
 
 def _modal(system: System) -> bool:
-    """Whether series are those of modal coordinates."""
+    """Return whether series are those of modal coordinates."""
     return is_linear(system) and not any(element.planar_bodies for element in system.elements)
 
 

@@ -163,7 +163,7 @@ def _start(bodies: tuple[Body, ...], frames: Frames) -> tuple[Array, Array]:
 
 
 def _holds_length(form: Form) -> bool:
-    """Whether places enter the form, not angles and directions alone."""
+    """Return whether positions enter the form, not only angles and directions."""
     weights = [end[0] for pair in form.products for vector in pair for end in vector.ends.values()]
     return any(weights) or any(terms[k] for terms in form.terms.values() for k in (0, 1, 3, 4))
 

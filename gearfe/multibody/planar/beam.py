@@ -133,7 +133,7 @@ class Beam(Element):
         return self._force(np.einsum("pi,pij->pj", stress, e.slope))
 
     def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:  # noqa: ARG002
-        """Its derivatives by q and v."""
+        """Return the derivatives of the force by q and v."""
         made = self.tangent(q, v, self.stress(q, v))
         return made.by_q, made.by_v
 
@@ -148,7 +148,7 @@ class Beam(Element):
         return Tangent(self, law, self._spread(-by_q), self._spread(-tau * (weighted @ law)))
 
     def write(self, tape: Tape, places: IntArray) -> bool:
-        """Its points and weight on a tape."""
+        """Write points and weight on a tape."""
         own = places[self.places]
         tape.constant[own] += self._weight
         N, D = self.shapes(self.points)

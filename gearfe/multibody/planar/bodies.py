@@ -110,7 +110,7 @@ class Frames:
         return place[0] + c * at[0] - s * at[1], place[1] + s * at[0] + c * at[1]
 
     def start_seen_from(self, body: str, place: Point) -> Point:
-        """Where a place of the ground lies in the body's frame at the start pose (m)."""
+        """Return a point of the ground in the body's frame at the start pose (m)."""
         i = self.number[body]
         if i == len(self.bodies):
             return place

@@ -189,7 +189,7 @@ def with_carriers(joints: Sequence[Joint], frames: Frames) -> tuple[Joint, ...]:
 
 
 class _Bearings:
-    """Which bodies turn about fixed points of which others: by hinges, of bodies that fixed joints make one, too."""
+    """Pairs of bodies that rotate about fixed points of each other by hinges; fixed joints merge bodies."""
 
     def __init__(self, joints: Sequence[Joint], frames: Frames) -> None:
         self.frames = frames

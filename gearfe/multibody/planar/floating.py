@@ -152,7 +152,7 @@ class Floating(Element):
         return (self.body.linear + 0.5 * bent) @ eta, (self.body.linear + bent) @ self._slope(q)
 
     def write(self, tape: Tape, places: IntArray) -> bool:
-        """Its strains and weight on a tape."""
+        """Write strains and weight on a tape."""
         tape.constant[places] += self._weight
         tape.floating(int(places[0]), self.body.linear, self.body.quadratic, self.body.damping)
         return True
@@ -168,7 +168,7 @@ class Floating(Element):
         return self._weight - (e + self.body.damping * (slope @ v)) @ slope
 
     def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:  # noqa: ARG002
-        """Its derivatives by q and v."""
+        """Return the derivatives of the force by q and v."""
         made = self.tangent(q, v, self.stress(q, v))
         return made.by_q, made.by_v
 

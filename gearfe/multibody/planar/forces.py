@@ -32,7 +32,7 @@ class StateFunction(ABC):
 
     @abstractmethod
     def write(self, bodies: BodyVariables) -> int:
-        """Its register on the tape of the bodies' variables."""
+        """Return the register of the value on the tape of the bodies' variables."""
 
     @abstractmethod
     def value(self, t: float, q: Array, v: Array) -> float:
@@ -57,7 +57,7 @@ class SpanFunction(ABC):
 
     @abstractmethod
     def write(self, tape: Tape, length: int, rate: int) -> int:
-        """Its register by those of length and rate."""
+        """Return the register of the tension from those of length and rate."""
 
     @abstractmethod
     def value(self, t: float, length: float, rate: float) -> float:
@@ -99,7 +99,7 @@ class Weight(NamedTuple):
 
 
 class Force(ABC):
-    """What acts on bodies: a frozen dataclass with a `name` and the names of its bodies.
+    """Force on bodies: a frozen dataclass with a `name` and the names of its bodies.
 
     A force MUST provide `parts`. Fields called ``a``, ``b``, ``body``,
     ``relative_to``, ``reaction`` name bodies, others are numbers, points (m, in the frame of a body), functions of
@@ -110,7 +110,7 @@ class Force(ABC):
 
     @abstractmethod
     def parts(self, frames: Frames) -> list[Along | Tension | Weight]:
-        """What the force is made of."""
+        """Return the components of the force."""
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class Row(NamedTuple):
 
 
 class Joint(ABC):
-    """What joins two bodies: a frozen dataclass with a `name` and the names of its bodies.
+    """Joint of two bodies: a frozen dataclass with a `name` and the names of its bodies.
 
     A joint MUST provide `rows`. Fields called ``a``, ``b``, ``body``,
     ``line``, ``relative_to`` name bodies, others are numbers, points (m, in the frame of a body), functions of time.

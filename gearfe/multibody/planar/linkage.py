@@ -190,7 +190,7 @@ class Linkage(TapeElement):
 
     @property
     def values(self) -> TapeValues:
-        """What it writes, and what energies ask for, on a tape of its own."""
+        """Return the written values and those of the energies, on a separate tape."""
         return self._own[0]
 
     @property
@@ -234,7 +234,7 @@ class Linkage(TapeElement):
 
     @property
     def pieced(self) -> bool:
-        """Whether loads have corners."""
+        """Return whether loads have corners."""
         return bool(self.values.switches)
 
     def pieces(self, t: float | Array, q: Array, v: Array) -> IntArray:
@@ -243,7 +243,7 @@ class Linkage(TapeElement):
 
     @property
     def has_knots(self) -> bool:
-        """Whether joints follow profiles."""
+        """Return whether joints follow profiles."""
         return self.values.has_knots
 
     def knots(self, q: Array) -> IntArray:
@@ -304,7 +304,7 @@ class Linkage(TapeElement):
         return np.asarray(given - (R[seen.law].T * rates).sum(axis=-1) - losses)
 
     def steady_work(self, q: Array) -> Array:
-        """Work of the constant loads (J), but for a constant, in states (..., size)."""
+        """Work of the constant loads (J), except for a constant, in states (..., size)."""
         return np.asarray(self._at_rest(q)[self.observed.form].T @ self._steady)
 
     def potential(self, q: Array) -> Array:

@@ -55,7 +55,7 @@ class QuadraticJoint(TapeElement):
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Where motions change their pieces."""
+        """Return the times at which motions change their pieces."""
         return tuple(t for motion in self.motions.values() for t in motion.breaks)
 
     def units(self) -> tuple[Array, Array]:

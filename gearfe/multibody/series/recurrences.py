@@ -249,13 +249,13 @@ def curve_forces(tb: Program, Z: Array, H: Array, k: int, out: Array) -> None:
 
 
 def own_piece(switches: Switches, s: int, piece: int) -> int:
-    """Number of a table's piece, which goes on to count beyond one period."""
+    """Number of a table's piece, which continues to count beyond one period."""
     count = switches.first[s + 1] - switches.first[s] - 1
     return piece % count if switches.period[s] > 0.0 else piece
 
 
 def lower_knot(switches: Switches, s: int, piece: int) -> float:
-    """Where a piece of a table begins."""
+    """Return the index at which a piece of a table begins."""
     count = switches.first[s + 1] - switches.first[s] - 1
     turns = piece // count if switches.period[s] > 0.0 else 0
     return switches.knot[switches.first[s] + piece - turns * count] + turns * switches.period[s]

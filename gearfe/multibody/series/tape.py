@@ -260,7 +260,7 @@ class Tape:
         return self._leaf(LINEAR, terms, constant)
 
     def rate(self, terms: Terms) -> int:
-        """Its rate."""
+        """Return the register of its rate."""
         return self._leaf(RATE, terms, 0.0)
 
     def function(self, function: TimeFunction) -> int:

@@ -75,7 +75,7 @@ class TimeFunction:
     __rmul__ = __mul__
 
     def squared(self) -> TimeFunction:
-        """Its square.
+        """Return the square of the function.
 
         Raises
         ------
@@ -99,17 +99,17 @@ class TimeFunction:
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Times at which one piece hands over to the next (s)."""
+        """Times at which one piece changes to the next (s)."""
         return self.starts[1:]
 
     @property
     def steady(self) -> bool:
-        """Whether it is constant."""
+        """Return whether it is constant."""
         return self.ends and not self.breaks
 
     @property
     def ends(self) -> bool:
-        """Whether it is constant in the end."""
+        """Return whether it is constant in the end."""
         return not self.sines and not any(self.coefficients[-1][1:])
 
     def integral(self, value: float = 0.0, at: float = 0.0) -> TimeFunction:

@@ -11,7 +11,7 @@ from .row_tables import Equations
 
 
 class Run(NamedTuple):
-    """What holds for a whole run."""
+    """Constant data of a run."""
 
     begin: float  # (s)
     end: float

@@ -1,6 +1,6 @@
 """Keyword lines of Abaqus' (CalculiX') input files with their data.
 
-A keyword line begins with one asterisk and goes on after a comma at its end; blanks in keywords and case do not count,
+A keyword line begins with one asterisk and continues after a final comma; blanks in keywords and case do not count,
 a comment begins with two asterisks (Abaqus Analysis User's Guide, section "Input syntax rules").
 """
 
@@ -36,7 +36,7 @@ class Card(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """How mistakes of a file are reported: key that named it, and the file."""
+    """Context of error messages of a file: the key that named it, and the file."""
 
     field: str
     path: Path
@@ -72,7 +72,7 @@ def cards(lines: Iterable[Line], fault: Fault, refused: Mapping[str, tuple[str, 
         For cards of `refused`, and for data before the first card.
     """
     card: Card | None = None
-    begun: Line | None = None  # a keyword line that goes on
+    begun: Line | None = None  # a keyword line that continues
     for line in lines:
         text = line.text.strip()
         if text.startswith("**") and card is not None:

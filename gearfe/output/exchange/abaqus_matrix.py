@@ -1,9 +1,9 @@
 """Matrices that Abaqus writes: of substructures, and of a whole model.
 
-*SUBSTRUCTURE MATRIX OUTPUT leaves a *USER ELEMENT whose nodes a comment names (``** ELEMENT NODES``), the freedoms of
-its nodes (those of a node hold for the nodes after it), and for each *MATRIX the lower triangle, row by row. *MATRIX
-OUTPUT leaves lines of node, freedom, node, freedom, value (Abaqus Keywords Guide, *USER ELEMENT, *MATRIX, *MATRIX
-INPUT; Analysis User's Guide, "Generating matrices").
+*SUBSTRUCTURE MATRIX OUTPUT leaves a *USER ELEMENT whose nodes a comment names (``** ELEMENT NODES``), the degrees of
+freedom of its nodes (those of a node hold for the nodes after it), and for each *MATRIX the lower triangle, row by row.
+*MATRIX OUTPUT leaves lines of node, degree of freedom, node, degree of freedom, value (Abaqus Keywords Guide, *USER
+ELEMENT, *MATRIX, *MATRIX INPUT; Analysis User's Guide, "Generating matrices").
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ _WHOLE = "the file may be cut short or damaged: write it again"
 
 
 def is_substructure(text: str) -> bool:
-    """Whether a text is the matrices of a substructure."""
+    """Return whether a text has the matrices of a substructure."""
     return _KEYWORD.search(text) is not None
 
 
 def read_substructure(text: str, path: Path, field: str, initial: str) -> tuple[Array, list[Label]]:
-    """Matrix of a substructure, and the node and freedom of its rows where the file names the nodes.
+    """Matrix of a substructure, and the node and degree of freedom of its rows where the file names the nodes.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def read_substructure(text: str, path: Path, field: str, initial: str) -> tuple[
     Raises
     ------
     InputError
-        When there is no such matrix, or it has not the numbers that its nodes and freedoms ask for.
+        When there is no such matrix, or it has not the numbers that its nodes and degrees of freedom ask for.
     """
     kind, fault = _KINDS[initial], Fault(field, path)
     nodes: list[int] = []
@@ -104,7 +104,7 @@ def _named_nodes(card: Card) -> list[int]:
 
 
 def _labels(nodes: list[int], freedoms: list[tuple[int, list[int]]], count: int, path: Path, field: str) -> list[Label]:
-    """Node and freedom of each row; nodes by their place where no comment names them."""
+    """Node and degree of freedom of each row; nodes by their place where no comment names them."""
     starts = [first for first, _ in freedoms]
     check_rows(count, path, field)
     if not count > 0 or not freedoms or starts != sorted(set(starts)) or starts[-1] > count:
@@ -125,7 +125,7 @@ def _labels(nodes: list[int], freedoms: list[tuple[int, list[int]]], count: int,
 
 
 def read_entries(text: str, path: Path, field: str) -> Entries:
-    """Matrix of lines of node, freedom, node, freedom, value, with commas or blanks between.
+    """Matrix of lines of node, degree of freedom, node, degree of freedom, value, with commas or blanks between.
 
     Raises
     ------

@@ -106,7 +106,7 @@ class _Members:
 
 @dataclass
 class _Space:
-    """What is numbered by itself: a part, an instance, or the assembly."""
+    """Numbering space of nodes and elements: a part, an instance, or the assembly."""
 
     nodes: dict[int, Point] = field(default_factory=dict)
     elements: dict[int, tuple[str, tuple[str, ...], Line]] = field(default_factory=dict)
@@ -270,7 +270,7 @@ class _Reader:
 
     def _element(self, card: Card) -> None:
         kind, count = self._kind(card)
-        names: list[str] = []  # of an element that may go on in the next line
+        names: list[str] = []  # of an element that may continue in the next line
         numbers = []
         for line in card.data:
             names = [*names, *split(line.text)]

@@ -28,7 +28,7 @@ class Line(NamedTuple):
 
     @property
     def place(self) -> str:
-        """Where it is, for messages."""
+        """Return the position, for messages."""
         return f"line {self.number} of {self.file}"
 
 

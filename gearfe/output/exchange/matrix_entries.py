@@ -1,4 +1,4 @@
-"""Matrices given by single entries, with node and freedom of their rows and columns."""
+"""Matrices given by single entries, with node and degree of freedom of their rows and columns."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.typing import Array
 
-#: Node and freedom; scalar points of Nastran have freedom 0.
+#: Node and degree of freedom; scalar points of Nastran have freedom 0.
 Label = tuple[int, int]
 #: Values by row and column.
 Entries = dict[tuple[Label, Label], float]

@@ -20,7 +20,7 @@ from .nastran_output import read_nastran
 
 
 class Matrix(NamedTuple):
-    """A square matrix, and node and freedom of its rows where the file has them."""
+    """A square matrix, and node and degree of freedom of its rows where the file has them."""
 
     values: Array
     labels: list[Label]
@@ -83,7 +83,7 @@ def _chosen(found: Mapping[str, Array | Entries], path: Path, field: str, initia
 
 
 def _usable(matrix: Array | Entries) -> bool:
-    """Whether a matrix has entries; of one without names, whether it is square and more than a filler of one row."""
+    """Return whether a matrix has entries and, if it has no names, is square with more than one row."""
     return bool(matrix) if isinstance(matrix, dict) else 1 < len(matrix) == matrix.shape[1]
 
 

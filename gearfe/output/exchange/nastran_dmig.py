@@ -1,7 +1,7 @@
 """Matrices of Nastran: DMIG entries of a bulk data or punch file (NX/MSC Nastran Quick Reference Guide, entry DMIG).
 
-An entry is a header (matrix name, 0, form, type) or a column: node and freedom of the column, then node, freedom and
-value of its rows, four fields each.
+An entry is a header (matrix name, 0, form, type) or a column: node and degree of freedom of the column, then node,
+degree of freedom and value of its rows, four fields each.
 """
 
 from __future__ import annotations

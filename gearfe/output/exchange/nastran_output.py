@@ -24,7 +24,7 @@ from ...base.typing import Array
 from .matrix_entries import Entries
 from .nastran_cards import number
 
-#: Matrices by name: values, or single entries with node and freedom.
+#: Matrices by name: values, or single entries with node and degree of freedom.
 Matrices = dict[str, Array | Entries]
 DMIG = (114, 1, 120)  # what the DMIG entries of a MATPOOL begin with
 #: Types: real, and those of double precision, which take two words of four bytes; 3 and 4 are complex.
@@ -55,7 +55,7 @@ def read_nastran(path: Path, field: str) -> Matrices:
 
 @dataclass(frozen=True)
 class Words:
-    """How a binary file stores numbers: its order of bytes (``<`` or ``>``), and bytes of a word (4 or 8)."""
+    """Number format of a binary file: its order of bytes (``<`` or ``>``), and bytes of a word (4 or 8)."""
 
     order: str
     size: int
@@ -167,7 +167,7 @@ def _columns_of(words: Words, pieces: list[tuple[int, list[bytes]]], shape: tupl
 
 
 def _pool(words: Words, records: list[bytes]) -> dict[str, Entries]:
-    """Matrices of DMIG entries: name, form, type; columns of node, freedom, rows of these with their values."""
+    """Matrices of DMIG entries: name, form, type; columns of node, degree of freedom, rows of these with values."""
     made: dict[str, Entries] = {}
     for record in records:
         size, whole = words.size, words.integers(record)

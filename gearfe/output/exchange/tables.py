@@ -184,7 +184,7 @@ def _axis(axis: str, column: str) -> dict[str, Any]:
 
 
 def _even(x: Array) -> bool:
-    """Whether begin and step, in the six digits of the format, give all abscissas."""
+    """Return whether begin and step, in the six digits of the format, give all abscissas."""
     begin, step = float(f"{x[0]:.5e}"), float(f"{x[1] - x[0]:.5e}")
     return bool(np.abs(begin + step * np.arange(len(x)) - x).max() <= 1e-9 * np.abs(x).max())
 

@@ -1104,7 +1104,7 @@ def end_state(w: Stages, tab: Scheme) -> None:
 
 
 def keep_path(w: Stages) -> None:
-    """What the dense output goes through."""
+    """Store the points of the dense output."""
     h = w.now[1]
     last = w.known.shape[0] - 1
     Q = flat(w.Q)

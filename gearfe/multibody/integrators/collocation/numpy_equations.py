@@ -1,4 +1,4 @@
-"""What a step of collocation asks of any system of elements, by NumPy; as `kernels`, which are compiled."""
+"""Evaluate the equations of a collocation step for any system by NumPy; `kernels` are the compiled ones."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ MIDDLE = 0.5
 #: Relative to the largest coordinate: a step whose path is straight within this is too short for differences of its
 #: positions to give accelerations or multipliers. (Rounding of positions weighs up to 2e4 times in accelerations.)
 STRAIGHT = 1e-12
-#: A step more than so many times as long as the last one begins anew: speeds and multipliers of a very short step are
+#: A step more than so many times as long as the last one begins again: speeds and multipliers of a very short step are
 #: rounding over powers of its length.
 MOST_AHEAD = 10.0
 #: Rounding of a position, relative to the largest so far.
@@ -144,7 +144,7 @@ class Stepper:
         self._guess = tab.side.c ** p[:, None] / p[:, None]
 
     def restart(self, system: System, start: Start, t: float, q: Array, v: Array) -> Array:
-        """Begin anew at a state: the guess of the next step has a constant acceleration.
+        """Begin again at a state: the guess of the next step has a constant acceleration.
 
         Parameters
         ----------
@@ -308,7 +308,7 @@ class Stepper:
 
         Accelerations of stiff links at the ends are the rounding of their strains; those of others follow from the
         equations of motion there. In steps that are too short for differences of positions (`STRAIGHT`) accelerations
-        go on a line between these; stiff links keep theirs, and their forces, from the step before.
+        continue a line between these; stiff links keep theirs, and their forces, from the step before.
         """
         inner, s = self.tab.inner, len(self.tab.c)
         if not known:
@@ -345,7 +345,7 @@ class Stepper:
         return Collocated(times, coefficients, origins=middles, forces=Polynomials(times, parts, origins=middles))
 
     def _straight(self, known: Array, units: Array) -> Array:
-        """Whether the stages of steps (steps, k, n) are on straight lines within rounding."""
+        """Return whether the stages of steps (steps, k, n) are on straight lines within rounding."""
         begin, speed = known[:, :1], known[:, 1:2]
         c = self.tab.c[: self.tab.inner, None]
         bent = np.abs((known[:, 2 : self.tab.inner + 2] - begin - c * speed) / units).max(axis=(1, 2), initial=0.0)

@@ -95,7 +95,7 @@ def scheme(family: str, stages: int, rates: bool = False) -> Scheme:
     next_to = np.linalg.pinv(before[:, : min(AHEAD, stages - 1) + 1])
     mu = np.array([values[k] for k in kept])
     level = int(family == GAUSS or rates)
-    parts = [0, *range(1, stages, 2), *range(2, stages, 2)]  # real parts, then imaginary ones but for the first
+    parts = [0, *range(1, stages, 2), *range(2, stages, 2)]  # real parts, then imaginary ones except for the first
     entry = [*range(len(kept)), *range(len(kept) + 1, stages + 1)]
 
     def wide(rows: Array) -> SimdArray:

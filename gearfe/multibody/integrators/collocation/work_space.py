@@ -187,7 +187,7 @@ def equations(program: Program, band: Band, s: int, stresses: int) -> Equations:
 
 
 def narrow_band(program: Program) -> Band:
-    """Which entries of the matrices may not vanish, and an order of the unknowns in which they lie in a narrow band."""
+    """Return the nonzero pattern of the matrices, and an order of the unknowns with a narrow band."""
     n, m, held = len(program.mass), len(program.rows.constant), np.argwhere(program.mass != 0.0)
 
     of = np.append(np.arange(n), program.curves.place[:, 0])  # coordinate of each variable

@@ -26,7 +26,7 @@ LEAST = 8
 
 
 class Equations(NamedTuple):
-    """What holds for a whole run, for n coordinates and p directions."""
+    """Constant data of a run, for n coordinates and p directions."""
 
     eigenvalues: Array  # (n,) w^2 (rad2/s2)
     damping: Array  # (n, n) D
@@ -42,7 +42,7 @@ class Equations(NamedTuple):
 
 
 class Work(NamedTuple):
-    """What changes from step to step, and scratch arrays; K orders."""
+    """Data that change from step to step, and scratch arrays; K orders."""
 
     memory: Array  # (rows, K) of the law
     pieces: IntArray
@@ -58,7 +58,7 @@ class Work(NamedTuple):
 
 
 class Output(NamedTuple):
-    """What a run fills, and where it stands."""
+    """Output arrays of a run, and its current position."""
 
     now: Array  # (3,) time, end, trial step (s)
     counts: IntArray  # (3,) steps made, output times passed, orders computed

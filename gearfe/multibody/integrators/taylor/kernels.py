@@ -131,7 +131,7 @@ def even_step(size: float, remains: float) -> float:
 
 
 class Samples(NamedTuple):
-    """Where the pieces of a run are asked for, and what is found."""
+    """Requested output times of a run, and the values there."""
 
     ends: Array  # (pieces + 1,) of the steps (s)
     coefficients: Array  # (pieces, orders, c)
@@ -669,7 +669,7 @@ def exchange(tb: Equations, w: Work, count: int) -> int:
 
 
 def passes(tb: Equations, w: Work, count: int) -> bool:
-    """Whether z^T g vanishes, so that two branches cross, for all singular rows."""
+    """Return whether z^T g vanishes, so that two branches cross, for all singular rows."""
     border = w.border
     residuals(tb, w, w.mu)
     for p in range(count):
@@ -914,7 +914,7 @@ def _defect(tb: Equations, w: Work, run: Run, t: float, h: float, singular: int)
 
 
 class Output(NamedTuple):
-    """What a run fills, and where it stands."""
+    """Output arrays of a run, and its current position."""
 
     state: Array  # (6,) time, singular rows, time to the singular position ahead ..., see above
     times: Array  # (room + 1,) ends of the steps (s)
@@ -931,7 +931,7 @@ def integrate_series(tb: Equations, w: Work, run: Run, out: Output) -> int:
     tb : Equations
         The system.
     w : Work
-        State and scratch arrays; call again with the same ones to go on.
+        State and scratch arrays; call again with the same ones to continue.
     run : Run
         What holds for the whole run.
     out : Output

@@ -97,7 +97,7 @@ def torques_of(
 
 
 def _free(matrix: np.ndarray) -> list[bool]:
-    """Whether each unknown stays open: it has a share in the null space."""
+    """Return whether each unknown stays open: it has a share in the null space."""
     _, sizes, vectors = np.linalg.svd(matrix)
     rank = int((sizes > ZERO * max(sizes.max(initial=0.0), 1e-30)).sum())
     return [bool(np.abs(vectors[rank:, i]).max(initial=0.0) > 1e-6) for i in range(matrix.shape[1])]

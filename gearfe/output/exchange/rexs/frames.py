@@ -1,4 +1,4 @@
-"""Where components are: local coordinate systems of REXS, each in that of another component.
+"""Locate components: local coordinate systems of REXS, each relative to another component.
 
 A component has the place of its origin (``support_vector``) and the directions of its u and w axis in the system of its
 reference component (https://spec.rexs.info, "Position and orientation in space"); v = w x u. Millimetres.

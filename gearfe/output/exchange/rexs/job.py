@@ -515,7 +515,7 @@ def _relative(tables: dict[str, Any], gear: str, carrier: str | None, speeds: di
 
 
 def _driving(reading: Reading, stage: str, gear: str) -> bool | None:
-    """Whether the data of a gear in its stage say that it drives."""
+    """Return whether the data of a gear in its stage say that it drives."""
     for relation in reading.model.joined("stage_gear_data", "stage", reading.numbers["meshes", stage]):
         if relation.roles.get("gear") == reading.numbers["gears", gear] and "stage_gear_data" in relation.roles:
             return reading.flag(reading.model.components[relation.roles["stage_gear_data"]], "is_driving_gear")

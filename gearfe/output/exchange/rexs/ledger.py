@@ -1,4 +1,4 @@
-"""What became of each value of a REXS file: read, derived, defaulted or ignored. Nothing is left out of the list."""
+"""List the use of each value of a REXS file: read, derived, defaulted or ignored. Nothing is left out of the list."""
 
 from __future__ import annotations
 

@@ -62,14 +62,14 @@ class Component:
 
     @property
     def label(self) -> str:
-        """Its type, number and name, for messages and comments."""
+        """Return type, number and name, for messages and comments."""
         name = self.name.removesuffix(f"[{self.number}]").strip()
         return f"{self.kind} {self.number}" + (f" ({name})" if name else "")
 
 
 @dataclass(frozen=True)
 class Relation:
-    """What joins components: role -> number of the component that has it."""
+    """Relation of components: role -> number of the component with this role."""
 
     number: int
     kind: str

@@ -190,7 +190,7 @@ def _group(tables: Mapping[str, Any], planet: str) -> dict[str, dict[str, str]]:
 
 
 def _alike(tables: Mapping[str, Any], one: dict[str, dict[str, str]], two: dict[str, dict[str, str]]) -> bool:
-    """Whether the entries of two planets differ by names and places only."""
+    """Return whether the entries of two planets differ by names and places only."""
     for kind, names in one.items():
         if names.keys() != two[kind].keys():
             return False

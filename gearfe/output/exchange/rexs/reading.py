@@ -1,4 +1,4 @@
-"""What the steps of a conversion share: the model, its frames, the names of the job's parts, and the list of values."""
+"""Hold the state of a conversion: the model, its frames, the names of the job's parts, and the list of values."""
 
 from __future__ import annotations
 
