@@ -43,6 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--torques-Nm", type=float, nargs="+", metavar="T", dest="torques_Nm", help="torques at the wheel's hub (N m)"
     )
     load.add_argument(
+        "--torques-pinion-Nm", type=float, nargs="+", metavar="T", dest="torques_pinion_Nm",
+        help="torques at the pinion's hub (N m)",
+    )  # fmt: skip
+    load.add_argument(
         "--torque-range", type=float, nargs=3, metavar=("START", "STOP", "COUNT"), help="a range of torques (N m)"
     )
     add_keys(parser, LoadMapTable, *LOADS, spacing="torque_spacing")
@@ -65,7 +69,7 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     """The map of one mesh."""
     started = time.perf_counter()
     mesh = replace(mesh, stiffness=_overridden_model(mesh.stiffness, args))
-    table = _with_loads(args, mesh.loads)
+    table = _with_loads(args, mesh.loads).at_wheel(mesh.ratio)
     table.torques()
 
     from ..gears.geometry.pair import pair_of
@@ -128,10 +132,12 @@ def _with_loads(args: argparse.Namespace, table: LoadMapTable) -> LoadMapTable:
     from ..base.errors import InputError
 
     more: dict[str, Any] = {}
-    if args.torques_Nm is not None:
-        for torque in args.torques_Nm:
-            check_option("--torques-Nm", torque, LoadMapTable, "torques_Nm")
-        more |= {"torques_Nm": tuple(args.torques_Nm), "torque_start_Nm": None, "torque_stop_Nm": None}
+    none = {"torques_Nm": None, "torques_pinion_Nm": None, "torque_start_Nm": None, "torque_stop_Nm": None}
+    for key in ("torques_Nm", "torques_pinion_Nm"):
+        if (given := getattr(args, key)) is not None:
+            for torque in given:
+                check_option("--" + key.replace("_", "-"), torque, LoadMapTable, key)
+            more |= {**none, key: tuple(given)}
     if args.torque_range is not None:
         start, stop, count = args.torque_range
         if not float(count).is_integer():
@@ -139,7 +145,7 @@ def _with_loads(args: argparse.Namespace, table: LoadMapTable) -> LoadMapTable:
         ends = {"torque_start_Nm": start, "torque_stop_Nm": stop, "torque_count": int(count)}
         for key, value in ends.items():
             check_option("--torque-range", value, LoadMapTable, key)
-        more |= {"torques_Nm": None, **ends}
+        more |= {**none, **ends}
     made = with_keys(args, replace(table, **more), *LOADS, spacing="torque_spacing")
     made.check(table.NAME)
     return made

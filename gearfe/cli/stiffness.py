@@ -92,7 +92,7 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     started = time.perf_counter()
     from ..base.errors import InputError
 
-    mesh = replace(mesh, stiffness=overridden(mesh.stiffness, args))
+    mesh = replace(mesh, stiffness=overridden(mesh.stiffness, args).at_wheel(mesh.ratio))
     chosen = field_angles(args)
     if args.animation is not None and not 2 <= args.animation <= 1000:
         raise InputError("--animation", args.animation, "must be >= 2 and <= 1000 frames", "40 are usual")
@@ -204,7 +204,7 @@ def overridden(table: StiffnessTable, args: argparse.Namespace) -> StiffnessTabl
     if args.law is not None:
         check_law("--law", args.law)
     if any(getattr(args, key) is not None for key in LOADS):
-        table = replace(table, twist_deg=None, torque_Nm=None)
+        table = replace(table, twist_deg=None, torque_Nm=None, torque_pinion_Nm=None)
     table = with_keys(args, table, *LOADS, *KEYS)
     if args.angles is not None:
         keys = ("angle_start_deg", "angle_step_deg", "angle_stop_deg")

@@ -9,13 +9,14 @@ from gearfe.base.tables.examples import job_file
 from gearfe.cli.main import main
 from gearfe.fem.reduction.error import reduction_error
 from tests.makers.housing_meshes import box
+from tests.makers.job_texts import pair_job
 from tests.places import GEOMETRY
 
 SHIPPED = GEOMETRY / "gear_train.toml"
 RIGID_TRAIN = (job_file("vibration").replace('# housing = "elastic"', 'housing = "rigid" #')).replace(
     "# stiffness_N_per_m (not set):", "stiffness_N_per_m = 2e8 #"
 )
-PAIR = job_file("stiffness")
+PAIR = pair_job()
 HOUSING = "[housing]\n[housing.material]\n"
 MECHANISM = job_file("mechanism")
 

@@ -10,6 +10,7 @@ import pytest
 
 from gearfe.base.tables.examples import job_file
 from gearfe.cli.main import main
+from tests.makers.job_texts import pair_job
 from tests.places import GEOMETRY
 
 FZG = GEOMETRY / "fzg_c.toml"
@@ -117,7 +118,7 @@ def test_jobs_that_are_refused(
 
 def test_files_without_the_table_or_the_speed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     job = tmp_path / "pair.toml"
-    job.write_text(job_file("stiffness"))
+    job.write_text(pair_job())
     assert main(["rating", str(job), "--out", str(tmp_path / "out")]) == 2
     assert "[rating]" in capsys.readouterr().err
     assert main(["rating", str(job), "--set", "rating.quality=6", "--out", str(tmp_path / "out")]) == 2

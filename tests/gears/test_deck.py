@@ -12,12 +12,12 @@ import meshio
 import numpy as np
 import pytest
 
-from gearfe.base.tables.examples import job_file
 from gearfe.cli.main import main
 from gearfe.gears.teeth.tooth_sector import sector_recipes
 from gearfe.gears.teeth.whole_gear import mixed_gear, teeth_near
 from gearfe.output.exchange.calculix_deck import deck_torque
 from tests.makers.gears import pair
+from tests.makers.job_texts import pair_job
 
 COARSE = ["--coarsen", "4"]
 
@@ -58,7 +58,7 @@ def test_teeth_in_mesh_are_those_nearest_to_the_mate():
 
 
 def write_job(folder: Path) -> str:
-    (folder / "pair.toml").write_text(job_file("stiffness"))
+    (folder / "pair.toml").write_text(pair_job())
     return str(folder / "pair.toml")
 
 

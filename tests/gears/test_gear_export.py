@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.base.tables.examples import job_file
 from gearfe.cli.main import main
 from gearfe.fem.meshing.session import gmsh_session
 from gearfe.gears.geometry.curves import coordinates
@@ -20,6 +19,7 @@ from gearfe.gears.geometry.pair import Gear
 from gearfe.gears.teeth.gear_solid import write_solid
 from gearfe.output.exchange.tables import read_csv
 from tests.makers.gears import gear, pair
+from tests.makers.job_texts import pair_job
 
 
 def area(wheel: Gear) -> float:
@@ -101,7 +101,7 @@ def test_a_helical_solid_has_the_flanks_of_its_turned_sections(tmp_path):
 
 
 def test_the_command_exports_both_gears(tmp_path, capfd):
-    (tmp_path / "pair.toml").write_text(job_file("stiffness"))
+    (tmp_path / "pair.toml").write_text(pair_job())
     line = ["gear", str(tmp_path / "pair.toml"), "--out", str(tmp_path / "out"), "--export"]
     assert main([*line, "csv,step"]) == 0
     out = capfd.readouterr().out
@@ -126,8 +126,7 @@ def test_the_command_exports_both_gears(tmp_path, capfd):
 def test_deviations_stand_in_the_table(tmp_path, capsys):
     """Crowning of 4 um is 0 in the middle between form and tip circle and -4 um at both ends; the slope adds a line."""
     (tmp_path / "pair.toml").write_text(
-        job_file("stiffness")
-        + "\n[microgeometry]\ntorques_Nm = [100.0]\n[microgeometry.pinion]\nprofile_crowning_um = 4.0\n"
+        pair_job() + "\n[microgeometry]\ntorques_Nm = [100.0]\n[microgeometry.pinion]\nprofile_crowning_um = 4.0\n"
         "[microgeometry.pinion.right]\nprofile_slope_um = 6.0\n"
     )
     line = ["gear", str(tmp_path / "pair.toml"), "--out", str(tmp_path / "out"), "--no-pictures", "--export"]
@@ -191,7 +190,7 @@ def distance(points: np.ndarray, line: np.ndarray) -> float:
 
 def test_a_drawing_in_layers(tmp_path):
     ezdxf = pytest.importorskip("ezdxf", reason="pip install 'gearfe[exchange]'")
-    (tmp_path / "pair.toml").write_text(job_file("stiffness"))
+    (tmp_path / "pair.toml").write_text(pair_job())
     assert main(["gear", str(tmp_path / "pair.toml"), "--out", str(tmp_path), "--export", "dxf", "-q"]) == 0
     drawing = ezdxf.readfile(Path(tmp_path / "pinion.dxf"))
     assert drawing.units == ezdxf.units.MM

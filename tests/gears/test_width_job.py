@@ -23,6 +23,7 @@ from gearfe.gears.gearmesh.width_report import FlankLoad, load_columns, sweep_co
 from gearfe.gears.width import WideMesh
 from gearfe.output.exchange.tables import read_csv
 from gearfe.study.kinds import Shared, solve
+from tests.makers.job_texts import pair_job
 
 PAIR: dict[str, Any] = {
     "module_mm": 2.5, "pressure_angle_deg": 20.0, "face_width_mm": 10.0, "tip_round_mm": 0.1,
@@ -161,7 +162,7 @@ def test_places_leave_a_common_width() -> None:
         wide_mesh(job(wheel={"y_mm": 12.0}))
 
 
-JOB = job_file("stiffness")
+JOB = pair_job()
 TILTED = ["--set", "pair.misalignment_um=5"]
 
 

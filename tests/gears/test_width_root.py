@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfe.base.tables.examples import job_file
 from gearfe.cli.main import main
 from gearfe.fem.extruded import lobatto_functions_at
 from gearfe.gears.contact.flank import edge_shapes
@@ -26,6 +25,7 @@ from gearfe.gears.width import (
 )
 from gearfe.gears.width.compliance import AxialSystem
 from gearfe.output.exchange.tables import read_csv
+from tests.makers.job_texts import pair_job
 from tests.makers.wide_gears import SPUR, spur_lines
 
 
@@ -115,7 +115,7 @@ def test_crowned_and_tilted_teeth_are_stressed_where_they_bear() -> None:
 
 def test_load_maps_take_root_stress_over_the_width(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "job.toml"
-    path.write_text(job_file("stiffness"))
+    path.write_text(pair_job())
     line = ["loadmap", str(path), "--out", str(tmp_path / "out"), "--torques-Nm", "20", "50", "--positions", "2"]
     sets = ["--set", "pair.misalignment_um=8", "--set", "stiffness.coarsen=2.0"]
     assert main([*line, "--root-stress", *sets]) == 0

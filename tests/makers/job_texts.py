@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from gearfe.base.tables.examples import PAIR
+from gearfe.base.tables.jobs import table_class
+from gearfe.base.tables.text import table_text
+
 BARE_TRAIN = """
 [train]
 housing = "rigid"
@@ -152,3 +156,10 @@ to_point = "O"
 
 
 MOMENT = '[forces.drive]\ntype = "moment"\nbody = "rod"\nmoment_N_m = "{}"\n'
+
+
+def pair_job() -> str:
+    """A commented job of 20 and 30 teeth by pitch diameters, 25 degrees, at 100 N m over two mesh cycles."""
+    load = {"torque_Nm": 100.0, "angle_start_deg": 1.0, "angle_step_deg": 1.0, "angle_stop_deg": 40.0}
+    tables = {"pair": PAIR, "stiffness": load}
+    return "\n".join(table_text(table_class(name), example, name) for name, example in tables.items())

@@ -42,8 +42,6 @@ DRAWN: dict[str, Any] = {
     "material": {"youngs_modulus_GPa": 206.0, "poisson_ratio": 0.3, "density_kg_per_m3": 7830.0},
 }  # fmt: skip
 
-STIFFNESS: dict[str, Any] = {"torque_Nm": 100.0, "angle_start_deg": 1.0, "angle_step_deg": 1.0, "angle_stop_deg": 40.0}
-
 RELIEFS: dict[str, Any] = {
     "pinion": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7},
     "wheel": {"tip_relief_um": 15.0, "tip_relief_length_mm": 2.7},

@@ -164,6 +164,11 @@ class NamedMesh:
         return self.driver, self.driven
 
     @property
+    def ratio(self) -> float:
+        """Teeth of the driven gear over those of the driver."""
+        return abs(self.driven.teeth / self.driver.teeth)
+
+    @property
     def deviates(self) -> bool:
         """Return whether the file has deviations of the flanks."""
         return any(gear.microgeometry is not None for gear in self.gears)

@@ -266,7 +266,11 @@ def _gearbox(tables: Mapping[str, Any]) -> Gearbox:
 def with_loads(box: Gearbox, raw: Mapping[str, Any], variant: str | None = None) -> Gearbox:
     """Return the gearbox with [stiffness] and [loadmap] in each mesh, each with the keys that the mesh has instead."""
     meshes = {
-        name: replace(mesh, stiffness=stiffness_of(raw, variant, name), loads=_loads_of(raw, name))
+        name: replace(
+            mesh,
+            stiffness=stiffness_of(raw, variant, name).at_wheel(mesh.ratio),
+            loads=_loads_of(raw, name).at_wheel(mesh.ratio),
+        )
         for name, mesh in box.meshes.items()
     }
     return replace(box, meshes=meshes)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..config import quantity
 from ..errors import InputError
 
 #: Keys that say the torques.
-TORQUES = ("torques_Nm", "torque_start_Nm", "torque_stop_Nm", "torque_count", "torque_spacing")
+TORQUES = ("torques_Nm", "torques_pinion_Nm", "torque_start_Nm", "torque_stop_Nm", "torque_count", "torque_spacing")
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,11 @@ class LoadMapTable:
 
     torques_Nm: tuple[float, ...] | None = quantity(
         None, doc="torques at the wheel's hub (N m), or give torque_start_Nm and torque_stop_Nm", above=0.0
+    )
+    torques_pinion_Nm: tuple[float, ...] | None = quantity(
+        None,
+        doc="torques at the pinion's (the driver's) hub (N m), instead: times z2/z1 they are torques_Nm",
+        above=0.0,
     )
     torque_start_Nm: float | None = quantity(None, doc="least torque at the wheel's hub (N m)", above=0.0)
     torque_stop_Nm: float | None = quantity(None, doc="largest torque (N m)", above=0.0)
@@ -34,6 +39,14 @@ class LoadMapTable:
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that contradict each other."""
         start, stop = self.torque_start_Nm, self.torque_stop_Nm
+        pinion = self.torques_pinion_Nm
+        if pinion is not None:
+            other = next((key for key in TORQUES[:4] if key != "torques_pinion_Nm" and self._given(key)), None)
+            if other is not None:
+                problem, cure = f"conflicts with {other}", "leave one of them out"
+                raise InputError(f"{where}.torques_pinion_Nm", list(pinion), problem, cure)
+            if not pinion:
+                raise InputError(f"{where}.torques_pinion_Nm", [], "is empty", "give at least one torque")
         if self.torques_Nm is not None:
             if start is not None or stop is not None:
                 name, value = ("torque_start_Nm", start) if start is not None else ("torque_stop_Nm", stop)
@@ -45,6 +58,15 @@ class LoadMapTable:
             raise InputError(f"{where}.{name}", None, "is missing", "give both ends of the range")
         elif start is not None and stop is not None and not start < stop:
             raise InputError(f"{where}.torque_stop_Nm", stop, f"must be > torque_start_Nm = {start:g}", "swap them")
+
+    def _given(self, key: str) -> bool:
+        return getattr(self, key) is not None
+
+    def at_wheel(self, ratio: float) -> LoadMapTable:
+        """Return the table with torques at the wheel; `ratio` is z2/z1."""
+        if self.torques_pinion_Nm is None:
+            return self
+        return replace(self, torques_Nm=tuple(ratio * t for t in self.torques_pinion_Nm), torques_pinion_Nm=None)
 
     def torques(self) -> list[float]:
         """Rising torques (N m).

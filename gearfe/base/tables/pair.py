@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 from ..config import quantity
@@ -425,7 +425,7 @@ def check_flank_coarsen(coarsen: float, flank_coarsen: float, field: str) -> Non
 
 
 #: Keys of [stiffness] that give its load, at most one of them.
-LOADS = ("twist_deg", "torque_Nm")
+LOADS = ("twist_deg", "torque_Nm", "torque_pinion_Nm")
 
 
 @dataclass(frozen=True)
@@ -452,6 +452,9 @@ class StiffnessTable:
         None, doc="twist of the wheel against the pinion (deg), or give torque_Nm", above=0.0, below=36.0
     )
     torque_Nm: float | None = quantity(None, doc="torque at the wheel's hub (N m), or give twist_deg", above=0.0)
+    torque_pinion_Nm: float | None = quantity(
+        None, doc="torque at the pinion's (the driver's) hub (N m), instead: times z2/z1 it is torque_Nm", above=0.0
+    )
     twist_from: Literal["contact", "centred"] = quantity(
         "contact",
         doc="reference of twist_deg: contact (where unmodified driving flanks touch) or centred (a wheel space "
@@ -499,10 +502,18 @@ class StiffnessTable:
         "cubic", doc="interpolation between the positions: cubic (monotone) or linear", choices=("cubic", "linear")
     )
 
+    def at_wheel(self, ratio: float) -> StiffnessTable:
+        """Return the table with the torque at the wheel; `ratio` is z2/z1."""
+        if self.torque_pinion_Nm is None:
+            return self
+        return replace(self, torque_Nm=ratio * self.torque_pinion_Nm, torque_pinion_Nm=None)
+
     def check(self, where: str) -> None:
         """Raise `InputError` for keys that contradict each other."""
-        if self.twist_deg is not None and self.torque_Nm is not None:
-            raise InputError(f"{where}.torque_Nm", self.torque_Nm, "conflicts with twist_deg", "leave one of them out")
+        found = [key for key in LOADS if getattr(self, key) is not None]
+        if len(found) > 1:
+            problem = f"conflicts with {found[0]}"
+            raise InputError(f"{where}.{found[1]}", getattr(self, found[1]), problem, "leave one of them out")
         check_flank_coarsen(self.coarsen, self.flank_coarsen, f"{where}.flank_coarsen")
         check_law(f"{where}.law", self.law)
         if self.angle_stop_deg is not None and self.angle_stop_deg < self.angle_start_deg:

@@ -164,7 +164,7 @@ class StiffnessJob:
         """Raise `InputError` when the job has neither a twist nor a torque, or a twist that leaves the tooth."""
         t = self.table
         if t.twist_deg is None and t.torque_Nm is None:
-            cure = "add twist_deg or torque_Nm to [stiffness], or give --twist-deg or --torque-Nm"
+            cure = "add twist_deg, torque_Nm or torque_pinion_Nm to [stiffness], or give --twist-deg or --torque-Nm"
             raise InputError("stiffness.twist_deg", None, "no load: neither twist_deg nor torque_Nm is given", cure)
         if t.twist_deg is not None:
             lost = math.degrees(self.pair.contact_twist) if t.twist_from == "contact" else 0.0
