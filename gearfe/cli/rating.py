@@ -12,7 +12,9 @@ from .arguments import add_folder, add_job, add_keys, add_mesh, each_mesh, print
 if TYPE_CHECKING:
     from ..base.tables.gearbox import NamedMesh
     from ..base.tables.rating import RatingTable
+    from ..drivetrain.gearbox.job import TrainJob
     from ..gears.gearmesh.rated import Compared
+    from ..gears.rating.rate import Rating
 
 #: Keys of the table [rating] that options stand for.
 KEYS = ("edition", "torque_Nm", "speed_rpm", "life_h", "application_factor", "quality")
@@ -32,6 +34,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also compute stiffness, pressure and root stress by finite elements",
     )
 
+    parser.add_argument(
+        "--runup",
+        metavar="FOLDER",
+        help="results of gearfe runup of this file: its dynamic factor at the speed, next to K_v",
+    )
+    parser.add_argument(
+        "--with-computed",
+        action="store_true",
+        help="rate with the computed K_Hbeta and, with --runup, the dynamic factor instead of the standard's",
+    )
+
 
 def run(args: argparse.Namespace) -> int:
     """Rate each mesh; write rating.json, rating.csv and rating.png."""
@@ -47,6 +60,7 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     raw = read_toml(args.job)
     table = _with_options(args, job_tables(raw, args.job, ("rating",))["rating"])
     box = whole_gearbox(raw, args.job)
+    train = None
     if "train" in raw:
         from ..base.tables.jobs import train_tables
         from ..drivetrain.gearbox.job import train_job
@@ -71,15 +85,23 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
     from ..gears.rating.report import rating_lines, rating_summary
 
     folder = output_folder(args.out)
-    found: dict[str, Any] = rating_summary(rating, pair, table, mesh.name)
     rows: list[Compared] = []
-    if args.computed:
+    if args.computed or (args.with_computed and mesh.along_width()):
         from ..gears.gearmesh.job import stiffness_job
         from ..gears.gearmesh.rated import compared
 
         with stage("computing the mesh"):
             rows = compared(stiffness_job(mesh, Path(args.job).parent, pair), rating)
+    if args.runup is not None:
+        rows.append(_dynamic_factor(args.runup, train, mesh, rating))
+    if args.with_computed:
+        table = _with_computed(table, mesh, rows)
+        rating = rate_mesh(mesh, table, box.gears, box.meshes, pair)
+    found: dict[str, Any] = rating_summary(rating, pair, table, mesh.name)
+    if rows:
         found["computed"] = [row.row() for row in rows]
+    if args.with_computed:
+        found["factors"] = "K_Hbeta and K_v of computed, where they stand there"
     with whole_set(folder, ("rating.png",)) as made:
         if not args.no_pictures:
             from ..figures.rating import rating_picture
@@ -97,6 +119,64 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
         lines += compared_lines(rows)
     print_results(lines, folder, files, {}, found["warnings"])
     return 0
+
+
+def _dynamic_factor(folder: str, train: TrainJob | None, mesh: NamedMesh, rating: Rating) -> Compared:
+    """Dynamic factor of a run-up at the speed of a rating, next to K_v.
+
+    Raises
+    ------
+    InputError
+        For a file without [train], a folder without a run-up of it, and a speed beyond it.
+    """
+    import csv
+
+    import numpy as np
+
+    from ..base.errors import InputError
+    from ..drivetrain.gearbox.mesh_loads import drive_speed
+    from ..gears.gearmesh.rated import DYNAMIC, Compared
+
+    if train is None:
+        raise InputError("--runup", folder, "is of a file with [train], which this one is not", "leave it out")
+    path = Path(folder) / "runup.csv"
+    number, speed = drive_speed(train, mesh.name, rating.load.speed)
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            lines = list(csv.DictReader(file))
+        points = sorted((abs(float(row["speed_rad_per_s"])), float(row[f"dynamic_factor_{number}"])) for row in lines)
+    except (OSError, KeyError, ValueError, TypeError):
+        problem = f"has no runup.csv with the columns speed_rad_per_s and dynamic_factor_{number}"
+        raise InputError("--runup", folder, problem, "write the folder of gearfe runup of this file") from None
+    speeds, factors = (np.array(values) for values in zip(*points, strict=True)) if points else ((), ())
+    if not len(speeds) or not speeds[0] <= speed <= speeds[-1]:
+        reach = f"reaches from {speeds[0]:.4g} to {speeds[-1]:.4g} rad/s" if len(speeds) else "has no speeds"
+        problem = f"{reach}, and the drive turns at {speed:.4g} rad/s in this rating"
+        raise InputError("--runup", folder, problem, "compute more speeds ([runup])")
+    factor = float(np.interp(speed, speeds, factors))
+    meaning = f"dynamic factor; computed: of the run-up at {speed:.4g} rad/s of the drive"
+    return Compared(DYNAMIC, "-", rating.general.K_v, factor, meaning)
+
+
+def _with_computed(table: RatingTable, mesh: NamedMesh, rows: list[Compared]) -> RatingTable:
+    """Return the table with the computed face load factor and dynamic factor of a mesh, each at least 1.
+
+    Raises
+    ------
+    InputError
+        Where neither was computed.
+    """
+    from ..base.errors import InputError
+    from ..base.tables.rating import MeshRatingTable
+    from ..gears.gearmesh.rated import DYNAMIC, FACE_LOAD
+
+    keys = {FACE_LOAD: "face_load_factor", DYNAMIC: "dynamic_factor"}
+    factors = {keys[row.name]: max(1.0, row.computed) for row in rows if row.name in keys}
+    if not factors:
+        problem = f"has nothing to take in mesh {mesh.name!r}: its load is alike along the face width"
+        raise InputError("--with-computed", None, problem, "add --runup FOLDER, or helix modifications or tilts")
+    own = table.meshes.get(mesh.name, MeshRatingTable())
+    return replace(table, meshes={**table.meshes, mesh.name: replace(own, **factors)})
 
 
 def _with_options(args: argparse.Namespace, table: RatingTable) -> RatingTable:

@@ -178,14 +178,46 @@ def test_computed_values_beside_the_standard(tmp_path: Path, capsys: pytest.Capt
 
 def test_computed_values_of_loads_along_the_width(tmp_path: Path) -> None:
     job = ["--set", "rating.speed_rpm=1500", "--set", "rating.torque_Nm=135", "--set", "stiffness.coarsen=2"]
-    line = ["rating", str(FZG.with_name("helical.toml")), *job, "--computed", "--out", str(tmp_path), "--no-pictures"]
-    assert main(line) == 0
+    line = ["rating", str(FZG.with_name("helical.toml")), *job, "--with-computed", "--out", str(tmp_path)]
+    assert main([*line, "--no-pictures"]) == 0
     made = json.loads((tmp_path / "rating.json").read_text())
     rows = {row["name"]: row for row in made["computed"]}
-    assert set(rows) == {"c_gamma", "K_Hbeta"}
-    assert rows["K_Hbeta"]["standard"] == made["influence"]["K_Hbeta"]["value"]
+    roots = {"root stress pinion", "root stress wheel"}
+    assert set(rows) == {"c_gamma", "K_Hbeta", "largest pressure", *roots}
+    # the rating has the computed load factor, and the table that of the standard next to it
+    assert rows["K_Hbeta"]["computed"] == made["influence"]["K_Hbeta"]["value"]
+    assert rows["K_Hbeta"]["standard"] != rows["K_Hbeta"]["computed"]
+    assert made["influence"]["K_Fbeta"]["value"] == pytest.approx(
+        rows["K_Hbeta"]["computed"] ** made["influence"]["N_F"]["value"]
+    )
+    assert all(abs(rows[name]["difference"]) < 0.2 for name in (*roots, "largest pressure"))
     assert rows["K_Hbeta"]["computed"] == pytest.approx(1.48, abs=0.1)
     assert rows["c_gamma"]["computed"] == pytest.approx(11.6, rel=0.05)
+
+
+def test_dynamic_factor_of_a_run_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Between the speeds of runup.csv it is interpolated; with --with-computed the rating has it as K_v."""
+    job = tmp_path / "box.toml"
+    job.write_text(job_file("gearbox"))
+    (tmp_path / "run").mkdir()
+    lines = ["speed_rad_per_s,dynamic_factor_1,dynamic_factor_2", "100,1.2,1.0", "120,1.6,1.1"]
+    (tmp_path / "run" / "runup.csv").write_text("\n".join(lines) + "\n")
+    speed = 110.0 * 30.0 / 3.141592653589793
+    line = ["rating", str(job), "--set", f"rating.speed_rpm={speed}", "--set", "rating.torque_Nm=50"]
+    line += ["--out", str(tmp_path / "out"), "--no-pictures", "--runup", str(tmp_path / "run")]
+    line += ["--mesh", "first"]
+    assert main([*line, "--with-computed"]) == 0
+    (path,) = (tmp_path / "out").rglob("rating.json")
+    made = json.loads(path.read_text())
+    row = {row["name"]: row for row in made["computed"]}["K_v"]
+    assert row["computed"] == pytest.approx(1.4)
+    assert made["influence"]["K_v"]["value"] == row["computed"] != row["standard"]
+    assert main([*line, "--set", "rating.speed_rpm=9000"]) == 2
+    assert "reaches from 100 to 120 rad/s" in capsys.readouterr().err
+    assert main([*line[:-3], str(tmp_path), *line[-2:]]) == 2
+    assert "has no runup.csv" in capsys.readouterr().err
+    assert main(["rating", str(FZG), "--with-computed", "--out", str(tmp_path / "out"), "--no-pictures"]) == 2
+    assert "alike along the face width" in capsys.readouterr().err
 
 
 def test_computed_values_of_a_torque_out_of_range(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from ...base.errors import InputError
 from ...base.tables.rating import GearRatingTable, MeshRatingTable, RatingTable
 from ..train.gear_train import GearTrain
 from ..train.kinematics import against, fastest
@@ -73,6 +74,34 @@ def mesh_loads(train: GearTrain) -> dict[str, MeshLoad]:
             fixed=(mesh.driver.shaft in held, mesh.driven.shaft in held),
         )
     return found
+
+
+def drive_speed(job: TrainJob, mesh: str, speed: float) -> tuple[int, float]:
+    """Return the number of a mesh in the train, from 1 on, and the speed of the drive (rad/s) at one of its driver.
+
+    Parameters
+    ----------
+    job : TrainJob
+        The train.
+    mesh : str
+        Name of the mesh; of one of planets that is written once the first counts.
+    speed : float
+        Of the driver of the mesh against the carrier of its stage (1/min).
+
+    Raises
+    ------
+    InputError
+        For mistakes in the train, and a mesh that is not in it.
+    """
+    train = job.rigid_train
+    names = [item.name for item in train.layout.meshes]
+    name = mesh if mesh in names else f"{mesh}_1"
+    if name not in names:
+        problem = f"is not among the meshes of [train]: {', '.join(names)}"
+        raise InputError("mesh", mesh, problem, "choose one of them by --mesh, or leave out --runup")
+    number = names.index(name)
+    ratio = abs(float(train.kinematics.drivers[number]))
+    return number + 1, speed * math.pi / 30.0 / ratio if ratio else 0.0
 
 
 def with_train(table: RatingTable, job: TrainJob, mesh: str, gears: tuple[str, str], given: bool) -> RatingTable:

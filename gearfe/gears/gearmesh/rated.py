@@ -21,7 +21,11 @@ from .job import StiffnessJob
 from .load_map import LoadMap
 from .sweep import sweep_loads
 from .width_job import check_width_job, job_lines
+from .width_report import hertzian_pressures
+from .width_root import roots_of_cells, wide_roots
 
+#: Names of the rows of face load factor and dynamic factor.
+FACE_LOAD, DYNAMIC = "K_Hbeta", "K_v"
 #: Positions in a mesh cycle, and in the stretch with one pair in contact.
 POSITIONS, SINGLE = 24, 9
 
@@ -59,8 +63,7 @@ def compared(job: StiffnessJob, rating: Rating) -> list[Compared]:
     Returns
     -------
     rows : list of Compared
-        Of plane sections stiffness, pressure and root stress; of gears whose load varies along the width stiffness and
-        K_Hbeta.
+        Stiffness, pressure and root stress; of gears whose load varies along the width K_Hbeta, too.
 
     Raises
     ------
@@ -75,21 +78,39 @@ def compared(job: StiffnessJob, rating: Rating) -> list[Compared]:
 def _of_width(job: StiffnessJob, rating: Rating, torque: float) -> list[Compared]:
     """Stiffness and load factor of gears whose load varies along the face width."""
     check_width_job(job)
-    sweep = sweep_width(job_lines(job), [torque])
-    general, mean = rating.general, float(np.nanmean(sweep.stiffness[0]))
+    general, flank = rating.general, rating.flank
+    # the load factor is of the mean load F_m of the standard; all else of the nominal load
+    lines = job_lines(job)
+    sweep = sweep_width(lines, [torque, torque * general.K_A * general.K_gamma * general.K_v])
+    mean = float(np.nanmean(sweep.stiffness[0]))
     stiffness = mean / job.pair.wheel.base_radius**2 / job.pair.common_width
-    return [
+    rows = [
         Compared(
             "c_gamma", "N/(mm um)", general.c_gamma_alpha_N_per_mm_um, 1e-9 * stiffness, "mean stiffness of the mesh"
         ),
         Compared(
-            "K_Hbeta",
+            FACE_LOAD,
             "-",
             general.K_Hbeta,
-            float(sweep.k_h_beta[0]),
-            "face load factor; computed: of the modifications and tilts of the file",
+            float(sweep.k_h_beta[1]),
+            "face load factor; computed: of the modifications and tilts of the file under F_m",
         ),
     ]
+    nominal = sweep.points.load == 0
+    pressure = hertzian_pressures(job, sweep.points.roll, sweep.points.line_load)[nominal]
+    if np.isfinite(pressure).any():
+        spread = math.sqrt(general.K_Hbeta * general.K_Halpha)
+        standard = max(flank.Z_BD) * flank.sigma_H0_MPa * spread
+        meaning = "largest contact stress, with K_Hbeta and K_Halpha; computed over the flanks, without edges"
+        rows.append(Compared("largest pressure", "MPa", standard, 1e-6 * float(np.nanmax(pressure)), meaning))
+    stress = roots_of_cells(wide_roots(lines, sweep), sweep.status.shape).stress[0]
+    for i, name in enumerate(rating.names):
+        largest = stress[:, i if not rating.driver else 1 - i]
+        if np.isfinite(largest).any():
+            standard = rating.root.sigma_F0_MPa[i] * general.K_Fbeta * general.K_Falpha
+            meaning = "largest root stress, with K_Fbeta and K_Falpha; computed over width and mesh cycle"
+            rows.append(Compared(f"root stress {name}", "MPa", standard, 1e-6 * float(np.nanmax(largest)), meaning))
+    return [row for row in rows if math.isfinite(row.computed)]
 
 
 def _of_sections(job: StiffnessJob, rating: Rating, torque: float) -> list[Compared]:
