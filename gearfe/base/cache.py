@@ -93,22 +93,22 @@ def kept(
     if folder is None:
         return make()
     path = folder / f"{kind}-{key[:32]}.npz"
-    found = read(path) if path.exists() else None
-    if found is not None:
+    entry = read(path) if path.exists() else None
+    if entry is not None:
         with suppress(OSError):
             os.utime(path)  # used now
-        return found
-    made = make()
+        return entry
+    value = make()
     # who was first wins, so that two processes that make the same continue with the same digits
-    found = read(path) if path.exists() else None
-    if found is not None:
-        return found
+    entry = read(path) if path.exists() else None
+    if entry is not None:
+        return entry
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-        write(made, path)
+        write(value, path)
         if int(key[:8], 16) % LOOK == 0:
             trim(folder, limit())
-    return made
+    return value
 
 
 def cached_arrays(
@@ -231,7 +231,7 @@ class Entry:
 
 def entries(folder: Path) -> list[Entry]:
     """All entries, the one used last at the end; other files of the folder are none of ours."""
-    found = []
+    entries_of_kind = []
     for path in folder.iterdir() if folder.is_dir() else ():
         kind, _, rest = path.name.rpartition("-")
         if not kind or not rest[:16].isalnum() or len(rest) < 16:
@@ -240,8 +240,8 @@ def entries(folder: Path) -> list[Entry]:
             files = [p.stat() for p in path.rglob("*") if p.is_file()] if path.is_dir() else [path.stat()]
             if files:
                 size, used = sum(s.st_size for s in files), max(s.st_mtime for s in files)
-                found.append(Entry(path, kind, size, used))
-    return sorted(found, key=lambda entry: entry.used)
+                entries_of_kind.append(Entry(path, kind, size, used))
+    return sorted(entries_of_kind, key=lambda entry: entry.used)
 
 
 def trim(folder: Path, size: int) -> list[Entry]:

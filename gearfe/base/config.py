@@ -182,10 +182,10 @@ def build(cls: type[T], table: Any, where: str, *, rules: bool = True) -> T:
     InputError
         Unknown key (with the nearest known one), missing key, wrong type, value out of range, a rule broken.
     """
-    made = _built(cls, table, where)
+    result = _built(cls, table, where)
     if rules:
-        _check_rules(made, where)
-    return made
+        _check_rules(result, where)
+    return result
 
 
 def _built(cls: type[T], table: Any, where: str) -> T:

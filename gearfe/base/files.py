@@ -201,16 +201,16 @@ def read_numbers(
     _check_header([name for name in header if name in known], path, field)
     body = [row for row in rows[1:] if any(cell.strip() for cell in row)]
     place = {name: i for i, name in enumerate(header) if name in known}
-    made = np.empty((len(body), len(place)))
+    numbers = np.empty((len(body), len(place)))
     for number, row in enumerate(body):
         try:
-            made[number] = [float(row[i]) for i in place.values()]
+            numbers[number] = [float(row[i]) for i in place.values()]
         except (ValueError, IndexError):
-            made[number] = np.nan
-        if len(row) != len(header) or not np.isfinite(made[number]).all():
+            numbers[number] = np.nan
+        if len(row) != len(header) or not np.isfinite(numbers[number]).all():
             problem = f"row {number + 1} must have {len(header)} numbers, all finite"
             raise InputError(field, path.name, problem, "correct that row")
-    return dict(zip(place, made.T, strict=True))
+    return dict(zip(place, numbers.T, strict=True))
 
 
 # ---- writing --------------------------------------------------------------------------------------------------------
@@ -383,12 +383,12 @@ def _plain(value: Any) -> Any:
 @contextmanager
 def recorded() -> Iterator[list[tuple[Path, list[str]]]]:
     """Yield a list that gets the folder and the names of each set of files written inside."""
-    found: list[tuple[Path, list[str]]] = []
-    _records.append(found)
+    notes: list[tuple[Path, list[str]]] = []
+    _records.append(notes)
     try:
-        yield found
+        yield notes
     finally:
-        _records[:] = [one for one in _records if one is not found]  # equal ones may be another's
+        _records[:] = [one for one in _records if one is not notes]  # equal ones may be another's
 
 
 @contextmanager
@@ -405,12 +405,12 @@ def whole_set(folder: Path, may_write: Sequence[str] = (), beside: Sequence[str]
     """
     _remove_leftovers(folder)
     with tempfile.TemporaryDirectory(prefix=WRITING, dir=folder) as name:
-        made = Path(name)
-        yield made
-        new = {path.name for path in made.iterdir()}
+        temporary = Path(name)
+        yield temporary
+        new = {path.name for path in temporary.iterdir()}
         if SUMMARY in new:
             may_write = (*may_write, *KEPT_LATER)
-        for path in sorted(made.iterdir()):
+        for path in sorted(temporary.iterdir()):
             _move(path, folder / path.name)
         for old in {old for pattern in may_write for old in folder.glob(pattern)}:
             if old.name not in new and old.is_file():

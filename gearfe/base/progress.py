@@ -55,9 +55,9 @@ class _Stage:
 
     def _steady(self, now: float) -> float:
         """Return the work per second; 0 if it varies too much to predict the remaining time."""
-        made = self.done - self.first
-        rates = [made / (now - self.counted)]
-        halves = [mark for mark in self.marks if mark[1] - self.first <= 0.5 * made and mark[0] < now]
+        progress = self.done - self.first
+        rates = [progress / (now - self.counted)]
+        halves = [mark for mark in self.marks if mark[1] - self.first <= 0.5 * progress and mark[0] < now]
         if halves and halves[-1][1] == self.first:
             return 0.0  # one stretch alone does not show whether the next ones take as long
         if halves:

@@ -66,9 +66,9 @@ def finer(times: Array, highest: float) -> tuple[Array, int]:
 def subdivided(times: Array, every: int) -> Array:
     """Equally spaced times (n,) with `every` steps instead of each one."""
     count = len(times) - 1
-    made = times[0] + float(times[-1] - times[0]) / (every * count) * np.arange(every * count + 1)
-    made[::every] = times
-    return np.asarray(made)
+    finer_times = times[0] + float(times[-1] - times[0]) / (every * count) * np.arange(every * count + 1)
+    finer_times[::every] = times
+    return np.asarray(finer_times)
 
 
 class RecordSpectrum:

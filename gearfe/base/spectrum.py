@@ -226,11 +226,11 @@ def peaks(frequency: ArrayLike, amplitude: ArrayLike, count: int = 5, *, above: 
     inner = a[1:]
     left = np.concatenate([[-np.inf], inner[:-1]])
     right = np.concatenate([inner[1:], [-np.inf]])
-    found = 1 + np.flatnonzero((inner > left) & (inner >= right) & (inner > 0.0))
-    found = found[np.argsort(-a[found], kind="stable")]
-    if len(found):
-        found = found[a[found] >= above * a[found[0]]]
-    return tuple(Peak(int(k), float(f[k]), float(a[k])) for k in found[:count])
+    indices = 1 + np.flatnonzero((inner > left) & (inner >= right) & (inner > 0.0))
+    indices = indices[np.argsort(-a[indices], kind="stable")]
+    if len(indices):
+        indices = indices[a[indices] >= above * a[indices[0]]]
+    return tuple(Peak(int(k), float(f[k]), float(a[k])) for k in indices[:count])
 
 
 def order_lines(fundamentals: Mapping[str, float], highest: float) -> tuple[OrderLine, ...]:

@@ -281,7 +281,7 @@ def _flexible(mechanism: Mechanism, results: Results, name: str) -> dict[str, An
     """Return the summary of a flexible link: mesh, largest deflection and stress at the output times."""
     link = mechanism.links[name]
     data = link.beam.link
-    made: dict[str, Any] = {
+    entry: dict[str, Any] = {
         "name": name,
         "elements": len(data.ends) - 1,
         "largest_deflection_m": float(np.abs(link.offsets(results.trajectory.q)[:, :, 1]).max()),
@@ -289,11 +289,11 @@ def _flexible(mechanism: Mechanism, results: Results, name: str) -> dict[str, An
         "largest_bending_moment_N_m": float(np.abs(results.sections[name][:, :, 2]).max()),
     }
     if data.section.edge is not None:
-        made["largest_edge_stress_Pa"] = float(link.edge_stress(results.sections[name], name).max())
+        entry["largest_edge_stress_Pa"] = float(link.edge_stress(results.sections[name], name).max())
         beam = mechanism.file.bodies[name].beam
         assert beam is not None  # it makes the link flexible
-        made["largest_strain"] = made["largest_edge_stress_Pa"] / (1e9 * beam.youngs_modulus_GPa)
-    return made
+        entry["largest_strain"] = entry["largest_edge_stress_Pa"] / (1e9 * beam.youngs_modulus_GPa)
+    return entry
 
 
 def _of_elements(mechanism: Mechanism, results: Results, name: str) -> dict[str, Any]:

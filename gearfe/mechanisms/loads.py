@@ -85,10 +85,10 @@ def divides(node: Node) -> bool:
 
 def constant_bases(node: Node) -> list[float]:
     """Numbers that are raised to powers that vary."""
-    found = [base for part in node.parts for base in constant_bases(part)]
+    bases = [base for part in node.parts for base in constant_bases(part)]
     if node.kind == "**" and quantities(node.parts[1]) and not quantities(node.parts[0]):
-        found.append(float(compute(node.parts[0], {})))
-    return found
+        bases.append(float(compute(node.parts[0], {})))
+    return bases
 
 
 class ExpressionLoad(Formula, StateFunction):

@@ -244,9 +244,9 @@ class Mechanism:
         owner = np.array(self.linkage.assembly.row_joint)
         G = self.system.jacobian(start.time, start.q) * self.system.units / self.system.row_units[:, None]
         names = list(self.file.joints)
-        found = [j for j in range(len(names)) if free_motions(G[owner != j]).shape[1]]
-        least = min(((owner == j).sum() for j in found), default=0)
-        return [names[j] for j in found if (owner == j).sum() == least]
+        joints = [j for j in range(len(names)) if free_motions(G[owner != j]).shape[1]]
+        least = min(((owner == j).sum() for j in joints), default=0)
+        return [names[j] for j in joints if (owner == j).sum() == least]
 
     def with_rigid_links(self) -> Mechanism:
         """The same joints between the same bodies, none of which bends, without forces; it need not be free to move."""
@@ -259,9 +259,9 @@ class Mechanism:
         rigid = self.with_rigid_links()
         known = rigid.start(time)
         q, v = bent_start(self.elastic, self.system, rigid.linkage, np.stack([known.q, known.v]))
-        made = consistent_start(self.system, time, q=q, v=v)
-        self._check_loads(made)
-        return made
+        projected = consistent_start(self.system, time, q=q, v=v)
+        self._check_loads(projected)
+        return projected
 
     def _check_loads(self, start: Start) -> None:
         state = start.time, start.q, start.v
@@ -354,10 +354,10 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     bending = [link.beam for link in flexible.values()], [link.element for link in elastic.values()]
     system = System([planar, *bending[0], *bending[1], *(link.joint for link in elastic.values())])
     outputs: dict[str, Node] = {}
-    made = Mechanism(file, system, outputs, path, flexible, elastic, known_until(file, tables))
+    mechanism = Mechanism(file, system, outputs, path, flexible, elastic, known_until(file, tables))
     for _, load in planar.assembly.state_loads:
         if isinstance(load, ExpressionLoad):
-            load.bind(made)
+            load.bind(mechanism)
     zero = np.zeros((1, system.size))
     has_links = any(body.shape is not None for body in file.bodies.values())  # those taken as rigid say so themselves
     of_links = (*OF_SECTION, *OF_LINK) if has_links else ()
@@ -367,7 +367,7 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
             raise InputError(f"outputs[{i}].name", output.name, "is used twice", "rename the column")
         node = parse(output.value, f"outputs[{i}].value", known)
         try:
-            made.values(quantities(node), zero, zero, zero)  # names exist
+            mechanism.values(quantities(node), zero, zero, zero)  # names exist
         except InputError as error:
             place = error.field.removeprefix("expression").strip()
             problem = f"{place}: {error.problem}" if place else error.problem
@@ -375,8 +375,8 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
         outputs[output.name] = node
     for path_table in file.paths:
         if isinstance(path_table.point, str):
-            made.point(f"{path_table.body}.{path_table.point}", "paths")
+            mechanism.point(f"{path_table.body}.{path_table.point}", "paths")
     for name in (*file.figure.curves, *file.figure.reference_columns):
         if name not in outputs:
             raise unknown_name("figure", name, outputs)
-    return made
+    return mechanism

@@ -95,14 +95,14 @@ class PlatePart:
     def nodes(self) -> tuple[Body, ...]:
         """Bodies without mass at the interfaces, which start as those of a rigid link."""
         c, s = math.cos(self.pose[2]), math.sin(self.pose[2])
-        made = []
+        bodies = []
         for name, interface in zip(self.node_names, self.table.interfaces.values(), strict=True):
             dx, dy = interface.centre
             x, y = c * dx - s * dy, s * dx + c * dy
             place = (self.pose[0] + x, self.pose[1] + y)
             speed = (self.speed[0] - self.speed[2] * y, self.speed[1] + self.speed[2] * x)
-            made.append(Body(name, 0.0, 0.0, (0.0, 0.0), place, self.pose[2], speed, self.speed[2]))
-        return tuple(made)
+            bodies.append(Body(name, 0.0, 0.0, (0.0, 0.0), place, self.pose[2], speed, self.speed[2]))
+        return tuple(bodies)
 
     def rigid(self) -> Body:
         """The rigid link of the same mass and inertia."""
@@ -319,7 +319,7 @@ def _interfaces(points: Array, table: PlateTable, where: str) -> list[Interface]
     from ..fem.reduction.plate import Interface
 
     near = NEAR * float(np.hypot(*np.ptp(points, axis=0)))
-    made: list[Interface] = []
+    interfaces: list[Interface] = []
     owner = np.full(len(points), "", dtype=object)
     for name, interface in table.interfaces.items():
         nodes = np.flatnonzero(_distance(interface, points) <= near)
@@ -331,8 +331,8 @@ def _interfaces(points: Array, table: PlateTable, where: str) -> list[Interface]
         if taken is not None:
             raise InputError(label, None, f"shares nodes with interface {taken}", "leave elements between them")
         owner[nodes] = name
-        made.append(Interface(np.array(interface.centre), nodes))
-    return made
+        interfaces.append(Interface(np.array(interface.centre), nodes))
+    return interfaces
 
 
 def plate_links(bodies: dict[str, BodyTable], planar: Linkage, parts: dict[str, PlatePart]) -> dict[str, PlateLink]:

@@ -205,8 +205,8 @@ def _pulls(linkage: Linkage, q: Array, multipliers: Array) -> Array:
     Shape (times, joints, bodies + 1, 3).
     """
     held = np.array(linkage.assembly.row_joint)[:, None] == np.arange(len(linkage.joints))
-    made = -np.einsum("tr,rj,trq->tjq", multipliers, held, linkage.jacobian(0.0, q))
-    on = made.reshape(len(q), len(linkage.joints), -1, 3)
+    pulls = -np.einsum("tr,rj,trq->tjq", multipliers, held, linkage.jacobian(0.0, q))
+    on = pulls.reshape(len(q), len(linkage.joints), -1, 3)
     place = q.reshape(len(q), 1, -1, 3)
     about = on[..., 2] + place[..., 0] * on[..., 1] - place[..., 1] * on[..., 0]  # what the ground has to balance
     ground = -np.concatenate([on[..., :2], about[..., None]], axis=-1).sum(axis=2, keepdims=True)
@@ -228,13 +228,13 @@ def reference_table(mechanism: Mechanism) -> dict[str, Array] | None:
     lines = [line for line in read_text(source, "figure.reference").splitlines() if not line.startswith("#")]
     try:
         rows = list(csv.DictReader(lines))
-        made = {name: np.array([float(row[name]) for row in rows]) for name in (rows[0] if rows else {})}
+        columns = {name: np.array([float(row[name]) for row in rows]) for name in (rows[0] if rows else {})}
     except (ValueError, TypeError, csv.Error) as error:
         raise InputError("figure.reference", str(source), f"is no table of numbers ({error})", "mend it") from None
-    if "time_s" in made:  # as trajectory.csv has it
-        made.setdefault("t", made["time_s"])
+    if "time_s" in columns:  # as trajectory.csv has it
+        columns.setdefault("t", columns["time_s"])
     for name in ("t", *table.reference_columns.values()):
-        if name not in made:
+        if name not in columns:
             problem = "has no column 't' or 'time_s' (s)" if name == "t" else f"has no column {name!r}"
             raise InputError("figure.reference", str(source), problem, "check its header")
-    return made
+    return columns

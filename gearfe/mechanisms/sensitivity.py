@@ -72,17 +72,17 @@ def sensitivities(
     cases: list[dict[str, float]] = [{}]
     for name, value in values.items():
         cases += [{name: value + sign * steps[name] / 2**j} for j in range(STEPS) for sign in (1.0, -1.0)]
-    made = sweep(file, cases, executor=executor, run=run)
+    solved = sweep(file, cases, executor=executor, run=run)
     ends = [case for k in range(len(steps)) for case in cases[1 + 2 * STEPS * k :][:2]]
     finer = sweep(file, ends, executor=executor, run=_finer(file, run))
-    for case in (*made, *finer):
+    for case in (*solved, *finer):
         if case.problem:
             name, at = next(iter(case.values.items()), ("mechanism file", None))
             raise InputError(name, at, f"has no answer: {case.problem}", "fix that, or give a smaller step")
-    at, outputs = _columns(made[0])
+    at, outputs = _columns(solved[0])
     slopes, errors = {}, {}
     for k, (name, h) in enumerate(steps.items()):
-        around = made[1 + 2 * STEPS * k : 1 + 2 * STEPS * (k + 1)]
+        around = solved[1 + 2 * STEPS * k : 1 + 2 * STEPS * (k + 1)]
         for output, base in outputs.items():
             shifted = [_columns(case)[1][output] for case in around]
             if any(len(column) != len(base) for column in shifted):
@@ -108,13 +108,13 @@ def extrapolated(differences: Sequence[Array]) -> tuple[Array, float]:
     rows = [differences[0]]
     best, least = differences[0], np.inf
     for one in differences[1:]:
-        made = [one]
+        column = [one]
         for i, above in enumerate(rows, start=1):
-            made.append(made[-1] + (made[-1] - above) / (4.0**i - 1.0))
-            error = max(float(np.abs(made[-1] - other).max(initial=0.0)) for other in (made[-2], above))
+            column.append(column[-1] + (column[-1] - above) / (4.0**i - 1.0))
+            error = max(float(np.abs(column[-1] - other).max(initial=0.0)) for other in (column[-2], above))
             if error < least:
-                best, least = made[-1], error
-        rows = made
+                best, least = column[-1], error
+        rows = column
     return best, SAFETY * least
 
 

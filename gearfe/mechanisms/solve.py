@@ -72,8 +72,8 @@ def solve(mechanism: Mechanism) -> Solution:
     run, start = mechanism.file.run, mechanism.start()
     if run.analysis in ("equilibrium", "modes"):
         rest = equilibrium(mechanism.system, start)
-        found = modes(mechanism.system, start, rest, run.modes) if run.analysis == "modes" else None
-        return Solution(start, evaluate(mechanism, at_rest(mechanism, start, rest)), rest, found)
+        vibrations = modes(mechanism.system, start, rest, run.modes) if run.analysis == "modes" else None
+        return Solution(start, evaluate(mechanism, at_rest(mechanism, start, rest)), rest, vibrations)
     return Solution(start, evaluate(mechanism, _moved(mechanism, start)))
 
 
@@ -148,7 +148,7 @@ def _case(raw: Mapping[str, Any], path: Path, run: RunTable | None, values: Mapp
             set_key(tables, name, value, name)
         file = build(MechanismFile, tables, "")
         with one_thread():
-            made = solve(make_mechanism(file if run is None else replace(file, run=run), path))
+            solution = solve(make_mechanism(file if run is None else replace(file, run=run), path))
     except InputError as error:
         return Case(values, problem=str(error))
-    return Case(values, made.tables(), made.problem)
+    return Case(values, solution.tables(), solution.problem)

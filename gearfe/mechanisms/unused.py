@@ -13,22 +13,22 @@ from ..base.tables.mechanism import FigureTable, MechanismFile, RunTable
 def unused(file: MechanismFile) -> list[str]:
     """Return sentences about keys that have no effect in the analysis that the file asks for."""
     analysis, flexible = file.run.analysis, any(body.bends for body in file.bodies.values())
-    found = []
+    remarks = []
     if analysis != "modes" and _given(file.run, "modes"):
-        found.append(f'run.modes = {file.run.modes} has no effect: it belongs to analysis = "modes"')
+        remarks.append(f'run.modes = {file.run.modes} has no effect: it belongs to analysis = "modes"')
     if analysis != "transient":
         keys = ("method", "tolerance") if analysis == "inverse" else ("method", "tolerance", "picture_s", "frames")
-        found += [f"run.{key} has no effect: analysis is {analysis}" for key in keys if _given(file.run, key)]
+        remarks += [f"run.{key} has no effect: analysis is {analysis}" for key in keys if _given(file.run, key)]
     elif file.run.picture_s is not None and file.run.picture_s > file.run.end_s:
-        found.append(f"run.picture_s = {file.run.picture_s:g} is after the end of the run: the picture shows the end")
+        remarks.append(f"run.picture_s = {file.run.picture_s:g} is after the end of the run: the picture shows the end")
     if file.figure.reference is None and _given(file.figure, "every"):
-        found.append("figure.every has no effect: it belongs to a reference")
+        remarks.append("figure.every has no effect: it belongs to a reference")
     if not flexible and _given(file.figure, "magnification"):
-        found.append("figure.magnification has no effect: no link is flexible")
+        remarks.append("figure.magnification has no effect: no link is flexible")
     texts = [text for key, part in vars(file).items() if key != "title" for text in _texts(part)]
     words = {word for text in texts for word in re.findall(r"\w+", text)}
-    found += [f"tables.{name} has no effect: nothing names it" for name in file.tables if name not in words]
-    return found
+    remarks += [f"tables.{name} has no effect: nothing names it" for name in file.tables if name not in words]
+    return remarks
 
 
 def _given(table: RunTable | FigureTable, key: str) -> bool:

@@ -69,18 +69,18 @@ class Task:
     def combinations(self, values: Sequence[Any]) -> Iterator[dict[str, Any]]:
         """Yield the tables of the job with these values at all combinations of what the worst is taken over."""
         for combination in itertools.product(*self.worst_over.values()):
-            made = self.tables(values)
+            job_tables = self.tables(values)
             for name, value in zip(self.worst_over, combination, strict=True):
-                set_key(made, name, value, f"study.worst_over.{name}")
-            yield made
+                set_key(job_tables, name, value, f"study.worst_over.{name}")
+            yield job_tables
 
     def tables(self, values: Sequence[Any]) -> dict[str, Any]:
         """Tables of the job with these values."""
-        made = copy.deepcopy(dict(self.raw))
+        job_tables = copy.deepcopy(dict(self.raw))
         for name, value in zip(self.names, values, strict=True):
             for key in (name, *self.also.get(name, ())):
-                set_key(made, key, value, f"study.parameters.{name}")
-        return made
+                set_key(job_tables, key, value, f"study.parameters.{name}")
+        return job_tables
 
     def expressions(self) -> dict[str, Output]:
         """Outputs, parsed."""

@@ -87,14 +87,14 @@ def trajectories(count: int, d: int, rng: np.random.Generator) -> Array:
     levels (Morris, Technometrics 33 (1991) 161, section 3). Levels stand at (i + 1/2) / `LEVELS`, for distributions may
     have no ends.
     """
-    made = np.empty((count, d + 1, d))
-    for one in made:
+    points = np.empty((count, d + 1, d))
+    for one in points:
         low = (rng.integers(0, LEVELS // 2, d) + 0.5) / LEVELS
         up = rng.random(d) < 0.5
         one[:] = np.where(up, low, low + 0.5)
         for step, i in enumerate(rng.permutation(d), start=1):
             one[step:, i] = low[i] + 0.5 if up[i] else low[i]
-    return made.reshape(count * (d + 1), d)
+    return points.reshape(count * (d + 1), d)
 
 
 def _rows(table: StudyTable, folder: Path, base: Mapping[str, Any]) -> tuple[tuple[Parameter, ...], Cases]:
@@ -103,8 +103,8 @@ def _rows(table: StudyTable, folder: Path, base: Mapping[str, Any]) -> tuple[tup
     columns.pop("case", None)
     hints = {name: key_hint(table.job, name, base) for name in columns}
     parameters = tuple(read_parameters({name: [0.0] for name in hints}, table.job, base))
-    made = [[_cell(text, one, file, i) for i, text in enumerate(columns[one.name], start=1)] for one in parameters]
-    return parameters, list(zip(*made, strict=True))
+    values = [[_cell(text, one, file, i) for i, text in enumerate(columns[one.name], start=1)] for one in parameters]
+    return parameters, list(zip(*values, strict=True))
 
 
 def _cell(text: str, one: Parameter, path: str, row: int) -> Any:

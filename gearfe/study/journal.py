@@ -467,8 +467,8 @@ def _difference(there: Any, here: Any, name: str = "") -> str:
     """First key in which two headers differ; empty where they are the same."""
     if isinstance(there, dict) and isinstance(here, dict):
         for key in [*here, *(k for k in there if k not in here)]:
-            found = _difference(there.get(key), here.get(key), f"{name}.{key}".lstrip("."))
-            if found:
-                return found
+            difference = _difference(there.get(key), here.get(key), f"{name}.{key}".lstrip("."))
+            if difference:
+                return difference
         return ""
     return "" if there == here else name or "the study"

@@ -176,10 +176,14 @@ def _runup(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
     run, unstable = solved(job, table, watch=Stopwatch())
     critical = critical_speeds(run, table.multiples, table.shaft_multiples)
     notes = report.warnings(run)
-    made = {**described(job, table, run.train.model.train), **report.summary(run, critical), "warnings": notes}
-    whole = made["speeds_reached"] == made["speeds"]
+    summary_of_run = {
+        **described(job, table, run.train.model.train),
+        **report.summary(run, critical),
+        "warnings": notes,
+    }
+    whole = summary_of_run["speeds_reached"] == summary_of_run["speeds"]
     rows = report.tables(run, critical, table.multiples, unstable)
-    return Answer(rows, made, "" if whole else "; ".join(notes) or "not all speeds were reached")
+    return Answer(rows, summary_of_run, "" if whole else "; ".join(notes) or "not all speeds were reached")
 
 
 def _modes(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:

@@ -129,7 +129,7 @@ def optimum(search: Search) -> Optimum:
         ends = {name: best.point[name] + s * size for s, (name, size) in zip(signs, off.items(), strict=True)}
         return {**best.point, **ends}
 
-    found = search.solve([moved(signs) for signs in (*units, *corners)])
-    pairs = list(zip(found[0 : len(units) : 2], found[1 : len(units) : 2], strict=True))
+    corner_outputs = search.solve([moved(signs) for signs in (*units, *corners)])
+    pairs = list(zip(corner_outputs[0 : len(units) : 2], corner_outputs[1 : len(units) : 2], strict=True))
     beside = dict(zip(off, pairs, strict=True))
-    return Optimum(search.result(), parameters, best, beside, found[len(units) :])
+    return Optimum(search.result(), parameters, best, beside, corner_outputs[len(units) :])

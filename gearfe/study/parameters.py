@@ -100,8 +100,8 @@ class Parameter:
         # a share of 0 has no value in a tail without an end
         inside = np.clip(below + (upto - below) * share, np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg)
         values = d.mean + deviation * ndtri(inside)
-        made = np.clip(values, d.low, d.high) if low is not None or high is not None else values
-        return [round(v) for v in made.tolist()] if self.whole else made.tolist()
+        clipped = np.clip(values, d.low, d.high) if low is not None or high is not None else values
+        return [round(v) for v in clipped.tolist()] if self.whole else clipped.tolist()
 
     def levels(self) -> Sequence[Any]:
         """Values for a factorial design."""
@@ -145,21 +145,26 @@ def read_parameters(given: Mapping[str, Any], kind: str, base: Mapping[str, Any]
                 _check_sizes(value, label)
             made.append(Parameter(name, whole, tuple(spec)))
             continue
-        found = build(DistributionTable, spec, label)
-        also = found.also
+        distribution = build(DistributionTable, spec, label)
+        also = distribution.also
         if not {int, float} & set(_options(hint)):
             raise InputError(label, None, "is no number: low, high, mean do not apply", "give a list of values")
-        if found.iso_class is not None:
-            found = _of_class(found, found.iso_class, name, base)
+        if distribution.iso_class is not None:
+            distribution = _of_class(distribution, distribution.iso_class, name, base)
         for end in ("low", "high", "mean", "deviation") if whole else ():
-            if abs(getattr(found, end) or 0.0) > WHOLE:
+            if abs(getattr(distribution, end) or 0.0) > WHOLE:
                 problem = f"must be of a size up to {WHOLE:.3g}, for the key takes whole numbers"
-                raise InputError(f"{label}.{end}", getattr(found, end), problem, "take a smaller one")
-        if whole and found.low is not None and found.high is not None and math.ceil(found.low) > found.high:
-            raise InputError(label, (found.low, found.high), "holds no whole number", "widen it")
+                raise InputError(f"{label}.{end}", getattr(distribution, end), problem, "take a smaller one")
+        if (
+            whole
+            and distribution.low is not None
+            and distribution.high is not None
+            and math.ceil(distribution.low) > distribution.high
+        ):
+            raise InputError(label, (distribution.low, distribution.high), "holds no whole number", "widen it")
         for other in also:
             key_hint(kind, other, base)
-        made.append(Parameter(name, whole, distribution=found, also=also))
+        made.append(Parameter(name, whole, distribution=distribution, also=also))
     return tuple(made)
 
 
@@ -198,21 +203,21 @@ def _gear_named(parts: Sequence[str], base: Mapping[str, Any]) -> NamedGear | No
 
 def _flat(given: Mapping[str, Any], above: str) -> dict[str, Any]:
     """Dotted name -> list or distribution; names may be quoted or be tables within tables."""
-    found: dict[str, Any] = {}
+    flat: dict[str, Any] = {}
     for key, value in given.items():
         name = f"{above}{key}"
         if isinstance(value, list) or (isinstance(value, dict) and value and set(value) <= _KEYS):
-            found |= _once(found, {name: value})
+            flat |= _once(flat, {name: value})
         elif isinstance(value, dict) and value:
             near = [k for k in value if k in _KEYS and not isinstance(value[k], (dict, list))]
             if near:
                 wrong = next(k for k in value if k not in _KEYS)
                 raise unknown_name(f"{WHERE}.{name}", wrong, _KEYS)
-            found |= _once(found, _flat(value, f"{name}."))
+            flat |= _once(flat, _flat(value, f"{name}."))
         else:
             cure = "write [a, b, c], { low = a, high = b }, { mean = a, deviation = b } or { iso_class = 6 }"
             raise InputError(f"{WHERE}.{name}", value, "must be a list of values or a distribution", cure)
-    return found
+    return flat
 
 
 def _once(found: Mapping[str, Any], more: dict[str, Any]) -> dict[str, Any]:

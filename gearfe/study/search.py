@@ -115,20 +115,20 @@ class Search(Facts):
         columns = journal.cells()
         for i, case in enumerate(columns["case"]):
             self._case[tuple(columns[name][i] for name in names)] = len(self._rows)
-            found = tuple(float(columns[name][i]) for name in outputs)
+            outputs_of_row = tuple(float(columns[name][i]) for name in outputs)
             status, message, seconds = (columns[name][i] for name in ("status", "message", "seconds"))
-            self._rows.append(Row(int(case), found, status, message, float(seconds)))
+            self._rows.append(Row(int(case), outputs_of_row, status, message, float(seconds)))
             self._points.append(tuple(_cell(columns[name][i]) for name in names))
         return journal
 
     def facts(self) -> dict[str, str]:
         """Study, parameters, outputs, points that are solved."""
-        found = Counter(row.status for row in self._rows)
+        counts = Counter(row.status for row in self._rows)
         return {
             "study": self.study.path.name,
             "parameters": ", ".join(self.study.task.names),
             "outputs": ", ".join(self.study.task.outputs),
-            "points": str(len(self)) + "".join(f", {count} {status}" for status, count in found.items()),
+            "points": str(len(self)) + "".join(f", {count} {status}" for status, count in counts.items()),
         }
 
     def __enter__(self) -> Search:

@@ -159,12 +159,12 @@ class StudyResult(ShownTable):
             return None
         n = len(values) // (d + 2)
         parts = {"f_A": values[None, :n], "f_B": values[None, n : 2 * n], "f_AB": values[2 * n :].reshape(d, 1, n)}
-        found = sobol_indices(func=parts, n=n)
+        indices = sobol_indices(func=parts, n=n)
         entries: dict[str, Any] = {
-            "first_order": dict(zip(self.parameters, found.first_order.ravel().tolist(), strict=True)),
-            "total_order": dict(zip(self.parameters, found.total_order.ravel().tolist(), strict=True)),
+            "first_order": dict(zip(self.parameters, indices.first_order.ravel().tolist(), strict=True)),
+            "total_order": dict(zip(self.parameters, indices.total_order.ravel().tolist(), strict=True)),
         }
-        boot = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=200)
+        boot = indices.bootstrap(confidence_level=CONFIDENCE, n_resamples=200)
         for key in ("first_order", "total_order"):
             ends = getattr(boot, key).confidence_interval
             low, high = np.ravel(ends.low).tolist(), np.ravel(ends.high).tolist()

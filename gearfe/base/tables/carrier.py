@@ -138,12 +138,12 @@ def with_planets(raw: Mapping[str, Any], carriers: Mapping[str, CarrierTable]) -
         if name not in planets.values():
             problem, cure = "carries nothing", f'write carrier = "{name}" in the shaft of its planets'
             raise InputError(f"[carriers.{name}]", None, problem, cure)
-    made = dict(raw)
+    expanded = dict(raw)
     gears: Mapping[str, Any] = raw.get("gears", {})
     of_gear = {name: planets[entry["shaft"]] for name, entry in gears.items() if entry.get("shaft") in planets}
-    made["shafts"] = _each(shafts, planets, carriers, "shafts", lambda entry, k, name: _place(
+    expanded["shafts"] = _each(shafts, planets, carriers, "shafts", lambda entry, k, name: _place(
         entry, shafts[carriers[name].shaft], carriers[name].angles_deg[k]))  # fmt: skip
-    made["gears"] = _each(gears, of_gear, carriers, "gears", lambda entry, k, _: {
+    expanded["gears"] = _each(gears, of_gear, carriers, "gears", lambda entry, k, _: {
         **entry, "shaft": f"{entry['shaft']}_{k + 1}"})  # fmt: skip
     meshes: Mapping[str, Any] = raw.get("meshes", {})
     of_mesh = {
@@ -151,10 +151,10 @@ def with_planets(raw: Mapping[str, Any], carriers: Mapping[str, CarrierTable]) -
         for name, entry in meshes.items()
         if {entry.get("driver"), entry.get("driven")} & of_gear.keys()
     }
-    made["meshes"] = _each(meshes, of_mesh, carriers, "meshes", lambda entry, k, _: {
+    expanded["meshes"] = _each(meshes, of_mesh, carriers, "meshes", lambda entry, k, _: {
         **entry, **{key: f"{entry[key]}_{k + 1}" for key in ("driver", "driven") if entry[key] in of_gear},
     })  # fmt: skip
-    return {name: table for name, table in made.items() if name in raw}
+    return {name: table for name, table in expanded.items() if name in raw}
 
 
 def _each(

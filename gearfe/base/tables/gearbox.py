@@ -404,23 +404,23 @@ def named_gearbox(
         pressure angles that differ.
     """
     known = None if shafts is None else list(shafts)
-    made = {name: _named_gear(name, table, materials, known) for name, table in gears.items()}
+    gear_of = {name: _named_gear(name, table, materials, known) for name, table in gears.items()}
     for mates in _meshing(meshes.values()):
         tables = {name: gears[name] for name in gears if name in mates}
         helix_deg = next((table.helix_angle_deg for table in tables.values() if table.helix_angle_deg), 0.0)
         common = common_module_mm(tables.values(), helix_deg)
         for name, table in tables.items():
-            module = module_mm_of(table, table.module_mm, common, made[name].form["helix_angle_deg"])
-            made[name] = replace(made[name], form={**made[name].form, "module_mm": module})
-    found = {name: _named_mesh(name, table, made) for name, table in meshes.items()}
+            module = module_mm_of(table, table.module_mm, common, gear_of[name].form["helix_angle_deg"])
+            gear_of[name] = replace(gear_of[name], form={**gear_of[name].form, "module_mm": module})
+    mesh_of = {name: _named_mesh(name, table, gear_of) for name, table in meshes.items()}
     twins: dict[frozenset[str], str] = {}
-    for name, mesh in found.items():
+    for name, mesh in mesh_of.items():
         both = frozenset((mesh.driver.name, mesh.driven.name))
         if both in twins:
             problem = f"has the gears of [meshes.{twins[both]}], too"
             raise InputError(f"meshes.{name}", None, problem, "two gears have one mesh: leave one out")
         twins[both] = name
-    return _with_shifts(with_hands(Gearbox(made, found)))
+    return _with_shifts(with_hands(Gearbox(gear_of, mesh_of)))
 
 
 def _meshing(meshes: Iterable[NamedMeshTable]) -> list[set[str]]:

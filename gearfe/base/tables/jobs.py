@@ -103,7 +103,7 @@ def job_tables(
         if name not in raw:
             cure = f"add a table [{name}] (see gearfe new)"
             raise InputError(f"[{name}]", None, f"is missing in {Path(path).name}", cure)
-    made: dict[str, Any] = {}
+    built: dict[str, Any] = {}
     for name, table in raw.items():
         asked = name in needed or name in optional
         if name in NAMED:
@@ -111,8 +111,8 @@ def job_tables(
         else:
             found = build(table_class(name), table, name, rules=asked)
         if asked:
-            made[name] = found
-    return made
+            built[name] = found
+    return built
 
 
 def _check_shorthand(raw: Mapping[str, Any]) -> None:

@@ -152,16 +152,16 @@ class GearMicrogeometryTable(FlankTable):
     def flank(self, side: str) -> FlankTable:
         """Return the deviations of the flanks `side` (left or right)."""
         own, default = getattr(self, side), FlankTable()
-        made = {f.name: getattr(self, f.name) for f in fields(FlankTable)}
+        values = {f.name: getattr(self, f.name) for f in fields(FlankTable)}
         if own is not None:
             given = {f.name: getattr(own, f.name) for f in fields(FlankTable)}
             changed = {name: value for name, value in given.items() if value != getattr(default, name)}
             # another start or end takes the place of the shared one
             for relief, keys in itertools.product(("tip_relief", "root_relief"), (STARTS, ENDS)):
                 if any(f"{relief}_{key}" in changed for key in keys):
-                    made |= dict.fromkeys((f"{relief}_{key}" for key in keys), None)
-            made |= changed
-        return FlankTable(**made)
+                    values |= dict.fromkeys((f"{relief}_{key}" for key in keys), None)
+            values |= changed
+        return FlankTable(**values)
 
 
 @dataclass(frozen=True)

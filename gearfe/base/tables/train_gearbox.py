@@ -111,7 +111,7 @@ def named_train(
     if places and len(places) < len(bearings):
         lacking = next(name for name, b in bearings.items() if b.y_mm is None)
         raise InputError(f"bearings.{lacking}.y_mm", None, "is required: other bearings have one", "give all, or none")
-    made = replace(
+    expanded = replace(
         table, shafts=rows, meshes=tuple(meshes.values()), bearings=springs,
         machines=_named_rows(TrainMachineTable, machines or {}),
         couplings=_named_rows(TrainCouplingTable, couplings or {}),
@@ -122,10 +122,10 @@ def named_train(
             for name, carrier in (carriers or {}).items()
         ),
     )  # fmt: skip
-    made.check_driveline("machines.{name}", "couplings.{name}")
-    made = replace(made, rigid_bores=places or table.rigid_bores)
-    ends: list[tuple[str, Any]] = [] if made.drive is None else [("train.drive", made.drive)]
-    ends += [(f"train.loads[{i}]", load) for i, load in enumerate(made.loads)]
+    expanded.check_driveline("machines.{name}", "couplings.{name}")
+    expanded = replace(expanded, rigid_bores=places or table.rigid_bores)
+    ends: list[tuple[str, Any]] = [] if expanded.drive is None else [("train.drive", expanded.drive)]
+    ends += [(f"train.loads[{i}]", load) for i, load in enumerate(expanded.loads)]
     for where, end in ends:
         if end.shaft not in shafts:
             raise unknown_name(f"{where}.shaft", end.shaft, shafts)
@@ -137,8 +137,8 @@ def named_train(
         name = str(end.attachment)
         return replace(end, attachment=_bore(name, bearings[name])) if name in bearings else end
 
-    drive = None if made.drive is None else at_bore(made.drive)
-    return replace(made, drive=drive, loads=tuple(map(at_bore, made.loads)))
+    drive = None if expanded.drive is None else at_bore(expanded.drive)
+    return replace(expanded, drive=drive, loads=tuple(map(at_bore, expanded.loads)))
 
 
 def with_materials(table: TrainTable, materials: Mapping[str, MaterialTable], where: str) -> TrainTable:
@@ -229,7 +229,7 @@ def _train_gear(table: TrainGearTable, where: str, pair: PairTable | None, share
             cure = "add it, or give teeth, module_mm, ..."
             raise InputError(f"{where}.gear", table.gear, "needs a table [pair]", cure)
         like = f"[pair.{table.gear}] and [pair]"
-        made = replace(shared.gears[table.gear], name=table.name, shaft=table.shaft, y_mm=table.y_mm, like=like)
+        gear = replace(shared.gears[table.gear], name=table.name, shaft=table.shaft, y_mm=table.y_mm, like=like)
     else:
         form, places = tooth_form_of(table, pair, "pair")
         for key in ("module_mm", *REQUIRED):
@@ -249,7 +249,7 @@ def _train_gear(table: TrainGearTable, where: str, pair: PairTable | None, share
             places["helix_hand"] = DEFAULT
         material, material_where = (None, DEFAULT) if pair is None else (pair.material, "pair.material")
         density = MaterialTable().density_kg_per_m3 if material is None else material.density_kg_per_m3
-        made = NamedGear(
+        gear = NamedGear(
             table.name,
             where,
             teeth,
@@ -264,5 +264,5 @@ def _train_gear(table: TrainGearTable, where: str, pair: PairTable | None, share
             y_mm=table.y_mm,
         )
     if table.density_kg_per_m3 is None:
-        return made
-    return replace(made, density_kg_per_m3=table.density_kg_per_m3, density_where="")
+        return gear
+    return replace(gear, density_kg_per_m3=table.density_kg_per_m3, density_where="")

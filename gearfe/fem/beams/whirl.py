@@ -109,10 +109,10 @@ def whirl_frequencies(
     matrix = np.zeros((2 * count, 2 * count))
     matrix[:count, count:] = matrix[count:, :count] = np.diag(1.0 / np.sqrt(values))
     gyroscopic = modes.T @ polar @ modes
-    found = []
+    frequencies = []
     for speed in speeds:
         matrix[count:, count:] = speed * gyroscopic
         w = linalg.eigh(matrix, eigvals_only=True) / (2.0 * np.pi)
         w = w[np.abs(w) <= highest_hz]
-        found.append(w[np.argsort(np.abs(w))])
-    return tuple(found)
+        frequencies.append(w[np.argsort(np.abs(w))])
+    return tuple(frequencies)

@@ -199,7 +199,7 @@ def _corrections(factor: Factor, m_ii: Any, modes: Array, coupling: Array, level
     ``X_1 = K^-1 b``, ``X_l = K^-1 M X_{l-1}``: all freed of the modes. Without corrections ``X_1^T b`` comes second.
     """
     m_modes = np.asarray(m_ii @ modes)
-    found = [modes]
+    blocks = [modes]
 
     def solved(load: Array) -> Array:
         x = factor.solve(load)
@@ -215,16 +215,16 @@ def _corrections(factor: Factor, m_ii: Any, modes: Array, coupling: Array, level
         scale = np.maximum(np.sqrt(np.einsum("ij,ij->j", x, mx)), 1e-300)
         new, m_new = x / scale, mx / scale
         for again in (True, False):
-            new = new - sum(basis @ (basis.T @ m_new) for basis in found)
+            new = new - sum(basis @ (basis.T @ m_new) for basis in blocks)
             size, directions = np.linalg.eigh(_symmetric(new.T @ (m_ii @ new)))
             keep = size > DEPENDENT**2
             new = new @ (directions[:, keep] / np.sqrt(size[keep]))
             m_new = m_ii @ new if again else m_new
-        found.append(new)
+        blocks.append(new)
         if number == levels:
             m_new = np.asarray(m_ii @ new)
             left = _symmetric(solved(m_new).T @ m_new)
-    return np.concatenate([np.zeros((len(modes), 0)), *found[1:]], axis=1), left
+    return np.concatenate([np.zeros((len(modes), 0)), *blocks[1:]], axis=1), left
 
 
 def _symmetric(matrix: Array) -> Array:

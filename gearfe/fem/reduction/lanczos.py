@@ -110,7 +110,7 @@ def lowest_modes(
         theta, s = theta[::-1], s[:, ::-1]
         residual = np.linalg.norm(spill @ s[first:], axis=0) if len(spill) else np.zeros(done)
         eigenvalues = 1.0 / np.maximum(theta, 1e-300) - shift
-        found = residual <= TOLERANCE * np.abs(theta)
+        converged = residual <= TOLERANCE * np.abs(theta)
         near = residual <= NEAR * np.abs(theta)
         below = int(np.searchsorted(eigenvalues, limit, side="right"))
         if at_most is not None and below > at_most:  # values of the projection lie above those of the pair
@@ -121,7 +121,7 @@ def lowest_modes(
         inside = min(needed, max(at_least, below))
         exhausted = basis.size == done or done >= n
         inside = min(inside, n)
-        if exhausted or (inside < done and bool(np.all(found[:inside])) and bool(near[inside])):
+        if exhausted or (inside < done and bool(np.all(converged[:inside])) and bool(near[inside])):
             inside = min(inside, done)
             following = float(eigenvalues[inside]) if inside < done else math.inf
             vectors = basis.vectors[:, :done]

@@ -228,8 +228,8 @@ class ModalBody(Reduction, Shown):
         lost = (half * np.broadcast_to(part, elastic.shape)[elastic]) @ half
         stiffness = np.linalg.inv(np.eye(len(root)) + lost) * np.outer(root, root)
         weighted = self.mass @ vectors
-        made = weighted @ stiffness @ weighted.T
-        return dataclasses.replace(self, stiffness=0.5 * (made + made.T))
+        softening = weighted @ stiffness @ weighted.T
+        return dataclasses.replace(self, stiffness=0.5 * (softening + softening.T))
 
     def save(self, path: str | Path) -> None:
         """Write one file with everything; `load` gives an equal body back."""
@@ -246,7 +246,7 @@ class ModalBody(Reduction, Shown):
             When the file is missing, damaged, or of another format.
         """
         stored = load_arrays(path)
-        made: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         if not np.array_equal(stored.get("format", np.array(-1)), FORMAT):
             raise InputError("reduced model", str(path), "was written by another version", "make it again")
         for field in dataclasses.fields(cls):
@@ -254,11 +254,11 @@ class ModalBody(Reduction, Shown):
                 raise InputError("reduced model", str(path), f"has no entry {field.name!r}", "make it again")
             value = stored[field.name]
             if field.type in ("int", "float", "bool", "str"):
-                made[field.name] = value.item()
+                values[field.name] = value.item()
             else:
-                made[field.name] = tuple(value.tolist()) if field.type == "tuple[str, ...]" else value
-        _check_consistent(made, path)
-        return cls(**made)
+                values[field.name] = tuple(value.tolist()) if field.type == "tuple[str, ...]" else value
+        _check_consistent(values, path)
+        return cls(**values)
 
 
 def _check_consistent(values: dict[str, Any], path: str | Path) -> None:

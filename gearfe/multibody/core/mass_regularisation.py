@@ -105,9 +105,9 @@ def loose_link(system: System, times: Array, q: Array, v: Array, active: np.ndar
     bodies, _ = _own_masses(system)
     share = _effective_mass(system, _gradients_ahead(system, times[at], q[at], v[at], active))[:, None]
     raised = (added_mass * system.units**2)[bodies]
-    found = np.where(raised > 0.0, share / np.where(raised > 0.0, raised, 1.0), np.inf).min(axis=1)
+    shares = np.where(raised > 0.0, share / np.where(raised > 0.0, raised, 1.0), np.inf).min(axis=1)
     names = [name for element in system.elements for name in element.planar_bodies]
-    return names[int(found.argmin())] if found.min() < LOOSE else None
+    return names[int(shares.argmin())] if shares.min() < LOOSE else None
 
 
 def _own_masses(system: System) -> tuple[np.ndarray, Array]:

@@ -121,11 +121,11 @@ def consistent_start(
 
 def count_freedoms(system: System, time: float, q: Array) -> Freedoms:
     """Find redundant rows, dependent at the start and at its neighbours, and hidden degrees of freedom."""
-    here = _dependent_rows(system, time, q)
-    if not here and _regular(system, time, q):
+    dependent = _dependent_rows(system, time, q)
+    if not dependent and _regular(system, time, q):
         return Freedoms(system.size, system.rows)
     random = np.random.default_rng(5)
-    fewest = here
+    fewest = dependent
     hidden: list[int] = []
     place, tried = (time, q), 0
     motions = motions_of_second_order(system, time, q, 5)
@@ -148,8 +148,8 @@ def count_freedoms(system: System, time: float, q: Array) -> Freedoms:
     if min(hidden, default=0):
         barely = tuple(_dependent_rows(system, *place, share=np.sqrt(SINGULAR)))
         return Freedoms(system.size, system.rows - len(barely), (), (), min(hidden), barely)
-    passing = tuple(r for r in here if r not in fewest)
-    return Freedoms(system.size, system.rows, tuple(fewest), passing[: len(here) - len(fewest)])
+    passing = tuple(r for r in dependent if r not in fewest)
+    return Freedoms(system.size, system.rows, tuple(fewest), passing[: len(dependent) - len(fewest)])
 
 
 def _regular(system: System, time: float, q: Array) -> bool:
@@ -425,12 +425,12 @@ def _velocities(system: System, time: float, q: Array, v: Array, forced: Sequenc
     else:
         rows, right = G, rate
     sizes = np.concatenate([system.row_units, [_forced_unit(system, f, q) for f in forced]])
-    made = v - least_change(system, rows, rows @ v - right, sizes)
-    if not np.isfinite(made).all():
+    projected = v - least_change(system, rows, rows @ v - right, sizes)
+    if not np.isfinite(projected).all():
         cure = "look for start values, speeds and forced velocities that are too large"
         raise InputError("start velocities", None, "are not finite numbers once they meet the constraints", cure)
-    gap = np.abs(rows @ made - right) / sizes
-    scale = max(float(np.abs(x).max(initial=0.0)) for x in (right / sizes, v / system.units, made / system.units))
+    gap = np.abs(rows @ projected - right) / sizes
+    scale = max(float(np.abs(x).max(initial=0.0)) for x in (right / sizes, v / system.units, projected / system.units))
     if gap.max(initial=0.0) > 1e-8 * scale:
         names = [*system.row_names(), *(f"start velocity {f.label}" for f in forced)]
         share = np.linalg.svd((rows * system.units / sizes[:, None]).T)[2][-1] if len(rows) > 1 else np.ones(1)
@@ -450,4 +450,4 @@ def _velocities(system: System, time: float, q: Array, v: Array, forced: Sequenc
             problem = f"contradicts {against} ({much})"
             raise InputError(f"start velocity {blame.label}", blame.target, problem, "force another value")
         raise InputError(worst, None, f"velocities cannot meet it ({much})", "check the motion")
-    return made
+    return projected

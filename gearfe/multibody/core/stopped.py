@@ -78,7 +78,7 @@ def _links_in_line(system: System, time: float, q: Array, carried: Array) -> lis
 
     Forces of joints at one point of a link count as one, that of a drive too; a drive's moment has no point.
     """
-    found: list[tuple[str, Array]] = []
+    lines: list[tuple[str, Array]] = []
     at_rows = 0
     gradients = system.jacobian(time, q)
     for element, index in system.joints:
@@ -92,15 +92,15 @@ def _links_in_line(system: System, time: float, q: Array, carried: Array) -> lis
             sizes = np.linalg.norm(ends[:, :2], axis=1)
             loaded = np.abs(ends).max(axis=1) > PART * np.abs(pull).max(initial=0.0)
             if loaded.sum() == 2 and (sizes[loaded] > PART * sizes.max()).all():
-                found.append((body, ends[loaded][0, :2] / sizes[loaded][0]))
+                lines.append((body, ends[loaded][0, :2] / sizes[loaded][0]))
         for row, name in enumerate(element.row_names):
             pull = carried[rows][row] * gradients[rows][row, index].reshape(-1)
             if name.startswith("distance ") and pull.any():  # a rod without mass
                 first = next(k for k in range(0, len(pull), 3) if pull[k : k + 2].any())
-                found.append(
+                lines.append(
                     (name.partition(" (")[0], pull[first : first + 2] / np.linalg.norm(pull[first : first + 2]))
                 )
-    groups = [[name for name, (x, y) in found if abs(x * along[1] - y * along[0]) < IN_LINE] for _, along in found]
+    groups = [[name for name, (x, y) in lines if abs(x * along[1] - y * along[0]) < IN_LINE] for _, along in lines]
     return max(groups, key=len, default=[])
 
 

@@ -210,8 +210,8 @@ class System:
     def pieces(self, t: float | Array, q: Array, v: Array) -> IntArray:
         """Numbers of the smooth pieces that the forces are on at times (...), shape (..., s); -1 without a value."""
         parts = [(e, i) for e, i in zip(self.elements, self.index, strict=True) if getattr(e, "pieced", False)]
-        found = [e.pieces(t, q[..., i], v[..., i]) for e, i in parts]  # type: ignore[attr-defined]
-        return np.concatenate([np.zeros((*np.shape(t), 0), dtype=np.int64), *found], axis=-1)
+        piece_numbers = [e.pieces(t, q[..., i], v[..., i]) for e, i in parts]  # type: ignore[attr-defined]
+        return np.concatenate([np.zeros((*np.shape(t), 0), dtype=np.int64), *piece_numbers], axis=-1)
 
     @cached_property
     def has_knots(self) -> bool:

@@ -195,15 +195,15 @@ class TapeValues:
     def jacobian(self, q: Array) -> Array:
         """G, shape (..., m, n)."""
         z, (own, other, weight) = self.variables(q), self._slope
-        made = self._by_entry.of(_spread(weight, z.slope) * z.slope[own] * z.value[other])
-        return made.T.reshape(*q.shape[:-1], self.rows, self.size)
+        gradient = self._by_entry.of(_spread(weight, z.slope) * z.slope[own] * z.value[other])
+        return gradient.T.reshape(*q.shape[:-1], self.rows, self.size)
 
     def velocity_terms(self, t: float | Array, q: Array, v: Array) -> Array:
         """g'' without its acceleration part, shape (..., m)."""
         z, speed = self.variables(q), v.T[self.coordinate]
         rate, pull = z.slope * speed, z.bend * speed**2
-        made = self._sum_rows(pull, z.value) + self._sum_rows(z.value, pull) + 2.0 * self._sum_rows(rate, rate)
-        return np.asarray(made - self.motion(t, 2))
+        terms = self._sum_rows(pull, z.value) + self._sum_rows(z.value, pull) + 2.0 * self._sum_rows(rate, rate)
+        return np.asarray(terms - self.motion(t, 2))
 
     def curvature(self, q: Array, multipliers: Array) -> Array:
         """d(G^T lambda)/dq at fixed lambda, shape (n, n), in one state."""
@@ -263,8 +263,8 @@ class TapeValues:
     def force_slopes(self, q: Array, v: Array, R: Array) -> tuple[Array, Array]:
         """Return the derivatives of the forces by q and v in one state, shapes (n, n)."""
         z, n = self.variables(q), self.size
-        made = self._along(self.slopes(q, v, R), z.slope[:, None])
-        return made[:, :n] + np.diag(self._along(R, z.bend)), made[:, n:]
+        slopes = self._along(self.slopes(q, v, R), z.slope[:, None])
+        return slopes[:, :n] + np.diag(self._along(R, z.bend)), slopes[:, n:]
 
     def _along(self, R: Array, slope: Array) -> Array:
         """Forces of registers along variables with those slopes, shape (n, ...)."""
@@ -291,8 +291,8 @@ class TapeValues:
     def pieces(self, R: Array) -> IntArray:
         """Numbers of the smooth pieces that registers (k + 1, ...) are on, shape (..., s); -1 without a value."""
         places = (self._place(s, R) for s in self.switches)
-        found = [np.where(np.isfinite(x), k, -1) for x, k in places]
-        return np.stack(found, axis=-1) if found else np.zeros((*R.shape[1:], 0), dtype=np.int64)
+        numbers = [np.where(np.isfinite(x), k, -1) for x, k in places]
+        return np.stack(numbers, axis=-1) if numbers else np.zeros((*R.shape[1:], 0), dtype=np.int64)
 
     def _table(self, switch: int) -> tuple[Array, Array, float]:
         """Knots, coefficients (pieces, 4) of powers of the distance from the knot below, highest first, and period."""

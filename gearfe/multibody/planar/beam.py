@@ -134,8 +134,8 @@ class Beam(Element):
 
     def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:  # noqa: ARG002
         """Return the derivatives of the force by q and v."""
-        made = self.tangent(q, v, self.stress(q, v))
-        return made.by_q, made.by_v
+        tangent = self.tangent(q, v, self.stress(q, v))
+        return tangent.by_q, tangent.by_v
 
     def tangent(self, q: Array, v: Array, stress: Array) -> Tangent:
         """Derivatives of the forces about a state, for stresses of their own, shape (points, 3)."""
@@ -259,11 +259,11 @@ def _gather(N: Array, D: Array) -> Array:
 
 def _lagrange(nodes: Array) -> list[np.polynomial.Polynomial]:
     """Polynomials that are 1 at one node and 0 at the others."""
-    made = []
+    polynomials = []
     for j, own in enumerate(nodes):
         others = np.delete(nodes, j)
-        made.append(np.polynomial.Polynomial.fromroots(others) / float(np.prod(own - others)))
-    return made
+        polynomials.append(np.polynomial.Polynomial.fromroots(others) / float(np.prod(own - others)))
+    return polynomials
 
 
 _LAGRANGE = _lagrange(NODES)

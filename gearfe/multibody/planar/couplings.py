@@ -178,14 +178,14 @@ def with_carriers(joints: Sequence[Joint], frames: Frames) -> tuple[Joint, ...]:
         When none or several bodies bear both, or a cam turns on a body that moves.
     """
     bearings = _Bearings(joints, frames)
-    found: list[Joint] = []
+    joints_with_carriers: list[Joint] = []
     for joint in joints:
         if isinstance(joint, Cam) and joint.carrier is None:
             bearings.at_rest(joint)
         elif isinstance(joint, GearRatio | Belt | Rack) and joint.carrier is None:
             joint = replace(joint, carrier=bearings.carrier(joint))  # noqa: PLW2901
-        found.append(joint)
-    return tuple(found)
+        joints_with_carriers.append(joint)
+    return tuple(joints_with_carriers)
 
 
 class _Bearings:

@@ -169,8 +169,8 @@ class Floating(Element):
 
     def force_jacobian(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:  # noqa: ARG002
         """Return the derivatives of the force by q and v."""
-        made = self.tangent(q, v, self.stress(q, v))
-        return made.by_q, made.by_v
+        tangent = self.tangent(q, v, self.stress(q, v))
+        return tangent.by_q, tangent.by_v
 
     def tangent(self, q: Array, v: Array, stress: Array) -> Tangent:
         """Derivatives of the forces about a state, for stresses of their own, shape (s,)."""

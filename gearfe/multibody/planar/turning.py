@@ -31,13 +31,13 @@ class TurningFrame(Force):
 
     def parts(self, frames: Frames) -> list[Along | Tension | Weight]:
         """Springs of negative stiffness, and loads that depend on the velocities."""
-        made: list[Along | Tension | Weight] = []
+        components: list[Along | Tension | Weight] = []
         for i, body in enumerate(frames.bodies):
             if body.mass > 0.0:
                 centre, pull = frames.centre(body.name), body.mass * self.rate
-                made.append(Along(centre.x, -pull * self.rate, load=Coriolis(3 * i + 1, 2.0 * pull)))
-                made.append(Along(centre.y, -pull * self.rate, load=Coriolis(3 * i, -2.0 * pull)))
-        return made
+                components.append(Along(centre.x, -pull * self.rate, load=Coriolis(3 * i + 1, 2.0 * pull)))
+                components.append(Along(centre.y, -pull * self.rate, load=Coriolis(3 * i, -2.0 * pull)))
+        return components
 
 
 def field_and_rate(linkage: Linkage) -> tuple[Array, float]:

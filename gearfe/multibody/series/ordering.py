@@ -60,14 +60,14 @@ def symbolic_factor(m: int, coupled: Iterable[tuple[int, int]]) -> tuple[Factor,
         for b, k in enumerate(column):
             update += [(target(i, k), first + a, first + b) for a, i in enumerate(column) if i >= k]
         update_start.append(len(update))
-    made = Factor(
+    factor = Factor(
         start,
         np.array([i for column in columns for i in column], dtype=np.uint64),
         np.array([j for j, column in enumerate(columns) for _ in column], dtype=np.uint64),
         np.array(update_start, dtype=np.int64),
         np.array(update, dtype=np.int64).reshape(-1, 3),
     )
-    return made, target
+    return factor, target
 
 
 def elimination_order(rows: list[tuple[int, tuple[int, ...]]], n_bodies: int) -> list[int]:

@@ -83,9 +83,9 @@ class TimeFunction:
             When it has sines beside pieces that are not constant: their products have no place here.
         """
         rows = tuple(tuple(float(c) for c in np.convolve(row, row)) for row in self.coefficients)
-        made = TimeFunction(self.starts, self.origins, rows)
+        square = TimeFunction(self.starts, self.origins, rows)
         if not self.sines:
-            return made
+            return square
         if self.breaks or any(self.coefficients[0][1:]):
             problem = "has sines beside a polynomial, a step or a table, whose square is no such function"
             raise InputError("function of time", None, problem, "give sines and a constant, or the others")
@@ -95,7 +95,7 @@ class TimeFunction:
             for b, u, r in self.sines:  # sin sin = (cos(difference) - cos(sum)) / 2
                 terms.append(sine(0.5 * a * b, w - u, p - r + math.pi / 2))
                 terms.append(sine(-0.5 * a * b, w + u, p + r + math.pi / 2))
-        return sum(terms, made)
+        return sum(terms, square)
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -124,9 +124,9 @@ class TimeFunction:
             raised[0] += level
             rows.append(tuple(raised))
         sines = tuple((a / w, w, p - math.pi / 2) for a, w, p in self.sines if w != 0.0)
-        made = TimeFunction(self.starts, self.origins, tuple(rows), sines)
-        offset = value - float(made(at))
-        return made + constant(offset)
+        antiderivative = TimeFunction(self.starts, self.origins, tuple(rows), sines)
+        offset = value - float(antiderivative(at))
+        return antiderivative + constant(offset)
 
     def _piece(self, start: float) -> tuple[float, tuple[float, ...]]:
         i = max(k for k, s in enumerate(self.starts) if s <= start)
