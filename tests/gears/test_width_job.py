@@ -16,6 +16,8 @@ from gearfe.base.tables.gearbox import pair_gearbox
 from gearfe.base.tables.microgeometry import MicrogeometryTable
 from gearfe.base.tables.pair import PairTable, StiffnessTable
 from gearfe.cli.main import main
+from gearfe.drivetrain.gearbox.job import read_train_job
+from gearfe.drivetrain.gearbox.mesh_stiffness import law_over_width
 from gearfe.gears.gearmesh import width_job
 from gearfe.gears.gearmesh.job import StiffnessJob, stiffness_job
 from gearfe.gears.gearmesh.width_job import job_lines, stiffness_sweep, wide_flanks, wide_mesh
@@ -201,27 +203,27 @@ LEADS = [
 ]  # fmt: skip
 
 
+def over_width(tmp_path: Path, text: str) -> list[bool]:
+    """Which meshes of a gearbox have a mesh law over the face width."""
+    path = tmp_path / "job.toml"
+    path.write_text(text)
+    job = read_train_job(path)
+    return [law_over_width(job, number) for number in range(len(job.meshes))]
+
+
 @pytest.mark.parametrize("lead", LEADS)
 @pytest.mark.parametrize("side", ["", ".right"])
-@pytest.mark.parametrize("command", ["vibration", "runup"])
-def test_mesh_laws_take_no_lead_modifications(
-    lead: str, side: str, command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    text = job_file("gearbox") + f"\n[gears.input_wheel.microgeometry{side}]\n{lead}\n"
-    key = lead.partition(" ")[0]
-    message = refused(tmp_path, capsys, text, command)
-    assert f"gears.input_wheel.microgeometry.{key}" in message
-    assert "of mesh 'first' takes spur gears alike along it only" in message
-    assert 'write mesh_model = "variable_stiffness" (or "mean_stiffness") in the mesh' in message
+def test_lead_modifications_make_mesh_laws_over_the_width(lead: str, side: str, tmp_path: Path) -> None:
+    """Of either flank, in the mesh of that gear alone."""
+    text = job_file("gearbox")
+    assert over_width(tmp_path, text) == [False, False]
+    assert over_width(tmp_path, text + f"\n[gears.input_wheel.microgeometry{side}]\n{lead}\n") == [True, False]
 
 
-@pytest.mark.parametrize("command", ["vibration", "runup"])
 @pytest.mark.parametrize("key", ["misalignment_um", "misalignment_across_um"])
-def test_mesh_laws_take_no_misalignment(
-    command: str, key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    message = refused(tmp_path, capsys, job_file("gearbox"), command, "--set", f"meshes.second.{key}=3.0")
-    assert f"meshes.second.{key} = 3.0: makes the load vary along the face width: mesh_model = " in message
+def test_misalignment_makes_mesh_laws_over_the_width(key: str, tmp_path: Path) -> None:
+    text = job_file("gearbox").replace("[meshes.second]", f"[meshes.second]\n{key} = 3.0", 1)
+    assert over_width(tmp_path, text) == [False, True]
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def train_curves(
         elif mesh.curve is not None:
             with _key_in_messages(f"{tables[number]}.curve", mesh.curve):
                 found.append(_read_curve(job.path.parent / mesh.curve, teeth))
-        elif _law_over_width(job, number):
+        elif law_over_width(job, number):
             found.append(_computed_width_law(job, train, number))
         elif job.table.model_of(mesh) == POTENTIAL:
             found.append(_computed_law(job, train, number, estimate))
@@ -210,7 +210,7 @@ def _computed_spring(job: TrainJob, train: GearTrain, number: int) -> MeshTable:
         return mesh_spring(states, pair.mesh_cycle, mean=mean, method=curves.interpolation)
 
 
-def _law_over_width(job: TrainJob, number: int) -> bool:
+def law_over_width(job: TrainJob, number: int) -> bool:
     """Whether a mesh has a law over the face width; raise `InputError` for a tilt of a law that has none."""
     table, named = job.table.meshes[number], job.meshes[number]
     if job.table.model_of(table) != POTENTIAL:
