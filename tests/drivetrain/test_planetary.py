@@ -14,11 +14,11 @@ from gearfe.drivetrain.modes.orders import train_orders
 from gearfe.drivetrain.modes.whirl import WhirlModes, train_modes
 from gearfe.drivetrain.runup.condensed import condense
 from gearfe.drivetrain.runup.run_up import steady_state
-from gearfe.drivetrain.train import Damping, Drive, Guide, TrainResponse, build_train, simulate
+from gearfe.drivetrain.train import Damping, Drive, GearMesh, Guide, TrainResponse, build_train, simulate
 from gearfe.drivetrain.train.misalignment import static_state
 from gearfe.drivetrain.train.planetary import mesh_families
 from gearfe.multibody import constant, smoothed_step
-from tests.makers.planetary import ALONG, ALPHA, LIN_PARKER, MODULE, SPEED, TILT, TORQUE, stage
+from tests.makers.planetary import ALONG, ALPHA, LIN_PARKER, MODULE, SPEED, TILT, TORQUE, gear, stage
 from tests.makers.trains import curve
 
 #: Lin & Parker (1999), three planets: frequencies (Hz) and kinds; translational ones are double, six pairs of them.
@@ -251,6 +251,28 @@ def test_mesh_phases_follow_from_the_places_of_the_planets() -> None:
     for family in mesh_families(train.layout, train.kinematics.phases):
         assert family.phases == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
         assert [kind for kind, value in family.excites(1).items() if value] == ["rotational"]
+
+
+def test_planets_in_mesh_with_each_other_are_two_sets_though_they_are_alike() -> None:
+    """Sun 30, planets 20 and 20, ring 100: those that mesh with the sun, and those that mesh with the ring."""
+    train = stage(3, (30, 35))
+    beside = math.acos((25.0**2 + 40.0**2 - 20.0**2) / (2.0 * 25.0 * 40.0))
+    shafts, gears, meshes, pins = list(train.shafts[:3]), list(train.gears[:2]), [], []
+    for k in range(3):
+        for kind, arm, angle in (("inner", 25.0, 0.0), ("outer", 40.0, beside)):
+            turn, name = 2.0 * math.pi * k / 3.0 + angle, f"{kind}{k}"
+            point = (arm * MODULE * math.cos(turn), 0.0, -arm * MODULE * math.sin(turn))
+            shafts.append(dataclasses.replace(train.shafts[3], name=name, point=point))
+            gears.append(dataclasses.replace(train.gears[2], name=name, shaft=name, gear=gear(20)))
+            pins.append(dataclasses.replace(train.carriers[0].pins[0], shaft=name))
+        meshes += [GearMesh("sun", f"inner{k}", 5e8), GearMesh(f"inner{k}", f"outer{k}", 5e8)]
+        meshes.append(GearMesh(f"outer{k}", "ring", 5e8))
+    carrier = dataclasses.replace(train.carriers[0], pins=tuple(pins))
+    train = dataclasses.replace(
+        train, shafts=tuple(shafts), gears=tuple(gears), meshes=tuple(meshes), carriers=(carrier,)
+    )
+    sets = [[train.shafts[shaft].name for shaft, _ in row] for row in train.layout.carriers[0].sets]
+    assert sets == [["inner0", "inner1", "inner2"], ["outer0", "outer1", "outer2"]]
 
 
 def test_a_differential_is_guided_at_its_ratio() -> None:

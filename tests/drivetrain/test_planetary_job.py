@@ -69,6 +69,14 @@ def test_angles_are_about_plus_y() -> None:
     np.testing.assert_allclose(train.shafts[2].point, [0.078 * math.cos(angle), 0.0, -0.078 * math.sin(angle)])
 
 
+def test_a_given_phase_is_that_of_the_first_planet() -> None:
+    """Teeth of sun and ring place those of the others, a third of a cycle apart as without it."""
+    plain, train = made(tables()), made(tables(meshes__sun_planet__phase_deg=3.0))
+    phases, before = (np.array(one.kinematics.phases[:3]) * 17 / (2.0 * math.pi) for one in (train, plain))
+    assert phases[0] == pytest.approx(3.0 * 17 / 360.0)
+    np.testing.assert_allclose((phases - phases[0]) % 1.0, (before - before[0]) % 1.0, atol=1e-9)
+
+
 def test_the_summary_has_fractions_phases_and_sidebands() -> None:
     """17/22/-61, ring fixed: carrier 17/78, planet -17/44; 61/3 leaves 1: translational modes, sidebands."""
     train = made(tables())

@@ -151,8 +151,10 @@ def with_planets(raw: Mapping[str, Any], carriers: Mapping[str, CarrierTable]) -
         for name, entry in meshes.items()
         if {entry.get("driver"), entry.get("driven")} & of_gear.keys()
     }
+    # a phase is that of the first planet: the teeth of sun and ring then place those of the others
     expanded["meshes"] = _each(meshes, of_mesh, carriers, "meshes", lambda entry, k, _: {
-        **entry, **{key: f"{entry[key]}_{k + 1}" for key in ("driver", "driven") if entry[key] in of_gear},
+        **{key: value for key, value in entry.items() if key != "phase_deg" or not k},
+        **{key: f"{entry[key]}_{k + 1}" for key in ("driver", "driven") if entry[key] in of_gear},
     })  # fmt: skip
     return {name: table for name, table in expanded.items() if name in raw}
 

@@ -504,8 +504,8 @@ class Carrier:
     name, shaft
         Its name, and that of its shaft.
     pins
-        One for each planet. Planets with equal gears are one set, numbered in the order of their pins; of planets that
-        mesh with each other those of one number do.
+        One for each planet. Planets with equal gears that mesh with the same central gears are one set, numbered in the
+        order of their pins; of planets that mesh with each other those of one number do.
     """
 
     name: str
@@ -618,11 +618,16 @@ class GearTrain(Facts):
         )  # fmt: skip
 
     def _layout_carrier(self, carrier: Carrier) -> LayoutCarrier:
-        sets: dict[tuple[tuple[int, float], ...], list[tuple[int, float]]] = {}
+        sets: dict[tuple[object, ...], list[tuple[int, float]]] = {}
+        carried = {pin.shaft for pin in carrier.pins}
         for pin in carrier.pins:
-            gears = tuple((gear.gear.teeth, gear.along) for gear in self.gears if gear.shaft == pin.shaft)
-            place = self.shaft_number(pin.shaft), self.pin_angle(carrier, pin)
-            sets.setdefault(gears, []).append(place)
+            gears = [gear for gear in self.gears if gear.shaft == pin.shaft]
+            names = {gear.name for gear in gears}
+            ends = [{mesh.driver, mesh.driven} for mesh in self.meshes]
+            mates = {name for both in ends if both & names for name in both - names}
+            central = sorted(name for name in mates if self.gear(name).shaft not in carried)
+            alike = (*((gear.gear.teeth, gear.along) for gear in gears), *central)
+            sets.setdefault(alike, []).append((self.shaft_number(pin.shaft), self.pin_angle(carrier, pin)))
         return LayoutCarrier(carrier.name, self.shaft_number(carrier.shaft), tuple(map(tuple, sets.values())))
 
     def pin_arm(self, carrier: Carrier, pin: Pin) -> Array:
