@@ -5,7 +5,7 @@ speed, measured ones; labels that keep apart.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -55,10 +55,34 @@ ROW, MARGIN = 8.5, 0.015
 _DASHES = ((0, (6, 3)), (0, (2, 2)), (0, (6, 2, 2, 2)))
 
 
+class Drawn(NamedTuple):
+    """A signal that a picture shows."""
+
+    name: str
+    what: str  # in headings
+    unit: str
+    micro: str  # unit of levels
+
+
+def drawn_signal(names: Sequence[str], attachment: str, moves: Callable[[str], bool]) -> Drawn:
+    """Acceleration at an attachment; in a housing that does not move, the contact force of the first mesh.
+
+    `moves` says of the name of a signal whether it has lines beside its mean.
+    """
+    name, force = f"attachment_{attachment}_acceleration_m_per_s2", "contact_force_1_N"
+    if force in names and not moves(name):
+        return Drawn(force, "contact force of mesh 1", "N", "µN")
+    return Drawn(name, f"normal acceleration at attachment {attachment}", "m/s²", "µm/s²")
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
 def draw_spectrum(
     path: Path, response: TrainResponse, made: TrainSpectra, attachment: str, title: str, band: Band = None
 ) -> None:
-    """Draw the amplitude spectrum of the acceleration at an attachment, its largest lines named.
+    """Draw the amplitude spectrum of the acceleration at an attachment, its largest lines named, see `drawn_signal`.
 
     Parameters
     ----------
@@ -75,8 +99,11 @@ def draw_spectrum(
     band : (float, float), optional
         Lowest and highest frequency drawn (Hz).
     """
-    name, spectrum = f"attachment_{attachment}_acceleration_m_per_s2", made.spectrum
-    amplitude = _inside(spectrum.frequency, made.amplitude(name), band)
+    spectrum = made.spectrum
+    signal = drawn_signal(made.names, attachment, lambda name: bool(made.amplitude(name)[1:].any()))
+    beside = spectrum.frequency > 0.0  # a force has a mean, which is none of its lines
+    unit, scale = ("kN", 1e-3) if signal.unit == "N" else (signal.unit, 1.0)
+    amplitude = _inside(spectrum.frequency, scale * made.amplitude(signal.name) * beside, band)
     lines = lines_of(response, float(spectrum.frequency[-1]))
     named: list[tuple[float, float, str]] = []
     for peak in peaks(spectrum.frequency, amplitude, 4 * _NAMED, above=_LEAST):
@@ -89,7 +116,7 @@ def draw_spectrum(
     lowest, highest = _ends(response, made, [f for f, _, _ in named], band)
     frequency, amplitude = largest_lines(1e-3 * spectrum.frequency, amplitude, highest)
     figure = fixed(10.5, 4.9)
-    head = f"Normal acceleration at attachment {attachment}\n{title}"
+    head = f"{_capital(signal.what)}\n{title}"
     axes = _frequency_axes(figure, head, response, made, (lowest, highest))
     _note(figure, f"resolution {spectrum.resolution:.1f} Hz, {window}")
     axes.vlines(frequency, 0.0, amplitude, color=BLUE, linewidth=2.2)
@@ -98,7 +125,7 @@ def draw_spectrum(
     top = float(amplitude[shown].max(initial=0.0)) or 1.0
     axes.set_ylim(0.0, (1.3 + 0.06 * len({line.name for line in lines})) * top)  # rows of numbers are above the names
     label_lines(axes, named, frequency[shown], amplitude[shown], fontsize=8.5)
-    axes.set_ylabel("amplitude  (m/s²)")
+    axes.set_ylabel(f"amplitude  ({unit})")
     save(figure, path)
 
 
@@ -270,15 +297,16 @@ def draw_spectrogram(path: Path, made: Analysed, attachment: str, title: str, ba
     band : (float, float), optional
         Lowest and highest frequency drawn (Hz).
     """
-    name = f"attachment_{attachment}_acceleration_m_per_s2"
-    fall, average = made.falls[made.names.index(name)], made.average[:, made.names.index(name)]
+    falls = dict(zip(made.names, made.falls, strict=True))
+    signal = drawn_signal(made.names, attachment, lambda name: bool(falls[name].amplitude[:, 1:].any()))
+    fall, average = falls[signal.name], made.average[:, made.names.index(signal.name)]
     loud = level(fall.amplitude)
     low, high = band or (0.0, float(fall.frequency[-1]))
     seen = (fall.frequency > 0.0) & (fall.frequency >= low) & (fall.frequency <= high)
     top = float(loud[:, seen].max(initial=-300.0))
     figure = new_figure(11.5, 5.6)
     axes, side = figure.subplots(1, 2, sharey=True, width_ratios=(4.0, 1.0))
-    headed(figure, f"Normal acceleration at attachment {attachment} over short times\n{title}")
+    headed(figure, f"{_capital(signal.what)} over short times\n{title}")
     shown = axes.pcolormesh(
         1e3 * fall.time, 1e-3 * fall.frequency, loud.T,
         cmap="magma_r", vmin=top - RANGE_DB, vmax=top, shading="nearest", rasterized=True,
@@ -287,7 +315,7 @@ def draw_spectrogram(path: Path, made: Analysed, attachment: str, title: str, ba
     axes.set_ylabel("frequency  (kHz)")
     axes.set_ylim(1e-3 * low, 1e-3 * high)
     bar = figure.colorbar(shown, ax=axes, pad=0.01)
-    bar.set_label("level  (dB re 1 µm/s²)")
+    bar.set_label(f"level  (dB re 1 {signal.micro})")
     tidy(side)
     side.plot(level(average)[1:], 1e-3 * fall.frequency[1:], color=BLUE, linewidth=1.0)
     side.set_xlim(top - RANGE_DB, top + 3.0)
@@ -312,11 +340,13 @@ def draw_tracks(path: Path, made: Analysed, tracks: OrderTracks, attachment: str
     title : str
         Second line of the heading.
     """
-    values = np.abs(tracks.amplitude[:, :, made.names.index(f"attachment_{attachment}_acceleration_m_per_s2")])
+    sizes = dict(zip(made.names, np.abs(tracks.amplitude).transpose(2, 0, 1), strict=True))
+    signal = drawn_signal(made.names, attachment, lambda name: bool((sizes[name] > 0.0).any()))
+    values = sizes[signal.name]
     change = np.diff(tracks.speed)
     over_speed = len(change) > 0 and bool((change > 0.0).all() or (change < 0.0).all())
     place = tracks.speed if over_speed else 1e3 * tracks.time
-    figure, axes = single(10.5, 5.4, f"Orders of the normal acceleration at attachment {attachment}\n{title}")
+    figure, axes = single(10.5, 5.4, f"Orders of the {signal.what}\n{title}")
     for i, order in enumerate(tracks.orders):
         axes.plot(
             place, values[:, i], color=COLOURS[i % len(COLOURS)], linewidth=1.4, label=_named(order, made.mesh_orders)
@@ -325,7 +355,7 @@ def draw_tracks(path: Path, made: Analysed, tracks: OrderTracks, attachment: str
         axes.set_yscale("log")
         axes.set_ylim(bottom=max(0.7 * float(np.nanmin(values)), 1e-4 * float(np.nanmax(values))))
     axes.set_xlabel("speed of the first shaft  (rad/s)" if over_speed else "time  (ms)")
-    axes.set_ylabel("amplitude  (m/s²)")
+    axes.set_ylabel(f"amplitude  ({signal.unit})")
     axes.legend(fontsize=8.5, frameon=False, ncols=2)
     save(figure, path)
 
