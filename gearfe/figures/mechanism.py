@@ -9,6 +9,7 @@ import numpy as np
 
 from ..base.files import whole_file
 from ..base.progress import count, stage
+from ..base.quantities import label as axis_label
 from ..base.typing import Array
 from ..mechanisms.model import Mechanism
 from ..mechanisms.results import Results, evaluate, reference_table
@@ -174,7 +175,7 @@ def _curves(path: Path, mechanism: Mechanism, results: Results) -> None:
             if not shown:
                 axes.legend(loc="upper right", fontsize=8)
             shown = True
-        axes.set_ylabel(name, fontsize=8)
+        axes.set_ylabel(axis_label(name).replace(" (", "\n("), fontsize=8)
         tidy(axes)
     all_axes[-1, 0].set_xlabel("time (s)")
     figure.align_ylabels(all_axes[:, 0])
