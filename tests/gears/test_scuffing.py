@@ -162,6 +162,10 @@ def test_without_an_oil_temperature_there_is_no_scuffing() -> None:
     [
         ({"oil_temperature_C": 90.0}, "viscosity_100_mm2_per_s"),
         ({"oil_temperature_C": 90.0, "viscosity_100_mm2_per_s": 220.0}, "viscosity_100_mm2_per_s"),
+        (
+            {"oil_temperature_C": -40.0, "viscosity_40_mm2_per_s": 1e5, "viscosity_100_mm2_per_s": 2.0},
+            "oil_temperature_C",
+        ),
         ({"scuffing_load_stage": 12}, "scuffing_load_stage"),
         ({"oil": "polyglycol"}, "oil"),
         ({"oil_temperature_C": 90.0, "viscosity_100_mm2_per_s": 19.0, "oil": "water"}, "oil"),

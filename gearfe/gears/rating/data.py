@@ -305,7 +305,7 @@ def load_of(table: MeshRatingTable, where: str, torque: float | None = None) -> 
             cure = "leave it out: the hours of the spectrum add up"
             raise InputError(f"{where}.life_h", table.life_h, "cannot be given together with a spectrum", cure)
         if speed is not None and given is None:
-            problem = "cannot be given together with a spectrum but without torque_Nm"
+            problem = "must not be given with a spectrum, unless torque_Nm is given, too"
             cure = "leave it out: the part with the largest torque has a speed; or add torque_Nm"
             raise InputError(f"{where}.speed_rpm", speed, problem, cure)
         largest = max(spectrum, key=lambda part: (part.torque_Nm, part.speed_rpm))
@@ -322,8 +322,9 @@ def load_of(table: MeshRatingTable, where: str, torque: float | None = None) -> 
         )
     span, shaft = table.bearing_span_mm, table.shaft_diameter_mm
     if (span is None) != (shaft is None):
-        lacking = "bearing_span_mm" if span is None else "shaft_diameter_mm"
-        raise InputError(f"{where}.{lacking}", None, "is required with the other one", "give both, or neither")
+        keys = "bearing_span_mm", "shaft_diameter_mm"
+        lacking, other = keys if span is None else keys[::-1]
+        raise InputError(f"{where}.{lacking}", None, f"is required together with {other}", "give both, or neither")
     offset = table.pinion_offset_mm or 0.0
     if span is not None and offset > 0.3 * span:
         problem = f"must be <= {0.3 * span:.6g} mm, 0.3 of the span, for method C of ISO 6336-1"

@@ -153,7 +153,7 @@ def _thickness(gear: Gear, keys: GearRatingTable) -> tuple[float, float] | None:
         return keys.thickness_allowances_um
     if keys.thickness_allowances_um is not None:
         problem = "cannot be given together with thickness_allowances_um"
-        raise InputError("rating.thickness_series", keys.thickness_series, problem, "leave out one of both")
+        raise InputError("rating.thickness_series", keys.thickness_series, problem, "leave out one of the two")
     return thickness_allowances(keys.thickness_series, 2e3 * gear.reference_radius, "rating.thickness_series")
 
 

@@ -42,6 +42,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...base.errors import InputError
 from .data import Oil, PairData, Strength
 from .ledger import cited
 from .load_factors import Influence
@@ -65,6 +66,8 @@ LUBRICATION = {"dip": 1.0, "spray": 1.2, "spray_and_dip": 1.0, "submerged": 0.2}
 FASTEST, LIGHTEST = 50.0, 150.0
 #: Excess of the load at both ends of the contact of helical gears with an overlap ratio of 1 or more.
 BUTTRESS = 0.3
+#: Common logarithm of the largest kinematic viscosity (mm^2/s) that Walther's line is followed to.
+THICKEST = 8.0
 #: Points of the path of contact.
 POINTS = 2001
 #: Values of the integral temperature, which needs a pitch point within the path of contact.
@@ -134,6 +137,11 @@ def viscosity(oil: Oil, at_40: float) -> float:
 
     The kinematic one follows Walther's line through 40 and 100 C (ASTM D341, constant 0.7), the density falls by
     0.7 kg/m^3 per kelvin (ISO/TR 15144-1).
+
+    Raises
+    ------
+    InputError
+        For a temperature at which the line leaves the range of oils.
     """
 
     def double(nu: float) -> float:
@@ -141,7 +149,11 @@ def viscosity(oil: Oil, at_40: float) -> float:
 
     cold, warm, at = (math.log10(theta + 273.15) for theta in (40.0, 100.0, oil.temperature))
     slope = (double(at_40) - double(oil.viscosity_100)) / (warm - cold)
-    nu = 10.0**10.0 ** (double(at_40) - slope * (at - cold)) - 0.7
+    exponent = 10.0 ** (double(at_40) - slope * (at - cold))
+    if exponent > THICKEST:
+        problem = f"gives the oil more than 1e{THICKEST:g} mm2/s, by its viscosities at 40 and 100 C"
+        raise InputError("rating.oil_temperature_C", oil.temperature, problem, "correct temperature and viscosities")
+    nu = 10.0**exponent - 0.7
     return 1e-3 * nu * (oil.density - 0.7 * (oil.temperature - 16.0))
 
 
