@@ -176,11 +176,12 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
             options |= {"action": "store_const", "const": True}
         else:
             options |= {"type": kinds[0], "metavar": "|".join(known["choices"] or ()) or METAVARS[kinds[0]]}
-        if name.endswith(RADIANS):
+        if other := partner(name):
             place = parser.add_mutually_exclusive_group() if isinstance(parser, argparse.ArgumentParser) else parser
             place.add_argument(_option(name), **options)
-            help_ = f"the same in 1/min, instead of {_option(name)}"
-            place.add_argument(_option(partner(name)), dest=name, type=_from_rpm, metavar="X", help=help_)
+            unit, convert = ("1/min", _from_rpm) if name.endswith(RADIANS) else ("rad/s", _to_rpm)
+            help_ = f"the same in {unit}, instead of {_option(name)}"
+            place.add_argument(_option(other), dest=name, type=convert, metavar="X", help=help_)
             continue
         parser.add_argument(_option(name), **options)
 
@@ -188,6 +189,11 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
 def _from_rpm(text: str) -> float:
     """A speed in 1/min as rad/s."""
     return RPM * float(text)
+
+
+def _to_rpm(text: str) -> float:
+    """A speed in rad/s as 1/min."""
+    return float(text) / RPM
 
 
 def _default_of(field: Any) -> str:

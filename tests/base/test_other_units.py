@@ -69,6 +69,9 @@ def test_set_and_options(tmp_path: Path) -> None:
     parsed = parser.parse_args([str(path), "--speed-start-rpm", "1500", "--speed-stop-rad-per-s", "200"])
     assert parsed.speed_start_rad_per_s == pytest.approx(1500 * RPM)
     assert parsed.speed_stop_rad_per_s == 200.0
+    rating = parser_of(command_module("rating"), "gearfe rating", "", "")
+    assert rating.parse_args([str(path), "--speed-rad-per-s", "100"]).speed_rpm == pytest.approx(100.0 / RPM)
+    assert rating.parse_args([str(path), "--speed-rpm", "955"]).speed_rpm == 955.0
     assert main(["runup", str(path), "--speed-start-rpm", "1", "--speed-start-rad-per-s", "1"]) == 2
     out = tmp_path / "out"
     line = [
