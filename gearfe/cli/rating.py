@@ -148,7 +148,7 @@ def _dynamic_factor(folder: str, train: TrainJob | None, mesh: NamedMesh, rating
     except (OSError, KeyError, ValueError, TypeError):
         problem = f"has no runup.csv with the columns speed_rad_per_s and dynamic_factor_{number}"
         raise InputError("--runup", folder, problem, "write the folder of gearfe runup of this file") from None
-    speeds, factors = (np.array(values) for values in zip(*points, strict=True)) if points else ((), ())
+    speeds, factors = np.array(points).reshape(-1, 2).T
     if not len(speeds) or not speeds[0] <= speed <= speeds[-1]:
         reach = f"reaches from {speeds[0]:.4g} to {speeds[-1]:.4g} rad/s" if len(speeds) else "has no speeds"
         problem = f"{reach}, and the drive turns at {speed:.4g} rad/s in this rating"
@@ -171,7 +171,7 @@ def _with_computed(table: RatingTable, mesh: NamedMesh, rows: list[Compared]) ->
     from ..gears.gearmesh.rated import DYNAMIC, FACE_LOAD
 
     keys = {FACE_LOAD: "face_load_factor", DYNAMIC: "dynamic_factor"}
-    factors = {keys[row.name]: max(1.0, row.computed) for row in rows if row.name in keys}
+    factors: dict[str, Any] = {keys[row.name]: max(1.0, row.computed) for row in rows if row.name in keys}
     if not factors:
         problem = f"has nothing to take in mesh {mesh.name!r}: its load is alike along the face width"
         raise InputError("--with-computed", None, problem, "add --runup FOLDER, or helix modifications or tilts")

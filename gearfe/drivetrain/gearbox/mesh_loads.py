@@ -7,8 +7,8 @@ carrier of a planetary stage.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ...base.errors import InputError
 from ...base.tables.rating import GearRatingTable, MeshRatingTable, RatingTable
@@ -133,26 +133,26 @@ def with_train(table: RatingTable, job: TrainJob, mesh: str, gears: tuple[str, s
     for name, mates, both, fixed in zip(gears, load.mates, load.both_flanks, load.fixed, strict=True):
         own = table.gears.get(name, GearRatingTable())
         merged = table.of_gear(name, {name: None, **table.gears})
-        more: dict[str, object] = {}
+        more: dict[str, Any] = {}
         if merged.mates is None:
             more["mates"] = mates
         if merged.alternating_factor is None and both:
             more["alternating_factor"] = BOTH_FLANKS
         if merged.fixed is None and fixed:
             more["fixed"] = True
-        changed[name] = replace(own, **more)  # type: ignore[arg-type]
+        changed[name] = replace(own, **more)
     return replace(table, gears=changed, meshes=_loaded(table, load, mesh, changed[gears[0]].mates, given))
 
 
 def _loaded(
     table: RatingTable, load: MeshLoad, mesh: str, mates: int | None, given: bool
-) -> Mapping[str, MeshRatingTable]:
+) -> dict[str, MeshRatingTable]:
     """Keys of the meshes with torque and speed of one of them, unless the file has them or a load spectrum."""
     own = table.meshes.get(mesh, MeshRatingTable())
     merged = table.of_mesh(mesh, {mesh: None, **table.meshes})
     if merged.spectrum:
         return dict(table.meshes)
-    more: dict[str, float] = {}
+    more: dict[str, Any] = {}
     if merged.speed_rpm is None and load.speed > 0.0:
         more["speed_rpm"] = load.speed
     if merged.torque_Nm is None and not given and load.torque > 0.0:
