@@ -100,6 +100,8 @@ class Names:
         The expression in messages: ``a load``.
     others : sequence of str
         Quantities that exist, but not in such an expression.
+    constants : mapping
+        Numbers that the job names.
     """
 
     plain: Sequence[str] | None = ()
@@ -107,6 +109,7 @@ class Names:
     tables: Mapping[str, Table] = field(default_factory=dict)
     what: str = "an expression"
     others: Sequence[str] = ()
+    constants: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def columns(self) -> bool:
@@ -121,7 +124,7 @@ class Names:
     @property
     def quantities(self) -> tuple[str, ...]:
         """Quantities and constants as one writes them."""
-        return (*(self.plain or ()), *(f"{name}(...)" for name in self.of), *CONSTANTS)
+        return (*(self.plain or ()), *(f"{name}(...)" for name in self.of), *CONSTANTS, *self.constants)
 
 
 @dataclass(frozen=True)
@@ -348,8 +351,9 @@ class _Parser:
 
     def name(self, name: str) -> Node:
         plain = self.names.plain
-        if name in CONSTANTS:
-            return Node("number", CONSTANTS[name])
+        for constants in (CONSTANTS, self.names.constants):
+            if name in constants:
+                return Node("number", float(constants[name]))
         if plain is None or name in plain:
             return Node("quantity", (name, None))
         raise self.unknown(name, self.names.quantities)

@@ -18,7 +18,7 @@ from ..base.typing import Array
 from ..multibody import GROUND, Forced, Linkage, Start, System, consistent_start
 from ..multibody.core.mass_regularisation import free_motions
 from .links import FlexibleLink, bent_start, flexible_links, link_of
-from .loads import ExpressionLoad
+from .loads import OF_SPAN, ExpressionLoad
 from .parts import Links, body_of, known_until, part_of
 from .plates import PlateLink, part_of_plate, plate_links
 from .quantities import NAMED, OF_BODY, OF_LINK, OF_PLATE, OF_POINT, OF_SECTION, PLAIN, quantity_names
@@ -271,7 +271,7 @@ class Mechanism:
     def _forced(self, text: str, target: float, level: int) -> Forced:
         label = f"start.{('positions', 'velocities')[level]} {text!r}"
         allowed = (("angle", "x", "y"), ("rate", "vx", "vy"))[level]
-        node = parse(text, label, quantity_names(allowed, what="a value of the start"))
+        node = parse(text, label, quantity_names(allowed, what="a value of the start", constants=self.file.parameters))
         needed = quantities(node)
 
         def position(q: Array) -> float:
@@ -330,9 +330,12 @@ def load_mechanism(path: str | Path) -> Mechanism:
 def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     """Mechanism from its tables."""
     tables = {name: read_table(name, table, path.parent) for name, table in file.tables.items()}
-    for name in tables:
-        if name in (*quantity_names().functions, *NAMED, *PLAIN, *CONSTANTS):
-            raise InputError("tables", name, "is the name of a function or a quantity", "rename the table")
+    used = (*quantity_names().functions, *NAMED, *PLAIN, *CONSTANTS)
+    for kind, names, others in (("tables", tables, used), ("parameters", file.parameters, (*used, *OF_SPAN, *tables))):
+        for name in names:
+            if name in others:
+                problem = "is the name of a function or a quantity" + (", or of a table" if name in tables else "")
+                raise InputError(kind, name, problem, "rename it")
     parts = {n: part_of_plate(n, table, path.parent) for n, table in file.bodies.items() if table.plate is not None}
     links = {n: link_of(file, n, table) for n, table in file.bodies.items() if table.bends and table.beam is not None}
     plates = {n: part for n, part in parts.items() if file.bodies[n].bends}
@@ -361,7 +364,7 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     zero = np.zeros((1, system.size))
     has_links = any(body.shape is not None for body in file.bodies.values())  # those taken as rigid say so themselves
     of_links = (*OF_SECTION, *OF_LINK) if has_links else ()
-    known = quantity_names((*PLAIN, *OF_BODY, *OF_POINT, *of_links), tables, "an output")
+    known = quantity_names((*PLAIN, *OF_BODY, *OF_POINT, *of_links), tables, "an output", file.parameters)
     for i, output in enumerate(file.outputs):
         if output.name in outputs or output.name == "time_s":
             raise InputError(f"outputs[{i}].name", output.name, "is used twice", "rename the column")

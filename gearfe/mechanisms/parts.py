@@ -17,6 +17,7 @@ from ..multibody import GROUND, Body, TimeFunction, constant, polynomial, sine, 
 from ..multibody.planar.beam_link import BeamLink
 from .links import link_of
 from .loads import ALLOWED, OF_SPAN, ExpressionLoad, ExpressionTension
+from .motions import time_function_of
 from .plates import PlatePart
 from .quantities import quantity_names
 from .tables import ValueTable
@@ -24,6 +25,8 @@ from .tables import ValueTable
 Point = tuple[float, float]
 #: Keys that may be expressions of the state.
 LOADS = ("x_N", "y_N", "moment_N_m")
+#: Keys that may be expressions of the time.
+OVER_TIME = ("motion", "length_m")
 
 
 #: Times of a run at which a length over time is looked at.
@@ -147,13 +150,18 @@ def part_of(
             value = time_function(value, tables, f"{label}.{key}", smooth=key not in LOADS)
             if key == "length_m":
                 _check_length(value, file.run.end_s, f"{label}.{key}")
+        elif isinstance(value, str) and key in OVER_TIME:
+            node = parse(value, f"{label}.{key}", quantity_names(("time",), tables, "a motion", file.parameters))
+            value = time_function_of(node, value, f"{label}.{key}", file.run.end_s)
+            if key == "length_m":
+                _check_length(value, file.run.end_s, f"{label}.{key}")
         elif key == "profile":
             value = _profile(value, tables, f"{label}.profile")
         elif isinstance(value, str) and key in LOADS:
-            node = parse(value, f"{label}.{key}", quantity_names(ALLOWED, tables, "a load"))
+            node = parse(value, f"{label}.{key}", quantity_names(ALLOWED, tables, "a load", file.parameters))
             value = ExpressionLoad(value, f"{label}.{key}", node)
         elif key == "tension_N" and value is not None:
-            node = parse(value, f"{label}.{key}", quantity_names(OF_SPAN, tables, "a tension"))
+            node = parse(value, f"{label}.{key}", quantity_names(OF_SPAN, tables, "a tension", file.parameters))
             value = ExpressionTension(value, f"{label}.{key}", node)
         elif key.endswith("_deg") and value is not None:
             value = math.radians(value)

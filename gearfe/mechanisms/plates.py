@@ -261,7 +261,8 @@ def _reduced(shape: _Shape, written: int) -> Plate:
     arrays = cached_arrays("plate", recipe, make)
     if made:
         return made[0]
-    return Plate(**{name: _NUMBERS.get(name, np.asarray)(value) for name, value in arrays.items()})
+    values: dict[str, Any] = {name: _NUMBERS.get(name, np.asarray)(value) for name, value in arrays.items()}
+    return Plate(**values)
 
 
 def _reduce(shape: _Shape, material: Material) -> Plate:

@@ -24,7 +24,10 @@ PLAIN = ("time", "kinetic", "potential", "work", "total")
 
 
 def quantity_names(
-    allowed: Sequence[str] = (*PLAIN, *NAMED), tables: Mapping[str, Table] | None = None, what: str = "an expression"
+    allowed: Sequence[str] = (*PLAIN, *NAMED),
+    tables: Mapping[str, Table] | None = None,
+    what: str = "an expression",
+    constants: Mapping[str, float] | None = None,
 ) -> Names:
     """Names that an expression about a mechanism may use.
 
@@ -36,8 +39,10 @@ def quantity_names(
         Functions of one number by name.
     what : str
         The expression in messages.
+    constants : mapping, optional
+        Parameters of the file.
     """
     plain = tuple(name for name in allowed if name not in NAMED)
     of = {name: NAMED[name] for name in allowed if name in NAMED}
     others = tuple(name for name in (*PLAIN, *NAMED) if name not in allowed)
-    return Names(plain, of, tables or {}, what, others)
+    return Names(plain, of, tables or {}, what, others, constants or {})

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.config import build, read_toml, set_key
+from ..base.config import read_toml, set_key
 from ..base.errors import InputError
 from ..base.progress import one_thread
-from ..base.tables.mechanism import MechanismFile, RunTable
+from ..base.tables.mechanism import RunTable, mechanism_tables
 from ..base.typing import Array
 from ..multibody import Start, Trajectory, integrate
 from ..multibody.core.equilibrium import Equilibrium, equilibrium
@@ -146,7 +146,7 @@ def _case(raw: Mapping[str, Any], path: Path, run: RunTable | None, values: Mapp
         tables = copy.deepcopy(dict(raw))
         for name, value in values.items():
             set_key(tables, name, value, name)
-        file = build(MechanismFile, tables, "")
+        file = mechanism_tables(tables)
         with one_thread():
             solution = solve(make_mechanism(file if run is None else replace(file, run=run), path))
     except InputError as error:

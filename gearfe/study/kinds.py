@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.config import build
 from ..base.files import read_csv
 from ..base.progress import Stopwatch
 from ..base.tables.jobs import job_tables
@@ -200,14 +199,14 @@ def _modes(raw: Raw, path: Path, _shared: Shared, _estimate: bool) -> Answer:
 
 
 def _mechanism(raw: Raw, path: Path, _shared: Shared, estimate: bool) -> Answer:
-    from ..base.tables.mechanism import MechanismFile
+    from ..base.tables.mechanism import mechanism_tables
     from ..mechanisms.error_estimate import trajectory_error
     from ..mechanisms.job import summarise
     from ..mechanisms.model import make_mechanism
     from ..mechanisms.rest import summarise_rest
     from ..mechanisms.solve import solve
 
-    mechanism = make_mechanism(build(MechanismFile, raw, ""), path)
+    mechanism = make_mechanism(mechanism_tables(raw), path)
     made, tolerance = solve(mechanism), mechanism.tolerance
     if made.rest is not None:
         return Answer(made.tables(), summarise_rest(mechanism, made.start, made.rest, made.results, made.modes))

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from ..config import build, quantity, read_toml
 from ..errors import InputError, unknown_name
@@ -120,9 +121,8 @@ class FunctionTable:
                     raise InputError(f"{where}.{key}", getattr(self, key), problem, f"add {term}, or remove it")
 
 
-Function = float | FunctionTable
-#: A load may be an expression, too.
-Load = float | FunctionTable | str
+#: A number, a function of time, or an expression: of the time for motions and lengths, for loads of the state, too.
+Function = float | FunctionTable | str
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,9 @@ class JointTable:
     direction: Pair | None = quantity(None, doc="direction of the line in the other body's frame, [x, y]")
     angle_deg: float | None = quantity(None, doc="angle of body minus 'to' that a prismatic joint keeps, in degrees")
     length_m: Function | None = quantity(
-        None, above=0.0, doc="distance that a distance joint keeps in m, or a function of time (default: at start)"
+        None,
+        above=0.0,
+        doc="distance that a distance joint keeps in m, or a function of time (default: at start)",
     )
     ratio: float | None = quantity(
         None, doc="turns of 'to' per turn of the body: -z/z_to of external gears, z/z_to of a ring"
@@ -168,7 +170,9 @@ class JointTable:
         None, choices=("angle", "rate", "x", "y"), doc="prescribed coordinate, or the one that follows a cam"
     )
     profile: str | None = quantity(None, doc="table of a cam's lift in m (or rad) over its angle in rad")
-    motion: Function | None = quantity(None, doc="rad, rad/s or m: a number or a function of time")
+    motion: Function | None = quantity(
+        None, doc="rad, rad/s or m: a number, a function of time, or an expression of it"
+    )
 
     def check(self, where: str) -> None:
         """Only the keys of this type."""
@@ -196,9 +200,9 @@ class ForceTable:
     coordinate: str | None = quantity(None, choices=("angle", "x", "y"), doc="coordinate that the spring acts on")
     reference: float = quantity(0.0, doc="coordinate at which the spring is free, in m or rad")
     rate_rad_per_s: float | None = quantity(None, doc="rate of a turning frame about the ground's origin in rad/s")
-    x_N: Load | None = quantity(None, doc="force in x in N: a number, a function of time, or an expression")
-    y_N: Load | None = quantity(None, doc="force in y in N: a number, a function of time, or an expression")
-    moment_N_m: Load | None = quantity(None, doc="moment in N m: a number, a function of time, or an expression")
+    x_N: Function | None = quantity(None, doc="force in x in N: a number, a function of time, or an expression")
+    y_N: Function | None = quantity(None, doc="force in y in N: a number, a function of time, or an expression")
+    moment_N_m: Function | None = quantity(None, doc="moment in N m: a number, a function of time, or an expression")
 
     def check(self, where: str) -> None:
         """Only the keys of this type."""
@@ -311,6 +315,9 @@ class MechanismFile:
 
     run: RunTable = quantity(doc="the run")
     bodies: dict[str, BodyTable] = quantity(doc="moving bodies by name")
+    parameters: dict[str, float] = quantity(
+        dict, doc="numbers by name, or expressions of those above; other keys and expressions may use them"
+    )
     ground: GroundTable = quantity(GroundTable, doc="points at rest")
     joints: dict[str, JointTable] = quantity(dict, doc="joints by name")
     forces: dict[str, ForceTable] = quantity(dict, doc="forces by name")
@@ -380,6 +387,21 @@ def read_mechanism_file(path: str | Path) -> MechanismFile:
     if others and "bodies" not in raw:
         cure = "run it with another command, or begin with gearfe new mechanism"
         raise InputError("mechanism file", str(path), f"has no bodies but a table [{others[0]}]", cure)
+    return mechanism_tables(raw)
+
+
+def mechanism_tables(raw: Mapping[str, Any]) -> MechanismFile:
+    """Return the tables of a parsed mechanism file, expressions of its parameters evaluated.
+
+    Raises
+    ------
+    InputError
+        For every mistake in them.
+    """
+    if raw.get("parameters"):
+        from .parameters import with_parameters
+
+        raw = with_parameters(MechanismFile, raw)
     return build(MechanismFile, raw, "")
 
 

@@ -1,0 +1,88 @@
+"""[parameters] of a mechanism file: numbers by name, which stand for themselves in the keys of all other tables.
+
+Where a key takes a number, it may have an expression of parameters instead, ``length_m = "2*r"``. Expressions of loads,
+outputs and start values know the parameters by their names.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import types
+import typing
+from collections.abc import Mapping
+from typing import Any
+
+from ..config import type_hints
+from ..errors import InputError
+from ..expressions import CONSTANTS, FUNCTIONS, Names, compute, parse
+
+#: Name of the table.
+PARAMETERS = "parameters"
+
+
+def with_parameters(table: type, raw: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a parsed file with numbers instead of expressions of its parameters.
+
+    Parameters
+    ----------
+    table : type
+        Dataclass of the file.
+    raw : mapping
+        The parsed file.
+
+    Raises
+    ------
+    InputError
+        For names that are none, and expressions that are not arithmetic, use unknown names, or have no finite value.
+    """
+    given = raw.get(PARAMETERS)
+    if not isinstance(given, Mapping):  # which is an error of its own
+        return dict(raw)
+    known: dict[str, float] = {}
+    functions = {name for name, _ in FUNCTIONS}
+    for name, value in given.items():
+        label = f"{PARAMETERS}.{name}"
+        if not name.isidentifier():
+            problem = "must be a word of letters, digits and _ (it is used in expressions)"
+            raise InputError(PARAMETERS, name, problem, "rename it")
+        if name in functions or name in CONSTANTS:
+            raise InputError(PARAMETERS, name, "is the name of a function or a constant", "rename it")
+        number = _value(value, label, known) if isinstance(value, str) else value
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            cure = 'write a number, or an expression of the parameters above it, such as "2*r"'
+            raise InputError(label, value, "must be a number", cure)
+        known[name] = number
+    tables = {name: _resolved(type_hints(table).get(name, Any), value, name, known) for name, value in raw.items()}
+    return {**tables, PARAMETERS: known}
+
+
+def _value(text: str, label: str, known: Mapping[str, float]) -> float:
+    names = Names(what="a number", constants=known)
+    value = float(compute(parse(text, label, names), {}))
+    if not math.isfinite(value):
+        raise InputError(label, text, "has no finite value", "correct it, or the parameters that it uses")
+    return value
+
+
+def _resolved(hint: Any, value: Any, label: str, known: Mapping[str, float]) -> Any:
+    """A value of a type with numbers where this takes numbers and the file has expressions."""
+    options = [hint]
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        options = [option for option in typing.get_args(hint) if option is not type(None)]
+    if isinstance(value, str):
+        if str in options or not {int, float} & set(options):
+            return value
+        number = _value(value, label, known)
+        return int(number) if float not in options and number.is_integer() else number
+    for option in options:
+        inner = typing.get_args(option)
+        if isinstance(value, list) and typing.get_origin(option) is tuple:
+            kinds = [inner[0] if inner[-1] is Ellipsis else inner[min(i, len(inner) - 1)] for i in range(len(value))]
+            return [_resolved(kinds[i], item, f"{label}[{i}]", known) for i, item in enumerate(value)]
+        if isinstance(value, dict) and typing.get_origin(option) is dict:
+            return {key: _resolved(inner[1], item, f"{label}.{key}", known) for key, item in value.items()}
+        if isinstance(value, dict) and isinstance(option, type) and dataclasses.is_dataclass(option):
+            hints = type_hints(option)
+            return {key: _resolved(hints.get(key, Any), item, f"{label}.{key}", known) for key, item in value.items()}
+    return value
