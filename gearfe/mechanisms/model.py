@@ -21,7 +21,7 @@ from .links import FlexibleLink, bent_start, flexible_links, link_of
 from .loads import OF_SPAN, ExpressionLoad
 from .parts import Links, body_of, known_until, part_of
 from .plates import PlateLink, part_of_plate, plate_links
-from .quantities import NAMED, OF_BODY, OF_LINK, OF_PLATE, OF_POINT, OF_SECTION, PLAIN, quantity_names
+from .quantities import NAMED, OF_BODY, OF_JOINT, OF_LINK, OF_PLATE, OF_POINT, OF_SECTION, PLAIN, quantity_names
 from .tables import read_table
 
 Point = tuple[float, float]
@@ -118,7 +118,7 @@ class Mechanism:
         Returns
         -------
         values : dict
-            (name, argument) -> ndarray, shape (n,), in SI units.
+            (name, argument) -> ndarray, shape (n,), in SI units; reactions of joints are not among them.
 
         Raises
         ------
@@ -132,6 +132,9 @@ class Mechanism:
             where = given(what, f"expression {kind}")
             if kind in OF_SECTION or kind in OF_LINK:
                 values[kind, what] = self._of_link(kind, where, q, v, sections)
+            elif kind in OF_JOINT:  # which follow from the multipliers, not from a state alone
+                if where not in self.file.joints:
+                    raise unknown_name(f"expression {kind}({where}): joints", where, self.file.joints)
             elif kind in OF_POINT:
                 x, y = self._point_values(kind, where, q, v, a)
                 values[kind, what] = x if kind.endswith("x") else y
@@ -364,7 +367,7 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     zero = np.zeros((1, system.size))
     has_links = any(body.shape is not None for body in file.bodies.values())  # those taken as rigid say so themselves
     of_links = (*OF_SECTION, *OF_LINK) if has_links else ()
-    known = quantity_names((*PLAIN, *OF_BODY, *OF_POINT, *of_links), tables, "an output", file.parameters)
+    known = quantity_names((*PLAIN, *OF_BODY, *OF_POINT, *OF_JOINT, *of_links), tables, "an output", file.parameters)
     for i, output in enumerate(file.outputs):
         if output.name in outputs or output.name == "time_s":
             raise InputError(f"outputs[{i}].name", output.name, "is used twice", "rename the column")

@@ -13,11 +13,14 @@ OF_POINT = ("x", "y", "vx", "vy", "ax", "ay")
 OF_SECTION = ("deflection", "stretch", "axial_force", "shear_force", "bending_moment", "edge_stress")
 OF_PLATE = ("largest_von_mises",)
 OF_LINK = ("elastic_energy", "largest_edge_stress", *OF_PLATE)
+#: Force (N) and moment (N m) of a joint on its body, at the joint's point, along the axes of the ground.
+OF_JOINT = ("reaction_x", "reaction_y", "reaction_moment")
 #: Quantities of something -> what it must be.
 NAMED = {
     **dict.fromkeys(OF_BODY, "a body or joint"),
     **dict.fromkeys((*OF_POINT, *OF_SECTION), "a point such as rod.B"),
     **dict.fromkeys(OF_LINK, "a flexible link"),
+    **dict.fromkeys(OF_JOINT, "a joint"),
 }
 #: Quantities of the whole mechanism.
 PLAIN = ("time", "kinetic", "potential", "work", "total")

@@ -17,7 +17,7 @@ from ..base.progress import stage
 from ..base.typing import Array
 from ..multibody import Linkage, Trajectory
 from .model import Mechanism
-from .quantities import PLAIN
+from .quantities import OF_JOINT, PLAIN
 
 #: States that are evaluated at once: links of some dozen points take 6 kB each for their strains.
 BLOCK = 4096
@@ -101,6 +101,10 @@ def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
         for name, link in mechanism.links.items()
     } | {name: trajectory.stress_at(link.element, trajectory.time) for name, link in mechanism.plates.items()}
     values = mechanism.values(needed, trajectory.q, v, a, sections)
+    if needs & set(OF_JOINT):
+        forces = reactions(mechanism, trajectory)
+        column = dict(zip(OF_JOINT, ("x_N", "y_N", "moment_N_m"), strict=True))
+        values |= {(kind, joint): forces[f"{joint}_{column[kind]}"] for kind, joint in needed if kind in column}
     values["time", None] = trajectory.time
     for name in ("kinetic", "potential", "work", "total"):
         values[name, None] = energy[f"{name}_J"]

@@ -100,3 +100,29 @@ def test_motions_that_cannot_be_prescribed_are_refused(tmp_path: Path, motion: s
         load_mechanism(mechanism_file(tmp_path, CRANK.format(motion=motion)))
     assert "joints.drive.motion" in caught.value.field
     assert words in str(caught.value)
+
+
+def test_reactions_are_outputs(tmp_path: Path) -> None:
+    """A body driven about its centre asks for J alpha; the hinge of a turning one for its weight and m r omega^2."""
+    text = CRANK.format(motion='"3*time"').replace("inertia_kg_m2 = 0.1", "inertia_kg_m2 = 0.1\ncentre_m = [0.2, 0.0]")
+    text += """
+[forces.gravity]
+type = "gravity"
+acceleration_m_per_s2 = [0.0, -9.81]
+"""
+    outputs = {"x": "reaction_x(O)", "y": "reaction_y(O) - 9.81", "moment": "reaction_moment(drive)"}
+    text += "".join(f'[[outputs]]\nname = "{name}"\nvalue = "{value}"\n' for name, value in outputs.items())
+    results = solve(load_mechanism(mechanism_file(tmp_path, text))).results
+    assert results is not None
+    angle = 3.0 * results.trajectory.time
+    for name, expected in (
+        ("x", -1.0 * 0.2 * 9.0 * np.cos(angle)),
+        ("y", -1.0 * 0.2 * 9.0 * np.sin(angle)),
+        ("moment", 1.0 * 9.81 * 0.2 * np.cos(angle)),
+    ):
+        np.testing.assert_allclose(results.outputs[name], expected, rtol=0.0, atol=1e-9)
+    with pytest.raises(InputError, match="joints"):
+        load_mechanism(mechanism_file(tmp_path, text.replace("reaction_x(O)", "reaction_x(P)")))
+    load = '"reaction_x(O)"'
+    with pytest.raises(InputError, match="reaction_x"):
+        load_mechanism(mechanism_file(tmp_path, text + f'[forces.f]\ntype = "force"\nbody = "crank"\nx_N = {load}\n'))
