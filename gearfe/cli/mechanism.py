@@ -35,7 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the slopes of all outputs by this key, as bodies.rod.mass_kg; may be given several times",
     )
     parser.add_argument("--no-estimate", action="store_true", help="leave out the finer runs that estimate the error")
-    parser.add_argument("--animation", action="store_true", help="write animation.gif")
+    parser.add_argument(
+        "--animation", action="store_true", help="write animation.gif, and animation.html with a slider over the time"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -80,11 +82,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _draw(mechanism: Mechanism, args: argparse.Namespace, folder: Path, results: Results) -> None:
     from ..figures.mechanism import draw_animation, draw_figures
+    from ..figures.mechanism_page import write_page
 
     if not args.no_pictures:
         draw_figures(folder, mechanism, results)
     if args.animation:
         draw_animation(folder, mechanism, results.trajectory)
+        write_page(folder, mechanism, results.trajectory)
 
 
 def _draw_rest(mechanism: Mechanism, folder: Path, results: Results, modes: Modes | None) -> None:

@@ -46,7 +46,7 @@ def draw_state(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0,
     """
     draw_backdrop(axes, mechanism, q, alpha=alpha)
     magnification = mechanism.file.figure.magnification
-    for (body, points), colour in zip(rigid_ends(mechanism), _colours(mechanism), strict=False):
+    for (body, points), colour in zip(rigid_ends(mechanism), body_colours(mechanism), strict=False):
         centre = place_of(q, body, (0.0, 0.0))[0]
         ends = np.array([place_of(q, body, (p.real, p.imag))[0] for p in points])
         loop = ends if len(ends) < 3 else np.append(ends, ends[0])
@@ -54,11 +54,11 @@ def draw_state(axes: Any, mechanism: Mechanism, q: Array, *, alpha: float = 1.0,
             axes.fill(loop.real, loop.imag, color=colour, alpha=0.1 * alpha, linewidth=0)
         axes.plot(loop.real, loop.imag, "-o", color=colour, lw=2, ms=3.5, alpha=alpha)
         axes.plot(centre.real, centre.imag, "+", color=colour, ms=8, alpha=alpha)
-    for link, colour in zip(mechanism.links.values(), _colours(mechanism), strict=False):
+    for link, colour in zip(mechanism.links.values(), body_colours(mechanism), strict=False):
         shape, nodes = (link_places(link, at, q, magnification)[0] for at in (link.smooth, link.beam.link.ends))
         axes.plot(shape.real, shape.imag, lw=2, color=colour, alpha=alpha)
         axes.plot(nodes.real, nodes.imag, "o", ms=3, color=colour, alpha=alpha)
-    for plate, colour in zip(mechanism.plates.values(), _colours(mechanism), strict=False):
+    for plate, colour in zip(mechanism.plates.values(), body_colours(mechanism), strict=False):
         _draw_plate(axes, plate, plate.exaggerated(q, magnification)[0], colour, alpha)
     if names:
         draw_names(axes, mechanism, q)
@@ -93,11 +93,11 @@ def draw_names(axes: Any, mechanism: Mechanism, q: Array) -> None:
     middles = [
         np.mean([place_of(q, body, (p.real, p.imag))[0] for p in points]) for body, points in rigid_ends(mechanism)
     ]
-    named = list(zip(rigid, middles, _colours(mechanism), strict=False))
-    for (name, link), colour in zip(mechanism.links.items(), _colours(mechanism), strict=False):
+    named = list(zip(rigid, middles, body_colours(mechanism), strict=False))
+    for (name, link), colour in zip(mechanism.links.items(), body_colours(mechanism), strict=False):
         shape = link_places(link, link.smooth, q, magnification)[0]
         named.append((name, shape[len(shape) // 2], colour))
-    for (name, plate), colour in zip(mechanism.plates.items(), _colours(mechanism), strict=False):
+    for (name, plate), colour in zip(mechanism.plates.items(), body_colours(mechanism), strict=False):
         named.append((name, plate.exaggerated(q, magnification)[0].mean(), colour))
     for name, place, colour in named:
         _name(axes, name, complex(place), colour, weight="bold")
@@ -129,7 +129,7 @@ def _draw_plate(axes: Any, plate: PlateLink, places: np.ndarray, colour: str, al
 
 def draw_paths(axes: Any, mechanism: Mechanism, q: Array) -> None:
     """Paths of points over the run, q of shape (n, k): states that `drawn_states` has chosen."""
-    for label, body, point in _path_points(mechanism):
+    for label, body, point in path_points(mechanism):
         places = place_of(q, body, point)
         axes.plot(places.real, places.imag, lw=0.8, alpha=0.7, color=GREY, zorder=1, label=label)
 
@@ -147,7 +147,7 @@ def drawn_states(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     ends = np.unique(np.concatenate([[begin], ends[(ends > begin) & (ends < end)], [end]]))
     pieces = int(np.clip(MOST_STATES // len(ends), 1, LEAST_PIECES))
     times = np.interp(np.arange((len(ends) - 1) * pieces + 1) / pieces, np.arange(len(ends)), ends)
-    tracks = [(body, point) for _, body, point in _path_points(mechanism)]
+    tracks = [(body, point) for _, body, point in path_points(mechanism)]
     tracks += [(body, (p.real, p.imag)) for body, points in rigid_ends(mechanism) for p in points]
 
     def places(at: Array) -> ComplexArray:
@@ -169,7 +169,7 @@ def drawn_states(mechanism: Mechanism, trajectory: Trajectory) -> Array:
     return trajectory.dense(times)
 
 
-def _path_points(mechanism: Mechanism) -> list[tuple[str, int, Point]]:
+def path_points(mechanism: Mechanism) -> list[tuple[str, int, Point]]:
     """Label, body and place relative to the mass centre of the points whose paths are drawn."""
     found = []
     for path in mechanism.file.paths:
@@ -182,7 +182,7 @@ def _path_points(mechanism: Mechanism) -> list[tuple[str, int, Point]]:
     return found
 
 
-def _colours(mechanism: Mechanism) -> list[str]:
+def body_colours(mechanism: Mechanism) -> list[str]:
     """Colours of the bodies in their order."""
     return list(itertools.islice(itertools.cycle(COLOURS), max(len(mechanism.file.bodies), 1)))
 
@@ -190,7 +190,7 @@ def _colours(mechanism: Mechanism) -> list[str]:
 def frame(axes: Any, mechanism: Mechanism, q: Array) -> None:
     """Limits that hold the whole run, labels with their unit."""
     factor = mechanism.file.figure.magnification
-    places = [*_rigid_places(mechanism, q), *(place for _, *ends in _coupled(mechanism, q) for place in ends)]
+    places = [*_rigid_places(mechanism, q), *(place for _, *ends in coupled(mechanism, q) for place in ends)]
     places += [link_places(link, link.beam.link.ends, q, factor) for link in mechanism.links.values()]
     places += [plate.exaggerated(q, factor) for plate in mechanism.plates.values()]
     low, high = (np.array([[f(p.real), f(p.imag)] for p in places]) for f in (np.min, np.max))
@@ -228,7 +228,7 @@ def link_places(link: FlexibleLink, at: Array, q: Array, factor: float) -> Compl
     return np.asarray(shape[:, :, 0] + 1j * shape[:, :, 1])
 
 
-def _coupled(mechanism: Mechanism, q: Array) -> list[tuple[Spring | Distance, ComplexArray, ComplexArray]]:
+def coupled(mechanism: Mechanism, q: Array) -> list[tuple[Spring | Distance, ComplexArray, ComplexArray]]:
     """Springs and distance joints with the places of both ends."""
     parts = [p for p in (*mechanism.linkage.forces, *mechanism.linkage.joints) if isinstance(p, (Spring, Distance))]
     seen = partial(_seen, mechanism, q)
@@ -275,7 +275,7 @@ def _size(mechanism: Mechanism, q: Array) -> float:
 
 def _couplings(axes: Any, mechanism: Mechanism, q: Array, size: float, alpha: float) -> None:
     """Springs as zigzags, rods of constant length as thin lines, slots and guides as dashed ones."""
-    for part, one, other in _coupled(mechanism, q):
+    for part, one, other in coupled(mechanism, q):
         line = np.array([one[0], other[0]])
         if isinstance(part, Spring):
             line = _coil(one[0], other[0], COIL_WIDTH * size)
