@@ -25,6 +25,7 @@ from gearfe.drivetrain.modes.job import at_speed
 from gearfe.drivetrain.modes.whirl import train_modes
 from gearfe.drivetrain.runup.run_up import run_up, steady_state
 from gearfe.drivetrain.train import Damping, Drive, GearTrain, SpeedCurve, build_train, simulate
+from gearfe.drivetrain.train.simulate import unbalanced
 from gearfe.multibody import TimeFunction, constant
 from tests.makers.gearboxes import tables
 from tests.makers.trains import base_radius, changed, curve, train
@@ -77,6 +78,16 @@ def test_a_fan_on_the_other_shaft_brakes_by_its_own_speed() -> None:
     response = simulate(build_train(given), t, tolerance=1e-10)
     expected = math.sqrt(torque / reduced) * np.tanh(math.sqrt(torque * reduced) / inertia(given) * t)
     np.testing.assert_allclose(response.speed[:, 1], -RATIO * expected, atol=1e-8 * expected.max())
+
+
+@pytest.mark.parametrize(("reference", "balances"), [(100.0, True), (60.0, False)])
+def test_torques_that_do_not_balance_at_the_steady_speed_are_named(reference: float, balances: bool) -> None:
+    """A motor of constant torque, and a fan behind gears that takes as much at 100 rad/s of the motor."""
+    fan = 1e-2
+    motor = function(400.0, expression=f"{RATIO**3 * fan * 100.0**2} + 0*speed")
+    load = function(400.0, expression=f"-{fan}*speed*abs(speed)")
+    model = build_train(from_rest(motor, reference=reference, load=load))
+    assert (unbalanced(model) == []) == balances
 
 
 def test_a_motor_that_falls_in_a_line_is_the_slope() -> None:

@@ -324,7 +324,8 @@ def _check_held(model: TrainModel) -> None:
     along_modes = modal.T.T @ push
     free = modal.eigenvalues <= FREE * float(modal.eigenvalues.max(initial=0.0))
     unheld = np.where(free, along_modes, 0.0)
-    if not np.linalg.norm(unheld) > UNHELD * np.linalg.norm(along_modes):
+    lost = FREE * float(np.abs(modal.T).max(initial=0.0) * np.abs(push).max(initial=0.0))  # what hinges take leaves it
+    if not np.linalg.norm(unheld) > max(UNHELD * np.linalg.norm(along_modes), lost):
         return
     moved = modal.T @ unheld
     slides = np.array([abs(float(moved[first : first + 3] @ axis)) for first in model.first.tolist()])

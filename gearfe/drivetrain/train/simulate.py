@@ -28,6 +28,8 @@ from .statics import ROUND_OFF
 
 #: Share of the nominal speed from which on a drive by torque leaves the speed of the frames of carriers.
 OFF_NOMINAL = 0.01
+#: Torques whose sum is this part of the largest balance.
+BALANCED = 1e-3
 #: The finer run shares a little of the error; with this factor the estimate covers it.
 SAFETY = 1.5
 #: An approach or a bore's displacement beyond this part of the module means that nothing holds any more.
@@ -281,7 +283,7 @@ def _whole(
 ) -> TrainResponse:
     """The last piece with estimates and warnings of the whole run."""
     warnings = model.mesh_notes + model.operating.warnings + totals.pulls(model) + _loose(model)
-    warnings += totals.beyond(model) + _frames(model, response)
+    warnings += totals.beyond(model) + unbalanced(model) + _frames(model, response)
     if response.status != "done":
         warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms {ended}")
     estimates: dict[str, float] = {}
@@ -290,6 +292,28 @@ def _whole(
         if model.train.housing is not None:
             estimates["reduction"] = reduction_error(model.train.housing, options.band_hz).response
     return replace(response, estimates=estimates, warnings=tuple(warnings))
+
+
+def unbalanced(model: TrainModel) -> list[str]:
+    """Return a sentence about torques over speed that do not balance at the speed that counts as steady."""
+    train, drive = model.train, model.train.driven
+    ends: list[Drive | Load] = [drive, *train.loads]
+    if drive.torque is None or all(end.over_speed is None for end in ends):
+        return []
+    parts = []
+    for end in ends:
+        if end.torque is not None:
+            steady = replace(end.torque, sines=())
+            ratio = float(model.ratios[train.shaft_number(end.shaft)])
+            parts.append(ratio * float(steady(max(steady.breaks, default=0.0))))
+    left = sum(parts)
+    if abs(left) <= BALANCED * max(map(abs, parts), default=0.0):
+        return []
+    return [
+        f"the torques over speed do not balance at the speed that counts as steady: {left:.4g} N m are left on the "
+        "drive; bearings and misalignment are those of that speed: give as speed_rad_per_s one near that at which they "
+        "balance, or curves that reach it"
+    ]
 
 
 def _frames(model: TrainModel, response: TrainResponse) -> list[str]:
