@@ -19,11 +19,15 @@ placed, which is the solution's to `PLACED`.
 Newton's method with an active set solves it at a given twist or, with the twist bordered, at a given torque. The
 tangent over twist and tilts follows from the same matrix: :math:`B^T(T + c')^{-1}B` over the loaded points.
 
-**Free ends.** Closer to an end of a gear than the load's bumps are wide, plane strain turns to plane stress, which
-polynomials along the axis do not resolve: the half-plane's :math:`2/(\pi E')` grows there by
-:math:`\tfrac{\nu^2}{1-\nu^2}\tfrac12\ln(1 + a^2/(\zeta + a_0)^2)` with the distance :math:`\zeta` from the end and
-the half width a of the bumps. The factor is theory, the form between bump and depth a guess that 3D contacts of
-another program bear out within 4 % of the load in the last 0.4 mm; `AT_END` was chosen on them (docs/face_width.md).
+**Free ends.** Close to an end of a gear a line load yields more than in plane strain, down to the width of its
+pressure; the finite elements contain that for bumps of half width a only. Between a and the half width b of the
+contact, the half-plane's :math:`2/(\pi E')` grows at the distance :math:`\zeta` from the end by
+
+.. math::
+    A\,\frac{\nu^2}{1-\nu^2}\,\ln\frac{a\,w(\zeta/a)}{b\,w(\zeta/b)}, \qquad w(x) = x + \frac{k}{1 + q x} .
+
+A, k and q (`AT_END`) are those of an elastic block with a free end under elliptic pressures, by finite elements that
+resolve it (`scripts/benchmarks/calibrate_free_ends.py`); at the very end A is the law of the quarter-space's corner.
 """
 
 from __future__ import annotations
@@ -54,8 +58,10 @@ ONE_BY_ONE = 1e-3
 #: Newton steps, change of the moments in parts of their sum in the last one, and the overlap (m) of a point that
 #: carries nothing that is none.
 STEPS, SETTLED, CLOSED = 300, 1e-9, 1e-12
-#: Distance from an end, in half widths of a bump, that is none.
-AT_END = 0.3
+#: A, k and q of free ends at Poisson's ratios (-), within 2 % of the resolved block.
+AT_END = {0.2: (2.79, 0.264, 2.03), 0.3: (2.35, 0.301, 1.60), 0.4: (2.13, 0.329, 1.43)}
+#: Least roll length (modules) for the curvature that the half widths at free ends follow from.
+LEAST_ROLL = 0.2
 #: Least derivative of c in parts of c/M under the lightest load, so that no contact yields less under more load.
 STIFFEST = 0.05
 #: Least twist beyond the first touch that points are placed for, in those of a usual stiffness.
@@ -348,22 +354,31 @@ def _points(lines: ContactLines, middle: float, twist: float, z: Array, weight: 
     rows = rows_at(law, middle + mesh.turns[0] * z + pair * mesh.sections.mesh_cycle)
     levers = np.concatenate([np.ones((len(z), 1)), lines.levers(z, rows) / rows.arm[:, None]], axis=1)
     approach = mean_arm(lines, rows) * (twist - rows.touch) - lines.gap(z, rows, pair)
-    rows = replace(rows, yields=rows.yields + _softer_ends(lines.compliance, z)[:, None])
+    rows = replace(rows, yields=rows.yields + _softer_ends(lines, z, rows))
     influence = _influence(lines.compliance, z, pair, rows) / (rows.arm[:, None] * rows.arm)
     return Points(z, weight, pair, rows, twist - approach / rows.arm, levers, influence)
 
 
-def _softer_ends(compliance: WideCompliance, z: Array) -> Array:
-    """What free ends of the gears add to the approach of half-planes per force per width (m2/N), shape (n,)."""
-    mesh, added = compliance.mesh, np.zeros(len(z))
+def _softer_ends(lines: ContactLines, z: Array, rows: Rows) -> Array:
+    """What free ends of the gears add to the approach of half-planes per force per width (m2/N), shape (n, loads)."""
+    compliance, forces = lines.compliance, lines.law.forces
+    mesh, added = compliance.mesh, np.zeros((len(z), len(forces)))
     if mesh.count == 1:
         return added
+    soft = sum(side.local.inverse_modulus for side in compliance.sides)
+    rolls = np.maximum(rows.roll, LEAST_ROLL * mesh.module)
+    radius = rolls.prod(axis=1) / rolls.sum(axis=1)
+    hertz = np.sqrt(4.0 / math.pi * soft * radius[:, None] * forces)
     for side, material, face in zip(compliance.sides, mesh.materials, mesh.faces, strict=True):
+        nu = material.poisson_ratio
+        grows, k, q = (np.interp(nu, list(AT_END), column) for column in zip(*AT_END.values(), strict=True))
+        scale = 2.0 / math.pi * side.local.inverse_modulus * grows * nu**2 / (1.0 - nu**2)
         bump = side.usual_bump
-        softer = material.poisson_ratio**2 / (1 - material.poisson_ratio**2)
+        half = np.minimum(hertz, bump)
         for end in face:
-            near = bump / (np.abs(z - end) + AT_END * bump)
-            added += side.local.inverse_modulus / math.pi * softer * np.log1p(near**2)
+            apart = np.abs(z - end)[:, None]
+            wide, narrow = (apart + a * k / (1.0 + q * apart / a) for a in (bump, half))
+            added += scale * np.log(wide / narrow)
     return added
 
 
