@@ -113,7 +113,7 @@ def test_free_ends_yield_more_under_narrow_pressures():
     middle, end = 0.0, lines.compliance.mesh.faces[0][1]
     rows = rows_at(lines.law, np.full(2, SPUR.path["C"].pinion_angle))
     added = _softer_ends(lines, np.array([middle, end]), rows)
-    assert np.abs(added[0]).max() < 0.01 * added[1].min()
+    assert np.abs(added[0]).max() < 0.01 * added[1].max()
     soft = sum(side.local.inverse_modulus for side in lines.compliance.sides)
     bump = lines.compliance.sides[0].usual_bump
     grows = AT_END[0.3][0] * 0.3**2 / (1 - 0.3**2)

@@ -493,8 +493,10 @@ def solve_position(
         return Solution(_nowhere(lines), math.nan, np.zeros(0), np.zeros((3, 3)), False, 0)
     ahead = guess - least if guess > least else torque / lines.compliance.mesh.usual_stiffness
     steps, settled, before = 0, False, None
+    broken = None
     for number in range(PLACINGS):
-        points = place_points(lines, angle, least + ahead, before)
+        broken = before if number < FREE_PLACINGS else broken  # ends of light loads may jump to and fro
+        points = place_points(lines, angle, least + ahead, broken)
         solution = _newton(lines, points, torque=torque, twist=None, before=before)
         steps, before = steps + solution.steps, solution
         # between the places that are looked at, a line may touch a little earlier
