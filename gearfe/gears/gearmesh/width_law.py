@@ -217,7 +217,8 @@ class WidthLaw:
             E[:, 0, 2, 0] - E[:, 1, 1, 0] * ty - of_tilt * ty - force * t[:, 2, 0],
             E[:, 0, 0, 0],
         )
-        return WidthForces(*(np.where(bears == 0.0, 0.0, bears * value) for value in values), self.past(overlap, tilt))
+        forces = [np.where(bears == 0.0, 0.0, bears * value) for value in values]
+        return WidthForces._make([*forces, self.past(overlap, tilt)])
 
     def past(self, overlap: Array, tilt: Array) -> BoolArray:
         """Whether x (m) or tilt (rad) are farther than the law is known, shape (n,)."""
@@ -400,8 +401,11 @@ def stacked_width_laws(laws: list[WidthLaw]) -> WidthLaws:
     shapes = np.array([law.energies.shape[:3] for law in laws], dtype=np.int64).reshape(-1, 3)
     n, m, g = shapes.max(axis=0, initial=1).tolist()
     count = len(laws)
+    cells, parts, sides = shapes.T.copy()
     stacked = WidthLaws(
-        *(shapes - [0, 0, 1]).T.copy(),
+        cells,
+        parts,
+        sides - 1,
         np.zeros((count, n + 1)),
         np.zeros((count, m)),
         np.zeros((count, g)),
