@@ -123,7 +123,7 @@ def _lines(mechanism: Mechanism, q: Array, path: Array) -> list[tuple[ComplexArr
     colours = body_colours(mechanism)
     lines: list[tuple[ComplexArray, dict[str, Any]]] = []
 
-    def add(places: ComplexArray, colour: str, thickness: float = 1.0, *, filled: bool = False) -> None:
+    def add(places: Any, colour: str, thickness: float = 1.0, *, filled: bool = False) -> None:
         fill = {"fill": colour, "fill-opacity": 0.12} if filled else {"fill": "none"}
         line = {"stroke": colour, "stroke-width": round(thickness * width, 1), "stroke-linejoin": "round"}
         lines.append((np.atleast_2d(places), {"closed": filled, "style": {**fill, **line, "stroke-linecap": "round"}}))

@@ -130,7 +130,7 @@ def last_part(response: TrainResponse) -> TrainResponse:
     slowest = float(np.abs(response.mesh_frequencies_Hz).min())
     first = int(np.searchsorted(response.time, response.time[-1] - ZOOMED / slowest))
     first, count = min(first, len(response.time) - 2), len(response.time)
-    cut = {
+    cut: dict[str, Any] = {
         field.name: values[first:]
         for field in fields(response)
         if isinstance(values := getattr(response, field.name), np.ndarray) and values.shape[:1] == (count,)

@@ -103,8 +103,8 @@ def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
     values = mechanism.values(needed, trajectory.q, v, a, sections)
     if needs & set(OF_JOINT):
         forces = reactions(mechanism, trajectory)
-        column = dict(zip(OF_JOINT, ("x_N", "y_N", "moment_N_m"), strict=True))
-        values |= {(kind, joint): forces[f"{joint}_{column[kind]}"] for kind, joint in needed if kind in column}
+        ends = dict(zip(OF_JOINT, ("x_N", "y_N", "moment_N_m"), strict=True))
+        values |= {(kind, joint): forces[f"{joint}_{ends[kind]}"] for kind, joint in needed if kind in ends}
     values["time", None] = trajectory.time
     for name in ("kinetic", "potential", "work", "total"):
         values[name, None] = energy[f"{name}_J"]

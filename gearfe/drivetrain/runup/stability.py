@@ -211,7 +211,7 @@ def around(
     yields = others[:, seen[of_freedoms]].T @ (others[:, pushed] / linear.squares[~kept, None])
     A = both[:, :, of_freedoms]
     both[:, :, of_freedoms] = np.linalg.solve(np.eye(len(pushed)) - A @ yields, A)
-    both = both.reshape(len(both) // stages, stages, len(pushed), len(seen))
+    by_step = both.reshape(len(both) // stages, stages, len(pushed), len(seen))
     reads = places[:, seen % linear.size]
     reads = np.vstack([reads * of_freedoms, reads * ~of_freedoms])
     free = linear.squares[~kept], np.diag(D)[~kept]
@@ -220,7 +220,7 @@ def around(
         constant = flow(linear.stiffness(speed)[among], (D - speed * linear.gyroscopic)[among], edges[-1])
 
         def map_over(first: int, last: int) -> Array:
-            return monodromy(constant, edges[first : last + 1], places[:, pushed], reads, both[first:last])
+            return monodromy(constant, edges[first : last + 1], places[:, pushed], reads, by_step[first:last])
 
         if span.half is None:
             return _sorted(map_over(0, len(edges) - 1), free, edges[-1])

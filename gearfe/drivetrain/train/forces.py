@@ -211,7 +211,7 @@ class CurveFlank(MeshFlank):
         bears = self.bears(phase, approach)
         if not bears.any() and self.error is None and self.tilting is None:
             none = np.zeros(len(phase))
-            damper = {"per_rate": none, "momentum": none, "push": none} if self.damping > 0.0 else {}
+            damper: dict[str, Any] = {"per_rate": none, "momentum": none, "push": none} if self.damping > 0.0 else {}
             return FlankForces(none, none, none, ~bears, bears, **damper)
         k, slope = self.curve(phase)
         late, rise = (0.0, 0.0) if self.error is None else self.error(phase)

@@ -325,7 +325,7 @@ def _check_held(model: TrainModel) -> None:
     free = modal.eigenvalues <= FREE * float(modal.eigenvalues.max(initial=0.0))
     unheld = np.where(free, along_modes, 0.0)
     lost = FREE * float(np.abs(modal.T).max(initial=0.0) * np.abs(push).max(initial=0.0))  # what hinges take leaves it
-    if not np.linalg.norm(unheld) > max(UNHELD * np.linalg.norm(along_modes), lost):
+    if not float(np.linalg.norm(unheld)) > max(UNHELD * float(np.linalg.norm(along_modes)), lost):
         return
     moved = modal.T @ unheld
     slides = np.array([abs(float(moved[first : first + 3] @ axis)) for first in model.first.tolist()])
