@@ -210,7 +210,7 @@ class Housing(Facts):
         return self.mesh.nodes
 
     def matrices(self) -> SolidMatrices:
-        """Nodal stiffness and mass, assembled anew: they are large, and no one needs them for long."""
+        """Nodal stiffness and mass, assembled at each call: they are large and used briefly."""
         with stage("assembling"):
             return self.mesh.assemble(self.material)
 

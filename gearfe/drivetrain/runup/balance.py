@@ -212,7 +212,7 @@ class Orbit:
     forces : (K + 1, m)
         Of the forces on them.
     error
-        Estimate of the error of the freedoms, in parts of their scale; not-a-number where there is none.
+        Estimate of the error of the freedoms, in parts of their scale; NaN where there is none.
     found
         Whether the equations are solved.
     steps

@@ -91,7 +91,7 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     Raises
     ------
     InputError
-        For meshes of more than `MOST_PHASES` phases, rigid meshes, loads that never rest but for their sines, and parts
+        For meshes of more than `MOST_PHASES` phases, rigid meshes, loads that are neither constant nor sines, and parts
         that nothing holds.
     """
     _check(model)

@@ -22,7 +22,7 @@ FEW = 3
 
 @dataclass(frozen=True, eq=False)
 class Growing(Oscillator):
-    """An oscillator at one speed; the part s of what swings stands in the speed's place."""
+    """An oscillator at one speed; the part s of the vibration replaces the speed."""
 
     speed: float = 0.0
 

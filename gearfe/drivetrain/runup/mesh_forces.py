@@ -1,8 +1,8 @@
 r"""Forces of all flanks of a train at the freedoms of its meshes, with their derivatives, over the phases.
 
 The same forces as `train.forces`: with the turns n of the drive in a period of each phase :math:`\theta`, the
-phase of a flank is :math:`s(g\,n\cdot\theta + u_r) + \varphi_0`, but for whole cycles of the mesh, so the rotation's
-feedback on the phase is kept. What stands in the linear part already, the mean stiffness along the approach, is taken
+phase of a flank is :math:`s(g\,n\cdot\theta + u_r) + \varphi_0`, up to whole cycles of the mesh, so the rotation's
+feedback on the phase is kept. What the linear part already contains, the mean stiffness along the approach, is taken
 off.
 
 A damper that acts in contact only has a force that jumps at the touch. It is the rate of change of what does not,

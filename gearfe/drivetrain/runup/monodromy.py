@@ -5,7 +5,7 @@ r"""The map of a periodic linear system over its period.
 
 The multipliers are the eigenvalues of the monodromy matrix, the map of (y, v) over T; one of modulus > 1 means
 parametric instability (Nayfeh & Mook, Nonlinear Oscillations, Sec. 5.2). The constant part is solved exactly
-(exponentials of its eigenvalues), the periodic part changes v only, by what depends on y but for small terms, so both
+(exponentials of its eigenvalues), the periodic part changes v only, by terms of y (others are small), so both
 alternate in the splitting of order 4 with six stages for such systems (Blanes & Moan, J. Comput. Appl. Math. 142, 2002,
 SRKN6b).
 """

@@ -47,7 +47,7 @@ def tables(
 
 
 def iso_dynamic_factors(run: RunUp, mesh: int) -> Array:
-    """K_v of a mesh at the given speeds by ISO 6336-1, method B, gears without deviations but for the relief of `Gear`:
+    """K_v of a mesh at the given speeds by ISO 6336-1, method B, gears without deviations except the relief of `Gear`:
     with the mesh's own mean stiffness, and all that turns with its gears.
     """
     model = run.train.model
@@ -65,7 +65,7 @@ def iso_dynamic_factors(run: RunUp, mesh: int) -> Array:
 
 
 def waterfall(run: RunUp, states: Sequence[SteadyState] | None = None) -> dict[str, Array]:
-    """Arrays of waterfall.npz: lines of all steady states up to the band by rising order; not-a-number beyond it.
+    """Arrays of waterfall.npz: lines of all steady states up to the band by rising order; NaN beyond it.
 
     ``speed_rad_per_s`` and ``branch`` (states,), ``frequency_Hz`` (states, lines), ``order`` (lines,), ``harmonic``
     (lines, phases): multiples of the frequency of each phase, ``acceleration_m_per_s2`` (states, lines, attachments),

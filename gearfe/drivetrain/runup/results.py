@@ -64,7 +64,7 @@ class SteadyState:
     span
         Time over which multipliers are made (s): the period, or after which all phases are back.
     multipliers : (2 modes,) or None
-        Floquet multipliers of the motion, largest modulus first; None where not computed, one not-a-number
+        Floquet multipliers of the motion, largest modulus first; None where not computed, one NaN
         where stability is undecided.
     """
 
@@ -95,7 +95,7 @@ class SteadyState:
 
     @property
     def growth(self) -> float:
-        """Rate (1/s) by which the slowest disturbance grows; not-a-number where it is not known."""
+        """Rate (1/s) by which the slowest disturbance grows; NaN where it is not known."""
         if self.multipliers is None or not abs(self.multipliers[0]) > 0.0:
             return math.nan
         return math.log(abs(self.multipliers[0])) / self.span

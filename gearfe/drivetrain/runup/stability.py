@@ -11,8 +11,8 @@ decay. A mode counts where its share in the forces' change, beside its damping, 
 
 T is the period of the one phase. Several phases share one, too, as long as hunting teeth need to meet all others; up to
 `LONGEST` mesh cycles T is that one. Beyond, T is a time after which all phases are nearly back: the growth
-:math:`\ln|\mu|/T` then is a Lyapunov exponent but for a rest that falls with T. Where it differs from that over about
-half the time by as much as its own size, there are no multipliers but not-a-number.
+:math:`\ln|\mu|/T` then is a Lyapunov exponent up to a term that falls with T. Where it differs from that over about
+half the time by as much as its own size, the multipliers are NaN.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def window(system: Oscillator) -> Window:
 
 
 def multipliers(system: Oscillator, orbit: Orbit, accuracy: float | None = None) -> ComplexArray:
-    """Floquet multipliers of an orbit over `window`, largest modulus first, (2 n,); (1,) not-a-number if undecided.
+    """Floquet multipliers of an orbit over `window`, largest modulus first, (2 n,); (1,) NaN if undecided.
 
     Parameters
     ----------

@@ -251,7 +251,7 @@ def spectrogram_columns(made: Analysed) -> dict[str, Any]:
 
 
 def track_columns(made: Analysed) -> dict[str, Any]:
-    """Columns of order_tracks.csv: a row for each order and part; not-a-number above the band is an empty cell."""
+    """Columns of order_tracks.csv: a row for each order and part; NaN above the band is an empty cell."""
     assert made.tracks is not None
     t = made.tracks
     count = len(t.orders)

@@ -77,7 +77,7 @@ def with_errors(
     Returns
     -------
     dict
-        The summary with ``headline_errors`` (name -> estimates like the numbers, not-a-number where unknown),
+        The summary with ``headline_errors`` (name -> estimates like the numbers, NaN where unknown),
         ``headline_error_parts`` (the same of each source), ``headline_error_changes`` (signed, of each changed run),
         and ``error_estimate``, ``error_parts`` and ``error_changes`` in each dominant line.
     """
@@ -160,7 +160,7 @@ def _halves(body: ModalBody) -> Iterator[ModalBody]:
 
 
 def _numbers(run: Run, like: Run) -> dict[str, Array]:
-    """The numbers of a run, lines with their phases at the bins of another one's; not-a-number where it ended early."""
+    """The numbers of a run, lines with their phases at the bins of another one's; NaN where it ended early."""
     summary = run.summary
     done = summary.get("status") == "done"
     found = {name: np.asarray(summary.get(name, math.nan), dtype=float) for name in FORCES}

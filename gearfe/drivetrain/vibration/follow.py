@@ -234,7 +234,7 @@ class RunningMean:
 
     @property
     def value(self) -> Array:
-        """(k,) the mean; not-a-number where the run ended before the times that it is taken over."""
+        """(k,) the mean; NaN where the run ended before the times that it is taken over."""
         if not self._to > self._from:
             return np.full(0 if self._last is None else self._last[1].shape[1], np.nan)
         return np.asarray(self._total) / (self._to - self._from)

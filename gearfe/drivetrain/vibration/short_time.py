@@ -45,7 +45,7 @@ class OrderTracks:
         When the shaft is in the middle of each part (s), and how fast it turns there (rad/s).
     orders : (k,)
     amplitude : (m, k, s)
-        Of s signals, complex: the part is ``Re(amplitude exp(i order angle))``; not-a-number above the band.
+        Of s signals, complex: the part is ``Re(amplitude exp(i order angle))``; NaN above the band.
     """
 
     time: Array

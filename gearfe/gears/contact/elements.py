@@ -10,9 +10,9 @@ the flanks and the stress rows S, a step solves
     f^+ = G^T W p, \qquad p = \max(0,\; -\gamma\,(g + G\,(C f^+ - u)) - S f^+) .
 
 What G leaves out (the normals turn and the forces move with the faces; across blended normals the gap also changes as
-its foot point slides) enters with the next step, where gaps and rows are taken anew. Errors shrink by about the ratio
+its foot point slides) enters with the next step, where gaps and rows are updated. Errors shrink by about the ratio
 of pressure to modulus a step; steps are mixed with those before, so that they shrink faster and settle beside corners.
-The matrix is made anew until the solution is near: under sharp corners pressures come to a third of the modulus, and
+The matrix is updated until the solution is near: under sharp corners pressures come to a third of the modulus, and
 the rows turn with the faces. A position has converged when its pressures are those that the law asks for *and* its
 forces are those of the pressures at the places reached.
 """

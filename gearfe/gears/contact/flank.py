@@ -141,7 +141,7 @@ def normal_stress_rows(
     tangent = np.einsum("qa,eai->eqi", edge_shapes(xi)[1], mesh.points[chain])
     y, x = np.moveaxis(
         tangent / np.linalg.norm(tangent, axis=-1, keepdims=True), -1, 0
-    )  # but for one's sign the normal
+    )  # the normal, except for the sign of one
     rows = np.einsum("seq,eqsai->eqai", np.stack([x * x, y * y, -2 * x * y]), stresses)
     unknowns = 2 * triangles[:, :, None] + np.arange(2)
     return unknowns.reshape(len(chain), 12), rows.reshape(*r.shape, 12)

@@ -3,7 +3,7 @@ r"""Contact laws: what the pressure on a flank is; and the model of a pair: its 
 **On the elements of the flanks** (nitsche, penalty; `gearfe.gears.contact.elements`). With the gap g (negative where
 the bodies overlap), the normal stress :math:`\sigma_n` of the body that carries a point, and the law's parameter
 :math:`\gamma` (Pa/m), find u such that for all v (Chouly, Mlika & Renard, *Numer. Math.* 139, 2018, with theta = 0 and
-the gap in place of its negative)
+the gap instead of its negative)
 
 .. math::
     a(u, v) = \int_{\Gamma_C} p\,\delta g(v), \qquad p = \max(0,\; -\gamma g - s\,\sigma_n).

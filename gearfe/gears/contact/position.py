@@ -191,7 +191,7 @@ NO_POINTS = PointPressures(*np.zeros((3, 0), dtype=np.int64), *np.zeros((2, 0)))
 
 @dataclass(frozen=True)
 class Positions:
-    """Solutions of n positions. `positions[i]` is one of them, with numbers in place of arrays of shape (n,).
+    """Solutions of n positions. `positions[i]` is one of them, with numbers instead of arrays of shape (n,).
 
     Attributes
     ----------
@@ -282,7 +282,7 @@ class Positions:
         return replace(self.with_loads(np.zeros(len(self), dtype=bool)), contacts=self.contacts.without_panels())
 
 
-#: Rounding of the gears' angles (rad) below which no twist can be told apart.
+#: Rounding of the gears' angles (rad) below which twists cannot be distinguished.
 ANGLE_ROUNDING = 2e-15
 #: Type of the names of statuses.
 STATUS = "<U18"

@@ -403,7 +403,7 @@ class StiffnessCurve(ShownTable):
                 raise InputError("stiffness curve", path, problem, cure)
 
 
-#: Field -> its column, in the order of the table but for the shares.
+#: Field -> its column, in the order of the table, without the shares.
 COLUMNS: dict[str, Column] = {own.name: own.metadata["column"] for own in fields(StiffnessCurve) if own.metadata}
 
 

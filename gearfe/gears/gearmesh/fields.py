@@ -72,7 +72,7 @@ def half_plane_stress(x: Array, z: Array, edges: Array, pressure: Array) -> Arra
 
 
 def bumped(body: GearBody, position: Positions, gear: int) -> tuple[FlankLoads, list[tuple[int, Array]]]:
-    """Loads of one gear at one position with bumps in place of narrow contacts, and what these make of the stresses.
+    """Loads of one gear at one position with bumps instead of narrow contacts, and what these make of the stresses.
 
     Returns
     -------

@@ -110,7 +110,7 @@ def write_fields(
 
 
 def fields_size(elastic: MeshingPair, positions: int) -> int:
-    """Bytes of ``fields.vtkhdf`` with so many positions, but for headers and what rounds its arrays up to whole MB.
+    """Bytes of ``fields.vtkhdf`` with so many positions, without headers and the rounding of its arrays to whole MB.
 
     A position has at each node three coordinates of 8 bytes and eight values of 4, and a byte for each element; the
     elements themselves, six numbers of 8 bytes, an offset and a kind, stand once.

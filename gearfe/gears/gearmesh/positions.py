@@ -262,7 +262,7 @@ def closed(found: Positions, goal: Array, first_contact: Array) -> Positions:
     energy = found.energy + 0.5 * (found.torque_wheel + moments["torque_wheel"]) * by
     loads = tuple(replace(one, force=one.force + by[one.position, None] * one.rate) for one in found.loads)
     contacts = found.contacts.moved(by)
-    whole = np.bincount(contacts.position, contacts.torque_wheel, len(found))  # but for what the step errs
+    whole = np.bincount(contacts.position, contacts.torque_wheel, len(found))  # up to the error of the step
     right = moments["torque_wheel"][contacts.position] / whole[contacts.position]
     contacts = replace(contacts, torque_wheel=contacts.torque_wheel * right)
     return replace(found, twist=twist, energy=energy, contacts=contacts, loads=loads, **moments)
