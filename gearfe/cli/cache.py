@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 
 from .arguments import add_json
 
@@ -20,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     one.add_argument(
         "--compile",
         action="store_true",
-        help="compile the kernels of mechanisms now, half a minute: single runs are over before that pays",
+        help="compile all kernels now, about a minute: later runs load them",
     )
     add_json(parser)
 
@@ -59,13 +60,31 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _compile() -> None:
-    """Any compiled run leaves the kernels in the cache."""
-    from ..multibody import Body, Hinge, Linkage, System, integrate
+    """Leave all kernels in the cache: those of mechanisms by both methods, of a train, and of a mesh law."""
+    import numpy as np
+
+    from ..drivetrain.train import build_train
+    from ..drivetrain.train.gear_train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
+    from ..drivetrain.train.simulate import simulate
+    from ..gears.gearmesh.law_kernel import load_kernel
+    from ..gears.geometry import Gear
+    from ..multibody import Body, Hinge, Linkage, System, constant, integrate
 
     rod, hinge = Body("rod", 1.0, 1.0, (1.0, 0.0)), Hinge("rod", "ground")
     system = System([Linkage((rod,), (hinge,))])
     for method in ("taylor", "implicit"):
         integrate(system, [0.0, 1e-3], method=method)
+    gear, axes = Gear(20, 2e-3, math.radians(20.0), 0.02, bore_diameter=0.01), {"one": 0.0, "two": 0.04}
+    train = GearTrain(
+        tuple(Shaft(name, (x, 0.0, 0.0), 0.1, 5e-3, (f"{name}_1", f"{name}_2")) for name, x in axes.items()),
+        tuple(ShaftGear(f"gear_{name}", name, 0.0, gear, 7850.0) for name in axes),
+        (GearMesh("gear_one", "gear_two", 1e8),),
+        Drive("one", "one_1", constant(100.0)),
+        (Load("two", None, constant(10.0)),),
+        rigid_bores={f"{name}_{k}": (x, y, 0.0) for name, x in axes.items() for k, y in ((1, 0.03), (2, -0.03))},
+    )
+    simulate(build_train(train), np.array([0.0, 1e-5]))
+    load_kernel()
 
 
 def _size(count: int) -> str:
