@@ -60,7 +60,9 @@ def test_a_bad_file_is_answered_before_the_libraries_load(tmp_path):
 
 
 def test_gears_that_cannot_run_together_are_told_before_scipy_loads(tmp_path):
-    text = job_file("stiffness").replace("# centre_distance_mm (not set):", "centre_distance_mm = 68.0 #")
+    text = job_file("stiffness")
+    assert "centre_distance_mm = 82.5" in text
+    text = text.replace("centre_distance_mm = 82.5", "centre_distance_mm = 92.0")
     (tmp_path / "job.toml").write_text(text)
     code = (
         "import sys\nfrom gearfe.cli.main import main\n"

@@ -125,7 +125,7 @@ def test_every_key_is_in_this_file():
     along_width = {"helix_angle_deg", "misalignment_um", "misalignment_across_um"}  # tests/gears/test_width_job.py
     assert set(PairTable.__dataclass_fields__) <= given | per_gear | along_width
     elsewhere = {"twist_deg", "twist_from", "nitsche_gamma0", "law_parameters", "solve_all", "interpolation"}
-    elsewhere |= {"angle_stop_deg", "angle_step_deg"}
+    elsewhere |= {"angle_stop_deg", "angle_step_deg", "torque_pinion_Nm"}
     assert {field.name for field in fields(StiffnessTable)} <= {*SWEEP_CHANGES, *elsewhere}
 
 

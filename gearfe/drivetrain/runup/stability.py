@@ -140,7 +140,8 @@ def _with_momentum(by: Changes, momentum: Changes, step: float, size: int) -> tu
     is what the saltation matrix of a jump in the acceleration has (Leine & Nijmeijer, Dynamics and Bifurcations of
     Non-Smooth Mechanical Systems, 2004, Ch. 7).
     """
-    by_step = momentum.values.reshape(-1, len(KICKS), momentum.values.shape[1])
+    samples, width = momentum.values.shape
+    by_step = momentum.values.reshape(samples // len(KICKS), len(KICKS), width)
     change = (by_step[:, -1] - by_step[:, 0]) / step
     jumped = momentum.forces, momentum.freedoms, np.repeat(change, len(KICKS), axis=0)
     of_rates = momentum.forces, momentum.freedoms + size, momentum.values
