@@ -22,6 +22,8 @@ from ..multibody import TimeFunction, constant
 DEGREE, ROUNDING = 16, 1e-14
 #: Places of a piece, beside the points, at which it is compared with the function, and how well they agree.
 BETWEEN, AGREES = np.array([-0.9713, -0.6091, -0.2347, 0.1279, 0.4453, 0.8377]), 1e-12
+#: Times of the run at which the pieces are compared with the function, too: a pulse shorter than that is not seen.
+LOOKS = 20_001
 #: Most pieces: steps end where a piece does.
 MOST_PIECES = 20_000
 #: Part of the run by which the function goes on after its end: steps of estimates may pass it.
@@ -49,7 +51,7 @@ def time_function_of(node: Node, text: str, label: str, end: float) -> TimeFunct
     def values(times: Array) -> Array:
         return np.broadcast_to(np.asarray(compute(node, {("time", None): times}, label), dtype=float), times.shape)
 
-    looked_at = np.linspace(0.0, end, 1001)
+    looked_at = np.linspace(0.0, end, LOOKS)
     found = values(looked_at)
     if not np.isfinite(found).all():
         at = float(looked_at[~np.isfinite(found)][0])
@@ -72,9 +74,12 @@ def time_function_of(node: Node, text: str, label: str, end: float) -> TimeFunct
         slope = np.abs(chebyshev.chebval(points, chebyshev.chebder(coefficients))).max() / half
         noise = float(np.finfo(float).eps * last * slope)  # of the function, from rounding in the time
         smooth = np.abs(coefficients[-2:]).max() <= ROUNDING * scale + noise
-        if smooth:  # a fast function may look smooth at few points
-            between = np.abs(values(middle + half * BETWEEN) - chebyshev.chebval(BETWEEN, coefficients))
-            smooth = between.max() <= AGREES * scale + 10.0 * noise
+        if smooth:  # a fast function, or a short pulse, may look smooth at few points
+            held = slice(*np.searchsorted(looked_at, (first, last)).tolist())
+            times = np.append(middle + half * BETWEEN, looked_at[held])
+            off = np.append(values(times[: len(BETWEEN)]), found[held])
+            off = np.abs(off - chebyshev.chebval((times - middle) / half, coefficients))
+            smooth = off.max() <= AGREES * scale + 10.0 * noise
         if smooth:
             starts.append(first)
             origins.append(middle)

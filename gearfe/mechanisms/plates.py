@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
@@ -222,11 +221,20 @@ def part_of_plate(name: str, table: BodyTable, folder: Path) -> PlatePart:
     """A link from its tables; the finite elements are condensed once for all links of the same shape and material."""
     plate = given(table.plate, f"bodies.{name}.plate")
     source = None if plate.mesh is None else folder / plate.mesh
-    written = 0 if source is None or not source.is_file() else source.stat().st_mtime_ns
+    where = f"bodies.{name}.plate"
     angle = table.angle_rad if table.angle_rad is not None else math.radians(table.angle_deg or 0.0)
-    reduced = _reduced(_Shape(plate, source, f"bodies.{name}.plate"), written)
+    reduced = _reduced(_Shape(plate, source, where), _fingerprint(source, f"{where}.mesh"))
     speed = (*table.velocity_m_per_s, table.rate_rad_per_s)
     return PlatePart(name, plate, reduced, (*table.position_m, angle), speed)
+
+
+def _fingerprint(source: Path | None, field: str) -> str:
+    """Return a hash of a mesh file and of the files that it includes; empty without one."""
+    if source is None or not source.is_file():
+        return ""
+    from ..fem.meshing.mesh_file import source_fingerprint
+
+    return source_fingerprint(source, field)
 
 
 @dataclass(frozen=True)
@@ -242,8 +250,8 @@ class _Shape:
 
 
 @lru_cache(maxsize=16)
-def _reduced(shape: _Shape, written: int) -> Plate:
-    """Return the reduced plate of a table, from the cache if the same was reduced before."""
+def _reduced(shape: _Shape, text: str) -> Plate:
+    """Return the reduced plate of a table and a hash of its mesh, from the cache if the same was reduced before."""
     from ..fem.plane import Material
     from ..fem.reduction.plate import Plate
 
@@ -254,10 +262,9 @@ def _reduced(shape: _Shape, written: int) -> Plate:
         made.append(_reduce(shape, material))
         return {own.name: np.asarray(getattr(made[0], own.name)) for own in fields(Plate)}
 
-    mesh = hashlib.sha256(shape.source.read_bytes()).hexdigest() if written and shape.source else ""
     code = [source_hash(*_MODULES), versions()]
     # keys of a recipe have no order, but the frame goes with the first interface
-    recipe = {"table": table, "interfaces": list(table.interfaces), "mesh": mesh, "code": code}
+    recipe = {"table": table, "interfaces": list(table.interfaces), "mesh": text, "code": code}
     arrays = cached_arrays("plate", recipe, make)
     if made:
         return made[0]

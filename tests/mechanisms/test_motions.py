@@ -126,3 +126,11 @@ acceleration_m_per_s2 = [0.0, -9.81]
     load = '"reaction_x(O)"'
     with pytest.raises(InputError, match="reaction_x"):
         load_mechanism(mechanism_file(tmp_path, text + f'[forces.f]\ntype = "force"\nbody = "crank"\nx_N = {load}\n'))
+
+
+@pytest.mark.parametrize("width", [0.001, 0.005, 0.05])
+def test_a_short_pulse_is_followed(width: float) -> None:
+    """Shorter than the distance of a piece's points, longer than the times at which the pieces are compared."""
+    made = function(f"0.5*exp(-((time - 0.37)/{width})**2)", 1.0)
+    times = np.linspace(0.0, 1.0, 54_321)
+    np.testing.assert_allclose(made(times), 0.5 * np.exp(-(((times - 0.37) / width) ** 2)), rtol=0.0, atol=1e-11)

@@ -101,6 +101,8 @@ def test_studies_and_slopes_change_a_parameter(tmp_path: Path) -> None:
         ("l = 0.8", "time = 0.8", "parameters", "is the name of a function or a quantity"),
         ("l = 0.8", "length = 0.8", "parameters", "name"),
         ("l = 0.8", '"l-1" = 0.8', "parameters", "must be a word"),
+        ("l = 0.8", "l = 0.8\nidle = 1.0", "parameters.idle", "is used nowhere"),
+        ("l = 0.8", "l = 1" + 400 * "0", "parameters.l", "must be finite"),
         ('mass_kg = "m"', 'mass_kg = "-m"', "bodies.rod.mass_kg", ">= 0"),
         ('mass_kg = "m"', 'mass_kg = "__import__(1)"', "bodies.rod.mass_kg", "__import__"),
         ('frames = "2*n"', 'frames = "n/3"', "run.frames", "whole number"),
@@ -112,11 +114,17 @@ def test_mistakes_are_named(tmp_path: Path, old: str, new: str, field: str, word
     text = text.replace(old, new)
     if new.startswith(("sin", "time", "length")):
         text = text.replace('half = "l/2"', "half = 0.4").replace('"l"', "0.8").replace("m*l**2/12", "m/12")
-        text = text.replace("/ l", "/ 0.8")
+        text = text.replace("/ l", f"/ {new.split()[0]}")
     with pytest.raises(InputError) as caught:
         load_mechanism(mechanism_file(tmp_path, text))
     assert field in caught.value.field
     assert words in str(caught.value)
+
+
+def test_speeds_in_turns_take_expressions(tmp_path: Path) -> None:
+    text = PENDULUM.format(**NAMED).replace("angle_deg = -60.0", 'angle_deg = -60.0\nrate_rpm = "3*n"')
+    tables = read_mechanism_file(mechanism_file(tmp_path, text))
+    assert tables.bodies["rod"].rate_rad_per_s == pytest.approx(30.0 * 2.0 * np.pi / 60.0, rel=1e-14)
 
 
 def test_texts_stay_errors_without_parameters(tmp_path: Path) -> None:

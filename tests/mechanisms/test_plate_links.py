@@ -501,6 +501,24 @@ def test_a_stored_plate_is_the_reduced_one(tmp_path: Path, monkeypatch: pytest.M
     _reduced.cache_clear()
 
 
+def test_a_file_that_the_mesh_includes_is_in_the_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two triangles of an Abaqus file whose nodes stand in another one, which becomes narrower."""
+    monkeypatch.setenv("GEARFE_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "m.inp").write_text(
+        "*INCLUDE, INPUT=n.inp\n*ELEMENT, TYPE=CPS3\n1, 1, 2, 3\n2, 1, 3, 4\n3, 2, 5, 6\n4, 2, 6, 3\n", encoding="utf-8"
+    )
+    table = replace(PlateTable(**COARSE), outline_m=None, element_size_m=None, mesh="m.inp", modes=1)
+    masses = []
+    for height in (0.02, 0.01):
+        nodes = ((0, 0), (0.1, 0), (0.1, height), (0, height), (0.2, 0), (0.2, height))
+        lines = [f"{k}, {x}, {y - 0.5 * height}\n" for k, (x, y) in enumerate(nodes, start=1)]
+        (tmp_path / "n.inp").write_text("*NODE\n" + "".join(lines), encoding="utf-8")
+        _reduced.cache_clear()
+        masses.append(part_of_plate("arm", BodyTable(plate=table), tmp_path).plate.mass)
+    _reduced.cache_clear()
+    assert masses[1] == pytest.approx(0.5 * masses[0], rel=1e-9)
+
+
 def test_nodal_stresses_of_many_times_are_those_of_each(slender: Plate) -> None:
     part = PlatePart("rod", PlateTable(**COARSE), slender, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     link = PlateLink(part, None, None, {}, slice(0, 0), np.zeros((2, 3), dtype=np.int64))  # type: ignore[arg-type]

@@ -26,6 +26,7 @@ HEAVY = {
     ("gearfe.drivetrain.gearbox.job", "gearfe.fem.beams"): "beams; for elastic shafts only",
     ("gearfe.drivetrain.train.model", "gearfe.drivetrain.train.elastic_shaft"): "beams; for elastic shafts only",
     ("gearfe.mechanisms.plates", "gearfe.fem.plane"): "finite elements",
+    ("gearfe.mechanisms.plates", "gearfe.fem.meshing.mesh_file"): "readers of meshes",
     ("gearfe.mechanisms.plates", "gearfe.fem.reduction.plate"): "finite elements",
     ("gearfe.mechanisms.plates", "gearfe.fem.meshing.plate_mesh"): "the mesher",
     ("gearfe.gears.gearmesh.law_store", "gearfe.gears.contact.half_plane"): "scipy; a law is read from the cache",

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..config import type_hints
+from ..config import check_size, type_hints
 from ..errors import InputError
 from ..expressions import CONSTANTS, FUNCTIONS, Names, compute, parse
+from ..other_units import partner
 
 #: Name of the table.
 PARAMETERS = "parameters"
@@ -52,9 +54,27 @@ def with_parameters(table: type, raw: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(number, bool) or not isinstance(number, int | float):
             cure = 'write a number, or an expression of the parameters above it, such as "2*r"'
             raise InputError(label, value, "must be a number", cure)
+        check_size(number, label, "write a smaller one")
         known[name] = number
+    used = set(_words({name: table for name, table in raw.items() if name != "title"}))
+    for name in known:
+        if name not in used:
+            raise InputError(f"{PARAMETERS}.{name}", None, "is used nowhere", "use it in a key, or remove it")
     tables = {name: _resolved(type_hints(table).get(name, Any), value, name, known) for name, value in raw.items()}
     return {**tables, PARAMETERS: known}
+
+
+def _words(part: Any) -> Iterator[str]:
+    """Words of all texts in a parsed file, and of the expressions that are keys of [start]."""
+    if isinstance(part, str):
+        yield from re.findall(r"\w+", part)
+    elif isinstance(part, dict):
+        for key, item in part.items():
+            yield from re.findall(r"\w+", key) if not key.isidentifier() else ()
+            yield from _words(item)
+    elif isinstance(part, list):
+        for item in part:
+            yield from _words(item)
 
 
 def _value(text: str, label: str, known: Mapping[str, float]) -> float:
@@ -84,5 +104,8 @@ def _resolved(hint: Any, value: Any, label: str, known: Mapping[str, float]) -> 
             return {key: _resolved(inner[1], item, f"{label}.{key}", known) for key, item in value.items()}
         if isinstance(value, dict) and isinstance(option, type) and dataclasses.is_dataclass(option):
             hints = type_hints(option)
-            return {key: _resolved(hints.get(key, Any), item, f"{label}.{key}", known) for key, item in value.items()}
+            return {
+                key: _resolved(hints.get(key, hints.get(partner(key), Any)), item, f"{label}.{key}", known)
+                for key, item in value.items()
+            }
     return value

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...base.errors import InputError
 from ...base.typing import Array
 from .equilibrium import Equilibrium, check_rests, stiffness_at
 from .mass_regularisation import free_motions
@@ -78,6 +79,9 @@ def modes(system: System, start: Start, rest: Equilibrium, count: int) -> Modes:
     M, C = T.T @ system.mass @ T, -T.T @ system.force_jacobian(t, rest.q, zero)[1] @ T
     K = T.T @ stiffness_at(system, t, rest.q, rest.multipliers) @ T
     n = len(K)
+    if n == 0:
+        problem = "has no motion that its joints leave free, so nothing vibrates"
+        raise InputError("mechanism", None, problem, "leave out a joint or a prescribed motion, or ask for no modes")
     companion = np.zeros((2 * n, 2 * n))  # of (m u, u) in powers of m: m^2 K + m C + M = 0, scaled by the slowest rate
     soft = np.linalg.solve(K, np.hstack([C, M]))
     scale = float(np.sqrt(np.abs(np.linalg.eigvals(soft[:, n:])).max())) or 1.0
