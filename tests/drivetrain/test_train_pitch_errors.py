@@ -160,5 +160,5 @@ def test_mistakes() -> None:
         build_train(dataclasses.replace(gear_train, gears=(few, gear_train.gears[1])))
     for stiffness in (curve(20), 1e8, None):
         mesh = dataclasses.replace(gear_train.meshes[0], stiffness=stiffness)
-        with pytest.raises(InputError, match="pitch errors on gear 'd0', which curves and rigid meshes do not know"):
+        with pytest.raises(InputError, match="pitch errors on gear 'd0', which curves, laws over the face width"):
             build_train(dataclasses.replace(gear_train, meshes=(mesh,)))

@@ -114,7 +114,7 @@ def test_mistakes_are_named(tmp_path: Path, old: str, new: str, field: str, word
     text = text.replace(old, new)
     if new.startswith(("sin", "time", "length")):
         text = text.replace('half = "l/2"', "half = 0.4").replace('"l"', "0.8").replace("m*l**2/12", "m/12")
-        text = text.replace("/ l", f"/ {new.split()[0]}")
+        text = text.replace("/ l", f"/ {new.split(maxsplit=1)[0]}")
     with pytest.raises(InputError) as caught:
         load_mechanism(mechanism_file(tmp_path, text))
     assert field in caught.value.field
