@@ -753,3 +753,50 @@ def test_a_rating_of_the_model(tmp_path):
     assert wheel == {"material": "Eh", "hardness": 720.0, "yield_strength_MPa": 900.0}
     rough = {"quality": 5, "flank_ra_um": 0.5, "flank_roughness_um": 3.0, "thickness_series": "cd25"}
     assert pinion == wheel | rough
+
+
+@pytest.mark.parametrize(
+    ("treated", "values", "material", "hardness"),
+    [
+        ("nitrided_steel", {"surface_hardness_vickers": 700.0}, "NT", 700.0),
+        ("nitrided_through_hardened_steel", {}, "NV", None),
+        ("normalized_wrought_low_carbon_steel", {"surface_hardness_vickers": 200.0}, "St", 190.0),
+        ("grey_cast_iron", {"surface_hardness_vickers": 200.0, "yield_strength": 250.0}, "GG", 190.0),
+        ("nodular_cast_iron_perlitic_or_bainitic_structure", {}, "GGG", None),
+        ("black_malleable_cast_iron", {}, "GTS", None),
+        ("through_hardened_wrought_steel", {"surface_hardness_vickers": 420.0}, "V", 420.0),
+        ("through_hardened_cast_steel", {"surface_hardness_vickers": 300.0}, "V_cast", 300.0),
+        ("flame_or_induction_hardened_steel", {"surface_hardness_vickers": 650.0}, "IF", 650.0),
+    ],
+)
+def test_no_material_is_replaced_by_another(tmp_path, treated, values, material, hardness):
+    """A heat treatment becomes the material of the rating even if hardness or yield strength are missing or strange."""
+    parts, joints = spur_pair()
+    parts = with_attributes(parts, 10, heat_treated_material_type_iso_6336_2019=treated, **values)
+    job = job_of(tmp_path, parts, joints)
+    complete(job)
+    for entry in job.tables["rating"]["gears"].values():
+        assert entry["material"] == material
+        assert entry.get("hardness") == (None if hardness is None else pytest.approx(hardness))
+        assert entry.get("yield_strength_MPa") == values.get("yield_strength")
+    assert not [entry for entry in job.entries if entry.kind == "ignored" and "rating" in entry.attribute]
+
+
+def test_a_heat_treatment_without_a_material_of_the_standard_is_listed_as_ignored(tmp_path):
+    """A type of heat treatment and a yield strength that the rating does not take are not noted as read."""
+    parts, joints = spur_pair()
+    name = "heat_treated_material_type_iso_6336_2019"
+    parts = with_attributes(parts, 10, **{name: "not_heat_treated"}, yield_strength=300.0)
+    job = job_of(tmp_path, parts, joints)
+    kinds = {(entry.attribute, entry.kind) for entry in job.entries}
+    for attribute in (name, "yield_strength"):
+        assert (attribute, "ignored") in kinds
+        assert (attribute, "read") not in kinds
+
+
+def test_a_material_without_an_elastic_modulus_has_its_strength_in_the_rating(tmp_path):
+    """The elastic modulus decides on [materials] only."""
+    parts, joints = spur_pair()
+    parts = with_attributes(parts, 10, elastic_modulus=None, heat_treated_material_type_iso_6336_2019="nitrided_steel")
+    gears = job_of(tmp_path, parts, joints).tables["rating"]["gears"]
+    assert [entry["material"] for entry in gears.values()] == ["NT", "NT"]

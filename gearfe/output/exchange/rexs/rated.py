@@ -10,7 +10,7 @@ import re
 from typing import Any
 
 from ....base.tables.rating import MATERIALS
-from .ledger import IGNORED, READ
+from .ledger import READ
 from .model import Component
 from .reading import Reading
 
@@ -30,8 +30,10 @@ HEAT_TREATED = {
     "through_hardened_cast_steel": "V_cast",
     "through_hardened_wrought_steel": "V",
 }
-#: Materials with a hardness in HV -> the range of ISO 6336-5, grade MQ; others are in HBW.
-VICKERS = {"V": (200.0, 390.0), "V_cast": (200.0, 360.0), "Eh": (660.0, 800.0), "IF": (500.0, 615.0)}
+#: Materials whose hardness is in HBW, ISO 6336-5:2016, Table 1; that of the others is in HV.
+BRINELL_SCALE = ("St", "St_cast", "GTS", "GGG", "GGG_ferritic", "GG")
+#: HBW of a hardness in HV (ISO 18265: HB = 0.95 HV).
+BRINELL = 0.95
 #: Surface hardness (HV) from which on steel without a type of heat treatment counts as case-hardened.
 CASE = 500.0
 SERIES = "tooth_thickness_deviation_tolerance_series_din_3967_1978"
@@ -94,8 +96,12 @@ def _gear(reading: Reading, tables: dict[str, Any], name: str) -> dict[str, Any]
     gear, key = reading.part("gears", name), f"rating.gears.{name}"
     entry: dict[str, Any] = {}
     material = tables["gears"][name].get("material")
+    # a material without an elastic modulus has no entry in [materials], but its strength counts
+    items = reading.parts(gear, "reference", "origin", "referenced", "material")
     if material is not None:
-        entry |= _material(reading, reading.part("materials", material), key)
+        items = [reading.part("materials", material)]
+    if items:
+        entry |= _material(reading, items[0], key)
     quality = reading.integer(gear, "global_tolerance_class_iso_1328_2013")
     if quality is not None:
         entry["quality"] = quality
@@ -106,6 +112,8 @@ def _gear(reading: Reading, tables: dict[str, Any], name: str) -> dict[str, Any]
         entry["flank_roughness_um"] = float(f"{6.0 * rough:.6g}")
         rule = "R_z = 6 R_a (ISO 6336-2)"
         reading.derived(gear, "arithmetic_mean_roughness_flank_iso_4287_1997", f"{key}.flank_roughness_um", rule)
+    elif rough is not None:
+        reading.ignored(gear, "arithmetic_mean_roughness_flank_iso_4287_1997", "must be positive")
     series = reading.text(gear, SERIES)
     if re.fullmatch(r"(a|ab|b|bc|c|cd|d|e|f|g|h)(2\d|30)", series) and series[-2:] != "20":
         entry["thickness_series"] = series
@@ -117,34 +125,35 @@ def _gear(reading: Reading, tables: dict[str, Any], name: str) -> dict[str, Any]
 
 
 def _material(reading: Reading, item: Component, key: str) -> dict[str, Any]:
-    """Material, hardness and yield strength of a gear."""
+    """Material, hardness and yield strength of a gear, as the file has them: the rating checks them."""
     entry: dict[str, Any] = {}
     hardness = reading.number(item, "surface_hardness_vickers", "HV")
-    names = [f"heat_treated_material_type_iso_6336_{year}" for year in (2019, 2006)]
-    source = next((name for name in names if reading.text(item, name) in HEAT_TREATED), "")
-    strength = reading.number(item, "yield_strength", "N / mm^2")
-    if source:
-        entry["material"] = HEAT_TREATED[reading.text(item, source)]
-        reading.note(READ, item, source, f"{key}.material")
-    elif hardness is not None:
+    for name in (f"heat_treated_material_type_iso_6336_{year}" for year in (2019, 2006)):
+        treated = reading.text(item, name)
+        if treated in HEAT_TREATED and not entry:
+            entry["material"] = HEAT_TREATED[treated]
+            reading.note(READ, item, name, f"{key}.material")
+        elif treated:
+            rule = f"{treated}: {entry['material']} is taken" if entry else f"{treated}: no material of ISO 6336-5"
+            reading.ignored(item, name, rule)
+    if not entry and hardness is not None and hardness > 0.0:
         entry["material"] = "Eh" if hardness >= CASE else "V"
         rule = f"case-hardened from {CASE:g} HV on, else through-hardened"
         reading.derived(item, "surface_hardness_vickers", f"{key}.material", rule)
-    low, high = VICKERS.get(entry.get("material", ""), (0.0, 0.0))
-    if hardness is not None and low <= hardness <= high:
-        entry["hardness"] = hardness
-        reading.note(READ, item, "surface_hardness_vickers", f"{key}.hardness")
-    elif hardness is not None:
-        rule = f"{hardness:g} HV is beyond the range of {entry.get('material')} in ISO 6336-5"
-        reading.ignored(item, "surface_hardness_vickers", rule)
-    if strength is not None and strength > 0.0 and entry:
-        entry["yield_strength_MPa"] = strength
-        reading.note(READ, item, "yield_strength", f"{key}.yield_strength_MPa")
-    # without these numbers a rating of the material stops; the default, case-hardened steel, needs neither
-    if entry.get("material") not in (None, "Eh") and not {"hardness", "yield_strength_MPa"} <= entry.keys():
-        rule = f"{entry['material']} needs a hardness in HV and a yield strength; case-hardened steel is taken"
-        reading.note(IGNORED, item, "material of a rating", "", rule)
-        return {}
+    values = {"hardness": (hardness, "surface_hardness_vickers")}
+    values["yield_strength_MPa"] = reading.number(item, "yield_strength", "N / mm^2"), "yield_strength"
+    for name, (value, attribute) in values.items():
+        if value is None:
+            continue
+        if not entry or not 0.0 < value < math.inf:
+            rule = "must be positive" if entry else "the type of heat treatment is missing"
+            reading.ignored(item, attribute, rule)
+        elif name == "hardness" and entry["material"] in BRINELL_SCALE:
+            entry[name] = float(f"{BRINELL * value:.6g}")
+            reading.derived(item, attribute, f"{key}.{name}", f"HBW = {BRINELL:g} HV (ISO 18265)")
+        else:
+            entry[name] = value
+            reading.note(READ, item, attribute, f"{key}.{name}")
     assert entry.get("material", "Eh") in MATERIALS
     return entry
 
