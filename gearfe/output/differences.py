@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -49,6 +49,8 @@ OF_HOUSING = ("mass_kg", "coordinates", "modes", "unknowns")
 OF_CURVES = ("law", "coarsen", "flank_coarsen", "points_per_edge", "plane")
 #: Safety factors of a rating.
 SAFETY = ("S_H", "S_F")
+#: Ends of the names of a rating's numbers.
+GEARS = " (gear 1)", " (gear 2)"
 #: Sources of error that are in a housing's body, and those in the curves.
 HOUSING, CURVE = ("mesh", "reduction"), ("curve",)
 
@@ -149,21 +151,32 @@ class Comparison:
     notes: tuple[str, ...]
 
     def columns(self) -> dict[str, list[Any]]:
-        """Columns of the table of differences."""
+        """Columns of the table of differences.
+
+        Raises
+        ------
+        InputError
+            For a run with the name of another column.
+        """
         names = [run.name for run in self.results]
-        table: dict[str, list[Any]] = {
-            "quantity": [row.name for row in self.rows],
-            "unit": [row.unit for row in self.rows],
-        }
+        columns: list[tuple[str, list[Any]]] = [
+            ("quantity", [row.name for row in self.rows]),
+            ("unit", [row.unit for row in self.rows]),
+        ]
         for i, name in enumerate(names):
-            table[name] = [row.values[i] for row in self.rows]
-            table[f"error of {name}"] = [row.errors[i] for row in self.rows]
+            columns.append((name, [row.values[i] for row in self.rows]))
+            columns.append((f"error of {name}", [row.errors[i] for row in self.rows]))
         for i, name in enumerate(names[1:]):
             head = f"{name} - {names[0]}"
-            table[head] = [row.differences[i] for row in self.rows]
-            table[f"{head}, relative"] = [_ratio(row.differences[i], row.values[0]) for row in self.rows]
-            table[f"error of {head}"] = [row.difference_errors[i] for row in self.rows]
-        return table
+            columns.append((head, [row.differences[i] for row in self.rows]))
+            columns.append((f"{head}, relative", [_ratio(row.differences[i], row.values[0]) for row in self.rows]))
+            columns.append((f"error of {head}", [row.difference_errors[i] for row in self.rows]))
+        heads = [head for head, _ in columns]
+        for head in heads:
+            if heads.count(head) > 1:
+                problem = f"give two columns of the table the head {head!r}"
+                raise InputError("names of the runs", ", ".join(names), problem, "give other names with --names")
+        return dict(columns)
 
 
 def _ratio(difference: float, value: float) -> float:
@@ -179,7 +192,7 @@ def compared(results: Sequence[Results]) -> Comparison:
     Raises
     ------
     InputError
-        For runs of different kinds, and for tables that hold a quantity in different units.
+        For runs of different kinds, or without a common quantity, and for tables that hold one in different units.
     """
     first = results[0]
     for other in results[1:]:
@@ -189,14 +202,22 @@ def compared(results: Sequence[Results]) -> Comparison:
     _check_units(results)
     read = NUMBERS[first.kind.name]
     numbers = [{number.name: number for number in read(run)} for run in results]
+    if read is _rating_numbers:
+        numbers = _of_both_gears(numbers)
     names = list(dict.fromkeys(name for found in numbers for name in found if name in numbers[0]))
     common = [_common(first, other) for other in results[1:]]
     rows = [_row(name, numbers, common) for name in names]
     left_out = sorted({name for found in numbers for name in found} - {row.name for row in rows})
+    compared_rows = tuple(row for row in rows if np.isfinite(row.values).sum() > 1)
+    panels = tuple(PANELS[first.kind.name](results))
+    if not compared_rows and not any(len({line.run for line in panel.lines}) > 1 for panel in panels):
+        inside = "; ".join(f"{run.name} has {_listed(found)}" for run, found in zip(results, numbers, strict=True))
+        problem = f"have no quantity in common: {inside}"
+        raise InputError("runs", ", ".join(run.name for run in results), problem, "compare runs of alike jobs")
     return Comparison(
         tuple(results),
-        tuple(row for row in rows if np.isfinite(row.values).sum() > 1),
-        tuple(PANELS[first.kind.name](results)),
+        compared_rows,
+        panels,
         tuple(_notes(results, common, [*left_out, *(row.name for row in rows if np.isfinite(row.values).sum() < 2)])),
     )
 
@@ -289,14 +310,23 @@ def _notes(results: Sequence[Results], common: Sequence[set[str]], left_out: Seq
                 f"{other.name} and {results[0].name} share no source of error: errors are added"
             )  # fmt: skip
     for run in results:
+        gears = _mapping(run.summary.get("gears"))
+        if results[0].kind.name == "rating" and {"gear_1", "gear_2"} <= gears.keys():
+            yield f"{run.name}: gear 1 is {gears['gear_1']}, gear 2 {gears['gear_2']}"
         if not run.summary:
             yield f"{run.name}: no {run.kind.summary} next to the table, so its numbers and their errors are missing"
         status = run.summary.get("status")
         if status not in (None, "done"):
             yield f"{run.name}: the run ended early ({status})"
     if left_out:
-        shown = ", ".join(left_out[:MOST]) + (f" and {len(left_out) - MOST} more" if len(left_out) > MOST else "")
-        yield f"not in all runs: {shown}"
+        yield f"not in all runs: {_listed(left_out)}"
+
+
+def _listed(names: Iterable[str]) -> str:
+    """The first names of several, and how many more there are."""
+    known = list(names)
+    more = f" and {len(known) - MOST} more" if len(known) > MOST else ""
+    return (", ".join(known[:MOST]) + more) or "none"
 
 
 # ---- numbers of each kind --------------------------------------------------------------------------------------------
@@ -512,18 +542,37 @@ def _runup_numbers(run: Results) -> list[Number]:
 
 def _rating_numbers(run: Results) -> list[Number]:
     """All values of a rating, safety factors first; they are formulas, without an error of a discretisation."""
-    table, gears = run.main, _mapping(run.summary.get("gears"))
+    table = run.main
     rows = zip(
         table["name"], table["unit"], table["meaning"], _texts(table["gear_1"]), _texts(table["gear_2"]), strict=True
     )
     found = []
     for key, unit, meaning, *values in rows:
-        alike = values[0] == values[1]
-        for gear, value in zip(("gear_1", "gear_2")[: 1 if alike else 2], values, strict=False):
-            name = "" if alike else f" ({gears.get(gear, gear.replace('_', ' '))})"
-            text = f"{key}, {meaning}{name}" if meaning else f"{key}{name}"
-            found.append(Number(text, "" if unit == "-" else str(unit), _number(value), {"formula": 0.0}))
+        text = f"{key}, {meaning}" if meaning else f"{key}"
+        for gear, value in zip(GEARS, values, strict=True):
+            found.append(Number(text + gear, "" if unit == "-" else str(unit), _number(value), {"formula": 0.0}))
     return sorted(found, key=lambda number: not number.name.startswith(SAFETY))
+
+
+def _of_both_gears(numbers: Sequence[Mapping[str, Number]]) -> list[dict[str, Number]]:
+    """Return the numbers of ratings, with one for both gears where these have the same value in every run."""
+    stems = {name.removesuffix(GEARS[0]) for run in numbers for name in run if name.endswith(GEARS[0])}
+    alike = {stem for stem in stems if all(_alike_values(*(run.get(stem + gear) for gear in GEARS)) for run in numbers)}
+    joined = []
+    for run in numbers:
+        found: dict[str, Number] = {}
+        for name, number in run.items():
+            stem = name.removesuffix(GEARS[0]).removesuffix(GEARS[1])
+            text = stem if stem in alike else name
+            found.setdefault(text, replace(number, name=text))
+        joined.append(found)
+    return joined
+
+
+def _alike_values(one: Number | None, two: Number | None) -> bool:
+    if one is None or two is None:
+        return one is two
+    return one.value == two.value or (math.isnan(one.value) and math.isnan(two.value))
 
 
 def _texts(values: Array) -> list[str]:

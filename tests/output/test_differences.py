@@ -172,9 +172,52 @@ def test_mistakes_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         ([one, one, one, one], "two or three"),
         ([one, one, "--names", "x", "x"], "must differ"),
         ([one, one, "--names", "x"], "must be 2 names"),
+        ([one, one, "--names", "unit", "x"], "two columns of the table the head 'unit'"),
+        ([one, one, "--names", "x", "quantity"], "the head 'quantity'"),
+        ([one, one, one, "--names", "a", "b", "b - a"], "the head 'b - a'"),
+        ([one, one, "--names", "a", "error of a"], "the head 'error of a'"),
     ):
         assert main(["compare", *map(str, paths), "--out", str(tmp_path / "out")]) == 2, part
         assert part in capsys.readouterr().err
     write_csv(tmp_path / "other.csv", {"x": [1.0], "y": [2.0]})
     with pytest.raises(InputError, match="is no main table"):
         read_results(tmp_path / "other.csv", "run 1")
+
+
+def test_runs_without_a_common_quantity_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two mechanisms with outputs of different names."""
+    for name, column in (("a", "crank_angle_rad"), ("b", "slider_force_N")):
+        (tmp_path / name).mkdir()
+        write_csv(tmp_path / name / "trajectory.csv", {"time_s": [0.0, 1.0], column: [1.0, 2.0]})
+    line = ["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--out", str(tmp_path / "out")]
+    assert main(line) == 2
+    message = capsys.readouterr().err
+    assert "no quantity in common" in message
+    assert "a has crank angle" in message
+    assert "b has slider force" in message
+    assert not (tmp_path / "out" / "compare.csv").exists()
+
+
+# ---- ratings ---------------------------------------------------------------------------------------------------------
+
+
+def rating(folder: Path, gears: tuple[str, str], safety: tuple[float, float]) -> Path:
+    """Folder of a rating with one number of each gear and one of the mesh."""
+    folder.mkdir()
+    columns = {
+        "group": ["flank", "influence"], "name": ["S_H", "K_v"], "gear_1": [safety[0], 1.1], "gear_2": [safety[1], 1.1],
+        "unit": ["-", "-"], "formula": ["ISO 6336-2", "ISO 6336-1"], "meaning": ["safety factor", "dynamic factor"],
+    }  # fmt: skip
+    write_csv(folder / "rating.csv", columns)
+    write_json(folder / "rating.json", {"gears": {"gear_1": gears[0], "gear_2": gears[1]}})
+    return folder
+
+
+def test_ratings_of_gears_with_other_names_or_equal_values_keep_their_safety_factors(tmp_path: Path) -> None:
+    one = rating(tmp_path / "a", ("pinion", "wheel"), (1.2, 1.3))
+    two = rating(tmp_path / "b", ("sun", "planet"), (1.5, 1.5))
+    rows = rows_of(one, two)
+    assert list(rows) == ["S_H, safety factor (gear 1)", "S_H, safety factor (gear 2)", "K_v, dynamic factor"]
+    assert [row.differences[0] for row in rows.values()] == pytest.approx([0.3, 0.2, 0.0])
+    notes = compared([read_results(path, "run") for path in (one, two)]).notes
+    assert "b: gear 1 is sun, gear 2 planet" in notes
