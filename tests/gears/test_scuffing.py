@@ -179,3 +179,32 @@ def test_tables_that_are_refused(keys: dict[str, Any], field: str) -> None:
     with pytest.raises(InputError) as caught:
         rate(helical_stage(), HELICAL | keys)
     assert caught.value.field == f"rating.{field}"
+
+
+def test_a_gear_without_relief_does_not_take_that_of_its_mate() -> None:
+    """Relief of one gear is that with 0 written for the other; the approach factor takes that of the driven gear."""
+
+    def heat(**reliefs: float) -> module.Scuffing:
+        gears = {name: {"tip_relief_um": value} for name, value in reliefs.items()}
+        rating = rate(spur_stage(), SPUR_OIL | {"gears": gears})
+        assert rating.driver == 0
+        assert rating.general.C_a_um == 0.0
+        assert rating.scuffing is not None
+        return rating.scuffing
+
+    none, driven, driver = heat(pinion=0.0, wheel=0.0), heat(wheel=20.0), heat(pinion=20.0)
+    assert driver.S_B == heat(pinion=20.0, wheel=0.0).S_B == none.S_B
+    assert driven.S_B == heat(pinion=0.0, wheel=20.0).S_B
+    entering = none.path.gamma < -0.01
+    approach = np.abs(none.path.gamma[entering]) ** 3 / 50.0
+    ratio = (1.0 + (none.C_eff_um - 20.0) * approach) / (1.0 + none.C_eff_um * approach)
+    loaded = none.path.share[entering] > 1e-6
+    assert (driven.path.flash / none.path.flash)[entering][loaded] == pytest.approx(ratio[loaded])
+    assert driven.path.share == pytest.approx(none.path.share)
+
+
+def test_flanks_that_friction_does_not_heat_are_infinitely_safe() -> None:
+    """A torque whose flash temperature is lost in rounding against that of the oil."""
+    heat = rate(spur_stage(), SPUR_OIL | {"torque_Nm": 1e-300}).scuffing
+    assert heat is not None
+    assert math.isinf(heat.S_B)

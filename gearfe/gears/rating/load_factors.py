@@ -300,9 +300,15 @@ def _blank(pair: PairData, strengths: tuple[Strength, Strength]) -> float:
 
 
 def _relief(strengths: tuple[Strength, Strength]) -> float:
-    """C_a (um): the smaller design relief of the gears that have one, else that of running-in, the mean of both."""
-    given = [s.C_a for s in strengths if s.C_a is not None]
-    return min(given) if given else 0.5 * sum(run_in_relief(s.sigma_H_lim) for s in strengths)
+    """C_a (um): the smaller design relief, 0 if one gear has none; without any that of running-in, the mean of both."""
+    designed = design_reliefs(strengths)
+    return 0.5 * sum(run_in_relief(s.sigma_H_lim) for s in strengths) if designed is None else min(designed)
+
+
+def design_reliefs(strengths: tuple[Strength, Strength]) -> tuple[float, float] | None:
+    """Design relief of both gears (um), 0 for a gear without one; None if neither has any."""
+    given = [s.C_a for s in strengths]
+    return None if given == [None, None] else (given[0] or 0.0, given[1] or 0.0)
 
 
 def speed_range(N: float | None, line_load: float) -> str:

@@ -15,10 +15,10 @@ are :math:`\Gamma`, the distance from the pitch point over that of the pitch poi
     S_B = \frac{\Theta_S - \Theta_{oil}}{\Theta_{B\,max} - \Theta_{oil}}.
 
 This is Blok's temperature of a Hertzian line contact [#]_. On the way in,
-:math:`X_J = 1 + (C_{eff} - C_a)/50\,|\Gamma|^3`. Load shares :math:`X_\Gamma` are those of the technical
-specification for profiles without relief: 1/3 to 2/3 where two pairs of a spur gear touch, :math:`1/\varepsilon_\alpha`
-for helical gears, with up to 1.3 times as much at both ends. With the relief :math:`C_{eff}` spur gears have 0 to 1 and
-helical ones no excess; between both the share is interpolated.
+:math:`X_J = 1 + (C_{eff} - C_a)/50\,|\Gamma|^3` with the relief of the driven gear. Load shares :math:`X_\Gamma` are
+those of the technical specification for profiles without relief: 1/3 to 2/3 where two pairs of a spur gear touch,
+:math:`1/\varepsilon_\alpha` for helical gears, with up to 1.3 times as much at both ends. With the relief
+:math:`C_{eff}` spur gears have 0 to 1 and helical ones no excess; between both the share is interpolated.
 
 **Integral temperature**: :math:`\Theta_{int} = \Theta_{MC} + 1.5\,\Theta_{fla\,int}`,
 :math:`\Theta_{MC} = \Theta_{oil} + 0.7 X_S X_{mp}\Theta_{fla\,int}`, with
@@ -45,7 +45,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...base.errors import InputError
 from .data import Oil, PairData, Strength
 from .ledger import cited
-from .load_factors import Influence
+from .load_factors import Influence, design_reliefs
 
 _FLASH = "ISO/TS 6336-20:2017"
 _INTEGRAL = "ISO/TS 6336-21:2017"
@@ -307,7 +307,9 @@ def scuffing(
     stiffness = general.c_gamma_alpha_N_per_mm_um if pair.beta else general.c_prime_N_per_mm_um
     C_eff = general.K_A * general.K_gamma * general.F_t_N / (pair.b * stiffness)
     relief = general.C_a_um / C_eff
-    designed = [s.C_a for s in strengths if s.C_a is not None]  # relief of running-in does not change load shares
+    designed = design_reliefs(strengths)
+    # relief of running-in does not change load shares; teeth come into contact with the tip of the driven gear
+    shared, entering_relief = (0.0, general.C_a_um) if designed is None else (min(designed), designed[1 - driver])
 
     # speeds of the working circle, m/s; radii of curvature of the normal section, mm
     v_t = general.v_m_per_s * math.cos(pair.alpha_t) / math.cos(pair.alpha_wt)
@@ -322,9 +324,9 @@ def scuffing(
         mu_m = mu_mC = oil.friction
 
     gamma = np.linspace(low, high, POINTS)
-    share = load_share(pair, gamma, min(designed, default=0.0) / C_eff, max(s.quality for s in strengths))
+    share = load_share(pair, gamma, shared / C_eff, max(s.quality for s in strengths))
     approach = np.maximum(0.0, gamma if driver else -gamma)
-    X_J = 1.0 + max(0.0, C_eff - general.C_a_um) / 50.0 * approach**3
+    X_J = 1.0 + max(0.0, C_eff - entering_relief) / 50.0 * approach**3
     flash = thermoelastic_factor(pair, E_r, B_M, gamma) * X_J * geometry_factor(pair, gamma)
     flash *= mu_m * (share * w) ** 0.75 * math.sqrt(v_t) / abs(pair.a) ** 0.25
     mean = float(np.mean(0.5 * (flash[1:] + flash[:-1])))
@@ -357,7 +359,7 @@ def scuffing(
             "theta_MC_C": theta_MC,
             "theta_int_C": theta_MC + 1.5 * heat,
             "theta_Sint_C": theta_Sint,
-            "S_intS": theta_Sint / (theta_MC + 1.5 * heat),
+            "S_intS": _safety(theta_Sint, theta_MC + 1.5 * heat),
         }
     return Scuffing(
         w_Bt_N_per_mm=w,
@@ -377,8 +379,13 @@ def scuffing(
         theta_B_C=float(contact[hottest]),
         Gamma_B_max=float(gamma[hottest]),
         theta_S_C=theta_S,
-        S_B=(theta_S - oil.temperature) / (float(contact[hottest]) - oil.temperature),
+        S_B=_safety(theta_S - oil.temperature, float(contact[hottest]) - oil.temperature),
         mu_mC=mu_mC,
         **{name: integral.get(name) for name in INTEGRAL},
         path=Path(gamma, share, flash, contact),
     )
+
+
+def _safety(allowed: float, value: float) -> float:
+    """Ratio of an allowed temperature to the one at work; infinite for flanks that are not heated above zero."""
+    return allowed / value if value > 0.0 else math.inf
