@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import math
 from dataclasses import fields, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -127,11 +129,9 @@ def _dynamic_factor(folder: str, train: TrainJob | None, mesh: NamedMesh, rating
     Raises
     ------
     InputError
-        For a file without [train], a folder without a run-up of it, and a speed beyond it.
+        For a file without [train], a folder without a run-up of it, a speed beyond it, and one without a stable motion.
     """
     import csv
-
-    import numpy as np
 
     from ..base.errors import InputError
     from ..drivetrain.gearbox.mesh_loads import drive_speed
@@ -141,21 +141,58 @@ def _dynamic_factor(folder: str, train: TrainJob | None, mesh: NamedMesh, rating
         raise InputError("--runup", folder, "is of a file with [train], which this one is not", "leave it out")
     path = Path(folder) / "runup.csv"
     number, speed = drive_speed(train, mesh.name, rating.load.speed)
+    column = f"dynamic_factor_{number}"
+    branches: dict[str, list[tuple[float, float, bool]]] = {}
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            lines = list(csv.DictReader(file))
-        points = sorted((abs(float(row["speed_rad_per_s"])), float(row[f"dynamic_factor_{number}"])) for row in lines)
+            for row in csv.DictReader(file):
+                # motions whose stability is undecided, or was not computed, count as stable
+                point = abs(float(row["speed_rad_per_s"])), float(row[column]), float(row.get("stable", 1.0)) != 0.0
+                branches.setdefault(row.get("branch", ""), []).append(point)
     except (OSError, KeyError, ValueError, TypeError):
-        problem = f"has no runup.csv with the columns speed_rad_per_s and dynamic_factor_{number}"
+        problem = f"has no runup.csv with the columns speed_rad_per_s and {column}"
         raise InputError("--runup", folder, problem, "write the folder of gearfe runup of this file") from None
-    speeds, factors = np.array(points).reshape(-1, 2).T
-    if not len(speeds) or not speeds[0] <= speed <= speeds[-1]:
-        reach = f"reaches from {speeds[0]:.4g} to {speeds[-1]:.4g} rad/s" if len(speeds) else "has no speeds"
+    speeds = [point[0] for points in branches.values() for point in points]
+    if not all(map(math.isfinite, speeds)):
+        raise InputError("--runup", folder, "has speeds that are not finite", "compute the run-up again")
+    # a speed in 1/min meets that of a motion only up to rounding
+    speed = next((at for at in speeds if math.isclose(at, speed, rel_tol=1e-9)), speed)
+    if not speeds or not min(speeds) <= speed <= max(speeds):
+        reach = f"reaches from {min(speeds):.4g} to {max(speeds):.4g} rad/s" if speeds else "has no speeds"
         problem = f"{reach}, and the drive turns at {speed:.4g} rad/s in this rating"
         raise InputError("--runup", folder, problem, "compute more speeds ([runup])")
-    factor = float(np.interp(speed, speeds, factors))
+    motions = [motion for points in branches.values() for motion in _motions_at(sorted(points), speed)]
+    factors = [factor for factor, stable in motions if stable]
+    if not factors:
+        problem = f"has no stable motion at {speed:.4g} rad/s of the drive"
+        raise InputError("--runup", folder, problem, "rate at another speed, or leave out --runup")
+    if not all(map(math.isfinite, factors)):
+        problem = f"has a {column} that is not finite next to {speed:.4g} rad/s of the drive"
+        raise InputError("--runup", folder, problem, "rate at another speed, or leave out --runup")
     meaning = f"dynamic factor; computed: of the run-up at {speed:.4g} rad/s of the drive"
-    return Compared(DYNAMIC, "-", rating.general.K_v, factor, meaning)
+    return Compared(DYNAMIC, "-", rating.general.K_v, max(factors), meaning)
+
+
+def _motions_at(points: list[tuple[float, float, bool]], speed: float) -> list[tuple[float, bool]]:
+    """Dynamic factors of one branch at a speed, and whether each motion can be stable.
+
+    Between two speeds the factor is interpolated; the motion can be stable if that at either end is.
+
+    Parameters
+    ----------
+    points
+        Speed (rad/s), dynamic factor and stability of the branch's motions, by speed.
+    speed
+        Of the drive (rad/s).
+    """
+    exact = [(factor, stable) for at, factor, stable in points if at == speed]
+    if exact:
+        return exact
+    return [
+        (low[1] + (high[1] - low[1]) * (speed - low[0]) / (high[0] - low[0]), low[2] or high[2])
+        for low, high in pairwise(points)
+        if low[0] < speed < high[0]
+    ]
 
 
 def _with_computed(table: RatingTable, mesh: NamedMesh, rows: list[Compared]) -> RatingTable:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -218,6 +219,42 @@ def test_dynamic_factor_of_a_run_up(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "has no runup.csv" in capsys.readouterr().err
     assert main(["rating", str(FZG), "--with-computed", "--out", str(tmp_path / "out"), "--no-pictures"]) == 2
     assert "alike along the face width" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        # a resonance that bends over: branch 1 between two turning points is unstable
+        (["100,0,1,1.2", "118,0,1,3.0", "118,1,0,9.0", "104,1,0,5.0", "104,2,1,1.4", "120,2,1,1.0"], 2.2),
+        (
+            ["100,0,1,1.2", "105,0,1,1.3", "105,1,0,9.0", "102,1,0,5.0", "102,2,1,1.4", "120,2,1,1.0"],
+            1.4 - 0.4 * 8 / 18,
+        ),
+        (["100,0,nan,1.2", "120,0,nan,1.6"], 1.4),
+        (["100,0,0,1.2", "110,0,1,1.3", "120,0,0,1.6"], 1.3),
+        (["100,0,0,1.2", "120,0,0,1.6"], "no stable motion at 110 rad/s"),
+        (["100,0,1,1.2", "110,0,0,1.6", "120,0,1,1.2"], "no stable motion at 110 rad/s"),
+        (["100,0,1,nan", "120,0,1,1.6"], "dynamic_factor_1 that is not finite"),
+        (["nan,0,1,1.0", "100,0,1,1.0", "120,0,1,1.6"], "speeds that are not finite"),
+    ],
+)
+def test_dynamic_factor_of_a_run_up_with_several_motions(
+    rows: list[str], expected: float | str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The largest stable one, interpolated within its branch, at 110 rad/s."""
+    job = tmp_path / "box.toml"
+    job.write_text(job_file("gearbox"))
+    (tmp_path / "runup.csv").write_text("\n".join(["speed_rad_per_s,branch,stable,dynamic_factor_1", *rows]) + "\n")
+    line = ["rating", str(job), "--set", f"rating.speed_rpm={110.0 * 30.0 / math.pi!r}", "--set", "rating.torque_Nm=50"]
+    line += ["--mesh", "first", "--runup", str(tmp_path), "--out", str(tmp_path / "out"), "--no-pictures"]
+    code = main(line)
+    if isinstance(expected, str):
+        assert code == 2
+        assert expected in capsys.readouterr().err
+        return
+    (path,) = (tmp_path / "out").rglob("rating.json")
+    (row,) = json.loads(path.read_text())["computed"]
+    assert row["computed"] == pytest.approx(expected)
 
 
 def test_computed_values_of_a_torque_out_of_range(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
