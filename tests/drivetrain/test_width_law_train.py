@@ -10,14 +10,17 @@ import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
-from gearfe.drivetrain.gearbox.job import job_train, read_train_job
-from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
+from gearfe.base.tables.jobs import train_tables
+from gearfe.drivetrain.gearbox.job import TrainJob, job_train, read_train_job, train_job
+from gearfe.drivetrain.gearbox.mesh_stiffness import rounded_up, train_curves, usual_tilt
 from gearfe.drivetrain.runup.condensed import condense
 from gearfe.drivetrain.runup.run_up import steady_state
 from gearfe.drivetrain.train import GearTrain, build_train, simulate
 from gearfe.drivetrain.train.forces import WidthFlank
+from gearfe.drivetrain.train.misalignment import TiltingTrain
 from gearfe.drivetrain.train.states import train_states
 from gearfe.drivetrain.train.statics import static_errors
+from gearfe.gears.gearmesh import width_law_store
 from gearfe.gears.gearmesh.job import StiffnessJob
 from gearfe.gears.gearmesh.width_job import job_lines
 from gearfe.gears.gearmesh.width_law import WidthLaw
@@ -25,6 +28,7 @@ from gearfe.gears.geometry.pair import gear_pair
 from gearfe.gears.width import sweep_width
 from gearfe.multibody import constant, integrate
 from tests.drivetrain.test_mesh_tilting import bearing_forces, settled
+from tests.drivetrain.test_planetary_job import SHIPPED, tables
 from tests.drivetrain.test_width_spring import text
 from tests.makers.files import job_file
 from tests.makers.helical_trains import HIGH, LOW, helical_pair
@@ -177,3 +181,81 @@ def test_keys_of_laws_need_one(tmp_path: Path) -> None:
     job = read_train_job(job_file(tmp_path, alike.replace("positions = 24\n", "")))
     with pytest.raises(InputError, match="is for loads that vary along the face width"):
         train_curves(job)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_law_has_the_tilt_of_its_force_whatever_the_load_in_the_end(sense: float) -> None:
+    """A mesh that carries its force by torques on its gears tilts as under the steady torque that makes this force."""
+
+    def still(torque: float) -> TiltingTrain:
+        return TiltingTrain(build_train(helical_pair(sense=sense, torque=torque, stiffness=2e8, moments=True)), 0)
+
+    loaded, light, idle = still(60.0), still(1e-3), still(0.0)
+    force = abs(float(loaded.model.kinematics.steady_forces[0]))
+    np.testing.assert_allclose(idle.at(1.0, np.zeros(2), force).tilts, loaded.at(1.0, np.zeros(2)).tilts, rtol=1e-6)
+    tilt = usual_tilt(loaded, 0.0, 0.02)
+    assert tilt * 0.02 > 1e-7
+    assert [usual_tilt(train, force, 0.02) for train in (light, idle)] == pytest.approx([tilt, tilt], rel=1e-2)
+    assert usual_tilt(idle, 0.0, 0.02) > 0.0  # gears that can tilt have a law with a stiffness against it
+    hinges = build_train(helical_pair(torque=60.0, stiffness=2e8, moments=True, on_bearings=False))
+    assert usual_tilt(TiltingTrain(hinges, 0), force, 0.02) == 0.0
+
+
+def test_a_law_without_tilts_flags_them() -> None:
+    law = sliced_law(cells=(24, 12, 0))
+    tilts = np.array([0.0, 0.5e-8, 2e-8, -2e-8]) / law.width
+    np.testing.assert_array_equal(law.past(np.full(4, 1e-6), tilts), [False, False, True, True])
+    assert not law.past(np.full(4, -1e-6), tilts).any()  # apart
+
+
+def test_forces_that_differ_by_round_off_are_rounded_up_alike() -> None:
+    for force in (1500.0, 8613.1, 0.02):
+        assert len({rounded_up(force * (1.0 + i * 1e-12)) for i in range(-3, 4)}) == 1
+        assert force * (1.0 - 1e-9) <= rounded_up(force) <= 1.01 * force
+
+
+def helical_stage(**changes: object) -> TrainJob:
+    """The shipped planetary stage with helical gears and a law between sun and planets, springs at the ring."""
+    helix = {f"gears__{gear}__helix_angle_deg": 12.0 for gear in ("sun", "planet", "ring")}
+    helix |= {"shafts__planet__x_mm": 79.74257, "meshes__sun_planet__stiffness_N_per_m": None}  # type: ignore[dict-item]
+    given = {**helix, "gears__sun__helix_hand": "right", "meshes__sun_planet__mesh_model": "potential", **changes}
+    raw = tables(**given)
+    raw.pop("stiffness", None)
+    return train_job(SHIPPED, train_tables(raw, SHIPPED))
+
+
+def test_equal_planets_share_the_law_of_the_largest_range(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[float, float]] = []
+
+    def recorded(_: StiffnessJob, force: float, tilt: float) -> WidthLaw:
+        asked.append((force, tilt))
+        return sliced_law()
+
+    monkeypatch.setattr(width_law_store, "cached_width_law", recorded)
+    found = train_curves(helical_stage())
+    assert len(asked) == 1
+    assert found[0] is found[1] is found[2]
+    assert asked[0][1] > 0.0
+
+
+RING = {"meshes__planet_ring__stiffness_N_per_m": None, "meshes__planet_ring__mesh_model": "potential"}
+PITCHES = {"gears__planet__microgeometry__pitch_um": [1.0, -1.0] * 11}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (RING, "is an internal gear, whose load .* give the mesh stiffness_N_per_m, mesh_table or curve"),
+        ({"meshes__sun_planet__friction": 0.05}, "leave it out, or .*helix_angle_deg"),
+        (PITCHES, "has pitch errors, and .*helix_angle_deg"),
+    ],
+)
+def test_what_laws_over_the_width_refuse_is_refused_before_the_first(
+    changes: dict[str, object], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_: object) -> WidthLaw:
+        raise AssertionError("a law was computed before all meshes were checked")
+
+    monkeypatch.setattr(width_law_store, "cached_width_law", never)
+    with pytest.raises(InputError, match=message):
+        train_curves(helical_stage(**changes))

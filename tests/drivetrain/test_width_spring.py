@@ -171,7 +171,7 @@ REFUSED = [
     (text().replace("torque_Nm = 75.0", "torque_Nm = 0.0"), "carries no torque, so its stiffness along the face"),
     (text().replace("torque_Nm = 75.0", "torque_Nm = 7e5"), "must be <="),
     (text().replace("coarsen = 2.0", 'plane = "stress"'), "stiffness.plane = 'stress': is for loads alike along"),
-    (text() + UNEVEN, "its teeth stand unevenly"),
+    (text() + UNEVEN, "has pitch errors, and pair.misalignment_um makes the load vary"),
     (text().replace("damping_N_s", "backlash_um = 40.0\ndamping_N_s") + SIDES, "left and right flanks differ"),
     (text().replace("positions = 24", 'load = "stiffness"'), "no load: neither twist_deg nor torque_Nm is given"),
 ]

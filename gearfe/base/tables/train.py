@@ -311,7 +311,8 @@ class TrainMeshTable:
         above=0.0,
         high=500.0,
         doc="largest tilt of the gears in the plane of action, over the common face width (um), that the potential of "
-        "loads that vary along it is made for; left out: twice what shafts and bearings yield under the steady torques",
+        "loads that vary along it is made for; left out: twice what shafts and bearings yield under "
+        "mesh_model_torque_Nm, at least the steady torque",
     )
     backlash_um: float | None = quantity(
         None,

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...base.cache import cache_key
 from ...base.errors import InputError
 from ...base.progress import stage
 from ...base.tables.gearbox import NamedGear, NamedMesh
@@ -21,8 +22,8 @@ from ...gears.gearmesh.job import StiffnessJob, cached_curve
 from ...gears.gearmesh.law import MeshLaw
 from ...gears.gearmesh.law_store import cached_law
 from ...gears.gearmesh.mesh_table import MeshTable, read_mesh_table
-from ...gears.gearmesh.width_law import WidthLaw
-from ...gears.geometry.deviation_job import deviations_of
+from ...gears.gearmesh.width_law import LEAST_TILT, WidthLaw
+from ...gears.geometry.deviation_job import deviations_of, pitch_errors_of
 from ...gears.geometry.face import NOMINAL, ToothDeviations
 from ...gears.geometry.pair import GearPair, gear_pair
 from ..train.gear_train import GearMesh, GearTrain
@@ -30,12 +31,15 @@ from .job import Stiffness, TrainJob, back_flanks, job_train
 
 if TYPE_CHECKING:
     from ...gears.contact.laws import ContactLaw
+    from ..train.misalignment import TiltingTrain
 
 #: A mesh law is made for so many times the torque in steady running: vibration has room.
 ROOM = 5.0
-#: Tilt for which a law over the face width is made, in those that the steady torque makes, and that it makes with a
-#: moment of the force on a sixth of the width; least one that counts (m over the width).
-TILT_ROOM, LEAST_TILT = 2.0, 1e-8
+#: Tilt for which a law over the face width is made, in those that its force without room makes, and that it makes with
+#: a moment of the force on a sixth of the width; the largest (m over the width), as of mesh_model_tilt_um.
+TILT_ROOM, MOST_TILT = 2.0, 500e-6
+#: Compliance against tilting, times stiffness of the mesh and square of the width, that is round-off.
+RIGID = 1e-9
 #: Positions at which the error of a law's stiffness is estimated.
 ESTIMATED = 8
 #: Positions of a curve at the carried torque.
@@ -62,6 +66,7 @@ def train_curves(
         problem = f"{len(files)} files for {len(meshes)} meshes"
         raise InputError("curve", [str(f) for f in files], problem, "give one for all, or one a mesh")
     train = job_train(job)
+    wide = {} if files else _wide(job, train)
     found: list[Stiffness] = []
     tables = [mesh.where for mesh in job.gearbox.meshes.values()]
     for number, (mesh, made) in enumerate(zip(meshes, train.meshes, strict=True)):
@@ -80,8 +85,8 @@ def train_curves(
         elif mesh.curve is not None:
             with _key_in_messages(f"{tables[number]}.curve", mesh.curve):
                 found.append(_read_curve(job.path.parent / mesh.curve, teeth))
-        elif law_over_width(job, number):
-            found.append(_computed_width_law(job, train, number))
+        elif number in wide:
+            found.append(wide[number])
         elif job.table.model_of(mesh) == POTENTIAL:
             found.append(_computed_law(job, train, number, estimate))
         elif _driving(job, train, number).along_width(places=False) is not None:
@@ -91,6 +96,19 @@ def train_curves(
             constant = job.table.model_of(mesh) == MEAN
             found.append(curve.interpolant("k_mesh", method="cubic").mean if constant else curve)
     return tuple(found)
+
+
+def _wide(job: TrainJob, train: GearTrain) -> dict[int, WidthLaw]:
+    """Laws over the face width of the meshes that have one, by number; meshes with springs are checked before them."""
+    laws = []
+    for number, mesh in enumerate(job.table.meshes):
+        if mesh.rigid or (mesh.stiffness_N_per_m, mesh.mesh_table, mesh.curve) != (None, None, None):
+            continue
+        if law_over_width(job, number):
+            laws.append(number)
+        elif job.table.model_of(mesh) != POTENTIAL and _driving(job, train, number).along_width(places=False):
+            _check_wide(job, train, number)
+    return _wide_laws(job, train, laws)
 
 
 def compute_meshes(train: GearTrain) -> GearTrain:
@@ -223,48 +241,152 @@ def law_over_width(job: TrainJob, number: int) -> bool:
     return varies
 
 
-def _computed_width_law(job: TrainJob, train: GearTrain, number: int) -> WidthLaw:
-    """Law over the face width of a mesh with the driver as pinion; of its back flanks where they are others."""
+@dataclass(frozen=True)
+class _WideLaw:
+    """What the law over the face width of a mesh needs: jobs of driving and back flanks, and its range.
+
+    Attributes
+    ----------
+    number
+        Of the mesh.
+    driving, back
+        Gears with their driving and back flanks; back is None where these mirror the driving ones or never bear.
+    key
+        Hash of both: equal ones have the same law.
+    most, usual
+        Largest force of the law, and the force that the train's parts yield to in its tilt (N).
+    """
+
+    number: int
+    driving: StiffnessJob
+    back: StiffnessJob | None
+    key: str
+    most: float
+    usual: float
+
+
+def _wide_laws(job: TrainJob, train: GearTrain, numbers: Sequence[int]) -> dict[int, WidthLaw]:
+    """Laws over the face width of meshes by number; equal gears and flanks share the one of the widest range."""
+    from ...gears.gearmesh.width_law_store import cached_width_law  # teeth in three dimensions, for these meshes
+
+    plans = [_wide_law(job, train, number) for number in numbers]  # all are checked before the first is computed
+    laws: dict[str, WidthLaw] = {}
+    for plan in plans:
+        if plan.key in laws:
+            continue
+        alike = [other for other in plans if other.key == plan.key]
+        force = rounded_up(max(other.most for other in alike))
+        tilt = max(_tilt(job, other) for other in alike)
+        with stage(train.meshes[plan.number].name):
+            law = cached_width_law(plan.driving, force, tilt)
+            if plan.back is not None:
+                law = replace(law, back=cached_width_law(plan.back, force, 0.0))
+        laws[plan.key] = law
+    return {plan.number: laws[plan.key] for plan in plans}
+
+
+def _wide_law(job: TrainJob, train: GearTrain, number: int) -> _WideLaw:
+    """What a mesh's law over the face width needs, with the driver as pinion.
+
+    Raises
+    ------
+    InputError
+        For gears, flanks, friction and loads that such a law does not take.
+    """
     from ...gears.gearmesh.width_job import wide_mesh  # teeth in three dimensions, for these meshes
-    from ...gears.gearmesh.width_law_store import cached_width_law
+    from ...gears.gearmesh.width_law_store import width_law_parts
 
     mesh, table = train.meshes[number], job.table.meshes[number]
     pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
+    _check_wide(job, train, number)
     driving, back = (
         StiffnessJob(replace(job.meshes[number], flank=flank), pair, job.path.parent)
         for flank in _flanks(train, number)
     )
-    most = table.mesh_model_torque_Nm or ROOM * carried_torque(train, number)
+    carried = carried_torque(train, number)
+    most = table.mesh_model_torque_Nm or ROOM * carried
     label = f"mesh {mesh.name!r} mesh_model_torque_Nm"
     if not most > 0.0:
         problem = "carries no torque in steady running, so the range of its mesh law is unknown"
         raise InputError(label, None, problem, "give mesh_model_torque_Nm")
-    wide = wide_mesh(driving)
     try:
-        wide.check_torque(most, label)
+        wide_mesh(driving).check_torque(most, label)
     except InputError as error:
         problem = f"is the largest of its law ({ROOM:g} times the steady one where none is given): {error.problem}"
         raise InputError(label, float(f"{most:.6g}"), problem, "give a smaller load, or mesh_model_torque_Nm") from None
-    if table.mesh_model_tilt_um is None:
-        tilt = _usual_tilt(job, number, wide.width)
-    else:
-        tilt = 1e-6 * table.mesh_model_tilt_um / wide.width
-    with stage(mesh.name):
-        law = cached_width_law(driving, most / pair.wheel.base_radius, tilt)
-        if back_flanks(job, train, number) and _flanks_differ(driving.mesh):
-            law = replace(law, back=cached_width_law(back, most / pair.wheel.base_radius, 0.0))
-    return law
+    others = back_flanks(job, train, number) and _flanks_differ(driving.mesh)
+    parts = [width_law_parts(flanks) for flanks in ((driving, back) if others else (driving,))]
+    usual = max(carried, table.mesh_model_torque_Nm or 0.0)
+    radius = pair.wheel.base_radius
+    key = cache_key("wide-law", parts)
+    return _WideLaw(number, driving, back if others else None, key, most / radius, usual / radius)
 
 
-def _usual_tilt(job: TrainJob, number: int, width: float) -> float:
-    """Tilt (rad) that a mesh of a common width (m) needs in its law: by shafts, bearings and housing."""
+def _check_wide(job: TrainJob, train: GearTrain, number: int) -> None:
+    """Raise `InputError` for what a law or spring over the face width does not take, with what a train can do."""
+    named, table = job.meshes[number], job.table.meshes[number]
+    cause, _ = named.along_width(("left", "right"), places=False) or ("", None)
+    gear = train.gear(train.meshes[number].driven).gear
+    if gear.internal:
+        problem = (
+            f"is an internal gear, whose load {cause} makes vary along the face width: only external ones have that"
+        )
+        cure = "give the mesh stiffness_N_per_m, mesh_table or curve"
+        raise InputError(f"{named.driven.where}.teeth", -abs(gear.teeth), problem, cure)
+    if table.friction or table.roughness_um:
+        key = "friction" if table.friction else "roughness_um"
+        problem = f"needs forces of single tooth pairs, and {cause} makes the load vary along the face width"
+        cure = f"leave it out, or {cause}"
+        raise InputError(f"mesh {named.name!r} {key}", getattr(table, key), problem, cure)
+    for side in named.gears:
+        if any(pitch_errors_of(side, train.gear(side.name).gear, job.path.parent)):
+            problem = (
+                f"has pitch errors, and {cause} makes the load vary along the face width, for which teeth are alike"
+            )
+            cure = f"leave them out, or {cause}"
+            raise InputError(side.microgeometry_where or side.where, None, problem, cure)
+
+
+def rounded_up(value: float) -> float:
+    """A positive number with three digits, at least as large up to round-off: forces that differ by it become alike."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return float(f"{math.ceil(float(f'{value / step:.6g}')) * step:.3g}")
+
+
+def _tilt(job: TrainJob, plan: _WideLaw) -> float:
+    """Largest tilt (rad) of a law: of the file, or that which shafts, bearings and housing need at the usual force."""
+    from ...gears.gearmesh.width_job import wide_mesh
     from .springs_train import tilting_train
 
-    statics = tilting_train(job, number)
-    force = float(abs(statics.model.kinematics.steady_forces[number]))
-    at = statics.at(1.0, np.zeros(2))
-    tilt = TILT_ROOM * (abs(float(at.tilts[0])) + float(at.compliance[0, 0]) * force * width / 6.0)
-    return float(f"{tilt:.3g}") if tilt * width > LEAST_TILT else 0.0
+    width = wide_mesh(plan.driving).width
+    given = job.table.meshes[plan.number].mesh_model_tilt_um
+    if given is not None:
+        return 1e-6 * given / width
+    statics = tilting_train(job, plan.number)
+    return usual_tilt(statics, plan.usual, width)
+
+
+def usual_tilt(statics: TiltingTrain, force: float, width: float) -> float:
+    """Return the tilt (rad) for which the law of a mesh is made; 0: its gears cannot tilt.
+
+    Parameters
+    ----------
+    statics : TiltingTrain
+        The train at rest.
+    force : float
+        Of the mesh, without sign (N); at least the steady one counts.
+    width : float
+        Common face width (m).
+    """
+    line = statics.model.meshes[statics.number]
+    steady = float(statics.model.kinematics.steady_forces[statics.number])
+    force = max(force, abs(steady))
+    at = statics.at(1.0, np.zeros(2), math.copysign(force - abs(steady), steady))
+    compliance = float(at.compliance[0, 0])
+    if not compliance * line.mean * width**2 > RIGID:
+        return 0.0
+    tilt = TILT_ROOM * (abs(float(at.tilts[0])) + compliance * force * width / 6.0)
+    return float(f"{min(max(tilt, LEAST_TILT / width), MOST_TILT / width):.3g}")
 
 
 def _driving(job: TrainJob, train: GearTrain, number: int) -> NamedMesh:

@@ -186,8 +186,33 @@ class TiltingTrain:
             between += sign * placed.whole(shaft, turns)
         return np.stack([np.cross(train.frame[2], n) @ between, n @ between])
 
-    def at(self, factor: float, moments: Array) -> Tilts:
-        """Tilts under `factor` times the steady torques and moments (N m) in the plane of action and across it.
+    @cached_property
+    def torques(self) -> Array:
+        """Torques on both gears of the mesh against which it carries one newton, on coordinates of the system, (size,).
+
+        Torques further along the train differ from these by what other meshes carry.
+        """
+        model, placed = self.model, self.model.placed
+        line = model.meshes[self.number]
+        torques = np.zeros(placed.size)
+        for name in (line.given.driver, line.given.driven):
+            gear = model.train.gear(name)
+            shaft = model.train.shaft_number(gear.shaft)
+            turn = placed.whole(shaft, placed.bodies[shaft].turn_rows(gear.along)[2])
+            torques += math.copysign(gear.gear.base_radius, float(line.row @ turn)) * turn
+        return torques
+
+    def at(self, factor: float, moments: Array, force: float = 0.0) -> Tilts:
+        """Return the tilts under `factor` times the steady torques and moments on the mesh.
+
+        Parameters
+        ----------
+        factor : float
+            Of the steady torques.
+        moments : ndarray, shape (2,)
+            In the plane of action and across it (N m).
+        force : float
+            What the mesh carries besides (N), by torques on its own two gears.
 
         Raises
         ------
@@ -196,13 +221,13 @@ class TiltingTrain:
         """
         model, operating = self.model, self.model.operating
         T, stiffness = model.modal.T, self._stiffness
-        force = factor * _steady_push(model) + _thrown(model) - self.rows.T @ moments
+        push = factor * _steady_push(model) + _thrown(model) + force * self.torques - self.rows.T @ moments
         if operating.bearings:
-            point = operating_point(operating.geometry, self._motions, stiffness, T, force)
+            point = operating_point(operating.geometry, self._motions, stiffness, T, push)
             q = point.coordinates
             for name, state in point.bearings.items():
                 stiffness = stiffness + self._motions[name].T @ state.stiffness @ self._motions[name]
-        solved = _solved(T.T @ stiffness @ T, T.T @ np.column_stack([force, self.rows.T]))
+        solved = _solved(T.T @ stiffness @ T, T.T @ np.column_stack([push, self.rows.T]))
         if solved is None:
             problem = "moves freely under the steady torques, so nothing says how far they tilt its gears"
             raise InputError("train", None, problem, "hold every shaft by bearings, and drive the train")

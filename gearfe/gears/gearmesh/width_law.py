@@ -41,6 +41,8 @@ from .load_search import Response, newton_twist, search_load
 NEARLY, ROUNDING, EVALUATIONS = 1e-10, 1e-15, 60
 #: Phases at which means over the mesh cycle are taken.
 PHASES = 72
+#: Tilt over the width (m) beyond which a law that was made for none is not known.
+LEAST_TILT = 1e-8
 #: Coefficients of a cell: powers of x, of the tilt, and of the phase.
 POWERS = 6, 4, 4
 
@@ -222,10 +224,9 @@ class WidthLaw:
 
     def past(self, overlap: Array, tilt: Array) -> BoolArray:
         """Whether x (m) or tilt (rad) are farther than the law is known, shape (n,)."""
-        past = overlap > self.reach
-        if len(self.tilts) > 1:
-            past = past | ((overlap > 0.0) & ((tilt < self.tilts[0]) | (tilt > self.tilts[-1])))
-        return np.asarray(past)
+        least = LEAST_TILT / self.width if len(self.tilts) == 1 else 0.0
+        tilted = (tilt < self.tilts[0] - least) | (tilt > self.tilts[-1] + least)
+        return np.asarray((overlap > self.reach) | ((overlap > 0.0) & tilted))
 
     def most(self, angles: ArrayLike, tilts: ArrayLike = 0.0) -> Array:
         """Mesh force (N) up to which the law is known at pinion angles (n,) and tilts (rad)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +31,21 @@ def width_law_of(arrays: Mapping[str, Array]) -> WidthLaw:
     return WidthLaw(nodes, overlaps, tilts, touch, energies, (pinion, wheel), *numbers)
 
 
+def width_law_parts(job: StiffnessJob) -> dict[str, Any]:
+    """Return all that decides the law of a mesh besides its range: equal parts have equal laws.
+
+    Raises
+    ------
+    InputError
+        For keys of [stiffness] that a load along the width does not take, and teeth that differ.
+    """
+    check_width_job(job)
+    mesh = wide_mesh(job)
+    flanks = wide_flanks(job, mesh)
+    check_alike(flanks.profiles)
+    return {"mesh": mesh, "flanks": flanks, "sense": axial_sense(job)}
+
+
 def cached_width_law(job: StiffnessJob, force: float, tilt: float) -> WidthLaw:
     """Return the law of a mesh over its face width, from disk where it was made before.
 
@@ -47,10 +63,8 @@ def cached_width_law(job: StiffnessJob, force: float, tilt: float) -> WidthLaw:
     InputError
         For keys of [stiffness] that a load along the width does not take, teeth that differ, and loads out of range.
     """
-    check_width_job(job)
-    mesh = wide_mesh(job)
-    flanks = wide_flanks(job, mesh)
-    check_alike(flanks.profiles)
+    recipe = width_law_parts(job)
+    mesh, flanks = recipe["mesh"], recipe["flanks"]
 
     def make() -> dict[str, Array]:
         from ..width import contact_lines, wide_compliance
@@ -60,5 +74,4 @@ def cached_width_law(job: StiffnessJob, force: float, tilt: float) -> WidthLaw:
         return width_law_arrays(width_law(lines, force, tilt, sense=axial_sense(job)))
 
     code = [source_hash("gears/width", *PACKAGES), versions()]
-    recipe = {"mesh": mesh, "flanks": flanks, "force": force, "tilt": tilt, "sense": axial_sense(job), "code": code}
-    return width_law_of(cached_arrays("width-law", recipe, make))
+    return width_law_of(cached_arrays("width-law", {**recipe, "force": force, "tilt": tilt, "code": code}, make))
