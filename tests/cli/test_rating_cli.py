@@ -285,3 +285,41 @@ def test_computed_values_where_the_larger_gear_drives(tmp_path: Path) -> None:
     assert rows["pressure at D"]["computed"] > rows["pressure at B"]["computed"]
     assert rows["root stress wheel"]["standard"] == pytest.approx(187.88, abs=0.01)
     assert rows["root stress wheel"]["computed"] == pytest.approx(170.0, abs=1.0)
+
+
+def test_a_mesh_that_the_train_does_not_have(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The message names the meshes of [train], instead of asking for a table that is there."""
+    job = tmp_path / "train.toml"
+    job.write_text((GEOMETRY / "gear_train.toml").read_text() + "\n[rating]\ntorque_Nm = 10.0\n")
+    line = ["rating", str(job), "--out", str(tmp_path / "out"), "--no-pictures"]
+    assert main(line) == 2
+    message = capsys.readouterr().err
+    assert "rating.meshes.pinion-wheel.speed_rpm" in message
+    assert "[train], which has gear_1-gear_2, gear_3-gear_4" in message
+    assert "or a table [train]" not in message
+    assert main([*line, "--speed-rpm", "900"]) == 0
+
+
+def test_thickness_of_a_single_gear_replaces_that_of_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Allowances of a gear and a series of all gears, and the other way round; only one table can contradict itself."""
+
+    job = tmp_path / "job.toml"
+    job.write_text(FZG.read_text().replace("thickness_allowances_um = [-60.0, -90.0]\n", ""))
+
+    def thickness(*changes: str) -> tuple[int, list[list[float] | None]]:
+        line = ["rating", str(job), "--out", str(tmp_path), "--no-pictures"]
+        code = main([*line, *(word for change in changes for word in ("--set", f"rating.{change}"))])
+        if code:
+            return code, []
+        measures = json.loads((tmp_path / "rating.json").read_text())["measures"]
+        return code, [measures[name].get("span_limits_mm") for name in ("pinion", "wheel")]
+
+    series, allowances = "thickness_series=cd25", "thickness_allowances_um=[-60,-90]"
+    both_series, both_allowances = thickness(series)[1], thickness(allowances)[1]
+    assert both_series != both_allowances
+    assert thickness(series, f"gears.wheel.{allowances}") == (0, [both_series[0], both_allowances[1]])
+    assert thickness(allowances, f"gears.wheel.{series}") == (0, [both_allowances[0], both_series[1]])
+    capsys.readouterr()
+    for where in ("", "gears.wheel."):
+        assert thickness(where + series, where + allowances)[0] == 2
+        assert "cannot be given together with thickness_allowances_um" in capsys.readouterr().err

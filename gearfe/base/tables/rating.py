@@ -229,6 +229,10 @@ class RatingTable(MeshRatingTable, GearRatingTable):
         return _merged(self, self.meshes, name, known, MeshRatingTable, "meshes")
 
 
+#: Keys that say the same in two ways: one of a single gear replaces both of all gears.
+ALTERNATIVES = ("thickness_allowances_um", "thickness_series")
+
+
 def _merged(
     table: RatingTable, own: Mapping[str, Any], name: str, known: Mapping[str, Any], kind: Any, where: str
 ) -> Any:
@@ -236,5 +240,7 @@ def _merged(
         if other not in known:
             raise unknown_name(f"rating.{where}", other, known)
     keys = [field.name for field in fields(kind)]
-    chosen = {key: getattr(own[name], key) for key in keys} if name in own else {}
-    return kind(**{key: chosen.get(key) if chosen.get(key) is not None else getattr(table, key) for key in keys})
+    given = {key: getattr(own[name], key) for key in keys} if name in own else {}
+    chosen = {key: value for key, value in given.items() if value is not None}
+    replaced = set(ALTERNATIVES) if set(ALTERNATIVES) & chosen.keys() else set()  # of all gears
+    return kind(**{key: chosen.get(key, None if key in replaced else getattr(table, key)) for key in keys})

@@ -123,11 +123,16 @@ def with_train(table: RatingTable, job: TrainJob, mesh: str, gears: tuple[str, s
     Raises
     ------
     InputError
-        For mistakes in the train.
+        For mistakes in the train, and a mesh without a speed that the train does not have.
     """
     loads = mesh_loads(job.rigid_train)
     load = loads.get(mesh) or loads.get(f"{mesh}_1")
     if load is None:
+        keys = table.of_mesh(mesh, {mesh: None, **table.meshes})
+        if keys.speed_rpm is None and not keys.spectrum:
+            problem = f"is required: the mesh {mesh} is not in [train], which has {', '.join(loads)}"
+            cure = f"add the speed of the driver (1/min) to [rating.meshes.{mesh}], or add the mesh to [train]"
+            raise InputError(f"rating.meshes.{mesh}.speed_rpm", None, problem, cure)
         return table
     changed = dict(table.gears)
     for name, mates, both, fixed in zip(gears, load.mates, load.both_flanks, load.fixed, strict=True):
