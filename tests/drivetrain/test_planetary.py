@@ -13,7 +13,8 @@ from gearfe.base.errors import InputError
 from gearfe.drivetrain.modes.orders import train_orders
 from gearfe.drivetrain.modes.whirl import WhirlModes, train_modes
 from gearfe.drivetrain.runup.condensed import condense
-from gearfe.drivetrain.runup.run_up import steady_state
+from gearfe.drivetrain.runup.report import far_shafts, warnings
+from gearfe.drivetrain.runup.run_up import run_up, steady_state
 from gearfe.drivetrain.train import Damping, Drive, GearMesh, Guide, TrainResponse, build_train, simulate
 from gearfe.drivetrain.train.misalignment import static_state
 from gearfe.drivetrain.train.planetary import mesh_families
@@ -226,6 +227,27 @@ def test_planets_move_outwards_by_their_centrifugal_force_over_the_stiffness_of_
             outwards = moved @ np.array([math.cos(angle), 0.0, -math.sin(angle)])
             assert outwards == pytest.approx(push * arm / (pin - push), rel=1e-4)  # the meshes have 1e-5 of it
             assert outwards == pytest.approx(push * arm / pin, rel=2.0 * push / pin)
+
+
+def test_a_run_up_names_shafts_that_move_by_more_than_a_quarter_of_a_module() -> None:
+    """The first planet, at angle 0, moves by m W^2 r/(k - m W^2) along x alone: 0.24 and 0.26 modules."""
+    mass, arm, pin = LIN_PARKER["planet"][0], 33 * MODULE, 1e8
+    train = stage(mesh=1e3, pin=pin, loads=())
+    ratio = abs(float(build_train(train).kinematics.ratios[2]))
+
+    def speed(modules: float) -> float:
+        push = pin * modules * MODULE / (arm + modules * MODULE)
+        return math.sqrt(push / mass) / ratio
+
+    speeds = [speed(0.24), speed(0.26)]
+    model = build_train(dataclasses.replace(train, drive=Drive("sun", "sun", constant(speeds[0]))))
+    run = run_up(model, speeds, stability=False)
+    moved = [state.displacement[3] / MODULE for state in run.states]
+    np.testing.assert_allclose(moved, [0.24, 0.26], rtol=1e-3)
+    said = [sentence for sentence in far_shafts(run) if sentence.startswith(f"shaft {train.shafts[3].name} moves")]
+    assert len(said) == 1
+    assert f"at 1 of 2 states, the first at {speeds[1]:.6g} rad/s" in said[0]
+    assert said[0] in warnings(run)
 
 
 @pytest.mark.parametrize("gyroscopic", [True, False])

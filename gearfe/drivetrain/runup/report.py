@@ -12,6 +12,7 @@ from ...gears.rating.dynamics import dynamic_factor
 from ..modes.report import mode_entries
 from ..modes.report import tables as mode_tables
 from ..train.response import XYZ
+from ..train.simulate import DIVERGED
 from . import torus
 from .columns import dynamic_factors
 from .critical import CriticalSpeeds, peaks_of
@@ -188,6 +189,7 @@ def warnings(run: RunUp) -> list[str]:
             f"at {len(beyond)} of {len(run.states)} states, the first at {beyond[0]:.6g} rad/s, a mesh goes beyond "
             "what its law is known for: write a larger mesh_model_torque_Nm, or mesh_model_tilt_um, in [[train.meshes]]"
         )
+    found += far_shafts(run)
     held = {s.speed for s in run.states if s.stable is not False}
     lost = sorted({s.speed for s in run.states} & set(run.speeds.tolist()) - held, key=abs)
     if lost:
@@ -208,4 +210,22 @@ def warnings(run: RunUp) -> list[str]:
             f"{len(late)} of {len(run.states)} states miss the tolerance, the worst with {worst.error:.2g} at "
             f"{worst.speed:.6g} rad/s: their motion has more harmonics than the program takes"
         )
+    return found
+
+
+def far_shafts(run: RunUp) -> list[str]:
+    """Sentences about shafts that move farther than transients may: the gears' geometry no longer holds there."""
+    model = run.train.model
+    limit = DIVERGED * min(line.module for line in model.meshes)
+    found = []
+    for number, shaft in enumerate(model.train.shafts):
+        far = [(float(s.displacement[number]), s.speed) for s in run.states if not s.displacement[number] <= limit]
+        if far:
+            most, speed = max(far)
+            found.append(
+                f"shaft {shaft.name} moves by more than {DIVERGED:g} module ({1e3 * limit:.3g} mm) at {len(far)} of "
+                f"{len(run.states)} states, the first at {far[0][1]:.6g} rad/s, by up to {1e3 * most:.3g} mm at "
+                f"{speed:.6g} rad/s: the gears' geometry no longer holds there; lower speed or load, or stiffen "
+                "bearings and pins"
+            )
     return found

@@ -54,6 +54,8 @@ class SteadyState:
         Share of the time without contact.
     beyond
         Whether a mesh goes beyond what its law is known for.
+    displacement : (shafts,)
+        Largest displacement of each shaft along an axis (m), its mean included, of planets against their carrier.
     acceleration : (K + 1, bores)
         Complex amplitudes along the shafts at the attachments (m/s2).
     bearing : (K + 1, bores, 6)
@@ -81,6 +83,7 @@ class SteadyState:
     transmission_error: Array
     apart: Array
     beyond: bool
+    displacement: Array
     acceleration: ComplexArray
     bearing: ComplexArray
     power: Array | None
@@ -152,6 +155,8 @@ def steady_result(
             force[:, i] += line.damping * du[:, along]
     modal = system.linear.modal(omega, orbit.speed, orbit.forces)
     acceleration = -(omega**2)[:, None] * real_times(modal, train.bores_of_modes.T)
+    coordinates = model.modal.origin + real_times(lattice.synthesis(modal), model.modal.T.T)
+    displacement = np.abs(model.displacements(coordinates)).max(axis=(0, 2), initial=0.0)
     power = None
     if train.radiation_of_modes is not None:
         square = (modal.conj() * real_times(modal, train.radiation_of_modes)).sum(axis=1).real
@@ -163,7 +168,7 @@ def steady_result(
     return SteadyState(
         orbit.speed, branch, orbit, period, waves,
         torus.numbers(system.periods, count), omega / (2.0 * math.pi), omega / abs(orbit.speed), lattice, force,
-        approach, apart, beyond, acceleration, bearing, power, second * window(system).turns, multipliers,
+        approach, apart, beyond, displacement, acceleration, bearing, power, second * window(system).turns, multipliers,
     )  # fmt: skip
 
 
