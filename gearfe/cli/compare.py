@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
 from .arguments import add_json, add_pictures, print_results
 
@@ -36,13 +37,15 @@ def run(args: argparse.Namespace) -> int:
     from ..base.files import output_folder, whole_set, write_csv, write_json
     from ..base.progress import stage
     from ..output.differences import compared, comparison_lines
-    from ..output.results import read_results, short_names
+    from ..output.results import KINDS, read_all, short_names
 
     names = args.names or short_names(args.runs)
-    results = [
-        read_results(path, f"run {i}", name) for i, (path, name) in enumerate(zip(args.runs, names, strict=True), 1)
-    ]
+    every = [read_all(path, f"run {i}", name) for i, (path, name) in enumerate(zip(args.runs, names, strict=True), 1)]
+    kinds = [kind for kind in KINDS if all(any(one.kind is kind for one in run) for run in every)]
+    results = [next((one for one in run if one.kind in kinds[:1]), run[0]) for run in every]
+    others = [f"{one.name}: {one.path.name} is left out" for run in every for one in run if one not in results]
     made = compared(results)
+    made = replace(made, notes=(*made.notes, *others))
     folder = output_folder(args.out)
     with whole_set(folder, FILES) as target:
         table = made.columns()

@@ -283,14 +283,16 @@ def _keep(folder: Path, names: list[str], parsed: argparse.Namespace, said: str,
             from ..base.config import read_toml
             from ..output.report_page import PICTURES, Run
             from ..output.report_sheets import date_of, run_of
-            from ..output.results import kind_of, read_results
+            from ..output.results import KINDS, read_results
             from .arguments import job_of
             from .reporting import heading_of, write_report
 
             job, command = job_of(parsed), shlex.join(["gearfe", *line])
             raw = {} if job is None else read_toml(job)
-            if kind_of(folder) is not None:
-                run = run_of(read_results(folder, "--out"), command=command, said=said)
+            # the folder may hold results of other commands
+            table = next((kind.table for kind in KINDS if kind.table in names), None)
+            if table is not None:
+                run = run_of(read_results(folder / table, "--out"), command=command, said=said)
             else:
                 pictures = [folder / name for name in names if Path(name).suffix in PICTURES]
                 run = Run(

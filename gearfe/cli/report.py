@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     from ..base.files import output_folder, whole_set
     from ..base.progress import stage
     from ..output.report_sheets import PICTURES_OF_RUN, PICTURES_OF_SEVERAL, date_of, run_of
-    from ..output.results import KINDS, kind_of, read_results
+    from ..output.results import KINDS, kinds_of, read_all
     from .reporting import heading_of, write_report
 
     raw, job = read_toml(args.job), Path(args.job)
@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     folders = [
         path
         for path in (place, *sorted(place.glob("*")), *sorted(place.glob("*/*")))
-        if path.is_dir() and kind_of(path)
+        if path.is_dir() and kinds_of(path)
     ]
     if not folders:
         known = ", ".join(kind.name for kind in KINDS)
@@ -45,8 +45,9 @@ def run(args: argparse.Namespace) -> int:
             "--results", str(place), f"holds no results of {known}", f"run gearfe stiffness {job.name} first"
         )
     found = [
-        read_results(folder, "--results", "/".join(folder.relative_to(place).parts) or folder.name)
+        results
         for folder in folders
+        for results in read_all(folder, "--results", "/".join(folder.relative_to(place).parts) or folder.name)
     ]
     found.sort(
         key=lambda results: (
@@ -54,17 +55,25 @@ def run(args: argparse.Namespace) -> int:
         )
     )
     newest = max((results.path for results in found), key=lambda path: path.stat().st_mtime)
-    old = [results.name for results in found if results.path.stat().st_mtime < job.stat().st_mtime]
-    titles = {
-        results.name: f"{results.kind.title[:1].upper()}{results.kind.title[1:]} ({results.name})" for results in found
-    }
+    old = dict.fromkeys(results.name for results in found if results.path.stat().st_mtime < job.stat().st_mtime)
     most = PICTURES_OF_RUN if len(found) == 1 else PICTURES_OF_SEVERAL
-    runs = [run_of(results, title=titles[results.name], most=most) for results in found]
+    runs, drawn = [], set()
+    for results in found:
+        title = f"{results.kind.title[:1].upper()}{results.kind.title[1:]} ({results.name})"
+        place_of = results.path.parent
+        alike = sum(other.path.parent == place_of for other in found)
+        # the pictures of a folder with several kinds of results are in the first of them
+        runs.append(run_of(results, title=title, most=0 if place_of in drawn else alike * most))
+        drawn.add(place_of)
     folder = output_folder(args.out or place)
     with whole_set(folder, (REPORT,)) as made, stage("report"):
         heading = heading_of(args, raw, job.stem, date_of(newest))
         write_report(made, heading, runs, raw, str(job))
-    lines = [f"{len(found)} runs: {', '.join(results.name for results in found)}"]
+    names = [results.name for results in found]
+    shown = [
+        f"{results.name} ({results.kind.name})" if names.count(results.name) > 1 else results.name for results in found
+    ]
+    lines = [f"{len(found)} runs: {', '.join(shown)}"]
     warnings = [f"{name} is older than the last change of {job.name}: run it again" for name in old]
     print_results(lines, folder, [REPORT], {}, warnings)
     return 0

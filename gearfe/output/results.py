@@ -87,13 +87,20 @@ class Results:
         return read_csv(path) if self.summary and path.exists() else {}
 
 
-def kind_of(folder: Path) -> Kind | None:
-    """Kind of the results that a folder holds."""
-    return next((kind for kind in KINDS if (folder / kind.table).is_file()), None)
+def kinds_of(folder: Path) -> tuple[Kind, ...]:
+    """Kinds of the results that a folder holds."""
+    return tuple(kind for kind in KINDS if (folder / kind.table).is_file())
 
 
 def read_results(path: str | Path, field: str, name: str = "") -> Results:
-    """Read the results of a folder, or of one of its files.
+    """Read the results of a folder, the first kind of several, or of one of its files; see `read_all`."""
+    return read_all(path, field, name)[0]
+
+
+def read_all(path: str | Path, field: str, name: str = "") -> tuple[Results, ...]:
+    """Read the results of a folder, one for each kind that it holds, or of one of its files.
+
+    Of kinds whose summaries have one name the newest table has the summary.
 
     Parameters
     ----------
@@ -113,23 +120,41 @@ def read_results(path: str | Path, field: str, name: str = "") -> Results:
     if not place.exists():
         raise InputError(field, str(path), "does not exist", "name a folder that a command wrote")
     name = name or (place.resolve().name if place.is_dir() else place.stem)
+    summary = ""
     if place.suffix == ".json" and place.is_file():
-        place = place.parent
+        place, summary = place.parent, place.name
     if place.is_dir():
-        kind = kind_of(place)
-        if kind is None:
+        kinds = kinds_of(place)
+        if not kinds:
             inside = sorted({found.parent.name for k in KINDS for found in place.glob(f"*/{k.table}")})
             cure = f"name one of its folders: {', '.join(inside)}" if inside else f"name a folder of: {_KNOWN}"
             raise InputError(field, str(path), "holds no results that can be compared", cure)
-        return Results(kind, name, place / kind.table, _summary(place / kind.summary, field))
-    return _of_table(place, field, name)
+        newest = {kind.summary: _newest(place, kind.summary) for kind in kinds}
+        every = tuple(
+            Results(
+                kind,
+                name,
+                place / kind.table,
+                _summary(place / kind.summary, field) if kind is newest[kind.summary] else {},
+            )
+            for kind in kinds
+        )
+        return tuple(results for results in every if results.kind is newest.get(summary)) or every
+    return (_of_table(place, field, name),)
+
+
+def _newest(folder: Path, summary: str) -> Kind:
+    """Kind with the newest table in a folder, among those whose summary has a name."""
+    kinds = [kind for kind in kinds_of(folder) if kind.summary == summary]
+    return max(kinds, key=lambda kind: (folder / kind.table).stat().st_mtime)
 
 
 def _of_table(path: Path, field: str, name: str) -> Results:
     """Results of a main table, with the summary of its folder where it has the name that a command gives it."""
     known = next((kind for kind in KINDS if kind.table == path.name), None)
     if known is not None:
-        return Results(known, name, path, _summary(path.with_name(known.summary), field))
+        of_it = _newest(path.parent, known.summary) is known
+        return Results(known, name, path, _summary(path.with_name(known.summary), field) if of_it else {})
     columns = read_csv(path)
     for kind in KINDS:
         if all(any(column.startswith(needed) for column in columns) for needed in kind.needed):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from gearfe.base.errors import InputError
 from gearfe.base.files import write_csv, write_json
 from gearfe.cli.main import main
 from gearfe.output.differences import Number, Row, compared, difference_error
-from gearfe.output.results import read_results, short_names
+from gearfe.output.results import read_all, read_results, short_names
 from tests.makers import gears
 
 
@@ -221,3 +222,26 @@ def test_ratings_of_gears_with_other_names_or_equal_values_keep_their_safety_fac
     assert [row.differences[0] for row in rows.values()] == pytest.approx([0.3, 0.2, 0.0])
     notes = compared([read_results(path, "run") for path in (one, two)]).notes
     assert "b: gear 1 is sun, gear 2 planet" in notes
+
+
+def test_a_folder_with_several_kinds_is_compared_in_the_kind_that_all_have(tmp_path: Path) -> None:
+    """A rating next to a vibration, against a rating alone; what is left out is named."""
+    one = response(tmp_path / "a", 900, 100.0, [[2.0], [-1.0]])
+    inside = rating(tmp_path / "of a", ("pinion", "wheel"), (1.2, 1.3))
+    for path in inside.iterdir():
+        path.rename(one / path.name)
+    two = rating(tmp_path / "b", ("pinion", "wheel"), (1.5, 1.6))
+    line = ["compare", str(one), str(two), "--out", str(tmp_path / "out"), "--no-pictures"]
+    assert main(line) == 0
+    made = json.loads((tmp_path / "out" / "compare.json").read_text(encoding="utf-8"))
+    assert {run["kind"] for run in made["runs"]} == {"rating"}
+    assert "a: response.csv is left out" in made["notes"]
+
+
+def test_a_summary_belongs_to_the_newest_of_several_tables(tmp_path: Path) -> None:
+    """A vibration and a mechanism both have a summary.json."""
+    folder = response(tmp_path / "a", 900, 100.0, [[2.0], [-1.0]])
+    write_csv(folder / "trajectory.csv", {"time_s": [0.0, 1.0], "x_m": [1.0, 2.0]})
+    os.utime(folder / "trajectory.csv", (1e9, 1e9))
+    summaries = {one.kind.name: bool(one.summary) for one in read_all(folder, "run")}
+    assert summaries == {"vibration": True, "mechanism": False}

@@ -132,6 +132,20 @@ def test_a_report_of_all_results_of_a_job(tmp_path: Path, capsys: pytest.Capture
     assert "script" not in page.tags
 
 
+def test_a_report_of_a_folder_with_several_kinds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A load map and a run-up in one folder are both in the page."""
+    path = job(tmp_path)
+    out = tmp_path / "results"
+    out.mkdir()
+    write_csv(out / "runup.csv", {"speed_rad_per_s": [100.0, 200.0], "branch": [0, 0], "dynamic_factor_1": [1.0, 2.0]})
+    write_csv(out / "loadmap.csv", {"torque_Nm": [50.0, 80.0], "pinion_angle_deg": [0.0, 0.0]})
+    assert main(["report", str(path), "--results", str(out)]) == 0
+    assert "2 runs: results (loadmap), results (runup)" in capsys.readouterr().out
+    page = page_of(out / "report.html")
+    assert "Load map (results)" in page.printed
+    assert "Run-up (results)" in page.printed
+
+
 def test_mistakes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = job(tmp_path)
     assert main(["report", str(path), "--results", str(tmp_path)]) == 2
