@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from .errors import InputError, nearest, unknown_key
 from .files import read_text
-from .other_units import in_known_units, partner
+from .other_units import as_written, in_known_units, partner
 from .suspects import LARGEST, other_unit
 
 T = TypeVar("T")
@@ -195,7 +195,7 @@ def _built(cls: type[T], table: Any, where: str) -> T:
         table = {kind.SHORT: table}
     if not isinstance(table, dict):
         raise InputError(where, table, "must be a table of keys and values", f"write [{where}] and its keys below it")
-    table = in_known_units(table, fields, where)
+    given, table = table, in_known_units(table, fields, where)
     hints = type_hints(kind)
     # what chooses among kinds first: a wrong kind brings keys of its own
     for name, spec in fields.items():
@@ -211,7 +211,12 @@ def _built(cls: type[T], table: Any, where: str) -> T:
     for name, spec in fields.items():
         label = _joined(where, name)
         if name in table:
-            values[name] = _convert(hints[name], table[name], label, spec.metadata)
+            try:
+                values[name] = _convert(hints[name], table[name], label, spec.metadata)
+            except InputError as error:
+                if name in given:
+                    raise
+                raise as_written(error, label, _joined(where, partner(name)), given[partner(name)]) from None
         elif spec.default is MISSING and spec.default_factory is MISSING:
             doc = spec.metadata.get("doc", "")
             raise InputError(label, None, "is required", f"add {_written(hints[name], label)} ({doc})")

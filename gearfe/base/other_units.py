@@ -56,6 +56,24 @@ def in_known_units(table: Mapping[str, Any], known: Iterable[str], where: str) -
     return found
 
 
+def as_written(error: InputError, known: str, written: str, value: Any) -> InputError:
+    """Return the error of a speed under the name, and with the value, that the user wrote in the other unit.
+
+    Parameters
+    ----------
+    error : InputError
+        The error of the known name.
+    known, written : str
+        Both names.
+    value : Any
+        What was written.
+    """
+    numbers = all(isinstance(item, (int, float)) and not isinstance(item, bool) for item in (value, error.value))
+    reason = f"{error.problem} ({known} = {error.value:.6g})" if numbers else error.problem
+    inner = error.field.removeprefix(known) if error.field.startswith(known) else ""
+    return InputError(written + inner, error.value if inner else value, reason, error.cure)
+
+
 def _times(factor: float, value: Any, label: str) -> Any:
     """A number, a list of numbers, an expression, or a function of time, times a factor."""
     if isinstance(value, bool):

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..base.config import JobFile, check_range, fields_of, type_hints
 from ..base.errors import InputError, MissingLibraryError, nearest, unknown_name
-from ..base.other_units import RADIANS, RPM, partner
+from ..base.other_units import RADIANS, RPM, as_written, partner
 from ..base.tables.report import ReportTable
 
 if TYPE_CHECKING:
@@ -179,21 +179,35 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
         if other := partner(name):
             place = parser.add_mutually_exclusive_group() if isinstance(parser, argparse.ArgumentParser) else parser
             place.add_argument(_option(name), **options)
-            unit, convert = ("1/min", _from_rpm) if name.endswith(RADIANS) else ("rad/s", _to_rpm)
+            unit, factor = ("1/min", RPM) if name.endswith(RADIANS) else ("rad/s", 1.0 / RPM)
             help_ = f"the same in {unit}, instead of {_option(name)}"
-            place.add_argument(_option(other), dest=name, type=convert, metavar="X", help=help_)
+            place.add_argument(
+                _option(other), dest=name, type=_converter(_option(other), factor), metavar="X", help=help_
+            )
             continue
         parser.add_argument(_option(name), **options)
 
 
-def _from_rpm(text: str) -> float:
-    """A speed in 1/min as rad/s."""
-    return RPM * float(text)
+class _Converted(float):
+    """A speed in the unit of a key, with the option and the number that were written in the other unit."""
+
+    option = ""
+    written = 0.0
 
 
-def _to_rpm(text: str) -> float:
-    """A speed in rad/s as 1/min."""
-    return float(text) / RPM
+def _converter(option: str, factor: float) -> Callable[[str], float]:
+    """Return the type of an option whose numbers times a factor are those of a key."""
+
+    def convert(text: str) -> float:
+        try:
+            written = float(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} must be a number") from None
+        value = _Converted(factor * written)
+        value.option, value.written = option, written
+        return value
+
+    return convert
 
 
 def _default_of(field: Any) -> str:
@@ -341,6 +355,11 @@ def completed(parsed: argparse.Namespace) -> argparse.Namespace:
             setattr(parsed, dest, JobFile(value, parsed.changes))
     if getattr(parsed, "folder_of", None) and parsed.out is None:
         parsed.out = str(Path("out") / Path(str(job_of(parsed))).stem / parsed.folder_of)
+    if not getattr(parsed, "report", True):
+        for dest in HEADING:
+            if getattr(parsed, dest, None) is not None:
+                problem = "has no effect without --report"
+                raise InputError(_option(dest), getattr(parsed, dest), problem, "add --report, or leave it out")
     parsed.format = _formats(getattr(parsed, "format", "csv"))
     return parsed
 
@@ -379,8 +398,13 @@ def with_keys(args: argparse.Namespace, table: Table, *keys: str, **renamed: str
     for name, key in ({k: k for k in keys} | renamed).items():
         value = getattr(args, name)
         if value is not None:
-            check_option(_option(name), value, type(table), key)
-            changes[key] = value
+            try:
+                check_option(_option(name), value, type(table), key)
+            except InputError as error:
+                if not isinstance(value, _Converted):
+                    raise
+                raise as_written(error, _option(name), value.option, value.written) from None
+            changes[key] = float(value) if isinstance(value, _Converted) else value
     return replace(table, **changes)
 
 

@@ -16,6 +16,7 @@ from gearfe.base.tables.train import TrainDriveTable
 from gearfe.cli.arguments import command_module, parser_of
 from gearfe.cli.main import main
 from tests.makers.job_texts import SMALL_TRAIN
+from tests.places import GEOMETRY
 
 RPM = 2.0 * math.pi / 60.0
 
@@ -87,3 +88,34 @@ def test_set_and_options(tmp_path: Path) -> None:
     assert main([*line, "--set", f"train.drive.speed_rpm={600.0 / RPM!r}"]) == 0
     first = (out / "response.csv").read_text(encoding="utf-8").splitlines()[1]
     assert first.split(",")[3] == "600"  # the speed of the drive, as in the file in rad/s
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"speed_rad_per_s": -5.0}, ["rating.speed_rad_per_s = -5.0:", "(rating.speed_rpm = -47.7465)"]),
+        ({"speed_rad_per_s": True}, ["rating.speed_rad_per_s = True: must be a number"]),
+        ({"speed_rad_per_s": "fast"}, ["rating.speed_rad_per_s = 'fast': must be a number"]),
+    ],
+)
+def test_errors_name_the_key_that_was_written(keys: dict[str, object], words: list[str]) -> None:
+    with pytest.raises(InputError) as caught:
+        build(RatingTable, {"torque_Nm": 1.0, **keys}, "rating")
+    for part in words:
+        assert part in str(caught.value)
+
+
+def test_a_truth_value_is_no_speed_in_revolutions() -> None:
+    with pytest.raises(InputError) as caught:
+        drive(speed_rpm=True)
+    assert str(caught.value).startswith("train.drive.speed_rpm = True")
+
+
+def test_errors_name_the_option_that_was_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = ["rating", str(GEOMETRY / "fzg_c.toml"), "--out", str(tmp_path / "out"), "--no-pictures"]
+    assert main([*line, "--speed-rad-per-s", "abc"]) == 2
+    assert "--speed-rad-per-s: 'abc' must be a number" in capsys.readouterr().err
+    assert main([*line, "--speed-rad-per-s", "-5"]) == 2
+    message = capsys.readouterr().err
+    assert "--speed-rad-per-s = -5" in message
+    assert "(--speed-rpm = -47.7465)" in message

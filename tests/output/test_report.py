@@ -146,6 +146,13 @@ def test_a_report_of_a_folder_with_several_kinds(tmp_path: Path, capsys: pytest.
     assert "Run-up (results)" in page.printed
 
 
+@pytest.mark.parametrize("option", ["--author", "--remark", "--report-title", "--report-date"])
+def test_a_heading_without_a_report(option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = ["rating", str(GEOMETRY / "fzg_c.toml"), "--out", str(tmp_path / "out"), "--no-pictures"]
+    assert main([*line, option, "2026-01-02"]) == 2
+    assert f"{option} = '2026-01-02': has no effect without --report" in capsys.readouterr().err
+
+
 def test_mistakes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = job(tmp_path)
     assert main(["report", str(path), "--results", str(tmp_path)]) == 2
