@@ -185,7 +185,10 @@ def report_lines(response: TrainResponse, train: GearTrain, written: Written, ch
     lines += bearing_lines(summary.get("bearings", {}))
     if response.common_period_s:
         count = summary.get("mean_over_common_periods", 0)
-        means = f"over the last {count} of them" if count else "over all times under load, which are fewer"
+        short = (
+            "over what the run has after the ramp, at least its last step: it is shorter than the ramp and one period"
+        )
+        means = f"over the last {count} of them" if count else short
         lines.append(f"common period of the meshes {1e3 * response.common_period_s:.4g} ms; means are {means}")
     frequencies = enumerate(response.coupled_frequencies_Hz[:10])
     shown = ", ".join(f"{f:.0f}{_error(summary, 'coupled_frequencies_Hz', i)}" for i, f in frequencies)

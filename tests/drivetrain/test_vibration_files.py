@@ -11,6 +11,7 @@ import pytest
 
 from gearfe.base.errors import InputError, NotFiniteWarning
 from gearfe.base.progress import Stopwatch
+from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.fields import frames, gear_surface, moved, solids, write_gears, write_housing
 from gearfe.drivetrain.gearbox.stability import Stability
 from gearfe.drivetrain.housing.attachments import Attachment
@@ -25,6 +26,7 @@ from gearfe.figures.train_scene import draw_scene, sharp_edges
 from gearfe.multibody import constant
 from tests.makers.gears import pair
 from tests.makers.housing_meshes import box
+from tests.makers.job_texts import BARE_TRAIN, BORES
 from tests.makers.train_responses import COLUMNS, COUNT, STEP, made_up, table, tone
 from tests.places import GEOMETRY
 
@@ -153,6 +155,15 @@ def test_a_mean_without_a_period():
     mean.add(time, (time**2)[:, None])
     assert mean.periods == 2
     assert mean.value == pytest.approx([(1 - 0.2**3) / 3 / 0.8], rel=1e-12)
+
+
+def test_a_run_that_ends_within_the_ramp_has_the_mean_of_its_last_step():
+    """No whole period, never a negative number of them, and a mean all the same."""
+    time = np.linspace(0.0, 1.0, 201)
+    mean = RunningMean(time, 1.5, 0.4)
+    mean.add(time, time[:, None])
+    assert mean.periods == 0
+    assert mean.value == pytest.approx([1.0 - 0.5 * 0.005], rel=1e-9)
 
 
 def test_the_radiated_power_of_one_coordinate(tmp_path, train):
@@ -347,3 +358,18 @@ def test_sharp_edges_of_a_tent():
     assert len(sharp_edges(points, np.array([[0, 1, 2], [0, 3, 1]]))) == 5
     flat = np.array([[0, 0, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0.0]])
     assert len(sharp_edges(flat, np.array([[0, 1, 2], [0, 3, 1]]))) == 4
+
+
+def test_a_run_within_the_ramp_says_so(tmp_path, capsys):
+    """Never means over -1 periods."""
+    job = tmp_path / "job.toml"
+    job.write_text(
+        (BARE_TRAIN + BORES)
+        .replace("duration_ms = 2.0", "duration_ms = 0.4")
+        .replace("centre_ms = 0.5", "centre_ms = 5.0")
+    )
+    assert main(["vibration", str(job), "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
+    said = capsys.readouterr().out
+    assert "it is shorter than the ramp and one period" in said
+    assert "over the last" not in said
+    assert "nan" not in said

@@ -54,7 +54,7 @@ def stage_entries(model: TrainModel, mean_forces: Sequence[float] | None = None)
         entries["mean_load_shares"] = [
             {names[i]: len(family.meshes) * float(mean_forces[i]) / total for i in family.meshes}
             for family in families
-            if (total := sum(float(mean_forces[i]) for i in family.meshes))
+            if (total := sum(float(mean_forces[i]) for i in family.meshes)) and math.isfinite(total)
         ]
     return {"planetary": entries}
 

@@ -199,7 +199,7 @@ class RunningMean:
     """Mean over the last whole periods after `begin` of values that arrive piece by piece.
 
     The integral is that of cubics through the samples, so its ends need not lie on them. Without a whole period
-    (or without any) the mean is that of all times after `begin`, and the number of periods 0.
+    (or without any) the mean is that of all times after `begin`, of the last step at least, and `periods` is 0.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ class RunningMean:
 
     def __init__(self, times: Array, begin: float, period: float | None) -> None:
         end = float(times[-1])
-        self.periods = 0 if not period else int((end - begin) / period * (1.0 + 1e-12))
+        self.periods = 0 if not period else max(0, int((end - begin) / period * (1.0 + 1e-12)))
         low = end - self.periods * period if self.periods and period else min(begin, float(times[-2]))
         self._low = max(low, float(times[0]))
         self._total: Array | float = 0.0
