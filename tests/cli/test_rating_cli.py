@@ -11,7 +11,7 @@ import pytest
 
 from gearfe.base.tables.examples import job_file
 from gearfe.cli.main import main
-from tests.makers.job_texts import pair_job
+from tests.makers.job_texts import BARE_TRAIN, BORES, pair_job
 from tests.places import GEOMETRY
 
 FZG = GEOMETRY / "fzg_c.toml"
@@ -323,3 +323,14 @@ def test_thickness_of_a_single_gear_replaces_that_of_all(tmp_path: Path, capsys:
     for where in ("", "gears.wheel."):
         assert thickness(where + series, where + allowances)[0] == 2
         assert "cannot be given together with thickness_allowances_um" in capsys.readouterr().err
+
+
+def test_a_train_that_stands_still(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The message asks for a speed, instead of for a table that is there."""
+    job = tmp_path / "train.toml"
+    job.write_text(BARE_TRAIN.replace("-300.0", "0.0") + BORES + "[rating]\n")
+    line = ["rating", str(job), "--out", str(tmp_path / "out"), "--no-pictures"]
+    assert main(line) == 2
+    message = capsys.readouterr().err
+    assert "rating.meshes.a-b.speed_rpm: is required: in [train] the driver of mesh a-b does not turn" in message
+    assert "or a table [train]" not in message

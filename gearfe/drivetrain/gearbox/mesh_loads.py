@@ -35,7 +35,7 @@ class MeshLoad:
     mates
         Meshes of the gear that load the flank of this one.
     both_flanks
-        Whether other meshes load the other flank.
+        Whether other meshes load the other flank; False where this one carries nothing.
     fixed
         Whether the gear's shaft is held.
     """
@@ -53,11 +53,15 @@ def mesh_loads(train: GearTrain) -> dict[str, MeshLoad]:
     speed = 30.0 / math.pi * fastest(layout.speed)
     held = {shaft for shaft, ratio in layout.guided if ratio == 0}
     largest = max((abs(float(force)) for force in rolled.steady_forces), default=0.0)
+
+    def carries(force: float) -> bool:
+        return abs(float(force)) > IDLE * largest
+
     # torque of each mesh on its gears about the axis, by the gear: its sign is that of the flank
     flanks: dict[str, list[float]] = {}
     for mesh, force, sense in zip(layout.meshes, rolled.steady_forces, rolled.senses, strict=True):
         for gear, side in ((mesh.driver, -1.0), (mesh.driven, 1.0 if mesh.turns_alike else -1.0)):
-            if abs(float(force)) > IDLE * largest:
+            if carries(force):
                 flanks.setdefault(gear.name, []).append(side * sense * float(force))
     found = {}
     for mesh, force, sense in zip(layout.meshes, rolled.steady_forces, rolled.senses, strict=True):
@@ -67,10 +71,10 @@ def mesh_loads(train: GearTrain) -> dict[str, MeshLoad]:
             [other * push > 0.0 for other in flanks.get(gear.name, [])] for gear, push in zip(gears, own, strict=True)
         ]
         found[mesh.name] = MeshLoad(
-            torque=abs(float(force)) * mesh.driver.base_radius,
+            torque=abs(float(force)) * mesh.driver.base_radius if carries(force) else 0.0,
             speed=speed * abs(float(against(mesh, mesh.driver.shaft, rolled.ratios))),
             mates=(max(1, sum(alike[0])), max(1, sum(alike[1]))),
-            both_flanks=(not all(alike[0]), not all(alike[1])),
+            both_flanks=(carries(force) and not all(alike[0]), carries(force) and not all(alike[1])),
             fixed=(mesh.driver.shaft in held, mesh.driven.shaft in held),
         )
     return found
@@ -158,7 +162,11 @@ def _loaded(
     if merged.spectrum:
         return dict(table.meshes)
     more: dict[str, Any] = {}
-    if merged.speed_rpm is None and load.speed > 0.0:
+    if merged.speed_rpm is None:
+        if not load.speed > 0.0:
+            problem = f"is required: in [train] the driver of mesh {mesh} does not turn against its mate"
+            cure = "add the speed of the driver (1/min), or give train.drive a speed"
+            raise InputError(f"rating.meshes.{mesh}.speed_rpm", None, problem, cure)
         more["speed_rpm"] = load.speed
     if merged.torque_Nm is None and not given and load.torque > 0.0:
         more["torque_Nm"] = load.torque * (mates or table.mates or 1)
