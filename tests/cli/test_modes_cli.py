@@ -104,3 +104,13 @@ def test_mistakes_are_one_line(job: Path, tmp_path: Path, capsys: pytest.Capture
     assert code == 2
     assert words in error
     assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
+
+
+def test_a_range_that_falls_is_run_from_slow_to_fast(job: Path, tmp_path: Path) -> None:
+    """The last speed of the command line is less than the first one of the run-up."""
+    job.write_text(job.read_text() + RUNUP)
+    assert main(["modes", str(job), "--out", str(tmp_path / "out"), "--no-pictures", "--speed-stop-rpm", "0"]) == 0
+    speeds = [float(row["speed_rad_per_s"]) for row in csv_rows(tmp_path / "out" / "modes.csv")]
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert [summary[f"speed_{end}_rad_per_s"] for end in ("start", "stop")] == [0.0, -200.0]
+    assert {0.0, -200.0} <= set(speeds)

@@ -127,7 +127,8 @@ def _speeds(table: ModesTable, runup: RunUpTable | None, runs: float) -> Array:
         problem = "is not given, and the drive stands still"
         raise InputError("modes.speed_stop_rad_per_s", None, problem, "give the last speed of the drive")
     replace(table, speed_start_rad_per_s=start, speed_stop_rad_per_s=stop).check("modes")
-    return np.linspace(start, stop, table.speeds)
+    low, high = sorted((start, stop), key=abs)  # modes are followed from slow to fast
+    return np.linspace(low, high, table.speeds)
 
 
 def described(job: TrainJob, table: ModesTable, result: ModesResult) -> dict[str, Any]:
