@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ import pytest
 from gearfe import Gear, GearPair
 from gearfe.base.config import build
 from gearfe.base.errors import InputError
-from gearfe.base.tables.examples import job_file
 from gearfe.base.tables.gearbox import named_gearbox
 from gearfe.base.tables.named import NamedGearTable, NamedMeshTable
 from gearfe.base.tables.pair import PairTable
@@ -353,42 +351,6 @@ def test_helices_in_the_picture_lean_with_their_hands() -> None:
     assert len(slopes) >= 9
     assert min(slopes) > 0.0
     assert len(pair_picture(pair_of_table(helix_angle_deg=None)).axes) == 2
-
-
-#: Command and the words of its refusal of a helical mesh.
-REFUSING = [
-    (["mesh", "--sector"], "a mesh of finite elements"),
-    (["mesh", "--deck"], "a mesh of finite elements"),
-]
-
-
-@pytest.mark.parametrize(("line", "what"), REFUSING)
-def test_what_takes_no_helical_gears_says_so(
-    line: list[str], what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    job = tmp_path / "job.toml"
-    job.write_text(JOB)
-    assert main([line[0], str(job), *line[1:]]) == 2
-    message = capsys.readouterr().err
-    assert (
-        f"pair.helix_angle_deg = 15.0: makes the load vary along the face width: {what} takes spur gears alike"
-        in message
-    )
-
-
-@pytest.mark.parametrize("command", ["vibration", "runup"])
-def test_mesh_laws_take_no_helical_gears(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    job = tmp_path / "box.toml"
-    text = job_file("gearbox")
-    gears = re.findall(r"^\[gears\.\w+\]$", text, re.MULTILINE)
-    for table in gears:
-        text = text.replace(table + "\n", f"{table}\nhelix_angle_deg = 5.0\n")
-    job.write_text(text)
-    assert main([command, str(job)]) == 2
-    message = capsys.readouterr().err
-    assert re.search(
-        r"gears\.\w+\.helix_angle_deg = 5\.0: makes the load vary .*: mesh_model = \"potential\" of", message
-    )
 
 
 def test_functions_take_no_helical_gears() -> None:

@@ -283,7 +283,7 @@ def test_a_full_disk_stops_and_keeps_all_rows(tmp_path):
         [sys.executable, "-c", program, *command], capture_output=True, text=True, env=environment, check=False
     )
     assert done.returncode == 2
-    assert "study.db': cannot be written (disk I/O error); rows that were finished are kept" in done.stderr
+    assert "study.db': cannot be written (disk I/O error); finished rows are kept" in done.stderr
     before = stored_rows(tmp_path / "out")
     assert 10 < len(before) < 300
     assert main(command) == 0
