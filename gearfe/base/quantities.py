@@ -90,7 +90,7 @@ def unit_of(column: str) -> Unit:
     return parted(column)[1]
 
 
-#: Names without units -> words: the first pattern that fits. Names of the user's shafts and bores stand in quotes.
+#: Names without units -> words: the first pattern that fits. Names of the user's shafts and bores are quoted.
 _WORDS = tuple(
     (re.compile(pattern + r"\Z"), text)
     for pattern, text in (

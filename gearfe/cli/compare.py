@@ -44,21 +44,21 @@ def run(args: argparse.Namespace) -> int:
     kinds = [kind for kind in KINDS if all(any(one.kind is kind for one in run) for run in every)]
     results = [next((one for one in run if one.kind in kinds[:1]), run[0]) for run in every]
     others = [f"{one.name}: {one.path.name} is left out" for run in every for one in run if one not in results]
-    made = compared(results)
-    made = replace(made, notes=(*made.notes, *others))
+    comparison = compared(results)
+    comparison = replace(comparison, notes=(*comparison.notes, *others))
     folder = output_folder(args.out)
     with whole_set(folder, FILES) as target:
-        table = made.columns()
+        table = comparison.columns()
         write_csv(target / "compare.csv", table)
         rows = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
         runs = [{"name": one.name, "kind": one.kind.name, "file": str(one.path)} for one in results]
-        write_json(target / "compare.json", {"runs": runs, "differences": rows, "notes": list(made.notes)})
-        if not args.no_pictures and made.panels:
+        write_json(target / "compare.json", {"runs": runs, "differences": rows, "notes": list(comparison.notes)})
+        if not args.no_pictures and comparison.panels:
             from ..figures.compare import comparison_picture
             from ..figures.style import save
 
             with stage("drawing"):
-                save(comparison_picture(made), target / "compare.png")
+                save(comparison_picture(comparison), target / "compare.png")
         written = sorted(path.name for path in target.iterdir())
-    print_results(comparison_lines(made), folder, written, {}, ())
+    print_results(comparison_lines(comparison), folder, written, {}, ())
     return 0

@@ -13,8 +13,12 @@ from ..base.tables.pair import StiffnessTable
 from .arguments import add_job, add_json, add_keys, add_mesh, add_pictures, check_option, with_keys
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ..base.tables.gearbox import NamedMesh
     from ..gears.gearmesh.job import StiffnessJob
-    from ..output.exchange.mesh_export import MeshPart
+    from ..gears.geometry.pair import GearPair
+    from ..output.exchange.mesh_export import MeshPart, Part
 
 
 #: Teeth of each gear whose flanks are fine in a deck, by default.
@@ -81,40 +85,54 @@ def run(args: argparse.Namespace) -> int:
     from ..gears.geometry.pair import pair_of
 
     pair = pair_of(mesh)  # gears that cannot run together show with NumPy alone
-    if mesh.along_width(places=False):
-        from .solid_mesh import write_solid_mesh
-
-        return write_solid_mesh(args, mesh, table, pair)
-    if args.layers is not None:
+    solid = mesh.along_width(places=False) is not None
+    if args.layers is not None and not solid:
         problem = "is for gears whose load varies along the face width: these are meshed in the plane"
         raise InputError("--layers", args.layers, problem, "leave it out")
 
     from ..base.files import output_folder
-    from ..gears.gearmesh.job import StiffnessJob
-    from ..output.exchange.mesh_export import export_mesh, format_of, group_sizes
+    from ..output.exchange.mesh_export import format_of, group_sizes
 
     format_of(args.out)
-    one, two = (replace(gear, microgeometry=None) for gear in mesh.gears)
-    job = StiffnessJob(replace(mesh, stiffness=table, driver=one, driven=two), pair)
     output_folder(Path(args.out).parent)
-    found: dict[str, float] = {}
-    if args.deck:
-        parts, found = _deck(args, job)
+    parts: Mapping[str, Part]
+    if solid:
+        from .solid_mesh import write_solid_mesh
+
+        parts, sections, solved = write_solid_mesh(args, mesh, table, pair)
     else:
-        parts = _parts(args, job, wheel_angle=pair.wheel_angle_at(math.radians(args.angle_deg)))
-        with stage("writing"):
-            export_mesh(args.out, parts, plane=job.table.plane)
+        parts, sections, solved = _write_plane(args, mesh, table, pair)
     if not args.no_pictures:
         from ..figures.gears import mesh_figure
 
         with stage("picture"):
-            mesh_figure(Path(args.out).with_suffix(".png"), parts, None if args.sector else pair)
-    nodes = sum(len(part.points) for part in parts.values())
-    print(f"written to {args.out}: {nodes} nodes, millimetres, groups with their elements or edges:")
-    for name, count in group_sizes(parts).items():
+            mesh_figure(Path(args.out).with_suffix(".png"), sections, None if args.sector else pair)
+    nodes, sizes = sum(len(part.points) for part in parts.values()), group_sizes(parts)
+    where, sides = (" in space", "faces") if solid else ("", "edges")
+    print(f"written to {args.out}: {nodes} nodes{where}, millimetres, groups with their elements or {sides}:")
+    for name, count in sizes.items():
         print(f"  {name:<24} {count}")
-    args.summary = {"file": args.out, "nodes": nodes, "groups": group_sizes(parts), **found}
+    args.summary = {"file": args.out, "nodes": nodes, "groups": sizes, **solved}
     return 0
+
+
+def _write_plane(
+    args: argparse.Namespace, mesh: NamedMesh, table: StiffnessTable, pair: GearPair
+) -> tuple[dict[str, MeshPart], dict[str, MeshPart], dict[str, float]]:
+    """Write a mesh or a deck in the plane; return its parts, twice, and what was solved for the deck."""
+    from ..gears.gearmesh.job import StiffnessJob
+    from ..output.exchange.mesh_export import export_mesh
+
+    one, two = (replace(gear, microgeometry=None) for gear in mesh.gears)
+    job = StiffnessJob(replace(mesh, stiffness=table, driver=one, driven=two), pair)
+    solved: dict[str, float] = {}
+    if args.deck:
+        parts, solved = _deck(args, job)
+    else:
+        parts = _parts(args, job, wheel_angle=pair.wheel_angle_at(math.radians(args.angle_deg)))
+        with stage("writing"):
+            export_mesh(args.out, parts, plane=job.table.plane)
+    return parts, parts, solved
 
 
 def _check(args: argparse.Namespace) -> None:

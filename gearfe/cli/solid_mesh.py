@@ -25,8 +25,10 @@ FLANK_COARSEN = 1.5
 APART = 1e-6
 
 
-def write_solid_mesh(args: argparse.Namespace, mesh: NamedMesh, table: StiffnessTable, pair: GearPair) -> int:
-    """Write a mesh or a deck of gears in space, and print its groups.
+def write_solid_mesh(
+    args: argparse.Namespace, mesh: NamedMesh, table: StiffnessTable, pair: GearPair
+) -> tuple[dict[str, Part], dict[str, MeshPart], dict[str, float]]:
+    """Write a mesh or a deck of gears in space; return its parts, their sections, and what was solved for the deck.
 
     Parameters
     ----------
@@ -44,33 +46,18 @@ def write_solid_mesh(args: argparse.Namespace, mesh: NamedMesh, table: Stiffness
         problem = "gives tilts by the load of a train, which a mesh of finite elements does not have"
         raise InputError(f"{mesh.where}.misalignment_from_shafts", True, problem, "give misalignment_um instead")
 
-    from ..base.files import output_folder
     from ..gears.gearmesh import width_job
     from ..gears.gearmesh.job import stiffness_job
-    from ..output.exchange.mesh_export import export_mesh, format_of, group_sizes
+    from ..output.exchange.mesh_export import export_mesh
 
-    format_of(args.out)
     job = stiffness_job(replace(mesh, stiffness=table), Path(args.job).parent, pair)
     width_job.check_stiffness_job(job)
-    output_folder(Path(args.out).parent)
-    found: dict[str, float] = {}
     if args.deck:
-        parts, sections, found = _deck(args, job)
-    else:
-        parts, sections = _parts(args, job, -pair.contact_twist, (set(), set()))
-        with stage("writing"):
-            export_mesh(args.out, parts)
-    if not args.no_pictures:
-        from ..figures.gears import mesh_figure
-
-        with stage("picture"):
-            mesh_figure(Path(args.out).with_suffix(".png"), sections, None if args.sector else pair)
-    nodes = sum(len(part.points) for part in parts.values())
-    print(f"written to {args.out}: {nodes} nodes in space, millimetres, groups with their elements or faces:")
-    for name, count in group_sizes(parts).items():
-        print(f"  {name:<24} {count}")
-    args.summary = {"file": args.out, "nodes": nodes, "groups": group_sizes(parts), **found}
-    return 0
+        return _deck(args, job)
+    parts, sections = _parts(args, job, -pair.contact_twist, (set(), set()))
+    with stage("writing"):
+        export_mesh(args.out, parts)
+    return parts, sections, {}
 
 
 def _parts(

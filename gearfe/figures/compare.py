@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..base.typing import Array
-from ..output.differences import Comparison, Line, Panel
+from ..output.differences import Comparison
+from ..output.run_curves import Line, Panel
 from .style import BLUE, GREEN, GREY, ORANGE, headed, new_figure, tidy
 
 #: Colour and dashes of each run.

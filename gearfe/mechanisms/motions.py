@@ -52,14 +52,14 @@ def time_function_of(node: Node, text: str, label: str, end: float) -> TimeFunct
         return np.broadcast_to(np.asarray(compute(node, {("time", None): times}, label), dtype=float), times.shape)
 
     looked_at = np.linspace(0.0, end, LOOKS)
-    found = values(looked_at)
-    if not np.isfinite(found).all():
-        at = float(looked_at[~np.isfinite(found)][0])
+    samples = values(looked_at)
+    if not np.isfinite(samples).all():
+        at = float(looked_at[~np.isfinite(samples)][0])
         why = without_value(node, {("time", None): at})
         raise InputError(label, text, f"has no value at {at:.6g} s" + (f": {why}" if why else ""), "correct it")
     if not quantities(node):
-        return constant(float(found[0]))
-    scale = float(np.abs(found).max())
+        return constant(float(samples[0]))
+    scale = float(np.abs(samples).max())
     points = chebyshev.chebpts1(DEGREE + 1)
     origins, rows, starts = [], [], []
     waiting = [(0.0, (1.0 + BEYOND) * end)]
@@ -77,7 +77,7 @@ def time_function_of(node: Node, text: str, label: str, end: float) -> TimeFunct
         if smooth:  # a fast function, or a short pulse, may look smooth at few points
             held = slice(*np.searchsorted(looked_at, (first, last)).tolist())
             times = np.append(middle + half * BETWEEN, looked_at[held])
-            off = np.append(values(times[: len(BETWEEN)]), found[held])
+            off = np.append(values(times[: len(BETWEEN)]), samples[held])
             off = np.abs(off - chebyshev.chebval((times - middle) / half, coefficients))
             smooth = off.max() <= AGREES * scale + 10.0 * noise
         if smooth:

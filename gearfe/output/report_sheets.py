@@ -13,9 +13,9 @@ import numpy as np
 from ..base.quantities import parted, unit_of, words
 from ..base.shown import percent
 from ..base.typing import Array
-from .differences import NUMBERS, Number
 from .report_page import PICTURES, Run, Sheet
 from .results import Results
+from .run_numbers import NUMBERS, Number
 
 #: Rows of a table at most, and pictures of a kind in this order; others follow up to `PICTURES_OF_RUN`.
 MOST_ROWS, PICTURES_OF_RUN, PICTURES_OF_SEVERAL = 14, 4, 2
@@ -141,9 +141,13 @@ def _error(number: Number) -> str:
     return f"± {number.error:.2g}" if math.isfinite(number.error) else "± ?"
 
 
+def _numbers(results: Results) -> list[Number]:
+    return list(NUMBERS[results.kind.name]([results])[0].values())
+
+
 def _of_numbers(results: Results) -> list[Sheet]:
     """The first numbers of a run."""
-    rows = _number_rows(NUMBERS[results.kind.name](results)[: 2 * MOST_ROWS])
+    rows = _number_rows(_numbers(results)[: 2 * MOST_ROWS])
     return [Sheet("Results", ("quantity", "value", "error", "unit"), rows, _note(results, rows))]
 
 
@@ -160,7 +164,7 @@ def _of_curve(results: Results) -> list[Sheet]:
     load = results.summary.get("load") or {}
     torque = load.get("torque_wheel_Nm") or {}
     rows = [["torque at the wheel, mean", _text(torque.get("mean")), "", "N m"]] if torque else []
-    rows += _number_rows(NUMBERS["stiffness"](results))
+    rows += _number_rows(_numbers(results))
     iso = results.summary.get("iso_6336") or {}
     if "c_gamma_times_width_N_per_m" in iso:
         rows.append(["ISO 6336-1, method B: c_γ b", _text(1e-6 * iso["c_gamma_times_width_N_per_m"]), "", "N/µm"])

@@ -116,31 +116,31 @@ def read_all(path: str | Path, field: str, name: str = "") -> tuple[Results, ...
     InputError
         If there are no results, or files are damaged.
     """
-    place = Path(path)
-    if not place.exists():
+    location = Path(path)
+    if not location.exists():
         raise InputError(field, str(path), "does not exist", "name a folder that a command wrote")
-    name = name or (place.resolve().name if place.is_dir() else place.stem)
+    name = name or (location.resolve().name if location.is_dir() else location.stem)
     summary = ""
-    if place.suffix == ".json" and place.is_file():
-        place, summary = place.parent, place.name
-    if place.is_dir():
-        kinds = kinds_of(place)
+    if location.suffix == ".json" and location.is_file():
+        location, summary = location.parent, location.name
+    if location.is_dir():
+        kinds = kinds_of(location)
         if not kinds:
-            inside = sorted({found.parent.name for k in KINDS for found in place.glob(f"*/{k.table}")})
+            inside = sorted({found.parent.name for k in KINDS for found in location.glob(f"*/{k.table}")})
             cure = f"name one of its folders: {', '.join(inside)}" if inside else f"name a folder of: {_KNOWN}"
             raise InputError(field, str(path), "holds no results that can be compared", cure)
-        newest = {kind.summary: _newest(place, kind.summary) for kind in kinds}
+        newest = {kind.summary: _newest(location, kind.summary) for kind in kinds}
         every = tuple(
             Results(
                 kind,
                 name,
-                place / kind.table,
-                _summary(place / kind.summary, field) if kind is newest[kind.summary] else {},
+                location / kind.table,
+                _summary(location / kind.summary, field) if kind is newest[kind.summary] else {},
             )
             for kind in kinds
         )
         return tuple(results for results in every if results.kind is newest.get(summary)) or every
-    return (_of_table(place, field, name),)
+    return (_of_table(location, field, name),)
 
 
 def _newest(folder: Path, summary: str) -> Kind:

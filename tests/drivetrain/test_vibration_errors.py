@@ -21,8 +21,9 @@ from gearfe.drivetrain.vibration.report import train_summary
 from gearfe.drivetrain.vibration.spectra import TrainRecord
 from gearfe.gears.gearmesh.curve import StiffnessCurve
 from gearfe.multibody import TimeFunction, constant
-from gearfe.output.differences import NUMBERS, difference_error
+from gearfe.output.differences import difference_error
 from gearfe.output.results import KINDS, Results
+from gearfe.output.run_numbers import NUMBERS
 from tests.makers.job_texts import SMALL_TRAIN
 from tests.makers.trains import SHIPPED, base_radius, curve, elastic, train
 
@@ -101,13 +102,13 @@ def test_the_error_of_a_difference_in_one_housing() -> None:
     runs = [estimated(one) for one in (train_a, dataclasses.replace(train_a, loads=loads))]
     summaries = [{**summary, "housing": {"mass_kg": 1.0, "unknowns": 1}} for _, summary, _ in runs]
     results = [Results(KINDS[3], name, Path(), summary) for name, summary in zip("ab", summaries, strict=True)]
-    numbers = [{number.name: number for number in NUMBERS["vibration"](run)} for run in results]
+    numbers = NUMBERS["vibration"](results)
     part = 0.6
     truth = [
         Results(KINDS[3], "", Path(), again(softened(dataclasses.replace(train_a, loads=own), part)).summary)
         for (_, _, again), own in zip(runs, (train_a.loads, loads), strict=True)
     ]
-    true = [{number.name: number.value for number in NUMBERS["vibration"](run)} for run in truth]
+    true = [{name: number.value for name, number in run.items()} for run in NUMBERS["vibration"](truth)]
     covered, smaller = [], []
     for name in numbers[0].keys() & numbers[1].keys() & true[0].keys() & true[1].keys():
         one, two = numbers[0][name], numbers[1][name]

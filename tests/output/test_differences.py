@@ -15,8 +15,9 @@ from gearfe import StiffnessCurve, sweep_stiffness
 from gearfe.base.errors import InputError
 from gearfe.base.files import write_csv, write_json
 from gearfe.cli.main import main
-from gearfe.output.differences import Number, Row, compared, difference_error
+from gearfe.output.differences import Row, compared, difference_error
 from gearfe.output.results import read_all, read_results, short_names
+from gearfe.output.run_numbers import Number
 from tests.makers import gears
 
 

@@ -41,8 +41,8 @@ def _with_springs(table: TrainTable) -> TrainTable:
     """[train] with springs as meshes, whose back flanks, should the loads press them, are as stiff as driving ones."""
 
     def spring(mesh: TrainMeshTable) -> TrainMeshTable:
-        made = replace(mesh, mesh_model=None, mesh_model_tilt_um=None, curve=None, mesh_table=None, rigid=False)
-        return replace(made, stiffness_N_per_m=1.0, backlash_um=0.0)
+        plain = replace(mesh, mesh_model=None, mesh_model_tilt_um=None, curve=None, mesh_table=None, rigid=False)
+        return replace(plain, stiffness_N_per_m=1.0, backlash_um=0.0)
 
     return replace(table, meshes=tuple(spring(mesh) for mesh in table.meshes))
 

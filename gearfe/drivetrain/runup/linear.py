@@ -142,11 +142,11 @@ class Linear:
         values, vectors = np.linalg.eig(A)
         forces = np.vstack([np.zeros_like(self._every), self._every])
         into = np.linalg.solve(vectors, forces.astype(complex))
-        made = Poles(values.astype(complex), np.asarray(vectors[:n] / rates[:, None], dtype=complex), into)
+        poles = Poles(values.astype(complex), np.asarray(vectors[:n] / rates[:, None], dtype=complex), into)
         if len(self._known) >= REMEMBERED:
             self._known.clear()
-        self._known[speed] = made
-        return made
+        self._known[speed] = poles
+        return poles
 
     def _numerators(self, poles: Poles) -> Array:
         """(n, 2 entries) a and b of the pairs of poles beside each other, for the entries that are computed."""
@@ -180,9 +180,9 @@ class Linear:
     def _entries(self) -> IntArray:
         """Number among the computed entries of each entry of the flexibility, (p p,)."""
         p = self._every.shape[1]
-        made = np.zeros((p, p), dtype=np.int64)
-        made.ravel()[self._kept] = np.arange(len(self._kept))
-        return made.ravel() if self._reacting is None else np.maximum(made, made.T).ravel()
+        numbers = np.zeros((p, p), dtype=np.int64)
+        numbers.ravel()[self._kept] = np.arange(len(self._kept))
+        return numbers.ravel() if self._reacting is None else np.maximum(numbers, numbers.T).ravel()
 
     def _own(self, omega: Array, speed: float) -> ComplexArray:
         """Flexibility of all directions without forces that react, (k, p, p)."""

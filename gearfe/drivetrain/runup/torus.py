@@ -53,7 +53,7 @@ class Lattice(NamedTuple):
     residue: IntArray  # (K + 1,) k . g
     place: IntArray  # (K + 1,) line of the transform
     conjugate: BoolArray  # (K + 1,) which stand there as the conjugate
-    plain: bool  # whether they stand in their own order, none as the conjugate: those of one phase
+    plain: bool  # whether all keep their own order and none is conjugate: those of one phase
 
     def synthesis(self, amplitudes: ComplexArray) -> Array:
         """(S, m) values of ``Re sum a_k exp(i k theta)``."""

@@ -40,17 +40,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base.errors import InputError
 from ...base.typing import Array, BoolArray, IntArray
 from ...multibody.compiled.packed import Packed
 from . import law_kernel
-from .load_search import Response, newton_twist, search_load
+from .load_search import Response, approach_of_force
 
 #: Approach (m) at which flanks touch that do not meet at all.
 NO_CONTACT = 1.0
-#: Relative miss of a force from which one step leads to its approach, whose error is of the order of its square;
-#: rounding of an approach (parts of the reach); most evaluations of the law for it.
-NEARLY, ROUNDING, EVALUATIONS = 1e-8, 1e-15, 60
 #: Places in each cell, in parts of its width, at which matrices are looked at.
 SAMPLES = np.linspace(0.0, 1.0, 5)
 
@@ -236,32 +232,13 @@ class MeshLaw:
             np.atleast_1d(np.asarray(angles, dtype=float)), np.asarray(forces, dtype=float)
         )
         later = np.broadcast_to(np.asarray(shifts, dtype=float), (len(angle), self.slots))
-        approach, most = self.first_contact(angle, later), self.most(angle, later)
-        if (force > most).any():
-            raise InputError(
-                "force", float(force.max()), f"must be <= {most.min():.6g} N", "make the law for larger torques"
-            )
-        loaded = np.flatnonzero(force > 0.0)
-        first, goal = approach[loaded], force[loaded]
 
         def evaluate(numbers: IntArray, approaches: Array) -> Response:
-            forces = self(angle[loaded[numbers]], approaches, later[loaded[numbers]])
+            forces = self(angle[numbers], approaches, later[numbers])
             return Response(forces.force, forces.tangent)
 
-        guess = first + self.reach * goal / most[loaded]
-        delta, response, _ = search_load(
-            evaluate,
-            guess,
-            evaluate(np.arange(len(loaded)), guess),
-            goal,
-            first_contact=first,
-            most=first + self.reach,
-            near=NEARLY,
-            rounding=ROUNDING * self.reach,
-            evaluations=EVALUATIONS,
-        )
-        approach[loaded] = newton_twist(delta, first, response, goal)
-        return approach
+        most = self.most(angle, later)
+        return approach_of_force(evaluate, force, self.first_contact(angle, later), most, self.reach)
 
 
 def indefinite(coupling: Array, widths: Array) -> float:

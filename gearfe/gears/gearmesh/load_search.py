@@ -18,7 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...base.errors import InputError
 from ...base.typing import Array, IntArray
+
+#: Relative miss of a force from which one step leads to its approach, whose error is of the order of its square;
+#: rounding of an approach (parts of the reach); most evaluations of a mesh law for it.
+LAW_NEAR, LAW_ROUNDING, LAW_EVALUATIONS = 1e-8, 1e-15, 60
 
 
 class Response(NamedTuple):
@@ -106,3 +111,52 @@ def search_load(
         load[missed], tangent[missed] = evaluate(missed, twist[missed])
         response = Response(load, tangent)
     return twist, response, missed
+
+
+def approach_of_force(
+    evaluate: Callable[[IntArray, Array], Response], force: Array, first_contact: Array, most: Array, reach: float
+) -> Array:
+    """Return the approach (m) at which a mesh law carries each force; that of the first contact without one.
+
+    Parameters
+    ----------
+    evaluate
+        ``evaluate(numbers, approaches)`` gives force (N) and tangent (N/m) at the places of these numbers.
+    force : ndarray, shape (n,)
+        Mesh forces (N).
+    first_contact : ndarray, shape (n,)
+        Approaches (m) at which the rigid flanks touch.
+    most : ndarray, shape (n,)
+        Forces (N) at the end of the law.
+    reach : float
+        Approach beyond the first contact (m) at which the law ends.
+
+    Raises
+    ------
+    InputError
+        For a force beyond what the law is known for.
+    """
+    if (force > most).any():
+        problem = f"must be <= {most.min():.6g} N"
+        raise InputError("force", float(force.max()), problem, "make the law for larger torques")
+    approach = first_contact.copy()
+    loaded = np.flatnonzero(force > 0.0)
+    first, goal = first_contact[loaded], force[loaded]
+
+    def of_loaded(numbers: IntArray, approaches: Array) -> Response:
+        return evaluate(loaded[numbers], approaches)
+
+    guess = first + reach * goal / most[loaded]
+    approaches, response, _ = search_load(
+        of_loaded,
+        guess,
+        of_loaded(np.arange(len(loaded)), guess),
+        goal,
+        first_contact=first,
+        most=first + reach,
+        near=LAW_NEAR,
+        rounding=LAW_ROUNDING * reach,
+        evaluations=LAW_EVALUATIONS,
+    )
+    approach[loaded] = newton_twist(approaches, first, response, goal)
+    return approach

@@ -33,12 +33,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from ...base.errors import InputError
 from ...base.typing import Array, BoolArray, IntArray
-from .load_search import Response, newton_twist, search_load
+from .load_search import Response, approach_of_force
 
-#: Relative miss of a force that ends the search for its approach, rounding (parts of the reach), most evaluations.
-NEARLY, ROUNDING, EVALUATIONS = 1e-10, 1e-15, 60
 #: Phases at which means over the mesh cycle are taken.
 PHASES = 72
 #: Tilt over the width (m) beyond which a law that was made for none is not known.
@@ -242,34 +239,13 @@ class WidthLaw:
         """
         given = (np.atleast_1d(np.asarray(x, dtype=float)) for x in (angles, forces, tilts))
         angle, force, tilt = (np.array(x) for x in np.broadcast_arrays(*given))
-        first, most = self.first_contact(angle, tilt), self.most(angle, tilt)
-        if (force > most).any():
-            raise InputError(
-                "force", float(force.max()), f"must be <= {most.min():.6g} N", "make the law for larger torques"
-            )
-        approach = first.copy()
-        loaded = np.flatnonzero(force > 0.0)
-        touch, goal = first[loaded], force[loaded]
 
         def evaluate(numbers: IntArray, approaches: Array) -> Response:
-            at = loaded[numbers]
-            forces = self(angle[at], approaches, tilt[at])
+            forces = self(angle[numbers], approaches, tilt[numbers])
             return Response(forces.force, forces.tangent)
 
-        guess = touch + self.reach * goal / most[loaded]
-        delta, response, _ = search_load(
-            evaluate,
-            guess,
-            evaluate(np.arange(len(loaded)), guess),
-            goal,
-            first_contact=touch,
-            most=touch + self.reach,
-            near=NEARLY,
-            rounding=ROUNDING * self.reach,
-            evaluations=EVALUATIONS,
-        )
-        approach[loaded] = newton_twist(delta, touch, response, goal)
-        return approach
+        most = self.most(angle, tilt)
+        return approach_of_force(evaluate, force, self.first_contact(angle, tilt), most, self.reach)
 
     def linearised(self, force: float) -> Linearised:
         """Return the spring of this law under a constant force (N) without a tilt."""
@@ -352,30 +328,30 @@ def _over_overlap(overlaps: Array, jets: Array) -> Array:
     """Coefficients over x, lowest first, of values and two derivatives (3, n, m, g) at its nodes: (n, m, 6, g)."""
     value, slope, bend = jets
     h = np.diff(overlaps)[:, None]
-    found = np.zeros((*value.shape[:2], POWERS[0], value.shape[2]))
-    found[:, :, 0], found[:, :, 1], found[:, :, 2] = value, slope, 0.5 * bend
-    low = found[:, :-1]
+    powers = np.zeros((*value.shape[:2], POWERS[0], value.shape[2]))
+    powers[:, :, 0], powers[:, :, 1], powers[:, :, 2] = value, slope, 0.5 * bend
+    low = powers[:, :-1]
     # what value, slope and bend lack at the other end, in powers of the cell's width
     off = value[:, 1:] - low[:, :, 0] - h * (low[:, :, 1] + h * low[:, :, 2])
     steep = h * (slope[:, 1:] - low[:, :, 1] - 2.0 * h * low[:, :, 2])
     bent = h**2 * (bend[:, 1:] - bend[:, :-1])
-    found[:, :-1, 3] = (10.0 * off - 4.0 * steep + 0.5 * bent) / h**3
-    found[:, :-1, 4] = (-15.0 * off + 7.0 * steep - bent) / h**4
-    found[:, :-1, 5] = (6.0 * off - 3.0 * steep + 0.5 * bent) / h**5
-    return found
+    powers[:, :-1, 3] = (10.0 * off - 4.0 * steep + 0.5 * bent) / h**3
+    powers[:, :-1, 4] = (-15.0 * off + 7.0 * steep - bent) / h**4
+    powers[:, :-1, 5] = (6.0 * off - 3.0 * steep + 0.5 * bent) / h**5
+    return powers
 
 
 def _over_tilt(tilts: Array, values: Array, slopes: Array) -> Array:
     """Coefficients over the tilt, lowest first, of values and slopes (..., g) at the tilts: shape (..., g + 1, 4)."""
     g = len(tilts)
-    found = np.zeros((*values.shape[:-1], g + 1, 4))
-    found[..., 1:, 0], found[..., 1:, 1] = values, slopes
-    found[..., 0, :2] = found[..., 1, :2]
+    powers = np.zeros((*values.shape[:-1], g + 1, 4))
+    powers[..., 1:, 0], powers[..., 1:, 1] = values, slopes
+    powers[..., 0, :2] = powers[..., 1, :2]
     h = np.diff(tilts)
     secant = np.diff(values, axis=-1) / h
-    found[..., 1:g, 2] = (3.0 * secant - 2.0 * slopes[..., :-1] - slopes[..., 1:]) / h
-    found[..., 1:g, 3] = (slopes[..., :-1] + slopes[..., 1:] - 2.0 * secant) / h**2
-    return found
+    powers[..., 1:g, 2] = (3.0 * secant - 2.0 * slopes[..., :-1] - slopes[..., 1:]) / h
+    powers[..., 1:g, 3] = (slopes[..., :-1] + slopes[..., 1:] - 2.0 * secant) / h**2
+    return powers
 
 
 def _over_phase(nodes: Array, values: Array) -> Array:

@@ -160,8 +160,8 @@ def viscosity(oil: Oil, at_40: float) -> float:
 def angle_factor(pair: PairData) -> float:
     """X_alphabeta."""
     cos_w, cos_t = math.cos(pair.alpha_wt), math.cos(pair.alpha_t)
-    made = (math.sin(pair.alpha_wt) * math.cos(pair.alpha_n) * math.cos(pair.beta)) ** 0.25
-    return 1.22 * made / math.sqrt(cos_w * cos_t)
+    inclination = (math.sin(pair.alpha_wt) * math.cos(pair.alpha_n) * math.cos(pair.beta)) ** 0.25
+    return 1.22 * inclination / math.sqrt(cos_w * cos_t)
 
 
 def ends(pair: PairData) -> tuple[float, float]:
@@ -243,12 +243,12 @@ def contact_ratio_factor(one: float, two: float) -> float:
     """X_eps of the addendum contact ratios of gears 1 and 2, whose sum is below 2."""
     both = one + two
     if one >= 1.0:
-        made = 0.18 * one**2 + 0.70 * two**2 + 0.82 * one - 0.52 * two - 0.30 * one * two
+        ratio = 0.18 * one**2 + 0.70 * two**2 + 0.82 * one - 0.52 * two - 0.30 * one * two
     elif two >= 1.0:
-        made = 0.70 * one**2 + 0.18 * two**2 - 0.52 * one + 0.82 * two - 0.30 * one * two
+        ratio = 0.70 * one**2 + 0.18 * two**2 - 0.52 * one + 0.82 * two - 0.30 * one * two
     else:
-        made = 0.70 * (one**2 + two**2) - 0.22 * both + 0.52 - 0.60 * one * two
-    return made / (2.0 * both * one)
+        ratio = 0.70 * (one**2 + two**2) - 0.22 * both + 0.52 - 0.60 * one * two
+    return ratio / (2.0 * both * one)
 
 
 def tip_relief_factor(relief: float, one: float, two: float) -> float:
