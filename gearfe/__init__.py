@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # what type checkers and the API reference see; below, the sa
     from .base.errors import InputError
     from .drivetrain.bearings import BallBearing, RollerBearing
     from .drivetrain.gearbox.mesh_stiffness import compute_meshes
+    from .drivetrain.gearbox.rexs_results import rexs_results
     from .drivetrain.housing.build import housing_from_job
     from .drivetrain.housing.model import Housing
     from .drivetrain.modes.whirl import train_modes
@@ -74,6 +75,7 @@ _PUBLIC: dict[str, str] = {
     "read_rexs": "output.exchange.rexs",
     "read_study": "study.job",
     "rexs_job": "output.exchange.rexs",
+    "rexs_results": "drivetrain.gearbox.rexs_results",
     "run_study": "study.job",
     "run_up": "drivetrain.runup.run_up",
     "simulate": "drivetrain.train",
@@ -123,6 +125,7 @@ __all__ = [
     "read_rexs",
     "read_study",
     "rexs_job",
+    "rexs_results",
     "run_study",
     "run_up",
     "simulate",

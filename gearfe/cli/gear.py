@@ -62,14 +62,16 @@ def _wants_rexs(text: str) -> bool:
 
 
 def _write_rexs(args: argparse.Namespace) -> None:
-    """Write the whole job as REXS 2.0."""
+    """Write the whole job as REXS 2.0, with what is known of it."""
     from ..base.files import output_folder
+    from ..drivetrain.gearbox.rexs_results import rexs_results
     from ..output.exchange.rexs import write_rexs
 
     folder = output_folder(args.out)
     with stage("writing gearbox.rexs"):
-        write_rexs(args.job, folder / "gearbox.rexs")
-    print_results([], folder, ["gearbox.rexs"], {}, ())
+        known = rexs_results(args.job, folder)
+        write_rexs(args.job, folder / "gearbox.rexs", known.results)
+    print_results([], folder, ["gearbox.rexs"], {}, known.notes)
 
 
 def _show_gearbox(args: argparse.Namespace) -> None:

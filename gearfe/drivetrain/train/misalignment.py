@@ -301,6 +301,27 @@ def static_state(model: TrainModel) -> Array | None:
     return None if y is None else np.asarray(modal.origin + modal.T @ y[:, 0])
 
 
+def static_bearing_loads(model: TrainModel, q: Array) -> dict[str, Array]:
+    """Return bore -> force (N) and moment (N m) of its shaft on it along x, y, z (6,), under the steady torques.
+
+    Parameters
+    ----------
+    model : TrainModel
+        The train.
+    q : ndarray, shape (size,)
+        What `static_state` returned.
+    """
+    acting = model.preload + _steady_push(model) + _thrown(model) - _changed(model) @ q
+    still = np.zeros((1, len(q)))
+    loads = dict(zip(model.bores, model.bearings(q[None], still, still, acting[None])[0], strict=True))
+    e1, e2, axis = model.train.frame
+    for name, state in model.operating.bearings.items():  # not linear from no load on
+        loads[name] = np.concatenate(
+            [np.array([e1, axis, e2]).T @ state.load[:3], np.array([e1, e2]).T @ state.load[3:]]
+        )
+    return loads
+
+
 def gear_motion(model: TrainModel, q: Array, name: str) -> Array:
     """Displacement and rotation of a gear along x, y, z by its shaft, its bearings and the housing, (3, 6).
 

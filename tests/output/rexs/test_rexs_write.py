@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
+import math
+import os
 import tomllib
 import zipfile
 from decimal import Decimal
@@ -16,7 +19,8 @@ from gearfe.base.errors import InputError
 from gearfe.base.tables.examples import job_file
 from gearfe.base.tables.jobs import gearbox_of, train_tables
 from gearfe.cli.main import main
-from gearfe.output.exchange.rexs import read_rexs, rexs_job, write_rexs
+from gearfe.drivetrain.gearbox.rexs_results import RexsResults
+from gearfe.output.exchange.rexs import Model, read_rexs, rexs_job, write_rexs
 from gearfe.output.exchange.rexs.read import read_model
 from gearfe.output.exchange.rexs.schema import OWN, schema
 from gearfe.output.exchange.rexs.units import UNITS
@@ -188,13 +192,12 @@ def test_a_job_comes_back_without_a_change(name, form):
     assert not back.left
 
 
-@pytest.mark.parametrize("name", JOBS)
-def test_files_are_valid_by_the_table_of_the_schema(name):
-    """Component types, attributes, units, types of values, enumerations, relations and their order."""
+def check_valid(model: Model) -> None:
+    """Check component types, attributes, units, types of values, enumerations, relations and their order."""
     table = schema()
-    model = read_model(rexs_bytes(tomllib.loads(JOBS[name])), name)
     assert model.version == "2.0"
-    for component in model.components.values():
+    cases = [part for spectrum in model.spectra for case in spectrum.cases for part in case.components]
+    for component in [*model.components.values(), *cases]:
         assert component.kind in table.components
         for attribute in component.attributes.values():
             if attribute.name.startswith(OWN):
@@ -210,6 +213,11 @@ def test_files_are_valid_by_the_table_of_the_schema(name):
         joined = frozenset((kinds[number], role) for role, number in relation.roles.items())
         assert joined in table.relations[relation.kind], (relation.kind, joined)
         assert (relation.order is not None) == (relation.kind in table.ordered)
+
+
+@pytest.mark.parametrize("name", JOBS)
+def test_files_are_valid_by_the_table_of_the_schema(name):
+    check_valid(read_model(rexs_bytes(tomllib.loads(JOBS[name])), name))
 
 
 def test_other_programs_find_what_rexs_can_say():
@@ -374,3 +382,140 @@ def test_the_command(tmp_path, capsys):
     assert "gearbox.rexs" in capsys.readouterr().out
     assert dict(rexs_job(tmp_path / "out" / "gearbox.rexs").tables) == tomllib.loads(ODD)
     assert read_rexs(tmp_path / "out" / "gearbox.rexs").application.startswith("gearfe")
+
+
+# --- results --------------------------------------------------------------------------------------------------------
+
+RATED = """
+[rating]
+quality = 6
+hardness = 700.0
+material = "Eh"
+"""
+
+
+#: Jobs whose train can run; in that with odd numbers a machine is beyond the end of its shaft.
+TRAINS = [name for name in JOBS if name != "odd"]
+
+
+@functools.cache
+def with_results(name: str) -> tuple[dict[str, Any], RexsResults]:
+    """A job of `JOBS`, rated, and its results."""
+    raw = tomllib.loads(JOBS[name] + ("" if "[rating]" in JOBS[name] else RATED))
+    return raw, gearfe.rexs_results(raw)
+
+
+@pytest.mark.parametrize("form", ["xml", "json", "zip"])
+@pytest.mark.parametrize("name", TRAINS)
+def test_files_with_results_are_valid_and_change_no_number(name, form):
+    raw, known = with_results(name)
+    assert not known.notes
+    model = read_model(rexs_bytes(raw, form, name, known.results), name)
+    check_valid(model)
+    back = rexs_job(model)
+    assert dict(back.tables) == raw
+    assert not back.left
+    written = {(part.kind, attribute) for part in model.spectra[0].cases[0].components for attribute in part.attributes}
+    assert ("cylindrical_stage_gear_data", "safety_factor_pitting_iso_6336_2019") in written
+    assert ("shaft", "rotational_speed") in written
+    ignored = {entry.attribute for entry in back.entries if entry.kind == "ignored"}
+    assert "safety_factor_pitting_iso_6336_2019" in ignored  # the reader lists what it has no key for
+
+
+def test_every_result_has_an_attribute_in_the_schema():
+    """A name that no component of its table has would be left out silently."""
+    kinds = {
+        "gears": ("cylindrical_gear", "ring_gear"),
+        "meshes": ("cylindrical_stage",),
+        "shafts": ("shaft",),
+        "bearings": ("rolling_bearing_with_detailed_geometry",),
+        "gear_data": ("cylindrical_stage_gear_data",),
+    }
+    for edition in (2006, 2019):
+        for name in TRAINS:
+            raw, _ = with_results(name)
+            raw = {**raw, "rating": {**raw["rating"], "edition": edition}}
+            for result in gearfe.rexs_results(raw).results:
+                known = [schema().attribute(kind, result.attribute) for kind in kinds[result.table]]
+                if (edition, result.attribute) != (2006, "load_distribution_influence_factor_tooth_root_iso_6336_2006"):
+                    assert any(known), result
+
+
+@pytest.mark.parametrize("name", TRAINS)
+def test_forces_on_every_shaft_balance(name):
+    """Tooth forces, bearing forces and the torques of drive and loads, on shafts with gears that are no planets."""
+    raw, known = with_results(name)
+    number = {(r.table, r.name, r.attribute): r.value for r in known.results}
+    loads = raw["train"]["loads"]
+    for shaft in (shaft for shaft in raw["shafts"] if not raw["shafts"][shaft].get("carrier")):
+        gears = [gear for gear, entry in raw["gears"].items() if entry["shaft"] == shaft]
+        carried = [bearing for bearing, entry in raw["bearings"].items() if entry["shaft"] == shaft]
+        largest = sum(abs(number["gears", gear, f"force_acting_on_shaft_{a}"]) for gear in gears for a in "uvw")
+        for axis in "uvw":
+            forces = [number["gears", gear, f"force_acting_on_shaft_{axis}"] for gear in gears]
+            forces += [number["bearings", item, f"force_acting_on_inner_component_{axis}"] for item in carried]
+            assert sum(forces) == pytest.approx(0.0, abs=1e-6 * max(largest, 1.0))
+        given = sum(load["torque_Nm"] for load in loads if load["shaft"] == shaft)
+        # rings are held, sun and planets are driven: their torque is the train's own
+        if shaft != raw["train"]["drive"]["shaft"] and raw["shafts"][shaft].get("speed_ratio") != 0.0 and gears:
+            turned = sum(number["gears", gear, "torque_acting_on_shaft_u"] for gear in gears)
+            assert turned == pytest.approx(-given, abs=1e-9 * largest)
+
+
+def test_results_are_those_of_the_rating_and_of_statics():
+    """S_H of `gearfe.rate_mesh`; tooth forces of the last stage of the first model, 500 N m at its output."""
+    name = next(name for name in TRAINS if name.startswith("SEW"))
+    raw, known = with_results(name)
+    number = {(r.table, r.name, r.attribute): r for r in known.results}
+    mesh, entry = list(raw["meshes"].items())[-1]
+    gear = raw["gears"][entry["driven"]]
+    helix, width = math.radians(gear["helix_angle_deg"]), gear["teeth"] * gear["module_mm"]
+    tangential = 2e3 * 500.0 * math.cos(helix) / width
+    where = f"{mesh}/{entry['driven']}"
+    of_mesh = number["meshes", mesh, "nominal_tangential_force_at_reference_diameter"]
+    assert of_mesh.value == pytest.approx(tangential)
+    axial = number["gear_data", where, "total_tooth_force_u_direction"]
+    assert abs(axial.value) == pytest.approx(tangential * math.tan(helix))
+    assert abs(number["gear_data", where, "torque"].value) == pytest.approx(500.0)
+    assert number["gear_data", where, "power_for_rotational_speed"].value == pytest.approx(
+        500.0 * abs(number["shafts", gear["shaft"], "rotational_speed"].value)
+    )
+
+
+def test_curves_of_stiffness_are_taken_from_their_folder(tmp_path):
+    """With the last torque's face load factor, unless the job file is newer than they are."""
+    job, folder = tmp_path / "box.toml", tmp_path / "out"
+    job.write_text(job_file("gearbox"), encoding="utf-8")
+    place = folder / "first"
+    place.mkdir(parents=True)
+    (place / "stiffness.csv").write_text(
+        "pinion_angle_deg,k_tangent_N_per_m\n0,2e8\n5,nan\n10,2.5e8\n", encoding="utf-8"
+    )
+    (place / "summary.json").write_text('{"by_torque": {"K_H_beta": [1.5, 1.25]}}', encoding="utf-8")
+    known = gearfe.rexs_results(job, folder)
+    found = {result.attribute: result for result in known.results if result.name.startswith("first")}
+    assert found["meshing_stiffness_characteristic"].value == [2e8, 2.5e8]
+    assert found["face_load_factor_contact_stress"].value == 1.25
+    path = tmp_path / "box.rexs"
+    write_rexs(job, path, known.results)
+    case = read_rexs(path).spectra[0].cases[0]
+    curve = next(part.attributes for part in case.components if "meshing_stiffness_characteristic" in part.attributes)
+    assert [float(value) for value in curve["meshing_stiffness_characteristic"].value] == [2e5, 2.5e5]  # N/mm
+    later = (place / "stiffness.csv").stat().st_mtime + 10.0
+    os.utime(job, (later, later))
+    known = gearfe.rexs_results(job, folder)
+    assert "meshing_stiffness_characteristic" not in {result.attribute for result in known.results}
+    assert any("changed after" in note for note in known.notes)
+
+
+def test_what_cannot_be_computed_is_named():
+    """A rating without a speed, and a train whose loads press back flanks: the file is written without them."""
+    raw = tomllib.loads(job_file("gearbox"))
+    raw["train"]["loads"][0]["torque_Nm"] *= -1.0
+    raw["rating"] = {"hardness": 100.0}
+    known = gearfe.rexs_results(raw)
+    assert [note.partition(":")[0] for note in known.notes] == [
+        "no statics of the train in the REXS file",
+        *(f"no rating of mesh {name} in the REXS file" for name in raw["meshes"]),
+    ]
+    assert dict(rexs_job(read_model(rexs_bytes(raw, "xml", "x", known.results), "x")).tables) == raw

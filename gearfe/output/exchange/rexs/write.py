@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -30,6 +31,7 @@ from .job import OWN_KEYS, OWN_NAME, OWN_TABLES, rexs_job
 from .modifications import SHAPES
 from .parts import TYPES
 from .read import read_model
+from .results import GEAR_DATA, Result, gear_data
 from .schema import VERSION, schema
 from .units import written
 
@@ -64,11 +66,12 @@ class _Part:
 
 @dataclass
 class _Builder:
-    """Components and relations of a model under way."""
+    """Components and relations of a model under way, and number -> attributes of a component in the load case."""
 
     parts: list[_Part] = field(default_factory=list)
     relations: list[tuple[str, dict[str, int], int | None]] = field(default_factory=list)
     numbers: dict[tuple[str, str], int] = field(default_factory=dict)
+    loaded: dict[int, _Part] = field(default_factory=dict)
 
     def add(self, kind: str, name: str = "", table: str = "", **values: Any) -> _Part:
         """Add a component; a value is (number, its unit), a text, a truth value, a whole number or None for nothing."""
@@ -96,12 +99,33 @@ class _Builder:
             else:
                 part.attributes[key] = value
 
+    def add_results(self, results: Iterable[Result]) -> None:
+        """Add results where the schema has an attribute for them; an attribute that the job gives stays."""
+        for result in results:
+            number = self.numbers.get((result.table, result.name))
+            if number is None:
+                continue
+            part = self.parts[number - 1]
+            if schema().attribute(part.kind, result.attribute) is None:
+                continue
+            if result.loaded:
+                part = self.loaded.setdefault(number, _Part(number, part.kind, part.name))
+            if result.attribute in part.attributes:
+                continue
+            value = result.value
+            if isinstance(value, (bool, int)):
+                self.set(part, **{result.attribute: value})
+                continue
+            values = [value] if isinstance(value, float) else list(value)
+            if all(math.isfinite(item) for item in values):  # REXS has finite numbers only
+                self.set(part, **{result.attribute: (value if isinstance(value, float) else values, result.unit)})
+
     def relate(self, kind: str, order: int | None = None, **roles: int) -> None:
         """Add a relation."""
         self.relations.append((kind, roles, order))
 
 
-def write_rexs(job: str | Path | Mapping[str, Any], path: str | Path) -> None:
+def write_rexs(job: str | Path | Mapping[str, Any], path: str | Path, results: Iterable[Result] = ()) -> None:
     """Write a job as a REXS 2.0 file; its ending says the form: .rexs (XML), .rexsj (JSON), .rexsz (archive of XML).
 
     Parameters
@@ -110,6 +134,8 @@ def write_rexs(job: str | Path | Mapping[str, Any], path: str | Path) -> None:
         Job file, or its parsed tables.
     path
         File to write.
+    results
+        What was computed of it, see `gearfe.rexs_results`; those without an attribute in REXS are left out.
 
     Raises
     ------
@@ -122,12 +148,12 @@ def write_rexs(job: str | Path | Mapping[str, Any], path: str | Path) -> None:
         raise InputError("file", str(path), f"must end in {', '.join(ENDINGS)}", "name it gearbox.rexs")
     name = "job" if isinstance(job, Mapping) else str(job)
     raw = dict(job) if isinstance(job, Mapping) else read_toml(job)
-    content = rexs_bytes(raw, form, name)
+    content = rexs_bytes(raw, form, name, results)
     with whole_file(path) as temporary:
         temporary.write_bytes(content)
 
 
-def rexs_bytes(raw: Mapping[str, Any], form: str = "xml", name: str = "job") -> bytes:
+def rexs_bytes(raw: Mapping[str, Any], form: str = "xml", name: str = "job", results: Iterable[Result] = ()) -> bytes:
     """Return a parsed job as REXS 2.0.
 
     Parameters
@@ -138,9 +164,12 @@ def rexs_bytes(raw: Mapping[str, Any], form: str = "xml", name: str = "job") -> 
         ``xml``, ``json`` or ``zip``.
     name
         Of the job, for messages.
+    results
+        What was computed of it.
     """
     tables, others = _by_name(dict(raw), name)
     builder = _model(tables, others)
+    builder.add_results(results)
     derived = rexs_job(read_model(_xml(builder), name)).tables
     for kind in AS_COMPONENTS:
         for key, entry in tables.get(kind, {}).items():
@@ -475,6 +504,7 @@ def _mesh(b: _Builder, name: str, entry: Mapping[str, Any]) -> None:
     b.relate("stage", stage=part.number, gear_1=gears[0], gear_2=gears[1])
     for gear, drives in zip(gears, (True, False), strict=True):
         data = b.add("cylindrical_stage_gear_data", "", is_driving_gear=drives)
+        b.numbers[GEAR_DATA, gear_data(name, entry["driver" if drives else "driven"])] = data.number
         b.relate("stage_gear_data", stage=part.number, gear=gear, stage_gear_data=data.number)
 
 
@@ -564,13 +594,21 @@ def _xml(b: _Builder) -> bytes:
         lines += [f'      <ref id="{target}" role="{role}" hint="{kinds[target]}"/>' for role, target in roles.items()]
         lines.append("    </relation>")
     lines += ["  </relations>", "  <components>"]
-    for part in b.parts:
-        lines.append(f'    <component id="{part.number}" type="{part.kind}" name={quoteattr(part.name)}>')
-        for name, value in part.attributes.items():
-            text = _xml_value(value)
-            lines.append(f'      <attribute id="{name}" unit={quoteattr(_unit(part, name))}>{text}</attribute>')
-        lines.append("    </component>")
-    return "\n".join([*lines, "  </components>", "</model>", ""]).encode()
+    lines += [line for part in b.parts for line in _xml_component(part)]
+    lines.append("  </components>")
+    if b.loaded:
+        lines += ['  <load_spectrum id="1">', '    <load_case id="1">']
+        lines += [f"  {line}" for _, part in sorted(b.loaded.items()) for line in _xml_component(part)]
+        lines += ["    </load_case>", "  </load_spectrum>"]
+    return "\n".join([*lines, "</model>", ""]).encode()
+
+
+def _xml_component(part: _Part) -> list[str]:
+    lines = [f'    <component id="{part.number}" type="{part.kind}" name={quoteattr(part.name)}>']
+    for name, value in part.attributes.items():
+        text = _xml_value(value)
+        lines.append(f'      <attribute id="{name}" unit={quoteattr(_unit(part, name))}>{text}</attribute>')
+    return [*lines, "    </component>"]
 
 
 def _xml_value(value: Any) -> str:
@@ -580,21 +618,27 @@ def _xml_value(value: Any) -> str:
 
 
 def _json(b: _Builder) -> bytes:
-    components = []
-    for part in b.parts:
-        attributes = []
-        for name, value in part.attributes.items():
-            known = schema().attribute(part.kind, name)
-            kind = "string" if known is None else known.kind
-            attributes.append({"id": name, "unit": _unit(part, name), kind: _Number.of(kind, value)})
-        components.append({"id": part.number, "type": part.kind, "name": part.name, "attributes": attributes})
+    components = [_json_component(part) for part in b.parts]
     relations = []
     for number, (kind, roles, order) in enumerate(b.relations, start=1):
         refs = [{"id": target, "role": role, "hint": b.parts[target - 1].kind} for role, target in roles.items()]
         place = {} if order is None else {"order": order}
         relations.append({"id": number, "type": kind, **place, "refs": refs})
-    text = json.dumps({"model": {**_head(), "relations": relations, "components": components}}, indent=1, default=str)
+    model = {**_head(), "relations": relations, "components": components}
+    if b.loaded:
+        case = {"id": 1, "components": [_json_component(part) for _, part in sorted(b.loaded.items())]}
+        model["load_spectrum"] = {"id": 1, "load_cases": [case]}
+    text = json.dumps({"model": model}, indent=1, default=str)
     return _Number.unquoted(text).encode()
+
+
+def _json_component(part: _Part) -> dict[str, Any]:
+    attributes = []
+    for name, value in part.attributes.items():
+        known = schema().attribute(part.kind, name)
+        kind = "string" if known is None else known.kind
+        attributes.append({"id": name, "unit": _unit(part, name), kind: _Number.of(kind, value)})
+    return {"id": part.number, "type": part.kind, "name": part.name, "attributes": attributes}
 
 
 class _Number:
