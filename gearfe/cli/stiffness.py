@@ -132,7 +132,7 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
         from ..gears.gearmesh.fields_output import size_note
 
         announce(size_note(elastic, np.degrees(sweep["angles"]), chosen))
-    curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, **sweep)
+    curve = sweep_stiffness(job.pair, elastic=elastic, estimate_error=not args.no_estimate, store=True, **sweep)
     watch.seconds.update(curve.timings)
     check = None
     if args.check is not None:

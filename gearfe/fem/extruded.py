@@ -34,7 +34,7 @@ import numpy as np
 
 from ..base.typing import Array, IntArray
 from .multifrontal import BlockRows, Factor, eliminate, elimination_order
-from .plane import Material, physical_gradients, triangle_rule, triangle_shapes
+from .plane import Material, physical_gradients, triangle_rule
 
 
 @dataclass(frozen=True)
@@ -156,8 +156,7 @@ def section_integrals(points: Array, triangles: IntArray, material: Material, tu
     turn : float
         kappa (rad/m), by which the section turns along the axis.
     """
-    r, s, weights = triangle_rule()
-    values, reference = triangle_shapes(r, s)
+    _, _, weights, values, reference = triangle_rule()
     gradients, det = physical_gradients(points[triangles], reference)
     place = np.einsum("qa,max->mqx", values, points[triangles])
     along = turn * (place[..., 1:] * gradients[..., 0] - place[..., :1] * gradients[..., 1])  # L

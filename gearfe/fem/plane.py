@@ -19,10 +19,11 @@ import math
 import warnings
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from ..base.cache import cached_arrays, versions
 from ..base.errors import InputError, UnitWarning
 from ..base.suspects import beyond, other_unit
 from ..base.typing import Array, IntArray
@@ -112,13 +113,34 @@ def triangle_shapes(r: Array, s: Array) -> tuple[Array, Array]:
     return values, np.stack([np.moveaxis(slope, 0, -1) for _, slope in functions], axis=-2)
 
 
-@cache
-def triangle_rule(degree: int = 4) -> tuple[Array, Array, Array]:
-    """Quadrature rule of scikit-fem, exact to a degree: reference points r, s and weights that sum to 1/2."""
-    from skfem.quadrature import get_quadrature_tri
+class TriangleRule(NamedTuple):
+    """A quadrature rule on the reference triangle, and the six functions at its q points."""
 
-    points, weights = get_quadrature_tri(degree)
-    return points[0], points[1], weights
+    #: (q,) reference coordinates of the points
+    r: Array
+    s: Array
+    #: (q,) sum to 1/2
+    weights: Array
+    #: (q, 6)
+    values: Array
+    #: (q, 6, 2) derivatives with respect to r and s
+    slopes: Array
+
+
+@cache
+def triangle_rule(degree: int = 4) -> TriangleRule:
+    """Quadrature rule of scikit-fem, exact to a degree, with `triangle_shapes` at its points.
+
+    The cache keeps the table: importing scikit-fem takes 0.12 s, which a run on stored gears saves.
+    """
+
+    def make() -> dict[str, Array]:
+        from skfem.quadrature import get_quadrature_tri
+
+        (r, s), weights = get_quadrature_tri(degree)
+        return TriangleRule(r, s, weights, *triangle_shapes(r, s))._asdict()
+
+    return TriangleRule(**cached_arrays("triangle-rule", {"degree": degree} | versions(("scikit-fem",)), make))
 
 
 def least_jacobian(points: Array, triangles: Array) -> Array:
@@ -247,11 +269,11 @@ def element_stiffness(coordinates: Array, material: Material, plane: Plane, thic
     ndarray, shape (m, 12, 12)
         N/m; rows are node-major (node 0 x, node 0 y, node 1 x, ...).
     """
-    r, s, weights = triangle_rule()
-    gradients, det = physical_gradients(coordinates, triangle_shapes(r, s)[1])
+    rule = triangle_rule()
+    gradients, det = physical_gradients(coordinates, rule.slopes)
     strain = strain_rows(gradients).reshape(*det.shape, 3, 12)
     stress = elasticity(material, plane) @ strain
-    stress *= (thickness * weights * det)[:, :, None, None]
+    stress *= (thickness * rule.weights * det)[:, :, None, None]
     m = len(coordinates)
     return np.matmul(stress.reshape(m, -1, 12).transpose(0, 2, 1), strain.reshape(m, -1, 12))
 
@@ -290,9 +312,9 @@ def finite_strain_rates(
     ndarray, shape (c,)
         J per unit of what changes.
     """
-    r, s, weights = triangle_rule(2)
-    gradients, det = physical_gradients(points[triangles], triangle_shapes(r, s)[1])
-    volume = thickness * weights * det
+    rule = triangle_rule(2)
+    gradients, det = physical_gradients(points[triangles], rule.slopes)
+    volume = thickness * rule.weights * det
     lam, mu = material.lame(plane)
     m, cases = len(triangles), fields.shape[2] // 2
     at = gradients.transpose(0, 1, 3, 2).reshape(m, 6, 6)  # (point, derivative) x node

@@ -114,7 +114,7 @@ class Segment:
 
     def _stiffness(self, elements: IntArray, material: Material) -> Any:
         """Sum of the stiffness of elements of 18 nodes, in scipy's rows."""
-        r, s, area = triangle_rule(4)
+        r, s, area, *_ = triangle_rule(4)
         t, length = np.polynomial.legendre.leggauss(3)
         plane, plane_slopes = triangle_shapes(r, s)
         axial, axial_slopes = line_shapes(0.5 * (t + 1))

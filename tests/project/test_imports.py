@@ -22,7 +22,7 @@ SWEEP = """
 from gearfe import sweep_stiffness
 from gearfe.gears.gearmesh.job import read_stiffness_job
 job = read_stiffness_job("geometry/gear_train.toml")
-curve = sweep_stiffness(job.pair, twist=1e-3, angles=[0.05], coarsen=4.0)
+curve = sweep_stiffness(job.pair, twist=1e-3, angles=[0.05], coarsen=4.0, estimate_error=True, store=True)
 assert not curve.failed.any()
 curve.interpolant
 """
@@ -37,8 +37,9 @@ def test_help_loads_no_numerics():
     assert not loaded_after("from gearfe.cli.main import main; main(['--help'])") & {*HEAVY, "numpy", "scipy"}
 
 
-def test_a_sweep_on_cached_meshes_loads_no_mesher_and_no_plots():
-    loaded_after(SWEEP)  # makes the meshes
+def test_a_sweep_on_stored_gears_loads_no_mesher_no_finite_elements_and_no_plots():
+    assert "skfem" in loaded_after("from gearfe.fem.plane import triangle_shapes as t; t(0.2, 0.3)")
+    loaded_after(SWEEP)  # makes the meshes, and condenses the gears of the curve and of its estimate
     loaded = loaded_after(SWEEP)
-    assert not loaded & {*HEAVY} - {"skfem"}  # the shape functions of the teeth are those of scikit-fem
+    assert not loaded & {*HEAVY}
     assert "numpy" in loaded

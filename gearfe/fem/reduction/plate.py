@@ -25,7 +25,7 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from ...base.typing import Array, IntArray
-from ..plane import Material, elasticity, physical_gradients, triangle_rule, triangle_shapes
+from ..plane import Material, elasticity, physical_gradients, triangle_rule
 
 #: Share of its own energy below which a shape counts as made of others; of the largest derivative, for derivatives.
 DEPENDENT, SMALL = 1e-6, 3e-2
@@ -208,8 +208,7 @@ def reduce_plate(
 
 
 def _operators(points: Array, triangles: IntArray, thickness: float, material: Material) -> _Elements:
-    r, s, weights = triangle_rule()
-    values, slopes = triangle_shapes(r, s)
+    _, _, weights, values, slopes = triangle_rule()
     gradients, determinant = physical_gradients(points[triangles], slopes)
     m, q = determinant.shape
     n = len(points)
@@ -329,7 +328,7 @@ def _symmetric(pairs: Array, r: int) -> Array:
 
 def _at_nodes(triangles: IntArray, recovery: Array, n: int) -> Array:
     """Stresses at the nodes: the linear field through those at an element's points, means over the elements."""
-    r, s, _ = triangle_rule()
+    r, s, *_ = triangle_rule()
     fit = np.linalg.pinv(np.stack([np.ones_like(r), r, s], axis=1))
     corners = np.array([[0.0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]])
     spread = np.column_stack([np.ones(6), corners]) @ fit  # (6, q)

@@ -95,9 +95,9 @@ def elastic_pair(
     return MeshingPair(pair, one, two, model)
 
 
-def coarser(elastic: MeshingPair) -> MeshingPair:
-    """The same gears on meshes `COARSENING` times coarser."""
-    return elastic_pair(elastic.gears, elastic.model, coarsen=COARSENING * elastic.model.coarsen)
+def coarser(elastic: MeshingPair, *, store: bool = False) -> MeshingPair:
+    """The same gears on meshes `COARSENING` times coarser; `store`: see `elastic_pair`."""
+    return elastic_pair(elastic.gears, elastic.model, store=store, coarsen=COARSENING * elastic.model.coarsen)
 
 
 def sweep_stiffness(
@@ -112,6 +112,7 @@ def sweep_stiffness(
     solve_all: bool = False,
     estimate_error: bool = False,
     elastic: MeshingPair | None = None,
+    store: bool = False,
     **changes: Any,
 ) -> StiffnessCurve:
     """Compute the mesh stiffness over the rotation of the pinion, at a given twist or a given torque.
@@ -141,6 +142,8 @@ def sweep_stiffness(
         Estimate the discretisation error from coarser meshes.
     elastic
         The pair from `elastic_pair`, when it is there already; the model is not looked at then.
+    store
+        Whether the cache keeps the condensed gears of the estimate, too, and of the curve; see `elastic_pair`.
 
     Returns
     -------
@@ -155,7 +158,7 @@ def sweep_stiffness(
     load, finite = _checked_load(pair, twist, torque, twist_from), _finite(kinematics)
     requested, watch = _requested(pair, angles, ANGLES), Stopwatch()
     if elastic is None:
-        elastic = elastic_pair(pair, model, watch=watch, **changes)
+        elastic = elastic_pair(pair, model, watch=watch, store=store, **changes)
     check_alike(elastic.deviations)
     if torque is not None:
         check_torque(pair, elastic.model, load)
@@ -166,7 +169,7 @@ def sweep_stiffness(
     curve, _ = grid.cells(solved)
     if estimate_error:
         with watch.stage("error estimate"), one_thread():
-            error, correction = curve_error(grid.solver, coarser(elastic), solved, finite=finite)
+            error, correction = curve_error(grid.solver, coarser(elastic, store=store), solved, finite=finite)
         curve = replace(curve, relative_error=error[grid.source], correction=correction[grid.source])
     return replace(curve, timings=dict(watch.seconds))
 
