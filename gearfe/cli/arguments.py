@@ -275,7 +275,7 @@ def each_mesh(
     codes = []
     for mesh in meshes:
         if len(meshes) > 1:
-            print(f"mesh {mesh.name}: {mesh.driver.name} drives {mesh.driven.name}")
+            print(mesh.described)
         codes.append(run_mesh(argparse.Namespace(**{**vars(args), "out": str(Path(args.out) / mesh.name)}), mesh))
     return max(codes)
 

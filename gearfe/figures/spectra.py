@@ -200,10 +200,10 @@ def _frequency_axes(
     *,
     width: float = 0.925,
 ) -> Any:
-    """Axes between two frequencies (kHz) with the meshes' lines and multiples, and orders of the first shaft on top.
+    """Axes between two frequencies (kHz) with the meshes' lines and multiples, and orders on top.
 
-    The numbers of each mesh's multiples stand in a row of their own. `width` is that of the axes, in parts of the
-    figure's.
+    Orders are those of the first shaft that turns. The numbers of each mesh's multiples stand in a row of their own.
+    `width` is that of the axes, in parts of the figure's.
     """
     axes = figure.add_axes((0.062, 0.175, width, 0.615))
     panel(axes, "", "", "")
@@ -239,8 +239,9 @@ def _frequency_axes(
         )
     if named:
         figure.legend(fontsize=8.5, loc="lower center", ncols=4, frameon=False)
-    name, turns = response.shaft_names[0], 1e-3 * float(abs(response.shaft_frequencies_Hz[0]))
-    if turns > 0.0 and settled(response):
+    turning = np.flatnonzero(response.shaft_frequencies_Hz)
+    if len(turning) and settled(response):
+        name, turns = response.shaft_names[turning[0]], 1e-3 * float(abs(response.shaft_frequencies_Hz[turning[0]]))
         above = axes.secondary_xaxis("top", functions=(lambda f: f / turns, lambda order: order * turns))
         above.set_xlabel(f'order of shaft "{name}"', fontsize=9)
         above.tick_params(labelsize=8.5)
@@ -354,7 +355,7 @@ def draw_tracks(path: Path, made: Analysed, tracks: OrderTracks, attachment: str
     if np.isfinite(values).any() and np.nanmax(values) > 0.0:
         axes.set_yscale("log")
         axes.set_ylim(bottom=max(0.7 * float(np.nanmin(values)), 1e-4 * float(np.nanmax(values))))
-    axes.set_xlabel("speed of the first shaft  (rad/s)" if over_speed else "time  (ms)")
+    axes.set_xlabel("speed of the first shaft that turns  (rad/s)" if over_speed else "time  (ms)")
     axes.set_ylabel(f"amplitude  ({signal.unit})")
     axes.legend(fontsize=8.5, frameon=False, ncols=2)
     save(figure, path)

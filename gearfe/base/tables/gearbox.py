@@ -127,7 +127,7 @@ class NamedMesh:
     name, where
         Of the mesh, and its table, for messages.
     driver, driven
-        The gears.
+        The gears, of an internal pair the external gear first: the pinion and the wheel of contact laws and results.
     centre_distance_mm, centre_distance_where
         Centre distance, None: without backlash; and the table that it stands in, or would.
     flank
@@ -142,6 +142,8 @@ class NamedMesh:
         Tilts of the axes over the common face width, in and across the plane of action.
     misalignment_from_shafts
         Whether the shafts of the train tilt the gears, too.
+    ring_drives
+        Whether the internal gear, `driven`, drives.
     """
 
     name: str
@@ -157,11 +159,18 @@ class NamedMesh:
     misalignment_um: float = 0.0
     misalignment_across_um: float = 0.0
     misalignment_from_shafts: bool = False
+    ring_drives: bool = False
 
     @property
     def gears(self) -> tuple[NamedGear, NamedGear]:
-        """Driver and driven gear."""
+        """Driver and driven gear, of an internal pair the external gear first."""
         return self.driver, self.driven
+
+    @property
+    def described(self) -> str:
+        """Sentence without a full stop that says which gear drives the other."""
+        one, two = self.gears[::-1] if self.ring_drives else self.gears
+        return f"mesh {self.name}: {one.name} drives {two.name}"
 
     @property
     def ratio(self) -> float:
@@ -498,7 +507,20 @@ def _named_mesh(name: str, table: NamedMeshTable, gears: Mapping[str, NamedGear]
             raise InputError(f"{two.where}.{given}", value, problem, f"gears in mesh have equal {what}")
     tilts = {key: getattr(table, key) for key in (*TILTS, FROM_SHAFTS)}
     distance = magnitude(table.centre_distance_mm, one.internal or two.internal, where)
-    return NamedMesh(name, where, one, two, distance, where, table.flank, table.tolerance_class, **tilts)
+    gears, ring_drives = external_first(one, two)
+    return NamedMesh(
+        name, where, *gears, distance, where, table.flank, table.tolerance_class, ring_drives=ring_drives, **tilts
+    )
+
+
+def external_first(driver: NamedGear, driven: NamedGear) -> tuple[tuple[NamedGear, NamedGear], bool]:
+    """Return driver and driven gear, an internal gear last, and whether that exchanges them: the internal gear drives.
+
+    Contact laws take the external gear as pinion.
+    """
+    if driver.internal and not driven.internal:
+        return (driven, driver), True
+    return (driver, driven), False
 
 
 def tooth_form_of(

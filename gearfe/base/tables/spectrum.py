@@ -37,12 +37,14 @@ class SpectrumTable:
         None, above=0.0, doc="duration of the parts of spectra over time (ms); left out: none"
     )
     order_turns: float | None = quantity(
-        None, above=0.0, doc="turns of the first shaft in the parts that orders are tracked over; left out: none"
+        None,
+        above=0.0,
+        doc="turns of the first shaft that turns, in the parts that orders are tracked over; left out: none",
     )
     orders: tuple[float, ...] = quantity(
         (),
         above=0.0,
-        doc="orders that are tracked (turns of the first shaft); left out: multiples 1 to 3 of the meshes",
+        doc="orders that are tracked, those of the first shaft that turns; left out: multiples 1 to 3 of the meshes",
     )
     measured: tuple[MeasuredTable, ...] = quantity((), doc="[[spectrum.measured]]")
 

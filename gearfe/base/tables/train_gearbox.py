@@ -23,6 +23,7 @@ from .gearbox import (
     Gearbox,
     NamedGear,
     NamedMesh,
+    external_first,
     mesh_name,
     pair_gearbox,
     tooth_form_of,
@@ -218,8 +219,8 @@ def train_gearbox(
         tilts: dict[str, Any] = {key: getattr(pair, key) if of_pair else 0.0 for key in TILTS}
         if name in meshes:
             raise InputError(where, None, f"has the gears of another mesh, {name!r}", "two gears have one mesh")
-        one, two = gears[mesh.driver], gears[mesh.driven]
-        meshes[name] = NamedMesh(name, where, one, two, distance, distance_where, **tilts)
+        both, ring_drives = external_first(gears[mesh.driver], gears[mesh.driven])
+        meshes[name] = NamedMesh(name, where, *both, distance, distance_where, ring_drives=ring_drives, **tilts)
     return with_hands(Gearbox(gears, meshes))
 
 

@@ -368,8 +368,8 @@ def _mesh(job: TrainJob, table: TrainMeshTable, named: NamedMesh) -> GearMesh:
     distance = named.centre_distance_mm
     normal = math.cos(job.gears[table.driver].base_helix_angle)
     return GearMesh(
-        table.driver,
-        table.driven,
+        named.driver.name,
+        named.driven.name,
         None,
         None if table.phase_deg is None else math.radians(table.phase_deg),
         table.damping_N_s_per_m,
@@ -378,6 +378,7 @@ def _mesh(job: TrainJob, table: TrainMeshTable, named: NamedMesh) -> GearMesh:
         None if table.backlash_um is None else 1e-6 * table.backlash_um / normal,
         damping_acts=table.damping_acts,
         name=named.name,
+        ring_drives=named.ring_drives,
     )
 
 

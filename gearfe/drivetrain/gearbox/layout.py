@@ -57,7 +57,7 @@ class PlacedMesh:
     Attributes
     ----------
     name, driver, driven
-        Names of the mesh and of its gears.
+        Names of the mesh and of its gears, the one that drives first.
     shaft_distance
         Distance of the axes of their shafts (m).
     centre_distance
@@ -158,5 +158,6 @@ def _placed(box: Gearbox, shafts: tuple[PlacedShaft, ...]) -> GearboxLayout:
         apart = math.hypot(two.centre[0] - one.centre[0], two.centre[2] - one.centre[2])
         ends = [(gear.centre[1] - 0.5 * gear.width, gear.centre[1] + 0.5 * gear.width) for gear in (one, two)]
         overlap = min(high for _, high in ends) - max(low for low, _ in ends)
-        meshes.append(PlacedMesh(name, one.name, two.name, apart, pairs[name].working_centre_distance, overlap))
+        names = (two.name, one.name) if mesh.ring_drives else (one.name, two.name)
+        meshes.append(PlacedMesh(name, *names, apart, pairs[name].working_centre_distance, overlap))
     return GearboxLayout(tuple(gears.values()), shafts, tuple(meshes))

@@ -78,10 +78,9 @@ def train_curves(
         elif mesh.stiffness_N_per_m is not None:
             found.append(mesh.stiffness_N_per_m)
         elif mesh.mesh_table is not None:
-            driven = train.gear(made.driven).gear
             file, method = job.path.parent / mesh.mesh_table, job.table.curves.interpolation
             with _key_in_messages(f"{tables[number]}.mesh_table", mesh.mesh_table):
-                found.append(read_mesh_table(file, 2.0 * math.pi / teeth, driven.base_radius, method=method))
+                found.append(read_mesh_table(file, method=method, **_table_roles(train, number)))
         elif mesh.curve is not None:
             with _key_in_messages(f"{tables[number]}.curve", mesh.curve):
                 found.append(_read_curve(job.path.parent / mesh.curve, teeth))
@@ -152,6 +151,22 @@ def _key_in_messages(key: str, file: str) -> Iterator[None]:
         raise InputError(key, file, error.problem, error.cure) from None
 
 
+def _table_roles(train: GearTrain, number: int) -> dict[str, Any]:
+    """Pitch of the gear that drives, base radius of the driven one, and the latter's phase where it is the pinion."""
+    mesh = train.layout.meshes[number]
+    pitches = [2.0 * math.pi / abs(gear.teeth) for gear in (mesh.driver, mesh.driven)]
+    if not mesh.ring_drives:
+        return {"pitch": pitches[0], "driven_base_radius": mesh.driven.base_radius}
+    mate = {"mate_pitch": pitches[0], "mate_phase": mesh.mate_phase}
+    return {"pitch": pitches[1], "driven_base_radius": mesh.driver.base_radius, **mate}
+
+
+def _largest_torque(job: TrainJob, number: int) -> float | None:
+    """Torque at the wheel (N m) for mesh_model_torque_Nm, that at the driven gear."""
+    torque, named = job.table.meshes[number].mesh_model_torque_Nm, job.meshes[number]
+    return None if torque is None else torque * (named.ratio if named.ring_drives else 1.0)
+
+
 def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
     """A curve from a CSV file; without a period in the file, that of the driver."""
     try:
@@ -163,7 +178,7 @@ def _read_curve(path: Path, teeth: int) -> StiffnessCurve:
 
 
 def carried_torque(train: GearTrain, number: int) -> float:
-    """Torque (N m) at the driven gear of a mesh in steady running, without sign."""
+    """Torque (N m) at the wheel of a mesh in steady running, without sign."""
     driven = train.gear(train.meshes[number].driven).gear
     return abs(float(train.kinematics.steady_forces[number])) * driven.base_radius
 
@@ -296,7 +311,7 @@ def _wide_law(job: TrainJob, train: GearTrain, number: int) -> _WideLaw:
     from ...gears.gearmesh.width_job import wide_mesh  # teeth in three dimensions, for these meshes
     from ...gears.gearmesh.width_law_store import width_law_parts
 
-    mesh, table = train.meshes[number], job.table.meshes[number]
+    mesh = train.meshes[number]
     pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
     _check_wide(job, train, number)
     driving, back = (
@@ -304,7 +319,7 @@ def _wide_law(job: TrainJob, train: GearTrain, number: int) -> _WideLaw:
         for flank in _flanks(train, number)
     )
     carried = carried_torque(train, number)
-    most = table.mesh_model_torque_Nm or ROOM * carried
+    most = _largest_torque(job, number) or ROOM * carried
     label = f"mesh {mesh.name!r} mesh_model_torque_Nm"
     if not most > 0.0:
         problem = "carries no torque in steady running, so the range of its mesh law is unknown"
@@ -316,7 +331,7 @@ def _wide_law(job: TrainJob, train: GearTrain, number: int) -> _WideLaw:
         raise InputError(label, float(f"{most:.6g}"), problem, "give a smaller load, or mesh_model_torque_Nm") from None
     others = back_flanks(job, train, number) and _flanks_differ(driving.mesh)
     parts = [width_law_parts(flanks) for flanks in ((driving, back) if others else (driving,))]
-    usual = max(carried, table.mesh_model_torque_Nm or 0.0)
+    usual = max(carried, _largest_torque(job, number) or 0.0)
     radius = pair.wheel.base_radius
     key = cache_key("wide-law", parts)
     return _WideLaw(number, driving, back if others else None, key, most / radius, usual / radius)
@@ -422,12 +437,12 @@ def _flanks_differ(mesh: NamedMesh) -> bool:
 def _computed_law(job: TrainJob, train: GearTrain, number: int, estimate: bool) -> MeshLaw:
     """Mesh law of a mesh with the driver as pinion; meshes of the same gears share the one for the largest torque."""
 
-    mesh, table = train.meshes[number], job.table.meshes[number]
+    mesh = train.meshes[number]
     pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
     tables = _plain_job(job, number, pair)
     alike = [i for i in range(len(train.meshes)) if _contact(job, train, i) == _contact(job, train, number)]
     steady = max(carried_torque(train, i) for i in alike)
-    most = table.mesh_model_torque_Nm or ROOM * steady
+    most = _largest_torque(job, number) or ROOM * steady
     if not most > 0.0:
         problem = "carries no torque in steady running, so the range of its mesh law is unknown"
         raise InputError(f"mesh {mesh.name!r} mesh_model_torque_Nm", None, problem, "give mesh_model_torque_Nm")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -149,15 +149,16 @@ class GearMesh:
     Parameters
     ----------
     driver, driven
-        Names of gears.
+        Names of gears. Of an internal gear that drives, a train makes `driven`, with `ring_drives`.
     stiffness
-        A mesh law (also one over the face width), a curve over the driver's rotation, its interpolant (N/m over rad), a
-        constant (N/m; along the line of action, of helical gears in the transverse section), the model from which
-        `gearfe.compute_meshes` computes the law (materials of driver and driven gear, element sizes), or None for the
-        ideal rigid mesh: a constraint whose multiplier is the contact force.
+        A mesh law (also one over the face width), a curve over the driver's rotation (of an internal pair that of the
+        external gear, whichever drives), its interpolant (N/m over rad), a constant (N/m; along the line of action, of
+        helical gears in the transverse section), the model from which `gearfe.compute_meshes` computes the law
+        (materials of driver and driven gear, element sizes), or None for the ideal rigid mesh: a constraint whose
+        multiplier is the contact force.
     phase
-        Angle of the driver (rad), counted in its driving sense, at which it starts; 0: a driver's tooth stands on the
-        line of centres. None: from the teeth of the connected gears, the first of whose meshes has 0; see
+        Angle of the gear that drives (rad), counted in its driving sense, at which it starts; 0: one of its teeth is on
+        the line of centres. None: from the teeth of the connected gears, the first of whose meshes has 0; see
         `gearfe.drivetrain.train.phases`.
     damping
         N s/m along the line of action; with a law that damps in contact only, at the force of steady running.
@@ -183,6 +184,8 @@ class GearMesh:
         middle of the common width, without a stiffness against tilting.
     moments
         Whether moments that tilt the gears act in a mesh without `tilting`: elastic shafts then keep what these bend.
+    ring_drives
+        Whether the internal gear, `driven`, drives.
     """
 
     driver: str
@@ -199,6 +202,7 @@ class GearMesh:
     transmission_error: PeriodicInterpolant | None = None
     tilting: Tilting | None = None
     moments: bool = False
+    ring_drives: bool = False
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -572,6 +576,16 @@ class GearTrain(Facts):
     carriers: tuple[Carrier, ...] = ()
     guides: tuple[Guide, ...] = ()
 
+    def __post_init__(self) -> None:
+        internal = {gear.name for gear in self.gears if gear.gear.internal}
+        meshes = tuple(
+            replace(mesh, driver=mesh.driven, driven=mesh.driver, ring_drives=True)
+            if mesh.driver in internal and mesh.driven not in internal
+            else mesh
+            for mesh in self.meshes
+        )
+        object.__setattr__(self, "meshes", meshes)
+
     def facts(self) -> dict[str, str]:
         """Shafts, gears, meshes, drive, loads, housing."""
         housing, drive = self.housing, self.drive
@@ -691,7 +705,7 @@ class GearTrain(Facts):
         towards, distance = math.atan2(arm[1], arm[0]), float(np.linalg.norm(arm))
         carrier = self.mesh_carrier(mesh)
         number = None if carrier is None else self.shaft_number(carrier.shaft)
-        return LayoutMesh(mesh.name, driver, driven, towards, distance, twist, mesh.phase, number)
+        return LayoutMesh(mesh.name, driver, driven, towards, distance, twist, mesh.phase, number, mesh.ring_drives)
 
     @cached_property
     def kinematics(self) -> Kinematics:

@@ -48,8 +48,9 @@ class Kinematics:
     note
         Why there is no common period, or nothing.
     senses
-        For each mesh, +1 or -1: sense about the axis in which the driver pushes, that of its rotation. Where the drive
-        stands still, it follows from the loads; in a planetary stage always, for there "driver" is a name only.
+        For each mesh, +1 or -1: sense about the axis in which the driver pushes, that of its rotation, and the opposite
+        where the internal gear drives. Where the drive stands still, it follows from the loads; in a planetary stage
+        always, for there "driver" is a name only.
     steady_forces : ndarray, shape (meshes,)
         Force of each mesh (N) under the final torques of the loads, without inertia; negative presses the back flanks.
         In a loop of gears those of least squares: statics alone do not determine them.
@@ -78,6 +79,11 @@ class Kinematics:
     def ratios(self) -> tuple[Fraction, ...]:
         """Speed of each shaft for unit speed of the drive, in the order of the shafts."""
         return self.rolling.ratios
+
+    @property
+    def first_turning(self) -> int:
+        """Number of the first shaft that turns, whose turns orders count."""
+        return next(number for number, ratio in enumerate(self.ratios) if ratio)
 
 
 @lru_cache(maxsize=32)
@@ -166,7 +172,10 @@ def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
 
 def _senses_and_forces(layout: TrainLayout, drivers: Sequence[Fraction]) -> tuple[tuple[float, ...], Array]:
     """Driving senses, and steady forces (N), see `Kinematics`; `drivers` are the speeds of the meshes' drivers."""
-    rolled = tuple(math.copysign(1.0, speed) for speed in drivers)
+    rolled = tuple(
+        math.copysign(1.0, -speed if mesh.ring_drives else speed)
+        for mesh, speed in zip(layout.meshes, drivers, strict=True)
+    )
     forces = balanced_forces(layout, rolled, load_torques(layout, [load_end(layout)]))[:, 0]
     sense = drive_sense(layout.speed)
     if sense == 0.0:

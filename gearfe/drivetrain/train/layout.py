@@ -5,10 +5,15 @@ Trains that differ in stiffness, damping, friction or housing only have equal la
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TypeVar
 
+from ...base.typing import Array
 from ...multibody.series.timefunctions import TimeFunction
+
+T = TypeVar("T", float, Array)
 
 #: Pitch errors of the left and of the right flanks of a gear (m), one a tooth, or none.
 PitchErrors = tuple[tuple[float, ...], tuple[float, ...]]
@@ -48,7 +53,7 @@ class LayoutMesh:
     name
         Of the mesh.
     driver, driven
-        The gears.
+        The gears, of an internal pair the external gear first.
     towards
         Angle (rad) of the line from the driver's axis to the pitch point, from the train's first direction e1.
     distance
@@ -56,9 +61,11 @@ class LayoutMesh:
     contact_twist
         Half the backlash as a twist of the driven gear (rad).
     phase
-        Given angle of the driver at the start (rad), or None.
+        Given angle of the gear that drives at the start (rad), or None.
     carrier
         Number of the shaft that carries the axis of one of the gears; None: both axes are fixed.
+    ring_drives
+        Whether the internal gear, `driven`, drives.
     """
 
     name: str
@@ -69,11 +76,26 @@ class LayoutMesh:
     contact_twist: float
     phase: float | None
     carrier: int | None = None
+    ring_drives: bool = False
 
     @property
     def turns_alike(self) -> bool:
         """Whether both gears turn in one sense: one of them is internal."""
         return self.driver.teeth * self.driven.teeth < 0
+
+    def mate_phase(self, phase: T, *, of_ring: bool = True) -> T:
+        """Return the phase (rad) of one gear of an internal pair for that of the other.
+
+        Parameters
+        ----------
+        phase
+            Rotation of a gear past a tooth on the line of centres, in the sense in which it pushes (rad).
+        of_ring
+            Whether that gear is the internal one; else it is the external one.
+        """
+        z1, z2 = self.driver.teeth, abs(self.driven.teeth)
+        known, sought = (z2, z1) if of_ring else (z1, z2)
+        return (math.pi + z2 * self.contact_twist - known * phase) / sought
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ from .driveline import Driveline, MachineRotor, driveline, machine_rotors
 from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, pin_rows, planes, rotor
 from .forces import Gyro, SpeedTorque, TrainForces, Turned, derivative
 from .gear_train import Carrier, Drive, Five, GearTrain, Load, Pin, Shaft
-from .kinematics import Kinematics, load_end
+from .kinematics import Kinematics, drive_sense, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
 from .operating import (
     OperatingPoint,
@@ -513,13 +513,22 @@ def _orders(train: GearTrain, shafts: Shafts) -> list[tuple[Array, TimeFunction,
         for order, amplitude, phase in load.orders:
             if load.mesh:
                 number = next(i for i, mesh in enumerate(train.meshes) if mesh.name == load.mesh)
-                teeth = train.gear(train.meshes[number].driver).gear.teeth
-                per_turn, start = rolled.cycles[number], phase + order * teeth * rolled.phases[number]
+                per_turn, start = rolled.cycles[number], phase + order * _start_angle(train, number)
             else:
                 per_turn, start = abs(rolled.ratios[train.shaft_number(load.shaft)]), phase
             cycles = Fraction(order).limit_denominator(MOST_DENOMINATOR) * per_turn
             found.append((direction, sine(amplitude, order * float(per_turn) * speed, start), cycles))
     return found
+
+
+def _start_angle(train: GearTrain, number: int) -> float:
+    """Rotation of a mesh's driver past a tooth on the line of centres at the start, 2 pi a pitch (rad)."""
+    mesh, rolled = train.layout.meshes[number], train.kinematics
+    turning = math.copysign(1.0, float(rolled.drivers[number])) * (drive_sense(train.layout.speed) or 1.0)
+    forwards = turning * rolled.senses[number]  # phases are in the sense in which a gear pushes
+    if mesh.ring_drives:
+        return -forwards * abs(mesh.driven.teeth) * mesh.mate_phase(rolled.phases[number], of_ring=False)
+    return forwards * mesh.driver.teeth * rolled.phases[number]
 
 
 def _forces(

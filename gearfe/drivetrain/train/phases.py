@@ -9,9 +9,10 @@ from driver (1) to driven gear (2), driving flanks touch when
 s the driver's sense (+1 or -1) and h half the backlash as a twist of the driven gear: for h = 0 a tooth on the line
 of centres faces a space. An internal driven gear has a negative z_2, and its teeth face the driver's at beta, the
 direction from the driver's axis to the pitch point: the term is :math:`z_2(\tau_2 - \beta)`, with :math:`+s|z_2|h`. The
-curve of the mesh begins at :math:`\varphi_0 = s(\tau_1 - \beta)`. Gears joined by meshes
-are one group, so one angle places all their teeth; gears on one shaft that are joined by no mesh are keyed on it
-independently of each other.
+curve of the mesh begins at :math:`\varphi_0 = s(\tau_1 - \beta)`; an internal gear that drives is then at
+:math:`\varphi_2 = -s(\tau_2 - \beta)`, with :math:`z_1\varphi_0 + |z_2|\varphi_2 = \pi + |z_2|h`.
+Gears joined by meshes are one group, so one angle places all their teeth; gears on one shaft that are joined by no mesh
+are keyed on it independently of each other.
 """
 
 from __future__ import annotations
@@ -62,6 +63,12 @@ class _Join:
         return self.mesh.driver.teeth, self.mesh.driven.teeth
 
     @property
+    def given_phase(self) -> float:
+        """Phase (rad) of the driver that is given, or 0 of the gear that drives."""
+        phase = self.mesh.phase or 0.0
+        return self.mesh.mate_phase(phase) if self.mesh.ring_drives else phase
+
+    @property
     def remainder(self) -> float:
         """Right side of the relation (rad)."""
         return math.pi + self.sense * abs(self.mesh.driven.teeth) * self.mesh.contact_twist
@@ -77,9 +84,7 @@ class _Join:
 
     def phase(self, tooth: float) -> float:
         """Phase (rad, 0 to a pitch) of the driver's tooth."""
-        pitch = 2.0 * math.pi / self.teeth[0]
-        angle = (self.sense * (tooth - self.mesh.towards)) % pitch
-        return 0.0 if min(angle, pitch - angle) < 1e-9 * pitch else angle
+        return _in_pitch(self.sense * (tooth - self.mesh.towards), 2.0 * math.pi / self.teeth[0])
 
     def driven_tooth(self, tooth: float) -> float:
         """Place of a driven tooth for a driver's."""
@@ -101,7 +106,7 @@ class _Join:
 def tooth_places(layout: TrainLayout, senses: Sequence[float]) -> ToothPlaces:
     """Places of all teeth and phases of all meshes.
 
-    The first mesh of a connected group of gears has the phase 0, unless one of them is given a phase.
+    In the first mesh of a connected group of gears the gear that drives has the phase 0, unless a phase is given.
 
     Parameters
     ----------
@@ -118,7 +123,7 @@ def tooth_places(layout: TrainLayout, senses: Sequence[float]) -> ToothPlaces:
     angles: dict[str, float] = {}
     for join in sorted(joins, key=lambda j: j.mesh.phase is None):
         if join.mesh.driver.name not in angles and join.mesh.driven.name not in angles:
-            angles[join.mesh.driver.name] = join.driver_tooth_at(join.mesh.phase or 0.0)
+            angles[join.mesh.driver.name] = join.driver_tooth_at(join.given_phase)
             _spread(joins, angles)
     room = 2.0 * sum(max(SAME * mesh.distance, 1e-3 * ROUNDING_MM) for mesh in layout.meshes)
     for join in joins:
@@ -156,11 +161,20 @@ def _check(join: _Join, angles: dict[str, float], room: float) -> None:
     if mesh.phase is None:
         return
     geometric = join.phase(angles[mesh.driver.name])
-    if abs(math.remainder(mesh.phase - geometric, pitch)) > NEAR * pitch:
+    if abs(math.remainder(join.given_phase - geometric, pitch)) > NEAR * pitch:
+        if mesh.ring_drives:
+            pitch = 2.0 * math.pi / abs(join.teeth[1])
+            geometric = _in_pitch(mesh.mate_phase(geometric, of_ring=False), pitch)
         degrees = f"{math.degrees(geometric):.9g}"
         problem = f"contradicts the teeth of gears that it shares with other meshes, which make it {degrees} deg"
         cure = f"leave it out, or write {degrees} (whole pitches of {math.degrees(pitch):.6g} deg more are the same)"
         raise InputError(f"mesh {mesh.name!r} phase_deg", math.degrees(mesh.phase), problem, cure)
+
+
+def _in_pitch(angle: float, pitch: float) -> float:
+    """Return an angle (rad) less whole pitches; a pitch less round-off is 0."""
+    angle %= pitch
+    return 0.0 if min(angle, pitch - angle) < 1e-9 * pitch else angle
 
 
 def pair_shifts(mesh: LayoutMesh, sense: float, places: ToothPlaces) -> tuple[Array, Array]:

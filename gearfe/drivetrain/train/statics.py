@@ -99,7 +99,8 @@ def _back_flank_error(train: GearTrain, number: int, time: float) -> InputError:
             "between it and the drive"
         )
     else:
-        problem = f"brakes, but gear {mesh.driven!r} drives gear {mesh.driver!r}; {flanks}"
+        one, two = (mesh.driver, mesh.driven) if mesh.ring_drives else (mesh.driven, mesh.driver)
+        problem = f"brakes, but gear {one!r} drives gear {two!r}; {flanks}"
         cure = f"exchange driver and driven of mesh {mesh.name!r}, or change the sign of the torque"
     return InputError(f"load on {load.shaft!r} torque_Nm", torque, problem, cure)
 

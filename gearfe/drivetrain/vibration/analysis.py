@@ -46,7 +46,7 @@ class Analysed:
     tracks
         Orders; None where not requested.
     mesh_orders
-        Turns of the first shaft after which each mesh repeats once, inverted.
+        Turns of the first shaft that turns after which each mesh repeats once, inverted.
     measured
         Measured spectra, and the computed one at each of their attachments.
     """
@@ -85,8 +85,8 @@ class Analysis:
         self._step = 1e-6 * job.table.step_us
         self.measured = read_measured(job)
         turning = train.kinematics
-        #: turns of the first shaft for one of the drive
-        self.ratio = float(turning.ratios[0])
+        #: turns of the first shaft that turns for one of the drive
+        self.ratio = float(turning.ratios[turning.first_turning])
         self.mesh_orders = np.array([float(c) for c in turning.cycles]) / abs(self.ratio)
         self._tracked: Tracked | None = None
         if self.table.short_time_ms is not None:  # refused before the long computation

@@ -51,7 +51,8 @@ def dominant(spectra: TrainSpectra, response: TrainResponse, name: str) -> list[
     """Largest lines of a signal, each with the multiple of a mesh frequency within one bin of it, or its sideband."""
     spectrum = spectra.spectrum
     lines = lines_of(response, float(spectrum.frequency[-1]))
-    drive = float(abs(response.shaft_frequencies_Hz[0])) if settled(response) else 0.0
+    turning = np.abs(response.shaft_frequencies_Hz[np.flatnonzero(response.shaft_frequencies_Hz)])
+    drive = float(turning[0]) if len(turning) and settled(response) else 0.0
     found = []
     for peak in peaks(spectrum.frequency, spectra.amplitude(name), NAMED, above=LEAST):
         line = nearest_line(peak.frequency, lines, spectrum.resolution)

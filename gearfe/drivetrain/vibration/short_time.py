@@ -85,7 +85,7 @@ def check_turns(angle: Array, turns: float) -> tuple[int, int, float]:
     first, last, sense = _one_way(angle)
     whole = float(abs(angle[last - 1] - angle[first])) / (2.0 * math.pi) if last > first else 0.0
     if whole * (1.0 + 1e-9) < turns:
-        problem = f"the first shaft makes {whole:.4g} turns in one sense"
+        problem = f"the first shaft that turns makes {whole:.4g} turns in one sense"
         raise InputError("spectrum.order_turns", turns, problem, "take less turns, or a longer run")
     return first, last, sense
 

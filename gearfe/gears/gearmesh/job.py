@@ -106,7 +106,8 @@ class StiffnessJob:
         gears = {mesh[role]["name"]: mesh.pop(role) for role in ("driver", "driven")}
         stiffness = mesh.pop("stiffness")
         mesh.pop("loads")
-        roles = {"driver": self.mesh.driver.name, "driven": self.mesh.driven.name}
+        both = self.mesh.gears[::-1] if self.mesh.ring_drives else self.mesh.gears
+        roles = {role: gear.name for role, gear in zip(("driver", "driven"), both, strict=True)}
         return {"gears": gears, "mesh": {**mesh, **roles}, "stiffness": stiffness}
 
     @property

@@ -7,7 +7,7 @@ force :math:`F_0` along the line of action, :math:`e = e_0 - F_0/k`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,7 +67,15 @@ class MeshTable:
     tilting: Tilting | None = None
 
 
-def read_mesh_table(path: str | Path, pitch: float, driven_base_radius: float, *, method: str = "cubic") -> MeshTable:
+def read_mesh_table(
+    path: str | Path,
+    pitch: float,
+    driven_base_radius: float,
+    *,
+    method: str = "cubic",
+    mate_pitch: float | None = None,
+    mate_phase: Callable[[Array], Array] | None = None,
+) -> MeshTable:
     """Read a mesh table from a CSV file.
 
     Parameters
@@ -81,6 +89,10 @@ def read_mesh_table(path: str | Path, pitch: float, driven_base_radius: float, *
         Base radius of the driven gear (m).
     method : str
         ``cubic`` (monotone) or ``linear``.
+    mate_pitch : float, optional
+        Pitch of the driven gear (rad), for an answer over its rotation: that of the external gear where a ring drives.
+    mate_phase : callable, optional
+        Rotation of the driven gear for that of the driver (rad), which falls as that rises.
 
     Raises
     ------
@@ -114,6 +126,9 @@ def read_mesh_table(path: str | Path, pitch: float, driven_base_radius: float, *
             problem = f"must have one {load} > 0 on all rows"
             raise InputError(TABLE, str(path), problem, "write the load of the transmission error, one for the table")
         error = error - force / k
+    if mate_phase is not None and mate_pitch is not None:
+        phase, k, error = mate_phase(phase)[::-1], k[::-1], error[::-1]
+        pitch = mate_pitch
     for values, unit in ((k, 1.0), (error, 1e6)):
         try:
             check_repeats(phase, unit * values, pitch, str(path))

@@ -476,9 +476,7 @@ def _mesh_loads(
         relative = _relative(tables, names[0], carriers.get(reading.numbers["meshes", row.name]), speeds)
         driving = [_driving(reading, row.name, name) for name in names]
         power = None if share is None or relative is None else share * gears[names[0]]["teeth"] * relative
-        if gears[names[0]]["teeth"] * gears[names[1]]["teeth"] < 0:
-            turned, rule = gears[names[0]]["teeth"] < 0, "the external gear of a mesh with a ring, whoever drives"
-        elif power is not None and abs(power) > 0.0:
+        if power is not None and abs(power) > 0.0:
             # power into the first gear from the mesh: positive, it is driven
             turned, rule = power > 0.0, "power flows from the driver to the driven gear"
         else:
@@ -490,19 +488,20 @@ def _mesh_loads(
                         f"meshes.{row.name}.driver", rule)  # fmt: skip
         if not share:
             continue
-        torque = float(f"{abs(share * gears[names[1]]['teeth']):.9g}")
+        pinion, wheel = names[::-1] if gears[names[0]]["teeth"] < 0 else names
+        torque = float(f"{abs(share * gears[wheel]['teeth']):.9g}")
         if torque <= 0.0:
             continue
         entry["stiffness"] = {"torque_Nm": torque}
         stage = reading.part("meshes", row.name)
         rule = "balance of the torques on all shafts, without losses"
         reading.derived(stage, "external_load", f"meshes.{row.name}.stiffness.torque_Nm", rule)
-        # the driver is pushed back by the mesh: counter-clockwise from larger y its left flanks drive
-        push = -share * gears[names[0]]["teeth"]
+        # the pinion is pushed back by the mesh: counter-clockwise from larger y its left flanks drive
+        push = -share * gears[pinion]["teeth"]
         if push < 0.0:
             entry["flank"] = "right"
         reading.derived(
-            stage, "external_load", f"meshes.{row.name}.flank", "left where the torque on the driver is > 0"
+            stage, "external_load", f"meshes.{row.name}.flank", "left where the torque on the pinion is > 0"
         )
 
 
@@ -545,7 +544,8 @@ def _other_cases(
         _, shares = _balance(list(tables["shafts"]), rows, there, held)
         for name, share in shares.items():
             if name in tables["meshes"] and share:
-                teeth = tables["gears"][tables["meshes"][name]["driven"]]["teeth"]
+                both = [tables["gears"][tables["meshes"][name][role]]["teeth"] for role in ("driver", "driven")]
+                teeth = min(both) if min(both) < 0 else both[1]
                 found.setdefault(name, set()).add(float(f"{abs(share * teeth):.9g}"))
     for name, values in found.items():
         if len(values) > 1:
