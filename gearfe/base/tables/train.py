@@ -497,6 +497,32 @@ class TrainLoadTable:
             raise InputError(f"{where}.mesh", self.mesh, problem, "add orders, or leave it out")
 
 
+@dataclass(frozen=True)
+class TrainForceTable:
+    """Force and moment on a shaft that stay as they are: belt pull, weight of an overhung part, force of a pump."""
+
+    shaft: str = quantity(doc="shaft that is loaded")
+    y_mm: float = quantity(doc="place along the axis where force and moment act (mm)")
+    force_x_N: float = quantity(0.0, doc="force across the shaft along x (N)")
+    force_y_N: float = quantity(0.0, doc="force along the shaft (N)")
+    force_z_N: float = quantity(0.0, doc="force across the shaft along z (N)")
+    moment_x_Nm: float = quantity(0.0, doc="bending moment about x (N m)")
+    moment_z_Nm: float = quantity(0.0, doc="bending moment about z (N m)")
+    ramp_centre_ms: float = quantity(0.0, doc="middle of the smoothed step from 0 to the force (ms)")
+    ramp_width_ms: float | None = quantity(None, above=0.0, doc="duration of that step (ms); left out: constant force")
+
+    @property
+    def values(self) -> tuple[float, float, float, float, float, float]:
+        """Force along x, y, z (N) and moment about them (N m)."""
+        return self.force_x_N, self.force_y_N, self.force_z_N, self.moment_x_Nm, 0.0, self.moment_z_Nm
+
+    def check(self, where: str) -> None:
+        """A force is not zero."""
+        if not any(self.values):
+            problem = "is required: force and moment are zero"
+            raise InputError(f"{where}.force_x_N", None, problem, "add force_x_N, force_y_N, force_z_N or a moment")
+
+
 def _check_place(where: str, machine: str, y_mm: float | None) -> None:
     if machine and y_mm is not None:
         problem = "conflicts with machine, which has its own position"
@@ -608,6 +634,7 @@ class TrainTable:
     meshes: tuple[TrainMeshTable, ...] = quantity((), doc="[[train.meshes]]; or [meshes.NAME]")
     drive: TrainDriveTable | None = quantity(None, doc="[train.drive]")  # noqa: RUF009
     loads: tuple[TrainLoadTable, ...] = quantity((), doc="[[train.loads]]")
+    forces: tuple[TrainForceTable, ...] = quantity((), doc="[[train.forces]]")
     bearings: tuple[TrainBearingTable, ...] = quantity((), doc="[[train.bearings]]; or [bearings.NAME]")
     rigid_bores: tuple[TrainRigidBoreTable, ...] = quantity((), doc="[[train.rigid_bores]]")
     machines: tuple[TrainMachineTable, ...] = quantity((), doc="[[train.machines]]; or [machines.NAME]")

@@ -54,6 +54,7 @@ from ..train.gear_train import (
     Machine,
     Pin,
     Shaft,
+    ShaftForce,
     ShaftGear,
 )
 from .over_speed import with_torques_over_speed
@@ -226,6 +227,15 @@ def _rigid_train(job: TrainJob) -> GearTrain:
         )
         for i, x in enumerate(t.loads)
     )
+    forces = tuple(
+        ShaftForce(
+            x.shaft,
+            1e-3 * x.y_mm,
+            x.values,
+            _over_time(job, 1.0, x.ramp_centre_ms, x.ramp_width_ms, f"train.forces[{i}]"),
+        )
+        for i, x in enumerate(t.forces)
+    )
     damping = Damping(t.damping.ratio, t.damping.rayleigh_alpha_per_s, t.damping.rayleigh_beta_s, t.damping.gyroscopic)
     bearings = tuple(bearing_of(str(b.attachment), b) for b in t.bearings)
     return GearTrain(
@@ -246,6 +256,7 @@ def _rigid_train(job: TrainJob) -> GearTrain:
         couplings=tuple(
             Coupling(c.name, c.shafts, c.stiffness_Nm_per_rad, c.damping_Nm_s_per_rad) for c in t.couplings
         ),
+        forces=forces,
     )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from .gear_train import (
     Machine,
     Pin,
     Shaft,
+    ShaftForce,
     ShaftGear,
     SpeedCurve,
 )
@@ -38,6 +39,7 @@ __all__ = [
     "Machine",
     "Pin",
     "Shaft",
+    "ShaftForce",
     "ShaftGear",
     "SpeedCurve",
     "TrainModel",

@@ -31,6 +31,7 @@ from .gear_train import (
     Load,
     Machine,
     Shaft,
+    ShaftForce,
     ShaftGear,
     common_face,
 )
@@ -373,8 +374,28 @@ def _check_ends(train: GearTrain) -> None:
         _check_machine(train, label, part)
     for load in train.loads:
         _check_orders(train, load)
+    for force in train.forces:
+        _check_force(train, force)
     if not train.meshes and len(train.shafts) > 1:
         raise InputError("train.meshes", None, "no gear is driven: the train has no mesh", "add a mesh")
+
+
+def _check_force(train: GearTrain, force: ShaftForce) -> None:
+    """A force acts on its shaft, whose motion is not described in a frame that turns."""
+    label = f"force on {force.shaft!r}"
+    _known(label, "shaft", force.shaft, [shaft.name for shaft in train.shafts])
+    if not all(math.isfinite(value) for value in (*force.values, force.along)):
+        raise InputError(label, None, "must be finite", "give N, N m and m")
+    shaft = train.shaft(force.shaft)
+    low, high = (train.shaft_end(shaft.name, side) for side in (-1.0, 1.0))
+    if not low - SAME * shaft.length <= force.along <= high + SAME * shaft.length:
+        problem = f"must be on shaft {shaft.name!r}, from {1e3 * low:.6g} to {1e3 * high:.6g} mm"
+        raise InputError(f"{label} y_mm", 1e3 * force.along, problem, "move it, or lengthen the shaft")
+    carrier = train.frame_of(shaft.name)
+    if carrier is not None:
+        problem = f"runs in the frame of carrier {carrier.name!r}, in which a constant force would turn"
+        cure = "put the force on a shaft outside of the planetary stage, joined by a coupling"
+        raise InputError(f"{label} shaft", shaft.name, problem, cure)
 
 
 def _check_machine(train: GearTrain, label: str, end: Drive | Load) -> None:

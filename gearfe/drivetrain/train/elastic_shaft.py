@@ -25,7 +25,7 @@ from ...fem.beams import BeamShaft, Disc, ReducedShaft, Station, reduce_shaft
 from ..bearings import BallBearing, RollerBearing
 from .driveline import spring_places
 from .elements import Gyration, Rotor, ShaftBody, gear_masses
-from .gear_train import Coupling, GearTrain, Machine, Shaft, ShaftGear, common_face
+from .gear_train import Coupling, GearTrain, Machine, Shaft, ShaftForce, ShaftGear, common_face
 
 #: Gyroscopic couples below this part of the largest are left out, as they count at this part of the highest frequency.
 #: Whirl frequencies of a train with shafts of 20 mm then change by 2e-8 at 600 rad/s and by 5e-7 at 3000 rad/s, and
@@ -192,6 +192,9 @@ def beam_shaft(train: GearTrain, shaft: Shaft) -> BeamShaft:
     for name, end in train.shaft_ends(shaft.name):
         if not end.machine:
             stations.append(Station(train.place(end), name, ("torsion",)))
+    for number, force in enumerate(train.forces):
+        if force.shaft == shaft.name:
+            stations.append(Station(force.along, f"force {number + 1}", _force_loads(train, force)))
     springs: list[Machine | Coupling] = [*train.machines, *train.couplings]
     for spring in springs:
         for name, along in spring_places(train, spring):
@@ -210,6 +213,13 @@ def _gear_loads(train: GearTrain, item: ShaftGear) -> tuple[str, ...]:
         off = abs(0.5 * (low + high) - item.along) > SAME_MIDDLE * item.gear.face_width
         tilts |= off or mesh.moments or mesh.acts_along_width
     return ("radial", *(("tilt",) if tilts else ()), *(("axial",) if helical else ()), "torsion")
+
+
+def _force_loads(train: GearTrain, force: ShaftForce) -> tuple[str, ...]:
+    """Directions in which a force and a moment load a shaft."""
+    push, moment, axis = np.array(force.values[:3]), np.array(force.values[3:]), train.frame[2]
+    found = {"radial": np.cross(push, axis).any(), "tilt": moment.any(), "axial": bool(push @ axis)}
+    return tuple(name for name, loaded in found.items() if loaded)
 
 
 def _bore_loads(train: GearTrain, bore: str) -> tuple[str, ...]:

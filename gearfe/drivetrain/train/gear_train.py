@@ -455,6 +455,28 @@ class Load:
 
 
 @dataclass(frozen=True)
+class ShaftForce:
+    """Force and moment on a shaft, whose directions do not turn with it.
+
+    Parameters
+    ----------
+    shaft
+        Name.
+    along
+        Coordinate along the train's axis (m) of the section of the shaft on which they act.
+    values
+        Force along x, y, z (N) and moment about them (N m); that about the axis is 0, for torques are `Load`.
+    over
+        Factor over time.
+    """
+
+    shaft: str
+    along: float
+    values: tuple[float, float, float, float, float, float]
+    over: TimeFunction
+
+
+@dataclass(frozen=True)
 class Damping:
     """Damping of the whole coupled system, beside that of housing, bearings and meshes.
 
@@ -559,6 +581,8 @@ class GearTrain(Facts):
         Inertias at the shafts, and torsional springs between shafts on one axis.
     carriers, guides
         Carriers of planetary stages, and shafts that are fixed or guided.
+    forces
+        Forces and moments on the shafts from outside, other than torques.
     """
 
     shafts: tuple[Shaft, ...]
@@ -575,6 +599,7 @@ class GearTrain(Facts):
     couplings: tuple[Coupling, ...] = ()
     carriers: tuple[Carrier, ...] = ()
     guides: tuple[Guide, ...] = ()
+    forces: tuple[ShaftForce, ...] = ()
 
     def __post_init__(self) -> None:
         internal = {gear.name for gear in self.gears if gear.gear.internal}

@@ -221,7 +221,14 @@ class TiltingTrain:
         """
         model, operating = self.model, self.model.operating
         T, stiffness = model.modal.T, self._stiffness
-        push = factor * _steady_push(model) + _thrown(model) + force * self.torques - self.rows.T @ moments
+        outer = model.outer_push
+        push = (
+            factor * (_steady_push(model) - outer)
+            + outer
+            + _thrown(model)
+            + force * self.torques
+            - self.rows.T @ moments
+        )
         if operating.bearings:
             point = operating_point(operating.geometry, self._motions, stiffness, T, push)
             q = point.coordinates

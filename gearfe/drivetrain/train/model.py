@@ -39,7 +39,7 @@ from .checks import SAME, check_train, overlap
 from .driveline import Driveline, MachineRotor, driveline, machine_rotors
 from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, pin_rows, planes, rotor
 from .forces import Gyro, SpeedTorque, TrainForces, Turned, derivative
-from .gear_train import Carrier, Drive, Five, GearTrain, Load, Pin, Shaft
+from .gear_train import Carrier, Drive, Five, GearTrain, Load, Pin, Shaft, ShaftForce
 from .kinematics import Kinematics, drive_sense, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
 from .operating import (
@@ -163,6 +163,14 @@ class TrainModel(Facts):
     def torque_end(self) -> float:
         """Time at which all torques have reached what they stay at (s)."""
         return max((b for _, torque in self.torques for b in torque.breaks), default=0.0)
+
+    @property
+    def outer_push(self) -> Array:
+        """Forces and moments on the shafts from outside of the train, other than torques, at their end, (size,)."""
+        push = np.zeros(self.system.size)
+        for force in self.train.forces:
+            push += _force_direction(self.train, force, self.placed) * float(force.over(self.torque_end))
+        return push
 
     @property
     def load_end(self) -> float:
@@ -321,6 +329,10 @@ def _check_held(model: TrainModel) -> None:
         for first in model.first.tolist():
             push[first : first + 3] += abs(force) * (pressed[first : first + 3] @ axis) * axis
             push[first + 3 : first + 5] += abs(force) * pressed[first + 3 : first + 5]
+    for first in model.first.tolist():
+        outer = model.outer_push[first : first + 5]
+        push[first : first + 3] += (outer[:3] @ axis) * axis
+        push[first + 3 : first + 5] += outer[3:]
     along_modes = modal.T.T @ push
     free = modal.eigenvalues <= FREE * float(modal.eigenvalues.max(initial=0.0))
     unheld = np.where(free, along_modes, 0.0)
@@ -365,6 +377,8 @@ def _operating_point(train: GearTrain) -> OperatingPoint:
     force = model.preload + speed**2 * turning.thrown
     for load in train.loads:
         force += _acts(train, load, placed) * float(replace(load.torque, sines=())(end))
+    for constant_force in train.forces:
+        force += _force_direction(train, constant_force, placed) * float(constant_force.over(model.torque_end))
     return operating_point(bearings, motions, stiffness, model.modal.T, force)
 
 
@@ -454,12 +468,20 @@ def _torques(train: GearTrain, shafts: Shafts, angle: TimeFunction) -> tuple[tup
     if train.driven.torque is not None:
         made.append((_acts(train, train.driven, shafts), train.driven.torque))
     made += [(_acts(train, load, shafts), load.torque) for load in train.loads]
+    made += [(_force_direction(train, force, shafts), force.over) for force in train.forces]
     for carrier in train.carriers:
         for pin in carrier.pins:
             if any(pin.error) and pin.stiffness is not None:  # springs whose rest is where the pin is
                 rows, local = _pin_rows(train, shafts, carrier, pin), _pin_springs(pin)
                 made.append(((local @ _pin_error(pin)) @ rows, constant(1.0)))
     return tuple(made)
+
+
+def _force_direction(train: GearTrain, force: ShaftForce, shafts: Shafts) -> Array:
+    """Direction in the system of a force and a moment on a section of a shaft."""
+    number = train.shaft_number(force.shaft)
+    rows = shafts.bodies[number].section_rows(np.array([force.along]), train.frame)[0]
+    return shafts.whole(number, np.array(force.values) @ rows)
 
 
 def _machines(train: GearTrain, size: int) -> Array:

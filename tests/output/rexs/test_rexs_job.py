@@ -7,6 +7,7 @@ import math
 import re
 import tomllib
 from decimal import Decimal
+from typing import Any
 
 import pytest
 
@@ -14,7 +15,7 @@ import gearfe
 from gearfe.base.errors import InputError
 from gearfe.base.tables.jobs import gearbox_of, train_tables
 from gearfe.cli.main import main
-from gearfe.output.exchange.rexs import rexs_job
+from gearfe.output.exchange.rexs import Attribute, Component, Relation, read_rexs, rexs_job
 from gearfe.output.exchange.rexs.ledger import KINDS
 from tests.makers.rexs_models import pose, saved, spur_pair, with_attributes, xml_of
 from tests.places import DATA
@@ -422,6 +423,66 @@ def test_what_no_oil_has_is_ignored_in_words(tmp_path, low, high, density, tempe
     for name in names:
         ((kind, _, rule),) = of_attribute(job, name)
         assert (kind, "out of range" in rule) == ("ignored", True)
+
+
+def pulled(along: tuple[float, float, float] = (1.0, 0.0, 0.0), **more: Any) -> tuple[list[Any], list[Any]]:
+    """A spur stage with a belt on its output: force and moment in the system of the shaft, and no torque."""
+    parts, joints = spur_pair()
+    parts = [(n, kind, name, pose(0.0, 0.0, 60.0, along) if n == 4 else a) for n, kind, name, a in parts]
+    parts.append((90, "external_load", "belt", {"u_coordinate_on_shaft": 10.0, **more}))
+    joints.append(("assembly", {"assembly": 4, "part": 90}))
+    return parts, joints
+
+
+def test_forces_across_shafts_become_forces_of_the_train(tmp_path):
+    """u, v, w of the shaft are y, z, x of the job; the torque balance stays that of the loads with a torque."""
+    plain = rexs_job(saved(tmp_path, xml_of(*spur_pair()))).tables
+    values = {
+        "force_u_direction": 5.0,
+        "force_v_direction": 100.0,
+        "force_w_direction": -30.0,
+        "torque_around_v_axis": 2.0,
+        "torque_around_w_axis": -4.0,
+    }
+    job = rexs_job(saved(tmp_path, xml_of(*pulled(**values))))
+    (force,) = job.tables["train"]["forces"]
+    expected = {"force_x_N": -30.0, "force_y_N": 5.0, "force_z_N": 100.0, "moment_x_Nm": -4.0, "moment_z_Nm": 2.0}
+    assert {key: force[key] for key in expected} == expected
+    assert force["shaft"] == "output"
+    assert force["y_mm"] == 10.0
+    assert job.tables["meshes"] == plain["meshes"]
+    assert job.tables["train"]["loads"] == plain["train"]["loads"]
+    derived = {entry.attribute for entry in job.entries if entry.kind == "derived" and entry.number == 90}
+    assert set(values) <= derived
+
+
+def test_forces_follow_the_direction_of_the_shaft(tmp_path):
+    """On a shaft that runs against y, u and v turn about w; without a place a force is listed as ignored."""
+    back = (-1.0, 0.0, 0.0)
+    job = rexs_job(saved(tmp_path, xml_of(*pulled(back, force_u_direction=7.0, force_v_direction=100.0))))
+    (force,) = job.tables["train"]["forces"]
+    assert (force["force_y_N"], force["force_z_N"], force["y_mm"]) == (-7.0, -100.0, -10.0)
+    parts, joints = pulled(force_v_direction=100.0)
+    del parts[-1][3]["u_coordinate_on_shaft"]
+    job = rexs_job(saved(tmp_path, xml_of(parts, joints)))
+    assert "forces" not in job.tables["train"]
+    assert any("place on the shaft" in line for line in job.lines("ignored"))
+
+
+def test_forces_on_planetary_stages_are_listed():
+    """The frame of the carrier turns: the force is named with its size and the reason."""
+    model = read_rexs(FVA)
+    shaft = next(item for item in model.of_kind("shaft") if item.name.startswith("Sonnenwelle"))
+    names = {"u_coordinate_on_shaft": ("10", "mm"), "force_w_direction": ("1234.5", "N")}
+    attributes = {name: Attribute(name, Decimal(value), unit) for name, (value, unit) in names.items()}
+    belt = Component(9000, "external_load", "belt", attributes)
+    joint = Relation(9001, "assembly", {"assembly": shaft.number, "part": 9000})
+    job = rexs_job(
+        dataclasses.replace(model, components={**model.components, 9000: belt}, relations=(*model.relations, joint))
+    )
+    assert "forces" not in job.tables["train"]
+    assert any("1234.5" in line and "planetary" in line for line in job.lines("ignored"))
+    assert job.tables["train"]["loads"] == rexs_job(FVA).tables["train"]["loads"]
 
 
 SPECTRUM = """<load_spectrum id="1">

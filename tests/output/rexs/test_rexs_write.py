@@ -167,6 +167,11 @@ speed_rad_per_s = 123.45678901234567
 [[train.loads]]
 shaft = "out"
 torque_Nm = 147.1
+[[train.forces]]
+shaft = "out"
+y_mm = 12.3
+force_x_N = 33.333333333333336
+moment_z_Nm = -1.1
 [train.damping]
 rayleigh_beta_s = 3.3e-7
 [modes]
@@ -236,6 +241,8 @@ def test_other_programs_find_what_rexs_can_say():
     assert number("shaft", "in_", "rotational_speed", "rad / s") == 123.45678901234567
     assert number("concept_bearing", "D", "bending_stiffness", "N m / rad") == 1e4
     assert number("external_load", "load 1", "torque_around_u_axis", "N m") == 147.1
+    assert number("external_load", "force 1", "force_w_direction", "N") == 33.333333333333336
+    assert number("external_load", "force 1", "torque_around_v_axis", "N m") == -1.1
     tip = [part.attributes["tip_relief_depth"].number("um") for part in model.of_kind("tip_relief")]
     assert tip == [11.1, 5.5]  # left and right
 

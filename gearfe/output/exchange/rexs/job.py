@@ -13,7 +13,7 @@ import math
 import textwrap
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -126,6 +126,7 @@ def rexs_job(source: str | Path | Model, *, load_case: int | None = None) -> Rex
     _friction(reading, tables)
     _loads(reading, tables, held, cases)
     planets.planetary(reading, tables, held, left)
+    _forces_in_stages(reading, tables)
     for (kind, name), (_, reason) in left.items():
         reading.entries.append(Entry(IGNORED, kind, reading.numbers.get((kind, name), 0), name, "", plain(reason)))
     _own(reading, tables)
@@ -340,6 +341,7 @@ class _External:
     shaft: str
     y_mm: float | None
     torque: float | None
+    force: Mapping[str, float]
 
 
 def _rows(reading: Reading, tables: dict[str, Any]) -> list[Row]:
@@ -432,14 +434,36 @@ def _external(reading: Reading, item: Component, tables: dict[str, Any], speeds:
     elif torque is None and power is not None:
         reading.ignored(item, "power", "the speed of its shaft does not follow from the file")
     reading.flag(item, "defines_torque")
-    reading.flag(item, "transmits_torque")
-    for part in ("force_u_direction", "force_v_direction", "force_w_direction", "torque_around_v_axis",
-                 "torque_around_w_axis"):  # fmt: skip
-        found = reading.attribute(item, part)
-        if found is not None and found.value:
-            reading.ignored(item, part, "loads of a job are torques about the shafts")
+    transmits = reading.flag(item, "transmits_torque")
     y = parts.along(reading, item, shaft)
-    return _External(item, name, y, None if torque is None else direction * torque)
+    force = _force(reading, item, shaft, y)
+    if torque is None and power is None and force and not transmits:
+        torque = 0.0  # a force alone balances no torques
+    return _External(item, name, y, None if torque is None else direction * torque, force)
+
+
+def _force(reading: Reading, item: Component, shaft: Component, y: float | None) -> dict[str, float]:
+    """Keys of [[train.forces]] of an external load: its force, and its moment across the shaft, in axes of the job."""
+    axes, frame = reading.axes, reading.frames.get(shaft.number)
+    entry: dict[str, float] = {}
+    for names, unit, keys in (
+        (("force_u_direction", "force_v_direction", "force_w_direction"), "N", ("force_x_N", "force_y_N", "force_z_N")),
+        (("", "torque_around_v_axis", "torque_around_w_axis"), "N m", ("moment_x_Nm", "", "moment_z_Nm")),
+    ):
+        values = [(reading.number(item, name, unit) if name else None) or 0.0 for name in names]
+        if not any(values):
+            continue
+        given = [name for name, value in zip(names, values, strict=True) if value]
+        if y is None:
+            for name in given:
+                reading.ignored(item, name, "its place on the shaft is not known")
+            continue
+        local = (values[0], values[1], values[2])
+        turned = (values[2], values[0], values[1]) if frame is None else axes.of(frame.direction(local))
+        entry |= {key: value for key, value in zip(keys, turned, strict=True) if key and value}
+        for name in given:
+            reading.derived(item, name, "train.forces", "in the directions of the job")
+    return entry
 
 
 def _balance(
@@ -540,7 +564,7 @@ def _other_cases(
             if given is not None and given.value is not None:
                 shaft = parts.shaft_of(reading, load.component)
                 torque = given.number("N m") * (1.0 if shaft is None else parts.sense(reading, shaft))
-            there.append(_External(load.component, load.shaft, load.y_mm, torque))
+            there.append(replace(load, torque=torque))
         _, shares = _balance(list(tables["shafts"]), rows, there, held)
         for name, share in shares.items():
             if name in tables["meshes"] and share:
@@ -584,10 +608,15 @@ def _train(
             place = tables["shafts"][driven]["y_mm"]
             reading.defaulted(None, "train.drive.y_mm", "the middle of the shaft")
         drive["y_mm"] = place
-    entries = []
+    entries: list[dict[str, Any]] = []
+    forces: list[dict[str, Any]] = []
     for load in loads:
         torque = torques.get(load.shaft) if load.torque is None else load.torque
+        if load.force:
+            forces.append({"shaft": load.shaft, "y_mm": load.y_mm, **load.force})
         if load.shaft == driven:
+            continue
+        if not torque and load.force:
             continue
         if torque is None:
             reading.ignored(load.component, "torque", "no torque, and the others do not settle it")
@@ -600,6 +629,8 @@ def _train(
             entry["y_mm"] = load.y_mm
         entries.append(entry)
     train: dict[str, Any] = {"housing": "rigid", "drive": drive, "loads": entries}
+    if forces:
+        train["forces"] = forces
     reading.defaulted(None, "train.housing", "rigid: the file has no body of the casing")
     frequencies = []
     for name, mesh in tables["meshes"].items():
@@ -612,7 +643,7 @@ def _train(
         train["duration_ms"] = duration
         reading.defaulted(None, "train.step_us", f"{STEPS} steps in a period of the fastest mesh")
         reading.defaulted(None, "train.duration_ms", f"{PERIODS} periods of the slowest mesh")
-        for entry in entries:
+        for entry in (*entries, *forces):
             entry["ramp_centre_ms"], entry["ramp_width_ms"] = 0.1 * duration, 0.2 * duration
         reading.defaulted(None, "train.loads.ramp_width_ms", "a fifth of the duration")
     train["damping"] = {"rayleigh_beta_s": RAYLEIGH_BETA_S}
@@ -621,6 +652,25 @@ def _train(
     low, high = (float(f"{share * speeds[driven]:.4g}") for share in RUNUP)
     tables["runup"] = {"speed_start_rad_per_s": low, "speed_stop_rad_per_s": high, "speeds": SPEEDS}
     reading.defaulted(None, "runup", f"{RUNUP[0]:g} to {RUNUP[1]:g} times the speed of the model")
+
+
+def _forces_in_stages(reading: Reading, tables: dict[str, Any]) -> None:
+    """Leave out forces on shafts of planetary stages, in whose turning frames they would turn."""
+    train, shafts, gears = tables.get("train", {}), tables["shafts"], tables["gears"]
+    turning = {name for name, shaft in shafts.items() if shaft.get("carrier")}
+    meshes = [[gears[mesh[role]].get("shaft") for role in ("driver", "driven")] for mesh in tables["meshes"].values()]
+    turning |= {name for pair in meshes if turning & set(pair) for name in pair}
+    turning |= {carrier.get("shaft") for carrier in tables.get(planets.CARRIERS, {}).values()}
+    kept = [force for force in train.get("forces", []) if force["shaft"] not in turning]
+    for force in train.get("forces", []):
+        if force not in kept:
+            text = ", ".join(f"{key} = {value:.6g}" for key, value in force.items() if key.endswith(("_N", "_Nm")))
+            rule = f"{text}: a job has forces on shafts outside of planetary stages only"
+            reading.note(IGNORED, reading.part("shafts", force["shaft"]), "force of external_load", "", rule)
+    if kept:
+        train["forces"] = kept
+    else:
+        train.pop("forces", None)
 
 
 # --- what this program wrote, and what it cannot take ----------------------------------------------------------------

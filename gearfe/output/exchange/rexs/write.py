@@ -48,6 +48,14 @@ ENDINGS = {
 AS_COMPONENTS = ("materials", "gears", "meshes", "shafts", "bearings", "machines", "couplings")
 #: Keys that the reader adds after it has taken those of this program.
 LATE = ("mesh_model", "addendum", "oil_viscosity_mPa_s", "roughness_um")
+#: Attribute of an external load, key of [[train.forces]], and unit.
+FORCES = (
+    ("force_u_direction", "force_y_N", "N"),
+    ("force_v_direction", "force_z_N", "N"),
+    ("force_w_direction", "force_x_N", "N"),
+    ("torque_around_v_axis", "moment_z_Nm", "N m"),
+    ("torque_around_w_axis", "moment_x_Nm", "N m"),
+)
 #: Type of bearing in a job -> in REXS.
 _TYPES = {kind: name for name, kind in reversed(TYPES.items())}
 #: Shape of a relief in a job -> in REXS.
@@ -569,6 +577,15 @@ def _train(b: _Builder, train: Mapping[str, Any], shafts: Mapping[str, Any]) -> 
                      torque_around_u_axis=(torque, "N m") if known else None, transmits_torque=True,
                      defines_torque=True if known else None)  # fmt: skip
         b.relate("assembly", assembly=b.numbers["shafts", load["shaft"]], part=part.number)
+    for number, force in enumerate(train.get("forces", []), start=1):
+        shaft = shafts.get(force["shaft"])
+        if shaft is None:
+            continue
+        values = {name: (force.get(key), unit) for name, key, unit in FORCES}
+        at = force["y_mm"] - _start(shaft)
+        part = b.add("external_load", f"force {number}", u_coordinate_on_shaft=(at, "mm"), transmits_torque=False,
+                     **values)  # fmt: skip
+        b.relate("assembly", assembly=b.numbers["shafts", force["shaft"]], part=part.number)
 
 
 # --- text -----------------------------------------------------------------------------------------------------------
