@@ -373,6 +373,34 @@ def test_only_the_wheel_is_work_hardened() -> None:
     assert rate(back, two).flank.Z_W == (1.0, 1.0)  # its driver, "pinion", is the larger gear, and hard
 
 
+def test_static_work_hardening_falls_from_130_to_470_hbw() -> None:
+    """1.05 to 1 of a through-hardened wheel with a hardened pinion (ISO 6336-2:2006, clause 13), 1 of all others."""
+    hard = {"material": "Eh", "hardness": 720.0}
+    for hardness, factor in ((210.0, 1.05 - (0.95 * 210.0 - 130.0) / 6800.0), (320.0, 1.05 - (304.0 - 130.0) / 6800.0)):
+        soft = {"material": "V", "hardness": hardness, "yield_strength_MPa": 500.0}
+        rating = rate(spur_stage(), {**SPUR, "gears": {"pinion": hard, "wheel": soft}})
+        assert rating.flank.curves[1].static == pytest.approx(1.6 * rating.strengths[1].sigma_H_lim * factor)
+        assert rating.flank.curves[0].static == pytest.approx(1.6 * 1500.0)
+
+
+@pytest.mark.parametrize("gear", ["pinion", "wheel"])
+@pytest.mark.parametrize("relief", [1.0, 10.0, 70.0])
+@pytest.mark.parametrize("material", [{}, {"material": "V", "hardness": 300.0, "yield_strength_MPa": 700.0}])
+def test_a_relief_of_one_gear_does_not_make_more_vibration_than_none(gear: str, relief: float, material: Any) -> None:
+    """K_v of gears that are fine enough for B_k: the other tip is as running-in makes it."""
+    table = {"torque_Nm": 9000.0, "speed_rpm": 360.0, "quality": 4, "gears": {"wheel": material}}
+    none = rate(helical_stage(), table)
+    one = rate(
+        helical_stage(),
+        table | {"gears": {**table["gears"], gear: {**table["gears"].get(gear, {}), "tip_relief_um": relief}}},
+    )
+    assert none.general.B_k != 1.0
+    assert one.general.K_v <= none.general.K_v
+    assert one.general.C_a_um == none.general.C_a_um
+    both = rate(helical_stage(), table | {"tip_relief_um": relief})
+    assert both.general.C_a_um == relief
+
+
 def test_auxiliary_factors_are_ratios_of_pressures() -> None:
     """M_1 and M_2 are the roots of the ratios of relative curvature at B and D to that at C."""
     made = spur_stage()

@@ -15,7 +15,8 @@ it; the text of 2006 had the reciprocal.
 
 **Work hardening factor**, clause 13: of the wheel; the pinion has at most 1.
 
-**Static load**: :math:`Z_L = Z_v = Z_R = 1` (5.4), and Z_W at most 1, instead of the standard's own static value of it.
+**Static load**: :math:`Z_L = Z_v = Z_R = 1` (5.4), and Z_W of a through-hardened wheel with a surface-hardened pinion
+:math:`1.05 - (HB - 130)/6800`, HB from 130 to 470, else 1.
 """
 
 from __future__ import annotations
@@ -140,6 +141,13 @@ def work_hardening(strength: Strength, mate: Strength, u: float, v: float, rho_r
     return 1.0 + (0.00898 * ratio - 0.00829) * (min(u, 20.0) - 1.0)
 
 
+def static_work_hardening(strength: Strength, mate: Strength) -> float:
+    """Z_W of a gear for static load, clause 13."""
+    if strength.hardened or strength.brinell is None or not mate.hardened:
+        return 1.0
+    return 1.05 - (min(max(strength.brinell, 130.0), 470.0) - 130.0) / 6800.0
+
+
 def flank(
     pair: PairData,
     strengths: tuple[Strength, Strength],
@@ -199,10 +207,11 @@ def flank(
         for s, mate in (strengths, strengths[::-1])
     )
     Z_W = min(of_pinion, 1.0), of_wheel
+    static_Z_W = 1.0, static_work_hardening(strengths[1], strengths[0])
     Z_NT, sigma_HG, curves = [], [], []
-    for strength, n, hardening in zip(strengths, cycles, Z_W, strict=True):
+    for strength, n, hardening, of_static in zip(strengths, cycles, Z_W, static_Z_W, strict=True):
         curve = flank_life(strength.material, load.long_life, pitting=load.pitting_allowed)
-        static = strength.sigma_H_lim * curve.static * min(hardening, 1.0)
+        static = strength.sigma_H_lim * curve.static * of_static
         reference = strength.sigma_H_lim * Z_L * Z_v * Z_R * hardening
         curves.append(FatigueCurve(curve, static, reference))
         Z_NT.append(curve.at(n))

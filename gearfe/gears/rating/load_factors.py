@@ -300,9 +300,13 @@ def _blank(pair: PairData, strengths: tuple[Strength, Strength]) -> float:
 
 
 def _relief(strengths: tuple[Strength, Strength]) -> float:
-    """C_a (um): the smaller design relief, 0 if one gear has none; without any that of running-in, the mean of both."""
-    designed = design_reliefs(strengths)
-    return 0.5 * sum(run_in_relief(s.sigma_H_lim) for s in strengths) if designed is None else min(designed)
+    """C_a (um): the smaller design relief; where a gear has none, that of running-in, the mean of both (Table 4).
+
+    Teeth come into contact at the tip of one gear and leave it at that of the other. A design relief of one tip alone
+    leaves the other one as running-in makes it.
+    """
+    given = [s.C_a for s in strengths if s.C_a is not None]
+    return min(given) if len(given) == 2 else 0.5 * sum(run_in_relief(s.sigma_H_lim) for s in strengths)
 
 
 def design_reliefs(strengths: tuple[Strength, Strength]) -> tuple[float, float] | None:

@@ -306,8 +306,8 @@ def scuffing(
     B_M = strengths[0].thermal_contact, strengths[1].thermal_contact
     stiffness = general.c_gamma_alpha_N_per_mm_um if pair.beta else general.c_prime_N_per_mm_um
     C_eff = general.K_A * general.K_gamma * general.F_t_N / (pair.b * stiffness)
-    relief = general.C_a_um / C_eff
     designed = design_reliefs(strengths)
+    relief = (general.C_a_um if designed is None else min(designed)) / C_eff
     # relief of running-in does not change load shares; teeth come into contact with the tip of the driven gear
     shared, entering_relief = (0.0, general.C_a_um) if designed is None else (min(designed), designed[1 - driver])
 
