@@ -17,7 +17,7 @@ from dataclasses import MISSING
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .errors import InputError, nearest, unknown_key
+from .errors import InputError, nearest, shown, unknown_key
 from .files import read_text
 from .other_units import as_written, in_known_units, partner
 from .suspects import LARGEST, other_unit
@@ -26,6 +26,12 @@ T = TypeVar("T")
 
 #: Of a removed key: what became of it, and what to write instead, which may depend on its value.
 Removed = tuple[str, str | Callable[[Any], str]]
+
+
+def renamed(key: str) -> Removed:
+    """Return the entry of `Removed` for a key whose name lacked the unit, and has it now."""
+    return "has another name, which has its unit", lambda value: f"write {key} = {shown(value)}"
+
 
 #: Whole numbers have 64 bits in arrays.
 LARGEST_WHOLE = 2**63 - 1

@@ -91,10 +91,10 @@ def _times(factor: float, value: Any, label: str) -> Any:
     changed = {
         key: _times(factor, item, label) if key in ("constant", "expression") else item for key, item in value.items()
     }
-    if isinstance(value.get("points"), list):
-        changed["points"] = [
+    if isinstance(value.get("points_ms"), list):
+        changed["points_ms"] = [
             [row[0], _times(factor, row[1], label)] if isinstance(row, list) and len(row) == 2 else row
-            for row in value["points"]
+            for row in value["points_ms"]
         ]
     for part, key in _PARTS.items():
         if isinstance(value.get(part), list):

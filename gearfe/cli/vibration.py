@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: Keys of [train] that options stand for, and of [spectrum]: option -> key.
 KEYS = ("tolerance", "method")
-RECORD = {"window": "window", "spectrum_from_ms": "spectrum_from", "spectrum_ms": "spectrum_ms"}
+RECORD = {key: key for key in ("window", "spectrum_from_ms", "spectrum_ms")}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -29,13 +29,13 @@ def test_numbers_and_functions_of_time_are_turned() -> None:
     assert drive(speed_rpm=3000).speed_rad_per_s == pytest.approx(3000 * RPM, rel=1e-15)
     table = {
         "constant": 60.0,
-        "points": [[0, 0.0], [5, 30.0]],
+        "points_ms": [[0, 0.0], [5, 30.0]],
         "steps": [{"height": 6.0, "centre_ms": 1.0, "width_ms": 1.0}],
         "sines": [{"amplitude": 3.0, "frequency_Hz": 7.0}],
     }
     made = drive(speed_rpm=table).speed_rad_per_s
     assert made.constant == pytest.approx(60 * RPM)
-    assert made.points == ((0.0, 0.0), (5.0, pytest.approx(30 * RPM)))
+    assert made.points_ms == ((0.0, 0.0), (5.0, pytest.approx(30 * RPM)))
     assert made.steps[0].height == pytest.approx(6 * RPM)
     assert made.steps[0].centre_ms == 1.0
     assert (made.sines[0].amplitude, made.sines[0].frequency_Hz) == (pytest.approx(3 * RPM), 7.0)

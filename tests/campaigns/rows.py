@@ -117,7 +117,11 @@ def _special(
         size = log_uniform(random, 1e6, 1e9)
         held = [[size, size, size, 1e-3 * size, 1e-3 * size][k] * random.uniform(0.5, 2.0) for k in range(5)]
         damp = [1e-5 * float(random.choice([0.0, 1.0])) * x for x in held]
-        train["bearings"] = [{"attachment": str(n), "stiffness": held, "damping": damp} for n in range(1, last + 2)]
+        springs = {
+            "stiffness_N_per_m": held[:3], "tilt_stiffness_Nm_per_rad": held[3:],
+            "damping_N_s_per_m": damp[:3], "tilt_damping_Nm_s_per_rad": damp[3:],
+        }  # fmt: skip
+        train["bearings"] = [{"attachment": str(n), **springs} for n in range(1, last + 2)]
     if kind == "general" and random.random() < 0.3:
         width = rounded(random.uniform(0.2, 3.0), 3)
         train["drive"] |= {"ramp_centre_ms": 0.5 * width, "ramp_width_ms": width}
@@ -175,8 +179,8 @@ def _special(
             train["duration_ms"] = 1e3 * period / teeth[0] * 200
     if kind == "symmetric":
         side = [log_uniform(random, 1e7, 1e9) for _ in range(3)]
-        held = [side[0], side[1], side[2], 1e4, 1e4]
-        train["bearings"] = [{"attachment": str(n), "stiffness": held} for n in range(1, last + 2)]
+        springs = {"stiffness_N_per_m": side, "tilt_stiffness_Nm_per_rad": [1e4, 1e4]}
+        train["bearings"] = [{"attachment": str(n), **springs} for n in range(1, last + 2)]
 
 
 def _in_a_frame(train: Table) -> None:

@@ -15,7 +15,9 @@ from tests.makers.files import csv_rows
 from tests.makers.job_texts import BARE_TRAIN, BORES
 
 BEARINGS = "".join(
-    f"[[train.bearings]]\nattachment = {i}\nstiffness = [5e7, 2e7, 5e7, 1e3, 1e3]\n" for i in (1, 2, 3, 4)
+    f"[[train.bearings]]\nattachment = {i}\n"
+    "stiffness_N_per_m = [5e7, 2e7, 5e7]\ntilt_stiffness_Nm_per_rad = [1e3, 1e3]\n"
+    for i in (1, 2, 3, 4)
 )
 RUNUP = "[runup]\nspeed_start_rad_per_s = -200.0\nspeed_stop_rad_per_s = -900.0\nspeeds = 3\nband_Hz = 4000.0\n"
 

@@ -211,9 +211,18 @@ WRONG_SHAFTS: list[tuple[dict[str, Any], str]] = [
 WRONG_BEARINGS: list[tuple[dict[str, Any], str]] = [
     ({"bearings__s1_left__shaft": None}, r"bearings\.s1_left\.shaft: is required"),
     ({"bearings__s1_left__shaft": "s0"}, r"bearings\.s1_left\.shaft: unknown name 's0'; known names: s1, s2, s3, s4"),
-    ({"bearings__s1_left__stiffness": [1e8]}, r"bearings\.s1_left\.stiffness = \[.*\]: must have 5 entries"),
-    ({"bearings__s1_left__stiffness": [-1e8, 0.0, 0.0, 0.0, 0.0]}, r"bearings\.s1_left\.stiffness\[0\] = -1"),
-    ({"bearings__s1_left__damping": [1.0, 0.0, 0.0, 0.0, 0.0]}, r"bearings\.s1_left\.damping.*needs a stiffness"),
+    ({"bearings__s1_left__stiffness_N_per_m": [1e8]}, r"s1_left\.stiffness_N_per_m = \[.*\]: must have 3 entries"),
+    ({"bearings__s1_left__stiffness_N_per_m": [-1e8, 0.0, 0.0]}, r"bearings\.s1_left\.stiffness_N_per_m\[0\] = -1"),
+    ({"bearings__s1_left__damping_N_s_per_m": [1.0, 0.0, 0.0]}, r"s1_left\.damping_N_s_per_m.*needs a stiffness"),
+    ({"bearings__s1_left__tilt_damping_Nm_s_per_rad": [0.0, 1.0]}, r"tilt_damping_Nm_s_per_rad.*needs a stiffness"),
+    ({"bearings__s1_left__tilt_stiffness_Nm_per_rad": [1.0, 1.0]}, r"tilt_stiffness.*add stiffness_N_per_m"),
+    (
+        {"bearings__s1_left__stiffness": [1e8, 2e8, 1e8, 3e4, 4e4]},
+        r"write stiffness_N_per_m = \[1000.*, 2000.*, 1000.*\] and tilt_stiffness_Nm_per_rad = \[30000",
+    ),
+    ({"bearings__s1_left__damping": 3.0}, r"write damping_N_s_per_m, and tilt_damping_Nm_s_per_rad for the tilts"),
+    ({"bearings__s1_left__stiffness_matrix": [[1.0] * 5] * 5}, r"write stiffness_matrix_N_m_rad"),
+    ({"bearings__s1_left__damping_matrix": [[1.0] * 5] * 5}, r"write damping_matrix_N_m_s_rad"),
     ({"bearings__s1_left__clearance_um": 3.0}, r"bearings\.s1_left: unknown name 'clearance_um'"),
     ({"bearings__s1_left__y_mm": 70.0}, r"attachment 's1_left': lies 25 mm beyond the end of shaft 's1'"),
     ({"bearings__s1_left__y_mm": None}, r"bearings\.s1_left\.y_mm: is required: other bearings have one"),
@@ -227,7 +236,7 @@ WRONG_BEARINGS: list[tuple[dict[str, Any], str]] = [
         r"train\.drive\.attachment: unknown name 's2_left'; did you mean 's1_left",
     ),
     (
-        {"train__bearings": [{"attachment": 1, "stiffness": [1.0] * 5}]},
+        {"train__bearings": [{"attachment": 1, "stiffness_N_per_m": [1.0] * 3}]},
         r"\[\[train\.bearings\]\]: conflicts with \[bear",
     ),
     ({"train__rigid_bores": [{"attachment": 1, "x_mm": 0.0, "y_mm": 0.0}]}, r"rigid_bores\]\]: conflicts with"),
@@ -253,7 +262,7 @@ WRONG_MATERIALS: list[tuple[dict[str, Any], str]] = [
     ({"materials__18Cr Ni": {}}, r"name in \[materials\] = '18Cr Ni': must have"),
 ]
 #: Mistakes that join several tables.
-ORDERS = {"shaft": "s4", "torque_Nm": 60.0, "orders": [[1.0, 2.0, 0.0]]}
+ORDERS = {"shaft": "s4", "torque_Nm": 60.0, "orders_Nm_deg": [[1.0, 2.0, 0.0]]}
 BOTH = {
     "gears__pinion_2__profile_shift": "from centre distance",
     "gears__wheel_2__profile_shift": "from centre distance",
@@ -273,7 +282,10 @@ WRONG_TOGETHER: list[tuple[dict[str, Any], str]] = [
         {"train__loads": [{**ORDERS, "mesh": "sun-idler"}]},
         r"loads\[0\]\.mesh: unknown name 'sun-idler'; known names: in, ",
     ),
-    ({"train__loads": [{**ORDERS, "orders": [], "mesh": "out"}]}, r"train\.loads\[0\]\.mesh = 'out': .*add orders"),
+    (
+        {"train__loads": [{**ORDERS, "orders_Nm_deg": [], "mesh": "out"}]},
+        r"train\.loads\[0\]\.mesh = 'out': .*add orders_Nm_deg",
+    ),
     ({**BOTH, "meshes__out__centre_distance_mm": 69.0}, r"gears\.pinion_2\.profile_shift .*needs a mesh with centre_"),
     (
         {

@@ -61,10 +61,10 @@ def tables(teeth: tuple[int, int, int, int] = SIMPLE, tail: str = "", at: float 
     gears |= {"ring": gear(-ring, "ring" + tail, at + apart)}
     if apart:
         gears["second"] = gear(two, "planet" + tail, at + apart)
-    spring = {"stiffness": [2e8, 2e8, 2e8, 1e6, 1e6]}
+    spring = {"stiffness_N_per_m": [2e8, 2e8, 2e8], "tilt_stiffness_Nm_per_rad": [1e6, 1e6]}
     places = {"sun": at - apart, "ring": at + apart, "arm": at}
     arm = 0.5 * MODULE_MM * (sun + one)
-    pin = [2e8, 2e8, 2e8, 1e6, 1e6]
+    pin = {"pin_stiffness_N_per_m": [2e8, 2e8, 2e8], "pin_tilt_stiffness_Nm_per_rad": [1e6, 1e6]}
     return {
         "gears": {name + tail: entry for name, entry in gears.items()},
         "meshes": {
@@ -73,7 +73,7 @@ def tables(teeth: tuple[int, int, int, int] = SIMPLE, tail: str = "", at: float 
         },
         "shafts": {name + tail: member(y=y) for name, y in places.items()}
         | {"planet" + tail: member(arm, at, carrier="arm" + tail)},
-        "carriers": {"arm" + tail: {"shaft": "arm" + tail, "planets": 3, "pin_stiffness_N_per_m": pin}},
+        "carriers": {"arm" + tail: {"shaft": "arm" + tail, "planets": 3, **pin}},
         "bearings": {name + tail: {"shaft": name + tail, "y_mm": y, **spring} for name, y in places.items()},
     }
 
@@ -299,7 +299,7 @@ def test_the_power_of_a_mesh_is_that_of_its_driver(drive: str, ratio: Fraction) 
 def test_the_angle_of_a_load_with_orders_of_a_mesh_is_that_of_its_driver(drive: str) -> None:
     """5 N m sin(z (phase + rotation)) of the gear that drives, from its given phase."""
     raw = pair_of_two(drive, drive, -30.0, phase_deg=1.25)
-    raw["train"]["loads"][0] |= {"orders": [[1.0, 5.0, 0.0]], "mesh": "outer"}
+    raw["train"]["loads"][0] |= {"orders_Nm_deg": [[1.0, 5.0, 0.0]], "mesh": "outer"}
     teeth, t = {"ring": 42, "planet": 12}[drive], np.linspace(0.0, 1e-2, 33)
     total = sum(torque(t) for _, torque in built(raw).forces.torques)
     expected = -30.0 + 5.0 * np.sin(teeth * (math.radians(1.25) + 100.0 * t))
@@ -313,7 +313,7 @@ def test_orders_of_a_mesh_of_a_stage_follow_its_rotation_whichever_flanks_it_pre
     """The first tooth of the sun begins on the line of centres; rotation of the sun against the carrier."""
     raw = roles(tables(), drive, load, -50.0, ring=0)
     raw["meshes"]["inner"]["phase_deg"] = 2.0
-    raw["train"]["loads"][0] |= {"orders": [[1.0, 5.0, 0.0]], "mesh": "inner_1"}
+    raw["train"]["loads"][0] |= {"orders_Nm_deg": [[1.0, 5.0, 0.0]], "mesh": "inner_1"}
     model = built(raw)
     t = np.linspace(0.0, 1e-2, 33)
     total = sum(torque(t) for _, torque in model.forces.torques)

@@ -200,6 +200,8 @@ def test_bearings_in_one_place_are_refused() -> None:
 DEEP = {"type": "deep_groove_ball", "elements": 8, "element_diameter_mm": 7.9, "pitch_diameter_mm": 33.5}
 ANGLED = {**DEEP, "type": "angular_contact_ball", "contact_angle_deg": 25.0, "axial_preload_um": 2.0}
 ROLLERS = {"elements": 13, "element_diameter_mm": 6.0, "pitch_diameter_mm": 32.0, "roller_length_mm": 7.0}
+STIFFNESS, DAMPING = "stiffness_matrix_N_m_rad", "damping_matrix_N_m_s_rad"
+SPRINGS = {"stiffness_N_per_m": [1.0] * 3, "damping_N_s_per_m": [1.0] * 3}
 MATRIX = np.diag([1e8, 5e7, 2e8, 1e4, 1e4])
 
 
@@ -235,7 +237,10 @@ def test_matrices_of_a_file_have_its_directions(tmp_path: Path) -> None:
     matrix[0, 2] = matrix[2, 0] = 3e7
     matrix[2, 3] = matrix[3, 2] = 4e5
     matrix[2, 4] = matrix[4, 2] = -2e5
-    model = built(tmp_path / "box.toml", box({"stiffness_matrix": matrix.tolist(), "damping_matrix": MATRIX.tolist()}))
+    model = built(
+        tmp_path / "box.toml",
+        box({STIFFNESS: matrix.tolist(), DAMPING: MATRIX.tolist()}),
+    )
     found = next(item for item in model.train.bearings if item.bore == "s1_left").stiffness_matrix
     e1, e2, axis = model.train.frame
     turn = np.zeros((5, 5))  # x, y, z, tilts about x and z -> directions of the train
@@ -312,22 +317,22 @@ def both(row: int, column: int, value: float) -> list[list[float]]:
 
 SIX = [[0.0] * 5] * 6
 WRONG: list[tuple[dict[str, Any], str]] = [
-    ({"stiffness": [1e8] * 5, "stiffness_matrix": MATRIX.tolist()}, r"stiffness_matrix.*conflicts with stiffness"),
-    ({**DEEP, "stiffness": [1e8] * 5}, r"type = 'deep_groove_ball': conflicts with stiffness"),
-    ({"stiffness_matrix": SIX}, r"stiffness_matrix.*must have 5 entries"),
-    ({"stiffness_matrix": [[1.0] * 4] * 5}, r"stiffness_matrix\[0\].*must have 5 entries"),
-    ({"stiffness_matrix": entry(0, 2, 1e7)}, r"must be symmetric: row 3 has 0 in column 1, row 1 has 1e\+07; write 5e"),
-    ({"stiffness_matrix": entry(1, 1, -5e7)}, r"-5e\+07 on its diagonal, in row 2: must be >= 0"),
-    ({"stiffness_matrix": both(0, 2, 1.5e8)}, r"1.5e\+08 in row 3, column 1: must be 1.41421e\+08 or less"),
-    ({"stiffness_matrix": both(2, 4, 1e7)}, r"1e\+07 in row 5, column 3: must be 1.41421e\+06 or less"),
+    ({"stiffness_N_per_m": [1e8] * 3, STIFFNESS: MATRIX.tolist()}, r"matrix_N_m_rad.*conflicts with stiffness_N_per_m"),
+    ({**DEEP, "stiffness_N_per_m": [1e8] * 3}, r"type = 'deep_groove_ball': conflicts with stiffness"),
+    ({STIFFNESS: SIX}, r"stiffness_matrix_N_m_rad.*must have 5 entries"),
+    ({STIFFNESS: [[1.0] * 4] * 5}, r"stiffness_matrix_N_m_rad\[0\].*must have 5 entries"),
+    ({STIFFNESS: entry(0, 2, 1e7)}, r"must be symmetric: row 3 has 0 in column 1, row 1 has 1e\+07; write 5e"),
+    ({STIFFNESS: entry(1, 1, -5e7)}, r"-5e\+07 on its diagonal, in row 2: must be >= 0"),
+    ({STIFFNESS: both(0, 2, 1.5e8)}, r"1.5e\+08 in row 3, column 1: must be 1.41421e\+08 or less"),
+    ({STIFFNESS: both(2, 4, 1e7)}, r"1e\+07 in row 5, column 3: must be 1.41421e\+06 or less"),
     (
-        {"stiffness_matrix": [[2.0, 1.5, -1.5, 0.0, 0.0], [1.5, 2.0, 1.5, 0.0, 0.0], [-1.5, 1.5, 2.0, 0.0, 0.0],
+        {STIFFNESS: [[2.0, 1.5, -1.5, 0.0, 0.0], [1.5, 2.0, 1.5, 0.0, 0.0], [-1.5, 1.5, 2.0, 0.0, 0.0],
                               [0.0, 0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]]},
         r"must be positive semi-definite: .* least eigenvalue is -0.5",
     ),
-    ({"stiffness": [1e8] * 5, "damping_matrix": entry(0, 0, -1.0)}, r"damping_matrix: has -1 on its diagonal"),
-    ({"damping_matrix": MATRIX.tolist()}, r"damping_matrix.*needs a stiffness"),
-    ({"stiffness": [1.0] * 5, "damping": [1.0] * 5, "damping_matrix": MATRIX.tolist()}, r"conflicts with damping"),
+    ({"stiffness_N_per_m": [1e8] * 3, DAMPING: entry(0, 0, -1.0)}, r"damping_matrix_N_m_s_rad: has -1"),
+    ({DAMPING: MATRIX.tolist()}, r"damping_matrix_N_m_s_rad.*needs a stiffness"),
+    ({**SPRINGS, DAMPING: MATRIX.tolist()}, "conflicts with damping"),
     ({"elements": 8}, r"elements = 8: conflicts with a bearing without type"),
     ({**DEEP, "type": "needle"}, r"type = 'needle': must be one of deep_groove_ball"),
     (without(DEEP, "elements"), r"elements: is required of type = 'deep_groove_ball'"),
@@ -370,5 +375,5 @@ def test_mistakes_of_a_bearing_name_key_value_and_cure(tmp_path: Path, keys: dic
 def test_lists_of_a_train_have_the_same_keys() -> None:
     table = build(TrainBearingTable, {"attachment": 1, **DEEP}, "train.bearings[0]")
     assert rolling_bearing(table) == BallBearing(8, 7.9e-3, 33.5e-3)
-    with pytest.raises(InputError, match=r"train\.bearings\[1\]\.stiffness: is required"):
+    with pytest.raises(InputError, match=r"train\.bearings\[1\]\.stiffness_N_per_m: is required"):
         build(TrainBearingTable, {"attachment": 1}, "train.bearings[1]")

@@ -67,8 +67,8 @@ length_mm = 100.0
 radius_mm = 15.0
 
 [bearings]
-A = {{ shaft = "input", y_mm = {side * -40.0}, stiffness = [1e13, 1e13, 1e13, 0.0, 0.0] }}
-B = {{ shaft = "input", y_mm = 0.0, stiffness = [1e13, 1e13, 1e13, 0.0, 0.0] }}
+A = {{ shaft = "input", y_mm = {side * -40.0}, stiffness_N_per_m = [1e13, 1e13, 1e13] }}
+B = {{ shaft = "input", y_mm = 0.0, stiffness_N_per_m = [1e13, 1e13, 1e13] }}
 C = {{ shaft = "output", y_mm = -40.0 }}
 D = {{ shaft = "output", y_mm = {side * 10.0} }}
 
@@ -207,7 +207,7 @@ def test_mistakes_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert "give torque_Nm instead" in refused(twist, tmp_path, capsys)
     idle = whole.replace(f'loads = [{{ shaft = "output", attachment = "C", torque_Nm = {TORQUE} }}]', "")
     assert "carries none in steady running" in refused(idle, tmp_path, capsys)
-    soft = whole.replace("[1e13, 1e13, 1e13, 0.0, 0.0]", "[1e5, 1e5, 1e5, 0.0, 0.0]")
+    soft = whole.replace("[1e13, 1e13, 1e13]", "[1e5, 1e5, 1e5]")
     assert "range of microgeometry" in refused(soft, tmp_path, capsys)
 
 

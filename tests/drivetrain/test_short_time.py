@@ -248,7 +248,7 @@ def test_a_run_up_with_all_of_it(tmp_path):
 
 def test_the_start_is_left_out(tmp_path):
     """Constant stiffness: what vibrates is the start, exp(-d w t); the spectrum of the steady part holds none of it."""
-    assert run(job(tmp_path, 'spectrum_from = "steady"'), "--no-pictures") == 0
+    assert run(job(tmp_path, 'spectrum_from_ms = "steady"'), "--no-pictures") == 0
     steady = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert 0.5e-3 < steady["spectrum"]["start_s"] < 15e-3
     assert run(job(tmp_path, ""), "--no-pictures") == 0
@@ -264,7 +264,7 @@ def test_the_start_is_left_out(tmp_path):
 @pytest.mark.parametrize(
     ("spectrum", "told"),
     [
-        ('spectrum_from = "stedy"', "spectrum.spectrum_from"),
+        ('spectrum_from_ms = "stedy"', "spectrum.spectrum_from_ms"),
         ("short_time_ms = 500.0", "spectrum.short_time_ms"),
         ("order_turns = 500.0", "makes 1.9"),
         ("orders = [20.0]", "order_turns: is required with orders"),

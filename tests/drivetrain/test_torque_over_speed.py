@@ -109,7 +109,9 @@ def test_tables_against_another_integrator(method: str, interpolation: str) -> N
     """A motor's table with its breaks: scipy's DOP853 on J w' = T(w) from break to break."""
     speed, torque = np.array([0.0, 60.0, 110.0, 150.0, 180.0]), np.array([20.0, 26.0, 40.0, 24.0, 0.0])
     given = from_rest(
-        function(points=[list(row) for row in zip(speed, torque, strict=True)], interpolation=interpolation)
+        function(
+            points_rad_per_s_Nm=[list(row) for row in zip(speed, torque, strict=True)], interpolation=interpolation
+        )
     )
     t = np.linspace(0.0, 0.03, 61)
     response = simulate(build_train(given), t, tolerance=1e-9, method=method)
@@ -123,7 +125,7 @@ def test_tables_against_another_integrator(method: str, interpolation: str) -> N
 
 def test_steps_end_at_the_breaks_of_a_table() -> None:
     """Straight pieces: between two breaks w' is linear in w, so Taylor's series reach 1e-9 in few steps."""
-    given = from_rest(function(points=[[0.0, 20.0], [60.0, 30.0], [120.0, 10.0]], interpolation="linear"))
+    given = from_rest(function(points_rad_per_s_Nm=[[0.0, 20.0], [60.0, 30.0], [120.0, 10.0]], interpolation="linear"))
     J, rises, falls = inertia(given), 10.0 / 60.0, 20.0 / 60.0
     reached = J / rises * math.log(1.0 + rises * 60.0 / 20.0)  # 60 rad/s, where the pieces meet
     t = np.array([0.0, 0.7 * reached, reached + 0.5 * J / falls])
@@ -135,7 +137,7 @@ def test_steps_end_at_the_breaks_of_a_table() -> None:
 
 
 def test_shapes_of_tables_and_expressions() -> None:
-    table = function(points=[[-10.0, 5.0], [0.0, 5.0], [20.0, -3.0]])
+    table = function(points_rad_per_s_Nm=[[-10.0, 5.0], [0.0, 5.0], [20.0, -3.0]])
     np.testing.assert_allclose(table(np.array([-50.0, -10.0, 0.0, 20.0, 70.0])), [5.0, 5.0, 5.0, -3.0, -3.0])
     assert float(table(0.0, 1)) == pytest.approx(0.0, abs=1e-12)  # monotone: nothing overshoots
     assert float(table(np.linspace(-60.0, 60.0, 999)).max()) <= 5.0 + 1e-12
@@ -143,7 +145,7 @@ def test_shapes_of_tables_and_expressions() -> None:
     slip = 1.0 - np.linspace(-490.0, 490.0, 333) / 157.0
     np.testing.assert_allclose(kloss(157.0 * (1.0 - slip)), 160.0 * 0.2 * slip / (slip**2 + 0.04), atol=1e-8)
     assert float(kloss(600.0)) == pytest.approx(float(kloss(500.0)), rel=1e-9)
-    assert float(constant(3.0)(1.0)) == float(function(points=[[7.0, 3.0]])(1.0))
+    assert float(constant(3.0)(1.0)) == float(function(points_rad_per_s_Nm=[[7.0, 3.0]])(1.0))
 
 
 def test_a_run_up_has_the_torque_of_each_speed() -> None:
@@ -239,7 +241,7 @@ def test_files_report_the_operating_point(tmp_path: Path, capsys: pytest.Capture
     assert abs(summary["operating_point"]["torques_over_speed_Nm"]["load_1"]) <= 40.0
     speed = summary["operating_point"]["drive_speed_rad_per_s"]
     assert speed == content["train"]["drive"]["speed_rad_per_s"]
-    content["train"]["loads"][0]["torque_over_speed"] = {"points": [[-1.0, 1.0], [1.0, -1.0]]}
+    content["train"]["loads"][0]["torque_over_speed"] = {"points_rad_per_s_Nm": [[-1.0, 1.0], [1.0, -1.0]]}
     path = written(tmp_path / "narrow.toml", content)
     assert main(["vibration", str(path), "--out", str(tmp_path / "narrow"), "--no-pictures"]) == 0
     summary = json.loads((tmp_path / "narrow" / "summary.json").read_text())
@@ -250,15 +252,18 @@ def at(key: str, value: Any) -> dict[str, Any]:
     return {"torque_over_speed": {key: value}}
 
 
+#: The same torque at all speeds.
+LEVEL = {"points_rad_per_s_Nm": [[0.0, 1.0]]}
 WRONG: list[tuple[dict[str, Any], dict[str, Any], str, str]] = [
     ({}, {}, "train.loads[0].torque_Nm", "add it, or torque_over_speed"),
     ({"torque_over_speed": {}}, {}, "train.loads[0].torque_over_speed", "give points"),
     (at("expression", "-log(speed)"), {}, "torque_over_speed.expression", "has no value at"),
     (at("expression", "-5*speed/abs(speed + 1e-9)"), {}, "torque_over_speed.expression", "jumps at"),
     (at("expression", "-time"), {}, "torque_over_speed.expression", "time"),
-    (at("points", [[0.0, 1.0], [0.0, 2.0]]), {}, "torque_over_speed.points[1]", "rad/s"),
-    ({"torque_over_speed": {"points": [[0.0, 1.0]], "expression": "1"}}, {}, "expression", "conflicts with points"),
-    ({"torque_over_speed": {"points": [[0.0, 1.0]], "largest_speed_rad_per_s": 9.0}}, {}, "largest_speed", "leave it"),
+    (at("points_rad_per_s_Nm", [[0.0, 1.0], [0.0, 2.0]]), {}, "torque_over_speed.points_rad_per_s_Nm[1]", "rad/s"),
+    ({"torque_over_speed": {**LEVEL, "expression": "1"}}, {}, "expression", "conflicts with points_rad_per_s_Nm"),
+    ({"torque_over_speed": {**LEVEL, "largest_speed_rad_per_s": 9.0}}, {}, "largest_speed", "leave it"),
+    (at("points", [[0.0, 1.0]]), {}, "torque_over_speed.points", "write points_rad_per_s_Nm = [[0.0, 1.0]]"),
     (at("csv", "none.csv"), {}, "torque_over_speed.csv", "none.csv"),
     ({**FAN, "ramp_width_ms": 1.0}, {}, "ramp_width_ms", "has no ramp"),
     (FAN, {"speed_rad_per_s": 0.0, "torque_Nm": 10.0}, "largest_speed_rad_per_s", "is required"),

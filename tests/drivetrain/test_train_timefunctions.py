@@ -22,12 +22,12 @@ def function(folder=None, **keys):
 
 
 def test_points_are_straight_lines_that_hold_at_their_ends(tmp_path):
-    made = function(points=[[10, 2.0], [30, 6.0], [50, 5.0]])
+    made = function(points_ms=[[10, 2.0], [30, 6.0], [50, 5.0]])
     np.testing.assert_allclose(made(TIMES), np.interp(TIMES, [0.01, 0.03, 0.05], [2.0, 6.0, 5.0]), atol=1e-13)
     assert made.ends
     (tmp_path / "f.csv").write_text("time_ms,value\n10,2.0\n30,6.0\n50,5.0\n")
     assert function(tmp_path, csv="f.csv") == made
-    smooth = function(points=[[0, 0.0], [20, 6.0], [50, 5.0]], interpolation="cubic")
+    smooth = function(points_ms=[[0, 0.0], [20, 6.0], [50, 5.0]], interpolation="cubic")
     assert smooth(np.array([0.0, 0.02, 0.05, 0.08])).tolist() == pytest.approx([0.0, 6.0, 5.0, 5.0])
     assert np.abs(np.diff(smooth(TIMES[TIMES < 0.05], 1))).max() < 1.5  # its slope does not jump between points
     assert smooth(TIMES).max() == pytest.approx(6.0)  # monotone: nothing rings
@@ -35,7 +35,7 @@ def test_points_are_straight_lines_that_hold_at_their_ends(tmp_path):
 
 def test_parts_add_up():
     made = function(
-        constant=1.0, points=[[0, 0.0], [100, 10.0]], steps=[{"height": 3.0, "centre_ms": 50.0, "width_ms": 20.0}],
+        constant=1.0, points_ms=[[0, 0.0], [100, 10.0]], steps=[{"height": 3.0, "centre_ms": 50.0, "width_ms": 20.0}],
         sines=[{"amplitude": 0.5, "frequency_Hz": 40.0, "phase_deg": 90.0}], expression="2*time",
     )  # fmt: skip
     x = np.clip((TIMES - 0.04) / 0.02, 0.0, 1.0)
@@ -70,8 +70,8 @@ def test_expressions_become_polynomials(text, exact, pieces):
     ("keys", "told"),
     [
         ({}, "empty function"),
-        ({"points": [[0, 1.0], [0, 2.0]]}, r"points\[1\] = 0.0: must be later"),
-        ({"points": [[0, 1.0]], "csv": "a.csv"}, "conflicts with points"),
+        ({"points_ms": [[0, 1.0], [0, 2.0]]}, r"points_ms\[1\] = 0.0: must be later"),
+        ({"points_ms": [[0, 1.0]], "csv": "a.csv"}, "conflicts with points_ms"),
         ({"csv": "none.csv"}, "there is no such file"),
         ({"csv": "wrong.csv"}, "has no column value"),
         ({"expression": "600 +"}, "not an expression"),
@@ -81,7 +81,7 @@ def test_expressions_become_polynomials(text, exact, pieces):
         ({"expression": "atan2(0.05 - time, 0*time)"}, "jumps at 50"),
         ({"expression": "sin(1e6*time)"}, f"more than {PIECES} pieces"),
         ({"steps": [{"height": 1.0, "centre_ms": 5.0}]}, "width_ms"),
-        ({"pionts": [[0, 1.0]]}, "did you mean 'points'"),
+        ({"pionts_ms": [[0, 1.0]]}, "did you mean 'points_ms'"),
     ],
 )
 def test_what_is_no_function_is_told(tmp_path, keys, told):
@@ -107,7 +107,7 @@ def job(tmp_path, drive: str = DRIVE, load: str = LOAD):
 
 def test_a_linear_ramp_turns_as_its_integral(tmp_path, capsys):
     """Speed 200 + 1e5 t: the angle is 200 t + 5e4 t^2, the acceleration of a shaft on a rigid drive 1e5."""
-    for drive in ('speed_rad_per_s = "200 + 1e5*time"', "speed_rad_per_s = { points = [[0, 200.0], [2, 400.0]] }"):
+    for drive in ('speed_rad_per_s = "200 + 1e5*time"', "speed_rad_per_s = { points_ms = [[0, 200.0], [2, 400.0]] }"):
         path = job(tmp_path, drive)
         out = tmp_path / "out"
         assert main(["vibration", str(path), "--out", str(out), "--no-pictures", "--no-estimate"]) == 0
@@ -123,7 +123,7 @@ def test_a_mistake_in_a_job_is_told_with_its_key(tmp_path, capsys):
     path = job(tmp_path, 'speed_rad_per_s = "600*tme"')
     assert main(["vibration", str(path), "--out", str(tmp_path / "out")]) == 2
     assert "train.drive.speed_rad_per_s.expression" in capsys.readouterr().err
-    path = job(tmp_path, "speed_rad_per_s = { points = [[0, 1.0]] }\nramp_width_ms = 1.0")
+    path = job(tmp_path, "speed_rad_per_s = { points_ms = [[0, 1.0]] }\nramp_width_ms = 1.0")
     assert main(["vibration", str(path), "--out", str(tmp_path / "out")]) == 2
     assert "train.drive.ramp_width_ms = 1.0: conflicts with a function of time" in capsys.readouterr().err
     path = job(tmp_path, load='torque_Nm = "20 - 30*sin(3000*time)"')

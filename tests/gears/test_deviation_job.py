@@ -52,7 +52,7 @@ def test_measured_teeth_and_sides(tmp_path) -> None:
 def test_a_k_chart_and_a_relief_are_the_same() -> None:
     one = deviations_of(table(tip_relief_um=20.0, tip_relief_length_mm=3.0), PAIR)[0].profiles[0]
     points = [[0.0, 0.0], [1e3 * (HIGH - 3e-3), 0.0], [1e3 * HIGH, -20.0]]
-    other = deviations_of(table(points=points), PAIR)[0].profiles[0]
+    other = deviations_of(table(points_mm_um=points), PAIR)[0].profiles[0]
     diameter = 2e3 * math.hypot(PINION.base_radius, HIGH - 3e-3)
     third = deviations_of(table(tip_relief_um=20.0, tip_relief_start_diameter_mm=diameter), PAIR)[0].profiles[0]
     ends = {"tip_relief_um": 10.0, "tip_relief_length_mm": 3.0}  # half of it at half of its length
@@ -78,8 +78,8 @@ def test_a_k_chart_and_a_relief_are_the_same() -> None:
         ({"crowning_um": 3.0}, r"pinion.crowning_um = 3.0: has another name.*; write profile_crowning_um"),
         ({"slope_um": 3.0}, r"pinion.slope_um = 3.0: has another name.*; write profile_slope_um"),
         ({"left": {"slope_um": 3.0}}, r"pinion.left.slope_um = 3.0: .*write profile_slope_um"),
-        ({"points": [[6.0, 0.0], [9.0, 1.0]]}, r"points: covers 6 to 9 mm.*must cover"),
-        ({"points": [[9.0, 0.0], [9.0, 1.0]]}, "rising"),
+        ({"points_mm_um": [[6.0, 0.0], [9.0, 1.0]]}, r"points_mm_um: covers 6 to 9 mm.*must cover"),
+        ({"points_mm_um": [[9.0, 0.0], [9.0, 1.0]]}, "rising"),
         ({"pitch_um": [1.0, 2.0]}, r"pinion.pitch_um = \[1.0, 2.0\]: must have one entry for each.* 20 teeth, has 2"),
         ({"single_pitch_um": [1.0, 2.0]}, r"pinion.single_pitch_um: must add up to 0.*the sum is 3 um"),
         ({"pitch_um": [0.0, 900.0] * 10}, r"pinion.pitch_um: span 900 um: must be finite and within 250 um"),
@@ -99,7 +99,10 @@ def test_a_k_chart_and_a_relief_are_the_same() -> None:
             {"waviness": [{"amplitude_um": 1.0, "waves": 20}, {"amplitude_um": 90.0, "waves": 400}]},
             r"pinion.waviness\[1\].amplitude_um = 90.0: makes the flank too steep",
         ),
-        ({"points": [[0.0, 0.0], [10.0, 0.0], [10.1, 40.0], [30.0, 0.0]]}, r"pinion.points: makes the flank too steep"),
+        (
+            {"points_mm_um": [[0.0, 0.0], [10.0, 0.0], [10.1, 40.0], [30.0, 0.0]]},
+            r"pinion.points_mm_um: makes the flank too steep",
+        ),
         ({"tip_releif_um": 1.0}, "tip_relief_um"),
     ],
 )

@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar
 
-from ..config import quantity
+from ..config import Removed, quantity, renamed
 from ..errors import InputError
 
+Two, Three = tuple[float, float], tuple[float, float, float]
 Five = tuple[float, float, float, float, float]
 Matrix = tuple[Five, Five, Five, Five, Five]
 
@@ -38,16 +41,45 @@ FURTHER: dict[str, tuple[str, ...]] = {
 }
 #: Least eigenvalue of a matrix, scaled to a diagonal of ones, and difference of its halves: round-off of four digits.
 ROUND_OFF = 1e-4
+#: Keys of the matrices, in N, m, rad (and s).
+MATRIX, DAMPING_MATRIX = "stiffness_matrix_N_m_rad", "damping_matrix_N_m_s_rad"
+
+
+def in_two(value: Any, along: str, tilt: str) -> str:
+    """Return what to write instead of a list of five numbers, the last two of which have another unit.
+
+    Parameters
+    ----------
+    value : Any
+        What was written.
+    along, tilt : str
+        Keys of the numbers along x, y, z, and of those for tilts.
+    """
+    if isinstance(value, list) and len(value) == 5:
+        return f"write {along} = {value[:3]} and {tilt} = {value[3:]}"
+    return f"write {along}, and {tilt} for the tilts"
+
+
+_UNITS_APART = "has other names, one for each unit"
 
 
 @dataclass(frozen=True)
 class BearingTable:
-    """Elasticity of a bearing: one of `stiffness`, `stiffness_matrix`, and `type` with its inner geometry."""
+    """Elasticity of a bearing: its stiffness, a matrix, or `type` with its inner geometry."""
 
-    stiffness: Five | None = quantity(  # noqa: RUF009
-        None, low=0.0, doc="along x, y, z (N/m) and for tilt about x, z (N m/rad)"
+    #: Removed keys, see `gearfe.base.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {
+        "stiffness": (_UNITS_APART, partial(in_two, along="stiffness_N_per_m", tilt="tilt_stiffness_Nm_per_rad")),
+        "damping": (_UNITS_APART, partial(in_two, along="damping_N_s_per_m", tilt="tilt_damping_Nm_s_per_rad")),
+        "stiffness_matrix": renamed(MATRIX),
+        "damping_matrix": renamed(DAMPING_MATRIX),
+    }
+
+    stiffness_N_per_m: Three | None = quantity(None, low=0.0, doc="along x, y, z (N/m)")  # noqa: RUF009
+    tilt_stiffness_Nm_per_rad: Two | None = quantity(  # noqa: RUF009
+        None, low=0.0, doc="for tilt about x, z (N m/rad), with stiffness_N_per_m; left out: 0, it tilts freely"
     )
-    stiffness_matrix: Matrix | None = quantity(  # noqa: RUF009
+    stiffness_matrix_N_m_rad: Matrix | None = quantity(  # noqa: RUF009
         None,
         doc="instead, five lists of five numbers: forces along x, y, z (N) and moments about x, z (N m), per "
         "displacement along x, y, z (m) and tilt about x, z (rad); symmetric",
@@ -58,9 +90,10 @@ class BearingTable:
         doc="instead, a rolling bearing, whose stiffness follows from its geometry and its load; the keys below are "
         "its geometry",
     )
-    damping: Five = quantity((0.0, 0.0, 0.0, 0.0, 0.0), low=0.0, doc="along x, y, z (N s/m), tilt about x, z (N m s)")  # noqa: RUF009
-    damping_matrix: Matrix | None = quantity(  # noqa: RUF009
-        None, doc="instead, five lists of five numbers, as of stiffness_matrix; symmetric"
+    damping_N_s_per_m: Three = quantity((0.0, 0.0, 0.0), low=0.0, doc="along x, y, z (N s/m)")  # noqa: RUF009
+    tilt_damping_Nm_s_per_rad: Two = quantity((0.0, 0.0), low=0.0, doc="for tilt about x, z (N m s/rad)")  # noqa: RUF009
+    damping_matrix_N_m_s_rad: Matrix | None = quantity(  # noqa: RUF009
+        None, doc=f"instead, five lists of five numbers, as of {MATRIX}, per velocity; symmetric"
     )
     elements: int | None = quantity(None, low=3, high=500, doc="number of rolling elements in a row")
     element_diameter_mm: float | None = quantity(
@@ -115,19 +148,28 @@ class BearingTable:
 
     def check(self, where: str) -> None:
         """One source of the stiffness, and the geometry of one type."""
-        sources = [key for key in ("stiffness", "stiffness_matrix", "type") if getattr(self, key) is not None]
+        sources = [key for key in ("stiffness_N_per_m", MATRIX, "type") if getattr(self, key) is not None]
         if len(sources) > 1:
             problem = f"conflicts with {sources[0]}: a bearing has one stiffness"
             raise InputError(f"{where}.{sources[1]}", getattr(self, sources[1]), problem, "leave one out")
-        if any(self.damping) and self.damping_matrix is not None:
-            problem = "conflicts with damping"
-            raise InputError(f"{where}.damping_matrix", None, problem, "leave one out")
-        for key in ("damping_matrix", "damping"):
+        tilt = self.tilt_stiffness_Nm_per_rad
+        if tilt is not None and self.stiffness_N_per_m is None:
+            label = f"{where}.tilt_stiffness_Nm_per_rad"
+            if sources:
+                problem = f"conflicts with {sources[0]}, which has the stiffness for tilt"
+                raise InputError(label, list(tilt), problem, "leave one out")
+            problem = "needs stiffness_N_per_m: a hinge without it holds the shaft and tilts freely"
+            raise InputError(label, list(tilt), problem, "add stiffness_N_per_m = [x, y, z]")
+        for key in ("damping_N_s_per_m", "tilt_damping_Nm_s_per_rad"):
+            if any(getattr(self, key)) and self.damping_matrix_N_m_s_rad is not None:
+                problem = f"conflicts with {key}"
+                raise InputError(f"{where}.{DAMPING_MATRIX}", None, problem, "leave one out")
+        for key in (DAMPING_MATRIX, "damping_N_s_per_m", "tilt_damping_Nm_s_per_rad"):
             value = getattr(self, key)
             if not sources and value is not None and any(x for x in value if x):
                 problem = "needs a stiffness: a hinge is rigid and has nothing to damp"
                 raise InputError(f"{where}.{key}", value, problem, "give the stiffness, or leave it out")
-        for key in ("stiffness_matrix", "damping_matrix"):
+        for key in (MATRIX, DAMPING_MATRIX):
             if getattr(self, key) is not None:
                 check_matrix(f"{where}.{key}", getattr(self, key))
         self._check_geometry(where)
@@ -194,9 +236,21 @@ class BearingTable:
                 raise InputError(f"{where}.{key}", getattr(self, key), problem, "correct it, or the osculations")
 
     @property
+    def stiffness(self) -> Five | None:
+        """Stiffness along x, y, z (N/m) and for tilt about x, z (N m/rad); None without numbers of it."""
+        if self.stiffness_N_per_m is None:
+            return None
+        return (*self.stiffness_N_per_m, *(self.tilt_stiffness_Nm_per_rad or (0.0, 0.0)))
+
+    @property
+    def damping(self) -> Five:
+        """Damping along x, y, z (N s/m) and for tilt about x, z (N m s/rad)."""
+        return (*self.damping_N_s_per_m, *self.tilt_damping_Nm_s_per_rad)
+
+    @property
     def hinge(self) -> bool:
         """Return whether the bearing is rigid."""
-        return self.stiffness is None and self.stiffness_matrix is None and self.type is None
+        return self.stiffness_N_per_m is None and self.stiffness_matrix_N_m_rad is None and self.type is None
 
 
 def check_matrix(where: str, matrix: Matrix) -> None:

@@ -10,11 +10,17 @@ from typing import Any
 
 from ..config import quantity
 from ..errors import InputError
+from .bearing import Two, in_two
 
 #: Most planets of a set: more do not fit round a sun.
 MOST_PLANETS = 24
 #: Kinds of tables by name of which each planet has its own entry.
 OF_PLANETS = ("shafts", "gears", "meshes")
+#: Keys of springs and dampers of a pin along its axes -> for tilt.
+PINS = {
+    "pin_stiffness_N_per_m": "pin_tilt_stiffness_Nm_per_rad",
+    "pin_damping_N_s_per_m": "pin_tilt_damping_Nm_s_per_rad",
+}
 
 
 @dataclass(frozen=True)
@@ -24,11 +30,17 @@ class _Pins:
     shaft: str = quantity(doc="name of the shaft that is the carrier")
     pin_stiffness_N_per_m: float | tuple[float, ...] | None = quantity(
         None,
-        doc="of each pin, radial and tangential (N/m), the other motions being held; or five numbers: radial, along y, "
-        "tangential (N/m), and two tilts (N m/rad); left out: hinges",
+        doc="of each pin, radial and tangential (N/m), the other motions being held; or three numbers: radial, along "
+        "y, tangential (N/m); left out: hinges",
+    )
+    pin_tilt_stiffness_Nm_per_rad: Two | None = quantity(  # noqa: RUF009
+        None, low=0.0, doc="with three numbers: of two tilts (N m/rad); left out: 0, it tilts freely"
     )
     pin_damping_N_s_per_m: float | tuple[float, ...] = quantity(
-        0.0, doc="of those springs (N s/m), or five numbers: three translations, and two tilts (N m s/rad)"
+        0.0, doc="of those springs (N s/m), one number or three as of the stiffness"
+    )
+    pin_tilt_damping_Nm_s_per_rad: Two | None = quantity(  # noqa: RUF009
+        None, low=0.0, doc="with three numbers: of two tilts (N m s/rad)"
     )
     pin_radial_errors_um: tuple[float, ...] = quantity(
         (), doc="how much farther from the axis of the carrier each pin is than it should be (um); left out: 0"
@@ -38,51 +50,75 @@ class _Pins:
     )
 
     def check(self, where: str) -> None:
-        """Springs of pins are one number > 0 or five, dampers >= 0 alike."""
-        for key, least in (("pin_stiffness_N_per_m", True), ("pin_damping_N_s_per_m", False)):
-            value = getattr(self, key)
+        """Springs of pins are one number > 0 or three, dampers >= 0 alike; tilts belong to three."""
+        for key, tilt in PINS.items():
+            least = key == "pin_stiffness_N_per_m"
+            value, tilts = getattr(self, key), getattr(self, tilt)
             numbers = value if isinstance(value, tuple) else (0.0 if value is None else value,)
-            wrong = len(numbers) not in (1, 5) or not all(math.isfinite(x) and x >= 0.0 for x in numbers)
+            written = list(value) if isinstance(value, tuple) else value
+            if len(numbers) == 5:
+                raise InputError(f"{where}.{key}", written, "has two numbers for tilts", in_two(written, key, tilt))
+            wrong = len(numbers) not in (1, 3) or not all(math.isfinite(x) and x >= 0.0 for x in numbers)
             if wrong or (least and value is not None and max(numbers) <= 0.0):
-                problem = f"must be one number {'>' if least else '>='} 0, or five >= 0"
-                cure = "one: radial and tangential; five: radial, along y, tangential, two tilts"
-                shown = list(value) if isinstance(value, tuple) else value
-                raise InputError(f"{where}.{key}", shown, problem, cure)
-        if self.pin_damping_N_s_per_m and self.pin_stiffness_N_per_m is None:
-            problem = "is of pins with a stiffness, and these are hinges"
-            value = self.pin_damping_N_s_per_m
-            shown = list(value) if isinstance(value, tuple) else value
-            cure = "add pin_stiffness_N_per_m, or leave it out"
-            raise InputError(f"{where}.pin_damping_N_s_per_m", shown, problem, cure)
+                problem = f"must be one number {'>' if least else '>='} 0, or three >= 0"
+                cure = f"one: radial and tangential; three: radial, along y, tangential, with {tilt}"
+                raise InputError(f"{where}.{key}", written, problem, cure)
+            if tilts is not None and len(numbers) == 1:
+                problem = f"needs three numbers of {key}: with one, pins do not tilt"
+                raise InputError(f"{where}.{tilt}", list(tilts), problem, f"write {key} = [radial, y, tangential]")
+            if not least and any((*numbers, *(tilts or ()))) and self.pin_stiffness_N_per_m is None:
+                problem = "is of pins with a stiffness, and these are hinges"
+                cure = "add pin_stiffness_N_per_m, or leave it out"
+                raise InputError(f"{where}.{key}", written, problem, cure)
+
+    def springs(self, key: str) -> Any:
+        """Stiffness or damping of a pin: one number for two directions, five, or None.
+
+        Parameters
+        ----------
+        key : str
+            One of `PINS`.
+        """
+        value = getattr(self, key)
+        if not isinstance(value, tuple):
+            return value
+        return value[0] if len(value) == 1 else (*value, *(getattr(self, PINS[key]) or (0.0, 0.0)))
 
 
 @dataclass(frozen=True)
 class CarrierTable(_Pins):
     """A carrier: the shaft that it is, its planets, and their pins. A shaft is a planet by carrier = "NAME"."""
 
-    planets: int | tuple[float, ...] = quantity(
-        doc="number of planets with equal spacing, or the angle of each (deg, about +y, from the place of its shaft)"
+    planets: int | None = quantity(
+        None, low=1, high=MOST_PLANETS, doc="number of planets with equal spacing, or give planet_angles_deg"
+    )
+    planet_angles_deg: tuple[float, ...] = quantity(
+        (), doc="angle of each planet (deg, about +y, from the position of its shaft), instead of their number"
     )
 
     @property
     def angles_deg(self) -> tuple[float, ...]:
-        """Angle of each planet from the place that its shaft has in the file."""
-        if isinstance(self.planets, tuple):
-            return self.planets
-        return tuple(360.0 * k / self.planets for k in range(self.planets))
+        """Angle of each planet from the position that its shaft has in the file."""
+        count = self.planets or 0
+        return self.planet_angles_deg or tuple(360.0 * k / count for k in range(count))
 
     def check(self, where: str) -> None:
-        """Planets of a number that can be, at places of their own; errors for each pin."""
+        """Planets of a possible number, at different positions; errors for each pin."""
         super().check(where)
-        angles = self.planets if isinstance(self.planets, tuple) else None
-        count = len(angles) if angles is not None else int(self.planets)  # type: ignore[arg-type]
-        if not 1 <= count <= MOST_PLANETS:
+        angles, cure = self.planet_angles_deg, "write planets = 3, or the angle of each in planet_angles_deg"
+        if self.planets is None and not angles:
+            raise InputError(f"{where}.planets", None, "is required", cure)
+        if self.planets is not None and angles:
+            raise InputError(f"{where}.planets", self.planets, "conflicts with planet_angles_deg", "leave one out")
+        count = len(self.angles_deg)
+        if count > MOST_PLANETS:
             problem = f"must be 1 to {MOST_PLANETS} planets"
-            raise InputError(f"{where}.planets", count, problem, "write a number, or the angle of each in degrees")
-        turned = sorted(angle % 360.0 for angle in angles or ())
-        if any(not math.isfinite(angle) for angle in angles or ()) or len(set(turned)) < len(turned):
-            problem = "must be finite angles (deg), each once"
-            raise InputError(f"{where}.planets", list(angles or ()), problem, "give each planet a different position")
+            raise InputError(f"{where}.planet_angles_deg", list(angles), problem, "leave some out")
+        turned = {angle % 360.0 for angle in angles}
+        if len(turned) < len(angles):
+            problem = "must be angles (deg), each once"
+            cure = "give each planet a different position"
+            raise InputError(f"{where}.planet_angles_deg", list(angles), problem, cure)
         for key in ("pin_radial_errors_um", "pin_tangential_errors_um"):
             errors = getattr(self, key)
             if errors and len(errors) != count:

@@ -135,8 +135,8 @@ GEARBOX: dict[str, dict[str, Any]] = {
     },
     "bearings": {
         name: {
-            "shaft": shaft, "y_mm": y, "stiffness": [1e8, 1e8, 1e8, 2e4, 2e4],
-            "damping": [200.0, 50.0, 200.0, 1.0, 1.0],
+            "shaft": shaft, "y_mm": y, "stiffness_N_per_m": [1e8, 1e8, 1e8], "tilt_stiffness_Nm_per_rad": [2e4, 2e4],
+            "damping_N_s_per_m": [200.0, 50.0, 200.0], "tilt_damping_Nm_s_per_rad": [1.0, 1.0],
         }
         for name, shaft, y in (
             ("A", "input", 40.0), ("B", "input", -40.0), ("C", "intermediate", 40.0), ("D", "intermediate", -40.0),
@@ -192,7 +192,8 @@ elements = 8
 element_diameter_mm = 7.9
 pitch_diameter_mm = 33.5
 radial_clearance_um = -4.0               # diametral; negative: preloaded
-damping = [200.0, 50.0, 200.0, 1.0, 1.0]
+damping_N_s_per_m = [200.0, 50.0, 200.0]
+tilt_damping_Nm_s_per_rad = [1.0, 1.0]
 
 [bearings.M2]
 shaft = "motor_shaft"
@@ -202,7 +203,8 @@ elements = 8
 element_diameter_mm = 7.9
 pitch_diameter_mm = 33.5
 radial_clearance_um = -4.0
-damping = [200.0, 50.0, 200.0, 1.0, 1.0]
+damping_N_s_per_m = [200.0, 50.0, 200.0]
+tilt_damping_Nm_s_per_rad = [1.0, 1.0]
 
 [couplings.clutch]
 shafts = ["motor_shaft", "input"]
@@ -257,7 +259,10 @@ PLANETARY: dict[str, dict[str, Any]] = {
     },
     "carriers": {"arm": {"shaft": "carrier", "planets": 3, "pin_stiffness_N_per_m": 4e8}},
     "bearings": {
-        name: {"shaft": name, "y_mm": y, "stiffness": [across, along, across, tilts, tilts]}
+        name: {
+            "shaft": name, "y_mm": y, "stiffness_N_per_m": [across, along, across],
+            "tilt_stiffness_Nm_per_rad": [tilts, tilts],
+        }
         for name, y, across, along, tilts in (
             ("sun", -50.0, 1e7, 1e8, 1e6), ("ring", 0.0, 1e9, 1e9, 1e7), ("carrier", 40.0, 5e8, 5e8, 5e6),
         )

@@ -6,7 +6,7 @@ import itertools
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
-from ..config import quantity
+from ..config import Removed, quantity, renamed
 from ..errors import InputError
 from .loadmap import LoadMapTable
 
@@ -50,13 +50,13 @@ class FlankTable:
     """Deviations of the flanks of a gear in the transverse section, along their normals; > 0 is more material."""
 
     #: Keys that were: what became of them, and what to write instead.
-    REMOVED: ClassVar[dict[str, tuple[str, str]]] = {
+    REMOVED: ClassVar[dict[str, Removed]] = {
         f"{key}_um": (
             f"has another name beside helix_{key}_um, the one along the face width",
             f"write profile_{key}_um",
         )
         for key in ("crowning", "slope")
-    }
+    } | {"points": renamed("points_mm_um")}
 
     tip_relief_um: float | None = quantity(None, doc="tip relief (um), at the tip circle", low=0.0)
     tip_relief_length_mm: float | None = quantity(None, doc="roll length of it from the tip circle (mm)", above=0.0)
@@ -94,7 +94,7 @@ class FlankTable:
     end_relief_shape: str = quantity("linear", doc="linear or parabolic, of both ends", choices=("linear", "parabolic"))
     triangular_reliefs: tuple[TriangularReliefTable, ...] = quantity((), doc="reliefs of corners")
     waviness: tuple[WavinessTable, ...] = quantity((), doc="waves")
-    points: tuple[tuple[float, float], ...] = quantity(
+    points_mm_um: tuple[tuple[float, float], ...] = quantity(
         (), doc="K-chart: [roll length (mm), deviation (um)] and straight lines between"
     )
     measured_csv: str | None = quantity(

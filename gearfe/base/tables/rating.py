@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
-from ..config import quantity
+from ..config import Removed, quantity, renamed
 from ..errors import InputError, unknown_name
 
 #: Editions of ISO 6336; that of 2006 goes with the tolerances of ISO 1328-1:1995, that of 2019 with those of 2013.
@@ -32,6 +32,9 @@ HELIX_MODIFICATIONS = ("none", "crowning", "crowning_of_load", "correction", "co
 @dataclass(frozen=True)
 class GearRatingTable:
     """Strength and accuracy of one gear."""
+
+    #: Removed keys, see `gearfe.base.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {"thermal_contact": renamed("thermal_contact_N_per_mm_m05_s05_K")}
 
     material: str | None = quantity(
         None, choices=MATERIALS, doc="material of ISO 6336-5, by default Eh (case-hardened steel)"
@@ -82,7 +85,7 @@ class GearRatingTable:
         high=2.0,
         doc="structure factor X_W of scuffing: 1 (default) case-hardened, 1.5 nitrided, 0.45 stainless",
     )
-    thermal_contact: float | None = quantity(
+    thermal_contact_N_per_mm_m05_s05_K: float | None = quantity(
         None, above=0.0, doc="thermal contact coefficient B_M (N/(mm m^0.5 s^0.5 K)), by default 13.78 (steel)"
     )
     web_thickness_mm: float | None = quantity(None, above=0.0, doc="web b_s (mm), for C_R; left out: a solid disc")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
-from ..config import quantity
+from ..config import Removed, quantity, renamed
 from ..errors import InputError
 
 STEADY = "steady"
@@ -26,10 +27,13 @@ class MeasuredTable:
 class SpectrumTable:
     """Spectra of a run."""
 
+    #: Removed keys, see `gearfe.base.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {"spectrum_from": renamed("spectrum_from_ms")}
+
     window: str = quantity(
         "none", choices=("none", "hann", "hamming", "blackman", "flattop"), doc="window of the spectrum"
     )
-    spectrum_from: float | str = quantity(
+    spectrum_from_ms: float | str = quantity(
         0.0, low=0.0, doc='start of the record (ms); "steady" in a job file: after the start-up has decayed'
     )
     spectrum_ms: float | None = quantity(None, above=0.0, doc="duration of the record (ms); left out: to the end")
@@ -51,7 +55,7 @@ class SpectrumTable:
     @property
     def start(self) -> float | None:
         """Begin of the record (s); None: where the motion is steady."""
-        return None if self.spectrum_from == STEADY else 1e-3 * float(self.spectrum_from)
+        return None if self.spectrum_from_ms == STEADY else 1e-3 * float(self.spectrum_from_ms)
 
     @property
     def duration(self) -> float | None:
@@ -60,8 +64,8 @@ class SpectrumTable:
 
     def check(self, where: str) -> None:
         """A text is the one word that is known."""
-        if isinstance(self.spectrum_from, str) and self.spectrum_from != STEADY:
+        if isinstance(self.spectrum_from_ms, str) and self.spectrum_from_ms != STEADY:
             cure = f'write milliseconds, or "{STEADY}"'
-            raise InputError(f"{where}.spectrum_from", self.spectrum_from, "is no time", cure)
+            raise InputError(f"{where}.spectrum_from_ms", self.spectrum_from_ms, "is no time", cure)
         if self.orders and self.order_turns is None:
             raise InputError(f"{where}.order_turns", None, "is required with orders", "write order_turns = 4")

@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import ClassVar
 
-from ..config import quantity
+from ..config import Removed, quantity, renamed
 from ..errors import InputError
 
 
@@ -34,9 +35,11 @@ class TrainFunctionTable:
     """A function of time; its parts add up. A text in its place is an expression."""
 
     SHORT = "expression"
+    #: Removed keys, see `gearfe.base.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {"points": renamed("points_ms")}
 
     constant: float = quantity(0.0, doc="constant part, in the unit of the key")
-    points: tuple[tuple[float, float], ...] = quantity(
+    points_ms: tuple[tuple[float, float], ...] = quantity(
         (), doc="list of [time (ms), value]; the first and the last value hold before and after"
     )
     csv: str | None = quantity(None, doc="or a CSV file with the columns time_ms and value, next to the job file")
@@ -51,12 +54,14 @@ class TrainFunctionTable:
 
     def check(self, where: str) -> None:
         """Something is given; points rise."""
-        if self.points and self.csv is not None:
-            raise InputError(f"{where}.csv", self.csv, "conflicts with points", "leave one out")
-        parts = (self.constant, self.points, self.csv, self.steps, self.sines, self.expression)
+        if self.points_ms and self.csv is not None:
+            raise InputError(f"{where}.csv", self.csv, "conflicts with points_ms", "leave one out")
+        parts = (self.constant, self.points_ms, self.csv, self.steps, self.sines, self.expression)
         if not any(part or part == 0.0 for part in parts[1:]) and not self.constant:
-            raise InputError(where, None, "is an empty function of time", "give points, steps, sines or an expression")
-        check_rising(f"{where}.points", tuple(time for time, _ in self.points))
+            raise InputError(
+                where, None, "is an empty function of time", "give points_ms, steps, sines or an expression"
+            )
+        check_rising(f"{where}.points_ms", tuple(time for time, _ in self.points_ms))
 
 
 @dataclass(frozen=True)
@@ -64,8 +69,10 @@ class SpeedFunctionTable:
     """A torque over speed. A text in its place is an expression."""
 
     SHORT = "expression"
+    #: Removed keys, see `gearfe.base.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {"points": renamed("points_rad_per_s_Nm")}
 
-    points: tuple[tuple[float, float], ...] = quantity(
+    points_rad_per_s_Nm: tuple[tuple[float, float], ...] = quantity(
         (), doc="list of [speed (rad/s), torque (N m)]; the first and the last torque hold below and above"
     )
     csv: str | None = quantity(
@@ -86,15 +93,17 @@ class SpeedFunctionTable:
 
     def check(self, where: str) -> None:
         """One of the three is given; points rise."""
-        given = [key for key in ("points", "csv", "expression") if getattr(self, key)]
+        given = [key for key in ("points_rad_per_s_Nm", "csv", "expression") if getattr(self, key)]
         if not given:
-            raise InputError(where, None, "is an empty function of speed", "give points, csv or an expression")
+            raise InputError(
+                where, None, "is an empty function of speed", "give points_rad_per_s_Nm, csv or an expression"
+            )
         if len(given) > 1:
             raise InputError(f"{where}.{given[1]}", None, f"conflicts with {given[0]}", "leave one out")
         if self.largest_speed_rad_per_s is not None and self.expression is None:
             problem = "is of an expression: points hold their first and last torque beyond their ends"
             raise InputError(f"{where}.largest_speed_rad_per_s", self.largest_speed_rad_per_s, problem, "leave it out")
-        check_rising(f"{where}.points", tuple(speed for speed, _ in self.points), "rad/s")
+        check_rising(f"{where}.points_rad_per_s_Nm", tuple(speed for speed, _ in self.points_rad_per_s_Nm), "rad/s")
 
 
 def check_rising(where: str, places: tuple[float, ...], unit: str = "ms") -> None:

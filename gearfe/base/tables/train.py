@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import ClassVar
 
-from ..config import Removed, quantity
+from ..config import Removed, quantity, renamed
 from ..errors import InputError, unknown_name
-from .bearing import BearingTable
+from .bearing import MATRIX, BearingTable
 from .carrier import TrainCarrierTable
 from .driveline import TrainCouplingTable, TrainMachineTable
 from .kinds import GONE_METHODS
@@ -456,6 +456,9 @@ class TrainDriveTable:
 class TrainLoadTable:
     """Torque on a shaft and its reaction on a bore."""
 
+    #: Removed keys, see `gearfe.base.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {"orders": renamed("orders_Nm_deg")}
+
     shaft: str = quantity(doc="shaft that is loaded")
     machine: str = quantity("", doc="machine of that shaft on which the torque acts; left out: the shaft itself")
     attachment: int | str | None = quantity(None, doc="bore on which the torque reacts; left out: outside of the train")
@@ -472,7 +475,7 @@ class TrainLoadTable:
         None,
         doc="torque about +y over the true speed of shaft or machine (N m over rad/s), with or without torque_Nm",
     )
-    orders: tuple[tuple[float, float, float], ...] = quantity(
+    orders_Nm_deg: tuple[tuple[float, float, float], ...] = quantity(
         (), doc="additional sines that follow the speed: list of [order, amplitude (N m), phase (deg)]"
     )
     mesh: str = quantity(
@@ -492,9 +495,9 @@ class TrainLoadTable:
             problem = "is of torque_Nm, and there is none: a torque over speed has no ramp"
             raise InputError(f"{where}.ramp_width_ms", self.ramp_width_ms, problem, "leave it out, or add torque_Nm")
         _check_ramp(where, "torque_Nm", self.torque_Nm, self.ramp_width_ms)
-        if self.mesh and not self.orders:
+        if self.mesh and not self.orders_Nm_deg:
             problem = "is the mesh of orders, and there are none"
-            raise InputError(f"{where}.mesh", self.mesh, problem, "add orders, or leave it out")
+            raise InputError(f"{where}.mesh", self.mesh, problem, "add orders_Nm_deg, or leave it out")
 
 
 @dataclass(frozen=True)
@@ -555,8 +558,8 @@ class TrainBearingTable(BearingTable, _Bore):
         """Without a stiffness there would be no entry."""
         super().check(where)
         if self.hinge:
-            cure = "give it, or stiffness_matrix, or type; without an entry the bore is a hinge"
-            raise InputError(f"{where}.stiffness", None, "is required", cure)
+            cure = f"give it, or {MATRIX}, or type; without an entry the bore is a hinge"
+            raise InputError(f"{where}.stiffness_N_per_m", None, "is required", cure)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.errors import InputError, given
-from ...base.tables.carrier import TrainCarrierTable
+from ...base.tables.carrier import PINS, TrainCarrierTable
 from ...base.tables.gearbox import Gearbox, NamedMesh
 from ...base.tables.housing import HousingTable
 from ...base.tables.jobs import read_train_tables
@@ -219,7 +219,7 @@ def _rigid_train(job: TrainJob) -> GearTrain:
             x.shaft,
             None if x.attachment is None else str(x.attachment),
             _over_time(job, x.torque_Nm or 0.0, x.ramp_centre_ms, x.ramp_width_ms, f"train.loads[{i}].torque_Nm"),
-            tuple((order, amplitude, math.radians(phase)) for order, amplitude, phase in x.orders),
+            tuple((order, amplitude, math.radians(phase)) for order, amplitude, phase in x.orders_Nm_deg),
             x.mesh,
             _metres(x.y_mm),
             x.machine,
@@ -263,18 +263,13 @@ def _rigid_train(job: TrainJob) -> GearTrain:
 def _carrier(table: TrainCarrierTable, train: TrainTable) -> Carrier:
     """A carrier with the pins of all shafts that name it."""
     planets = [shaft.name for shaft in train.shafts if shaft.carrier == table.name]
-    springs, dampers = (_pin_values(v) for v in (table.pin_stiffness_N_per_m, table.pin_damping_N_s_per_m))
+    springs, dampers = (table.springs(key) for key in PINS)
     pins = []
     for number, name in enumerate(planets):
         errors = (table.pin_radial_errors_um, table.pin_tangential_errors_um)
         radial, tangential = (1e-6 * values[number % len(values)] if values else 0.0 for values in errors)
         pins.append(Pin(name, springs, 0.0 if dampers is None else dampers, (radial, tangential)))
     return Carrier(table.name, table.shaft, tuple(pins))
-
-
-def _pin_values(values: float | tuple[float, ...] | None) -> Any:
-    """One number for two directions, or five."""
-    return values[0] if isinstance(values, tuple) and len(values) == 1 else values
 
 
 def _metres(length_mm: float | None) -> float | None:

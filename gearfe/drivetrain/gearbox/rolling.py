@@ -22,13 +22,13 @@ SIGNS = np.array([1.0, 1.0, -1.0, 1.0, -1.0])
 
 def bearing_of(bore: str, table: BearingTable) -> Bearing:
     """Return the bearing at a bore that a table describes, which is no hinge."""
-    damping = table.damping if table.damping_matrix is None else in_frame(table.damping_matrix)
+    damping = table.damping if table.damping_matrix_N_m_s_rad is None else in_frame(table.damping_matrix_N_m_s_rad)
     if table.type is not None:
         return Bearing(bore, rolling_bearing(table), damping)
     if table.stiffness is not None:
         return Bearing(bore, table.stiffness, damping)
-    assert table.stiffness_matrix is not None
-    return Bearing(bore, in_frame(table.stiffness_matrix), damping)
+    assert table.stiffness_matrix_N_m_rad is not None
+    return Bearing(bore, in_frame(table.stiffness_matrix_N_m_rad), damping)
 
 
 def in_frame(matrix: Matrix | Array) -> Matrix:

@@ -47,8 +47,8 @@ def time_function(value: float | TrainFunctionTable, where: str, folder: Path, e
     if not isinstance(value, TrainFunctionTable):
         return constant(value)
     made = constant(value.constant)
-    if value.points:
-        made = made + _through(np.array(value.points), value.interpolation)
+    if value.points_ms:
+        made = made + _through(np.array(value.points_ms), value.interpolation)
     if value.csv is not None:
         made = made + _through(_table(value.csv, f"{where}.csv", folder), value.interpolation)
     for one in value.steps:
@@ -81,7 +81,7 @@ def speed_function(table: SpeedFunctionTable, where: str, folder: Path, largest:
     """
     if table.expression is None:
         if table.csv is None:
-            return _within(np.array(table.points), table.interpolation)
+            return _within(np.array(table.points_rad_per_s_Nm), table.interpolation)
         columns = read_numbers(folder / table.csv, f"{where}.csv", ("speed_rad_per_s", "torque_Nm"))
         points = np.column_stack([columns["speed_rad_per_s"], columns["torque_Nm"]])
         check_rising(f"{where}.csv speed_rad_per_s", tuple(points[:, 0].tolist()), "rad/s")

@@ -81,7 +81,7 @@ def _not_assembled(
         f"planet {number} does not mesh with gears {chain.one.name!r} and {chain.two.name!r} at once, "
         f"{degrees:.9g} deg from planet 1: ({chain.sum}) * {degrees:.9g} / 360 = {turned:.6g} must be a whole number"
     )
-    cure = f"place it {near[0]} or {near[1]} deg from planet 1 (planets = [0.0, ...])"
+    cure = f"place it {near[0]} or {near[1]} deg from planet 1 (planet_angles_deg = [0.0, ...])"
     step = 2.0 * math.pi / count
     if all(abs(angle - angles[0] - k * step) < 1e-9 for k, angle in enumerate(angles)):
         fitting = [str(n) for n in range(2, 13) if chain.teeth % n == 0]

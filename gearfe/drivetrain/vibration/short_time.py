@@ -180,7 +180,7 @@ def steady_from(time: Array, groups: list[Array], period: float | None) -> float
     cure = "compute for longer (duration_ms), or give the begin of the record in ms"
     if count < 4:
         problem = f"has only {count} parts of {1e3 * part:.4g} ms in the run: at least 4 tell whether it is steady"
-        raise InputError("spectrum.spectrum_from", "steady", problem, cure)
+        raise InputError("spectrum.spectrum_from_ms", "steady", problem, cure)
     begin = time[-1] - part * np.arange(count, 0, -1)  # parts end with the run
     off = np.zeros(count)
     for values in groups:
@@ -204,7 +204,7 @@ def steady_from(time: Array, groups: list[Array], period: float | None) -> float
         problem = (
             f"the run is not steady: forces or accelerations still change by {percent(worst, 3)} in its last quarter"
         )
-        raise InputError("spectrum.spectrum_from", "steady", problem, cure)
+        raise InputError("spectrum.spectrum_from_ms", "steady", problem, cure)
     return float(begin[first])
 
 

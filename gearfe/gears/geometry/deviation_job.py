@@ -175,11 +175,11 @@ def modification(one: FlankOf) -> FlankModification:
     table, gear, active, where = one.own, one.gear, one.active, one.where
     extra: list[Deviation] = []
     measured: tuple[Deviation, ...] = ()
-    if table.points:
-        s, h = np.array(table.points).T
+    if table.points_mm_um:
+        s, h = np.array(table.points_mm_um).T
         if gear.internal:  # with the standard's sign, or without
             s = -np.abs(s)
-        extra.append(_covering(1e-3 * s, 1e-6 * h, active, f"{where}.points", straight=True))
+        extra.append(_covering(1e-3 * s, 1e-6 * h, active, f"{where}.points_mm_um", straight=True))
     if table.measured_csv is not None:
         found = _measured(table.measured_csv, gear, active, f"{where}.measured_csv", one.folder)
         if len(found) == 1:
@@ -352,7 +352,7 @@ def _named(error: InputError, where: str, table: FlankTable) -> InputError:
         "root_relief.end": "root_relief_end_mm",
         "crowning": "profile_crowning_um",
         "slope": "profile_slope_um",
-        "extra[0]": "points" if table.points else "measured_csv",
+        "extra[0]": "points_mm_um" if table.points_mm_um else "measured_csv",
         "extra[1]": "measured_csv",
         "pitch errors": (given or ["run_out_um"])[0],
     }

@@ -176,7 +176,7 @@ def strength_of(table: GearRatingTable, gear: Gear, edition: int, where: str, re
         alternating=table.alternating_factor or 1.0,
         flank_ra=table.flank_ra_um or (table.flank_roughness_um or FLANK_ROUGHNESS) / RZ_OVER_RA,
         structure=table.structure_factor or 1.0,
-        thermal_contact=table.thermal_contact or THERMAL_CONTACT,
+        thermal_contact=table.thermal_contact_N_per_mm_m05_s05_K or THERMAL_CONTACT,
     )
 
 

@@ -64,7 +64,8 @@ def test_a_spur_stage(tmp_path):
     assert t["train"]["drive"]["speed_rad_per_s"] == pytest.approx(50.0 * math.pi, rel=1e-15)
     # the output turns against +y, and takes power: a torque along +y
     assert t["train"]["loads"][0]["torque_Nm"] == 60.0
-    assert t["bearings"]["B11"]["stiffness"] == [2e8, 1e8, 2e8, 1e4, 1e4]
+    assert t["bearings"]["B11"]["stiffness_N_per_m"] == [2e8, 1e8, 2e8]
+    assert t["bearings"]["B11"]["tilt_stiffness_Nm_per_rad"] == [1e4, 1e4]
     assert [section["outer_diameter_mm"] for section in t["shafts"]["input"]["sections"]] == [20.0, 25.0]
     assert (t["shafts"]["output"]["x_mm"], t["shafts"]["output"]["z_mm"]) == (60.0, 0.0)
     assert not job.left
@@ -343,7 +344,8 @@ def test_rigid_and_floating_bearings(tmp_path):
     parts, joints = spur_pair()
     parts = with_attributes(parts, 11, radial_stiffness=1e20, axial_force_absorption="no_direction")
     job = job_of(tmp_path, parts, joints)
-    assert job.tables["bearings"]["B11"]["stiffness"] == [1e10, 0.0, 1e10, 1e4, 1e4]
+    assert job.tables["bearings"]["B11"]["stiffness_N_per_m"] == [1e10, 0.0, 1e10]
+    assert job.tables["bearings"]["B11"]["tilt_stiffness_Nm_per_rad"] == [1e4, 1e4]
     assert any("rigid: 1e+10" in line for line in job.lines("derived"))
 
 

@@ -126,7 +126,8 @@ element_diameter_mm = 7.938
 pitch_diameter_mm = 38.5
 inner_osculation = 0.5173
 radial_clearance_um = 4.1
-damping = [1.0, 2.0, 3.0, 0.0, 0.0]
+damping_N_s_per_m = [1.0, 2.0, 3.0]
+tilt_damping_Nm_s_per_rad = [0.0, 0.0]
 [bearings.B]
 shaft = "in_"
 y_mm = 33.0
@@ -140,11 +141,13 @@ axial_preload_um = 3.0
 [bearings.C]
 shaft = "out"
 y_mm = -30.0
-stiffness = [1.1e8, 2.2e7, 3.3e8, 1.7e4, 1.9e4]
+stiffness_N_per_m = [1.1e8, 2.2e7, 3.3e8]
+tilt_stiffness_Nm_per_rad = [1.7e4, 1.9e4]
 [bearings.D]
 shaft = "out"
 y_mm = 30.0
-stiffness = [3e8, 0.0, 3e8, 1e4, 1e4]
+stiffness_N_per_m = [3e8, 0.0, 3e8]
+tilt_stiffness_Nm_per_rad = [1e4, 1e4]
 [bearings.E]
 shaft = "out"
 y_mm = 35.0

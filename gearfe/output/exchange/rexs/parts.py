@@ -776,36 +776,38 @@ def _springs(reading: Reading, bearing: Component, key: str) -> dict[str, Any]:
     axial = reading.text(bearing, "axial_force_absorption")
     radial = reading.flag(bearing, "radial_force_absorption")
     values = {}
-    for name, unit, rigid in (
-        ("radial_stiffness", "N / m", RIGID),
-        ("axial_stiffness", "N / m", RIGID),
-        ("bending_stiffness", "N m / rad", RIGID_TILT),
+    for name, unit, rigid, target in (
+        ("radial_stiffness", "N / m", RIGID, "stiffness_N_per_m"),
+        ("axial_stiffness", "N / m", RIGID, "stiffness_N_per_m"),
+        ("bending_stiffness", "N m / rad", RIGID_TILT, "tilt_stiffness_Nm_per_rad"),
     ):
         value = reading.number(bearing, name, unit)
         if value is not None and value > rigid:
-            reading.derived(bearing, name, f"{key}.stiffness", f"rigid: {rigid:g} {unit}")
+            reading.derived(bearing, name, f"{key}.{target}", f"rigid: {rigid:g} {unit}")
         elif value is not None:
-            reading.note(READ, bearing, name, f"{key}.stiffness")
+            reading.note(READ, bearing, name, f"{key}.{target}")
         values[name] = None if value is None else min(value, rigid)
     across, tilt = values["radial_stiffness"], values["bending_stiffness"] or 0.0
     if across is None or (not across and radial is not False):
         across = USUAL
-        reading.defaulted(bearing, f"{key}.stiffness", f"{USUAL:g} N/m across the axis")
+        reading.defaulted(bearing, f"{key}.stiffness_N_per_m", f"{USUAL:g} N/m across the axis")
     if radial is False:
         across = 0.0
-        reading.derived(bearing, "radial_force_absorption", f"{key}.stiffness", "carries nothing across the axis")
+        reading.derived(
+            bearing, "radial_force_absorption", f"{key}.stiffness_N_per_m", "carries nothing across the axis"
+        )
     way = values["axial_stiffness"]
     if axial == "no_direction":
         way = 0.0
-        reading.derived(bearing, "axial_force_absorption", f"{key}.stiffness", "floats: no axial stiffness")
+        reading.derived(bearing, "axial_force_absorption", f"{key}.stiffness_N_per_m", "floats: no axial stiffness")
     elif not way and axial:
         way = USUAL
-        reading.defaulted(bearing, f"{key}.stiffness", f"{USUAL:g} N/m along the axis")
+        reading.defaulted(bearing, f"{key}.stiffness_N_per_m", f"{USUAL:g} N/m along the axis")
     elif axial in ("positive", "negative"):
         reading.ignored(bearing, "axial_force_absorption", f"{axial}: springs of a job act both ways")
     elif axial:
-        reading.note(READ, bearing, "axial_force_absorption", f"{key}.stiffness")
-    return {"stiffness": [across, way or 0.0, across, tilt, tilt]}
+        reading.note(READ, bearing, "axial_force_absorption", f"{key}.stiffness_N_per_m")
+    return {"stiffness_N_per_m": [across, way or 0.0, across], "tilt_stiffness_Nm_per_rad": [tilt, tilt]}
 
 
 def couplings(reading: Reading) -> tuple[dict[str, dict[str, Any]], dict[str, str], dict[str, str]]:

@@ -84,10 +84,14 @@ def _stage(
     name = reading.name(holder[0] if holder else stage)
     count = len(planets)
     even = all(abs(angle - 360.0 * k / count) < 1e-6 for k, angle in enumerate(angles))
-    tables.setdefault(CARRIERS, {})[name] = {"shaft": main, "planets": count if even else angles}
+    placed = {"planets": count} if even else {"planet_angles_deg": angles}
+    tables.setdefault(CARRIERS, {})[name] = {"shaft": main, **placed}
     where = f"carriers.{name}"
     reading.derived(
-        stage, "planet_shaft", f"{where}.planets", "positions of the planets around the axis of the carrier"
+        stage,
+        "planet_shaft",
+        f"{where}.{next(iter(placed))}",
+        "positions of the planets around the axis of the carrier",
     )
     _pins(reading, tables[CARRIERS][name], planets[0], where)
     shafts[planets[0]]["carrier"] = name
@@ -318,8 +322,9 @@ def _hold(reading: Reading, tables: dict[str, Any], shaft: str, name: str, carri
         if table.get("shaft") == shaft and abs(y - table.get("y_mm", 0.0)) < half:
             y = table["y_mm"] + math.copysign(half, y - table["y_mm"])
             reading.derived(coupling, "support_vector", f"{where}.y_mm", f"the nearer end of the face of {gear}")
-    tables["bearings"][name] = {"shaft": shaft, "y_mm": y, "stiffness": [across, axial, across, tilt, tilt]}
-    reading.derived(coupling, "radial_stiffness", f"{where}.stiffness", f"at most {RIGID:g} N/m, rigid")
+    springs = {"stiffness_N_per_m": [across, axial, across], "tilt_stiffness_Nm_per_rad": [tilt, tilt]}
+    tables["bearings"][name] = {"shaft": shaft, "y_mm": y, **springs}
+    reading.derived(coupling, "radial_stiffness", f"{where}.stiffness_N_per_m", f"at most {RIGID:g} N/m, rigid")
 
 
 def ring_springs(reading: Reading, tables: dict[str, Any]) -> None:

@@ -523,12 +523,12 @@ def _bearing(b: _Builder, name: str, entry: Mapping[str, Any], shafts: Mapping[s
     pose = _pose(y, shaft.get("z_mm", 0.0), shaft.get("x_mm", 0.0)) if "y_mm" in entry else {}
     kind = entry.get("type")
     if kind is None:
-        stiffness = entry.get("stiffness")
+        stiffness, tilt = entry.get("stiffness_N_per_m"), entry.get("tilt_stiffness_Nm_per_rad") or (0.0, 0.0)
         values: dict[str, Any] = {}
         if stiffness is not None:
             values = {
                 "radial_stiffness": (stiffness[0], "N / m"), "axial_stiffness": (stiffness[1], "N / m"),
-                "bending_stiffness": (stiffness[3], "N m / rad"),
+                "bending_stiffness": (tilt[0], "N m / rad"),
             }  # fmt: skip
         part = b.add("concept_bearing", name, "bearings", **pose, **at, **values)
     else:
