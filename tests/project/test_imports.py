@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from tests.places import ROOT
 
 HEAVY = ("gmsh", "meshio", "skfem", "matplotlib", "pyvista", "vtk", "h5py")
@@ -43,3 +45,11 @@ def test_a_sweep_on_stored_gears_loads_no_mesher_no_finite_elements_and_no_plots
     loaded = loaded_after(SWEEP)
     assert not loaded & {*HEAVY}
     assert "numpy" in loaded
+
+
+@pytest.mark.parametrize("program", [False, True])
+def test_only_the_program_leaves_out_the_property_lists_of_matplotlib(program):
+    start = "from gearfe.base.isolation import leave_working_folder as leave; leave()\n" if program else ""
+    code = "import gearfe.figures\nfrom matplotlib.lines import Line2D\nprint('linestyle' in Line2D.set.__doc__)"
+    done = subprocess.run([sys.executable, "-c", start + code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == [str(not program)]
