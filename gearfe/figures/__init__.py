@@ -10,4 +10,4 @@ if os.environ.get("MATPLOTLIBRC", "").startswith(EMPTY):  # the program, not an 
     from matplotlib import artist
 
     # the docstrings that list all properties of each artist take a third of the time that matplotlib loads
-    artist.kwdoc = lambda _: ""
+    artist.kwdoc = lambda artist: ""  # noqa: ARG005
