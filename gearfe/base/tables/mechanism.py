@@ -12,6 +12,7 @@ from ..config import build, quantity, read_toml
 from ..errors import InputError, unknown_name
 from .beam import BeamTable, check_on_axis
 from .jobs import TABLES
+from .joint_coordinates import LinksTable, with_links
 from .kinds import FORCES, GONE_METHODS, JOINTS, Kind
 from .plate import PlateTable
 
@@ -143,8 +144,14 @@ class ValueTableTable:
 class JointTable:
     """[joints.NAME]; which keys belong to which type is in `JOINTS`."""
 
-    type: str = quantity(choices=tuple(JOINTS), doc="type of joint")
-    body: str = quantity(doc="body that the joint holds")
+    type: str = quantity(choices=tuple(JOINTS), doc='type of joint; with at_m left out: "hinge"')
+    body: str = quantity(doc="body that the joint holds, or give at_m and links")
+    at_m: Pair | None = quantity(
+        None, doc="position at the start, [x, y] in m, instead of body, to and points: hinge, slot or prismatic"
+    )
+    links: tuple[str, ...] = quantity(
+        (), doc="with at_m: the links that it joins, or one of which it is a point; lengths and start poses follow"
+    )
     to: str = quantity("ground", doc="the other body, or 'ground'")
     point: str | Pair | None = quantity(None, doc="point of the body: a name or [x, y] in m")
     to_point: str | Pair | None = quantity(None, doc="point of the other body: a name or [x, y] in m")
@@ -318,6 +325,7 @@ class MechanismFile:
     parameters: dict[str, float] = quantity(
         dict, doc="numbers by name, or expressions of those above; other keys and expressions may use them"
     )
+    links: LinksTable = quantity(LinksTable, doc="links that joints with at_m define")
     ground: GroundTable = quantity(GroundTable, doc="points at rest")
     joints: dict[str, JointTable] = quantity(dict, doc="joints by name")
     forces: dict[str, ForceTable] = quantity(dict, doc="forces by name")
@@ -384,14 +392,16 @@ def read_mechanism_file(path: str | Path) -> MechanismFile:
     """
     raw = read_toml(path)
     others = [name for name in raw if name in TABLES]
-    if others and "bodies" not in raw:
+    if others and "bodies" not in raw and "joints" not in raw:
         cure = "run it with another command, or begin with gearfe new mechanism"
         raise InputError("mechanism file", str(path), f"has no bodies but a table [{others[0]}]", cure)
     return mechanism_tables(raw)
 
 
 def mechanism_tables(raw: Mapping[str, Any]) -> MechanismFile:
-    """Return the tables of a parsed mechanism file, expressions of its parameters evaluated.
+    """Return the tables of a parsed mechanism file.
+
+    Expressions of parameters are evaluated; links whose joints have positions become bodies.
 
     Raises
     ------
@@ -402,7 +412,7 @@ def mechanism_tables(raw: Mapping[str, Any]) -> MechanismFile:
         from .parameters import with_parameters
 
         raw = with_parameters(MechanismFile, raw)
-    return build(MechanismFile, raw, "")
+    return build(MechanismFile, with_links(raw), "")
 
 
 def _check_keys(table: JointTable | ForceTable, where: str, kind: Kind, what: str) -> None:
