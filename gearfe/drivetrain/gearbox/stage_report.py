@@ -6,9 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..train.kinematics import against, drive_sense
 from ..train.model import TrainModel
-from ..train.planetary import KINDS, MeshFamily, family_facts, mesh_families
+from ..train.planetary import KINDS, MeshFamily, family_facts
 
 #: Multiples of a mesh frequency whose sidebands are listed.
 MULTIPLES = 3
@@ -29,13 +28,7 @@ def stage_entries(model: TrainModel, mean_forces: Sequence[float] | None = None)
         return {}
     rolled, names = train.kinematics, [mesh.name for mesh in train.meshes]
     shafts = [shaft.name for shaft in train.shafts]
-    # phases are in the sense in which the driver pushes; here they are in that in which it turns
-    sense = drive_sense(train.layout.speed) or 1.0
-    turned = [
-        phase * push * sense * math.copysign(1.0, against(mesh, mesh.driver.shaft, rolled.ratios))
-        for mesh, phase, push in zip(train.layout.meshes, rolled.phases, rolled.senses, strict=True)
-    ]
-    families = mesh_families(train.layout, turned)
+    families = model.families
     entries: dict[str, Any] = {
         "speed_ratios": {name: str(ratio) for name, ratio in zip(shafts, rolled.ratios, strict=True)},
         "torque_ratios": {

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+from ..train.kinematics import drive_sense
 from ..train.model import TrainModel
 
 
@@ -18,7 +20,7 @@ class TrainOrder:
     order
         Cycles in a turn of the drive.
     names
-        What has this order, such as ``2 x mesh 1`` and ``1 x shaft output``.
+        What has this order, such as ``2 x mesh 1``, ``1 x mesh 1 + 1 x carrier arm`` and ``1 x shaft output``.
     meshes, shafts
         Their numbers.
     """
@@ -63,4 +65,30 @@ def train_orders(model: TrainModel, multiples: int, shaft_multiples: int) -> lis
     for shaft, ratio in enumerate(rolled.ratios):
         for a in range(1, shaft_multiples + 1) if ratio else ():
             add(a * abs(ratio), f"{a} x shaft {model.train.shafts[shaft].name}", shafts=(shaft,))
+    for order, name, meshes in _sidebands(model, multiples):
+        add(order, name, meshes=meshes)
     return [found[order] for order in sorted(found)]
+
+
+def _sidebands(model: TrainModel, multiples: int) -> Iterator[tuple[Fraction, str, tuple[int, ...]]]:
+    """Sidebands of mesh orders that carry something in an elastic housing, where carriers turn.
+
+    The mesh forces across the axis turn with the carrier, so their harmonics of the order n push the housing at n + c
+    and n - c, c the rotations of the carrier. With pins out of place both carry something. Sidebands of more passes, of
+    a housing that is not alike in all directions, are much smaller: orders.csv of a run-up has them.
+    """
+    train, rolled = model.train, model.kinematics
+    turned = set(model.turned_carriers)
+    for family in model.families:
+        carrier = next(c for c in train.carriers if c.name == family.carrier)
+        number = train.shaft_number(carrier.shaft)
+        ratio, cycles = rolled.ratios[number], rolled.cycles[family.meshes[0]]
+        if number not in turned or not cycles:
+            continue
+        uneven = any(any(pin.error) for pin in carrier.pins)
+        sense = 1 if float(ratio) * (drive_sense(train.driven.speed) or 1.0) > 0.0 else -1
+        for a in range(1, multiples + 1):
+            for sign, passes in (("-", -1), ("+", 1)):
+                order = a * cycles + passes * abs(ratio)
+                if order > 0 and (uneven or family.carries(a, sense * passes)):
+                    yield order, f"{a} x mesh {family.meshes[0] + 1} {sign} 1 x carrier {carrier.name}", family.meshes

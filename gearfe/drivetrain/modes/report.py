@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..train.model import TrainModel
 from .critical import Campbell, nearest
 from .job import ModesResult
 from .orders import TrainOrder
@@ -51,7 +52,18 @@ def warnings(result: ModesResult) -> list[str]:
         for shaft in result.model.train.shafts
         if shaft.sections and shaft.highest_hz < KEPT * band
     ]
-    return [*result.model.mesh_notes, *result.model.operating.warnings, *few]
+    return [*result.model.mesh_notes, *result.model.operating.warnings, *frozen_carriers(result.model), *few]
+
+
+def frozen_carriers(model: TrainModel) -> list[str]:
+    """Return a sentence about modes of trains whose carriers turn in an elastic housing."""
+    names = [c.name for c in model.train.carriers if model.train.shaft_number(c.shaft) in model.turned_carriers]
+    if not names:
+        return []
+    return [
+        f"modes are those with carrier {' and '.join(names)} at its start position: in an elastic housing they change "
+        "as it turns, and hold where it turns slowly against their frequencies"
+    ]
 
 
 def mode_entries(modes: WhirlModes) -> list[dict[str, Any]]:

@@ -128,7 +128,8 @@ def turning_train(model: TrainModel, kinds: Array) -> TurningTrain:
         if line.in_contact:  # its Rayleigh part is in the constant damping already
             along = modal.T.T @ line.row
             damping += line.given.damping * np.outer(along, along)
-    gyroscopic, stiffening = (modal.T.T @ x @ modal.T for x in model.turning[:2])
+    turning = model.spinning if model.forces.turned else model.turning
+    gyroscopic, stiffening = (modal.T.T @ x @ modal.T for x in turning[:2])
     return TurningTrain(modal.eigenvalues, damping, gyroscopic, stiffening, kinds)
 
 

@@ -224,6 +224,9 @@ class WhirlModes(ShownTable):
 def train_modes(model: TrainModel, speeds: ArrayLike, highest_hz: float = 5000.0) -> WhirlModes:
     """Find the modes of a train with the mean stiffness of its meshes, with gyroscopic moments and damping.
 
+    With carriers that turn in an elastic housing the train changes as they turn. Its modes are those with the carriers
+    where they are at the start, seen from axes that stand still.
+
     Parameters
     ----------
     model : TrainModel
@@ -239,7 +242,6 @@ def train_modes(model: TrainModel, speeds: ArrayLike, highest_hz: float = 5000.0
         For speeds that change sign, are not sorted, or turn against the drive of the model, and for a train that
         cannot vibrate.
     """
-    model.check_constant("modes do not take")
     given = _checked(model, speeds)
     sense = float(np.sign(given[np.argmax(np.abs(given))])) or drive_sense(model.train.driven.speed) or 1.0
     forms = train_forms(model, sense)

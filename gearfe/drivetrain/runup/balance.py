@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
@@ -34,6 +34,7 @@ import numpy as np
 
 from ...base.typing import Array, ComplexArray, IntArray
 from . import torus
+from .coupling import Coupling, TurnedSpring, coupling
 from .krylov import gmres
 from .linear import Linear
 from .torus import Lattice
@@ -58,6 +59,8 @@ GROWTH = 1.5
 PLENTY = 256
 #: Most harmonics: a bound on time and memory, not on the error, whose estimate stays.
 MOST_HARMONICS = 8192
+#: Equations of turned springs that are kept.
+KEPT = 4
 
 
 class Changes(NamedTuple):
@@ -151,6 +154,10 @@ class Oscillator:
         Largest motion that means something, in parts of the scale.
     start : (m,), optional
         Where the search of a first motion begins, beside the freedoms under the constant forces alone.
+    carriers
+        So many of the last phases are rotations of carriers, see `gearfe.drivetrain.runup.torus`.
+    turned
+        Springs and dampers between the frames of these and an elastic housing.
     """
 
     linear: Linear
@@ -160,20 +167,30 @@ class Oscillator:
     orders: tuple[tuple[int, ...], ...] = ((1,),)
     limit: float = math.inf
     start: Array | None = None
+    carriers: int = 0
+    turned: tuple[TurnedSpring, ...] = ()
+    _last: dict[tuple[float, int], Coupling] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def periods(self) -> tuple[float, ...]:
         """Of the phases, in parts of that of the first."""
         return tuple(turns / self.turns[0] for turns in self.turns)
 
+    def waves(self, count: int) -> IntArray:
+        """Numbers k of the harmonics 0 to `count`, (count + 1, n)."""
+        return torus.harmonics(self.periods, count, self.carriers).waves
+
+    def numbers(self, count: int) -> dict[tuple[int, ...], int]:
+        """Number of each of the harmonics 0 to `count` by its k."""
+        return torus.numbers(self.periods, count, self.carriers)
+
     def omega(self, speed: float, count: int) -> Array:
         """Angular frequencies (rad/s) of the harmonics 0 to `count`, none negative."""
-        waves, _ = torus.harmonics(self.periods, count)
-        return np.asarray((waves * (abs(speed) / np.array(self.turns))).sum(axis=1))
+        return np.asarray((self.waves(count) * (abs(speed) / np.array(self.turns))).sum(axis=1))
 
     def lattice(self, count: int) -> Lattice:
         """Places at which so many harmonics are sampled."""
-        return torus.lattice(self.periods, count)
+        return torus.lattice(self.periods, count, self.carriers)
 
     def harmonics(self, speed: float, highest: float, multiples: int = 8) -> int:
         """Number of harmonics: multiples up to an angular frequency (rad/s), so many of each mesh at least.
@@ -182,9 +199,9 @@ class Oscillator:
         """
         periods = self.periods
         order = max(multiples * cycles / b for mesh in self.orders for cycles, b in zip(mesh, periods, strict=True))
-        most = torus.harmonics(periods, MOST_HARMONICS if len(periods) == 1 else PLENTY).order[-1]
+        most = torus.harmonics(periods, MOST_HARMONICS if len(periods) == 1 else PLENTY, self.carriers).order[-1]
         band = min(highest * self.turns[0] / abs(speed), float(most))
-        return self.rounded(torus.count_below(periods, max(order, band)))
+        return self.rounded(torus.count_below(periods, max(order, band), self.carriers))
 
     def rounded(self, harmonics: float) -> int:
         """Number whose samples transform quickly, at least the given one, up to the most."""
@@ -197,6 +214,40 @@ class Oscillator:
     def flexibility(self, speed: float, count: int) -> ComplexArray:
         """H at harmonics 0 to `count`, (count + 1, m, m)."""
         return self.linear.flexibility(self.omega(speed, count), speed)
+
+    def coupled(self, speed: float, places: ComplexArray, flexibility: ComplexArray) -> ComplexArray:
+        """Motion (K + 1, m) with the springs of carriers, for that of the constant part, whose H is given."""
+        if not self.turned:
+            return places
+        key = speed, len(places)
+        known = self._last.get(key)
+        if known is None:
+            count = len(places) - 1
+            known = coupling(self.turned, self.waves(count), self.carriers, self.omega(speed, count), flexibility)
+            if len(self._last) >= KEPT:
+                self._last.clear()
+            self._last[key] = known
+        return known(places)
+
+    def turned_entries(self, theta: Array) -> list[Entries]:
+        """Derivatives of the forces of the springs of carriers at phases theta (S, n)."""
+        made = []
+        for spring in self.turned:
+            rows, columns, values = spring.entries(theta)
+            made.append((rows, columns + self.linear.size * spring.of_rates, values))
+        return made
+
+    def whole_forces(self, orbit: Orbit) -> ComplexArray:
+        """Amplitudes (K + 1, m) of the forces of an orbit, with those of the springs of carriers."""
+        if not self.turned:
+            return orbit.forces
+        lattice = self.lattice(2 * orbit.harmonics)
+        rates = 1j * self.omega(orbit.speed, orbit.harmonics)[:, None] * orbit.places
+        both = lattice.synthesis(np.hstack([orbit.places, rates]))
+        forces = np.zeros((len(both), self.linear.size))
+        for rows, columns, values in self.turned_entries(lattice.theta):
+            np.add.at(forces.T, rows, (values * both[:, columns]).T)
+        return np.asarray(orbit.forces + lattice.analysis(forces)[: len(orbit.places)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,7 +351,7 @@ def moved(system: Oscillator, speed: float, flexibility: ComplexArray, forces: C
     """
     made = (flexibility @ forces[..., None])[..., 0]
     made[0] += system.rest(speed)
-    return np.asarray(made)
+    return system.coupled(speed, np.asarray(made), flexibility)
 
 
 def packed(amplitudes: ComplexArray, scale: Array) -> Array:
@@ -346,11 +397,11 @@ def product(system: Oscillator, speed: float, at: Evaluated, flexibility: Comple
         moves = change[:, columns]
         if of_rates.any():
             moves[:, of_rates] *= turning
-        sampled = lattice.synthesis(moves)
+        sampled, moves = lattice.synthesis(moves), np.zeros_like(change)
         for part, where in zip(parts, wheres, strict=False):
             forces = lattice.analysis((part.values * sampled[:, where]) @ part.sums)[:count]
-            change -= (part.way @ (forces if part.factor is None else part.factor * forces)[..., None])[..., 0]
-        return packed(change, scale)
+            moves += (part.way @ (forces if part.factor is None else part.factor * forces)[..., None])[..., 0]
+        return packed(change - system.coupled(speed, moves, flexibility), scale)
 
     return changed
 

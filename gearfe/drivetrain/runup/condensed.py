@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, partial
@@ -20,6 +20,7 @@ from ..train.kinematics import drive_sense, fastest, mesh_phases
 from ..train.model import TrainModel
 from ..train.simulate import DIVERGED
 from .balance import Oscillator
+from .coupling import TurnedSpring
 from .linear import Linear
 from .mesh_forces import WHOLE, MeshForces, Rubbing, SwingingTorque
 
@@ -30,6 +31,8 @@ SHARED = 12
 LONGEST = 64
 #: Most phases: harmonics and samples grow with their number.
 MOST_PHASES = 3
+#: Unit directions that differ by no more are one.
+PARALLEL = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +55,8 @@ class CondensedTrain:
         Of the freedoms.
     torque : (system size,)
         Constant torques on the coordinates.
+    frames : (shafts, phases)
+        Rotation of the frame of each shaft for one of each phase; 0 in a rigid housing.
     """
 
     model: TrainModel
@@ -61,6 +66,17 @@ class CondensedTrain:
     steady: Array
     directions: Array
     torque: Array
+    frames: Array
+
+    @cached_property
+    def passes(self) -> dict[int, tuple[str, int]]:
+        """Carriers that turn in an elastic housing: number of the phase, name and number of planets of each."""
+        made: dict[int, tuple[str, int]] = {}
+        for carrier in self.model.train.carriers:
+            turned = self.frames[self.model.train.shaft_number(carrier.shaft)]
+            for phase in np.flatnonzero(turned).tolist():
+                made.setdefault(phase, (f"carrier {carrier.name}", len(carrier.pins)))
+        return made
 
     @cached_property
     def bores_of_modes(self) -> Array:
@@ -97,11 +113,16 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     _check(model)
     modal, rolled = model.modal, model.kinematics
     phases = mesh_phases(rolled.cycles, shared)
-    if len(phases) > MOST_PHASES:
+    carriers = sorted({abs(rolled.ratios[number]) for number in model.turned_carriers})
+    if len(phases) + len(carriers) > MOST_PHASES:
         problem = f"need {len(phases)} phases of their own, more than {MOST_PHASES}: {rolled.note}"
+        if carriers:
+            problem = f"need {len(phases)} phases, and carriers in an elastic housing {len(carriers)} more: more than "
+            problem += str(MOST_PHASES)
         raise InputError("train.meshes", None, problem, "look at it with gearfe vibration")
-    phases = _with_torques(model, phases, speeds)
+    phases = [*_with_torques(model, phases, speeds), *((1 / ratio, []) for ratio in carriers)]
     turns = [turns for turns, _ in phases]
+    sense = drive_sense(model.train.driven.speed) or 1.0
     flanks = model.forces.flanks
     reads = [_directions(f) for f in flanks]
     fixed = len(model.torques) - len(model.orders)
@@ -112,16 +133,18 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     acted = [*(direction for direction, *_ in swinging), *(over.direction for over in over_speed)]
     used = sorted({*(x for four in reads for x in four if x >= 0), *acted})
     freedoms = np.array([[used.index(x) if x >= 0 else -1 for x in four] for four in reads])
-    to_modes = modal.T.T @ model.directions
+    frames = {float(sign * ratio): sense * sign * np.eye(len(phases))[number - len(carriers)]
+              for number, ratio in enumerate(carriers) for sign in (1, -1)}  # fmt: skip
+    columns, springs = _turned_springs(model, len(used), frames)
+    directions = np.column_stack([model.directions[:, used], *columns])
     ends = ((d, float(replace(f, sines=())(model.torque_end))) for d, f in model.torques)
     torque = sum((d * value for d, value in ends), start=np.zeros(len(modal.T)))
     push = modal.constant + modal.T.T @ torque
     turning = model.turning
     linear = Linear(
-        modal.eigenvalues, _damping(model), to_modes[:, used], push, modal.T.T @ turning.gyroscopic @ modal.T,
+        modal.eigenvalues, _damping(model), modal.T.T @ directions, push, modal.T.T @ turning.gyroscopic @ modal.T,
         modal.T.T @ turning.stiffening @ modal.T, modal.T.T @ (turning.thrown + turning.stiffening @ modal.origin),
     )  # fmt: skip
-    sense = drive_sense(model.train.driven.speed) or 1.0
     steady = model.kinematics.steady_forces
     ends = np.cumsum([0, *(len(line.flanks) for line in model.meshes)]).tolist()
     of_mesh = tuple(tuple(range(a, b)) for a, b in itertools.pairwise(ends))
@@ -134,15 +157,66 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     speeding = [replace(over, direction=used.index(over.direction)) for over in over_speed]
     forces = MeshForces(flanks, freedoms, sense * of_flank, rubbing, torques, speeding)
     more = [*(torque.freedom for torque in torques), *(over.direction for over in speeding)]
-    scale = _scale(model, linear, freedoms, flanks, more)
+    scale = _scale(model, linear, freedoms, flanks, more, springs)
     limit = DIVERGED * min(line.module for line in model.meshes) / float(scale[freedoms[:, 0]].max())
     many = tuple(tuple(row) for row in orders.tolist())
+    turned = np.array([frames.get(float(ratio), np.zeros(len(phases))) for ratio in model.frame_ratios])
     start = np.zeros(linear.size)
     for numbers, force in zip(of_mesh, steady.tolist(), strict=True):
         if force < 0.0 and len(numbers) == 2:  # statics press the back flanks, which bear behind the backlash
             start[freedoms[list(numbers), 0]] += flanks[numbers[1]].gap * np.array([-1.0, 1.0])
-    system = Oscillator(linear, forces, tuple(float(t) for t in turns), scale, many, limit, start)
-    return CondensedTrain(model, system, forces, of_mesh, steady, model.directions[:, used], torque)
+    system = Oscillator(
+        linear, forces, tuple(float(t) for t in turns), scale, many, limit, start, len(carriers), tuple(springs)
+    )
+    return CondensedTrain(model, system, forces, of_mesh, steady, directions, torque, turned)
+
+
+def _turned_springs(
+    model: TrainModel, count: int, frames: Mapping[float, Array]
+) -> tuple[list[Array], list[TurnedSpring]]:
+    """Springs and dampers between frames of carriers and an elastic housing, at freedoms of their own.
+
+    Parameters
+    ----------
+    model : TrainModel
+        The train.
+    count : int
+        Number of the first of these freedoms.
+    frames : mapping of float to ndarray, shape (phases,)
+        Rotation of a carrier for one of each phase, by its speed in parts of that of the drive.
+
+    Returns
+    -------
+    columns : list of ndarray, shape (system size,)
+        Unit directions of the freedoms.
+    springs : list of TurnedSpring
+    """
+    columns, springs = list[Array](), list[TurnedSpring]()
+
+    def freedom(direction: Array) -> tuple[int, float]:
+        """Number of the freedom along a direction, and its length."""
+        length = float(np.linalg.norm(direction))
+        unit = direction / length
+        for number, known in enumerate(columns):
+            if np.abs(known - unit).max() <= PARALLEL:
+                return count + number, length
+        columns.append(unit)
+        return count + len(columns) - 1, length
+
+    for each in model.forces.turned:
+        numbers = [each.still, each.still + 1, each.turning, each.turning + 1]
+        along = model.directions[:, numbers].T
+        if not along.any(axis=1).all():  # a bearing without stiffness or damping in this plane
+            continue
+        freedoms, lengths = zip(*map(freedom, along), strict=True)
+        springs.append(TurnedSpring(np.array(freedoms), np.array(lengths), each.of_rates, *_frame(frames[each.ratio])))
+    return columns, springs
+
+
+def _frame(rotation: Array) -> tuple[int, float]:
+    """Number of the phase that is a rotation, and its sign."""
+    phase = int(np.flatnonzero(rotation)[0])
+    return phase, float(rotation[phase])
 
 
 def _rubbing(model: TrainModel, flank: Flank, mesh: int, force: float) -> Rubbing | None:
@@ -171,7 +245,6 @@ def _directions(flank: Flank) -> tuple[int, int, int, int]:
 def _check(model: TrainModel) -> None:
     if not model.meshes:
         raise InputError("train.meshes", None, "is empty: nothing excites the train", "add a mesh")
-    model.check_constant("steady states do not take")
     for line in model.meshes:
         if line.rigid:
             problem = "is a constraint without a stiffness, which excites nothing"
@@ -237,12 +310,21 @@ def _damping(model: TrainModel) -> Array:
 
 
 def _scale(
-    model: TrainModel, linear: Linear, freedoms: Array, flanks: Sequence[Flank], torques: Sequence[int]
+    model: TrainModel,
+    linear: Linear,
+    freedoms: Array,
+    flanks: Sequence[Flank],
+    torques: Sequence[int],
+    springs: Sequence[TurnedSpring],
 ) -> Array:
     """Approach of each mesh under its steady force; rotations that move a base circle so far."""
     rest = np.abs(linear.rest())
     size = max(float(rest[np.unique(freedoms[:, 0])].max()), 1e-9)
     scale = np.full(linear.size, size)
+    if len(springs):  # as far as the energy of a touch moves them
+        flexible = np.diag(linear.statics)
+        own = np.unique(np.concatenate([spring.freedoms for spring in springs]))
+        scale[own] = size * np.sqrt(flexible[own] / flexible[np.unique(freedoms[:, 0])].max())
     scale[list(torques)] = size / (0.5 * model.meshes[0].module * 2.0 * math.pi)
     for flank, (d, r, a, s) in zip(flanks, freedoms, strict=True):
         if flank.mean > 0.0:

@@ -8,7 +8,7 @@ Introduction to Numerical Continuation Methods, 2003, Ch. 11).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -63,7 +63,8 @@ def first_motion(system: Oscillator, speed: float, *, tolerance: float, highest:
     def forces(theta: Array, _part: float, u: Array, du: Array) -> Pushes:
         return system.forces(theta, speed, u, du)
 
-    grows = Growing(system.linear, forces, system.turns, system.scale, system.orders, system.limit, speed=speed)
+    parts = {item.name: getattr(system, item.name) for item in fields(Oscillator) if item.init} | {"forces": forces}
+    grows = Growing(**parts, speed=speed)
     places = np.zeros((grows.harmonics(0.0, 0.0) + 1, system.linear.size), dtype=complex)
     places[0] = system.rest(speed) + (0.0 if system.start is None else system.start)
     start, _ = solve(grows, 0.0, places, tolerance)

@@ -20,7 +20,7 @@ from ...base.errors import InputError
 from ...base.progress import count, one_thread
 from ...base.typing import Array, ComplexArray
 from ..train.forces import CurveFlank, WidthFlank
-from .balance import Changes
+from .balance import Changes, changes
 from .condensed import CondensedTrain
 from .stability import LONGEST, around, kicks, steps_of, strengths, window
 
@@ -95,4 +95,5 @@ def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Changes:
             u[:, along] = factor * steady / flank.curve(phase).value - flank.beyond_touch(phase, np.zeros(()), tilts)
         else:
             u[:, along] = flank.gap + flank.law.approach(phase, factor * steady)
-    return train.forces(theta, 1.0, u, np.zeros_like(u)).by.of_freedoms(train.system.linear.size)
+    entries, size = train.forces(theta, 1.0, u, np.zeros_like(u)).entries, train.system.linear.size
+    return changes([*entries, *train.system.turned_entries(theta)], size, len(theta)).of_freedoms(size)

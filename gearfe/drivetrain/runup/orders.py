@@ -90,7 +90,29 @@ def orders(run: RunUp, multiples: int) -> list[OrderCut]:
         rising = sorted(met, key=lambda x: x[0])
         order = float(np.sum(np.array(k) / np.array(system.turns)))
         made.append(OrderCut(k, order, tuple(name for _, name, _ in rising), rising[0][2]))
-    return sorted(made, key=lambda cut: cut.order)
+    return sorted([*made, *_sidebands(run, made)], key=lambda cut: cut.order)
+
+
+def _sidebands(run: RunUp, cuts: Sequence[OrderCut]) -> list[OrderCut]:
+    """Sidebands of orders, and orders of the carriers alone: of up to as many rotations as a carrier has planets."""
+    turns, passes = np.array(run.train.system.turns), run.train.passes
+    none = OrderCut((0,) * len(turns), 0.0, (), None)
+    made = list[OrderCut]()
+    for shifts in itertools.product(*(range(-planets, planets + 1) for _, planets in passes.values())):
+        waves = np.zeros(len(turns), dtype=int)
+        waves[list(passes)] = shifts
+        shift = float(np.sum(waves / turns))
+        more = "".join(
+            f" {'-' if k < 0 else '+'} {abs(k)} x {name}"
+            for k, (name, _) in zip(shifts, passes.values(), strict=True)
+            if k
+        )
+        for cut in (none, *cuts) if any(shifts) else ():
+            if cut.order + shift > 0.0:
+                names = tuple(name + more for name in cut.names or ("",))
+                k = tuple((np.array(cut.waves) + waves).tolist())
+                made.append(OrderCut(k, cut.order + shift, tuple(name.removeprefix(" + ") for name in names), None))
+    return made
 
 
 def _combined(parts: Sequence[tuple[int, int]]) -> str:

@@ -9,11 +9,10 @@ import numpy as np
 
 from ...base.typing import Array
 from ...gears.rating.dynamics import dynamic_factor
-from ..modes.report import mode_entries
+from ..modes.report import frozen_carriers, mode_entries
 from ..modes.report import tables as mode_tables
 from ..train.response import XYZ
 from ..train.simulate import DIVERGED
-from . import torus
 from .columns import dynamic_factors
 from .critical import CriticalSpeeds, peaks_of
 from .instability import InstabilityMap
@@ -81,7 +80,7 @@ def waterfall(run: RunUp, states: Sequence[SteadyState] | None = None) -> dict[s
         inside = np.flatnonzero(s.frequency <= run.band_hz)
         frequency[row, inside], moved[row, inside] = s.frequency[inside], np.abs(s.acceleration[inside])
         forces[row, inside] = np.abs(s.bearing[inside, :, :3])
-    waves = torus.harmonics(run.train.system.periods, max(count - 1, 0)).waves[:count]
+    waves = run.train.system.waves(max(count - 1, 0))[:count]
     order = (waves / np.array(run.train.system.turns)).sum(axis=1)
     kept = np.flatnonzero(np.isfinite(frequency).any(axis=0))
     kept = kept[np.argsort(order[kept], kind="stable")]
@@ -165,15 +164,18 @@ def summary(run: RunUp, critical: CriticalSpeeds) -> dict[str, Any]:
 def phases(run: RunUp) -> list[dict[str, Any]]:
     """Phases of the motion: after how many turns of the drive each repeats, and the meshes that follow it."""
     system, names = run.train.system, [line.name for line in run.train.model.meshes]
+    carriers = {phase: [name.removeprefix("carrier ")] for phase, (name, _) in run.train.passes.items()}
     return [
         {"turns": turns, "meshes": [n for n, cycles in zip(names, system.orders, strict=True) if cycles[p]]}
+        | ({"carriers": carriers[p]} if p in carriers else {})
         for p, turns in enumerate(system.turns)
     ]
 
 
 def warnings(run: RunUp) -> list[str]:
     """Sentences about what a reader must know."""
-    found = [*run.train.model.mesh_notes, *run.train.model.operating.warnings, *run.notes]
+    model = run.train.model
+    found = [*model.mesh_notes, *model.operating.warnings, *frozen_carriers(model), *run.notes]
     for i, line in enumerate(run.train.model.meshes):
         if line.pulls:
             low = [(float(s.force[:, i].min()), s.speed) for s in run.states]

@@ -14,7 +14,6 @@ import numpy as np
 
 from ...base.typing import Array, ComplexArray, IntArray
 from ..gearbox.radiation import AIR_IMPEDANCE
-from . import torus
 from .balance import Orbit
 from .condensed import CondensedTrain
 from .linear import real_times
@@ -153,7 +152,8 @@ def steady_result(
         approach[:, i], apart[i] = u[:, along], open_.mean()
         if not line.in_contact:
             force[:, i] += line.damping * du[:, along]
-    modal = system.linear.modal(omega, orbit.speed, orbit.forces)
+    forces = system.whole_forces(orbit)
+    modal = system.linear.modal(omega, orbit.speed, forces)
     acceleration = -(omega**2)[:, None] * real_times(modal, train.bores_of_modes.T)
     coordinates = model.modal.origin + real_times(lattice.synthesis(modal), model.modal.T.T)
     displacement = np.abs(model.displacements(coordinates)).max(axis=(0, 2), initial=0.0)
@@ -161,28 +161,50 @@ def steady_result(
     if train.radiation_of_modes is not None:
         square = (modal.conj() * real_times(modal, train.radiation_of_modes)).sum(axis=1).real
         power = 0.5 * AIR_IMPEDANCE * omega**2 * np.maximum(square, 0.0)
-    bearing = _bearing(train, orbit, omega, modal)
+    bearing = _bearing(train, orbit.speed, forces, omega, modal, lattice)
     second = 2.0 * math.pi / abs(orbit.speed)  # of one turn
-    waves, _ = torus.harmonics(system.periods, count)
     period = second * system.turns[0] if len(system.turns) == 1 else math.inf
     return SteadyState(
-        orbit.speed, branch, orbit, period, waves,
-        torus.numbers(system.periods, count), omega / (2.0 * math.pi), omega / abs(orbit.speed), lattice, force,
+        orbit.speed, branch, orbit, period, system.waves(count),
+        system.numbers(count), omega / (2.0 * math.pi), omega / abs(orbit.speed), lattice, force,
         approach, apart, beyond, displacement, acceleration, bearing, power, second * window(system).turns, multipliers,
     )  # fmt: skip
 
 
-def _bearing(train: CondensedTrain, orbit: Orbit, omega: Array, modal: ComplexArray) -> ComplexArray:
-    """Amplitudes of the loads on the bores."""
+def _bearing(
+    train: CondensedTrain, speed: float, forces: ComplexArray, omega: Array, modal: ComplexArray, lattice: Lattice
+) -> ComplexArray:
+    """Return the amplitudes of the loads on the bores, in an elastic housing along axes that stand still.
+
+    Parameters
+    ----------
+    train : CondensedTrain
+        The train.
+    speed : float
+        Speed of the drive (rad/s).
+    forces : ndarray of complex, shape (K + 1, m)
+        Amplitudes of all forces at the freedoms.
+    omega : ndarray, shape (K + 1,)
+        Angular frequencies (rad/s).
+    modal : ndarray of complex, shape (K + 1, n)
+        Amplitudes of the modal coordinates.
+    lattice : Lattice
+        Samples of the harmonics.
+    """
     model, turning = train.model, 1j * omega[:, None]
     q = real_times(modal, model.modal.T.T)
     v, a = turning * q, -(omega**2)[:, None] * q
-    acting = real_times(orbit.forces, train.directions.T)
+    acting = real_times(forces, train.directions.T)
     for line in model.meshes:
         if line.in_contact:  # which the constant part has, too
             acting += line.rayleigh * real_times(v, np.outer(line.row, line.row))
     q[0] += model.modal.origin
     turns = model.turning
-    acting += orbit.speed * real_times(v, turns.gyroscopic.T) + orbit.speed**2 * real_times(q, turns.stiffening)
-    acting[0] += train.torque + orbit.speed**2 * turns.thrown
-    return model.bearings(q, v, a, acting)
+    acting += speed * real_times(v, turns.gyroscopic.T) + speed**2 * real_times(q, turns.stiffening)
+    acting[0] += train.torque + speed**2 * turns.thrown
+    loads, still = model.bearings.parts(q, v, a, acting)
+    if train.frames.any():
+        vectors = lattice.synthesis(loads.reshape(len(q), -1)).reshape(-1, len(model.bores), 2, 3)
+        turned = model.on_bores(lattice.theta @ train.frames.T, vectors)
+        loads = lattice.analysis(turned.reshape(len(turned), -1, 6))[: len(q)]
+    return np.asarray(loads + still)

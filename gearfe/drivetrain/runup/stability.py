@@ -23,7 +23,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.typing import Array, BoolArray, ComplexArray
-from . import torus
 from .balance import Changes, Orbit, Oscillator, changes
 from .linear import Linear
 from .monodromy import KICKS, PLACES, flow, kick_times, monodromy
@@ -119,7 +118,7 @@ def _multipliers(
     """Multipliers with so many steps, and whether derivatives jump."""
     theta, u, du = _along(system, orbit, span.turns, steps)
     pushes = system.forces(theta, orbit.speed, u, du)
-    by = pushes.by
+    by = changes([*pushes.entries, *system.turned_entries(theta)], system.linear.size, len(theta))
     order = np.argsort(kick_times(np.linspace(0.0, 1.0, steps + 1)).ravel(), kind="stable")  # kicks step back, too
     own = by.forces == by.freedoms
     steepest = np.abs(np.diff(by.values[order][:, own], axis=0)).max(axis=0)
@@ -150,9 +149,8 @@ def _with_momentum(by: Changes, momentum: Changes, step: float, size: int) -> tu
 
 def _along(system: Oscillator, orbit: Orbit, turns: float, steps: int) -> tuple[Array, Array, Array]:
     """Return phases (S, n), and freedoms and rates (S, m), at the kicks over some turns of the drive."""
-    waves, _ = torus.harmonics(system.periods, orbit.harmonics)
     speeds = 2.0 * math.pi * turns / steps / np.array(system.turns)  # of the phases, in a step
-    line = waves @ speeds
+    line = system.waves(orbit.harmonics) @ speeds
     both = np.hstack([orbit.places, 1j * system.omega(orbit.speed, orbit.harmonics)[:, None] * orbit.places])
     begin = np.exp(1j * np.arange(steps)[:, None] * line)
     values = np.stack([(begin @ (np.exp(1j * place * line)[:, None] * both)).real for place in PLACES], axis=1)

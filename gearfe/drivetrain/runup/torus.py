@@ -8,8 +8,10 @@ harmonic for each vector k of n whole numbers,
 
 Of k and -k, whose frequencies :math:`k\cdot\omega` are opposite, the positive one counts. Harmonics stand in rising
 order w: the first K of them hold the multiples of all base frequencies up to one frequency, and their combinations less
-far. With one phase they are 1, 2, 3, ... They are sampled at S places on a line that winds round all phases, a lattice
-of rank 1 (Sloan & Joe, Lattice Methods for Multiple Integration, 1994),
+far. With one phase they are 1, 2, 3, ... The last phases may be rotations of carriers in an elastic housing, which are
+slow and couple each harmonic with its neighbours n + 1 and n - 1: they add :math:`|k_p|` times `PASS` to w instead, so
+that each multiple of a mesh frequency has its sidebands. Harmonics are sampled at S places on a line that winds round
+all phases, a lattice of rank 1 (Sloan & Joe, Lattice Methods for Multiple Integration, 1994),
 
 .. math:: \theta_j = 2\pi j g / S ,\qquad e^{ik\cdot\theta_j} = e^{2\pi i j (k\cdot g) / S} ,
 
@@ -37,6 +39,8 @@ ROUND_OFF = 1e-9
 RUNGS = 3
 #: Growth of the order up to which harmonics are listed.
 FARTHER = 1.3
+#: What one rotation of a carrier adds to the order of a harmonic, in parts of the frequency of the first phase.
+PASS = 0.5
 
 
 class Harmonics(NamedTuple):
@@ -81,18 +85,33 @@ class Lattice(NamedTuple):
         return np.asarray(made)
 
 
-def below(periods: tuple[float, ...], order: float) -> Harmonics:
-    """All harmonics of less than an order, the constant included."""
+def below(periods: tuple[float, ...], order: float, carriers: int = 0) -> Harmonics:
+    """All harmonics of less than an order, the constant included.
+
+    Parameters
+    ----------
+    periods
+        Of the phases, in parts of that of the first.
+    order
+        The order w.
+    carriers
+        So many of the last phases are rotations of carriers.
+    """
     if len(periods) == 1:
         rising = np.arange(math.ceil(order * (1.0 - ROUND_OFF)))
         return Harmonics(rising[:, None], rising.astype(float))
     waves, roots = np.zeros((1, 0), dtype=int), np.zeros(1)  # axis by axis, what is left of the order for the next
-    for period in periods:
+    for period in periods[: len(periods) - carriers]:
         most = np.floor(period * np.maximum(math.sqrt(order) - roots, 0.0) ** 2).astype(int)
         before = np.repeat(np.arange(len(roots)), 2 * most + 1)
         k = np.arange(len(before)) - (np.cumsum(2 * most + 1) - most - 1)[before]
         waves, roots = np.column_stack([waves[before], k]), roots[before] + np.sqrt(np.abs(k) / period)
     w = roots**2
+    for _ in range(carriers):
+        most = np.floor(np.maximum(order - w, 0.0) / PASS).astype(int)
+        before = np.repeat(np.arange(len(w)), 2 * most + 1)
+        k = np.arange(len(before)) - (np.cumsum(2 * most + 1) - most - 1)[before]
+        waves, w = np.column_stack([waves[before], k]), w[before] + PASS * np.abs(k)
     frequency, first = (waves / np.array(periods)).sum(axis=1), np.argmax(waves != 0, axis=1)
     none = np.abs(frequency) <= ROUND_OFF * w
     kept = (w < order * (1.0 - ROUND_OFF)) & np.where(none, waves[np.arange(len(waves)), first] >= 0, frequency > 0.0)
@@ -102,46 +121,40 @@ def below(periods: tuple[float, ...], order: float) -> Harmonics:
 
 
 @lru_cache(maxsize=64)
-def harmonics(periods: tuple[float, ...], count: int) -> Harmonics:
-    """The constant and the first `count` harmonics.
-
-    Parameters
-    ----------
-    periods
-        Of the phases, in parts of that of the first.
-    """
+def harmonics(periods: tuple[float, ...], count: int, carriers: int = 0) -> Harmonics:
+    """The constant and the first `count` harmonics, see `below`."""
     order = count + 2.0 if len(periods) == 1 else 4.0
-    while len(below(periods, order).waves) <= count:
+    while len(below(periods, order, carriers).waves) <= count:
         order *= FARTHER
-    waves, w = (x[: count + 1] for x in below(periods, order))
+    waves, w = (x[: count + 1] for x in below(periods, order, carriers))
     for x in (waves, w):
         x.setflags(write=False)
     return Harmonics(waves, w)
 
 
-def count_below(periods: tuple[float, ...], order: float) -> int:
+def count_below(periods: tuple[float, ...], order: float, carriers: int = 0) -> int:
     """Number of the first harmonic that is not below an order."""
-    return len(below(periods, order).waves)
+    return len(below(periods, order, carriers).waves)
 
 
 @lru_cache(maxsize=64)
-def numbers(periods: tuple[float, ...], count: int) -> dict[tuple[int, ...], int]:
+def numbers(periods: tuple[float, ...], count: int, carriers: int = 0) -> dict[tuple[int, ...], int]:
     """Number of each of the first harmonics by its k."""
-    return {tuple(k): number for number, k in enumerate(harmonics(periods, count).waves.tolist())}
+    return {tuple(k): number for number, k in enumerate(harmonics(periods, count, carriers).waves.tolist())}
 
 
-def lattice(periods: tuple[float, ...], count: int) -> Lattice:
+def lattice(periods: tuple[float, ...], count: int, carriers: int = 0) -> Lattice:
     """Samples for the constant and the first `count` harmonics at least."""
     if len(periods) > 1:  # it takes a search: the same for many
         count = math.ceil(2.0 ** (math.ceil(RUNGS * math.log2(max(count, LEAST))) / RUNGS))
-    return _searched(periods, count)
+    return _searched(periods, count, carriers)
 
 
 @lru_cache(maxsize=64)
-def _searched(periods: tuple[float, ...], count: int) -> Lattice:
+def _searched(periods: tuple[float, ...], count: int, carriers: int) -> Lattice:
     from scipy.fft import next_fast_len  # a train without steady motion needs no transforms
 
-    waves, _ = harmonics(periods, count)
+    waves, _ = harmonics(periods, count, carriers)
     every = np.concatenate([waves, -waves[1:]])
     samples = SAMPLES * max(count, LEAST)
     while True:

@@ -36,7 +36,10 @@ def why_not(model: TrainModel) -> str:
     """Why a train has no multipliers, or nothing."""
     drive = model.train.driven
     reasons = (
-        (bool(model.forces.turned), "a carrier turns in an elastic housing: the linear part of the train changes"),
+        (
+            bool(model.forces.turned),
+            "a carrier turns in an elastic housing: `gearfe runup` has the multipliers of its motions",
+        ),
         (drive.torque is not None, "the drive is by torque, so no speed is held; `gearfe runup` prescribes it"),
         (not drive.speed.ends or model.steady_speed == 0.0, "the drive has no steady speed"),
         (

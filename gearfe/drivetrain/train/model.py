@@ -40,7 +40,7 @@ from .driveline import Driveline, MachineRotor, driveline, machine_rotors
 from .elements import LinearForce, RigidShaft, ShaftBody, bearing, bore_rows, hinge, pin_rows, planes, rotor
 from .forces import Gyro, SpeedTorque, TrainForces, Turned, derivative
 from .gear_train import Carrier, Drive, Five, GearTrain, Load, Pin, Shaft, ShaftForce
-from .kinematics import Kinematics, drive_sense, load_end
+from .kinematics import Kinematics, against, drive_sense, load_end
 from .mesh_element import MeshLine, Shafts, mesh_lines
 from .operating import (
     OperatingPoint,
@@ -49,6 +49,7 @@ from .operating import (
     with_operating_stiffness,
     with_pressed_bearings,
 )
+from .planetary import MeshFamily, mesh_families
 from .program import train_series
 from .shaft_sections import ShaftSections, shaft_sections
 
@@ -237,8 +238,11 @@ class TrainModel(Facts):
 
     def frame_turns(self, t: Array, shafts: Sequence[int]) -> Array:
         """Rotations (n, shafts, 3, 3) from the frames of shafts to axes that stand still, at times (n,)."""
+        return self._about_axis(self.angle(t)[:, None] * self.frame_ratios[list(shafts)])
+
+    def _about_axis(self, turned: Array) -> Array:
+        """Rotations (..., 3, 3) about the axis by angles (rad)."""
         e1, e2, axis = self.train.frame
-        turned = self.angle(t)[:, None] * self.frame_ratios[list(shafts)]
         across = np.outer(e1, e1) + np.outer(e2, e2)
         right = np.outer(e2, e1) - np.outer(e1, e2)
         return np.asarray(
@@ -260,25 +264,46 @@ class TrainModel(Facts):
         """Vectors (n, bores, k, 3) at the bores, in the frames of their shafts, along axes that stand still."""
         if not self.train.carriers:
             return vectors
+        return self.on_bores(self.angle(t)[:, None] * self.frame_ratios, vectors)
+
+    def on_bores(self, turned: Array, vectors: Array) -> Array:
+        """The same for rotations (n, shafts) of the frames of the shafts (rad)."""
         held = {bore: number for number, shaft in enumerate(self.train.shafts) for bore in shaft.bores}
-        turns = self.frame_turns(t, [held[bore] for bore in self.bores])
+        turns = self._about_axis(turned[:, [held[bore] for bore in self.bores]])
         return np.asarray(np.einsum("nbij,nbkj->nbki", turns, vectors))
 
-    def check_constant(self, what: str) -> None:
-        """Raise `InputError` for a train whose linear part changes all the time, which `what` does not take."""
-        if not self.forces.turned:
-            return
-        names = [c.name for c in self.train.carriers if self.ratios[self.train.shaft_number(c.shaft)]]
-        problem = f"changes what holds the shafts of carrier {names[0]!r} as it turns, which {what}"
-        cure = 'look at it with gearfe vibration, or write housing = "rigid"'
-        raise InputError("train.housing", "elastic", problem, cure)
+    @property
+    def turned_carriers(self) -> list[int]:
+        """Numbers of the shafts of carriers that turn in an elastic housing: those of bearings with turned springs."""
+        ratios = {spring.ratio for spring in self.forces.turned}
+        shafts = [self.train.shaft_number(carrier.shaft) for carrier in self.train.carriers]
+        return [number for number in shafts if self.ratios[number] in ratios]
+
+    @property
+    def families(self) -> tuple[MeshFamily, ...]:
+        """Meshes of planetary stages by what they are, their phases in the sense in which their drivers turn."""
+        rolled, layout = self.kinematics, self.train.layout
+        sense = drive_sense(layout.speed) or 1.0
+        turned = [
+            phase * push * sense * math.copysign(1.0, against(mesh, mesh.driver.shaft, rolled.ratios))
+            for mesh, phase, push in zip(layout.meshes, rolled.phases, rolled.senses, strict=True)
+        ]
+        return mesh_families(layout, turned)
 
     @cached_property
     def turning(self) -> Turning:
         """What turns, for unit speed of the drive."""
+        return self._turning(self.forces.gyros)
+
+    @cached_property
+    def spinning(self) -> Turning:
+        """The same of a train whose carriers stay where they are at the start, while its shafts turn."""
+        return self._turning([replace(gyro, stiffening=0.0) for gyro in self.forces.gyros if not gyro.euler])
+
+    def _turning(self, gyros: Sequence[Gyro]) -> Turning:
         size = self.system.size
         gyroscopic, stiffening, thrown = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
-        for gyro in self.forces.gyros:
+        for gyro in gyros:
             first, second = self.directions[:, gyro.direction : gyro.direction + 2].T
             gyroscopic += gyro.polar * gyro.ratio * (np.outer(second, first) - np.outer(first, second))
             stiffening += gyro.stiffening * (np.outer(first, first) + np.outer(second, second))

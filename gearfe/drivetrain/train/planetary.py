@@ -139,6 +139,23 @@ class MeshFamily:
     angles: tuple[float, ...]
     phases: tuple[float, ...]
 
+    def carries(self, harmonic: int, passes: int) -> bool:
+        """Whether a sideband of ideal planets carries anything at a point that stands still.
+
+        Parameters
+        ----------
+        harmonic
+            Of the mesh.
+        passes
+            Rotations of the carrier, about the axis of the train, that are added to it: the planets push there one
+            after the other, with the phases of their meshes (McFadden & Smith, Proc. IMechE C 199, 1985).
+        """
+        turns = [
+            cmath.exp(1j * (2.0 * math.pi * harmonic * phase + passes * angle))
+            for phase, angle in zip(self.phases, self.angles, strict=True)
+        ]
+        return abs(sum(turns)) / len(turns) >= NONE
+
     def excites(self, harmonic: int) -> dict[str, float]:
         """How strongly a harmonic of the mesh force excites each kind of modes, 0 to 1; 0 is suppressed."""
         turns = [cmath.exp(2j * math.pi * harmonic * phase) for phase in self.phases]
