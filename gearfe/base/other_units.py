@@ -16,6 +16,7 @@ from .errors import InputError
 RADIANS, TURNS = "_rad_per_s", "_rpm"
 RPM = math.pi / 30.0
 #: Parts of a function of time, and the key of each that has its unit.
+_SCALED = ("constant", "expression", "polynomial", "step", "sine")
 _PARTS = {"steps": "height", "sines": "amplitude"}
 
 
@@ -86,11 +87,10 @@ def _times(factor: float, value: Any, label: str) -> Any:
         return [_times(factor, item, label) for item in value]
     if not isinstance(value, dict):
         return value
-    if "csv" in value:
-        raise InputError(f"{label}.csv", value["csv"], "has values in rad/s", f"write the key {partner(label)}")
-    changed = {
-        key: _times(factor, item, label) if key in ("constant", "expression") else item for key, item in value.items()
-    }
+    for key in ("csv", "table"):
+        if key in value:
+            raise InputError(f"{label}.{key}", value[key], "has values in rad/s", f"write the key {partner(label)}")
+    changed = {key: _times(factor, item, label) if key in _SCALED else item for key, item in value.items()}
     if isinstance(value.get("points_ms"), list):
         changed["points_ms"] = [
             [row[0], _times(factor, row[1], label)] if isinstance(row, list) and len(row) == 2 else row

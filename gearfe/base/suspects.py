@@ -52,6 +52,8 @@ LARGEST = 1e75
 FAR = 200.0
 #: Terms of a function of time that have its unit.
 _TERMS = ("constant", "step", "sine")
+#: Keys of a function of time that do not have its unit.
+_TIMES = ("origin_s", "step_centre_s", "step_width_s", "frequency_hz", "phase_deg")
 #: Keys in metres that are no sizes of the mechanism.
 _OTHER = ("mesh_unit_m",)
 
@@ -61,7 +63,8 @@ def _numbers(value: Any, name: str, key: str) -> Iterator[tuple[str, str, float]
     if isinstance(value, dict):
         for inner, item in value.items():
             # names of points stand below the key that has the unit
-            yield from _numbers(item, f"{name}.{inner}" if name else inner, key if key.endswith("_m") else inner)
+            held = key.endswith("_m") and inner not in _TIMES
+            yield from _numbers(item, f"{name}.{inner}" if name else inner, key if held else inner)
     elif isinstance(value, list):
         for i, item in enumerate(value):
             yield from _numbers(item, f"{name}[{i}]", key)
@@ -75,7 +78,7 @@ def _turns(raw: dict[str, Any]) -> Iterator[tuple[str, float]]:
         for name, part in _tables(raw.get(kind)):
             if part.get("coordinate") != "angle":
                 continue
-            for key in ("motion", "reference"):
+            for key in ("motion_rad", "reference_rad"):
                 value = part.get(key)
                 values = (
                     {"": value} if not isinstance(value, dict) else {f".{term}": value.get(term) for term in _TERMS}

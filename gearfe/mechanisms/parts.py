@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.errors import InputError, given, unknown_name
 from ..base.expressions import parse
-from ..base.tables.kinds import Kind
+from ..base.tables.kinds import MOTIONS, Kind
 from ..base.tables.mechanism import BodyTable, ForceTable, FunctionTable, JointTable, MechanismFile
 from ..multibody import GROUND, Body, TimeFunction, constant, polynomial, sine, smoothed_step
 from ..multibody.planar.beam_link import BeamLink
@@ -26,7 +26,7 @@ Point = tuple[float, float]
 #: Keys that may be expressions of the state.
 LOADS = ("x_N", "y_N", "moment_N_m")
 #: Keys that may be expressions of the time.
-OVER_TIME = ("motion", "length_m")
+OVER_TIME = (*MOTIONS, "length_m")
 
 
 #: Times of a run at which a length over time is looked at.
@@ -170,7 +170,8 @@ def part_of(
     try:
         return getattr(importlib.import_module(module), cls)(**values, name=name)
     except InputError as error:  # of the class's field: the file has a key
-        wrong = next((key for key, of in kind.fields.items() if error.field.endswith(f" {of}")), None)
+        named = [key for key, of in kind.fields.items() if error.field.endswith(f" {of}")]
+        wrong = next((key for key in named if getattr(table, key) is not None), next(iter(named), None))
         if wrong is None:
             raise
         raise InputError(f"{label}.{wrong}", error.value, error.problem, error.cure) from None

@@ -164,8 +164,8 @@ interpolation = "periodic"
 type = "coordinate_spring"
 body = "follower"
 coordinate = "y"
-stiffness = 400.0
-damping = {damping}
+stiffness_N_per_m = 400.0
+damping_N_s_per_m = {damping}
 """
 
 

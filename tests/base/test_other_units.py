@@ -10,6 +10,7 @@ import pytest
 from gearfe.base.config import JobFile, build, read_toml
 from gearfe.base.errors import InputError
 from gearfe.base.other_units import in_known_units, partner
+from gearfe.base.tables.mechanism import ForceTable, FunctionTable, JointTable
 from gearfe.base.tables.rating import RatingTable
 from gearfe.base.tables.runup import RunUpTable
 from gearfe.base.tables.train import TrainDriveTable
@@ -119,3 +120,40 @@ def test_errors_name_the_option_that_was_written(tmp_path: Path, capsys: pytest.
     message = capsys.readouterr().err
     assert "--speed-rad-per-s = -5" in message
     assert "(--speed-rpm = -47.7465)" in message
+
+
+def test_terms_of_a_prescribed_rate_have_the_unit_of_the_key() -> None:
+    """All terms of a function of time of a mechanism, a step and a sine among them, are in 1/min with the key."""
+    terms = {"constant": 30.0, "polynomial": [60.0, 6.0], "step": 90.0, "step_width_s": 2.0, "sine": 3.0}
+    joint = {"type": "prescribed", "body": "crank", "coordinate": "rate"}
+    made = build(JointTable, {**joint, "motion_rpm": {**terms, "frequency_hz": 5.0}}, "joints.drive").motion_rad_per_s
+    assert isinstance(made, FunctionTable)
+    assert made.constant == pytest.approx(30.0 * RPM)
+    assert made.polynomial == pytest.approx((60.0 * RPM, 6.0 * RPM))
+    assert (made.step, made.sine) == pytest.approx((90.0 * RPM, 3.0 * RPM))
+    assert (made.step_width_s, made.frequency_hz) == (2.0, 5.0)
+    with pytest.raises(InputError, match=r"motion_rpm\.table.*values in rad/s"):
+        build(JointTable, {**joint, "motion_rpm": {"table": "drive"}}, "joints.drive")
+
+
+@pytest.mark.parametrize(
+    ("table", "keys", "words"),
+    [
+        (JointTable, {"type": "prescribed", "body": "a", "coordinate": "x", "motion": 3.0}, "motion_rad_per_s or"),
+        (ForceTable, {"type": "spring", "body": "a", "stiffness": 3.0}, "stiffness_N_per_m or stiffness_Nm_per_rad"),
+        (ForceTable, {"type": "spring", "body": "a", "damping": 3.0}, "damping_N_s_per_m or damping_Nm_s_per_rad"),
+        (
+            ForceTable,
+            {"type": "coordinate_spring", "body": "a", "coordinate": "angle", "reference": 3.0},
+            "reference_m or reference_rad",
+        ),
+        (
+            ForceTable,
+            {"type": "coordinate_spring", "body": "a", "coordinate": "angle", "stiffness_N_per_m": 3.0},
+            "has another unit than coordinate = 'angle'; write stiffness_Nm_per_rad",
+        ),
+    ],
+)
+def test_keys_without_a_unit_are_answered_with_those_that_have_one(table: type, keys: dict, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        build(table, keys, "part")

@@ -320,16 +320,16 @@ def test_materials_of_the_python_interface_are_suspected(values: dict[str, float
 def test_angles_of_joints_that_may_be_degrees() -> None:
     raw = {
         "joints": {
-            "drive": {"coordinate": "angle", "motion": {"constant": 45, "step": 90.0, "polynomial": [0.0, 300.0]}},
-            "turn": {"coordinate": "angle", "motion": 20.0 * math.pi},
-            "slide": {"coordinate": "x", "motion": 45.0},
+            "drive": {"coordinate": "angle", "motion_rad": {"constant": 45, "step": 90.0, "polynomial": [0.0, 300.0]}},
+            "turn": {"coordinate": "angle", "motion_rad": 20.0 * math.pi},
+            "slide": {"coordinate": "x", "motion_m": 45.0},
         },
-        "forces": {"spring": {"coordinate": "angle", "reference": 30.0}},
+        "forces": {"spring": {"coordinate": "angle", "reference_rad": 30.0}},
         "start": {"positions": {"angle(crank)": 180.0, "x(rod.B)": 12.0}},
     }
     names = [text.partition(" = ")[0] for text in suspects(raw)]
     assert names == [
-        "joints.drive.motion.constant", "joints.drive.motion.step", "forces.spring.reference",
+        "joints.drive.motion_rad.constant", "joints.drive.motion_rad.step", "forces.spring.reference_rad",
         "start.positions.angle(crank)",
     ]  # fmt: skip
     assert "write 0.785398163 rad" in suspects(raw)[0]

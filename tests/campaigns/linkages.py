@@ -107,8 +107,8 @@ def springs(random: np.random.Generator) -> Made:
     }
     joints = {"O": hinge("a", "A")}
     spring = {
-        "type": "spring", "body": "b", "point": "A", "to": "a", "to_point": "B", "stiffness": stiffness,
-        "free_length_m": gap, "damping": float(random.choice([0.0, 0.0, 1.0, 1e3])),
+        "type": "spring", "body": "b", "point": "A", "to": "a", "to_point": "B", "stiffness_N_per_m": stiffness,
+        "free_length_m": gap, "damping_N_s_per_m": float(random.choice([0.0, 0.0, 1.0, 1e3])),
     }  # fmt: skip
     tolerance = some_tolerance(random, 1e-9, 1e-4)
     tables = job(bodies, joints, 0.3, 0.01, tolerance, forces={"joint": spring})

@@ -58,7 +58,14 @@ def base_jobs() -> dict[str, BaseJob]:
     mechanism["start"] = {"positions": {"angle(crank)": 0.7854}, "velocities": {"vx(rod.B)": -4.0}}
     mechanism["forces"] = {
         **MECHANISM["forces"],
-        "spring": {"type": "spring", "body": "rod", "point": "B", "to_point": "O", "stiffness": 5.0, "damping": 0.1},
+        "spring": {
+            "type": "spring",
+            "body": "rod",
+            "point": "B",
+            "to_point": "O",
+            "stiffness_N_per_m": 5.0,
+            "damping_N_s_per_m": 0.1,
+        },
         "motor": {"type": "moment", "body": "crank", "moment_N_m": {"constant": 0.5, "sine": 1.0, "frequency_hz": 2.0}},
     }
     train = {**TRAIN, "housing": "rigid", "duration_ms": 1.0, "step_us": 50.0}

@@ -43,7 +43,7 @@ A = { type = "hinge", body = "crank", point = "A", to_point = "A" }
 B = { type = "hinge", body = "crank", point = "B", to = "coupler", to_point = "B" }
 C = { type = "hinge", body = "coupler", point = "C", to = "rocker", to_point = "C" }
 D = { type = "hinge", body = "rocker", point = "D", to_point = "D" }
-drive = { type = "prescribed", body = "crank", coordinate = "angle", motion = "6*time" }
+drive = { type = "prescribed", body = "crank", coordinate = "angle", motion_rad = "6*time" }
 """
 
 

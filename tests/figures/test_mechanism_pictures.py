@@ -42,7 +42,7 @@ def crank(turns: float, step: float, colour: str | None = None, outputs: Any = (
         },
         "joints": {
             "O": {"type": "hinge", "body": "crank"},
-            "drive": {"type": "prescribed", "body": "crank", "coordinate": "rate", "motion": RATE},
+            "drive": {"type": "prescribed", "body": "crank", "coordinate": "rate", "motion_rad_per_s": RATE},
         },
         "paths": [{"body": "crank", "point": "A"}, {"body": "crank", "point": [0.0, 0.7]}],
         "figure": {} if colour is None else {"colour": colour},

@@ -49,12 +49,12 @@ MOTOR = f"""
 type = "prescribed"
 body = "cam"
 coordinate = "rate"
-motion = {SPEED}
+motion_rad_per_s = {SPEED}
 [forces.spring]
 type = "coordinate_spring"
 body = "follower"
 coordinate = "y"
-stiffness = {SPRING}
+stiffness_N_per_m = {SPRING}
 """
 
 

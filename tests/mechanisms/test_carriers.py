@@ -11,6 +11,7 @@ import pytest
 
 from gearfe.base.config import build
 from gearfe.base.errors import InputError
+from gearfe.base.tables.kinds import UNIT_OF
 from gearfe.base.tables.mechanism import MechanismFile
 from gearfe.mechanisms.model import Mechanism, make_mechanism
 from gearfe.mechanisms.results import reactions
@@ -30,7 +31,7 @@ def hinge(name: str, to: str = "ground", **keys: Any) -> dict[str, Any]:
 
 
 def drive(name: str, rate: float, **keys: Any) -> dict[str, Any]:
-    return {"type": "prescribed", "body": name, "coordinate": "rate", "motion": rate, **keys}
+    return {"type": "prescribed", "body": name, "coordinate": "rate", "motion_rad_per_s": rate, **keys}
 
 
 def planetary() -> dict[str, Any]:
@@ -190,7 +191,7 @@ def test_a_cylinder_of_given_length_raises_a_boom() -> None:
                 "body": "rod",
                 "to": "barrel",
                 "coordinate": "x",
-                "motion": {"constant": 1.0, "step": 0.4, "step_centre_s": 1.0, "step_width_s": 1.6},
+                "motion_m": {"constant": 1.0, "step": 0.4, "step_centre_s": 1.0, "step_width_s": 1.6},
             },
         },
     }
@@ -276,7 +277,7 @@ def test_a_coordinate_in_the_frame_of_a_body_that_turns(coordinate: str, to_poin
                 "point": [0.1, -0.1],
                 "to": "frame",
                 "coordinate": coordinate,
-                "motion": {"polynomial": [0.4, 0.3, -0.2]},
+                f"motion_{UNIT_OF[coordinate]}": {"polynomial": [0.4, 0.3, -0.2]},
             }
         },
     }

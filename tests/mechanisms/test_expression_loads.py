@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from gearfe.base.errors import InputError
+from gearfe.base.tables.kinds import UNIT_OF
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.error_estimate import finer_run
 from gearfe.mechanisms.job import run_mechanism
@@ -41,11 +42,12 @@ def test_a_controller_is_the_damped_oscillator(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("method", "allowed"), [("taylor", 1e-8), ("implicit", 1e-6)])
 def test_an_expression_of_places_is_the_spring_that_it_says(tmp_path: Path, method: str, allowed: float) -> None:
-    spring = '[forces.s]\ntype = "spring"\nbody = "rod"\npoint = "tip"\nstiffness = 30.0\ndamping = 2.0\n'
+    spring = '[forces.s]\ntype = "spring"\nbody = "rod"\npoint = "tip"\n'
+    spring += "stiffness_N_per_m = 30.0\ndamping_N_s_per_m = 2.0\n"
     force = '[forces.s]\ntype = "force"\nbody = "rod"\npoint = "tip"\n'
     force += 'x_N = "-30*x(rod.tip) - 2*vx(rod.tip)"\ny_N = "-30*y(rod.tip) - 2*vy(rod.tip)"\n'
     # a spring damps along its line only: of a hinged tip about O nothing; so the damping is left out there
-    spring = spring.replace("damping = 2.0", "damping = 0.0").replace(
+    spring = spring.replace("damping_N_s_per_m = 2.0", "damping_N_s_per_m = 0.0").replace(
         'point = "tip"', 'point = "tip"\nto_point = [0.3, 0.1]'
     )
     force = force.replace(" - 2*vx(rod.tip)", "").replace(" - 2*vy(rod.tip)", "")
@@ -253,7 +255,7 @@ def test_output_times_by_rounding_beyond_the_end_of_a_stopped_run_are_left_out(t
 @pytest.mark.parametrize(("load", "text"), [("1/(time - 0.5)", "1 / 0"), ("motor(time)", "from 0 to 0.4")])
 def test_a_prescribed_motion_under_a_load_without_value_is_refused(tmp_path: Path, load: str, text: str) -> None:
     (tmp_path / "motor.csv").write_text("t,torque\n0,1\n0.4,2\n", encoding="utf-8")
-    drive = '[joints.d]\ntype = "prescribed"\nbody = "rod"\ncoordinate = "rate"\nmotion = 1.0\n'
+    drive = '[joints.d]\ntype = "prescribed"\nbody = "rod"\ncoordinate = "rate"\nmotion_rad_per_s = 1.0\n'
     table = '[tables.motor]\nfile = "motor.csv"\nx = "t"\ny = "torque"\n'
     mechanism = load_mechanism(mechanism_file(tmp_path, ROD + drive + MOMENT.format(load) + table))
     with pytest.raises(InputError, match=text):
@@ -265,7 +267,7 @@ TABLED = """
 type = "prescribed"
 body = "rod"
 coordinate = "{coordinate}"
-motion = {{ table = "drive" }}
+motion_{unit} = {{ table = "drive" }}
 [tables.drive]
 file = "drive.csv"
 x = "t"
@@ -280,7 +282,9 @@ def test_a_motion_from_a_table_over_time(tmp_path: Path, coordinate: str) -> Non
     value = np.sin(t) if coordinate == "angle" else np.cos(t)
     rows = "\n".join(f"{a},{b}" for a, b in zip(t, value, strict=True))
     (tmp_path / "drive.csv").write_text("t,value\n" + rows + "\n", encoding="utf-8")
-    text = ROD.replace("angle_deg = 30.0\nrate_rad_per_s = 1.0\n", "") + TABLED.format(coordinate=coordinate)
+    text = ROD.replace("angle_deg = 30.0\nrate_rad_per_s = 1.0\n", "") + TABLED.format(
+        coordinate=coordinate, unit=UNIT_OF[coordinate]
+    )
     mechanism, run = ran(tmp_path, text, method="taylor")
     if coordinate == "angle":
         np.testing.assert_allclose(run.q[::2, 2], np.sin(t), atol=1e-12)
@@ -300,7 +304,7 @@ def test_a_motion_from_a_table_over_time(tmp_path: Path, coordinate: str) -> Non
 )
 def test_wrong_tables_over_time(tmp_path: Path, content: str, extra: str, text: str) -> None:
     (tmp_path / "drive.csv").write_text("t,value\n" + content, encoding="utf-8")
-    path = mechanism_file(tmp_path, ROD + TABLED.format(coordinate="rate") + extra)
+    path = mechanism_file(tmp_path, ROD + TABLED.format(coordinate="rate", unit=UNIT_OF["rate"]) + extra)
     with pytest.raises(InputError, match=text):
         run_mechanism(load_mechanism(path), tmp_path / "out")
 
@@ -311,7 +315,7 @@ def test_a_flexible_link_driven_by_tables_beside_the_file(tmp_path: Path) -> Non
         "[bodies.rod.beam]\nlength_m = 1.0\ndiameter_m = 0.05\nyoungs_modulus_GPa = 200.0\ndensity_kg_per_m3 = 7850.0\n"
     )
     text = ROD.replace("mass_kg = 2.0\ninertia_kg_m2 = 0.5\n", "").replace("[joints.O]", beam + "[joints.O]")
-    _, run = ran(tmp_path, text + TABLED.format(coordinate="rate"), 0.1)
+    _, run = ran(tmp_path, text + TABLED.format(coordinate="rate", unit=UNIT_OF["rate"]), 0.1)
     np.testing.assert_allclose(run.v[:, 2], 2.0, atol=1e-9)
 
 

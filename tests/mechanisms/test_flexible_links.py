@@ -152,7 +152,7 @@ to_point = "pin"
 type = "prescribed"
 body = "arm.tip"
 coordinate = "angle"
-motion = 0.0
+motion_rad = 0.0
 [forces.twist]
 type = "moment"
 body = "arm.middle"
@@ -180,7 +180,7 @@ body = "arm"
 type = "prescribed"
 {place}
 coordinate = "angle"
-motion = {swing}
+motion_rad = {swing}
 [[outputs]]
 name = "tip_rad"
 value = "angle(arm.tip)"

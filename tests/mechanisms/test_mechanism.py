@@ -155,8 +155,8 @@ moment_N_m = { step = 2.0, step_centre_s = 0.4, step_width_s = 0.3, constant = 0
 type = "coordinate_spring"
 body = "rod"
 coordinate = "angle"
-stiffness = 1.0
-damping = 0.3
+stiffness_Nm_per_rad = 1.0
+damping_Nm_s_per_rad = 0.3
 """
     mechanism = load_mechanism(mechanism_file(tmp_path, PENDULUM + extra))
     times = np.linspace(0, 1, 41)
@@ -168,7 +168,9 @@ damping = 0.3
 
 def test_driven_crank_closes_the_energy_balance(tmp_path):
     """The work of a prescribed motion is the multiplier times the rate."""
-    driven = PENDULUM + '[joints.drive]\ntype = "prescribed"\nbody = "rod"\ncoordinate = "rate"\nmotion = 4.0\n'
+    driven = (
+        PENDULUM + '[joints.drive]\ntype = "prescribed"\nbody = "rod"\ncoordinate = "rate"\nmotion_rad_per_s = 4.0\n'
+    )
     mechanism = load_mechanism(mechanism_file(tmp_path, driven))
     made = integrate(mechanism.system, np.linspace(0, 1, 41), start=mechanism.start(), tolerance=1e-11)
     results = evaluate(mechanism, made)

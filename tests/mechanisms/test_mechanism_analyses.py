@@ -57,7 +57,7 @@ acceleration_m_per_s2 = [0.0, -9.81]
 type = "coordinate_spring"
 body = "rod"
 coordinate = "angle"
-damping = 0.4
+damping_Nm_s_per_rad = 0.4
 [[outputs]]
 name = "angle_rad"
 value = "angle(rod)"
@@ -67,7 +67,7 @@ DRIVE = """
 type = "prescribed"
 body = "rod"
 coordinate = "angle"
-motion = { constant = 0.5235987755982988, sine = 0.8, frequency_hz = 1.0 }
+motion_rad = { constant = 0.5235987755982988, sine = 0.8, frequency_hz = 1.0 }
 """
 
 

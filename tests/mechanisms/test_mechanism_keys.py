@@ -13,7 +13,7 @@ import pytest
 from gearfe.base.config import build, read_toml
 from gearfe.base.errors import InputError
 from gearfe.base.tables.beam import BeamTable
-from gearfe.base.tables.kinds import FORCES, JOINTS
+from gearfe.base.tables.kinds import FORCES, JOINTS, MOTIONS, UNIT_OF
 from gearfe.base.tables.mechanism import BodyTable, FunctionTable, MechanismFile, ValueTableTable
 from gearfe.base.tables.plate import InterfaceTable, PlateTable
 from gearfe.mechanisms.model import make_mechanism
@@ -63,20 +63,27 @@ JOINT_CASES: Parts = {
     "rolling": ("rolling", {**LINE, "radius_m": 0.2}, {}),
     "cam y": ("cam", {**PLACE, "to": "other", "coordinate": "y", "profile": "lift"}, SHAFT),
     "cam angle": ("cam", {"body": "link", "to": "other", "coordinate": "angle", "profile": "lift"}, SHAFT),
-    "prescribed x": ("prescribed", {**PLACE, "coordinate": "x", "motion": {"polynomial": [0.6, 0.3]}}, {}),
-    "prescribed y": ("prescribed", {**PLACE, "coordinate": "y", "motion": {"polynomial": [0.1, 0.3]}}, {}),
-    "prescribed angle": ("prescribed", {"body": "link", "to": "arm", "coordinate": "angle", "motion": 0.3}, {}),
-    "prescribed rate": ("prescribed", {"body": "link", "to": "arm", "coordinate": "rate", "motion": 0.3}, {}),
+    "prescribed x": ("prescribed", {**PLACE, "coordinate": "x", "motion_m": {"polynomial": [0.6, 0.3]}}, {}),
+    "prescribed y": ("prescribed", {**PLACE, "coordinate": "y", "motion_m": {"polynomial": [0.1, 0.3]}}, {}),
+    "prescribed angle": ("prescribed", {"body": "link", "to": "arm", "coordinate": "angle", "motion_rad": 0.3}, {}),
+    "prescribed rate": ("prescribed", {"body": "link", "to": "arm", "coordinate": "rate", "motion_rad_per_s": 0.3}, {}),
 }  # fmt: skip
-SPRING = {**ENDS, "stiffness": 30.0, "damping": 0.5, "free_length_m": 0.2, "tension_N": "2*length_rate"}
+SPRING = {
+    **ENDS,
+    "stiffness_N_per_m": 30.0,
+    "damping_N_s_per_m": 0.5,
+    "free_length_m": 0.2,
+    "tension_N": "2*length_rate",
+}
 FORCE_CASES: Parts = {
     "gravity": ("gravity", {"acceleration_m_per_s2": [0.0, -9.81]}, {}),
     "spring": ("spring", SPRING, {}),
-    "spring without stiffness": ("spring", {**ENDS, "damping": 0.5}, {}),
-    "angle spring": ("coordinate_spring", {"body": "link", "to": "arm", "coordinate": "angle", "stiffness": 9.0,
-                                           "damping": 0.5, "reference": 0.1}, {}),
-    "x spring": ("coordinate_spring", {"body": "link", "coordinate": "x", "stiffness": 9.0}, {}),
-    "y damper": ("coordinate_spring", {"body": "link", "coordinate": "y", "damping": 9.0}, {}),
+    "spring without stiffness": ("spring", {**ENDS, "damping_N_s_per_m": 0.5}, {}),
+    "angle spring": ("coordinate_spring", {"body": "link", "to": "arm", "coordinate": "angle",
+                                           "stiffness_Nm_per_rad": 9.0, "damping_Nm_s_per_rad": 0.5,
+                                           "reference_rad": 0.1}, {}),
+    "x spring": ("coordinate_spring", {"body": "link", "coordinate": "x", "stiffness_N_per_m": 9.0}, {}),
+    "y damper": ("coordinate_spring", {"body": "link", "coordinate": "y", "damping_N_s_per_m": 9.0}, {}),
     "force": ("force", {"body": "link", "point": [0.1, 0.2], "x_N": 2.0, "y_N": "3*time"}, {}),
     "moment": ("moment", {"body": "link", "to": "arm", "moment_N_m": 0.4}, {}),
     "turning_frame": ("turning_frame", {"rate_rad_per_s": 2.0}, {}),
@@ -85,14 +92,16 @@ FORCE_CASES: Parts = {
 OTHER: dict[str, Any] = {
     "body": "other", "to": "ground", "point": [-0.2, 0.1], "to_point": [-0.1, 0.25], "direction": [0.3, 1.0],
     "angle_deg": 45.0, "length_m": 0.55, "ratio": 0.4, "radius_m": 0.14, "to_radius_m": 0.22, "crossed": True,
-    "carrier": "ground", "coordinate": "y", "profile": "higher", "motion": {"polynomial": [0.4, 0.9]},
-    "acceleration_m_per_s2": [1.0, -3.0], "stiffness": 50.0, "damping": 1.5, "free_length_m": 0.5,
-    "tension_N": "5*length", "reference": -0.4, "rate_rad_per_s": 3.0, "x_N": {"constant": 5.0}, "y_N": 7.0,
+    "carrier": "ground", "coordinate": "y", "profile": "higher", "motion_m": {"polynomial": [0.4, 0.9]},
+    "motion_rad": {"polynomial": [0.4, 0.9]}, "motion_rad_per_s": {"polynomial": [0.4, 0.9]},
+    "acceleration_m_per_s2": [1.0, -3.0], "stiffness_N_per_m": 50.0, "damping_N_s_per_m": 1.5,
+    "stiffness_Nm_per_rad": 50.0, "damping_Nm_s_per_rad": 1.5, "reference_rad": -0.4, "free_length_m": 0.5,
+    "tension_N": "5*length", "reference_m": -0.4, "rate_rad_per_s": 3.0, "x_N": {"constant": 5.0}, "y_N": 7.0,
     "moment_N_m": "rate(link)",
 }  # fmt: skip
 #: What the other value of a key is refused for; everything else must act.
 REFUSED = {
-    ("angle spring", "coordinate"): "only an angle can be relative",
+    ("angle spring", "coordinate"): "has another unit",
     ("rack", "body"): "is unknown|joins a body to itself",
     ("rack", "to"): "is unknown|name the other body",
     ("cam y", "body"): "to itself",
@@ -104,8 +113,8 @@ REFUSED = {
     ("prescribed rate", "point"): "has no part in an angle",
     ("prescribed angle", "to_point"): "has no part in an angle",
     ("prescribed rate", "to_point"): "has no part in an angle",
-    ("spring without stiffness", "free_length_m"): "says nothing without stiffness",
-    ("y damper", "reference"): "says nothing without stiffness",
+    ("spring without stiffness", "free_length_m"): "says nothing without stiffness_N_per_m",
+    ("y damper", "reference_m"): "says nothing without stiffness_N_per_m",
     ("x spring", "to"): "only an angle can be relative",
     ("y damper", "to"): "only an angle can be relative",
 }
@@ -116,7 +125,27 @@ SPECIAL: dict[tuple[str, str], Any] = {
     ("x spring", "to"): "arm", ("y damper", "to"): "arm",
     ("cam y", "carrier"): "arm", ("cam angle", "carrier"): "arm", ("rack", "body"): "other", ("rack", "to"): "arm",
 }  # fmt: skip
+#: Keys with another unit than the coordinate of the case, and coordinates with another unit than its key.
 REFUSED |= {
+    **{
+        (f"prescribed {name}", key): "has another unit"
+        for name, own in UNIT_OF.items()
+        for key in MOTIONS
+        if key != f"motion_{own}"
+    },
+    **{(f"prescribed {name}", "coordinate"): "has another unit" for name in ("angle", "rate")},
+    **{
+        (case, f"{key}_{unit}"): "has another unit"
+        for case, units in (
+            ("angle spring", ("N_per_m", "N_s_per_m", "m")),
+            ("x spring", ("Nm_per_rad", "Nm_s_per_rad", "rad")),
+            ("y damper", ("Nm_per_rad", "Nm_s_per_rad", "rad")),
+        )
+        for key, unit in zip(("stiffness", "damping", "reference"), units, strict=True)
+    },
+    ("x spring", "reference_rad"): "says nothing without stiffness_Nm_per_rad",
+    ("y damper", "reference_rad"): "says nothing without stiffness_Nm_per_rad",
+    ("angle spring", "reference_m"): "says nothing without stiffness_N_per_m",
     ("cam y", "carrier"): "must be the ground",
     ("cam angle", "carrier"): "must be the ground",
 }
@@ -200,7 +229,7 @@ OTHER_OF_BODY: dict[str, tuple[Any, str | None]] = {
 @pytest.mark.parametrize("key", [field.name for field in fields(BodyTable)])
 def test_keys_of_bodies(key: str, folder: Path) -> None:
     """A body on a spring at its point P, under gravity."""
-    spring = {"type": "spring", "body": "link", "point": "P", "stiffness": 30.0}
+    spring = {"type": "spring", "body": "link", "point": "P", "stiffness_N_per_m": 30.0}
     raw = tables(forces={"spring": spring, "gravity": {"type": "gravity", "acceleration_m_per_s2": [0.0, -9.81]}})
     raw["bodies"]["link"]["points_m"] = {"P": [0.2, 0.1]}
     value, refused = OTHER_OF_BODY[key]

@@ -39,12 +39,12 @@ acceleration_m_per_s2 = [0.0, -{GRAVITY}]
 type = "coordinate_spring"
 body = "block"
 coordinate = "y"
-stiffness = {STIFFNESS}
+stiffness_N_per_m = {STIFFNESS}
 [[outputs]]
 name = "y_m"
 value = "y(block)"
 """
-KEYS = ("bodies.block.mass_kg", "forces.spring.stiffness")
+KEYS = ("bodies.block.mass_kg", "forces.spring.stiffness_N_per_m")
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ body = "crank"
 type = "prescribed"
 body = "crank"
 coordinate = "angle"
-motion = {motion}
+motion_rad = {motion}
 [[outputs]]
 name = "angle_rad"
 value = "angle(crank)"

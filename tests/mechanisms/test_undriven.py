@@ -35,7 +35,7 @@ def four_bar() -> dict[str, Any]:
             "P": hinge("coupler", "A", "crank", "B"),
             "Q": hinge("coupler", "B", "rocker", "B"),
             "C": hinge("rocker", "A", "ground", [1.0, 0.0]),
-            "drive": {"type": "prescribed", "body": "crank", "coordinate": "rate", "motion": 2.0},
+            "drive": {"type": "prescribed", "body": "crank", "coordinate": "rate", "motion_rad_per_s": 2.0},
         },
     }
 

@@ -210,7 +210,9 @@ def test_couplings_that_contradict_each_other_are_told(tmp_path: Path) -> None:
     second = TRAIN + '[joints.other]\ntype = "gear"\nbody = "motor"\nto = "load"\nratio = -0.4\n'
     with pytest.raises(InputError, match=r"nothing is free to move .*, without 'pair' or 'other' something would be"):
         load_mechanism(mechanism_file(tmp_path, second)).start()
-    driven = second + '[joints.speed]\ntype = "prescribed"\nbody = "motor"\ncoordinate = "rate"\nmotion = 3.0\n'
+    driven = (
+        second + '[joints.speed]\ntype = "prescribed"\nbody = "motor"\ncoordinate = "rate"\nmotion_rad_per_s = 3.0\n'
+    )
     with pytest.raises(InputError, match="velocities cannot meet it"):
         load_mechanism(mechanism_file(tmp_path, driven)).start()
 

@@ -70,7 +70,7 @@ to_point = [0.1, 0.1]
 @pytest.mark.parametrize(("method", "tolerance", "allowed"), [("taylor", 1e-10, 1e-8), ("implicit", 1e-8, 1e-6)])
 def test_a_linear_law_is_the_spring(tmp_path: Path, method: str, tolerance: float, allowed: float) -> None:
     times = np.linspace(0.0, 1.0, 11)
-    spring = PENDULUM + "stiffness = 30.0\ndamping = 2.0\nfree_length_m = 0.5\n"
+    spring = PENDULUM + "stiffness_N_per_m = 30.0\ndamping_N_s_per_m = 2.0\nfree_length_m = 0.5\n"
     law = PENDULUM + 'tension_N = "30*(length - 0.5) + 2*length_rate"\n'
     one, other = (
         ran(tmp_path, spring, times, tolerance=1e-11),
@@ -88,7 +88,8 @@ def test_a_linear_law_is_the_spring(tmp_path: Path, method: str, tolerance: floa
 def test_slopes_of_a_law_are_those_of_its_force(tmp_path: Path) -> None:
     mechanism = load_mechanism(
         mechanism_file(
-            tmp_path, PENDULUM + 'tension_N = "5*length**3 - exp(-length)*length_rate**2 + time"\nstiffness = 3.0\n'
+            tmp_path,
+            PENDULUM + 'tension_N = "5*length**3 - exp(-length)*length_rate**2 + time"\nstiffness_N_per_m = 3.0\n',
         )
     )
     rng = np.random.default_rng(2)
@@ -166,12 +167,12 @@ inertia_kg_m2 = 0.5
 [forces.bushing]
 type = "spring"
 body = "arm"
-stiffness = 400.0
+stiffness_N_per_m = 400.0
 [forces.twist]
 type = "coordinate_spring"
 body = "arm"
 coordinate = "angle"
-stiffness = 30.0
+stiffness_Nm_per_rad = 30.0
 [forces.load]
 type = "force"
 body = "arm"

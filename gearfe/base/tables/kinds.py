@@ -21,6 +21,10 @@ class Kind(NamedTuple):
     needs: Mapping[str, str] = {}  # key that says nothing alone -> the key that it goes with
 
 
+#: Keys of a prescribed motion, by the unit of its coordinate.
+MOTIONS = ("motion_rad", "motion_rad_per_s", "motion_m")
+#: Coordinate of a prescribed motion or a spring -> the end of the keys that have its unit.
+UNIT_OF = {"angle": "rad", "rate": "rad_per_s", "x": "m", "y": "m"}
 #: Types of joints. A new one is a class (`gearfe.multibody.planar.joints` says what it provides), and a line here.
 JOINTS: dict[str, Kind] = {
     "hinge": Kind(
@@ -85,9 +89,9 @@ JOINTS: dict[str, Kind] = {
         "gearfe.multibody.planar.joints:Prescribed",
         {
             "body": "body", "to": "relative_to", "point": "point", "to_point": "origin", "coordinate": "coordinate",
-            "motion": "function",
+            **dict.fromkeys(MOTIONS, "function"),
         },
-        ("coordinate", "motion"),
+        ("coordinate",),
     ),
 }  # fmt: skip
 #: Types of forces, likewise (`gearfe.multibody.planar.forces`).
@@ -98,20 +102,21 @@ FORCES: dict[str, Kind] = {
     "spring": Kind(
         "gearfe.multibody.planar.forces:Spring",
         {
-            "body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "stiffness": "stiffness",
-            "damping": "damping", "free_length_m": "free_length", "tension_N": "law",
+            "body": "a", "to": "b", "point": "point_a", "to_point": "point_b", "stiffness_N_per_m": "stiffness",
+            "damping_N_s_per_m": "damping", "free_length_m": "free_length", "tension_N": "law",
         },
         ("body",),
-        {"free_length_m": "stiffness"},
+        {"free_length_m": "stiffness_N_per_m"},
     ),
     "coordinate_spring": Kind(
         "gearfe.multibody.planar.forces:CoordinateSpring",
         {
-            "body": "body", "to": "relative_to", "coordinate": "coordinate", "stiffness": "stiffness",
-            "damping": "damping", "reference": "reference",
+            "body": "body", "to": "relative_to", "coordinate": "coordinate",
+            "stiffness_N_per_m": "stiffness", "damping_N_s_per_m": "damping", "reference_m": "reference",
+            "stiffness_Nm_per_rad": "stiffness", "damping_Nm_s_per_rad": "damping", "reference_rad": "reference",
         },
         ("body", "coordinate"),
-        {"reference": "stiffness"},
+        {"reference_m": "stiffness_N_per_m", "reference_rad": "stiffness_Nm_per_rad"},
     ),
     "force": Kind(
         "gearfe.multibody.planar.forces:PointForce",

@@ -6,17 +6,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from ..config import build, quantity, read_toml
+from ..config import Removed, build, quantity, read_toml
 from ..errors import InputError, unknown_name
 from .beam import BeamTable, check_on_axis
 from .jobs import TABLES
 from .joint_coordinates import LinksTable, with_links
-from .kinds import FORCES, GONE_METHODS, JOINTS, Kind
+from .kinds import FORCES, GONE_METHODS, JOINTS, MOTIONS, UNIT_OF, Kind
 from .plate import PlateTable
 
 Pair = tuple[float, float]
+
+
+def _by_coordinate(key: str, names: tuple[str, ...]) -> Removed:
+    """Return the entry of `Removed` for a key whose unit depended on what it is of."""
+    *others, last = names
+    return f"has other names, one for each unit of {key}", f"write {', '.join(others)} or {last}"
 
 
 @dataclass(frozen=True)
@@ -177,13 +183,24 @@ class JointTable:
         None, choices=("angle", "rate", "x", "y"), doc="prescribed coordinate, or the one that follows a cam"
     )
     profile: str | None = quantity(None, doc="table of a cam's lift in m (or rad) over its angle in rad")
-    motion: Function | None = quantity(
-        None, doc="rad, rad/s or m: a number, a function of time, or an expression of it"
+    motion_rad: Function | None = quantity(
+        None, doc="motion of an angle (rad): a number, a function of time, or an expression of it"
     )
+    motion_rad_per_s: Function | None = quantity(None, doc="motion of a rate (rad/s), likewise")
+    motion_m: Function | None = quantity(None, doc="motion of x or y (m), likewise")
+
+    #: Removed keys, see `gearfe.base.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {"motion": _by_coordinate("motion", MOTIONS)}
 
     def check(self, where: str) -> None:
-        """Only the keys of this type."""
+        """Only the keys of this type and of its coordinate."""
         _check_keys(self, where, JOINTS[self.type], f"a {self.type} joint")
+        if self.type == "prescribed":
+            wanted = f"motion_{UNIT_OF[str(self.coordinate)]}"
+            _check_units(self, where, dict.fromkeys(MOTIONS, wanted))
+            if getattr(self, wanted) is None:
+                cure = f"add {wanted}, a number, a function of time, or an expression of it"
+                raise InputError(f"{where}.{wanted}", None, f"is required with coordinate = {self.coordinate!r}", cure)
         if self.direction is not None and self.direction == (0.0, 0.0):
             raise InputError(f"{where}.direction", [0.0, 0.0], "must not be zero", "give the direction of the line")
         if self.body == self.to:
@@ -200,20 +217,38 @@ class ForceTable:
     point: str | Pair | None = quantity(None, doc="point of the body: a name or [x, y] in m")
     to_point: str | Pair | None = quantity(None, doc="point of the other body: a name or [x, y] in m")
     acceleration_m_per_s2: Pair | None = quantity(None, doc="gravity [x, y] in m/s2")
-    stiffness: float | None = quantity(None, low=0.0, doc="stiffness in N/m, or N m/rad on an angle, >= 0 (default: 0)")
-    damping: float = quantity(0.0, low=0.0, doc="damping in N s/m, or N m s/rad on an angle, >= 0")
+    stiffness_N_per_m: float | None = quantity(None, low=0.0, doc="stiffness (N/m), >= 0 (default: 0)")
+    stiffness_Nm_per_rad: float | None = quantity(
+        None, low=0.0, doc="stiffness on an angle (N m/rad), >= 0 (default: 0)"
+    )
+    damping_N_s_per_m: float | None = quantity(None, low=0.0, doc="damping (N s/m), >= 0 (default: 0)")
+    damping_Nm_s_per_rad: float | None = quantity(None, low=0.0, doc="damping on an angle (N m s/rad), >= 0")
     free_length_m: float = quantity(0.0, low=0.0, doc="length of the spring without force (m)")
     tension_N: str | None = quantity(None, doc="further tension of a spring in N, by length and length_rate (m, m/s)")
     coordinate: str | None = quantity(None, choices=("angle", "x", "y"), doc="coordinate that the spring acts on")
-    reference: float = quantity(0.0, doc="coordinate at which the spring is free, in m or rad")
+    reference_m: float | None = quantity(None, doc="x or y at which the spring is free, in m (default: 0)")
+    reference_rad: float | None = quantity(None, doc="angle at which the spring is free, in rad (default: 0)")
     rate_rad_per_s: float | None = quantity(None, doc="rate of a turning frame about the ground's origin in rad/s")
     x_N: Function | None = quantity(None, doc="force in x in N: a number, a function of time, or an expression")
     y_N: Function | None = quantity(None, doc="force in y in N: a number, a function of time, or an expression")
     moment_N_m: Function | None = quantity(None, doc="moment in N m: a number, a function of time, or an expression")
 
+    #: Removed keys, see `gearfe.base.config.build`.
+    REMOVED: ClassVar[dict[str, Removed]] = {
+        "stiffness": _by_coordinate("stiffness", ("stiffness_N_per_m", "stiffness_Nm_per_rad")),
+        "damping": _by_coordinate("damping", ("damping_N_s_per_m", "damping_Nm_s_per_rad")),
+        "reference": _by_coordinate("reference", ("reference_m", "reference_rad")),
+    }
+
     def check(self, where: str) -> None:
-        """Only the keys of this type."""
+        """Only the keys of this type and of its coordinate."""
         _check_keys(self, where, FORCES[self.type], f"a force of type {self.type}")
+        if self.type == "coordinate_spring":
+            way = ("N_per_m", "N_s_per_m", "m"), ("Nm_per_rad", "Nm_s_per_rad", "rad")
+            of, other = way[::-1] if self.coordinate == "angle" else way
+            names = ("stiffness", "damping", "reference")
+            pairs = zip(names, other, of, strict=True)
+            _check_units(self, where, {f"{name}_{wrong}": f"{name}_{right}" for name, wrong, right in pairs})
         if self.type == "force" and self.x_N is None and self.y_N is None:
             raise InputError(where, None, "has no force", "give x_N or y_N")
         if self.body is not None and self.body == self.to:
@@ -413,6 +448,16 @@ def mechanism_tables(raw: Mapping[str, Any]) -> MechanismFile:
 
         raw = with_parameters(MechanismFile, raw)
     return build(MechanismFile, with_links(raw), "")
+
+
+def _check_units(table: JointTable | ForceTable, where: str, wanted: Mapping[str, str]) -> None:
+    """Raise `InputError` for a key with another unit than its coordinate has; `wanted`: key -> the one to write."""
+    for key, right in wanted.items():
+        if key != right and getattr(table, key) is not None:
+            problem = f"has another unit than coordinate = {table.coordinate!r}"
+            value = getattr(table, key)
+            shown = value if isinstance(value, float | str) else None
+            raise InputError(f"{where}.{key}", shown, problem, f"write {right}, or another coordinate")
 
 
 def _check_keys(table: JointTable | ForceTable, where: str, kind: Kind, what: str) -> None:

@@ -55,7 +55,7 @@ def tables(mechanism: str) -> dict[str, Any]:
                 "O": {"type": "hinge", "body": "rod", "point": "root", "to_point": "O"},
                 "drive": {
                     "type": "prescribed", "body": "rod", "coordinate": "rate",
-                    "motion": {"step": 6.0, "step_centre_s": 7.5, "step_width_s": 15.0},
+                    "motion_rad_per_s": {"step": 6.0, "step_centre_s": 7.5, "step_width_s": 15.0},
                 },
             },
             "outputs": [
