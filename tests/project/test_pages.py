@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import re
 import shlex
 import subprocess
@@ -162,8 +163,11 @@ def test_the_site_builds(tmp_path: Path) -> None:
     """Strictly: a dead link, a missing page or anchor, a name that the reference cannot find ends it."""
     pytest.importorskip("mkdocs", reason="pip install 'gearfe[docs]'")
     line = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", str(tmp_path)]
-    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False)
+    environment = {**os.environ, "SITE_NOTEBOOKS": "off"}  # tests/project/test_notebooks.py runs them
+    done = subprocess.run(line, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+    assert "sweep_stiffness" in (tmp_path / "notebooks" / "gear_pair.html").read_text(encoding="utf-8")
+    assert 'href="notebooks/gearbox.html"' in (tmp_path / "howto.html").read_text(encoding="utf-8")
     page = (tmp_path / "api.html").read_text(encoding="utf-8")
     assert 'id="gearfe.GearPair"' in page
     assert "centre_distance" in page
