@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
+import os
 
 from .arguments import add_json
+
+#: Groups of kernels: both integrators of mechanisms, the series of a train and a mesh law; the longest first.
+KERNELS = ("taylor", "implicit", "train", "mesh law")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     one.add_argument(
         "--compile",
         action="store_true",
-        help="compile all kernels now, about a minute: later runs load them",
+        help="compile all kernels now, on all cores, about a minute: later runs load them",
     )
     add_json(parser)
 
@@ -60,20 +65,56 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _compile() -> None:
-    """Leave all kernels in the cache: those of mechanisms by both methods, of a train, and of a mesh law."""
+    """Leave all kernels in the cache, each compiled in a process of its own on as many cores as there are.
+
+    Raises
+    ------
+    InputError
+        If a process ends before its kernels are compiled.
+    """
+    from concurrent.futures import BrokenExecutor, as_completed
+
+    from ..base.errors import InputError
+    from ..base.progress import count, stage
+    from ..study.run import processes
+
+    with stage("compiling the kernels"), processes(min(len(KERNELS), os.cpu_count() or 1)) as pool:
+        running = [pool.submit(compile_kernels, name) for name in KERNELS]
+        try:
+            for done, future in enumerate(as_completed(running), start=1):
+                future.result()
+                count(done, len(KERNELS), "groups of kernels")
+        except BrokenExecutor:
+            problem = "ended before all kernels were compiled: a process was killed"
+            raise InputError("--compile", None, problem, "is memory short? compiled kernels are kept: again") from None
+
+
+def compile_kernels(name: str) -> None:
+    """Leave the kernels of one of `KERNELS` in the cache, without a word: the command reports them all."""
+    with contextlib.redirect_stderr(None):
+        _use(name)
+
+
+def _use(name: str) -> None:
+    """Run the kernels of one of `KERNELS` as briefly as possible, which compiles them."""
     import numpy as np
 
+    if name == "mesh law":
+        from ..gears.gearmesh.law_kernel import load_kernel
+
+        load_kernel()
+        return
+    from ..multibody import Body, Hinge, Linkage, System, constant, integrate
+
+    if name != "train":
+        rod, hinge = Body("rod", 1.0, 1.0, (1.0, 0.0)), Hinge("rod", "ground")
+        integrate(System([Linkage((rod,), (hinge,))]), [0.0, 1e-3], method=name)
+        return
     from ..drivetrain.train import build_train
     from ..drivetrain.train.gear_train import Drive, GearMesh, GearTrain, Load, Shaft, ShaftGear
     from ..drivetrain.train.simulate import simulate
-    from ..gears.gearmesh.law_kernel import load_kernel
     from ..gears.geometry import Gear
-    from ..multibody import Body, Hinge, Linkage, System, constant, integrate
 
-    rod, hinge = Body("rod", 1.0, 1.0, (1.0, 0.0)), Hinge("rod", "ground")
-    system = System([Linkage((rod,), (hinge,))])
-    for method in ("taylor", "implicit"):
-        integrate(system, [0.0, 1e-3], method=method)
     gear, axes = Gear(20, 2e-3, math.radians(20.0), 0.02, bore_diameter=0.01), {"one": 0.0, "two": 0.04}
     train = GearTrain(
         tuple(Shaft(name, (x, 0.0, 0.0), 0.1, 5e-3, (f"{name}_1", f"{name}_2")) for name, x in axes.items()),
@@ -84,7 +125,6 @@ def _compile() -> None:
         rigid_bores={f"{name}_{k}": (x, y, 0.0) for name, x in axes.items() for k, y in ((1, 0.03), (2, -0.03))},
     )
     simulate(build_train(train), np.array([0.0, 1e-5]))
-    load_kernel()
 
 
 def _size(count: int) -> str:

@@ -32,4 +32,6 @@ def test_nothing_is_compiled_after_it(tmp_path: Path) -> None:
         gearfe(cache, "mechanism", str(GEOMETRY / f"{name}.toml"), "--no-estimate", *short)
     for name in ("helical", "planetary"):
         gearfe(cache, "vibration", str(GEOMETRY / f"{name}.toml"), "--set", "train.duration_ms=2", *short)
+    rigid = ("--set", "train.housing=rigid", "--set", "train.duration_ms=0.1")
+    gearfe(cache, "vibration", str(GEOMETRY / "gear_train.toml"), *rigid, "--no-estimate", "--no-floquet", *short)
     assert kernels(cache) == made
