@@ -41,14 +41,17 @@ if [ "${#packages[@]}" -gt 0 ]; then
     fi
 fi
 
-# A half-made environment (an interrupted first run) has no pip: make it anew.
+# A half-made environment (an interrupted first run) has no pip: create it again.
 if ! .venv/bin/python -m pip --version >/dev/null 2>&1; then
     rm -rf .venv
     "$python" -m venv .venv
 fi
 stamp=".venv/.gearfe-$(cksum pyproject.toml | tr ' ' '-' | cut -c1-24)-$extras"
 if [ ! -e "$stamp" ]; then
-    echo "installing gearfe into .venv (a few minutes the first time)"
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check -e ".[$extras]"
+    echo "installing gearfe into .venv (a few minutes the first time); a line for each package:"
+    PYTHONUNBUFFERED=1 .venv/bin/python -m pip install --disable-pip-version-check --progress-bar off -e ".[$extras]" |
+        while IFS= read -r line; do
+            case "$line" in Collecting*|Building*|Installing*|Successfully*) echo "  ${line:0:100}" ;; esac
+        done
     touch "$stamp"
 fi
