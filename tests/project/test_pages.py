@@ -137,6 +137,17 @@ def test_commands_are_understood() -> None:
     assert seen > 20
 
 
+def test_every_file_of_paraview_has_a_line_of_pyvista() -> None:
+    """Files that the program or a page names by a text; `waves` is that of an example in a docstring."""
+    sources = [*(ROOT / "gearfe").rglob("*.py"), *DOCS.glob("*.md")]
+    text = "\n".join(path.read_text(encoding="utf-8") for path in sources)
+    named = set(re.findall(r"[\"`](\w+)\.vtkhdf[\"`]", text)) - {"waves"}
+    rows = [line for line in (DOCS / "exchange.md").read_text(encoding="utf-8").splitlines() if "pv.read(" in line]
+    told = {name for row in rows for name in re.findall(r"`(\w+)\.vtkhdf`", row.split("|")[1])}
+    assert {"stiffness_flank", "loadmap_flank"} <= told  # whose names the program puts together
+    assert named <= told
+
+
 def test_the_reference_has_every_public_name() -> None:
     page = (DOCS / "api.md").read_text(encoding="utf-8")
     told = re.findall(r"^::: ([\w.]+)$", page, re.MULTILINE)
