@@ -84,6 +84,11 @@ class CondensedTrain:
         return np.asarray(self.model.axial @ self.model.modal.T)
 
     @cached_property
+    def displaced_of_modes(self) -> Array:
+        """(n, 3 shafts) displacements of the shafts for unit modal coordinates, see `TrainModel.displaced`."""
+        return np.asarray(self.model.modal.T.T @ self.model.displaced)
+
+    @cached_property
     def radiation_of_modes(self) -> Array | None:
         """(n, n) surface matrix of the housing in modal coordinates; None where the housing has no surface."""
         housing = self.model.train.housing

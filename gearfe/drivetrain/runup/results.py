@@ -155,8 +155,8 @@ def steady_result(
     forces = system.whole_forces(orbit)
     modal = system.linear.modal(omega, orbit.speed, forces)
     acceleration = -(omega**2)[:, None] * real_times(modal, train.bores_of_modes.T)
-    coordinates = model.modal.origin + real_times(lattice.synthesis(modal), model.modal.T.T)
-    displacement = np.abs(model.displacements(coordinates)).max(axis=(0, 2), initial=0.0)
+    moved = lattice.synthesis(real_times(modal, train.displaced_of_modes)) + model.modal.origin @ model.displaced
+    displacement = np.abs(moved).reshape(len(moved), -1, 3).max(axis=(0, 2), initial=0.0)
     power = None
     if train.radiation_of_modes is not None:
         square = (modal.conj() * real_times(modal, train.radiation_of_modes)).sum(axis=1).real

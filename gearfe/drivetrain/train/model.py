@@ -249,16 +249,18 @@ class TrainModel(Facts):
             np.cos(turned)[..., None, None] * across + np.sin(turned)[..., None, None] * right + np.outer(axis, axis)
         )
 
-    def displacements(self, q: Array) -> Array:
-        """Displacements (n, shafts, 3) of shafts (m), of planets against the turned carrier, of states (n, size)."""
-        moved = q[:, [first + i for first in self.first for i in range(3)]].reshape(len(q), -1, 3).copy()
+    @cached_property
+    def displaced(self) -> Array:
+        """Displacements of shafts, of planets against the turned carrier, for unit coordinates, (size, 3 shafts)."""
+        size = self.system.size
+        moved = np.eye(size)[:, [first + i for first in self.first for i in range(3)]].reshape(size, -1, 3)
         for number, body in enumerate(self.shafts):
             angle, radius, follows = _carried(self.train, self.placed, number)
             if radius:
                 plane = planes(body, self.train.frame)[0]
                 round_ = math.cos(angle) * plane.second[:3] - math.sin(angle) * plane.first[:3]
-                moved[:, number] -= np.outer(q @ follows, round_)
-        return moved
+                moved[:, number] -= np.outer(follows, round_)
+        return np.asarray(moved.reshape(size, -1))
 
     def fixed_axes(self, t: Array, vectors: Array) -> Array:
         """Vectors (n, bores, k, 3) at the bores, in the frames of their shafts, along axes that stand still."""

@@ -359,7 +359,8 @@ def _ended(model: TrainModel, trajectory: Trajectory, moved: TrainStates) -> tup
     """Status, the number of output times up to which the results hold, and what moved too far."""
     limit = DIVERGED * min((line.module for line in model.meshes), default=1e-3)
     reach = np.abs(moved.approach) if model.meshes else np.zeros((len(moved.q), 1))
-    shafts = np.abs(model.displacements(moved.q)).reshape(len(moved.q), -1)
+    with np.errstate(invalid="ignore"):  # of motions that are not finite
+        shafts = np.abs(moved.q @ model.displaced)
     worst = np.maximum(reach.max(axis=1), shafts.max(axis=1))
     bad = ~np.isfinite(moved.q).all(axis=1) | ~(worst <= limit)
     if bad.any():
