@@ -1,6 +1,6 @@
 """Mesh of the example box in meshes/: how a housing with named groups is made with gmsh. Lengths in mm.
 
-python scripts/build/make_box.py [FOLDER]     writes box.msh (gmsh) and box.inp (Abaqus, CalculiX), by default into meshes/
+python scripts/build/make_box.py [FOLDER]    writes box.msh (gmsh) and box.inp (Abaqus, CalculiX), else into meshes/
 """
 
 from __future__ import annotations

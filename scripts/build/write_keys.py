@@ -20,8 +20,8 @@ from gearfe.base.tables.train import ShaftTable, TrainMeshTable
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "keys.md"
 HEAD = """# Keys of the job files
 
-Made from the descriptions in `gearfe/base/tables/` by `python scripts/build/write_keys.py`; the messages, `gearfe new` and
-the options of the commands say the same. A key whose default is *required* must be given; where it is -, it may be
+Made from the descriptions in `gearfe/base/tables/` by `python scripts/build/write_keys.py`; the messages, `gearfe new`
+and the options of the commands say the same. A key whose default is *required* must be given; where it is -, it may be
 left out.
 """
 
