@@ -13,7 +13,8 @@ from typing import Any, ClassVar
 from ..config import Removed, quantity, renamed
 from ..errors import InputError
 
-Two, Three = tuple[float, float], tuple[float, float, float]
+Two = tuple[float, float]
+Three = tuple[float, float, float]
 Five = tuple[float, float, float, float, float]
 Matrix = tuple[Five, Five, Five, Five, Five]
 

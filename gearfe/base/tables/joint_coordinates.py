@@ -57,7 +57,7 @@ def with_links(raw: Mapping[str, Any]) -> dict[str, Any]:
     InputError
         For positions and names that are none, and for what contradicts the positions.
     """
-    joints, bodies = raw.get("joints"), raw.get("bodies", {})
+    joints, bodies = raw.get("joints", {}), raw.get("bodies", {})
     tables = isinstance(joints, dict) and isinstance(bodies, dict)
     given = {name: joint for name, joint in joints.items() if _is_placed(joint)} if tables else {}
     if not given:
@@ -86,7 +86,8 @@ def with_links(raw: Mapping[str, Any]) -> dict[str, Any]:
     if GROUND in points and isinstance(ground, dict):
         at_rest = _with_points("ground", ground.get("points_m", {}), points[GROUND])
         ground = {**ground, "points_m": at_rest}
-    by_name, rest = {point.name: point for point in placed}, {}
+    by_name = {point.name: point for point in placed}
+    rest: dict[str, Any] = {}
     for name, joint in joints.items():
         rest |= _joints(by_name[name], joint, frames, joints) if name in by_name else {name: joint}
     others = {name: table for name, table in raw.items() if name != "links"}
