@@ -40,13 +40,14 @@ def test_samples_hold_the_harmonics(periods: tuple[float, ...], count: int) -> N
     less than thrice the order.
     """
     rng = np.random.default_rng(1)
-    waves, order = torus.harmonics(periods, count)
-    made = torus.lattice(periods, count)
+    phases = torus.Phases.of(periods, (1,) * len(periods))
+    waves, order = torus.harmonics(phases, count)
+    made = torus.lattice(phases, count)
     a = rng.normal(size=(count + 1, 2)) + 1j * rng.normal(size=(count + 1, 2))
     a[0] = a[0].real
     values = (np.exp(1j * made.theta @ waves.T) @ a).real
     assert made.synthesis(a) == pytest.approx(values, abs=1e-9)
-    others = torus.below(periods, 3.0 * order[-1] if len(periods) == 1 else 0.0).waves[count + 1 :]
+    others = torus.below(phases, 3.0 * order[-1] if len(periods) == 1 else 0.0).waves[count + 1 :]
     more = (np.exp(1j * made.theta @ others.T) @ rng.normal(size=(len(others), 2))).real
     assert made.analysis(values + more)[: count + 1] == pytest.approx(a, abs=1e-9)
     assert (np.diff(order) >= -1e-9).all()
@@ -101,7 +102,7 @@ def test_duffing_under_two_forces_whose_frequencies_share_no_period() -> None:
 
     run = solve_ivp(rhs, (0.0, 400.0), [0.0, 0.0], "DOP853", t_eval=times, rtol=1e-11, atol=1e-12)
     assert np.abs(at_times(system, orbit, times)[:, 0] - run.y[0]).max() < 1e-6
-    combined = torus.numbers(system.periods, orbit.harmonics)[(1, 2)]
+    combined = torus.numbers(system.phases, orbit.harmonics)[(1, 2)]
     assert abs(orbit.places[combined, 0]) > 1e-3
 
 

@@ -172,17 +172,19 @@ class Oscillator:
     _last: dict[tuple[float, int], Coupling] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
-    def periods(self) -> tuple[float, ...]:
-        """Of the phases, in parts of that of the first."""
-        return tuple(turns / self.turns[0] for turns in self.turns)
+    def phases(self) -> torus.Phases:
+        """Periods of the phases, and how far multiples of meshes reach in combinations."""
+        cycles = tuple(max(1, *column) for column in zip(*self.orders, strict=True))
+        periods = tuple(turns / self.turns[0] for turns in self.turns)
+        return torus.Phases.of(periods, cycles[: len(periods) - self.carriers])
 
     def waves(self, count: int) -> IntArray:
         """Numbers k of the harmonics 0 to `count`, (count + 1, n)."""
-        return torus.harmonics(self.periods, count, self.carriers).waves
+        return torus.harmonics(self.phases, count).waves
 
     def numbers(self, count: int) -> dict[tuple[int, ...], int]:
         """Number of each of the harmonics 0 to `count` by its k."""
-        return torus.numbers(self.periods, count, self.carriers)
+        return torus.numbers(self.phases, count)
 
     def omega(self, speed: float, count: int) -> Array:
         """Angular frequencies (rad/s) of the harmonics 0 to `count`, none negative."""
@@ -190,18 +192,18 @@ class Oscillator:
 
     def lattice(self, count: int) -> Lattice:
         """Places at which so many harmonics are sampled."""
-        return torus.lattice(self.periods, count, self.carriers)
+        return torus.lattice(self.phases, count)
 
     def harmonics(self, speed: float, highest: float, multiples: int = 8) -> int:
         """Number of harmonics: multiples up to an angular frequency (rad/s), so many of each mesh at least.
 
         With several phases they reach less far where that would be more than `PLENTY`: the error estimate adds to them.
         """
-        periods = self.periods
+        periods = self.phases.periods
         order = max(multiples * cycles / b for mesh in self.orders for cycles, b in zip(mesh, periods, strict=True))
-        most = torus.harmonics(periods, MOST_HARMONICS if len(periods) == 1 else PLENTY, self.carriers).order[-1]
+        most = torus.harmonics(self.phases, MOST_HARMONICS if len(periods) == 1 else PLENTY).order[-1]
         band = min(highest * self.turns[0] / abs(speed), float(most))
-        return self.rounded(torus.count_below(periods, max(order, band), self.carriers))
+        return self.rounded(torus.count_below(self.phases, max(order, band)))
 
     def rounded(self, harmonics: float) -> int:
         """Number whose samples transform quickly, at least the given one, up to the most."""

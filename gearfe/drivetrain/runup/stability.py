@@ -227,7 +227,8 @@ def around(
         X = map_over(0, middle)
         half, whole = _sorted(X, free, edges[middle]), _sorted(map_over(middle, len(edges) - 1) @ X, free, edges[-1])
     growth, before = math.log(abs(whole[0])) / edges[-1], math.log(abs(half[0])) / edges[middle]
-    return whole if abs(growth) > abs(growth - before) else np.array([math.nan + 0j])
+    agree = math.isfinite(growth) and abs(growth) > abs(growth - before)  # a map that overflows says nothing
+    return whole if agree else np.array([math.nan + 0j])
 
 
 def _sorted(X: Array, free: tuple[Array, Array], time: float) -> ComplexArray:

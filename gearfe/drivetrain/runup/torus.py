@@ -3,15 +3,20 @@ r"""Harmonics of a motion with one or several phases, and where it is sampled.
 A motion with the n base frequencies :math:`\omega` is a function of n phases, :math:`\theta = \omega t`, with a
 harmonic for each vector k of n whole numbers,
 
-.. math:: u(\theta) = \mathrm{Re}\sum_k \hat u_k\,e^{ik\cdot\theta} ,\qquad
-    w(k) = \Big(\sum_p\sqrt{|k_p|\,\omega_p / \omega_1}\Big)^2 .
+.. math:: u(\theta) = \mathrm{Re}\sum_k \hat u_k\,e^{ik\cdot\theta} .
 
 Of k and -k, whose frequencies :math:`k\cdot\omega` are opposite, the positive one counts. Harmonics stand in rising
-order w: the first K of them hold the multiples of all base frequencies up to one frequency, and their combinations less
-far. With one phase they are 1, 2, 3, ... The last phases may be rotations of carriers in an elastic housing, which are
-slow and couple each harmonic with its neighbours n + 1 and n - 1: they add :math:`|k_p|` times `PASS` to w instead, so
-that each multiple of a mesh frequency has its sidebands. Harmonics are sampled at S places on a line that winds round
-all phases, a lattice of rank 1 (Sloan & Joe, Lattice Methods for Multiple Integration, 1994),
+order w. That of a multiple of one base frequency is its frequency, :math:`w = |k_p|\,\omega_p/\omega_1`. Combinations
+come from the product of variations that are small each, and fall with the multiples of the meshes' own frequencies,
+
+.. math:: w(k) = \Big(\sum_p\sqrt{|k_p| / r_p}\Big)^2 ,\qquad r_p = \frac{c_p}{\max_q (c_q/b_q)} ,
+
+with the cycles :math:`c_p` of the fastest mesh of a phase in its period :math:`b_p`. So the first K of them hold the
+multiples of all base frequencies up to one frequency, and in combinations as many multiples of slow meshes as of the
+fastest one. With one phase they are 1, 2, 3, ... The last phases may be rotations of carriers in an elastic housing,
+which are slow and couple each harmonic with its neighbours n + 1 and n - 1: they add :math:`|k_p|` times `PASS` to w
+instead, so that each multiple of a mesh frequency has its sidebands. Harmonics are sampled at S places on a line that
+winds round all phases, a lattice of rank 1 (Sloan & Joe, Lattice Methods for Multiple Integration, 1994),
 
 .. math:: \theta_j = 2\pi j g / S ,\qquad e^{ik\cdot\theta_j} = e^{2\pi i j (k\cdot g) / S} ,
 
@@ -41,6 +46,24 @@ RUNGS = 3
 FARTHER = 1.3
 #: What one rotation of a carrier adds to the order of a harmonic, in parts of the frequency of the first phase.
 PASS = 0.5
+
+
+class Phases(NamedTuple):
+    """Phases of a motion: first those of meshes, last the rotations of carriers."""
+
+    periods: tuple[float, ...]  # in parts of that of the first
+    reaches: tuple[float, ...]  # of the phases of meshes: r
+
+    @classmethod
+    def of(cls, periods: tuple[float, ...], cycles: tuple[int, ...]) -> Phases:
+        """Phases of periods, the first of which hold so many cycles of their fastest mesh."""
+        fastest = max(count / period for count, period in zip(cycles, periods, strict=False))
+        return cls(periods, tuple(count / fastest for count in cycles))
+
+    @property
+    def carriers(self) -> int:
+        """Number of the phases that are rotations of carriers."""
+        return len(self.periods) - len(self.reaches)
 
 
 class Harmonics(NamedTuple):
@@ -85,34 +108,18 @@ class Lattice(NamedTuple):
         return np.asarray(made)
 
 
-def below(periods: tuple[float, ...], order: float, carriers: int = 0) -> Harmonics:
-    """All harmonics of less than an order, the constant included.
-
-    Parameters
-    ----------
-    periods
-        Of the phases, in parts of that of the first.
-    order
-        The order w.
-    carriers
-        So many of the last phases are rotations of carriers.
-    """
-    if len(periods) == 1:
+def below(phases: Phases, order: float) -> Harmonics:
+    """All harmonics of less than an order, the constant included."""
+    if len(phases.periods) == 1:
         rising = np.arange(math.ceil(order * (1.0 - ROUND_OFF)))
         return Harmonics(rising[:, None], rising.astype(float))
-    waves, roots = np.zeros((1, 0), dtype=int), np.zeros(1)  # axis by axis, what is left of the order for the next
-    for period in periods[: len(periods) - carriers]:
-        most = np.floor(period * np.maximum(math.sqrt(order) - roots, 0.0) ** 2).astype(int)
-        before = np.repeat(np.arange(len(roots)), 2 * most + 1)
-        k = np.arange(len(before)) - (np.cumsum(2 * most + 1) - most - 1)[before]
-        waves, roots = np.column_stack([waves[before], k]), roots[before] + np.sqrt(np.abs(k) / period)
-    w = roots**2
-    for _ in range(carriers):
+    waves, w = _of_meshes(phases, order)
+    for _ in range(phases.carriers):
         most = np.floor(np.maximum(order - w, 0.0) / PASS).astype(int)
         before = np.repeat(np.arange(len(w)), 2 * most + 1)
         k = np.arange(len(before)) - (np.cumsum(2 * most + 1) - most - 1)[before]
         waves, w = np.column_stack([waves[before], k]), w[before] + PASS * np.abs(k)
-    frequency, first = (waves / np.array(periods)).sum(axis=1), np.argmax(waves != 0, axis=1)
+    frequency, first = (waves / np.array(phases.periods)).sum(axis=1), np.argmax(waves != 0, axis=1)
     none = np.abs(frequency) <= ROUND_OFF * w
     kept = (w < order * (1.0 - ROUND_OFF)) & np.where(none, waves[np.arange(len(waves)), first] >= 0, frequency > 0.0)
     waves, w = waves[kept], w[kept]
@@ -120,47 +127,67 @@ def below(periods: tuple[float, ...], order: float, carriers: int = 0) -> Harmon
     return Harmonics(waves[rising], w[rising])
 
 
+def _of_meshes(phases: Phases, order: float) -> tuple[IntArray, Array]:
+    """Multiples of each mesh phase and their combinations up to an order, both signs, and their orders."""
+    waves, roots = np.zeros((1, 0), dtype=int), np.zeros(1)  # axis by axis, what is left of the order for the next
+    for reach in phases.reaches:
+        most = np.floor(reach * np.maximum(math.sqrt(order) - roots, 0.0) ** 2).astype(int)
+        before = np.repeat(np.arange(len(roots)), 2 * most + 1)
+        k = np.arange(len(before)) - (np.cumsum(2 * most + 1) - most - 1)[before]
+        waves, roots = np.column_stack([waves[before], k]), roots[before] + np.sqrt(np.abs(k) / reach)
+    combined = (waves != 0).sum(axis=1) != 1
+    found, orders = [waves[combined]], [roots[combined] ** 2]
+    for axis, period in enumerate(phases.periods[: len(phases.reaches)]):
+        rising = np.arange(1, math.floor(order * period) + 1)
+        multiples = np.zeros((2 * len(rising), len(phases.reaches)), dtype=int)
+        multiples[:, axis] = np.concatenate([rising, -rising])
+        found.append(multiples)
+        orders.append(np.abs(multiples[:, axis]) / period)
+    return np.concatenate(found), np.concatenate(orders)
+
+
 @lru_cache(maxsize=64)
-def harmonics(periods: tuple[float, ...], count: int, carriers: int = 0) -> Harmonics:
+def harmonics(phases: Phases, count: int) -> Harmonics:
     """The constant and the first `count` harmonics, see `below`."""
-    order = count + 2.0 if len(periods) == 1 else 4.0
-    while len(below(periods, order, carriers).waves) <= count:
+    order = count + 2.0 if len(phases.periods) == 1 else 4.0
+    while len(below(phases, order).waves) <= count:
         order *= FARTHER
-    waves, w = (x[: count + 1] for x in below(periods, order, carriers))
+    waves, w = (x[: count + 1] for x in below(phases, order))
     for x in (waves, w):
         x.setflags(write=False)
     return Harmonics(waves, w)
 
 
-def count_below(periods: tuple[float, ...], order: float, carriers: int = 0) -> int:
+def count_below(phases: Phases, order: float) -> int:
     """Number of the first harmonic that is not below an order."""
-    return len(below(periods, order, carriers).waves)
+    return len(below(phases, order).waves)
 
 
 @lru_cache(maxsize=64)
-def numbers(periods: tuple[float, ...], count: int, carriers: int = 0) -> dict[tuple[int, ...], int]:
+def numbers(phases: Phases, count: int) -> dict[tuple[int, ...], int]:
     """Number of each of the first harmonics by its k."""
-    return {tuple(k): number for number, k in enumerate(harmonics(periods, count, carriers).waves.tolist())}
+    return {tuple(k): number for number, k in enumerate(harmonics(phases, count).waves.tolist())}
 
 
-def lattice(periods: tuple[float, ...], count: int, carriers: int = 0) -> Lattice:
+def lattice(phases: Phases, count: int) -> Lattice:
     """Samples for the constant and the first `count` harmonics at least."""
-    if len(periods) > 1:  # it takes a search: the same for many
+    if len(phases.periods) > 1:  # it takes a search: the same for many
         count = math.ceil(2.0 ** (math.ceil(RUNGS * math.log2(max(count, LEAST))) / RUNGS))
-    return _searched(periods, count, carriers)
+    return _searched(phases, count)
 
 
 @lru_cache(maxsize=64)
-def _searched(periods: tuple[float, ...], count: int, carriers: int) -> Lattice:
+def _searched(phases: Phases, count: int) -> Lattice:
     from scipy.fft import next_fast_len  # a train without steady motion needs no transforms
 
-    waves, _ = harmonics(periods, count, carriers)
+    waves, _ = harmonics(phases, count)
+    several = len(phases.periods)
     every = np.concatenate([waves, -waves[1:]])
     samples = SAMPLES * max(count, LEAST)
     while True:
         rng = np.random.default_rng(samples)  # the same in each run
-        for factor in rng.integers(1, samples, TRIED if len(periods) > 1 else 1).tolist():
-            step = np.array([pow(factor, p, samples) for p in range(len(periods))])
+        for factor in rng.integers(1, samples, TRIED if several > 1 else 1).tolist():
+            step = np.array([pow(factor, p, samples) for p in range(several)])
             if np.bincount((every @ step) % samples).max() == 1:
                 residue = (waves @ step) % samples
                 theta = 2.0 * math.pi * ((np.arange(samples)[:, None] * step) % samples) / samples
