@@ -38,6 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "a tooth (csv), of the gear (dxf), solid (step, brep), mm; rexs: the whole job as gearbox.rexs",
     )
     parser.add_argument(
+        "--results",
+        metavar="DIR",
+        help="with --export rexs: folder that holds the folders of results (default: out/JOB, as of all commands)",
+    )
+    parser.add_argument(
         "--angle-deg", type=float, default=0.0, metavar="X", help="pinion angle of the drawing (deg, default: 0)"
     )
 
@@ -69,7 +74,7 @@ def _write_rexs(args: argparse.Namespace) -> None:
 
     folder = output_folder(args.out)
     with stage("writing gearbox.rexs"):
-        known = rexs_results(args.job, folder)
+        known = rexs_results(args.job, args.results or Path("out") / Path(args.job).stem)
         write_rexs(args.job, folder / "gearbox.rexs", known.results)
     print_results([], folder, ["gearbox.rexs"], {}, known.notes)
 

@@ -78,6 +78,21 @@ def gears_of(raw: dict[str, Any], job: str) -> tuple[list[Picture], list[Sheet]]
     return pictures, merged(sheets)
 
 
+def loads_of(raw: dict[str, Any], job: str) -> list[Sheet]:
+    """Loads of meshes and bearings in steady running; nothing for jobs that are no gearbox."""
+    from ..base.errors import InputError
+
+    if "train" not in raw:
+        return []
+    from ..drivetrain.gearbox.overview import overview_sheets
+
+    try:
+        return overview_sheets(job, raw)
+    except InputError as error:
+        print(f"gearfe: warning: the loads are not in the report: {error}", file=sys.stderr)
+        return []
+
+
 def _drawn(raw: dict[str, Any], job: str, pair: Any) -> list[Picture]:
     """Picture of the whole gearbox of a file with shafts, else of a pair."""
     from ..base.errors import InputError
@@ -119,5 +134,6 @@ def write_report(folder: Path, heading: Heading, runs: Sequence[Run], raw: dict[
 
     text = "" if job is None else Path(job).read_text(encoding="utf-8-sig")
     gears = gears_of(raw, job) if job is not None else ((), ())
-    page = Report(heading, gears, runs, ("", "") if job is None else (Path(job).name, text))
+    loads = [] if job is None else loads_of(raw, job)
+    page = Report(heading, gears, runs, ("", "") if job is None else (Path(job).name, text), loads)
     (folder / REPORT).write_text(report_page(page), encoding="utf-8", errors="backslashreplace", newline="\n")

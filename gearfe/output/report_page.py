@@ -133,12 +133,15 @@ class Report:
         The runs.
     job
         Name and text of the job file; empty without one.
+    loads
+        Tables of the loads of a gearbox.
     """
 
     heading: Heading
     gears: tuple[Sequence[Picture], Sequence[Sheet]] = ((), ())
     runs: Sequence[Run] = ()
     job: tuple[str, str] = ("", "")
+    loads: Sequence[Sheet] = ()
 
 
 def picture_of(path: Path) -> Picture:
@@ -151,6 +154,8 @@ def report_page(report: Report) -> str:
     pictures, sheets = report.gears
     gears = "".join(map(_figure, pictures)) + "<div>" + "".join(map(_sheet, sheets)) + "</div>"
     parts = [("Gears", f'<div class="side">{gears}</div>')] if pictures or sheets else []
+    if report.loads:
+        parts.append(("Loads", "".join(map(_sheet, report.loads))))
     parts += [(run.title, _run(run)) for run in report.runs]
     parts.append(("Provenance", _provenance(report)))
     body = "".join(f"<h2>{html.escape(name)}</h2>\n{text}\n" for name, text in parts)

@@ -287,12 +287,47 @@ def _warnings(results: Results) -> str:
     return "; ".join(str(text) for text in results.summary.get("warnings") or ())
 
 
+def _of_modes(results: Results) -> list[Sheet]:
+    """Natural frequencies, critical speeds by their distance to the speed of the drive, and the nearest modes."""
+    summary, sheets = results.summary, []
+    modes = [mode for mode in summary.get("modes") or () if isinstance(mode, Mapping)]
+    rows = [
+        [
+            str(mode.get("name")), _text(mode.get("frequency_Hz")),
+            _text(mode.get("frequency_at_the_fastest_speed_Hz")), _text(100.0 * (mode.get("damping_ratio") or 0.0)),
+            str(mode.get("label") or ""),
+        ]
+        for mode in modes[: 2 * MOST_ROWS]
+    ]  # fmt: skip
+    if rows:
+        head = ("mode", "first speed (Hz)", "last speed (Hz)", "damping (%)", "what moves")
+        note = f"{len(rows)} of {len(modes)} modes" if len(rows) < len(modes) else ""
+        sheets.append(Sheet("Natural frequencies", head, rows, note))
+    drive = summary.get("speed_of_the_drive_rad_per_s")
+    met = [c for c in summary.get("critical_speeds") or () if isinstance(c, Mapping) and c.get("excited")]
+    if isinstance(drive, (int, float)):
+        met.sort(key=lambda c: abs(c.get("speed_rad_per_s", 0.0) - drive))
+    rows = [
+        [
+            _text(c.get("speed_rad_per_s")), _text(30.0 / math.pi * c.get("speed_rad_per_s", math.nan)),
+            _text(c.get("frequency_Hz")), str(c.get("order")), f"{c.get('mode')}: {c.get('label')}",
+        ]
+        for c in met[:MOST_ROWS]
+    ]  # fmt: skip
+    if rows:
+        head = ("rad/s", "1/min", "Hz", "excitation", "mode")
+        note = f"{len(rows)} of {len(met)} critical speeds, nearest to that of the drive first"
+        sheets.append(Sheet("Critical speeds", head, rows, note + (f", {_text(drive)} rad/s" if drive else "")))
+    return sheets
+
+
 #: Kind -> its tables; of other kinds the numbers that a comparison takes, too.
 SHEETS: dict[str, Callable[[Results], list[Sheet]]] = {
     "stiffness": _of_curve,
     "loadmap": _over_load,
     "runup": _over_speed,
     "rating": _of_rating,
+    "modes": _of_modes,
 }
 
 

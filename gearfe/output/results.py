@@ -34,6 +34,8 @@ class Kind:
         File with the figures.
     needed
         Columns of `table` by which a file of another name is recognised.
+    part_of
+        File next to which `table` is a part of other results.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Kind:
     table: str
     summary: str
     needed: tuple[str, ...]
+    part_of: str = ""
 
 
 #: Kinds in the order in which a folder or a file is recognised.
@@ -50,6 +53,14 @@ KINDS = (
     Kind("runup", "run-up", "runup.csv", "summary.json", ("speed_rad_per_s", "branch")),
     Kind("vibration", "vibration", "response.csv", "summary.json", ("time_s", "contact_force_1")),
     Kind("rating", "rating by ISO 6336", "rating.csv", "rating.json", ("group", "name", "formula")),
+    Kind(
+        "modes",
+        "natural frequencies and critical speeds",
+        "critical_speeds.csv",
+        "summary.json",
+        ("meets", "mode", "excited"),
+        "runup.csv",
+    ),
     Kind("mechanism", "mechanism", "trajectory.csv", "summary.json", ("time_s",)),
 )
 _KNOWN = ", ".join(kind.name for kind in KINDS)
@@ -89,7 +100,11 @@ class Results:
 
 def kinds_of(folder: Path) -> tuple[Kind, ...]:
     """Kinds of the results that a folder holds."""
-    return tuple(kind for kind in KINDS if (folder / kind.table).is_file())
+    return tuple(
+        kind
+        for kind in KINDS
+        if (folder / kind.table).is_file() and not (kind.part_of and (folder / kind.part_of).is_file())
+    )
 
 
 def read_results(path: str | Path, field: str, name: str = "") -> Results:

@@ -170,6 +170,19 @@ def _rating_panels(results: Sequence[Results]) -> Iterator[Panel]:
         yield Panel("S_H of both gears, then S_F of both", "safety factor", tuple(lines), "bars")
 
 
+def _modes_panels(results: Sequence[Results]) -> Iterator[Panel]:
+    """Natural frequencies at the slowest speed by their numbers, side by side."""
+    lines = []
+    for number, run in enumerate(results):
+        modes = run.summary.get("modes")
+        entries = [mapping(mode).get("frequency_Hz") for mode in modes] if isinstance(modes, list) else []
+        values = np.array([value for value in entries if isinstance(value, float)])
+        if len(values):
+            lines.append(Line(number, run.name, np.arange(1.0, len(values) + 1.0), values))
+    if lines:
+        yield Panel("mode", "natural frequency (Hz)", tuple(lines), "bars")
+
+
 def _mechanism_panels(results: Sequence[Results]) -> Iterator[Panel]:
     names = [name for name, values in results[0].main.items() if name != "time_s" and values.dtype.kind == "f"]
     yield from _panels(results, "", "time_s", [re.escape(name) for name in names[:MOST]])
@@ -182,5 +195,6 @@ PANELS: dict[str, Callable[[Sequence[Results]], Iterator[Panel]]] = {
     "vibration": _vibration_panels,
     "runup": _runup_panels,
     "rating": _rating_panels,
+    "modes": _modes_panels,
     "mechanism": _mechanism_panels,
 }

@@ -265,6 +265,19 @@ def _runup_numbers(run: Results) -> list[Number]:
     return found
 
 
+def _modes_numbers(run: Results) -> list[Number]:
+    """Natural frequencies at the slowest speed, and speeds at which excitations meet them."""
+    found = []
+    for mode in map(mapping, _list(run.summary.get("modes"))[: 2 * MOST]):
+        text = f"natural frequency {mode.get('name')}, {mode.get('label')}"
+        found.append(Number(text, "Hz", _finite(mode.get("frequency_Hz"))))
+    excited = [c for c in map(mapping, _list(run.summary.get("critical_speeds"))) if c.get("excited")]
+    for critical in excited[: 2 * MOST]:
+        text = f"critical speed: {critical.get('order')} meets mode {critical.get('mode')}, {critical.get('label')}"
+        found.append(Number(text, "rad/s", _finite(critical.get("speed_rad_per_s"))))
+    return found
+
+
 def _rating_numbers(run: Results) -> list[Number]:
     """All values of a rating, safety factors first; they are formulas, without an error of a discretisation."""
     table = run.main
@@ -345,5 +358,6 @@ NUMBERS: dict[str, Reader] = {
     "vibration": _each(_vibration_numbers),
     "runup": _each(_runup_numbers),
     "rating": _ratings,
+    "modes": _each(_modes_numbers),
     "mechanism": _each(_mechanism_numbers),
 }

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import re
 import shutil
+import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -13,7 +15,10 @@ import numpy as np
 import pytest
 
 from gearfe.base.files import write_csv, write_json
+from gearfe.base.tables.examples import job_file
 from gearfe.cli.main import main
+from gearfe.drivetrain.gearbox.overview import overview_sheets
+from gearfe.output.results import kinds_of
 from tests.places import GEOMETRY
 
 HOSTILE = '<script>alert(1)</script><img src="http://example.org/x.png" onerror="x()">'
@@ -171,3 +176,56 @@ def test_a_report_without_gears(tmp_path: Path) -> None:
     assert "crank angle, at the end" in page.printed
     assert "short run" in page.printed
     assert "Gears" not in page.printed
+
+
+def gearbox(folder: Path) -> Path:
+    """The gearbox that `gearfe new` writes, with a rating."""
+    path = folder / "box.toml"
+    path.write_text(job_file("gearbox") + "\n[rating]\nhardness = 700.0\nquality = 6\n", encoding="utf-8")
+    return path
+
+
+def test_a_report_begins_with_the_loads_of_the_gearbox(tmp_path: Path) -> None:
+    """Torques and speeds by the tooth numbers 23/... from 145 N m at the output, and forces of all bearings."""
+    path = gearbox(tmp_path)
+    raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    meshes, bearings = overview_sheets(path, raw)
+    rows = {row[0]: row for row in meshes.rows}
+    assert float(rows["second: output_wheel"][2]) == 145.0
+    ratio = 1.0
+    for mesh in raw["meshes"].values():
+        ratio *= raw["gears"][mesh["driven"]]["teeth"] / raw["gears"][mesh["driver"]]["teeth"]
+    assert float(rows["first: input_pinion"][2]) == pytest.approx(-145.0 / ratio, rel=1e-4)
+    assert all(float(row[5]) > 0.5 and float(row[6]) > 0.5 for row in meshes.rows)
+    assert [row[0] for row in bearings.rows] == list(raw["bearings"])
+    # the input's bearings balance the force of its gear, F_t/cos(alpha_wt) across the axis
+    of_input = sum(float(row[4]) for row in bearings.rows if row[1] == "input")
+    assert of_input == pytest.approx(float(rows["first: input_pinion"][4]) / math.cos(math.radians(20.0)), rel=0.02)
+
+
+def test_modes_are_in_the_report_of_a_job(tmp_path: Path) -> None:
+    """Natural frequencies and critical speeds of gearfe modes; in a run-up they are a part of it."""
+    path = gearbox(tmp_path)
+    out = tmp_path / "out"
+    for command in (["modes"], ["rating"], ["gear"]):
+        assert main([*command, str(path), "--out", str(out / command[0]), "--no-pictures"]) == 0
+    assert [kind.name for kind in kinds_of(out / "modes")] == ["modes"]
+    assert main(["report", str(path), "--results", str(out)]) == 0
+    page = page_of(out / "report.html")
+    for part in (
+        "Loads in steady running", "Bearing forces in steady running", "Natural frequencies", "Critical speeds",
+        "S_H", "number of teeth",
+    ):  # fmt: skip
+        assert part in page.printed, part
+    (out / "modes" / "runup.csv").write_text("speed_rad_per_s,branch\n", encoding="utf-8")
+    assert [kind.name for kind in kinds_of(out / "modes")] == ["runup"]
+
+
+def test_modes_of_two_jobs_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = gearbox(tmp_path)
+    for name, stiff in (("a", "1e8"), ("b", "2e8")):
+        line = ["modes", str(path), "--out", str(tmp_path / name), "--no-pictures"]
+        assert main([*line, "--set", f"bearings.A.stiffness=[{stiff}, 0.0, {stiff}, 0.0, 0.0]"]) == 0
+    capsys.readouterr()
+    assert main(["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--out", str(tmp_path / "c")]) == 0
+    assert "natural frequency" in capsys.readouterr().out

@@ -20,13 +20,12 @@ import numpy as np
 from ...base.config import read_toml
 from ...base.errors import InputError
 from ...base.tables.gearbox import NamedMesh
-from ...base.tables.jobs import gearbox_of, job_tables, train_tables
+from ...base.tables.jobs import job_tables, train_tables, whole_gearbox
 from ...base.typing import Array
 from ...gears.geometry.derived import derived_geometry
 from ...gears.geometry.pair import GearPair, pair_of
 from ...gears.geometry.validity import tip_clearance
-from ...gears.rating.rate import STEEL_TABLE, Rating, rate_mesh
-from ...gears.rating.stiffness import mesh_stiffness
+from ...gears.rating.rate import Rating, rate_mesh
 from ...output.exchange.rexs.results import GEAR_DATA, Result, gear_data
 from ...output.results import Results, kinds_of, read_all
 from ..train import build_train
@@ -37,6 +36,7 @@ from ..train.model import TrainModel
 from .job import TrainJob, train_job
 from .mesh_loads import mesh_loads, with_train
 from .rolling import SIGNS
+from .springs_train import springs_train
 
 #: Axes of REXS -> number of that of the job.
 AXES = {"u": 1, "v": 2, "w": 0}
@@ -133,7 +133,7 @@ def rexs_results(job: str | Path | Mapping[str, Any], folder: str | Path | None 
     """
     path = "job" if isinstance(job, Mapping) else str(job)
     raw = dict(job) if isinstance(job, Mapping) else read_toml(job)
-    box = gearbox_of(raw, path)
+    box = whole_gearbox(raw, path)
     pairs = {name: pair_of(mesh) for name, mesh in box.meshes.items()}
     found: list[Result] = []
     notes: list[str] = []
@@ -259,10 +259,7 @@ def _statics(job: TrainJob) -> Iterator[Result]:
         yield Result("shafts", shaft, "defines_speed", shaft == rigid.driven.shaft)
     for gear in rigid.gears:
         yield Result("gears", gear.name, "rotational_speed", speeds[gear.shaft], "rad / s")
-    stiffness = [mesh_stiffness(pair, *_moduli(mesh)) * pair.common_width
-                 for mesh, pair in ((mesh, pair_of(mesh)) for mesh in job.meshes)]  # fmt: skip
-    springs = zip(rigid.meshes, stiffness, strict=True)
-    model = build_train(replace(rigid, meshes=tuple(replace(mesh, stiffness=k) for mesh, k in springs)))
+    model = build_train(springs_train(job))
     loads = mesh_loads(rigid)
     pushes: dict[str, list[Array]] = {}
     turns: dict[str, float] = {}
@@ -299,14 +296,6 @@ def _statics(job: TrainJob) -> Iterator[Result]:
             yield Result("gears", name, attribute, value, unit)
         yield Result("gears", name, "torque_acting_on_shaft_u", turns[name], "N m")
     yield from _bearings(model)
-
-
-def _moduli(mesh: NamedMesh) -> tuple[float, float]:
-    """Young's moduli (Pa) of driver and driven gear; steel where none is given."""
-    one, two = (
-        1e9 * (STEEL_TABLE if gear.material is None else gear.material).youngs_modulus_GPa for gear in mesh.gears
-    )
-    return one, two
 
 
 def _bearings(model: TrainModel) -> Iterator[Result]:
@@ -366,8 +355,9 @@ def _rated(rating: Rating, mesh: str) -> Iterator[Result]:
 
 
 def _stiffness_runs(folder: Path, mesh: str, single: bool) -> list[Results]:
-    """Results of the last `gearfe stiffness` of a mesh."""
-    places = [folder / mesh, *([folder] if single else [])]
+    """Results of the last `gearfe stiffness` of a mesh, in its own folder of results or where ``--out`` put them."""
+    tops = folder / "stiffness", folder
+    places = [place for top in tops for place in (top / mesh, *([top] if single else []))]
     place = next((place for place in places if place.is_dir() and kinds_of(place)), None)
     return [] if place is None else [run for run in read_all(place, "results") if run.kind.name == "stiffness"]
 

@@ -7,8 +7,10 @@ from dataclasses import replace
 from ...base.tables.gearbox import Gearbox, NamedMesh
 from ...base.tables.pair import MaterialTable
 from ...base.tables.train import TrainMeshTable, TrainTable
+from ...fem.reduction.modal_body import ModalBody
 from ...gears.geometry.pair import gear_pair
 from ...gears.rating.stiffness import iso_values
+from ..train.gear_train import GearTrain
 from ..train.misalignment import TiltingTrain
 from ..train.model import build_train
 from .job import Stiffness, TrainJob, job_train, train_body
@@ -16,10 +18,24 @@ from .job import Stiffness, TrainJob, job_train, train_body
 
 def tilting_train(job: TrainJob, number: int) -> TiltingTrain:
     """Return the train of a job at rest with springs as meshes, and moments on the gears of one mesh."""
-    job = replace(job, gearbox=_without_flanks(job.gearbox), table=_with_springs(job.table))
-    train = job_train(job, _mean_stiffness(job), train_body(job))
-    meshes = tuple(replace(m, moments=i == number, friction=0.0) for i, m in enumerate(train.meshes))
+    train = springs_train(job, train_body(job))
+    meshes = tuple(replace(mesh, moments=i == number) for i, mesh in enumerate(train.meshes))
     return TiltingTrain(build_train(replace(train, meshes=meshes)), number)
+
+
+def springs_train(job: TrainJob, body: ModalBody | None = None) -> GearTrain:
+    """Return the train of a job with the mean stiffness of ISO 6336-1 in each mesh, without friction and deviations.
+
+    Parameters
+    ----------
+    job : TrainJob
+        The job.
+    body : ModalBody, optional
+        Its housing; None: a rigid one.
+    """
+    job = replace(job, gearbox=_without_flanks(job.gearbox), table=_with_springs(job.table))
+    train = job_train(job, _mean_stiffness(job), body)
+    return replace(train, meshes=tuple(replace(mesh, friction=0.0) for mesh in train.meshes))
 
 
 def _without_flanks(box: Gearbox) -> Gearbox:

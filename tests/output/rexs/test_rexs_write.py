@@ -389,7 +389,9 @@ def test_the_command(tmp_path, capsys):
     job = tmp_path / "box.toml"
     job.write_text(ODD, encoding="utf-8")
     assert main(["gear", str(job), "--out", str(tmp_path / "out"), "--export", "rexs", "--no-pictures"]) == 0
-    assert "gearbox.rexs" in capsys.readouterr().out
+    shown = capsys.readouterr()
+    assert "gearbox.rexs" in shown.out
+    assert "no statics of the train in the REXS file: machine 'motor'" in shown.err
     assert dict(rexs_job(tmp_path / "out" / "gearbox.rexs").tables) == tomllib.loads(ODD)
     assert read_rexs(tmp_path / "out" / "gearbox.rexs").application.startswith("gearfe")
 
@@ -492,11 +494,12 @@ def test_results_are_those_of_the_rating_and_of_statics():
     )
 
 
-def test_curves_of_stiffness_are_taken_from_their_folder(tmp_path):
+@pytest.mark.parametrize("place", ["stiffness/first", "first"])
+def test_curves_of_stiffness_are_taken_from_their_folder(tmp_path, place):
     """With the last torque's face load factor, unless the job file is newer than they are."""
     job, folder = tmp_path / "box.toml", tmp_path / "out"
     job.write_text(job_file("gearbox"), encoding="utf-8")
-    place = folder / "first"
+    place = folder / place
     place.mkdir(parents=True)
     (place / "stiffness.csv").write_text(
         "pinion_angle_deg,k_tangent_N_per_m\n0,2e8\n5,nan\n10,2.5e8\n", encoding="utf-8"
@@ -519,9 +522,9 @@ def test_curves_of_stiffness_are_taken_from_their_folder(tmp_path):
 
 
 def test_what_cannot_be_computed_is_named():
-    """A rating without a speed, and a train whose loads press back flanks: the file is written without them."""
+    """A load that reacts on a bearing that does not exist, and a hardness out of range: the file has the rest."""
     raw = tomllib.loads(job_file("gearbox"))
-    raw["train"]["loads"][0]["torque_Nm"] *= -1.0
+    raw["train"]["loads"][0]["attachment"] = "nowhere"
     raw["rating"] = {"hardness": 100.0}
     known = gearfe.rexs_results(raw)
     assert [note.partition(":")[0] for note in known.notes] == [
