@@ -55,6 +55,18 @@ def test_samples_hold_the_harmonics(periods: tuple[float, ...], count: int) -> N
     assert len({tuple(k) for k in waves.tolist()} | {tuple(k) for k in (-waves).tolist()}) == 2 * count + 1
 
 
+def test_slow_meshes_make_multiples_but_few_combinations() -> None:
+    """Stages 23/67, 13/76, 14/87: all multiples up to eight of the fastest, and pairs of the first few of each mesh."""
+    cycles = [23.0, 23.0 * 13.0 / 67.0, 23.0 * 13.0 * 14.0 / 67.0 / 76.0]
+    phases = torus.Phases.of(tuple(cycles[0] / each for each in cycles), (1, 1, 1))
+    waves = {tuple(k) for k in torus.below(phases, 8.0).waves.tolist()}
+    for axis, period in enumerate(phases.periods):
+        for k in range(1, math.ceil(8.0 * period)):
+            assert tuple(k * (i == axis) for i in range(3)) in waves
+    assert {(1, 1, 0), (1, -1, 0), (0, 1, 1), (1, 0, -1), (2, 1, 0), (1, 2, 0), (0, 1, 2)} <= waves
+    assert len(waves) < 1.2 * 8.0 * sum(phases.periods)
+
+
 def test_phases_of_meshes() -> None:
     """Meshes of one frequency or a small ratio share a phase, hunting teeth have their own."""
     shipped = [Fraction(20), Fraction(40, 3)]

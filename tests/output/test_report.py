@@ -225,7 +225,7 @@ def test_modes_of_two_jobs_are_compared(tmp_path: Path, capsys: pytest.CaptureFi
     path = gearbox(tmp_path)
     for name, stiff in (("a", "1e8"), ("b", "2e8")):
         line = ["modes", str(path), "--out", str(tmp_path / name), "--no-pictures"]
-        assert main([*line, "--set", f"bearings.A.stiffness=[{stiff}, 0.0, {stiff}, 0.0, 0.0]"]) == 0
+        assert main([*line, "--set", f"bearings.A.stiffness_N_per_m=[{stiff}, 0.0, {stiff}]"]) == 0
     capsys.readouterr()
     assert main(["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--out", str(tmp_path / "c")]) == 0
     assert "natural frequency" in capsys.readouterr().out
