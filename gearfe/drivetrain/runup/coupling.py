@@ -151,15 +151,15 @@ def coupling(
     number = {tuple(vector): n for n, vector in enumerate(vectors.tolist())}
     own = flexibility[:, freedoms[:, None], freedoms][harmonic]
     own[conjugate] = own[conjugate].conj()
-    places = {}
+    parts: dict[tuple[int, bool], tuple[Array, Array]] = {}
     for spring in springs:
-        P, Q = places.setdefault((spring.phase, spring.of_rates), (np.zeros((t, t)), np.zeros((t, t))))
+        P, Q = parts.setdefault((spring.phase, spring.of_rates), (np.zeros((t, t)), np.zeros((t, t))))
         local = np.searchsorted(freedoms, spring.freedoms)
         cosine, sine = TurnedSpring(local, spring.factors, spring.of_rates, spring.phase, spring.sense).matrices(t)
         P += cosine
         Q += sine
     rows, columns, blocks = list[IntArray](), list[IntArray](), list[ComplexArray]()
-    for (phase, of_rates), (P, Q) in places.items():
+    for (phase, of_rates), (P, Q) in parts.items():
         for step, block in ((0, -P), (-1, 0.5 * (P - 1j * Q)), (1, 0.5 * (P + 1j * Q))):
             other = vectors.copy()
             other[:, phase] += step

@@ -109,9 +109,9 @@ def _sidebands(run: RunUp, cuts: Sequence[OrderCut]) -> list[OrderCut]:
         )
         for cut in (none, *cuts) if any(shifts) else ():
             if cut.order + shift > 0.0:
-                names = tuple(name + more for name in cut.names or ("",))
+                name = "".join(cut.names[:1]) + more
                 k = tuple((np.array(cut.waves) + waves).tolist())
-                made.append(OrderCut(k, cut.order + shift, tuple(name.removeprefix(" + ") for name in names), None))
+                made.append(OrderCut(k, cut.order + shift, (name.removeprefix(" + ").strip(),), None))
     return made
 
 
