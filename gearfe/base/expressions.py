@@ -279,7 +279,7 @@ def _syntax(text: str, label: str) -> ast.expr:
         problem, cure = str(error).partition(" (")[0], "write numbers, names and functions as in Python"
         words = [word for word in re.findall(r"\w+", text) if keyword.iskeyword(word)]
         if words:
-            cure += f"; {words[0]} is one of its keywords and can be no name here"
+            cure += f"; {words[0]} is one of its keywords and cannot be a name"
         raise InputError(label, text, f"is not an expression: {problem}", cure) from None
     if _depth(tree) > OPERATIONS:
         raise InputError(label, None, f"is nested more than {OPERATIONS} times", "split it into several outputs")

@@ -196,7 +196,9 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, MeshPa
     curve = sweep_stiffness(job.pair, job.model, **sweep)
     twist, torque = float(curve.twist[0]), float(curve.torque_wheel[0])
     if not math.isfinite(torque) or twist <= 0.0:
-        raise InputError("--deck", None, f"the position has no solution here ({curve.status[0]})", "try another load")
+        raise InputError(
+            "--deck", None, f"the contact of this position has no solution ({curve.status[0]})", "try another load"
+        )
     least = int(np.sum(curve.load_share[0] > 0.0))
     args.teeth = max(DECK_TEETH, least) if args.teeth is None else args.teeth
     if args.teeth < least:

@@ -119,11 +119,11 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, Part],
         lines = job_lines(job)
         sweep = position_sweep(job, lines, angle)
     if sweep.status[0, 0] != "converged" or not sweep.torque[0, 0] > 0.0:
-        problem = f"the position has no solution here ({sweep.status[0, 0]})"
+        problem = f"the contact of this position has no solution ({sweep.status[0, 0]})"
         raise InputError("--deck", None, problem, "try another load")
     torque, loaded = float(sweep.torque[0, 0]), _loaded_teeth(sweep, pair)
     if args.teeth is not None and args.teeth < len(loaded[0]):
-        problem = "leaves tooth pairs that bear without a contact boundary: the deck would not find equilibrium"
+        problem = "leaves loaded tooth pairs without a contact boundary: the deck would not find equilibrium"
         raise InputError("--teeth", args.teeth, problem, f"give {len(loaded[0])} or more, or leave it out")
     begin = look_at(lines, angle).least - APART / pair.wheel.base_radius
     twist = float(sweep.twist[0, 0]) - begin

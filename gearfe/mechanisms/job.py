@@ -360,7 +360,7 @@ def _undriven_line(f: dict[str, Any]) -> str:
 
 
 def _freedoms(count: int) -> str:
-    return "1 freedom is" if count == 1 else f"{count} freedoms are"
+    return "1 degree of freedom is" if count == 1 else f"{count} degrees of freedom are"
 
 
 def _text(summary: dict[str, Any]) -> str:

@@ -376,7 +376,7 @@ def test_load_and_pressure_are_told(tmp_path, capsys):
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 0
     said = capsys.readouterr().out
     assert "torque at the wheel: mean" in said
-    assert "beyond the 1500 MPa that case-hardened steel bears for long (ISO 6336-5)" in said
+    assert "beyond the 1500 MPa that case-hardened steel endures (ISO 6336-5)" in said
     assert "a rounded edge bearing" in said
     told = json.loads((tmp_path / "summary.json").read_text())
     curve = StiffnessCurve.from_csv(tmp_path / "stiffness.csv")

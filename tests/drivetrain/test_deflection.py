@@ -145,4 +145,4 @@ def test_the_command_names_the_line(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert (out / "deflection_gears.vtkhdf").exists()
     assert "deflection shape at 1000 Hz, the line nearest to 900 Hz" in capsys.readouterr().out
     assert main(["vibration", str(job), "--deflection-Hz", "1e6", *options]) == 2
-    assert "lies beside the lines" in capsys.readouterr().err
+    assert "is outside the lines" in capsys.readouterr().err

@@ -217,7 +217,7 @@ def test_a_stiffness_in_another_unit_is_refused(factor):
     force = abs(TORQUE) / base_radius(30)
     for stiffness in (1e8 * factor, curve(20, 1e8 * factor)):
         yields = force / (1e8 * factor * (1.0 if isinstance(stiffness, float) else 0.9))
-        words = re.escape(f"yields by {1e3 * yields:.3g} mm, {yields / MODULE:.3g} modules, under the force")
+        words = re.escape(f"deflects by {1e3 * yields:.3g} mm, {yields / MODULE:.3g} modules, under the force")
         with pytest.raises(InputError, match=rf"{words}.*stiffnesses are in N/m"):
             build_train(train([(20, 30)], stiffness=lambda _, k=stiffness: k))
 

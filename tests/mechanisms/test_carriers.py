@@ -253,7 +253,10 @@ def test_a_distance_over_time_is_an_actuator(kind: str) -> None:
     ("length", "text"),
     [
         ({"polynomial": [1.0, -0.6]}, r"length_m = -0\.19999.*must be > 0 m at all times"),
-        ({"constant": 1.2, "step": 0.1, "step_width_s": 1.0, "sine": 0.1, "frequency_hz": 1.0}, "sines beside a poly"),
+        (
+            {"constant": 1.2, "step": 0.1, "step_width_s": 1.0, "sine": 0.1, "frequency_hz": 1.0},
+            "sines together with a poly",
+        ),
         (-1.0, r"length_m = -1"),
     ],
 )

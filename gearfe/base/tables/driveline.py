@@ -22,7 +22,7 @@ class _MachinePlace:
 
     shaft: str = quantity(doc="name of the shaft that it is coupled to")
     y_mm: float | None = quantity(
-        None, doc="place on an elastic shaft where it is coupled (mm), required there; of no matter on a rigid one"
+        None, doc="position on an elastic shaft where it is coupled (mm), required there; without effect on a rigid one"
     )
     inertia_kg_m2: float = quantity(above=0.0, doc="inertia of its rotor about the axis (kg m2)")
     initial_speed_rad_per_s: float | None = quantity(

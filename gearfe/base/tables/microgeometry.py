@@ -52,7 +52,7 @@ class FlankTable:
     #: Keys that were: what became of them, and what to write instead.
     REMOVED: ClassVar[dict[str, Removed]] = {
         f"{key}_um": (
-            f"has another name beside helix_{key}_um, the one along the face width",
+            f"has another name when helix_{key}_um is given, the one along the face width",
             f"write profile_{key}_um",
         )
         for key in ("crowning", "slope")

@@ -495,7 +495,7 @@ class StiffnessTable:
         1.0, doc="factor on all element sizes; 2 is faster and about four times less accurate", low=0.2, high=5.0
     )
     flank_coarsen: float = quantity(
-        1.0, doc="factor on the element sizes of the driving flanks, besides coarsen", low=0.1, high=10.0
+        1.0, doc="factor on the element sizes of the driving flanks, in addition to coarsen", low=0.1, high=10.0
     )
     solve_all: bool = quantity(False, doc="true: also solve positions that differ by whole mesh cycles")
     interpolation: str = quantity(

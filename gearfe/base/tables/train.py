@@ -310,9 +310,9 @@ class TrainMeshTable:
         None,
         above=0.0,
         high=500.0,
-        doc="largest tilt of the gears in the plane of action, over the common face width (um), that the potential of "
-        "loads that vary along it is made for; left out: twice what shafts and bearings yield under "
-        "mesh_model_torque_Nm, at least the steady torque",
+        doc="largest tilt of the gears in the plane of action, over the common face width (um), for which "
+        "the potential of a load that varies along it is computed; left out: twice the tilt by shafts and bearings "
+        "under mesh_model_torque_Nm, at least the steady torque",
     )
     backlash_um: float | None = quantity(
         None,

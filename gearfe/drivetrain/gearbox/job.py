@@ -418,7 +418,7 @@ def _rigid_bores(job: TrainJob) -> dict[str, tuple[float, float, float]]:
     if found:
         return found
     if job.housing is None:
-        problem = "are not given: neither [[train.rigid_bores]] nor [housing] tells where the bores are"
+        problem = "are not given: neither [[train.rigid_bores]] nor [housing] gives the positions of the bores"
         raise InputError("train.rigid_bores", None, problem, "add one entry for each attachment")
     return bore_places(job.housing, job.path.parent)
 

@@ -58,7 +58,7 @@ def _loaded(path: Path) -> ModalBody:
     try:
         return ModalBody.load(path)
     except InputError as error:
-        cure = "give housing.npz of gearfe housing, beside the job file"
+        cure = "give housing.npz of gearfe housing, in the folder of the job file"
         raise InputError("housing.body", str(path), error.problem, cure) from None
 
 

@@ -140,7 +140,7 @@ def compare(body: ModalBody, test: TestModes, modes: int = 20) -> Comparison:
         far = int(nearest.argmax())
         coordinates = ", ".join(f"{1e3 * x:.4g}" for x in test.points[far])
         problem = f"the measured point ({coordinates}) mm is {1e3 * nearest[far]:.4g} mm from the nearest node"
-        cure = "coordinates of test and housing must be the same, in the units that the file tells"
+        cure = "coordinates of test and housing must be the same, in the units that the file states"
         for factor, unit in {1e-3: "a thousandth", 1e-2: "a hundredth", 25.4e-3: "0.0254", 1e3: "a thousand"}.items():
             if tree.query(factor * test.points)[0].max() <= APART * size:
                 cure = f"times {unit} all points fit: correct the unit (universal files: dataset 164; without it, m)"

@@ -161,7 +161,7 @@ def _attachment(bore: MeshBoreTable, i: int, mesh: MeshFile, used: IntArray) -> 
         distance = f"they are up to {1e3 * off:.3g} mm off the nearest one"
         distance = "they lie in a plane" if flat < 1e-3 * np.linalg.norm(np.ptp(at, axis=0)) else distance
         problem = f"its {len(nodes)} nodes are no cylinder: {distance}"
-        cure = "give point_mm, the point that the attachment is referred to, beside the group"
+        cure = "give point_mm, the point that the attachment is referred to, as well as the group"
         raise InputError(f"{field}.group", bore.group, problem, cure)
     height = (at - foot) @ axis
     reference = foot + 0.5 * (height.min() + height.max()) * axis

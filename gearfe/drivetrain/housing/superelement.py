@@ -36,7 +36,7 @@ TINY, HUGE = 1e-30, 1e30
 ROUNDED = 0.01
 #: Eigenvalue of a matrix of unit diagonal that is singular; highest frequency of no housing (Hz).
 NO_MASS, LEAST_HZ = 1e-13, 0.01
-NO_ESTIMATE = "matrices of another program: nothing tells the error of their mesh and reduction"
+NO_ESTIMATE = "matrices of another program: the error of their mesh and reduction is unknown"
 MOTIONS = ("x", "y", "z", "rotation about x", "rotation about y", "rotation about z")
 
 
@@ -57,7 +57,7 @@ def superelement(table: SuperelementTable, folder: str | Path) -> ModalBody:
     if K.values.shape != M.values.shape or K.labels != M.labels:
         problem = f"has {len(M.values)} coordinates, the stiffness {len(K.values)}"
         if len(K.values) == len(M.values):
-            problem = "is of other nodes and freedoms than the stiffness"
+            problem = "has other nodes and degrees of freedom than the stiffness"
         raise InputError(f"{field}.mass", table.mass, problem, "write both of the same superelement")
     if not K.values.any():
         raise InputError(f"{field}.stiffness", table.stiffness, "has only zeros", "name the file of the stiffness")
@@ -151,8 +151,10 @@ def _rows(one: AttachmentTable, i: int, matrix: Matrix, field: str) -> IntArray:
             return np.array([matrix.labels.index((one.node, freedom)) for freedom in range(1, 7)])
         except ValueError:
             known = ", ".join(str(node) for node in sorted({node for node, _ in matrix.labels})[:20])
-            problem = f"has no six freedoms 1 to 6 in the matrices, whose nodes are {known}"
-            raise InputError(f"{where}.node", one.node, problem, "retain all six freedoms of the node") from None
+            problem = f"does not have its six degrees of freedom 1 to 6 in the matrices, whose nodes are {known}"
+            raise InputError(
+                f"{where}.node", one.node, problem, "retain all six degrees of freedom of the node"
+            ) from None
     rows = np.array(one.rows if one.rows is not None else range(6 * i + 1, 6 * i + 7)) - 1
     if rows.min() < 0 or rows.max() >= count:
         given = list(one.rows) if one.rows is not None else None
@@ -259,7 +261,7 @@ def _is_free(stiffness: Array, rigid: Array, points: Array, table: SuperelementT
         f"{field}.stiffness",
         table.stiffness,
         problem,
-        "check the unit, and that all six coordinates of each attachment are there, in the order that rows tell",
+        "check the unit, and that all six coordinates of each attachment are there, in the order given by rows",
     )
 
 
@@ -285,7 +287,7 @@ def _check_length(stiffness: Array, points: Array, table: SuperelementTable, fie
     length = math.sqrt(diagonal[:, 3:].sum() / diagonal[:, :3].sum())
     if span and not LENGTHS[0] * span < length < LENGTHS[1] * span:
         problem = (
-            f"rotational by translational stiffness of the attachments tells a length of {1e3 * length:.3g} mm, "
+            f"rotational by translational stiffness of the attachments is that of a length of {1e3 * length:.3g} mm, "
             f"their points lie within {1e3 * span:.3g} mm"
         )
         raise InputError(f"{field}.unit", table.unit, problem, f"one of {', '.join(FORCES)}: that of the matrices")

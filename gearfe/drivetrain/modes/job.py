@@ -124,7 +124,7 @@ def _speeds(table: ModesTable, runup: RunUpTable | None, runs: float) -> Array:
     start = 0.0 if start is None else start
     stop = BEYOND * runs if stop is None else stop
     if stop == start:
-        problem = "is not given, and the drive stands still"
+        problem = "is not given, and the speed of the drive is 0"
         raise InputError("modes.speed_stop_rad_per_s", None, problem, "give the last speed of the drive")
     replace(table, speed_start_rad_per_s=start, speed_stop_rad_per_s=stop).check("modes")
     low, high = sorted((start, stop), key=abs)  # modes are followed from slow to fast

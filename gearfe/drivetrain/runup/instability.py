@@ -60,7 +60,7 @@ def instability_map(
     """
     requested, factors = np.asarray(speeds, dtype=float), np.asarray(loads, dtype=float)
     if not (factors > 0.0).all():
-        raise InputError("instability_loads", factors.tolist(), "must be > 0", "without a load no flank bears")
+        raise InputError("instability_loads", factors.tolist(), "must be > 0", "without a load no flank is in contact")
     if (train.steady <= 0.0).any():
         problem = "carries no force on its driving flanks, so its stiffness under load is open"
         name = train.model.meshes[int(np.argmin(train.steady))].name

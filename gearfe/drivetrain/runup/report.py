@@ -203,7 +203,7 @@ def warnings(run: RunUp) -> list[str]:
     if open_:
         found.append(
             f"at {len(open_)} of {len(run.states)} states, the first at {open_[0].speed:.6g} rad/s, it is not known "
-            "whether the motion is stable: the phases of the meshes come back too late to tell; look at a transient"
+            "whether the motion is stable: the phases of the meshes repeat too late to decide it; look at a transient"
         )
     late = [s for s in run.states if s.error > run.tolerance]
     if late:

@@ -28,7 +28,7 @@ def train_stability(model: TrainModel) -> Stability:
     except InputError as error:
         return Stability(note=str(error))
     if not np.isfinite(found).all():
-        return Stability(note="the multipliers do not tell: the phases of the meshes come back too late")
+        return Stability(note="the multipliers do not decide: the phases of the meshes repeat too late")
     return Stability(found, state.span)
 
 

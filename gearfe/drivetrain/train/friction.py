@@ -127,7 +127,7 @@ class Lubrication:
             For gears at rest, for which the formula gives no coefficient.
         """
         if not abs(speed) > 0.0:
-            problem = "cannot be computed: the gears stand still"
+            problem = "cannot be computed: the gears do not rotate"
             raise InputError("coefficient of friction", None, problem, "give the coefficient itself")
         one, two, sine = pair.pinion_working_radius, pair.wheel_working_radius, math.sin(pair.working_pressure_angle)
         width = min(pair.pinion.face_width, pair.wheel.face_width)

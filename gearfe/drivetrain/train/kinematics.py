@@ -161,7 +161,7 @@ def _common(cycles: tuple[Fraction, ...]) -> tuple[Fraction | None, str]:
     if not cycles:
         return None, "the train has no meshes"
     if not any(cycles):
-        return None, "the gears of all meshes stand still against each other"
+        return None, "the gears of no mesh rotate against each other"
     turns = _repeating(cycles)
     if turns * max(cycles) > MOST_CYCLES:
         count = int(turns * max(cycles))

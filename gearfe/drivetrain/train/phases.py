@@ -153,7 +153,7 @@ def _check(join: _Join, angles: dict[str, float], room: float) -> None:
     if abs(turn) * radius > room:
         problem = (
             "closes a chain of gears that cannot be assembled with all driving flanks in contact: "
-            f"gear {mesh.driver.name!r} stands {math.degrees(abs(turn)):.6g} deg ({abs(turn) / pitch:.4g} of its "
+            f"gear {mesh.driver.name!r} is {math.degrees(abs(turn)):.6g} deg ({abs(turn) / pitch:.4g} of its "
             f"pitch, {math.degrees(pitch):.6g} deg) off, {1e3 * abs(turn) * radius:.4g} mm on its base circle"
         )
         cure = "move a shaft of the chain, or change tooth numbers, so that the chain closes on whole teeth"

@@ -377,7 +377,7 @@ def _too_far(model: TrainModel, reach: Array, shafts: Array, limit: float) -> st
     if not (np.isfinite(reach).all() and np.isfinite(shafts).all()):
         return ""
     if reach.max() > limit:
-        what, size = f"mesh {model.meshes[int(reach.argmax())].name} yields", reach.max()
+        what, size = f"mesh {model.meshes[int(reach.argmax())].name} deflects", reach.max()
     else:
         what, size = f"shaft {model.train.shafts[int(shafts.argmax()) // 3].name} moves", shafts.max()
     return (

@@ -118,8 +118,8 @@ def check_yields(train: GearTrain) -> None:
         modules = abs(force) / stiffness / module
         if modules > MOST_YIELD:
             problem = (
-                f"yields by {1e3 * modules * module:.3g} mm, {modules:.3g} modules, under the force of steady running, "
-                f"{abs(force):.5g} N: must be {MOST_YIELD:g} modules or less"
+                f"deflects by {1e3 * modules * module:.3g} mm, {modules:.3g} modules, under the force of steady "
+                f"running, {abs(force):.5g} N: must be {MOST_YIELD:g} modules or less"
             )
             cure = "stiffnesses are in N/m (1 N/um is 1e6 N/m), torques in N m; write a larger one, or a lower torque"
             raise InputError(f"mesh {mesh.name!r} stiffness", stiffness, problem, cure)

@@ -144,7 +144,7 @@ def nearest_lines(frequencies: Sequence[float], count: int, step: float) -> Arra
     resolution = 1.0 / (count * step)
     for frequency in frequencies:
         if not 0.5 * resolution <= frequency <= (count // 2 + 0.5) * resolution:
-            problem = f"lies beside the lines of the spectrum, {resolution:.6g} to {count // 2 * resolution:.6g} Hz"
+            problem = f"is outside the lines of the spectrum, {resolution:.6g} to {count // 2 * resolution:.6g} Hz"
             raise InputError("--deflection-Hz", frequency, problem, "choose one of them, or a longer record")
     return np.round(np.asarray(frequencies, dtype=float) / resolution)
 

@@ -179,7 +179,7 @@ def steady_from(time: Array, groups: list[Array], period: float | None) -> float
     count = int(duration / part * (1.0 + 1e-9))
     cure = "compute for longer (duration_ms), or give the begin of the record in ms"
     if count < 4:
-        problem = f"has only {count} parts of {1e3 * part:.4g} ms in the run: at least 4 tell whether it is steady"
+        problem = f"has only {count} parts of {1e3 * part:.4g} ms in the run: at least 4 are needed"
         raise InputError("spectrum.spectrum_from_ms", "steady", problem, cure)
     begin = time[-1] - part * np.arange(count, 0, -1)  # parts end with the run
     off = np.zeros(count)

@@ -336,5 +336,5 @@ def check_torque(pair: GearPair, model: PairModel, torque: float, name: str = "t
     ]
     most = MOST_YIELD * pair.pinion.module * mesh_stiffness(pair, *moduli) * width * pair.wheel.base_radius
     if torque > most:
-        problem = f"must be <= {most:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
+        problem = f"must be <= {most:.3g} N m: the teeth would deflect by more than {MOST_YIELD:g} modules"
         raise InputError(name, torque, problem, "linear elasticity does not reach so far; give less")

@@ -40,7 +40,7 @@ EXPECTED = {
     "finite": "same elements and law; the curve adds finite strain to first order, so both torques agree within 5e-4 "
     "up to 0.5 deg of twist",
     "half_plane": "two laws on two meshes: with coarsen = 1 both torques agree within 0.2 % on smooth flanks, within "
-    "0.5 % where an edge bears, and less well where the contact is narrower than an element of the whole gears",
+    "0.5 % where an edge is loaded, and less well where the contact is narrower than an element of the whole gears",
 }
 
 

@@ -117,7 +117,7 @@ def read_mesh_table(
     error = _values(columns, error_name, path)
     loads = [name for name in (FORCE, TORQUE) if name in columns]
     if error_name == UNLOADED and loads:
-        problem = f"has {loads[0]} beside {UNLOADED}, which has no load"
+        problem = f"has {loads[0]} as well as {UNLOADED}, which has no load"
         raise InputError(TABLE, str(path), problem, f"leave it out, or name the error {LOADED}")
     if error_name == LOADED:
         load = _one_of(columns, (FORCE, TORQUE), path)

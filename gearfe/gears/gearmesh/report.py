@@ -372,8 +372,8 @@ def pressure_lines(curve: StiffnessCurve) -> list[str]:
         line += f" (the computed contact is {percent(found['its_relative_error'])} off Hertz's)"
         if found["largest_hertzian_MPa"] > ALLOWABLE_MPA:
             line += (
-                f", beyond the {ALLOWABLE_MPA:.0f} MPa that case-hardened steel bears for long (ISO 6336-5): "
-                "linear elasticity goes on where the steel would not"
+                f", beyond the {ALLOWABLE_MPA:.0f} MPa that case-hardened steel endures (ISO 6336-5): "
+                "the model stays linear elastic where the steel would fail"
             )
         lines.append(line)
     for kind, (edge, why) in EDGE_WORDS.items():
@@ -436,7 +436,7 @@ def _jam(job: StiffnessJob, load_map: LoadMap, count: int) -> str:
     i, j = np.unravel_index(int(np.nanargmin(clearance)), clearance.shape)
     where = f"{load_map.torque[i]:.4g} N m and {np.degrees(load_map.pinion_angle[j]):.4g} deg"
     return (
-        f"{count} positions have no numbers, for the back flanks would bear, too: they overlap by up to "
+        f"{count} positions have no numbers, because the back flanks would be loaded, too: they overlap by up to "
         f"{-1e6 * clearance[i, j]:.3g} um (at {where}), more material stands out than "
         f"{1e6 * job.pair.base_backlash:.3g} um of backlash leave room for; thin the teeth (tooth_thinning_um)"
     )

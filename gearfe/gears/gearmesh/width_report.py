@@ -425,7 +425,7 @@ def width_warnings(job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep) -> list
     ends = [end for g, face in enumerate(mesh.faces) for end in _inner_ends(face, mesh.faces[1 - g])]
     if ends:
         sentences.append(
-            f"ends of a narrower gear bear on its mate ({len(ends)}): where an end is sharp the pressure is singular; "
+            f"ends of a narrower gear press on its mate ({len(ends)}): where an end is sharp the pressure is singular; "
             "the line load holds"
         )
     return sentences

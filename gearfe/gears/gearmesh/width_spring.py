@@ -134,7 +134,7 @@ def mesh_spring(states: WidthStates, pitch: float, *, mean: bool, method: str = 
     stiffness: Any = periodic_interpolant(states.angle, states.stiffness, pitch, method=method)
     if not stiffness.values.min() > 0.0:
         at = float(np.degrees(states.angle[int(np.nanargmin(states.stiffness))]))
-        problem = f"is {stiffness.values.min():.4g} N/m at a driver's angle of {at:.6g} deg: the flanks do not bear"
+        problem = f"is {stiffness.values.min():.4g} N/m at a driver's angle of {at:.6g} deg: the flanks carry no load"
         raise InputError("mesh stiffness", None, problem, "use more load, or less modification")
     softness: Array | float = 1.0 / states.stiffness
     if mean:

@@ -168,6 +168,6 @@ class WideMesh:
         """Raise `InputError`, with the name of the field, for a torque (N m) that bends the teeth too far."""
         if torque > self.most_torque:
             problem = (
-                f"must be <= {self.most_torque:.3g} N m: the teeth would yield by more than {MOST_YIELD:g} modules"
+                f"must be <= {self.most_torque:.3g} N m: the teeth would deflect by more than {MOST_YIELD:g} modules"
             )
             raise InputError(name, torque, problem, "linear elasticity does not reach so far; give less")

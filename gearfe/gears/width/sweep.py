@@ -185,7 +185,7 @@ def _check_twist(lines: ContactLines, angles: Array, twist: float) -> None:
     first = min((look_at(lines, angle).least for angle in angles.tolist()), default=math.inf)
     most = first + MOST_YIELD * mesh.module / mesh.sections.wheel.base_radius
     if twist > most:
-        problem = f"must be <= {most:.4g} rad: the teeth would yield by more than {MOST_YIELD:g} modules"
+        problem = f"must be <= {most:.4g} rad: the teeth would deflect by more than {MOST_YIELD:g} modules"
         raise InputError("twists", twist, problem, "linear elasticity does not reach so far; give less")
 
 

@@ -249,11 +249,11 @@ class _Bearings:
         a, b = (self.bearers(name, pair - {self.one(name)}) for name in (joint.a, joint.b))
         both = sorted(((a if guides is None else guides) & b) - pair)
         if len(both) > 1:
-            problem = f"may be {' or '.join(map(repr, both))}: each bears {joint.a!r} and {joint.b!r}"
+            problem = f"may be {' or '.join(map(repr, both))}: each carries {joint.a!r} and {joint.b!r}"
             raise InputError(label, None, problem, "name it: carrier = ...")
         if not both:
-            verb = "guides" if isinstance(joint, Rack) else "bears"
-            problem = f"is unknown: no hinges say which body {verb} {joint.a!r} and bears {joint.b!r}"
+            verb = "guides" if isinstance(joint, Rack) else "carries"
+            problem = f"is unknown: no hinges say which body {verb} {joint.a!r} and carries {joint.b!r}"
             cure = (
                 "name the body that holds the distance of their centres: carrier = ... (make a rod without mass a body)"
             )

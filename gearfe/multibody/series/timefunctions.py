@@ -87,7 +87,7 @@ class TimeFunction:
         if not self.sines:
             return square
         if self.breaks or any(self.coefficients[0][1:]):
-            problem = "has sines beside a polynomial, a step or a table, whose square is no such function"
+            problem = "has sines together with a polynomial, a step or a table: the square of the sum has no such form"
             raise InputError("function of time", None, problem, "give sines and a constant, or the others")
         level = self.coefficients[0][0]
         terms = [sine(2.0 * level * a, w, p) for a, w, p in self.sines]

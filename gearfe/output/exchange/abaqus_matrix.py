@@ -81,7 +81,9 @@ def read_substructure(text: str, path: Path, field: str, initial: str) -> tuple[
     n, entries = len(labels), np.array(blocks[kind])
     asked = n * (n + 1) // 2 if symmetric else n * n
     if len(entries) != asked:
-        problem = f"the {kind} of {count} nodes with {n} freedoms must have {asked} numbers, but has {len(entries)}"
+        problem = (
+            f"the {kind} of {count} nodes with {n} degrees of freedom must have {asked} numbers, but has {len(entries)}"
+        )
         raise InputError(field, path.name, problem, f"rows are missing or doubled; {_WHOLE}")
     if not symmetric:
         return entries.reshape(n, n), labels if nodes else []
@@ -108,7 +110,7 @@ def _labels(nodes: list[int], freedoms: list[tuple[int, list[int]]], count: int,
     starts = [first for first, _ in freedoms]
     check_rows(count, path, field)
     if not count > 0 or not freedoms or starts != sorted(set(starts)) or starts[-1] > count:
-        problem = f"the lines of freedoms of its *USER ELEMENT do not fit its {count} nodes"
+        problem = f"the lines of degrees of freedom of its *USER ELEMENT do not fit its {count} nodes"
         raise InputError(field, path.name, problem, _WHOLE)
     if nodes and (len(nodes) != count or len(set(nodes)) != count):
         problem = f"the comment ELEMENT NODES names {len(nodes)} nodes, the *USER ELEMENT has {count}, each once"
