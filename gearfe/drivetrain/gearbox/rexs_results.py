@@ -336,7 +336,7 @@ def _stiffness(matrix: Array) -> Iterator[tuple[str, float, str]]:
 
 def _rated(rating: Rating, mesh: str) -> Iterator[Result]:
     """Values of a rating."""
-    values = {entry.name: entry.value for entry in rating.entries()}
+    values: dict[str, Any] = {entry.name: entry.value for entry in rating.entries()}
     end = f"iso_6336_{rating.edition}"
     for key, (stem, unit) in OF_STAGE.items():
         if isinstance(values.get(key), float):

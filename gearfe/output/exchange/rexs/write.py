@@ -581,7 +581,7 @@ def _train(b: _Builder, train: Mapping[str, Any], shafts: Mapping[str, Any]) -> 
         shaft = shafts.get(force["shaft"])
         if shaft is None:
             continue
-        values = {name: (force.get(key), unit) for name, key, unit in FORCES}
+        values: dict[str, Any] = {name: (force.get(key), unit) for name, key, unit in FORCES}
         at = force["y_mm"] - _start(shaft)
         part = b.add("external_load", f"force {number}", u_coordinate_on_shaft=(at, "mm"), transmits_torque=False,
                      **values)  # fmt: skip
@@ -641,7 +641,7 @@ def _json(b: _Builder) -> bytes:
         refs = [{"id": target, "role": role, "hint": b.parts[target - 1].kind} for role, target in roles.items()]
         place = {} if order is None else {"order": order}
         relations.append({"id": number, "type": kind, **place, "refs": refs})
-    model = {**_head(), "relations": relations, "components": components}
+    model: dict[str, Any] = {**_head(), "relations": relations, "components": components}
     if b.loaded:
         case = {"id": 1, "components": [_json_component(part) for _, part in sorted(b.loaded.items())]}
         model["load_spectrum"] = {"id": 1, "load_cases": [case]}
