@@ -40,7 +40,7 @@ def named_orders(run: RunUp) -> Callable[[tuple[int, ...]], OrderCut]:
     """Return what gives a line of the motions its order and its names, by its numbers k.
 
     Names are multiples of the mesh frequencies or combinations of them, else orders of loads and multiples of the turns
-    of shafts; a line that is none of these is named by its order.
+    of shafts; any other line is named by its order.
     """
     model, system = run.train.model, run.train.system
     combined = {cut.waves: cut for cut in orders(run, COMBINED)}

@@ -2,9 +2,9 @@ r"""Exact compliance between the flanks of a whole elastic gear with a rigid bor
 
 One sector is condensed onto its flank nodes F and its two cut sides B. With :math:`A = S_{FF}^{-1}` and
 :math:`P = -A S_{FB}`, flank forces f and side displacements b give :math:`u_F = A f + P b`. The sides of neighbouring
-sectors coincide, so the side displacements of all sectors follow from a block-circulant system, which a discrete
-Fourier transform over the teeth splits into one small system per harmonic (Thomas, Int. J. Numer. Meth. Eng. 14,
-1979). The compliance between the loads on tooth i and the flank of tooth j is
+sectors coincide, so the side displacements of all sectors follow from a block-circulant system. A discrete Fourier
+transform over the teeth splits it into one small system per harmonic (Thomas, Int. J. Numer. Meth. Eng. 14, 1979). The
+compliance between the loads on tooth i and the flank of tooth j is
 
 .. math:: C_{ji} = \delta_{ij} A + P\,X_{j-i}\,P^T .
 

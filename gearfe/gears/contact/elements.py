@@ -1,7 +1,7 @@
 r"""Nitsche's and the penalty law by finite elements: positions of a gear pair from solutions that are near.
 
-Those are the half-plane law's. They say which tooth pairs bear and where: windows about them are the pieces of mesh in
-which the contact is solved (`.element_batch`), and Newton's method on the pressures at their points starts there.
+Those are the half-plane law's. They give the loaded tooth pairs and their positions. The contact is solved in windows
+of the mesh about them (`.element_batch`), and Newton's method on the pressures at their points starts there.
 
 With the rows :math:`G = n\cdot D` of the gaps' variation at the present state u = C f, the areas W, the compliance C of
 the flanks and the stress rows S, a step solves
@@ -10,11 +10,11 @@ the flanks and the stress rows S, a step solves
     f^+ = G^T W p, \qquad p = \max(0,\; -\gamma\,(g + G\,(C f^+ - u)) - S f^+) .
 
 What G leaves out (the normals turn and the forces move with the faces; across blended normals the gap also changes as
-its foot point slides) enters with the next step, where gaps and rows are updated. Errors shrink by about the ratio
-of pressure to modulus a step; steps are mixed with those before, so that they shrink faster and settle beside corners.
-The matrix is updated until the solution is near: under sharp corners pressures come to a third of the modulus, and
-the rows turn with the faces. A position has converged when its pressures are those that the law asks for *and* its
-forces are those of the pressures at the places reached.
+its foot point slides) enters with the next step, where gaps and rows are updated. Errors shrink by about the ratio of
+pressure to modulus a step; steps are mixed with those before, so that they shrink faster and settle beside corners.
+The matrix is updated until the solution is near: under sharp corners pressures come to a third of the modulus, and the
+rows turn with the faces. A position has converged when its pressures satisfy the law *and* its forces agree with the
+pressures at the displaced points.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ would have without these pressures, and the influence K of all panels of one pos
 .. math::
     p \ge 0, \qquad g + K p \ge 0, \qquad p\,(g + K p) = 0 .
 
-On the panels that bear the gap is closed; which bear is found by taking out those that pull and letting in those that
-overlap, until none does.
+The gap is closed on the loaded panels. An active-set iteration finds them: it removes panels that pull and adds panels
+that overlap, until none does.
 
 **Surfaces.** A line load f per width at t moves the surface of a half-plane at s by :math:`-\tfrac{2}{\pi
 E'}\ln|s-t|\,f` plus a constant, with :math:`E' = E/(1-\nu^2)` in plane strain and E in plane stress (Flamant); at the
@@ -22,8 +22,8 @@ half-plane seen from near and a wedge seen from far,
 .. math::
     u(s) \approx -\tfrac{1}{E'}\Big(\tfrac2\pi\ln|s-t|\,I + W\ln(y(s)+y(t))\Big) f, \qquad W = A - \tfrac2\pi I .
 
-What the exact wedge (Mellin's transform) has besides is bounded, nothing at a right angle, and changes the torques of
-sharp tips by at most 0.006 %: left out.
+The exact wedge (Mellin's transform) has a further bounded term, zero at a right angle. It is left out: it changes the
+torques of sharp tips by at most 0.006 %.
 """
 
 from __future__ import annotations

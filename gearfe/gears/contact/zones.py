@@ -10,7 +10,7 @@ becomes a contact of its own, with its own centre, normal and window:
   the flank cut where they are furthest apart.
 
 Contacts of one pair act on each other exactly as the panels of one window do (`.half_plane_pair`), so one contact more
-or less is another discretisation of the same pressure, and no other answer.
+or less only changes the discretisation of the same pressure.
 
 **The gap of the deformed faces** over all of their length, seen from a contact's centre along its normal n, is that of
 the rigid faces (`geometry.first_contact`) and :math:`n\cdot(u_2-u_1)`: u by the far-field influence of all pairs of

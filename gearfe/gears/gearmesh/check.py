@@ -1,8 +1,8 @@
 """Positions of a curve solved again on whole gears with all their unknowns, as an independent check.
 
-The curve comes from gears condensed to their flanks; here both whole gears are finite elements in scikit-fem forms
-(`gears.contact.whole_gears`), which share meshes, materials and the closest-point search with it and nothing else.
-Each position is solved at the twist of the curve, and torques are compared.
+The curve comes from gears condensed to their flanks. Here both whole gears are finite elements in scikit-fem forms
+(`gears.contact.whole_gears`). They share only meshes, materials and the closest-point search with the curve. Each
+position is solved at the twist of the curve, and torques are compared.
 
     >>> curve = sweep_stiffness(pair, twist=math.radians(0.05), law="nitsche")
     >>> check = check_positions(curve, pair, [3, 17], law="nitsche")  # third and seventeenth row of its table

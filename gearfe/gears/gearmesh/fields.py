@@ -17,10 +17,10 @@ Mechanics*, 1985, eq. 2.30), :math:`\tan\theta_{1,2} = z/(x-\xi\pm\tfrac12 w)` a
     \sigma_{x,z} = -\tfrac{p}{2\pi}\big(2(\theta_2-\theta_1) \pm (\sin 2\theta_2-\sin 2\theta_1)\big), \qquad
     \tau_{xz} = \tfrac{p}{2\pi}(\cos 2\theta_2-\cos 2\theta_1).
 
-Force and place of both pressures are the same, so their difference falls off with the cube of the distance, and does
-not see that the tooth is no half-plane. Depths are those below the curved flank. Where a contact is wider than a bump
-the elements resolve it, and where it is nearer to an end of the flank than a, there is no room for one: nothing is
-changed.
+Both pressures have the same resultant at the same place. The stress of their difference falls with the cube of the
+distance, so the shape of the tooth hardly affects it. Depths are those below the curved flank. Where a contact is
+wider than a bump the elements resolve it, and where it is nearer to an end of the flank than a, there is no room for
+one: nothing is changed.
 """
 
 from __future__ import annotations

@@ -16,8 +16,8 @@ a linear relief starts, the edge of an undercut), or the radius of a tip round d
 
 .. math:: p_e = \frac{2F}{\pi w \sqrt{b^2 + \epsilon^2}}, \qquad \epsilon = 0.01\,m,
 
-the peak of a Hertzian contact with the same force and second moment, blunted by a hundredth of a module: a figure to
-compare designs with, which neither the mesh nor a contact of some micrometres decides. It is no stress of the material.
+the peak of a Hertzian contact with the same force and second moment, blunted by a hundredth of a module. This figure
+compares designs; it depends neither on the mesh nor on contacts of some micrometres. It is no stress of the material.
 """
 
 from __future__ import annotations

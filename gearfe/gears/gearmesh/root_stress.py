@@ -1,7 +1,7 @@
 r"""Tension at the tooth roots from the contact forces, on separate meshes, with an error estimate.
 
-The fillet carries no traction, so equilibrium leaves one stress there, along the surface, and it follows from the
-surface's own stretching: with the arc length s and the unit tangent t
+The fillet carries no traction, so the only stress there is along the surface. It follows from the stretch of the
+surface, with the arc length s and the unit tangent t
 
 .. math::
     \sigma = E'\, t\cdot\frac{\partial u}{\partial s}, \qquad E' = E/(1-\nu^2) \text{ in plane strain, } E \text{ in

@@ -9,8 +9,8 @@ with the blended normal :math:`n_v` faces the slave point with
 .. math:: (x_s(\xi) - x_v) \times n_v = 0,
 
 a quadratic equation on a quadratic edge. Breaks are placed in the current configuration and move with it. Their motion
-adds nothing to the derivative of the integral, as the integrand is continuous at them; what remains is of the order of
-the quadrature error, and Newton's method keeps converging fast.
+adds nothing to the derivative of the integral, because the integrand is continuous at them. The remaining error is of
+the order of the quadrature error, and Newton's method converges fast.
 """
 
 from __future__ import annotations
