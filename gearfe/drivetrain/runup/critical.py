@@ -1,11 +1,11 @@
 r"""Critical speeds of a run-up, and which order and mode make a peak of the dynamic factor.
 
 The table, the Campbell diagram and the peaks take the intersections of `gearfe.drivetrain.modes.critical`: the first
-two those within the run-up's range, its band, and the multiples asked for. A peak may have any order of its motion, and
-a mode above the band; it names an intersection that lies within `NEAR` of its speed, or none.
+two those within the run-up's range, its band, and the multiples asked for. A peak may have any order of its motion,
+and a mode above the band. It names an intersection within `NEAR` of its speed, or none.
 
-The order of a peak is the one whose force grew most from the valleys beside it: the loudest order is often loud at all
-speeds, without a resonance.
+The order of a peak is the one whose force grew most from the valleys next to it. The loudest order is often loud at
+all speeds, without a resonance.
 """
 
 from __future__ import annotations

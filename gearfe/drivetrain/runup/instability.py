@@ -5,7 +5,8 @@ Under a constant force a mesh changes its stiffness with the phase. Small motion
 .. math:: \ddot y + \Lambda y = P\,A(t)\,P^T y + \Omega\,G\dot y
 
 with the tangents A of the meshes under their steady forces. Where a multiplier of the common period T has a modulus
-above 1, vibration grows by :math:`e^{\sigma t}`, :math:`\sigma = \ln|\mu|/T`: so much damping (1/s) holds it.
+above 1, vibration grows by :math:`e^{\sigma t}`, :math:`\sigma = \ln|\mu|/T`. Damping of this size (1/s) prevents the
+growth.
 """
 
 from __future__ import annotations

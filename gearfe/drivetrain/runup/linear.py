@@ -6,8 +6,8 @@ r"""What is linear in a train: modal coordinates behind a few freedoms, as a dyn
 
 G (skew) has the gyroscopic moments of steady spins and the Coriolis forces of frames that turn with carriers, S and h
 the centrifugal forces of these frames. Both act along few directions B: :math:`G = B g B^T`, :math:`S = B s B^T`. The
-poles without them are found once for all speeds and frequencies; at each frequency they are forces that react on the
-motion along B, a small solution (Woodbury's identity). With more than half as many directions as modes the poles of
+poles without them are computed once for all speeds and frequencies. At each frequency they are reaction forces to the
+motion along B, from a small system (Woodbury's identity). With more than half as many directions as modes the poles of
 the whole are found at each speed instead, which costs less.
 """
 

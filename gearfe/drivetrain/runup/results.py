@@ -1,7 +1,7 @@
 r"""What a steady motion of a train means: forces, transmission errors, vibration, power.
 
-All accelerations come from the forces of the motion and the flexibility of the whole train at once, so harmonics far
-above those of Newton's method are there too.
+All accelerations follow from the forces of the motion and the flexibility of the whole train. They therefore contain
+harmonics far above those of Newton's method, too.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 r"""Lines of contact of all tooth pairs at one position, and how they share a load.
 
-A line is a tooth pair k over the common width; its point at z has the pair angle
-:math:`\psi = \varphi + \kappa z + 2\pi k/z_1 - \tfrac12 i\theta` of `.pair_law`, where the pair has its first contact
-t, its arms, and how its contact yields. Lines are broken at the ends of the path of contact, beyond which tips may
-bear, and have Gauss points with weights w in each stretch. With the gap d of `.flanks`, a twist :math:`\theta` and the
-forces F of the points, f = F/w per width,
+A line is a tooth pair k over the common width; its point at z has the pair angle :math:`\psi = \varphi + \kappa z +
+2\pi k/z_1 - \tfrac12 i\theta` of `.pair_law`, where the pair has its first contact t, its arms, and how its contact
+yields. Lines are broken at the ends of the path of contact, beyond which tips may be loaded, and have Gauss points
+with weights w in each stretch. With the gap d of `.flanks`, a twist :math:`\theta` and the forces F of the points, f =
+F/w per width,
 
 .. math::
     g_j = \bar r_j(\theta - t_j) - d_j - C_j(f_j)\,f_j - \sum_l T_{jl}\,F_l \le 0, \quad F_j \ge 0, \quad g_j F_j = 0 .
@@ -19,9 +19,9 @@ placed, which is the solution's to `PLACED`.
 Newton's method with an active set solves it at a given twist or, with the twist bordered, at a given torque. The
 tangent over twist and tilts follows from the same matrix: :math:`B^T(T + c')^{-1}B` over the loaded points.
 
-**Free ends.** Close to an end of a gear a line load yields more than in plane strain, down to the width of its
-pressure; the finite elements contain that for bumps of half width a only. Between a and the half width b of the
-contact, the half-plane's :math:`2/(\pi E')` grows at the distance :math:`\zeta` from the end by
+**Free ends.** Close to an end of a gear the contact under a line load is more compliant than in plane strain, down to
+the width of its pressure. The finite elements contain this for bumps of half width a only. Between a and the half
+width b of the contact, the half-plane's :math:`2/(\pi E')` grows at the distance :math:`\zeta` from the end by
 
 .. math::
     A\,\frac{\nu^2}{1-\nu^2}\,\ln\frac{a\,w(\zeta/a)}{b\,w(\zeta/b)}, \qquad w(x) = x + \frac{k}{1 + q x} .
