@@ -1,10 +1,10 @@
 r"""Lines of contact of all tooth pairs at one position, and how they share a load.
 
-A line is a tooth pair k over the common width; its point at z has the pair angle :math:`\psi = \varphi + \kappa z +
-2\pi k/z_1 - \tfrac12 i\theta` of `.pair_law`, where the pair has its first contact t, its arms, and how its contact
-yields. Lines are broken at the ends of the path of contact, beyond which tips may be loaded, and have Gauss points
-with weights w in each stretch. With the gap d of `.flanks`, a twist :math:`\theta` and the forces F of the points, f =
-F/w per width,
+A line is a tooth pair k over the common width; its point at z has the pair angle
+:math:`\psi = \varphi + \kappa z + 2\pi k/z_1 - \tfrac12 i\theta` of `.pair_law`, where the pair has its first contact
+t, its arms, and its compliance. Lines are broken at the ends of the path of contact, beyond which tips may be loaded,
+and have Gauss points with weights w in each stretch. With the gap d of `.flanks`, a twist :math:`\theta` and the
+forces F of the points, f = F/w per width,
 
 .. math::
     g_j = \bar r_j(\theta - t_j) - d_j - C_j(f_j)\,f_j - \sum_l T_{jl}\,F_l \le 0, \quad F_j \ge 0, \quad g_j F_j = 0 .
