@@ -168,7 +168,7 @@ def coupling(
             rates = 1j * frequency[column] if of_rates else np.ones(len(column))
             rows.append(row)
             columns.append(column)
-            blocks.append(rates[:, None, None] * block)
+            blocks.append(np.asarray(rates[:, None, None] * block, dtype=complex))
     row, column, block = np.concatenate(rows), np.concatenate(columns), np.concatenate(blocks)
 
     def matrix(values: ComplexArray) -> Any:
