@@ -507,9 +507,18 @@ def _named_mesh(name: str, table: NamedMeshTable, gears: Mapping[str, NamedGear]
             raise InputError(f"{two.where}.{given}", value, problem, f"gears in mesh have equal {what}")
     tilts = {key: getattr(table, key) for key in (*TILTS, FROM_SHAFTS)}
     distance = magnitude(table.centre_distance_mm, one.internal or two.internal, where)
-    gears, ring_drives = external_first(one, two)
+    (driver, driven), ring_drives = external_first(one, two)
     return NamedMesh(
-        name, where, *gears, distance, where, table.flank, table.tolerance_class, ring_drives=ring_drives, **tilts
+        name,
+        where,
+        driver,
+        driven,
+        distance,
+        where,
+        table.flank,
+        table.tolerance_class,
+        ring_drives=ring_drives,
+        **tilts,
     )
 
 
