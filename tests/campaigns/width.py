@@ -81,7 +81,7 @@ def random_flanks(random: np.random.Generator, width: float) -> WideFlanks:
 def miss(lines: ContactLines, angle: float, torque: float) -> float:
     """Largest gap of a loaded point or overlap of another (m); infinite where the position is not solved."""
     solution = solve_position(lines, angle, torque=torque)
-    if not solution.converged or not math.isclose(solution.moment.sum(), torque, rel_tol=1e-8):
+    if not solution.converged or not math.isclose(solution.torque, torque, rel_tol=1e-8):
         return math.inf
     points = solution.points
     own = own_twists(lines.law, points, solution.moment / points.weight)[0]

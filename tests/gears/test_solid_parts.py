@@ -98,19 +98,31 @@ def test_layers_and_teeth_are_checked(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "--layers = 3: is for gears whose load varies" in capsys.readouterr().err
     line = ["mesh", job, "--out", str(tmp_path / "pair.inp"), "--deck", "--teeth", "1", "--angle-deg", "12", *LAYERS]
     assert main(line) == 2
-    assert "--teeth = 1: leaves tooth pairs that bear" in capsys.readouterr().err
+    assert "--teeth = 1: leaves loaded tooth pairs" in capsys.readouterr().err
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
-def test_calculix_runs_the_deck_of_a_helical_pair(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Another program, resolved contact in space: the torque, on coarse flanks."""
-    assert main(["mesh", write_job(tmp_path), "--out", str(tmp_path / "pair.inp"), "--deck", *LAYERS]) == 0
-    out = capsys.readouterr().out
-    torque = float(re.search(r"by gearfe: (\S+) N m", out).group(1))
-    twist = float(re.search(r"twist of the wheel: (\S+) rad", out).group(1))
-    deck = tmp_path / "pair.inp"
-    centre = float(re.search(r"centre of the wheel x = (\S+) mm", deck.read_text()).group(1))
-    deck.write_text(deck.read_text().replace("\n0.05, 1.\n", "\n0.5, 1.\n"))
-    subprocess.run(["ccx", "pair"], cwd=tmp_path, capture_output=True, check=False, timeout=500)
-    assert deck_torque(deck, 1e-3 * centre, twist) == pytest.approx(torque, rel=0.03)
+def test_calculix_comes_closer_to_the_torque_on_finer_flanks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Another program, contact in space: elements of twice and once the contact's width are too stiff, by first order.
+
+    On halved elements the difference is halved, or less (docs/development/contact.md).
+    """
+    excess = []
+    for flank_coarsen in (1.0, 0.5):
+        folder = tmp_path / str(flank_coarsen)
+        folder.mkdir()
+        job = Path(write_job(folder))
+        job.write_text(job.read_text() + f"flank_coarsen = {flank_coarsen}\n")
+        deck = folder / "pair.inp"
+        assert main(["mesh", str(job), "--out", str(deck), "--deck", *LAYERS]) == 0
+        out = capsys.readouterr().out
+        torque = float(re.search(r"by gearfe: (\S+) N m", out).group(1))
+        twist = float(re.search(r"twist of the wheel: (\S+) rad", out).group(1))
+        centre = float(re.search(r"centre of the wheel x = (\S+) mm", deck.read_text()).group(1))
+        deck.write_text(deck.read_text().replace("\n0.05, 1.\n", "\n0.5, 1.\n"))
+        subprocess.run(["ccx", "pair"], cwd=folder, capture_output=True, check=False, timeout=900)
+        excess.append(deck_torque(deck, 1e-3 * centre, twist) / torque - 1.0)
+    assert 0.0 < excess[1] < 0.6 * excess[0]

@@ -143,7 +143,7 @@ def contact_at(lines: ContactLines, angle: float, approach: float, tilt: float =
     tangent = solution.tangent[0]
     return Contact(
         stored_energy(lines.law, solution),
-        float(solution.moment.sum()) / radius,
+        solution.torque / radius,
         float(tangent[0]) / radius**2,
         float(solution.points.levers[:, 1] @ solution.moment),
         float(tangent[1]) / radius,

@@ -11,13 +11,15 @@ forces F of the points, f = F/w per width,
 
 :math:`T_{jl} = \sum_{gears} v_j H_{k_j - k_l} v_l` is the influence between all points of all lines, with
 :math:`v = N(s)\otimes n\otimes P(z)` the stations' and Legendre functions there. The torque on the wheel is
-:math:`\sum r_2 F`, the derivative of the energy with the twist at a pinion angle: the pair angle moves back as the
-twist grows, so that the approach grows by :math:`r_2` per twist. Unknowns are the moments :math:`m = r_2 F`, whose
-points touch at the twist :math:`\theta - (\bar r(\theta - t) - d)/r_2`; T is that of the twist at which points are
-placed, which is the solution's to `PLACED`.
+:math:`\sum (1 + \delta_j)\,r_2 F`, the derivative of the energy with the twist at a pinion angle: the pair angle moves
+back as the twist grows, so that the approach grows by :math:`r_2` per twist, and under load by the excess
+:math:`\delta_j(f_j)` of `.pair_law` more. Unknowns are the moments :math:`m = r_2 F`, whose points touch at the twist
+:math:`\theta - (\bar r(\theta - t) - d)/r_2`; T is that of the twist at which points are placed, which is the
+solution's to `PLACED`.
 
 Newton's method with an active set solves it at a given twist or, with the twist bordered, at a given torque. The
-tangent over twist and tilts follows from the same matrix: :math:`B^T(T + c')^{-1}B` over the loaded points.
+tangent over twist and tilts follows from the same matrix: :math:`B^T(T + c')^{-1}B` over the loaded points, where the
+twist has :math:`d((1 + \delta)\,m)/dm` in B.
 
 **Free ends.** Close to an end of a gear the contact under a line load is more compliant than in plane strain, down to
 the width of its pressure. The finite elements contain this for bumps of half width a only. Between a and the half
@@ -139,6 +141,7 @@ class Rows:
     arc: Array
     tooth_normal: Array
     yields: Array
+    excess: Array
 
 
 def rows_at(law: PairLaw, angle: Array) -> Rows:
@@ -157,7 +160,8 @@ def rows_at(law: PairLaw, angle: Array) -> Rows:
         roll=packed[:, 7:9],
         arc=packed[:, 9:11],
         tooth_normal=packed[:, 11:15].reshape(-1, 2, 2),
-        yields=packed[:, 15:],
+        yields=packed[:, 15 : 15 + len(law.forces)],
+        excess=packed[:, 15 + len(law.forces) :],
     )
 
 
@@ -194,9 +198,19 @@ class Points:
 
     @cached_property
     def slopes(self) -> Array:
-        """Slopes of the cubics between the loads of the law's tables, shape (n, loads)."""
-        between = np.diff(self.rows.yields, axis=1)
-        return np.concatenate([between[:, :1], 0.5 * (between[:, :-1] + between[:, 1:]), between[:, -1:]], axis=1)
+        """Slopes of the cubics between the loads of C, shape (n, loads)."""
+        return _slopes(self.rows.yields)
+
+    @cached_property
+    def excess_slopes(self) -> Array:
+        """Slopes of the cubics between the loads of delta, shape (n, loads)."""
+        return _slopes(self.rows.excess)
+
+
+def _slopes(values: Array) -> Array:
+    """Mean slopes on both sides of each load, per spacing of the loads, shape (n, loads)."""
+    between = np.diff(values, axis=1)
+    return np.concatenate([between[:, :1], 0.5 * (between[:, :-1] + between[:, 1:]), between[:, -1:]], axis=1)
 
 
 @dataclass(frozen=True)
@@ -418,18 +432,32 @@ def own_twists(law: PairLaw, points: Points, moment: Array) -> tuple[Array, Arra
     """How contacts yield at moments per width (N), shape (n,): C f/r_2 (rad) and its derivative (rad per N)."""
     force, spacing = moment / points.rows.arm, math.log(law.forces[1] / law.forces[0])
     x = np.log(np.maximum(force / law.forces[0], 1e-9)) / spacing
-    last = len(law.forces) - 1
+    share, slope, inside = _cubic(points.rows.yields, points.slopes, x)
+    slope = np.where(x > inside, 0.0, slope)  # beyond the forces of the table C stays, so that C f rises
+    share = share + (x - inside) * slope
+    rate = np.maximum(share + slope / spacing, STIFFEST * points.rows.yields[:, 0])
+    return share * force / points.rows.arm, rate / points.rows.arm**2
+
+
+def wheel_moments(law: PairLaw, points: Points, moment: Array) -> tuple[Array, Array]:
+    """Moments of the points on the wheel (1 + delta) m (N m), and their derivatives with m = `moment`, shape (n,)."""
+    force, spacing = moment / (points.weight * points.rows.arm), math.log(law.forces[1] / law.forces[0])
+    x = np.log(np.maximum(force / law.forces[0], 1e-9)) / spacing
+    excess, slope, inside = _cubic(points.rows.excess, points.excess_slopes, x)
+    slope = np.where(x == inside, slope, 0.0)  # beyond the forces of the table delta stays
+    return (1.0 + excess) * moment, 1.0 + excess + slope / spacing
+
+
+def _cubic(values: Array, slopes: Array, x: Array) -> tuple[Array, Array, Array]:
+    """Cubic between the loads of a table at x (in their spacings) within it: value, slope, and that x, shape (n,)."""
+    last = values.shape[1] - 1
     inside = np.minimum(np.maximum(x, 0.0), last)
     i = np.minimum(inside.astype(np.int64), last - 1)
     t, first = inside - i, i + np.arange(0, len(i) * (last + 1), last + 1)
-    values, slopes = points.rows.yields.ravel(), points.slopes.ravel()
+    values, slopes = values.ravel(), slopes.ravel()
     a, b, da, db = values[first], values[first + 1], slopes[first], slopes[first + 1]
     c2, c3 = 3 * (b - a) - 2 * da - db, da + db - 2 * (b - a)
-    slope = da + t * (2 * c2 + 3 * t * c3)
-    slope = np.where(x > last, 0.0, slope)  # beyond the forces of the table C stays, so that C f rises
-    share = a + t * (da + t * (c2 + t * c3)) + (x - inside) * slope
-    rate = np.maximum(share + slope / spacing, STIFFEST * points.rows.yields[:, 0])
-    return share * force / points.rows.arm, rate / points.rows.arm**2
+    return a + t * (da + t * (c2 + t * c3)), da + t * (2 * c2 + 3 * t * c3), inside
 
 
 @dataclass(frozen=True)
@@ -443,7 +471,9 @@ class Solution:
     twist
         From where unmodified flanks touch (rad).
     moment : ndarray, shape (n,)
-        Of the points on the wheel (N m).
+        m = r_2 F of the points (N m), the unknowns.
+    wheel_moment : ndarray, shape (n,)
+        Moments of the points on the wheel (N m), whose sum is the torque.
     tangent : ndarray, shape (3, 3)
         Torque and moments of the tilts by twist, tilt in the plane of action and tilt across (N m/rad).
     converged
@@ -455,9 +485,15 @@ class Solution:
     points: Points
     twist: float
     moment: Array
+    wheel_moment: Array
     tangent: Array
     converged: bool
     steps: int
+
+    @property
+    def torque(self) -> float:
+        """Torque at the wheel (N m)."""
+        return float(self.wheel_moment.sum())
 
 
 def solve_position(
@@ -482,15 +518,15 @@ def solve_position(
         assert twist is not None
         at_twist = _newton(lines, place_points(lines, angle, twist), twist=twist, torque=None)
         for _ in range(PLACINGS):
-            torque_before = at_twist.moment.sum()
+            torque_before = at_twist.torque
             points = place_points(lines, angle, twist, at_twist)
             at_twist = _newton(lines, points, twist=twist, torque=None, before=at_twist)
-            if abs(at_twist.moment.sum() - torque_before) <= TWIST_PLACED * torque_before:
+            if abs(at_twist.torque - torque_before) <= TWIST_PLACED * torque_before:
                 break
         return at_twist
     least = look_at(lines, angle).least
     if not math.isfinite(least):
-        return Solution(_nowhere(lines), math.nan, np.zeros(0), np.zeros((3, 3)), False, 0)
+        return Solution(_nowhere(lines), math.nan, np.zeros(0), np.zeros(0), np.zeros((3, 3)), False, 0)
     ahead = guess - least if guess > least else torque / lines.compliance.mesh.usual_stiffness
     steps, settled, before = 0, False, None
     broken = None
@@ -552,7 +588,9 @@ def _newton(
         right[:, 0] = rate[i] * moment[i] - own[i] - points.touch[i]
         answer = np.linalg.solve(system, right)
         if torque is not None:
-            at = (torque - answer[:, 0].sum()) / answer[:, 1].sum()
+            on_wheel, worth = wheel_moments(law, points, moment)
+            missing = torque - on_wheel.sum() + worth @ moment
+            at = (missing - worth[i] @ answer[:, 0]) / (worth[i] @ answer[:, 1])
         new = np.zeros(n)
         new[i] = answer[:, 0] + at * answer[:, 1]
         leaving = loaded & (new <= 0)
@@ -576,7 +614,8 @@ def _newton(
         if not loaded.any():
             converged = torque is None and not (overlap > closed).any()
             loaded = points.touch <= points.touch.min()
-    return Solution(points, at, moment, _tangent(law, points, moment), converged, steps)
+    on_wheel, worth = wheel_moments(law, points, moment)
+    return Solution(points, at, moment, on_wheel, _tangent(law, points, moment, worth), converged, steps)
 
 
 def _density(before: Solution, points: Points) -> Array:
@@ -591,15 +630,15 @@ def _density(before: Solution, points: Points) -> Array:
     return found
 
 
-def _tangent(law: PairLaw, points: Points, moment: Array) -> Array:
-    """B^T (T + c')^-1 B over the loaded points (N m/rad), shape (3, 3)."""
+def _tangent(law: PairLaw, points: Points, moment: Array, worth: Array) -> Array:
+    """B^T (T + c')^-1 B over the loaded points (N m/rad), shape (3, 3); `worth`: derivatives of `wheel_moments`."""
     i = np.flatnonzero(moment > 0)
     if len(i) == 0:
         return np.zeros((3, 3))
     rate = own_twists(law, points, moment / points.weight)[1]
     system = points.influence[i[:, None], i]
     system.flat[:: len(i) + 1] += rate[i] / points.weight[i]
-    levers = points.levers[i]
+    levers = points.levers[i] * np.stack([worth[i], np.ones(len(i)), np.ones(len(i))], axis=1)
     return np.asarray(levers.T @ np.linalg.solve(system, levers))
 
 

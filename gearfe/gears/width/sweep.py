@@ -234,7 +234,7 @@ def _assembled(
             continue
         if len(loaded) == 0:
             status[cell] = NO_CONTACT
-        torque[cell], twist[cell], tangent[cell] = solution.moment.sum(), solution.twist, solution.tangent
+        torque[cell], twist[cell], tangent[cell] = solution.torque, solution.twist, solution.tangent
         force[cell], moment[cell] = _resultants(lines, solution)
         line_load = solution.moment / (points.weight * points.rows.arm)
         peak[cell] = line_load.max(initial=0.0)
@@ -274,11 +274,14 @@ def _resultants(lines: ContactLines, solution: Solution) -> tuple[Array, Array]:
     rows, z = points.rows, points.z
     size = solution.moment / rows.arm
     transverse = size * rows.normal
-    force = np.stack([transverse.real, transverse.imag, mesh.turns[1] * solution.moment], axis=1)
+    force = np.stack([transverse.real, transverse.imag, mesh.turns[1] * solution.wheel_moment], axis=1)
     moments = []
-    for sign, centre in ((-1.0, 0.0), (1.0, mesh.sections.working_centre_distance)):
+    excess = solution.torque - solution.moment.sum()  # of the wheel's moment as the arms change under load
+    for sign, centre, more in (
+        (-1.0, 0.0, excess / mesh.sections.gear_ratio), (1.0, mesh.sections.working_centre_distance, -excess)
+    ):  # fmt: skip
         place = np.stack([rows.point.real - centre, rows.point.imag, z], axis=1)
-        moments.append(sign * np.cross(place, force).sum(axis=0))
+        moments.append(sign * np.cross(place, force).sum(axis=0) + [0.0, 0.0, more])
     return force.sum(axis=0), np.array(moments)
 
 
