@@ -96,7 +96,7 @@ def test_modes_in_a_study(job: Path, tmp_path: Path) -> None:
         (["--fields", "99"], "is no number of a mode"),
         (["--speed-start-rad-per-s", "100"], "changes sign"),
         (["--speed-stop-rad-per-s", "500"], "back flanks"),
-        (["--speed-stop-rad-per-s", "0"], "stands still"),
+        (["--speed-stop-rad-per-s", "0"], "speed of the drive is 0"),
         (["--speeds", "1"], "--speeds"),
     ],
 )

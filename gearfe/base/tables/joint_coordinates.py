@@ -95,7 +95,7 @@ def with_links(raw: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _is_placed(joint: Any) -> bool:
-    return isinstance(joint, dict) and ("at_m" in joint or "links" in joint)
+    return isinstance(joint, dict) and ("at_m" in joint or joint.get("links", []) != [])  # the default is none
 
 
 def _placed(name: str, joint: Mapping[str, Any]) -> _Placed:
