@@ -1,7 +1,7 @@
 """Components, attributes, units and relations of REXS 2.0.0, and the names that older versions give them.
 
-The file ``table.txt`` beside this module holds the identifiers; ``scripts/build/write_rexs_table.py`` makes it from the
-schema of the REXS API (https://github.com/fva-net/rexs-api-java).
+The file ``table.txt`` next to this module holds the identifiers of the schema of the REXS API
+(https://github.com/fva-net/rexs-api-java).
 """
 
 from __future__ import annotations
