@@ -22,9 +22,9 @@ def test_a_mass_in_a_turning_frame_on_a_bore_alike_in_all_directions(sense: floa
     A damper of the rates in their own axes, as those of bearings are, adds :math:`-c(\dot z - \dot Z e^{-i\Omega t})`.
     """
     speed = sense * CARRIER
-    periods = (1.0, MESH / CARRIER)
-    count = torus.count_below(periods, 3.0, 1)
-    waves = torus.harmonics(periods, count, 1).waves
+    phases = torus.Phases.of((1.0, MESH / CARRIER), (1,))
+    count = torus.count_below(phases, 3.0)
+    waves = torus.harmonics(phases, count).waves
     omega = waves @ np.array([MESH, CARRIER])
     spring, damper = (
         value * np.block([[np.eye(2), -np.eye(2)], [-np.eye(2), np.eye(2)]]) for value in (SPRING, DAMPER)
