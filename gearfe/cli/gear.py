@@ -53,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
 
     check_option("--angle-deg", args.angle_deg, StiffnessTable, "angle_start_deg")
     _exports(args.export)
+    _check_results(args)
     code = each_mesh(args, _run_mesh)
     if _wants_rexs(args.export):
         _write_rexs(args)
@@ -64,6 +65,18 @@ def run(args: argparse.Namespace) -> int:
 def _wants_rexs(text: str) -> bool:
     """Whether a value of ``--export`` names REXS."""
     return REXS in (word.strip() for word in text.split(","))
+
+
+def _check_results(args: argparse.Namespace) -> None:
+    """A folder of results that is named exists, and is used."""
+    from ..base.errors import InputError
+
+    if args.results is None:
+        return
+    if not _wants_rexs(args.export):
+        raise InputError("--results", args.results, "is of --export rexs only", "add --export rexs, or leave it out")
+    if not Path(args.results).is_dir():
+        raise InputError("--results", args.results, "is no folder", "name the folder that holds the folders of results")
 
 
 def _write_rexs(args: argparse.Namespace) -> None:

@@ -532,3 +532,19 @@ def test_what_cannot_be_computed_is_named():
         *(f"no rating of mesh {name} in the REXS file" for name in raw["meshes"]),
     ]
     assert dict(rexs_job(read_model(rexs_bytes(raw, "xml", "x", known.results), "x")).tables) == raw
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--export", "rexs", "--results", "nowhere"], "is no folder"),
+        (["--export", "rexs", "--results", "box.toml"], "is no folder"),
+        (["--results", "."], "is of --export rexs only"),
+    ],
+)
+def test_a_folder_of_results_that_is_not_used_is_named(options, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "box.toml").write_text(job_file("gearbox"), encoding="utf-8")
+    assert main(["gear", "box.toml", "--no-pictures", *options]) == 2
+    assert words in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["box.toml"]
