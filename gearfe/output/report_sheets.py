@@ -15,7 +15,7 @@ from ..base.shown import percent
 from ..base.typing import Array
 from .report_page import PICTURES, Run, Sheet
 from .results import Results
-from .run_numbers import NUMBERS, Number
+from .run_numbers import NUMBERS, Number, entries, finite, mapping
 
 #: Rows of a table at most, and pictures of a kind in this order; others follow up to `PICTURES_OF_RUN`.
 MOST_ROWS, PICTURES_OF_RUN, PICTURES_OF_SEVERAL = 14, 4, 2
@@ -290,11 +290,11 @@ def _warnings(results: Results) -> str:
 def _of_modes(results: Results) -> list[Sheet]:
     """Natural frequencies, critical speeds by their distance to the speed of the drive, and the nearest modes."""
     summary, sheets = results.summary, []
-    modes = [mode for mode in summary.get("modes") or () if isinstance(mode, Mapping)]
+    modes = [mapping(mode) for mode in entries(summary.get("modes"))]
     rows = [
         [
             str(mode.get("name")), _text(mode.get("frequency_Hz")),
-            _text(mode.get("frequency_at_the_fastest_speed_Hz")), _text(100.0 * (mode.get("damping_ratio") or 0.0)),
+            _text(mode.get("frequency_at_the_fastest_speed_Hz")), _text(100.0 * finite(mode.get("damping_ratio"))),
             str(mode.get("label") or ""),
         ]
         for mode in modes[: 2 * MOST_ROWS]
@@ -303,21 +303,24 @@ def _of_modes(results: Results) -> list[Sheet]:
         head = ("mode", "first speed (Hz)", "last speed (Hz)", "damping (%)", "what moves")
         note = f"{len(rows)} of {len(modes)} modes" if len(rows) < len(modes) else ""
         sheets.append(Sheet("Natural frequencies", head, rows, note))
-    drive = summary.get("speed_of_the_drive_rad_per_s")
-    met = [c for c in summary.get("critical_speeds") or () if isinstance(c, Mapping) and c.get("excited")]
-    if isinstance(drive, (int, float)):
-        met.sort(key=lambda c: abs(c.get("speed_rad_per_s", 0.0) - drive))
+    drive = finite(summary.get("speed_of_the_drive_rad_per_s"))
+    met = [c for c in map(mapping, entries(summary.get("critical_speeds"))) if c.get("excited")]
+    met = [c for c in met if math.isfinite(finite(c.get("speed_rad_per_s")))]
+    if math.isfinite(drive):
+        met.sort(key=lambda c: abs(finite(c.get("speed_rad_per_s")) - drive))
     rows = [
         [
-            _text(c.get("speed_rad_per_s")), _text(30.0 / math.pi * c.get("speed_rad_per_s", math.nan)),
+            _text(c.get("speed_rad_per_s")), _text(30.0 / math.pi * finite(c.get("speed_rad_per_s"))),
             _text(c.get("frequency_Hz")), str(c.get("order")), f"{c.get('mode')}: {c.get('label')}",
         ]
         for c in met[:MOST_ROWS]
     ]  # fmt: skip
     if rows:
         head = ("rad/s", "1/min", "Hz", "excitation", "mode")
-        note = f"{len(rows)} of {len(met)} critical speeds, nearest to that of the drive first"
-        sheets.append(Sheet("Critical speeds", head, rows, note + (f", {_text(drive)} rad/s" if drive else "")))
+        note = f"{len(rows)} of {len(met)} critical speeds"
+        if math.isfinite(drive):
+            note += f", nearest to that of the drive first, {_text(drive)} rad/s"
+        sheets.append(Sheet("Critical speeds", head, rows, note))
     return sheets
 
 

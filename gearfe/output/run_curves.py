@@ -176,9 +176,10 @@ def _modes_panels(results: Sequence[Results]) -> Iterator[Panel]:
     for number, run in enumerate(results):
         modes = run.summary.get("modes")
         entries = [mapping(mode).get("frequency_Hz") for mode in modes] if isinstance(modes, list) else []
-        values = np.array([value for value in entries if isinstance(value, float)])
-        if len(values):
-            lines.append(Line(number, run.name, np.arange(1.0, len(values) + 1.0), values))
+        known = [(k, value) for k, value in enumerate(entries, start=1) if isinstance(value, (int, float))]
+        if known:
+            numbers, values = np.array(known, dtype=np.float64).T
+            lines.append(Line(number, run.name, numbers, values))
     if lines:
         yield Panel("mode", "natural frequency (Hz)", tuple(lines), "bars")
 

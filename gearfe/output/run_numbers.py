@@ -56,8 +56,8 @@ class Number:
         return sum(self.parts.values()) if self.parts else math.nan
 
 
-def _finite(value: Any) -> float:
-    """A number of a summary as a float; NaN for null and anything else."""
+def finite(value: Any) -> float:
+    """Return a number of a summary as a float; NaN for null and anything else."""
     return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
 
 
@@ -66,7 +66,8 @@ def mapping(value: Any) -> Mapping[str, Any]:
     return value if isinstance(value, Mapping) else {}
 
 
-def _list(value: Any) -> list[Any]:
+def entries(value: Any) -> list[Any]:
+    """Return an entry of a summary that is a list; an empty one for anything else."""
     return value if isinstance(value, list) else []
 
 
@@ -97,7 +98,7 @@ def _curve_numbers(run: Results) -> list[Number]:
         ("least", k.min(), (error * k)[k.argmin()]),
         ("largest", k.max(), (error * k)[k.argmax()]),
     ):
-        value = 1e-6 * _finite(levels.get(f"{text}_N_per_m", float(own)))
+        value = 1e-6 * finite(levels.get(f"{text}_N_per_m", float(own)))
         found.append(number(f"{text} mesh stiffness", "N/µm", value, 1e-6 * float(size), phases))
     yielded, torque = _column(table, "transmission_error_um")[solved], _column(table, "torque_wheel_Nm")[solved]
     if np.isfinite(yielded).all() and np.ptp(torque) < 1e-6 * np.abs(torque).max():  # at a torque the twist is found
@@ -147,20 +148,20 @@ def _torque_numbers(run: Results) -> list[Number]:
     if key is None:
         return []
     found, errors = [], mapping(run.summary.get("error_estimate"))
-    root = _finite(run.summary.get("root_stress_error_estimate"))
-    for i, torque in enumerate(_list(table[key])):
+    root = finite(run.summary.get("root_stress_error_estimate"))
+    for i, torque in enumerate(entries(table[key])):
         for column, values in table.items():
             if column == key or _COUNTS.match(column) or column.endswith("_error_estimate"):
                 continue
-            value, stem = _finite(_list(values)[i]), parted(column)[0]
+            value, stem = finite(entries(values)[i]), parted(column)[0]
             parts = {}
             if "root_stress" in column:
                 own = table.get(f"{stem}_error_estimate")
-                relative = _finite(_list(own)[i]) if own is not None else root
+                relative = finite(entries(own)[i]) if own is not None else root
                 parts = {"root mesh": abs(relative * value)}
             elif stem in errors:
                 given = errors[stem]
-                parts = {"gear mesh": abs(_finite(_list(given)[i] if isinstance(given, list) else given) * value)}
+                parts = {"gear mesh": abs(finite(entries(given)[i] if isinstance(given, list) else given) * value)}
             unit = unit_of(column)
             factor, symbol = (1e-6, "N/µm") if unit.key == "N_per_m" else (1.0, unit.symbol)
             scaled = {source: factor * size for source, size in parts.items()}
@@ -177,7 +178,7 @@ def _vibration_numbers(run: Results) -> list[Number]:
         """Parts and changes of a number of the summary, or of one entry of it."""
 
         def pick(values: Any) -> float:
-            return _finite(values if place is None else values[place])
+            return finite(values if place is None else values[place])
 
         sizes = {source: pick(part[name]) for source, part in parts.items() if name in part}
         moves = {
@@ -188,24 +189,24 @@ def _vibration_numbers(run: Results) -> list[Number]:
         return sizes, moves
 
     found: list[Number] = []
-    meshes = [str(name) for name in _list(summary.get("meshes"))]
+    meshes = [str(name) for name in entries(summary.get("meshes"))]
     for name, text in (
         ("mean_contact_forces_N", "mean contact force"),
         ("smallest_contact_forces_under_load_N", "smallest contact force under load"),
         ("largest_contact_forces_N", "largest contact force"),
     ):
-        for i, (mesh, value) in enumerate(zip(meshes, _list(summary.get(name)), strict=False)):
-            found.append(Number(f"{text} of {mesh}", "N", _finite(value), *entry(name, i)))
+        for i, (mesh, value) in enumerate(zip(meshes, entries(summary.get(name)), strict=False)):
+            found.append(Number(f"{text} of {mesh}", "N", finite(value), *entry(name, i)))
     name = "coupled_frequencies_Hz"
-    for i, value in enumerate(_list(summary.get(name))[:MOST]):
+    for i, value in enumerate(entries(summary.get(name))[:MOST]):
         text = f"natural frequency {i + 1} of the coupled system"
-        found.append(Number(text, "Hz", _finite(value), *entry(name, i)))
+        found.append(Number(text, "Hz", finite(value), *entry(name, i)))
     name = "peak_attachment_accelerations_m_per_s2"
     for bore, value in mapping(summary.get(name)).items():
         text = f'largest acceleration at attachment "{bore}"'
-        found.append(Number(text, "m/s²", _finite(value), *entry(name, bore)))
+        found.append(Number(text, "m/s²", finite(value), *entry(name, bore)))
     power = mapping(summary.get("radiated_power"))
-    mean = _finite(power.get("mean_W"))
+    mean = finite(power.get("mean_W"))
     if mean > 0.0:
         sizes, moves = entry("radiated_power_mean_W")
         factor = DECIBELS / mean
@@ -213,13 +214,13 @@ def _vibration_numbers(run: Results) -> list[Number]:
             Number(
                 "mean radiated power (re 1 pW)",
                 "dB",
-                _finite(power.get("mean_level_dB")),
+                finite(power.get("mean_level_dB")),
                 {s: factor * x for s, x in sizes.items()},
                 {s: factor * x for s, x in moves.items()},
             )
         )
     for signal, lines in mapping(summary.get("dominant_lines")).items():
-        found += _line_numbers(signal, _list(lines))
+        found += _line_numbers(signal, entries(lines))
     return found
 
 
@@ -230,15 +231,15 @@ def _line_numbers(signal: str, lines: Sequence[Any]) -> Iterator[Number]:
         return
     seen: set[str] = set()
     for line in map(mapping, lines):
-        near = line.get("near") or f"{_finite(line.get('frequency_Hz')):.6g} Hz"
+        near = line.get("near") or f"{finite(line.get('frequency_Hz')):.6g} Hz"
         if near in seen or len(seen) == MOST:
             continue
         seen.add(str(near))
-        sizes = {source: _finite(size) for source, size in mapping(line.get("error_parts")).items()}
+        sizes = {source: finite(size) for source, size in mapping(line.get("error_parts")).items()}
         if not sizes and "error_estimate" in line:
-            sizes = {"all": _finite(line["error_estimate"])}
-        moves = {s: np.array([_finite(x) for x in rows]) for s, rows in mapping(line.get("error_changes")).items()}
-        yield Number(f"{text}, line {near}", unit, _finite(line.get("amplitude")), sizes, moves)
+            sizes = {"all": finite(line["error_estimate"])}
+        moves = {s: np.array([finite(x) for x in rows]) for s, rows in mapping(line.get("error_changes")).items()}
+        yield Number(f"{text}, line {near}", unit, finite(line.get("amplitude")), sizes, moves)
 
 
 def _runup_numbers(run: Results) -> list[Number]:
@@ -257,10 +258,10 @@ def _runup_numbers(run: Results) -> list[Number]:
         found.append(Number(f"largest {words(column)}", unit.symbol, float(values[at])))
         if values[at] > 0.0:
             found.append(Number(f"its speed: largest {words(column)}", "rad/s", float(speed[at])))
-    for i, turn in enumerate(_list(summary.get("turning_speeds_rad_per_s"))[:MOST]):
-        found.append(Number(f"turning point {i + 1}", "rad/s", _finite(turn)))
-    for i, mode in enumerate(_list(summary.get("modes"))[:MOST]):
-        frequency = _finite(mapping(mode).get("frequency_Hz"))
+    for i, turn in enumerate(entries(summary.get("turning_speeds_rad_per_s"))[:MOST]):
+        found.append(Number(f"turning point {i + 1}", "rad/s", finite(turn)))
+    for i, mode in enumerate(entries(summary.get("modes"))[:MOST]):
+        frequency = finite(mapping(mode).get("frequency_Hz"))
         found.append(Number(f"natural frequency {i + 1} of the coupled system", "Hz", frequency))
     return found
 
@@ -268,13 +269,13 @@ def _runup_numbers(run: Results) -> list[Number]:
 def _modes_numbers(run: Results) -> list[Number]:
     """Natural frequencies at the slowest speed, and speeds at which excitations meet them."""
     found = []
-    for mode in map(mapping, _list(run.summary.get("modes"))[: 2 * MOST]):
+    for mode in map(mapping, entries(run.summary.get("modes"))[: 2 * MOST]):
         text = f"natural frequency {mode.get('name')}, {mode.get('label')}"
-        found.append(Number(text, "Hz", _finite(mode.get("frequency_Hz"))))
-    excited = [c for c in map(mapping, _list(run.summary.get("critical_speeds"))) if c.get("excited")]
+        found.append(Number(text, "Hz", finite(mode.get("frequency_Hz"))))
+    excited = [c for c in map(mapping, entries(run.summary.get("critical_speeds"))) if c.get("excited")]
     for critical in excited[: 2 * MOST]:
         text = f"critical speed: {critical.get('order')} meets mode {critical.get('mode')}, {critical.get('label')}"
-        found.append(Number(text, "rad/s", _finite(critical.get("speed_rad_per_s"))))
+        found.append(Number(text, "rad/s", finite(critical.get("speed_rad_per_s"))))
     return found
 
 
@@ -333,7 +334,7 @@ def _mechanism_numbers(run: Results) -> list[Number]:
     for column, values in run.main.items():
         if column == "time_s" or values.dtype.kind != "f" or not len(values):
             continue
-        parts = {"integration": _finite(errors[column])} if column in errors else {}
+        parts = {"integration": finite(errors[column])} if column in errors else {}
         for text, value in (("at the end", values[-1]), ("least", np.nanmin(values)), ("largest", np.nanmax(values))):
             found.append(Number(f"{words(column)}, {text}", unit_of(column).symbol, float(value), parts))
     return found

@@ -14,11 +14,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gearfe.base.errors import InputError
 from gearfe.base.files import write_csv, write_json
 from gearfe.base.tables.examples import job_file
 from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.overview import overview_sheets
-from gearfe.output.results import kinds_of
+from gearfe.output.report_sheets import run_of
+from gearfe.output.results import kinds_of, read_all
+from gearfe.output.run_curves import PANELS
 from tests.places import GEOMETRY
 
 HOSTILE = '<script>alert(1)</script><img src="http://example.org/x.png" onerror="x()">'
@@ -201,6 +204,36 @@ def test_a_report_begins_with_the_loads_of_the_gearbox(tmp_path: Path) -> None:
     # the input's bearings balance the force of its gear, F_t/cos(alpha_wt) across the axis
     of_input = sum(float(row[4]) for row in bearings.rows if row[1] == "input")
     assert of_input == pytest.approx(float(rows["first: input_pinion"][4]) / math.cos(math.radians(20.0)), rel=0.02)
+
+
+def test_forces_of_bearings_do_not_need_the_rating(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise InputError("rating", None, "fails", "none")
+
+    monkeypatch.setattr("gearfe.drivetrain.gearbox.rexs_results.rate_mesh", fails)
+    path = gearbox(tmp_path)
+    raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    titles = [sheet.title for sheet in overview_sheets(path, raw)]
+    assert titles == ["Loads in steady running", "Bearing forces in steady running", ""]
+
+
+def test_values_of_modes_that_are_null_are_left_out(tmp_path: Path) -> None:
+    """Modes keep their numbers, and an unknown damping is no 0."""
+    write_csv(tmp_path / "critical_speeds.csv", {"meets": np.ones(1), "mode": np.ones(1), "excited": np.ones(1)})
+    modes = [
+        {"name": "1", "frequency_Hz": None, "damping_ratio": None},
+        {"name": "2", "frequency_Hz": 0, "damping_ratio": 0.0},
+        {"name": "3", "frequency_Hz": 7.5, "damping_ratio": 0.02},
+    ]  # fmt: skip
+    critical = [{"excited": True, "speed_rad_per_s": speed, "order": "1", "mode": "3"} for speed in (None, 30.0, 21.0)]
+    summary = {"modes": modes, "critical_speeds": critical, "speed_of_the_drive_rad_per_s": 20.0}
+    write_json(tmp_path / "summary.json", summary)
+    (run,) = read_all(tmp_path, "results")
+    frequencies, speeds = run_of(run).sheets
+    assert [row[3] for row in frequencies.rows] == ["-", "0", "2"]
+    assert [row[0] for row in speeds.rows] == ["21", "30"]
+    (panel,) = PANELS["modes"]([run])
+    assert panel.lines[0].x.tolist() == [2.0, 3.0]
 
 
 def test_modes_are_in_the_report_of_a_job(tmp_path: Path) -> None:

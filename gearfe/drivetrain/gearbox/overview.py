@@ -40,7 +40,7 @@ def overview_sheets(job: str | Path, raw: Mapping[str, Any]) -> list[Sheet]:
         name: (mesh.driver.name, mesh.driven.name) for name, mesh in whole_gearbox(dict(raw), str(job)).meshes.items()
     }
     sheets = [_meshes(meshes, raw.get("rating", {}).get("edition", 2019), values)]
-    if not known.notes:
+    if any(item.table == "bearings" for item in known.results):  # a rating that fails leaves the statics
         sheets.append(_bearings(train_tables(dict(raw), str(job))["train"], values))
     notes = Sheet("", (), (), "; ".join(known.notes))
     return [sheet for sheet in sheets if sheet.rows] + ([notes] if known.notes else [])
