@@ -139,13 +139,25 @@ def test_terms_of_a_prescribed_rate_have_the_unit_of_the_key() -> None:
 @pytest.mark.parametrize(
     ("table", "keys", "words"),
     [
-        (JointTable, {"type": "prescribed", "body": "a", "coordinate": "x", "motion": 3.0}, "motion_rad_per_s or"),
-        (ForceTable, {"type": "spring", "body": "a", "stiffness": 3.0}, "stiffness_N_per_m or stiffness_Nm_per_rad"),
-        (ForceTable, {"type": "spring", "body": "a", "damping": 3.0}, "damping_N_s_per_m or damping_Nm_s_per_rad"),
+        (
+            JointTable,
+            {"type": "prescribed", "body": "a", "coordinate": "x", "motion": 3.0},
+            "motion_rad_per_s = 3.0 or motion_m = 3.0",
+        ),
+        (
+            ForceTable,
+            {"type": "spring", "body": "a", "stiffness": 3.0},
+            "stiffness_N_per_m = 3.0 or stiffness_Nm_per_rad = 3.0",
+        ),
+        (
+            ForceTable,
+            {"type": "spring", "body": "a", "damping": 3.0},
+            "damping_N_s_per_m = 3.0 or damping_Nm_s_per_rad = 3.0",
+        ),
         (
             ForceTable,
             {"type": "coordinate_spring", "body": "a", "coordinate": "angle", "reference": 3.0},
-            "reference_m or reference_rad",
+            "reference_m = 3.0 or reference_rad = 3.0",
         ),
         (
             ForceTable,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -261,3 +262,10 @@ def test_links_without_positions_are_named(tmp_path: Path) -> None:
     text = CRANKS[: CRANKS.index("[joints]")] + "[bodies.rod]\nmass_kg = 1.0\ninertia_kg_m2 = 1.0\n"
     with pytest.raises(InputError, match=r"\[links\].*there are none"):
         mechanism_tables(read_toml(mechanism_file(tmp_path, text)))
+
+
+@pytest.mark.parametrize("name", ["joints", "bodies"])
+def test_what_is_no_table_is_named_before_links(name: str) -> None:
+    raw = tomllib.loads(CRANKS)
+    with pytest.raises(InputError, match=rf"{name} = \[1\]: must be a table"):
+        mechanism_tables({"bodies": {}, **raw, name: [1]})

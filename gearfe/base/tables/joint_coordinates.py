@@ -60,6 +60,8 @@ def with_links(raw: Mapping[str, Any]) -> dict[str, Any]:
     joints, bodies = raw.get("joints", {}), raw.get("bodies", {})
     tables = isinstance(joints, dict) and isinstance(bodies, dict)
     given = {name: joint for name, joint in joints.items() if _is_placed(joint)} if tables else {}
+    if not tables:
+        return {name: table for name, table in raw.items() if name != "links"}  # which is an error of those tables
     if not given:
         if isinstance(raw.get("links"), dict):
             cure = "give joints at_m and links, or remove [links]"

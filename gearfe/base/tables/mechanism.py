@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from ..config import Removed, build, quantity, read_toml
-from ..errors import InputError, unknown_name
+from ..errors import InputError, shown, unknown_name
 from .beam import BeamTable, check_on_axis
 from .jobs import TABLES
 from .joint_coordinates import LinksTable, with_links
@@ -21,8 +21,12 @@ Pair = tuple[float, float]
 
 def _by_coordinate(key: str, names: tuple[str, ...]) -> Removed:
     """Return the entry of `Removed` for a key whose unit depended on what it is of."""
-    *others, last = names
-    return f"has other names, one for each unit of {key}", f"write {', '.join(others)} or {last}"
+
+    def cure(value: Any) -> str:
+        *others, last = (f"{name} = {shown(value)}" for name in names)
+        return f"write {', '.join(others)} or {last}"
+
+    return f"has other names, one for each unit of {key}", cure
 
 
 @dataclass(frozen=True)
@@ -456,8 +460,8 @@ def _check_units(table: JointTable | ForceTable, where: str, wanted: Mapping[str
         if key != right and getattr(table, key) is not None:
             problem = f"has another unit than coordinate = {table.coordinate!r}"
             value = getattr(table, key)
-            shown = value if isinstance(value, float | str) else None
-            raise InputError(f"{where}.{key}", shown, problem, f"write {right}, or another coordinate")
+            written = value if isinstance(value, float | str) else None
+            raise InputError(f"{where}.{key}", written, problem, f"write {right}, or another coordinate")
 
 
 def _check_keys(table: JointTable | ForceTable, where: str, kind: Kind, what: str) -> None:
