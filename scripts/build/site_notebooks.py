@@ -23,7 +23,7 @@ for number, cell in enumerate(json.load(open(sys.argv[1], encoding="utf-8"))["ce
     outputs = []
     if cell["cell_type"] == "code":
         tree = ast.parse("".join(cell["source"]))
-        last = ast.Expression(tree.body.pop().value) if isinstance(tree.body[-1], ast.Expr) else None
+        last = ast.Expression(tree.body.pop().value) if tree.body and isinstance(tree.body[-1], ast.Expr) else None
         printed, value = io.StringIO(), None
         with contextlib.redirect_stdout(printed):
             exec(compile(tree, f"cell {number}", "exec"), names)

@@ -38,5 +38,11 @@ def test_an_error_of_a_cell_ends_the_build(tmp_path: Path) -> None:
         outputs(tmp_path / "wrong.ipynb", tmp_path)
 
 
+def test_a_cell_without_code_shows_nothing(tmp_path: Path) -> None:
+    cells = [{"cell_type": "code", "source": source} for source in ([], ["# a remark"], ["1 + 1"])]
+    (tmp_path / "sparse.ipynb").write_text(json.dumps({"cells": cells}), encoding="utf-8")
+    assert outputs(tmp_path / "sparse.ipynb", tmp_path, root=tmp_path) == [[], [], [("text", "2")]]
+
+
 def test_there_are_two() -> None:
     assert len(NOTEBOOKS) >= 2
