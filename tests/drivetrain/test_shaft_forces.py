@@ -153,11 +153,33 @@ def test_mesh_forces_do_not_change_but_bearing_forces_do() -> None:
         ("y_mm = 0.0", "force and moment are zero"),
         ("y_mm = 1e4\nforce_x_N = 1.0", "must be on shaft 'output'"),
         ("y_mm = 0.0\nforce_x_N = inf", "finite"),
+        ("y_mm = 0.0\nforce_x_N = 1.0\nramp_centre_ms = 2.0", "is the middle of a ramp, which has no width"),
     ],
 )
 def test_mistakes_are_named(force: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         model_of(gearbox(force))
+
+
+@pytest.mark.parametrize("table", ["drive", "loads"])
+def test_a_middle_of_a_ramp_without_width_is_named(table: str) -> None:
+    """The width makes the ramp: without it the middle said nothing."""
+    raw = tomllib.loads(job_file("gearbox"))
+    entry = raw["train"][table] if table == "drive" else raw["train"][table][0]
+    entry.pop("ramp_width_ms", None)
+    entry["ramp_centre_ms"] = 2.0
+    with pytest.raises(InputError, match=r"ramp_centre_ms.*has no width"):
+        model_of(raw)
+
+
+def test_means_begin_after_the_ramps_of_forces() -> None:
+    """What is reported under load leaves out the ramp of a force, as it does that of a torque."""
+    free = model_of(tomllib.loads(job_file("gearbox")))
+    late = 1e3 * free.load_end + 3.0
+    pulled = model_of(gearbox(f"y_mm = 0.0\nforce_x_N = 300.0\nramp_centre_ms = {late}\nramp_width_ms = 2.0"))
+    assert pulled.load_end == pytest.approx(1e-3 * (late + 1.0))
+    early = model_of(gearbox("y_mm = 0.0\nforce_x_N = 300.0"))
+    assert early.load_end == free.load_end
 
 
 def test_unknown_shafts_and_turning_frames_are_refused() -> None:

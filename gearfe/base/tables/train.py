@@ -437,7 +437,7 @@ class TrainDriveTable:
     def check(self, where: str) -> None:
         """A ramp is of a number; a torque leaves the speed free; a machine has its own place."""
         _check_place(where, self.machine, self.y_mm)
-        _check_ramp(where, "speed_rad_per_s", self.speed_rad_per_s, self.ramp_width_ms)
+        _check_ramp(where, "speed_rad_per_s", self.speed_rad_per_s, self.ramp_centre_ms, self.ramp_width_ms)
         if not self.by_torque and self.torque_slope_Nm_s_per_rad:
             problem = "is of a torque, and none is given"
             key = "torque_slope_Nm_s_per_rad"
@@ -494,7 +494,7 @@ class TrainLoadTable:
         if self.torque_Nm is None and self.ramp_width_ms is not None:
             problem = "is of torque_Nm, and there is none: a torque over speed has no ramp"
             raise InputError(f"{where}.ramp_width_ms", self.ramp_width_ms, problem, "leave it out, or add torque_Nm")
-        _check_ramp(where, "torque_Nm", self.torque_Nm, self.ramp_width_ms)
+        _check_ramp(where, "torque_Nm", self.torque_Nm, self.ramp_centre_ms, self.ramp_width_ms)
         if self.mesh and not self.orders_Nm_deg:
             problem = "is the mesh of orders, and there are none"
             raise InputError(f"{where}.mesh", self.mesh, problem, "add orders_Nm_deg, or leave it out")
@@ -520,7 +520,8 @@ class TrainForceTable:
         return self.force_x_N, self.force_y_N, self.force_z_N, self.moment_x_Nm, 0.0, self.moment_z_Nm
 
     def check(self, where: str) -> None:
-        """A force is not zero."""
+        """A force is not zero; the middle of a ramp is that of one with a width."""
+        _check_ramp(where, "force_x_N", self.force_x_N, self.ramp_centre_ms, self.ramp_width_ms)
         if not any(self.values):
             problem = "is required: force and moment are zero"
             raise InputError(f"{where}.force_x_N", None, problem, "add force_x_N, force_y_N, force_z_N or a moment")
@@ -532,7 +533,12 @@ def _check_place(where: str, machine: str, y_mm: float | None) -> None:
         raise InputError(f"{where}.y_mm", y_mm, problem, f"give y_mm of the machine {machine!r}, or leave machine out")
 
 
-def _check_ramp(where: str, key: str, value: float | TrainFunctionTable | None, width: float | None) -> None:
+def _check_ramp(
+    where: str, key: str, value: float | TrainFunctionTable | None, centre: float, width: float | None
+) -> None:
+    if centre and width is None:
+        problem = "is the middle of a ramp, which has no width"
+        raise InputError(f"{where}.ramp_centre_ms", centre, problem, "add ramp_width_ms, or leave it out")
     if isinstance(value, TrainFunctionTable) and width is not None:
         problem = f"conflicts with a function of time in {key}"
         raise InputError(f"{where}.ramp_width_ms", width, problem, "write the ramp in steps of the function")

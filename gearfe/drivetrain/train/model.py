@@ -175,8 +175,8 @@ class TrainModel(Facts):
 
     @property
     def load_end(self) -> float:
-        """Time at which all load ramps have ended (s)."""
-        return load_end(self.train.layout)
+        """Time at which all ramps of loads and of forces on shafts have ended (s)."""
+        return max([load_end(self.train.layout), *(end for force in self.train.forces for end in force.over.breaks)])
 
     @property
     def coupled_frequencies_hz(self) -> Array:
