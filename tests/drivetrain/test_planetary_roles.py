@@ -22,6 +22,7 @@ from gearfe.base.errors import InputError
 from gearfe.base.tables.jobs import meshes_of, train_tables
 from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.job import job_train, train_job
+from gearfe.drivetrain.gearbox.mesh_loads import drive_speed, mesh_loads
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
 from gearfe.drivetrain.train import Drive, GearMesh, Guide, TrainModel, build_train, simulate
 from gearfe.drivetrain.train.misalignment import static_state
@@ -242,6 +243,18 @@ def test_a_mesh_of_the_python_interface_may_have_a_ring_as_driver() -> None:
     assert [mesh.name for mesh in train.meshes[3:]] == ["ring-planet0", "ring-planet1", "ring-planet2"]
     assert isinstance(train.meshes[3], GearMesh)
     np.testing.assert_allclose(static_forces(build_train(train)), static_forces(build_train(given)), rtol=1e-12)
+
+
+def test_loads_for_ratings_are_those_of_the_gear_that_drives() -> None:
+    """Torque, speed against the housing in 1/min, and the speed of the drive that belongs to it."""
+    for driver, torque, speed in (("planet", 50.0 * 12 / 42, 100.0), ("ring", 50.0, 100.0)):
+        raw = pair_of_two(driver, driver, -50.0 if driver == "planet" else -50.0 * 12 / 42)
+        job = train_job("job.toml", train_tables(raw, "job.toml"))
+        load = mesh_loads(job.rigid_train)["outer"]
+        assert load.drives == (driver == "ring")
+        assert load.torque == pytest.approx(torque, rel=1e-12)
+        assert load.speed == pytest.approx(speed * 30.0 / math.pi, rel=1e-12)
+        assert drive_speed(job, "outer", load.speed) == (1, pytest.approx(speed, rel=1e-12))
 
 
 @pytest.mark.parametrize("backlash", [None, 80.0])

@@ -55,6 +55,7 @@ from tests.makers.rated import (
     spur_stage,
     stage,
 )
+from tests.places import GEOMETRY
 
 #: A table without the hours that a spectrum adds up, and a part of such a spectrum.
 WITHOUT_LIFE = {key: value for key, value in SPUR.items() if key != "life_h"}
@@ -147,6 +148,26 @@ def test_a_fixed_ring_has_an_infinite_mass(
     assert values["m_red_kg_per_mm"] == pytest.approx(mass, abs=6e-5)
     assert values["n_E1_per_min"] == pytest.approx(speed, rel=8e-4)
     assert values["N"] == pytest.approx(N, abs=6e-4)
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_a_ring_that_drives_is_rated_at_its_own_torque_and_speed(given: bool) -> None:
+    """The same forces and speeds give the same stresses; [stiffness] has 500 N m at the ring, whichever drives."""
+    text, rated = (GEOMETRY / "internal.toml").read_text(encoding="utf-8"), []
+    for driver, driven, ratio in (("planet", "ring", 22 / 61), ("ring", "planet", 1.0)):
+        raw = tomllib.loads(text)
+        raw["meshes"]["outer"] |= {"driver": driver, "driven": driven}
+        box = whole_gearbox(raw, "job.toml")
+        keys = {"speed_rpm": 220.0 / ratio, **({"torque_Nm": 500.0 * ratio} if given else {})}
+        table = build(RatingTable, keys, "rating")
+        rated.append(rate_mesh(box.meshes["outer"], table, box.gears, box.meshes))
+    one, two = rated
+    assert one.names == two.names == ("planet", "ring")
+    assert (one.driver, two.driver) == (0, 1)
+    assert one.general.F_t_N == pytest.approx(500.0 / (0.5 * 61 * 4e-3), rel=1e-12)
+    for name, values in (("flank", "sigma_H_MPa"), ("root", "sigma_F_MPa"), ("general", "v_m_per_s")):
+        first, second = (getattr(getattr(rating, name), values) for rating in rated)
+        assert second == pytest.approx(first, rel=1e-12)
 
 
 @pytest.mark.parametrize("pair", [spur_ring, first_ring])

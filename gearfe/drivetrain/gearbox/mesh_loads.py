@@ -24,14 +24,16 @@ IDLE = 1e-9
 
 @dataclass(frozen=True)
 class MeshLoad:
-    """Load of a mesh; pairs are of driver and driven gear.
+    """Load of a mesh; pairs are of its gears, of an internal pair the external one first.
 
     Attributes
     ----------
+    drives
+        Number of the gear that drives in these pairs.
     torque
-        At the driver, of this mesh alone (N m).
+        At the gear that drives, of this mesh alone (N m).
     speed
-        Of the driver against the carrier of its stage, without sign (1/min).
+        Of this gear against the carrier of its stage, without sign (1/min).
     mates
         Meshes of the gear that load the flank of this one.
     both_flanks
@@ -40,6 +42,7 @@ class MeshLoad:
         Whether the gear's shaft is held.
     """
 
+    drives: int
     torque: float
     speed: float
     mates: tuple[int, int]
@@ -71,8 +74,9 @@ def mesh_loads(train: GearTrain) -> dict[str, MeshLoad]:
             [other * push > 0.0 for other in flanks.get(gear.name, [])] for gear, push in zip(gears, own, strict=True)
         ]
         found[mesh.name] = MeshLoad(
-            torque=abs(float(force)) * mesh.driver.base_radius if carries(force) else 0.0,
-            speed=speed * abs(float(against(mesh, mesh.driver.shaft, rolled.ratios))),
+            drives=int(mesh.ring_drives),
+            torque=abs(float(force)) * abs(mesh.driving.base_radius) if carries(force) else 0.0,
+            speed=speed * abs(float(against(mesh, mesh.driving.shaft, rolled.ratios))),
             mates=(max(1, sum(alike[0])), max(1, sum(alike[1]))),
             both_flanks=(carries(force) and not all(alike[0]), carries(force) and not all(alike[1])),
             fixed=(mesh.driver.shaft in held, mesh.driven.shaft in held),
@@ -104,7 +108,8 @@ def drive_speed(job: TrainJob, mesh: str, speed: float) -> tuple[int, float]:
         problem = f"is not among the meshes of [train]: {', '.join(names)}"
         raise InputError("mesh", mesh, problem, "choose one of them by --mesh, or leave out --runup")
     number = names.index(name)
-    ratio = abs(float(train.kinematics.drivers[number]))
+    item = train.layout.meshes[number]
+    ratio = abs(float(against(item, item.driving.shaft, train.kinematics.ratios)))
     return number + 1, speed * math.pi / 30.0 / ratio if ratio else 0.0
 
 
@@ -120,7 +125,7 @@ def with_train(table: RatingTable, job: TrainJob, mesh: str, gears: tuple[str, s
     mesh : str
         Name of the mesh; one of planets is written once and has the load of the first planet.
     gears : (str, str)
-        Names of driver and driven gear.
+        Names of its gears, of an internal pair the external one first.
     given : bool
         Whether [stiffness] gives the torque.
 
@@ -150,7 +155,7 @@ def with_train(table: RatingTable, job: TrainJob, mesh: str, gears: tuple[str, s
         if merged.fixed is None and fixed:
             more["fixed"] = True
         changed[name] = replace(own, **more)
-    return replace(table, gears=changed, meshes=_loaded(table, load, mesh, changed[gears[0]].mates, given))
+    return replace(table, gears=changed, meshes=_loaded(table, load, mesh, changed[gears[load.drives]].mates, given))
 
 
 def _loaded(

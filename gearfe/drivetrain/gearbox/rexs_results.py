@@ -277,7 +277,7 @@ def _statics(job: TrainJob) -> Iterator[Result]:
             "nominal_tangential_force_at_base_diameter": (abs(force), "N"),
             "nominal_tangential_force_at_reference_diameter": (abs(force) * pitch, "N"),
             "tangential_velocity_at_reference_diameter": (
-                math.pi / 30.0 * load.speed * driver.gear.reference_radius, "m / s"
+                math.pi / 30.0 * load.speed * abs((driver, driven)[load.drives].gear.reference_radius), "m / s"
             ),
         }  # fmt: skip
         for attribute, (value, unit) in of_mesh.items():

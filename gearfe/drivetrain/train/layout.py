@@ -79,6 +79,11 @@ class LayoutMesh:
     ring_drives: bool = False
 
     @property
+    def driving(self) -> LayoutGear:
+        """The gear that drives."""
+        return self.driven if self.ring_drives else self.driver
+
+    @property
     def turns_alike(self) -> bool:
         """Whether both gears turn in one sense: one of them is internal."""
         return self.driver.teeth * self.driven.teeth < 0

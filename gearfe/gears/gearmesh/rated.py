@@ -105,7 +105,7 @@ def _of_width(job: StiffnessJob, rating: Rating, torque: float) -> list[Compared
         rows.append(Compared("largest pressure", "MPa", standard, 1e-6 * float(np.nanmax(pressure)), meaning))
     stress = roots_of_cells(wide_roots(lines, sweep), sweep.status.shape).stress[0]
     for i, name in enumerate(rating.names):
-        largest = stress[:, i if not rating.driver else 1 - i]
+        largest = stress[:, rating.of_pair[i]]
         if np.isfinite(largest).any():
             standard = rating.root.sigma_F0_MPa[i] * general.K_Fbeta * general.K_Falpha
             meaning = "largest root stress, with K_Fbeta and K_Falpha; computed over width and mesh cycle"
@@ -138,8 +138,8 @@ def _of_sections(job: StiffnessJob, rating: Rating, torque: float) -> list[Compa
         )
     mean = 1e-9 * float(np.nanmean(tangent[:POSITIONS])) / width
     rows.append(Compared("c_gamma", "N/(mm um)", general.c_gamma_alpha_N_per_mm_um, mean, "mean stiffness of the mesh"))
-    # gear 1 of the standard has its inner point of single pair contact at B where it drives
-    inner = dict(zip(("B", "D"), rating.flank.M if not rating.driver else rating.flank.M[::-1], strict=True))
+    # the pinion of the pair has its inner point of single pair contact at B
+    inner = {("B", "D")[of_pair]: M for of_pair, M in zip(rating.of_pair, rating.flank.M, strict=True)}
     for at, (name, point) in enumerate(points.items()):
         found, share = _pressure(load_map, POSITIONS + SINGLE + at, point.pinion_roll)
         standard = rating.flank.sigma_H0_MPa * inner.get(name, 1.0)
@@ -148,8 +148,7 @@ def _of_sections(job: StiffnessJob, rating: Rating, torque: float) -> list[Compa
     root = load_map.root
     if root is not None and single.any():
         for i, name in enumerate(rating.names):
-            side = i if not rating.driver else 1 - i
-            largest = 1e-6 * float(np.nanmax(root.largest[0, single, side]))
+            largest = 1e-6 * float(np.nanmax(root.largest[0, single, rating.of_pair[i]]))
             rows.append(
                 Compared(f"root stress {name}", "MPa", rating.root.sigma_F0_MPa[i], largest, "nominal root stress")
             )

@@ -44,6 +44,8 @@ class Rating(ShownTable):
         Names of gear 1 and gear 2.
     driver
         0 where gear 1 drives, else 1.
+    of_pair
+        Numbers of gear 1 and gear 2 in the pair: 0 its pinion, 1 its wheel.
     pair, strengths, load
         What was rated.
     general, flank, root, service, loss
@@ -55,6 +57,7 @@ class Rating(ShownTable):
     edition: int
     names: tuple[str, str]
     driver: int
+    of_pair: tuple[int, int]
     pair: PairData
     strengths: tuple[Strength, Strength]
     load: Load
@@ -223,11 +226,13 @@ def rate_mesh(
     materials = tuple(gear.material for gear in mesh.gears)
     names = mesh.driver.name, mesh.driven.name
     torque = None
-    if stiffness is not None:  # that of [stiffness] is at the driven gear, of this mesh alone
-        torque = stiffness / abs(made.gear_ratio) * (table.of_gear(names[0], gears).mates or 1)
+    drives = 1 if mesh.ring_drives else 0
+    if stiffness is not None:  # that of [stiffness] is at the wheel, of this mesh alone
+        torque = stiffness * (1.0 if drives else 1.0 / abs(made.gear_ratio))
+        torque *= table.of_gear(names[drives], gears).mates or 1
     tables = tuple(gear.microgeometry for gear in mesh.gears)
     driver, driven = (None if flanks is None else flanks.flank(mesh.flank).tip_relief_um for flanks in tables)
-    return _rated(made, table, materials, names, mesh.name, torque, gears, meshes, (driver, driven))
+    return _rated(made, table, materials, names, mesh.name, torque, gears, meshes, (driver, driven), drives)
 
 
 def _rated(
@@ -240,13 +245,14 @@ def _rated(
     gears: Mapping[str, Any],
     meshes: Mapping[str, Any],
     reliefs: tuple[float | None, float | None],
+    drives: int = 0,
 ) -> Rating:
     if table.edition not in EDITIONS:
         raise InputError("rating.edition", table.edition, "must be 2006 or 2019", "2019 is the newer one")
     load = load_of(table.of_mesh(mesh, meshes), f"rating.meshes.{mesh}" if mesh in table.meshes else "rating", torque)
     one, other = ordered(pair)
-    swap = one is not pair.pinion
-    order = (1, 0) if swap else (0, 1)
+    order = (0, 1) if one is pair.pinion else (1, 0)
+    driver = order.index(drives)
     both, names = (one, other), (names[order[0]], names[order[1]])
     elastic = tuple(materials[i] for i in order)
     strengths = tuple(
@@ -261,7 +267,7 @@ def _rated(
     )
     data, two = pair_data(pair), (strengths[0], strengths[1])
     # torque and speed of gear 1 in this mesh from those of the driver, whose torque its mates share
-    ratio, shares = abs(data.u) if swap else 1.0, two[order.index(0)].mates
+    ratio, shares = abs(data.u) if driver else 1.0, two[driver].mates
     modulus = 1e9 * elastic[0].youngs_modulus_GPa, 1e9 * elastic[1].youngs_modulus_GPa
     single = 1e-9 * single_stiffness(pair, modulus[0], modulus[1])
 
@@ -310,7 +316,7 @@ def _rated(
         sum(hours for _, _, hours in parts),
         {"flank": load.flank_safety, "root": load.root_safety},
     )
-    heated, driver, losses = None, order.index(0), loss(data)
+    heated, losses = None, loss(data)
     if load.oil is not None:
         heated = scuffing(
             data,
@@ -328,6 +334,7 @@ def _rated(
         edition=table.edition,
         names=names,
         driver=driver,
+        of_pair=order,
         pair=data,
         strengths=two,
         load=load,
