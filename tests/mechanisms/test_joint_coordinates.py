@@ -237,6 +237,10 @@ WRONG = [
     (('["rod"] }', '["rod", "ground"], type = "gear" }'), "must be one of hinge, slot, prismatic"),
     (('["rod"] }', '["rod", "ground"], type = "slot" }'), "direction"),
     (('["rod"] }', '["rod", "ground"], direction = [1, 0] }'), "write type = \"slot\""),
+    (
+        ('["rod"] }', '["rod", "ground"], type = "prismatic", direction = [1, 0], angle_deg = 30 }'),
+        "joints.B.angle_deg = 30: conflicts with at_m",
+    ),
     (('["rod"] }', '["rod", "crank", "ground"], type = "slot", direction = [1, 0] }'), "must be two links"),
     (('["rod"] }', '["rod", "other"] }'), "it has no length.*give mass_kg, inertia_kg_m2"),
     (("[joints]", "[bodies.rod]\nposition_m = [1, 0]\n[joints]"), "bodies.rod.position_m.*follows from the joints"),

@@ -16,14 +16,14 @@ from ..config import build, quantity
 from ..errors import InputError
 
 GROUND = "ground"
-#: Types of joints that a position defines; the last two also need a direction.
+#: Types of joints that a position defines; the last two also need a direction. Start poses give all angles.
 PLACED = ("hinge", "slot", "prismatic")
 #: Keys of bodies that follow from the positions of the joints.
 _POSE = ("position_m", "angle_deg", "angle_rad")
 #: Joints of a link that are so far off a line, relative to its length, lie on it; round-off of 15 digits.
 STRAIGHT = 1e-9
 #: Further keys of a joint with ``at_m``.
-_KEYS = ("at_m", "links", "type", "direction", "angle_deg")
+_KEYS = ("at_m", "links", "type", "direction")
 
 
 @dataclass(frozen=True)
@@ -58,17 +58,16 @@ def with_links(raw: Mapping[str, Any]) -> dict[str, Any]:
         For positions and names that are none, and for what contradicts the positions.
     """
     joints, bodies = raw.get("joints", {}), raw.get("bodies", {})
-    tables = isinstance(joints, dict) and isinstance(bodies, dict)
-    given = {name: joint for name, joint in joints.items() if _is_placed(joint)} if tables else {}
-    if not tables:
+    if not (isinstance(joints, dict) and isinstance(bodies, dict)):
         return {name: table for name, table in raw.items() if name != "links"}  # which is an error of those tables
+    given = {name: joint for name, joint in joints.items() if _is_placed(joint)}
     if not given:
         if isinstance(raw.get("links"), dict):
             cure = "give joints at_m and links, or remove [links]"
             raise InputError("[links]", None, "is of links that joints with at_m define, and there are none", cure)
         return dict(raw)
     placed = [_placed(name, joint) for name, joint in given.items()]
-    density = _mass_per_length(raw.get("links", {}))
+    density = build(LinksTable, raw.get("links", {}), "links").mass_per_length_kg_per_m
     points: dict[str, dict[str, tuple[float, float]]] = {}
     for point in placed:
         for link in point.links:
@@ -124,7 +123,7 @@ def _placed(name: str, joint: Mapping[str, Any]) -> _Placed:
             raise InputError(f"{label}.links[{i}]", link, problem, "rename it")
     kind = joint.get("type", "hinge")
     if len(links) == 1:
-        for key in ("type", "direction", "angle_deg"):
+        for key in ("type", "direction"):
             if key in joint:
                 problem = f"is of a joint, and {label} has one link: it is a point of it"
                 raise InputError(f"{label}.{key}", joint[key], problem, "name a second link, or remove it")
@@ -140,10 +139,6 @@ def _placed(name: str, joint: Mapping[str, Any]) -> _Placed:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e75
-
-
-def _mass_per_length(links: Any) -> float | None:
-    return build(LinksTable, links, "links").mass_per_length_kg_per_m
 
 
 @dataclass(frozen=True)
@@ -256,10 +251,9 @@ def _joints(
     kind = joint.get("type", "hinge")
     common = {"type": kind, "point": point.name, "to_point": point.name}
     if kind == "hinge":
-        for key in ("direction", "angle_deg"):
-            if key in joint:
-                problem = "does not belong to type 'hinge'"
-                raise InputError(f"joints.{point.name}.{key}", joint[key], problem, 'remove it, or write type = "slot"')
+        if "direction" in joint:
+            problem, cure = "does not belong to type 'hinge'", 'remove it, or write type = "slot"'
+            raise InputError(f"joints.{point.name}.direction", joint["direction"], problem, cure)
         first, *others = sorted(point.links, key=lambda link: link != GROUND)  # angles are those of moving links
         made = {}
         for k, link in enumerate(others, start=1):
@@ -271,7 +265,7 @@ def _joints(
             made[name] = {**common, "body": body, "to": to}
         return made
     body, to = point.links
-    entry = {**common, "body": body, "to": to, **{key: joint[key] for key in ("angle_deg",) if key in joint}}
+    entry = {**common, "body": body, "to": to}
     way = joint.get("direction")
     if way is not None:
         if not (isinstance(way, list) and len(way) == 2 and all(_is_number(x) for x in way)):

@@ -70,12 +70,15 @@ class CondensedTrain:
 
     @cached_property
     def passes(self) -> dict[int, tuple[str, int]]:
-        """Carriers that turn in an elastic housing: number of the phase, name and number of planets of each."""
+        """Carriers that turn in an elastic housing, by phase: their names, and the most planets of one of them."""
         made: dict[int, tuple[str, int]] = {}
         for carrier in self.model.train.carriers:
             turned = self.frames[self.model.train.shaft_number(carrier.shaft)]
             for phase in np.flatnonzero(turned).tolist():
-                made.setdefault(phase, (f"carrier {carrier.name}", len(carrier.pins)))
+                name, planets = f"carrier {carrier.name}", len(carrier.pins)
+                if phase in made:  # of one speed with another carrier
+                    name, planets = f"{made[phase][0]} and {carrier.name}", max(planets, made[phase][1])
+                made[phase] = name, planets
         return made
 
     @cached_property

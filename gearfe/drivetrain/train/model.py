@@ -404,8 +404,7 @@ def _operating_point(train: GearTrain) -> OperatingPoint:
     force = model.preload + speed**2 * turning.thrown
     for load in train.loads:
         force += _acts(train, load, placed) * float(replace(load.torque, sines=())(end))
-    for constant_force in train.forces:
-        force += _force_direction(train, constant_force, placed) * float(constant_force.over(model.torque_end))
+    force += model.outer_push
     return operating_point(bearings, motions, stiffness, model.modal.T, force)
 
 
