@@ -202,7 +202,7 @@ def _frequency_axes(
 ) -> Any:
     """Axes between two frequencies (kHz) with the meshes' lines and multiples, and orders on top.
 
-    Orders are those of the first shaft that turns. The numbers of each mesh's multiples stand in a row of their own.
+    Orders are those of the first shaft that turns. The numbers of each mesh's multiples form a row of their own.
     `width` is that of the axes, in parts of the figure's.
     """
     axes = figure.add_axes((0.062, 0.175, width, 0.615))

@@ -14,7 +14,7 @@ from tests.places import ROOT
 
 
 def test_the_archive_holds_what_builds_the_wheel(tmp_path: Path) -> None:
-    """Files that git is told to leave out are not in it, so no pattern of .gitignore may match a folder of sources."""
+    """It leaves out files that .gitignore matches, so no pattern of it may match a folder of sources."""
     pytest.importorskip("hatchling", reason="pip install 'gearfe[dev]'")
     line = [sys.executable, "-m", "hatchling", "build", "--target", "sdist", "--directory", str(tmp_path)]
     subprocess.run(line, cwd=ROOT, check=True, capture_output=True)
