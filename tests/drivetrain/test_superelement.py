@@ -190,7 +190,7 @@ def test_a_held_body_in_a_wrong_unit(unit, length, bodies, tmp_path) -> None:
     body = bodies["held"]
     to = np.concatenate([np.tile([length] * 3 + [1.0] * 3, 4), np.ones(body.size - B)])
     write(tmp_path, *(A * np.outer(to, to) / length for A in (body.stiffness, body.mass)))
-    told = "unit = 'm': rotational by translational stiffness .* tells a length of .* mm, their points .* 88.* mm"
+    told = "unit = 'm': rotational by translational stiffness .* is that of a length of .* mm, their points .* 88.* mm"
     with pytest.raises(InputError, match=told if unit == "m" else "motions .* without energy: .* check the unit"):
         superelement(table(unit=unit), tmp_path)
 

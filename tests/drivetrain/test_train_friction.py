@@ -193,5 +193,5 @@ def test_mistakes():
         drive=Drive("s0", "s0+", constant(0.0)),
         loads=(Load("s1", None, constant(1.0)),),
     )
-    with pytest.raises(InputError, match="stand still"):
+    with pytest.raises(InputError, match="the gears do not rotate"):
         build_train(still)

@@ -149,7 +149,7 @@ def test_a_closed_chain_assembles_where_its_angle_fits_the_teeth() -> None:
     phases = [line.phase for line in build_train(rhombus(81.0)).meshes]
     assert np.degrees(phases[:2]) == pytest.approx([0.0, 9.0], abs=1e-9)  # four teeth and a half
     with pytest.raises(
-        InputError, match=r"closes a chain of gears that cannot be assembled.*stands 4 deg \(0\.2222 of"
+        InputError, match=r"closes a chain of gears that cannot be assembled.*gear 'g2' is 4 deg \(0\.2222 of"
     ):
         rhombus(80.0)
     rhombus(76.5)
