@@ -16,6 +16,7 @@ from gearfe.drivetrain.train.series import train_order
 from gearfe.gears.geometry.pair import MeshGeometry
 from gearfe.multibody import TimeFunction, constant, smoothed_step
 from tests.makers.mesh_laws import hertzian_law
+from tests.makers.rated import fzg
 from tests.makers.train_pairs import R1, R2, pair
 from tests.makers.trains import gear, series_at_start
 
@@ -177,6 +178,21 @@ def test_the_mean_coefficient_by_schlenk():
     law = hertzian_law()
     model = build_train(rubbing(law, oil, torque=constant(2000.0 * R2)))
     assert model.meshes[0].sliding.coefficient == pytest.approx(by_hand, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("width", "force", "rpm", "oil", "printed"),
+    [
+        (14.0, 5912.1, 1500.0, Lubrication(46.23e-3, 0.600e-6, 0.85), "0.0483"),
+        (14.0, 5912.1, 1500.0, Lubrication(46.23e-3, 0.600e-6, 0.846), "0.0481"),
+        (14.0, 5912.1, 1500.0, Lubrication(13.28e-3, 0.355e-6, 0.846), "0.0449"),
+        (40.0, 6370.7, 1800.0, Lubrication(49.85e-3, 0.355e-6, 0.65), "0.0256"),
+    ],
+)
+def test_the_coefficient_of_fzg_pairs_as_printed(width, force, rpm, oil, printed):
+    """Coefficients by Schlenk in the reports C14 and C40 of an open program, with the forces and oils they print."""
+    coefficient = oil.coefficient(fzg(width), force, rpm * math.pi / 30.0)
+    assert f"{coefficient:.4f}" == printed
 
 
 def test_mistakes():

@@ -684,8 +684,6 @@ def test_fzg_pairs_of_14_and_40_mm(
     check(rating, printed)
     assert rating.flank.sigma_H0_MPa * math.sqrt(36.0 / 36.6) == pytest.approx(nominal, rel=3e-5)
     assert rating.flank.sigma_H0_MPa / rating.flank.Z_eps == pytest.approx(pressure, abs=0.05)
-    assert rating.root.Y_F == pytest.approx((1.689, 1.583), rel=3e-3)
-    assert rating.root.Y_S == pytest.approx((1.851, 1.917), rel=3e-3)
 
 
 def test_loss_factor_of_the_polymer_pair_as_printed() -> None:

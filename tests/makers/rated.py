@@ -188,10 +188,13 @@ def first_ring() -> MeshGeometry:
 
 
 def fzg(width: float) -> MeshGeometry:
-    """FZG test gears of type C without tip alteration: 16/24 teeth, module 4.5 mm, a width (mm)."""
+    """FZG test gears of type C without tip alteration: 16/24 teeth, module 4.5 mm, a width (mm).
+
+    The program rates the roots of all spur gears with a rack whose tip radius is 0.375 modules.
+    """
     gears = [
         Gear(
-            z, 4.5e-3, ANGLE, 1e-3 * width, 0.03, profile_shift=x, rack_tip_radius=0.38, addendum=tip / 4.5 - z / 2 - x
+            z, 4.5e-3, ANGLE, 1e-3 * width, 0.03, profile_shift=x, rack_tip_radius=0.375, addendum=tip / 4.5 - z / 2 - x
         )
         for z, x, tip in ((16, 0.1817, 41.318), (24, 0.1715, 59.272))
     ]
@@ -481,9 +484,11 @@ FZG_C14_PRINTED: dict[str, str] = {
     "Y_beta": "1.000",
     "Y_delta_rel_T": "0.994 0.996",
     "Y_R_rel_T": "0.957 0.957",
+    "Y_F": "1.689 1.583",
+    "Y_S": "1.851 1.917",
 }
 FZG_C40_PRINTED: dict[str, str] = FZG_C14_PRINTED | {"Z_L": "1.045", "Z_v": "0.990"}
-#: Values that differ: forces at the working circle, and form factors by DIN 3990.
-FZG_C14_LOOSE: dict[str, str] = {"sigma_H0_MPa": "1228.89", "Y_F": "1.689 1.583", "Y_S": "1.851 1.917"}
-FZG_C40_LOOSE: dict[str, str] = FZG_C14_LOOSE | {"sigma_H0_MPa": "754.69"}
+#: Values that differ: the force at the working circle.
+FZG_C14_LOOSE: dict[str, str] = {"sigma_H0_MPa": "1228.89"}
+FZG_C40_LOOSE: dict[str, str] = {"sigma_H0_MPa": "754.69"}
 POLYMER_PRINTED: dict[str, str] = {"H_V": "0.1494"}
