@@ -1,7 +1,7 @@
 """Multibody dynamics: elements, a system, a consistent start, integrators, a trajectory.
 
-Five packages: `core` (contract, system, start, results), `planar` (mechanisms), `series` (the tape and its compiled
-loops), `integrators` (Taylor series, collocation, the rule that chooses) and `compiled` (numba). Begin with
+The five packages are `core` (contract, system, start, results), `planar` (mechanisms), `series` (the tape and its
+compiled loops), `integrators` (Taylor series, collocation, selection rule) and `compiled` (numba). Begin with
 `core.contract`. The names below are the public ones.
 """
 

@@ -1,1 +1,1 @@
-"""Large sparse models to small modal bodies: factorisations, Lanczos, Craig-Bampton, the error of the reduction."""
+"""Reduce large sparse models to small modal bodies: factorisation, Lanczos, Craig-Bampton, error estimate."""

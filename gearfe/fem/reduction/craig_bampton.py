@@ -8,23 +8,25 @@ each) move their rows through the constant matrix B, the internal unknowns ``u_i
     \Psi = -K_{ii}^{-1} K_{ib},\qquad K_{ii}\Phi = M_{ii}\Phi\Lambda,\qquad
     X = K_{ii}^{-1}(M_{ii}\Psi + M_{ib}) .
 
-``Psi`` are the constraint modes (the static response at the interfaces is exact), ``Phi`` the lowest modes with the
-interfaces held (Craig, Bampton, AIAA J. 6, 1968), ``X`` the first-order inertia corrections: the quasi-static part of
-all modes that are left out. ``X`` is freed of ``Phi`` and made M-orthonormal, and both are turned to the principal axes
-of their stiffness: all internal coordinates have unit mass and diagonal stiffness. One more level repeats ``K^-1 M`` on
-the last one. All this is Galerkin projection: frequencies converge from above. One factorisation serves all of it.
+``Psi`` are the constraint modes, with which the static response at the interfaces is exact. ``Phi`` are the lowest
+modes with the interfaces held (Craig, Bampton, AIAA J. 6, 1968). ``X`` are the first-order inertia corrections, the
+quasi-static part of all modes that are left out. ``X`` is made M-orthonormal and M-orthogonal to ``Phi``. Both are then
+transformed to the principal axes of their stiffness, so all internal coordinates have unit mass and diagonal stiffness.
+One more level applies ``K^-1 M`` to the last one. The reduction is a Galerkin projection: frequencies converge from
+above. One factorisation serves all steps.
 
-**Error bound.** The interfaces see the internal unknowns through the dynamic stiffness
-``D(w) = K_bb - w^2 M_bb - w^4 b^T A(w)^{-1} b``, ``A = K_ii - w^2 M_ii``, ``b = M_ii Psi + M_ib``. With all internal
-vectors V, M-orthonormal with stiffnesses L, the projection puts ``x = V g, g = (L - w^2)^{-1} V^T b`` for ``A^{-1} b``
-and errs by ``dD = w^4 r^T A^{-1} r``, ``r = b - A x``. Modes leave no residual; with corrections b lies in K V, and
-r is ``w^2 K Y g``, Y what ``K^{-1} M V`` has K-orthogonal to V. There ``A >= (1 - w^2/w_next^2) K``, hence
+**Error bound.** The dynamic stiffness at the interfaces is ``D(w) = K_bb - w^2 M_bb - w^4 b^T A(w)^{-1} b``, with
+``A = K_ii - w^2 M_ii`` and ``b = M_ii Psi + M_ib``. Let V be the internal vectors, M-orthonormal with the stiffnesses
+L. The projection replaces ``A^{-1} b`` by ``x = V g``, ``g = (L - w^2)^{-1} V^T b``. The error is
+``dD = w^4 r^T A^{-1} r`` with the residual ``r = b - A x``. Modes have no residual. With corrections b lies in K V, and
+r is ``w^2 K Y g``. Y is the part of ``K^{-1} M V`` that is K-orthogonal to V. On this part
+``A >= (1 - w^2/w_next^2) K``, hence
 
 .. math::
     dD \le \frac{w^8}{1 - w^2/w_{next}^2}\; g^T S\, g,\qquad S = Y^T K Y = V^T M K^{-1} M V - L^{-1},
 
-``w_next`` the first one left out. Without corrections ``w^4 S``, S = ``b^T K^{-1} b`` freed of the modes, stands for
-``w^8 g^T S g``.
+with the first frequency ``w_next`` that is left out. Without corrections the bound has ``w^4 S`` instead of
+``w^8 g^T S g``. S is then ``b^T K^{-1} b`` without the part of the modes.
 """
 
 from __future__ import annotations

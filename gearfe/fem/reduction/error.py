@@ -7,12 +7,12 @@ r"""Estimate the errors of a reduced body: those of the reduction and of the mes
   unit modal mass, so ``d f_k / f_k <= v_b^T E v_b / (2 w_k^2)``;
 - the response of the attachments to forces on them: ``dH = H E H`` with ``H = D^-1``, compared with H over the band.
 
-**Mesh.** The body that carries an estimate of its mesh's error (`ModalBody.softening`) is compared with the body
-softened by it: each frequency with that of the same number, and the response with those of several parts of the way,
-because a resonance that moves past a frequency raises the response there before it lowers it.
+**Mesh.** A body with an estimate of its mesh error (`ModalBody.softening`) is compared with the softened body. Each
+frequency is compared with that of the same number. The response is compared with those of several partly softened
+bodies, because a resonance that passes a frequency first raises the response there and then lowers it.
 
-Both stiffen, so frequencies err towards too high; the mesh by far the more. Joined they are added: the body that is
-reduced is the mesh's, so the errors follow each other, and of two bounds only the sum is one.
+Both errors make the body too stiff, so frequencies are too high; that of the mesh is much larger. Both bounds are
+added: the reduction starts from the mesh, so only the sum bounds the whole error.
 """
 
 from __future__ import annotations

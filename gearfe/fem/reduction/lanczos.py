@@ -1,9 +1,9 @@
 r"""Lowest modes of ``K phi = lambda M phi`` by block Lanczos on ``A = (K + s M)^-1 M``.
 
-The operator is self-adjoint in the M inner product, its largest values ``theta = 1 / (lambda + s)`` belong to the
-lowest modes, and one factorisation serves all steps. Several columns at a time make better use of a factorisation than
-one (eight: a fifth of the time a column), and find repeated frequencies up to the block's width. All vectors are kept
-and every new block is made orthogonal to all of them, so no spurious copies appear (Golub, Van Loan, Matrix
+The operator is self-adjoint in the M inner product. Its largest values ``theta = 1 / (lambda + s)`` belong to the
+lowest modes, and one factorisation serves all steps. Blocks of several columns use a factorisation better than single
+ones (eight: a fifth of the time per column). They find repeated frequencies up to the block's width. All vectors are
+kept, and every new block is made orthogonal to all of them, so no spurious copies appear (Golub, Van Loan, Matrix
 Computations, 4th ed., sec. 10.3; Grimes, Lewis, Simon, SIAM J. Matrix Anal. Appl. 15, 1994).
 """
 

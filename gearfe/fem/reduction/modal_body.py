@@ -1,14 +1,14 @@
-r"""An elastic body as a few constant matrices: what the rigid core carries, and the way back to the full field.
+r"""Describe an elastic body by a few constant matrices, with the reconstruction of its full field.
 
-Coordinates ``q = [attachments | internal]``: six for each attachment, the displacement of its reference point (m) along
-x, y, z and its small rotation about x, y, z (rad), in the body's own frame; then internal ones with unit modal mass
-(m kg^1/2). In that frame
+The coordinates are ``q = [attachments | internal]``. Each attachment has six: the displacement of its reference point
+(m) along x, y, z and its small rotation about x, y, z (rad), in the frame of the body. Internal coordinates have unit
+modal mass (m kg^1/2). In that frame
 
 .. math::
     M\ddot q + C\dot q + K q = f, \qquad u(x) = \mathrm{shapes}(x)\,q ,
 
-``f`` the forces (N) and moments (N m) on the attachments, zero for the internal coordinates. Loading and using a saved
-body needs numpy and scipy only.
+with the forces (N) and moments (N m) ``f`` on the attachments, zero for the internal coordinates. Loading and using a
+saved body needs numpy and scipy only.
 """
 
 from __future__ import annotations

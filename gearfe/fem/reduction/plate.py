@@ -1,18 +1,19 @@
-r"""A plane part of finite elements, condensed to the interfaces of its joints and a few modes (Craig & Bampton).
+r"""Condense a plane part of finite elements to the interfaces of its joints and a few modes (Craig & Bampton).
 
 Plane stress, second-order triangles. The nodes of an interface move as one, u = d + f i (Z - Z_i). With the first
 interface held the modes are
 
 1. the static shapes of unit displacements and turns of the other interfaces (Craig & Bampton, AIAA J. 6 (1968)),
 2. the lowest vibrations with all interfaces held,
-3. the static answers to what a moving frame does to the mass: accelerations, turning and its change (loads rho N,
-   N = 1, i, Z, iZ), so that a steady rotation stretches the body as its full mesh would,
-4. static derivatives: what the mesh adds to two of these at once, K^-1 times the quadratic part of the forces. A bent
-   bar becomes shorter; without these the modes would stretch it (Idelsohn & Cardona, Comput. Methods Appl. Mech. Eng.
-   49 (1985) 253-279; Wu & Tiso, Multibody Syst. Dyn. 36 (2016) 405-425). Interfaces that turn by f move their nodes by
-   (i f - f^2/2) (Z - Z_i) here.
+3. the static responses to the inertia loads of a moving frame: acceleration, rotation and angular acceleration (loads
+   rho N, N = 1, i, Z, iZ). With them a steady rotation stretches the body as its full mesh would be stretched.
+4. static derivatives: the displacement of the mesh, beyond the sum, when two of these act at once. This is K^-1 times
+   the quadratic part of the forces. A bent bar becomes shorter; without static derivatives the modes would stretch it
+   (Idelsohn & Cardona, Comput. Methods Appl. Mech. Eng. 49 (1985) 253-279; Wu & Tiso, Multibody Syst. Dyn. 36 (2016)
+   405-425). To this order, interfaces that rotate by f displace their nodes by (i f - f^2/2) (Z - Z_i).
 
-Strains are those of Green and Lagrange, the energy that of St. Venant and Kirchhoff, quadratic and exact in the modes.
+Strains are Green-Lagrange strains. The energy is that of St. Venant and Kirchhoff, quadratic in the strains and exact
+in the modes.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-r"""Sparse symmetric positive definite systems ``A x = b`` by the factorisation of `gearfe.fem.multifrontal`.
+r"""Solve sparse symmetric positive definite systems ``A x = b`` by the factorisation of `gearfe.fem.multifrontal`.
 
-The order of elimination is METIS' nested dissection where pymetis is installed, else SciPy's minimum degree, which is
-as good up to 100,000 unknowns. Measured on housings (processor seconds on one core, METIS and minimum degree): 64,000
-unknowns 0.6 and 0.5, 110,000 1.5 and 1.7, 190,000 1.6 and 3.8, 280,000 9.7 and 15.
+The order of elimination is METIS' nested dissection if pymetis is installed, otherwise SciPy's minimum degree. The
+latter is as good up to 100,000 unknowns. Measured on housings (processor seconds on one core, METIS and minimum
+degree): 64,000 unknowns 0.6 and 0.5, 110,000 1.5 and 1.7, 190,000 1.6 and 3.8, 280,000 9.7 and 15.
 
-What depends on what in that order is a tree (the elimination tree), whose runs become fronts. The unknowns of a mesh
-node stay together: orders and trees are found on the graph of nodes, a third of the size.
+The dependencies of the unknowns in that order form the elimination tree, whose chains become fronts. The unknowns of a
+mesh node stay together: orders and trees are computed on the graph of nodes, a third of the size.
 """
 
 from __future__ import annotations

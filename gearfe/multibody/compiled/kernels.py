@@ -4,9 +4,9 @@ The kernel modules hold plain functions that call one another by name. `bind` pu
 those that Python calls. With `NUMBA_DISABLE_JIT=1` in the environment, numba's own switch for debugging, they stay
 Python functions: a debugger steps through them, some hundred times slower.
 
-Compiled code (`multibody.compiled.object_code`) is kept in the cache folder (`gearfe.base.cache`) below a hash of its
-sources, of the compiler and of the processor: no stale code after an upgrade, one form for all installations of the
-same sources, nothing written to the installed package.
+Compiled code (`multibody.compiled.object_code`) is kept in the cache folder (`gearfe.base.cache`) under a hash of its
+sources, the compiler and the processor. No code is stale after an upgrade, all installations of the same sources share
+one form, and nothing is written to the installed package.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Machine code of kernels: made by numba once, kept as an object file, linked into later processes by LLVM alone.
 
 Numba's own cache of compiled code needs all of numba to be read: 0.6 s of imports and tables of types in every process.
-An entry takes the addresses of blocks (`multibody.compiled.packed`) and returns an integer, so its code is a C
-function of pointers; llvmlite links its object file in milliseconds after 0.04 s of import. Numba's functions put two
-pointers before the arguments, to the result and to an exception, and return a status (numba/core/callconv.py).
+An entry takes the addresses of blocks (`multibody.compiled.packed`) and returns an integer. Its code is a C function of
+pointers. llvmlite links its object file in milliseconds after 0.04 s of import. Numba's functions put two pointers
+before the arguments, to the result and to an exception, and return a status (numba/core/callconv.py).
 """
 
 from __future__ import annotations

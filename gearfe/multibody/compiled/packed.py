@@ -1,9 +1,9 @@
 """Named arrays behind one pointer, for compiled kernels.
 
-Numba hands a named tuple of arrays to a function as all its addresses, lengths and strides: some 500 numbers a call for
-the tables and the work space of a mechanism, which the compiler then carries through every function. Here they lie in
-one block of 8-byte words, and a kernel gets the block's address. In kernels a `Packed` reads like the named tuple it
-was made from.
+Numba passes a named tuple of arrays to a function as all its addresses, lengths and strides. For the tables and the
+work space of a mechanism these are some 500 numbers per call, which the compiler carries through every function. Here
+they lie in one block of 8-byte words, and a kernel gets the block's address. In kernels a `Packed` reads like the named
+tuple it was made from.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Compiling functions that are only ever parts of others.
 
-Numba optimises and emits every function for itself, with all that it calls, and again inside each of its callers: the
-kernels of mechanisms took 46 s that way. A part is only translated into LLVM's language here; the entries, which Python
-calls, are optimised and emitted once, with all their parts in them.
+Numba optimises and emits every function with all that it calls, and again inside each of its callers. The kernels of
+mechanisms took 46 s that way. A part is only translated into LLVM's language here; the entries, which Python calls, are
+optimised and emitted once, with all their parts in them.
 
 This rests on numba's custom pipelines (numba manual, "Customizing the compiler") and on two methods of its code library
 that are not public. A numba without them compiles as it always does.

@@ -1,9 +1,9 @@
 """Numbers side by side: one of each of several stages, or systems of equations, which kernels take at once.
 
-The last axis of a `SimdArray` are the SIMD lanes of the processor. In NumPy it is an array like others; in compiled
-kernels an element of it is a whole row, one vector of the processor, with +, -, *, /, abs, `np.maximum`, `np.sin` and
-`np.cos` of its own (`simd_type`). So kernels need no loops over stages or systems, and indices of a row are read once
-for all of them.
+The last axis of a `SimdArray` are the SIMD lanes of the processor. In NumPy it is an array like others. In compiled
+kernels an element of it is a whole row, one vector of the processor. The vector has its operations +, -, *, /, abs,
+`np.maximum`, `np.sin` and `np.cos` (`simd_type`). So kernels need no loops over stages or systems, and indices of a row
+are read once for all of them.
 """
 
 from __future__ import annotations

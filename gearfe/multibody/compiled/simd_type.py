@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-call,no-untyped-def,misc"
 """Numba's type of a row of `gearfe.multibody.compiled.simd.SimdArray`: a vector of the processor.
 
-Sine and cosine by their series about the nearest multiple of pi, whose terms beyond degree 22 are below 1e-17; the
-multiple is taken off in two parts, the first exactly by fused multiplication (Muller et al., Handbook of Floating-Point
-Arithmetic, Birkhaeuser 2018, Sec. 10.2).
+Sine and cosine follow from their series about the nearest multiple of pi, whose terms beyond degree 22 are below 1e-17.
+The multiple is subtracted in two parts, the first exactly by fused multiplication (Muller et al., Handbook of
+Floating-Point Arithmetic, Birkhaeuser 2018, Sec. 10.2).
 """
 
 from __future__ import annotations

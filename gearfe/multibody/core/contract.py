@@ -9,26 +9,22 @@ elements in that order, k numbers in all. The equations of motion are
 
 1. A body (size > 0) MUST provide ``mass()``: its constant, symmetric positive definite mass matrix (size, size).
    Inertia that depends on velocity (gyroscopic terms) is a force.
-2. A force MUST provide ``force(t, q, v)``: generalised forces on the local coordinates, shape (k,). An applied
-force and
-   its reaction on a touched body are both entries of this one vector.
+2. A force MUST provide ``force(t, q, v)``: generalised forces on the local coordinates, shape (k,). An applied force
+   and its reaction on a touched body are both entries of this one vector.
 3. A joint (rows > 0) MUST provide ``residual(t, q)`` (rows,), ``jacobian(t, q)`` (rows, k), and
-   ``velocity_terms(t, q, v)`` (rows,), the part of g'' without accelerations: g'' = G a + velocity_terms. It
-   MUST provide
-   ``rate(t, q)`` (rows,), the partial derivative of g with respect to time, if that is not zero.
+   ``velocity_terms(t, q, v)`` (rows,). The last is the part of g'' without accelerations: g'' = G a + velocity_terms.
+   It MUST provide ``rate(t, q)`` (rows,), the partial derivative of g with respect to time, if that is not zero.
    Positions enter g, never velocities; a prescribed rate is integrated to a prescribed position.
 4. ``start()`` gives start coordinates and velocities of the own coordinates (zeros by default).
 
 It MAY provide
 
-5. ``blocks()``: constant (C, K), both (k, k), with the force ``-C v - K q`` on the local coordinates: an
-elastic body in
-   modal coordinates. ``force`` then holds only what is left. Absent: no linear part.
+5. ``blocks()``: constant (C, K), both (k, k), with the force ``-C v - K q`` on the local coordinates: an elastic body
+   in modal coordinates. ``force`` then holds only what is left. Absent: no linear part.
 6. ``force_jacobian(t, q, v)``: (df/dq, df/dv) of ``force``, both (k, k). Absent: finite differences, one call per
    coordinate, in the implicit integrator only.
-7. ``constant_jacobian = True`` when g is linear in q with constant coefficients and no time: such rows are
-eliminated at
-   set-up by `gearfe.multibody.core.elimination` where an integrator profits. Absent: treated as any constraint.
+7. ``constant_jacobian = True`` if g is linear in q with constant coefficients and no time. Such rows are eliminated at
+   set-up by `gearfe.multibody.core.elimination` for integrators that profit. Absent: treated as any constraint.
 8. ``algebraic = True``: planar bodies under loads that do not depend on the state, and rows without profiles; and
    ``steady_forces = True``: its forces depend on no coordinate or velocity.
 9. ``potential(q)``: its potential energy in local coordinates (..., k). Absent: zero. (The kinetic one is 1/2 v M v.)
@@ -36,25 +32,23 @@ eliminated at
     Absent: the force is called as it is; collocation then calls Python in every stage.
 11. ``units()``: sizes of the own coordinates and of the rows that count as much as 1 rad, so that bounds do not depend
     on the unit of length. Absent: ones.
-12. ``shared_mass()``: constant mass on the local coordinates (k, k), for what gives mass to the coordinates of
-    others: a beam whose nodes are bodies of a linkage. Absent: none.
-13. ``stiff = True``: its fast motions leave steps of series next to no length; ``method="auto"`` then is
-    the implicit method. Absent: not stiff.
+12. ``shared_mass()``: constant mass on the local coordinates (k, k), for what gives mass to the coordinates of others:
+    a beam whose nodes are bodies of a linkage. Absent: none.
+13. ``stiff = True``: its fast motions leave steps of series next to no length; ``method="auto"`` then is the implicit
+    method. Absent: not stiff.
 14. ``write(tape, places)``: its rows and forces on a `multibody.series.tape.Tape`, `places` being the numbers of the
-local
-    coordinates; False where they cannot be written. Rows are quadratic in coordinates, cosines and sines. The Taylor
-    method then runs any system compiled. Not needed by what has neither rows nor ``force``. A
+    local coordinates; False where they cannot be written. Rows are quadratic in coordinates, cosines and sines. The
+    Taylor method then runs any system compiled. Not needed by what has neither rows nor ``force``. A
     `gearfe.multibody.core.tape_evaluation.TapeElement` has the rows of 3. from it.
 15. ``pieced = True`` and ``pieces(t, q, v)``: whole numbers, shape (..., s) at times (...), that change where its force
-    has a kink, a jump or a pole; -1 where it has no value. Steps of the implicit method end there.
-    Absent: smooth.
+    has a kink, a jump or a pole; -1 where it has no value. Steps of the implicit method end there. Absent: smooth.
 16. ``has_knots = True`` and ``knots(q)``: whole numbers, shape (..., s) in states (..., k), that change where the third
     derivative of a row jumps (knots of a cam's profile). Steps of the implicit method end there. Absent: smooth.
 17. ``breaks``: times at which a force or joint is not smooth. Steps of all integrators end there. Absent: none.
-18. Names and places for messages and tables: ``coordinate_names``, ``row_names``, ``row_joint`` (number of the joint
-    of each row), ``joint_places`` (of each joint: body -> point at which its force acts), ``turns`` (own coordinates
-    that are angles), ``planar_bodies`` (names of bodies with the coordinates x, y, angle, in order), ``gap_text``.
-    Absent: numbers.
+18. Names and places for messages and tables: ``coordinate_names``, ``row_names``, ``row_joint`` (number of the joint of
+    each row), ``joint_places`` (of each joint: body -> point at which its force acts), ``turns`` (own coordinates that
+    are angles), ``planar_bodies`` (names of bodies with the coordinates x, y, angle, in order), ``gap_text``. Absent:
+    numbers.
 19. ``load_problem``, ``load_pole``, ``pole_between``: which force has no value, or grows beyond all bounds, at given
     states. Integrators ask after a step has failed. Absent: empty strings. ``load_values``: names and values of loads
     that depend on the state; the cause of a stopped run is sought among them. Absent: no loads.
@@ -218,9 +212,9 @@ class LinearJoint(Element):
 class SeriesLaw:
     """A law phi(t, u, u') of p directions by the orders of its Taylor series: module-level functions for numba.
 
-    Time is t + s x, s the trial step; ``u[k, j]`` is order j of direction k over x. The law keeps series of its own in
-    ``memory[row, order]``, from order to order of one step, and in ``pieces`` whole numbers for the whole run: on which
-    of its smooth pieces it is.
+    Time is t + s x, s the trial step; ``u[k, j]`` is order j of direction k over x. The law keeps its own series in
+    ``memory[row, order]``, from order to order of one step. In ``pieces`` it keeps whole numbers for the whole run: the
+    smooth pieces on which it is.
 
     Parameters
     ----------

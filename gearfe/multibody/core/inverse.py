@@ -1,6 +1,6 @@
 """Inverse dynamics: the motion that joints prescribe, without integrating, and the forces that it takes.
 
-At every time the positions close, g(t, q) = 0, then G v = -dg/dt and G a = -(velocity terms); the multipliers follow
+At every time the positions satisfy g(t, q) = 0; then G v = -dg/dt and G a = -(velocity terms). The multipliers follow
 from M a = f - G^T lambda as in every trajectory.
 """
 

@@ -1,15 +1,15 @@
 """Links that are light beside what the joints make them carry.
 
-All solvers of the core eliminate accelerations with the inverse masses: S = G M^-1 G^T. A coupler of next to no mass
-fills S with numbers that cancel in the pivots which carry the heavy links, and nothing of these is left. Its mass may
-be anything in the elimination, though, as long as the force is the same: with an added mass D on a few coordinates
+All solvers of the core eliminate accelerations with the inverse masses: S = G M^-1 G^T. A coupler with almost no mass
+fills S with large numbers. They cancel in the pivots of the heavy links, which loses all digits of these. The
+elimination may use any mass, if the force is changed accordingly: with an added mass D on a few coordinates
 
     (M + D) a + G^T lambda = f + D a
 
-and D a is found exactly (`System.acceleration`, `recurrences`). The effective mass of a link is twice the
-least kinetic energy of all motions in which it moves with speed 1: the mass that resists a push on the link. An added
-mass up to that changes no energy of the mechanism by more than a few times, so nothing is lost in finding D a; a
-pendulum that is truly light keeps its mass.
+and D a is found exactly (`System.acceleration`, `recurrences`). The effective mass of a link is the mass that resists a
+force on it. It is twice the least kinetic energy of all motions in which the link has speed 1. An added mass up to that
+changes no energy of the mechanism by more than a small factor, so D a is computed without loss. A pendulum that is
+truly light keeps its mass.
 """
 
 from __future__ import annotations

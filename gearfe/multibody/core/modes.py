@@ -1,12 +1,12 @@
 """Small vibrations about a state of rest.
 
-With a state at rest, a basis T of the motions that the joints leave free (G T = 0), M, C = -df/dv and
-K = -df/dq + d(G^T lambda)/dq, small motions T u exp(l t) obey
+The state is at rest, and T is a basis of the motions that the joints leave free (G T = 0). With M, C = -df/dv and K =
+-df/dq + d(G^T lambda)/dq, small motions T u exp(l t) satisfy
 
     (l^2 M_r + l C_r + K_r) u = 0,        M_r = T^T M T, ...
 
-It is solved for m = 1/l, of which those of slow motions are the largest and the most exact; links may be without mass,
-and C and K need not be symmetric (Tisseur & Meerbergen, SIAM Review 43 (2001) 235-286).
+It is solved for m = 1/l, because the values of slow motions are then the largest and the most exact. Links may have no
+mass, and C and K need not be symmetric (Tisseur & Meerbergen, SIAM Review 43 (2001) 235-286).
 """
 
 from __future__ import annotations

@@ -41,8 +41,8 @@ def hidden_freedoms(system: System, time: float, q: Array) -> tuple[int, int]:
 def motions_of_second_order(system: System, time: float, q: Array, count: int) -> list[Array]:
     """Return random motions that the constraints allow to second order.
 
-    In a position where branches meet each is along one of these: w^T H(v, v) = 0 by Gauss-Newton steps on the unit
-    sphere of the motions that the gradients leave free.
+    In a position where branches meet, each branch has one of these directions. Gauss-Newton steps on the unit sphere of
+    the motions that the gradients leave free solve w^T H(v, v) = 0.
 
     Parameters
     ----------

@@ -214,8 +214,8 @@ def _dependent_rows(system: System, time: float, q: Array, share: float = DEPEND
 def close(system: System, time: float, q: Array, forced: Sequence[Forced]) -> tuple[Array, Array]:
     """Find the closed position nearest to a guess, or the position of least gap.
 
-    Gauss-Newton with least changes in coordinates divided by their units. Levenberg's damping keeps a body from turning
-    by more than `TURN` in one step, which stays on the branch of the guess, and makes every step lessen the gaps.
+    Gauss-Newton with least changes in coordinates divided by their units. Levenberg's damping limits the rotation of a
+    body in one step to `TURN`, which keeps the branch of the guess. It also makes every step reduce the gaps.
 
     Parameters
     ----------

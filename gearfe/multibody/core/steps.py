@@ -67,10 +67,10 @@ class StepLaw:
 class Pace:
     """The number of steps that a run needs, extrapolated from the steps so far.
 
-    The times in which the number of steps doubles continue as the geometric series of the last four: they double at a
-    steady pace, stay where a force feeds the motion, grow by 2**(1/p) where the number is as time to the power p. Of
-    the ratios of successive times the largest counts. One change to shorter steps lowers two of the three, so neither
-    that nor a burst of short steps ends a run.
+    The times in which the number of steps doubles are continued as the geometric series of the last four. They double
+    at a steady pace, and stay constant if a force makes the motion grow. They grow by 2**(1/p) if the number of steps
+    is proportional to time to the power p. Of the ratios of successive times the largest counts. One change to shorter
+    steps lowers two of the three, so neither that nor a burst of short steps ends a run.
 
     Parameters
     ----------
@@ -268,8 +268,8 @@ def run_in_pieces(
 def first_step(q: Array, v: Array, a: Array, span: float) -> float:
     """Return a careful first step from the state at the start.
 
-    It is a hundredth of the time in which the speeds change by themselves, or the one from rest in which the
-    accelerations move the coordinates by 5e-9 of themselves.
+    It is a hundredth of the time in which the speeds change by their own size. From rest it is the time in which the
+    accelerations change the coordinates by 5e-9 of their size.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
 """Why a run stopped before its end: positions in which a mechanism locks, and what makes the steps short.
 
 With the gradients G of the constraints g(t, q) = 0, velocities follow from ``G v = -dg/dt``. In a locked position G
-loses rank, and the combination w of its rows that vanishes, ``w^T G = 0``, still has a share in the prescribed motion,
-``w^T dg/dt != 0``: no velocity fulfils it. (In a singular position that a mechanism passes, that share is zero.) The
-row forces w hold the links in equilibrium. A link that they load at two points only lies along the line of its force,
-so such links with one common direction are in line.
+loses rank: a combination w of its rows vanishes, ``w^T G = 0``. The prescribed motion still requires
+``w^T dg/dt != 0``, so no velocity satisfies it. (In a singular position that a mechanism passes, that share is zero.)
+The row forces w hold the links in equilibrium. A link that is loaded at two points only lies along the line of its
+force. Such links with one common direction are in line.
 """
 
 from __future__ import annotations
@@ -109,8 +109,9 @@ def short_steps(
 ) -> str:
     """Return the fastest process in a state where steps are short, in words.
 
-    Compared are the turning of bodies, growth and decay by forces that depend on velocities, loads that reverse, as dry
-    friction does, vibration, and the change of forces over time alone. Loads are named where they are known.
+    It compares the rotation of bodies, growth and decay by forces that depend on velocities, and loads that reverse,
+    such as dry friction. It also compares vibration, and forces that change with time alone. Loads are named where they
+    are known.
 
     Parameters
     ----------

@@ -5,8 +5,8 @@ Each variable z_i of a tape is a function of one coordinate, with the slope z_i'
     g = c + L z + sum w z_i z_j - motion(t),        dg/dq = sum dg/dz_i z_i',
 
 a sum over the variables of each coordinate, and so are forces along variables. Registers are evaluated in groups: all
-of one operation whose operands are known, at once; derivatives go along (forward mode: Griewank & Walther, Evaluating
-Derivatives, SIAM 2008, Sec. 3.1).
+registers of one operation whose operands are known. Derivatives are evaluated with them (forward mode: Griewank &
+Walther, Evaluating Derivatives, SIAM 2008, Sec. 3.1).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Locate kinks and jumps of forces within a step of collocation.
 
-A step that crosses a kink has an error that no estimate sees as it is. Such a step is made again, up to just before
-the kink; from there a short one goes over it, and the method begins again behind it. Jumps are passed like this, too;
-poles and ends of tables are not.
+The error estimate of a step that crosses a kink is not valid. Such a step is repeated up to just before the kink. A
+short step then crosses it, and the method starts again behind it. Jumps are crossed in the same way; poles and ends of
+tables are not.
 """
 
 from __future__ import annotations
@@ -203,8 +203,8 @@ def quiet_speeds(c: Array, v: Array, V: Array, vn: Array, scale: Array) -> Array
 def collocated_path(h: float, powers: Array, speeds: Array) -> Path:
     """Path of a step of the implicit method.
 
-    `powers` are coefficients of powers of the share x of the step, `speeds` of powers of the time since its end
-    (velocities from the coordinates would be their rounding over the step).
+    `powers` are coefficients of powers of the fraction x of the step, `speeds` those of powers of the time since its
+    end. Velocities from the coordinates would contain their rounding divided by the step.
     """
     p, r = np.arange(float(len(powers))), np.arange(float(len(speeds)))
 

@@ -168,8 +168,9 @@ def _dropped_rows_hold(system: System, start: Start, dense: Dense, tolerance: fl
 def chosen_method(system: System, start: Start, duration: float) -> str:
     """Return the method that ``auto`` begins with for a run of that duration (s), by the rule in docs/integrators.md.
 
-    It depends on the system and its start alone, and what follows on counted steps (`_stiff`), so the same file has the
-    same digits on every machine. The decay at the start decides only where it stays: nonlinear loads change it.
+    The rule depends only on the system and its start, and later on the number of steps (`_stiff`). The same file
+    therefore has the same digits on every machine. The decay at the start decides only where it stays: nonlinear loads
+    change it.
     """
     if not _has_series(system) or any(element.stiff for element in system.elements):
         return "implicit"

@@ -7,12 +7,11 @@ t = (cos theta, sin theta) and n a quarter turn ahead, the strains of axis, shea
     U = 1/2 int EA Gamma^2 + GA_s gamma^2 + EI kappa^2 ds
 
 for displacements and rotations of any size (Reissner, ZAMP 23 (1972) 795-804; Simo & Vu-Quoc, J. Appl. Mech. 53 (1986)
-849-863). x, y and theta are interpolated by cubics, so the mass matrix is constant, and integrated at three Gauss
-points an element, which leaves thin beams free of locking. Damping is Kelvin's and Voigt's: every strain e counts as
-e + tau e'.
+849-863). x, y and theta are interpolated by cubics, so the mass matrix is constant. Integrals use three Gauss points
+per element, with which thin beams do not lock. Damping is Kelvin's and Voigt's: every strain e counts as e + tau e'.
 
 Every node is a body without mass of its own; what mass it has is in the mass matrix of the beam. Joints and forces of
-the linkage so hold at any node. At a Gauss point z = (x', y', theta, theta') = P q is linear in the coordinates: forces
+the linkage so hold at any node. At a Gauss point z = (x', y', theta, theta') = P q is linear in the coordinates. Forces
 are -P^T s(P q, P q'), tangents P^T k P, with the law of one point in closed form.
 """
 
@@ -223,9 +222,9 @@ class Tangent:
     """Forces of a beam whose stresses S are unknowns of their own, for Newton's method with one matrix.
 
     S and the coordinates are found together from f = -B(q)^T S and C e(q) - S = 0, linearised as f' and C B about one
-    state. With B from one state and not S but the stress of a wrong strain, the matrix would be useful only as far as
-    turns leave no axial strain: thousandths of a degree in a thin link. (Mixed integration points: Magisano, Leonetti
-    & Garcea, Int. J. Numer. Meth. Engng 109 (2017) 1237-1262.)
+    state. With B from one state, and the stress of a wrong strain instead of S, the matrix would only hold for
+    rotations without axial strain. In a thin link these are thousandths of a degree. (Mixed integration points:
+    Magisano, Leonetti & Garcea, Int. J. Numer. Meth. Engng 109 (2017) 1237-1262.)
     """
 
     beam: Beam

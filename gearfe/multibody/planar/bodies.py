@@ -1,7 +1,7 @@
 """Planar bodies as plain data, and their frames, of which joints and forces make forms.
 
-A body carries a frame: points, the mass centre and joint directions are written in that frame (m); the start pose is
-the position of the frame's origin and its angle. The ground is the body named ``"ground"`` with its frame at rest.
+A body carries a frame: points, the mass centre and joint directions are given in that frame (m). The start pose is the
+position of the frame's origin and its angle. The ground is the body named ``"ground"`` with its frame at rest.
 """
 
 from __future__ import annotations

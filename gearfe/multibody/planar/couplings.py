@@ -82,9 +82,9 @@ class Belt(Joint):
 class Rack(Joint):
     """Body `a` moves along `direction` by `radius` (m) times what body `b` turns: one constraint.
 
-    Both motions, and the direction, are those in the frame of the `carrier`, which guides the rack and bears the
-    pinion by joints of their own (`with_carriers`). A negative radius turns the sense. The multiplier is the tooth
-    force along the direction (N).
+    Both motions and the direction refer to the frame of the `carrier`. Separate joints guide the rack and hold the
+    pinion on it (`with_carriers`). A negative radius turns the sense. The multiplier is the tooth force along the
+    direction (N).
     """
 
     a: str

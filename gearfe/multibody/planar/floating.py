@@ -5,9 +5,9 @@ With points of the plane as complex numbers, a point Z of the body stands at
     r(Z) = x + Z a + sum_k phi_k(Z) p_k,        a = exp(i theta),   p_k = eta_k a,
 
 x the place of the frame's origin, phi_k the modes (displacements in the frame) and eta_k their shares. r is linear in
-the vectors (x, a, p), so the mass matrix is constant: the integrals of rho conj(N_j) N_k, N = (1, Z, phi). What makes
-the vectors a frame, |a| = 1 and p_k parallel to a, are rows, quadratic in the vectors (`frame_joint`), and so are those
-that hold bodies of a linkage at the interfaces, which the joints of the linkage reach.
+the vectors (x, a, p), so the mass matrix is constant: the integrals of rho conj(N_j) N_k, N = (1, Z, phi). Constraint
+rows that are quadratic in the vectors make them a frame: |a| = 1 and p_k parallel to a (`frame_joint`). Further
+quadratic rows hold bodies of a linkage at the interfaces; joints of the linkage act on these bodies.
 
 The strain of Green and Lagrange is quadratic in the displacement. In an orthonormal basis of strain energy it is
 

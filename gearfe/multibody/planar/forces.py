@@ -1,7 +1,7 @@
 """Planar forces as plain data, each with the forms and vectors that it acts along.
 
-A new force is a class here, or in a file of its own, with `parts`; its line in `gearfe.base.tables.kinds.FORCES` makes
-it known to mechanism files.
+A new force is a class with `parts`, in this module or another. Its line in `gearfe.base.tables.kinds.FORCES` makes it
+known to mechanism files.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 class StateFunction(ABC):
     """A load f(t, q, v) of the coordinates and velocities of a whole linkage.
 
-    Values, slopes and corners follow from its registers on a tape; a load that cannot be written is a `LocalForce`, or
-    the ``force`` of another element (`multibody.core.contract`). Where it has no value, a step is made shorter and
-    the run ends at last; `value` is NaN there, and `problem` says why.
+    Values, slopes and corners follow from its registers on a tape. A load that cannot be written on a tape is a
+    `LocalForce`, or the ``force`` of another element (`multibody.core.contract`). Where it has no value, a step is made
+    shorter and the run ends at last; `value` is NaN there, and `problem` says why.
     """
 
     @abstractmethod

@@ -4,9 +4,9 @@
     form     u(q) = sum_bodies  kx x + ky y + kt theta + kc cos theta + ks sin theta  +  constant  +  sum U . V
 
 Both are closed under sums and multiples; the product U . V of two vectors is a form, and an affine one where one of the
-vectors stands still. Values, gradients, time derivatives and Taylor coefficients of every form follow from these
-few numbers (`multibody.planar.linkage`), so a joint or a force says nothing more than which form it holds or acts
-along.
+vectors stands still. Values, gradients, time derivatives and Taylor coefficients of every form follow from these few
+numbers (`multibody.planar.linkage`). A joint therefore only states the forms that it keeps at zero, a force those along
+which it acts.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Planar joints as plain data, each with the forms that it holds at zero.
 
-A new joint is a class here, or in a file of its own, with `rows`; its line in `base.tables.kinds.JOINTS` makes it
-known to mechanism files. Nothing else changes: every integrator gets the joint from its forms
-(`multibody.planar.forms`).
+A new joint is a class with `rows`, in this module or another. Its line in `base.tables.kinds.JOINTS` makes it known to
+mechanism files. Nothing else changes: every integrator gets the joint from its forms (`multibody.planar.forms`).
 """
 
 from __future__ import annotations
@@ -198,9 +197,9 @@ class Rolling(Joint):
 class Prescribed(Joint):
     """A motion given as a function of time: one constraint.
 
-    `coordinate` is ``"angle"`` (rad, relative to body `relative_to`), ``"rate"`` (rad/s, likewise; the angle starts
-    from the start pose), or ``"x"`` or ``"y"`` (m, of the point `point`, seen from the point `origin` of body
-    `relative_to`, along its axes).
+    `coordinate` is ``"angle"`` (rad) or ``"rate"`` (rad/s), relative to body `relative_to`; with a rate the angle
+    starts from the start pose. With ``"x"`` or ``"y"`` (m) it is that of the point `point`, seen from the point
+    `origin` of body `relative_to` along its axes.
     """
 
     body: str

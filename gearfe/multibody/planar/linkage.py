@@ -1,7 +1,7 @@
 """Planar bodies with joints and forces as one element of the contract: what it writes on a tape, and its energies.
 
-With the variables x, y, theta, cos theta, sin theta of the bodies, forms (`multibody.planar.forms`) are affine or
-quadratic and vectors have affine components; the tension T along a span D pulls with (T / |D|) D.
+In the variables x, y, theta, cos theta, sin theta of the bodies, forms (`multibody.planar.forms`) are affine or
+quadratic, and vectors have affine components. The tension T along a span D pulls with (T / |D|) D.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Elimination order of the constraint rows and the symbolic factorisation of S = G M^-1 G^T = L D L^T.
 
-Two rows couple in S when they share a moving body. The order is minimum degree on the graph of the joints
-(George & Liu,
-SIAM Review 31 (1989)): chains and trees fill nothing, so the cost of a factorisation grows as the number of joints.
+Two rows couple in S when they share a moving body. The order is minimum degree on the graph of the joints (George &
+Liu, SIAM Review 31 (1989)). Chains and trees have no fill-in, so the cost of a factorisation is proportional to the
+number of joints.
 """
 
 from __future__ import annotations

@@ -3,14 +3,14 @@
 Compiled functions that call each other in every order of every step. Arrays of series have the shape (variables or
 registers, orders). The variables are z = (q, functions u of one coordinate, forms of the squares), see `row_tables`.
 
-Registers: order k of y = f(a) follows from orders up to k of a and below k of y; sines and cosines from
-s' = c theta', c' = -s theta' (Barrio, Appl. Math. Comput. 163 (2005) 525). A register that leaves the piece of its
-table or switch ends the step.
+Registers: order k of y = f(a) follows from orders up to k of a and below k of y. Sines and cosines follow from s' = c
+theta', c' = -s theta' (Barrio, Appl. Math. Comput. 163 (2005) 525). A register that leaves the piece of its table or
+switch ends the step.
 
 Rows: values, gradients G, and the factors S = G M^-1 G^T = L D L^T.
 
-Motion by the index-3 equations: with q(t) = sum_j q_j (t - t0)^j and the multipliers likewise, order k of the motion
-and order k + 2 of the constraints read
+The motion follows from the index-3 equations, with q(t) = sum_j q_j (t - t0)^j and the same for the multipliers. Order
+k of the motion and order k + 2 of the constraints are
 
     M (k+2)(k+1) q_{k+2} + G_0^T lambda_k = f_k - sum_{i>=1} G_i^T lambda_{k-i},       G_0 q_{k+2} = -r_{k+2}
 

@@ -1,7 +1,8 @@
 """Rows of a program and its masses as flat arrays, for series: gradients, squares, and S = G M^-1 G^T = L D L^T.
 
-The quadratic part of a row is a sum of squares of forms of the variables, sum_k d_k (w_k . z)^2 (its eigenvalues and
-vectors): a distance has two, a line that turns with a body four. They are variables behind those of the program.
+The quadratic part of a row is a sum of squares of forms of the variables, sum_k d_k (w_k . z)^2, from its eigenvalues
+and eigenvectors. A distance has two squares, a line that rotates with a body four. They are variables behind those of
+the program.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ in them,
 
 forces are registers of the tape along variables: a register f along z_i with the factor w gives the coordinates the
 force w f dz_i/dq. Registers are sums, products, quotients, powers and other functions of registers before them, of
-variables, their rates and time. What `min`, `max`, `abs` and tables do changes at places of their own: they hold the
-piece that they are on, and steps end where it ends. (Moore's recurrences: Hairer, Norsett & Wanner I, Sec. I.8; Jorba &
-Zou, Exp. Math. 14 (2005) 99-117.)
+variables, their rates and time. `min`, `max`, `abs` and tables consist of pieces. They keep the piece that they are on,
+and steps end where it ends. (Moore's recurrences: Hairer, Norsett & Wanner I, Sec. I.8; Jorba & Zou, Exp. Math. 14
+(2005) 99-117.)
 """
 
 from __future__ import annotations

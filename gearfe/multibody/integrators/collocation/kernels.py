@@ -1,11 +1,12 @@
-"""One step by collocation of  M a = f(t, q, v) - G^T lambda,  g(t, q) = 0:  simplified Newton on all stages.
+"""Solve one step by collocation of  M a = f(t, q, v) - G^T lambda,  g(t, q) = 0:  simplified Newton on all stages.
 
-Radau's stages hold the constraints (index 3), Gauss's their rates (index 2: positions would cost its order; Ascher &
-Petzold, SIAM J. Numer. Anal. 28 (1991) 1097-1120). So do Radau's where loads are not linear in the state: in the short
-steps that dry friction asks for, rounding of the positions over the step would be a speed beyond its width.
+Radau stages hold the constraints (index 3). Gauss stages hold their rates (index 2), because constraints on the
+positions would reduce the order (Ascher & Petzold, SIAM J. Numer. Anal. 28 (1991) 1097-1120). Radau stages hold the
+rates, too, if loads are not linear in the state. Dry friction requires short steps, and rounding of the positions
+divided by such a step would exceed the speed over which friction reverses.
 
-Stresses S of stiff links are unknowns beside the coordinates. With the matrices of one stage and the eigenvalues mu of
-A^-1 (`collocation`) the changes follow from one system of the size of the mechanism for each mu,
+Stresses S of stiff links are unknowns in addition to the coordinates. The matrices are those of one stage. The changes
+follow from one system of the size of the mechanism for each eigenvalue mu of A^-1 (`collocation`),
 
     [ mu^2/h^2 M - mu/h df/dv - df/dq + d(G^T lambda)/dq    G^T ]
     [ G                                                      0  ].
@@ -13,24 +14,26 @@ A^-1 (`collocation`) the changes follow from one system of the size of the mecha
 Stages lie side by side in SIMD vectors (`compiled.simd`), and so do these systems: all are evaluated, factorised and
 solved at once.
 
-The error is that of the stages' polynomials at the step's begin, v - V(0) and M (a - A(0)), filtered by the matrix of
-the real eigenvalue (Hairer & Wanner II, Secs. IV.8, VI.1, VII.4). Of coordinates on which nonlinear loads act the error
-of the speed counts, too, as the displacement that it makes in the time in which the fastest motion so far crosses the
-mechanism: a force that reverses within a short step shows in the speed alone. The end is projected onto the constraints
-of positions and velocities by the least changes in the mass norm.
+The error is that of the polynomials of the stages at the start of the step, v - V(0) and M (a - A(0)). It is filtered
+by the matrix of the real eigenvalue (Hairer & Wanner II, Secs. IV.8, VI.1, VII.4). For coordinates with nonlinear loads
+the error of the speed counts, too, because a force that reverses within a short step affects only the speed. It is
+converted to a displacement by the time in which the fastest motion so far crosses the mechanism. The end is projected
+onto the constraints of positions and velocities by the least changes in the mass norm.
 
-Read from the bottom up: `collocation_step` calls `begin`, `stages` (what is left of the equations, with the forces of
-beams (`beam.Beam`) and floating frames (`floating.Floating`)), `linearise` and `factorise` (matrices at one stage),
-`solve`, `change`, `defect`, `project`. `numpy_equations` has functions of the same names for any `System`.
+Read from the bottom up: `collocation_step` calls `begin`, `stages`, `linearise` and `factorise` (matrices at one
+stage), `solve`, `change`, `defect`, `project`. `stages` evaluates the residual of the equations, with the forces of
+beams (`beam.Beam`) and floating frames (`floating.Floating`). `numpy_equations` has functions of the same names for any
+`System`.
 
-Forces of registers and their derivatives are orders 0 and 1 of the registers' series (`series.recurrences`), those of
-beams and of bodies in floating frames are in closed form. Stresses S of all these form one row of unknowns; ``law``
-holds the derivatives of each by what its strain is made of. A stage's force is that of S and, through `law`, of what S
-lacks; S then becomes the stress of the strains.
+Forces of registers and their derivatives are orders 0 and 1 of the series of the registers (`series.recurrences`).
+Those of beams and of bodies in floating frames are in closed form. Stresses S of all these form one row of unknowns.
+``law`` holds the derivatives of each stress by the quantities that determine its strain. The force of a stage is that
+of S plus, through `law`, that of the difference between S and the stress of the strains. S then becomes the stress of
+the strains.
 
-The matrices are banded saddle matrices [[T, G^T], [G, 0]] of one pattern, complex; the matrix of masses, too, in every
-entry of the SIMD vectors alike. They are stored by columns, real and imaginary parts in turn: B[j, i, 0] is the real
-part of row i of column j. Rows are exchanged for all matrices alike, where the diagonal is small in their sum
+The matrices are complex banded saddle matrices [[T, G^T], [G, 0]] of one pattern. So is the matrix of masses, with
+equal entries in the SIMD vectors. They are stored by columns, real and imaginary parts in turn: B[j, i, 0] is the real
+part of row i of column j. If the diagonal is small in the sum of all matrices, rows are exchanged in all of them
 (threshold pivoting: Duff, Erisman & Reid, Direct Methods for Sparse Matrices, 2nd ed., Oxford 2017, Sec. 5.2).
 """
 

@@ -1,7 +1,7 @@
-"""Implicit integration by collocation: Radau IIA for stiff and flexible systems, Gauss where energy counts.
+"""Integrate implicitly by collocation: Radau IIA for stiff and flexible systems, Gauss to conserve energy.
 
-Steps of `kernels`, compiled where the system can be written on a tape, with NumPy for elements of any other
-kind; this module chooses their lengths and keeps what they pass through. The order goes with the tolerance.
+Steps are those of `kernels`, compiled if the system can be written on a tape, otherwise with NumPy. This module chooses
+their lengths and keeps the solution. The order depends on the tolerance.
 """
 
 from __future__ import annotations
@@ -307,8 +307,8 @@ class Stepper:
         """Polynomials through the stages of every step and the states at its ends.
 
         Accelerations of stiff links at the ends are the rounding of their strains; those of others follow from the
-        equations of motion there. In steps that are too short for differences of positions (`STRAIGHT`) accelerations
-        continue a line between these; stiff links keep theirs, and their forces, from the step before.
+        equations of motion there. In steps that are too short for differences of positions (`STRAIGHT`), accelerations
+        are linear between the ends of the step. Stiff links keep their accelerations and forces from the step before.
         """
         inner, s = self.tab.inner, len(self.tab.c)
         if not known:
@@ -353,10 +353,10 @@ class Stepper:
 
 
 def _before(coefficients: Array, h: Array, k: int, short: Array, derivative: int = 2) -> Array:
-    """A derivative of polynomials about the middles of steps h (s), just before step k.
+    """Evaluate a derivative of polynomials about the middles of steps h (s), just before step k.
 
-    Of the last step without the flag `short`, as Radau's stages are the more exact the nearer to their end; else of the
-    next one at its begin, or zero.
+    It is that at the end of the last earlier step without the flag `short`, because Radau stages are most exact near
+    the end of a step. If there is none, it is that at the start of the next such step, or zero.
     """
     before, behind = np.flatnonzero(~short[:k])[-1:], k + 1 + np.flatnonzero(~short[k + 1 :])[:1]
     for step, x in ((before, 0.5), (behind, -0.5)):

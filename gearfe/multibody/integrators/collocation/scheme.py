@@ -1,9 +1,9 @@
-"""Collocation of second-order systems at the points of Radau IIA or of Gauss: coefficients for odd numbers of stages.
+"""Compute coefficients of collocation for second-order systems: Radau IIA or Gauss, odd numbers of stages.
 
-With stages at c_1 .. c_s of the step h and A_ij = int_0^{c_i} l_j of Lagrange's polynomials l, positions q + c h v + Z
-have the velocities v + A^-1 Z / h and the accelerations A^-2 Z / h^2. Radau's points (c_s = 1) give the order 2s - 1
-and damp what is faster than the steps, Gauss's the order 2s and keep the energy (Hairer & Wanner II, Secs. IV.5, IV.8;
-Hairer, Lubich & Wanner, Geometric Numerical Integration, Sec. VI.4).
+The stages are at c_1 .. c_s of the step h, and A_ij = int_0^{c_i} l_j with Lagrange's polynomials l. Positions q + c h
+v + Z have the velocities v + A^-1 Z / h and the accelerations A^-2 Z / h^2. Radau points (c_s = 1) have the order 2s -
+1 and damp motions that are faster than the steps. Gauss points have the order 2s and conserve energy (Hairer & Wanner
+II, Secs. IV.5, IV.8; Hairer, Lubich & Wanner, Geometric Numerical Integration, Sec. VI.4).
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def scheme(family: str, stages: int, rates: bool = False) -> Scheme:
 
 
 def path_matrix(c: Array, accelerations: bool = False, origin: float = 0.0) -> Array:
-    """Coefficients of powers of x - origin from q, h v at 0, q at c, q, h v at 1, and from h^2 q'' at 0 and 1.
+    """Compute coefficients of powers of x - origin from q and h v at 0 and 1, q at c, and h^2 q'' at 0 and 1.
 
     About the middle of the step rounding weighs a thousand times less at the step's end than about its begin.
     """
@@ -144,8 +144,8 @@ def path_matrix(c: Array, accelerations: bool = False, origin: float = 0.0) -> A
 class Collocated(Polynomials):
     """Dense output through the stages; `forces`: multipliers of all rows, then stresses of the elements that have some.
 
-    Both are unknowns of the stages. From the coordinates between them they would be as far off as the stiffness times
-    the error of a strain, which is that of the coordinates.
+    Both are unknowns of the stages. Stresses that follow from the coordinates between them would err by the stiffness
+    times the error of a strain, which is that of the coordinates.
     """
 
     forces: Polynomials | None = None

@@ -1,7 +1,7 @@
-"""State, tables and scratch arrays of a step of collocation, and the order of its unknowns.
+"""Allocate state, tables and scratch arrays of a collocation step, and order its unknowns.
 
-The entries of a SIMD vector are s stages, and last the begin of the step; those of the factors are its systems
-(`kernels`).
+The entries of a SIMD vector are the s stages, followed by the start of the step. Those of the factors are the systems
+of the step (`kernels`).
 """
 
 from __future__ import annotations

@@ -1,19 +1,21 @@
-"""The integration loop of the Taylor method: expand, choose the step, land, project; land on singular positions rather
-than jump them, and where a switch leaves its piece.
+"""Integrate by Taylor series: expand, choose the step, find its end, project onto the constraints.
 
-Read from the bottom up: `integrate_series` is the loop, `land` finds the end of a step, `project` puts it onto the
-constraints, `next_singular` and `locate` look for singular positions.
+A step ends at a singular position instead of crossing it, and where a switch leaves its piece.
 
-Step length from the last two coefficients (Jorba & Zou, Exp. Math. 14 (2005) 99-117): |q_N| h^N <= tolerance, in units
-of the coordinates. Forces within the step are checked against their series.
+Read from the bottom up. `integrate_series` is the loop, `land` finds the end of a step, `project` puts it onto the
+constraints. `next_singular` and `locate` look for singular positions.
 
-At a passing singular position a combination z^T g of the constraints loses its gradient, G^T z = 0, while the motion
-carries it through zero: B = d(G^T z)/dt != 0. Two branches cross there. The motion continues on the one its velocity
-selects: z^T G v = 0 holds the position to it, z^T g'' = 0 its velocity, and both are linear in the direction B. All
-rows that pass at the same moment take part, however many loops pass.
+The step length follows from the last two coefficients (Jorba & Zou, Exp. Math. 14 (2005) 99-117): |q_N| h^N <=
+tolerance, in units of the coordinates. Forces within the step are checked against their series.
 
-A series started at the distance d from a singular position amplifies round-off by (h/d)^N beyond it, so a step never
-crosses one: it ends there, and the next one is expanded there with the bordered equations of `series.recurrences`.
+At a singular position that is passed, a combination z^T g of the constraints loses its gradient, G^T z = 0. The
+gradient passes through zero there: B = d(G^T z)/dt != 0. Two branches cross. The motion continues on the one that its
+velocity selects. The condition z^T G v = 0 keeps the position on it, z^T g'' = 0 the velocity; both are linear in the
+direction B. All rows that become singular at the same time take part, of any number of loops.
+
+A series that starts at the distance d from a singular position amplifies round-off by (h/d)^N beyond it, so no step
+crosses one. The step ends there, and the next one is expanded there with the bordered equations of
+`series.recurrences`.
 """
 
 from __future__ import annotations
@@ -288,9 +290,9 @@ def row_square(tb: Equations, w: Work, r: int) -> float:
 def next_singular(tb: Equations, w: Work, run: Run, v: Array, low: float, high: float) -> tuple[float, int]:
     """Estimate the first singular position from here within low < sign tau < high.
 
-    It is judged from all small pivots. For each such row z = S^-1 e_row, p = G^T z. It stands on the gradients of all
-    other rows, so only the part of B = dG^T/dt z across them moves it: what is left of B without all rows, and the part
-    along p. Were the row's passing to remove p, most of that part would be along p.
+    It is judged from all small pivots. For each such row z = S^-1 e_row, p = G^T z. The vector is orthogonal to the
+    gradients of all other rows, so only the part of B = dG^T/dt z across them changes it. This is the part of B
+    orthogonal to all rows, plus the part along p. If the row is to become singular, most of that part is along p.
 
     Parameters
     ----------
@@ -491,10 +493,10 @@ def time_to_singular(tb: Equations, w: Work, p: int) -> float:
 def locate(tb: Equations, w: Work, run: Run, t: float, guess: float, reach: float, where: int) -> tuple[int, float]:
     """Find the passing singular position near a guess, and the rows that pass together there.
 
-    Newton on: regular rows of g = 0, z^T G v = 0, and time such that B . G^T z = 0. It is a true crossing when z^T g
-    vanishes there too; a near miss (rod a little longer than the crank) leaves a residual and is integrated as usual.
-    All rows that pass at the same moment take part: those with pivots below `TOGETHER` near the singular position of
-    the first one, less those that keep a gradient where the others have none.
+    Newton on: regular rows of g = 0, z^T G v = 0, and time such that B . G^T z = 0. It is a true crossing if z^T g
+    vanishes there, too. A near miss (rod a little longer than the crank) has a residual and is integrated as usual. All
+    rows that become singular at the same time take part. These are the rows with pivots below `TOGETHER` near the
+    singular position of the first one. Rows that keep a gradient there are excluded.
 
     Parameters
     ----------
@@ -635,11 +637,11 @@ def _split(tb: Equations, w: Work, count: int, where: int) -> bool:
 
 
 def exchange(tb: Equations, w: Work, count: int) -> int:
-    """Number of singular rows that are left when every redundant row that has a gradient of its own here takes the
-    place of a row that lost its.
+    """Replace rows without gradient by redundant rows that have one here; return the number of singular rows left.
 
-    Which row of a dependent set may be left out changes along the motion: without the x-row of one of three parallel
-    cranks, what is left loses rank where that crank's end moves along x, though the mechanism is regular there.
+    Which row of a dependent set may be left out changes along the motion. An example is three parallel cranks without
+    the x-row of one. The remaining rows lose rank where the end of that crank moves along x, although the mechanism is
+    regular there.
     """
     border = w.border
     for row in range(w.base.shape[0]):
@@ -815,8 +817,8 @@ def _land(tb: Equations, w: Work, run: Run, state: Array, h: float, close: float
 
     The state there is in w.qn, w.vn.
 
-    A singular position ahead within `close` (0.7 of the last step) is landed on even when |h| is shorter: so close to
-    it, round-off in the last coefficients and not the motion sets |h|.
+    A step ends on a singular position within `close` (0.7 of the last step) even if |h| is shorter. So close to it, |h|
+    is determined by round-off in the last coefficients, not by the motion.
     """
     t, ahead, row, sign = state[TIME], state[AHEAD], int(state[ROW]), run.sign
     base = w.base
@@ -861,8 +863,8 @@ def _land(tb: Equations, w: Work, run: Run, state: Array, h: float, close: float
 def _defect(tb: Equations, w: Work, run: Run, t: float, h: float, singular: int) -> float:
     """Return the largest error of the series within the step h by the forces there, in units of the coordinates.
 
-    Terms of a series do not show what is too small to be in them: tanh(100) is 1 to the last digit, but it is none
-    of its neighbours'. The factor is that at the end of the step, with `singular` rows.
+    A series does not contain changes that are below the rounding of its terms. For example, the series of tanh about
+    100 is the constant 1, but tanh is not. The factor is that at the end of the step, with `singular` rows.
     """
     program = tb.program
     P, F, code, switches = w.P, w.F, program.code, program.switches

@@ -1,7 +1,7 @@
-"""Integration in modal coordinates: y'' = -omega^2 y - C y' + W^T phi(t, W y, W y').
+"""Integrate in modal coordinates: y'' = -omega^2 y - C y' + W^T phi(t, W y, W y').
 
-The only force is a `LocalForce` whose law has a series; so the motion is a Taylor series of up to `ORDER` terms, in a
-compiled loop.
+The only force is a `LocalForce` whose law has a series. The motion is therefore a Taylor series of up to `ORDER` terms,
+in a compiled loop.
 """
 
 from __future__ import annotations
