@@ -39,6 +39,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
+from ...base.cache import cached_arrays, source_hash, versions
 from ...base.progress import Stopwatch, one_thread
 from ...base.typing import Array
 from ...fem.extruded import (
@@ -66,6 +67,8 @@ BEYOND_ORDER, BEYOND_MODULES = 3, 1.0
 LEAST_LENGTH = 0.5
 #: Mesh cycles beyond both ends of the path of contact within which tips may bear.
 TIPS = 0.7
+#: Packages and modules whose text decides kept gears and laws of pairs.
+SOURCES = ("fem", "gears/contact", "gears/geometry", "gears/teeth", "gears/width/compliance", "gears/width/mesh")
 
 
 @dataclass(frozen=True)
@@ -269,13 +272,34 @@ def loads_of(mesh: WideMesh, gear: int, system: AxialSystem, points: Array, noda
 
 def _wide_flank(mesh: WideMesh, gear: int, sector: SectorMesh, whole: bool) -> WideFlank:
     section, material = mesh.gears[gear], mesh.materials[gear]
-    integrals = section_integrals(sector.points, sector.triangles, material, mesh.turns[gear])
-    flank, n, steps = flank_of(sector, 4), mesh.count, _steps(mesh)
+    flank, n = flank_of(sector, 4), mesh.count
     face = face_of(section)
     stations, bumps, nodal = stations_of(flank, float(face.arc[0]), section.module)
+    k = len(stations)
+    recipe = {"mesh": mesh, "gear": gear, "whole": whole, "code": [source_hash(*SOURCES), versions()]}
+    influence: Array = cached_arrays(
+        "wide-gear", recipe, lambda: {"influence": _condensed(mesh, gear, sector, nodal, whole)}
+    )["influence"]
+    inverse = material.contact_compliance("strain") / math.cos(mesh.base_helix_angle)
+    corner, wedge = corner_of(face)
+    length = max(2 * math.exp(-np.euler_gamma) * mesh.width / (math.pi * n), LEAST_LENGTH * mesh.module)
+    bare = FlankCompliance(face, inverse, corner, wedge, stations, bumps, {})
+    every = np.kron(np.ones((k, k)), 2 / math.pi * np.eye(2) + wedge)
+    bracket = inverse * (local_bracket(bare) - math.log(length) * every)
+    for a in range(n):
+        influence[0, :, :, a, :, :, a] += bracket.reshape(k, 2, k, 2)
+    even = influence[0, :, :, 0, :, :, 0].reshape(2 * k, 2 * k) + inverse * math.log(length) * every
+    local = FlankCompliance(face, inverse, corner, wedge, stations, bumps, {0: even / mesh.width})
+    return WideFlank(local, influence, length)
+
+
+def _condensed(mesh: WideMesh, gear: int, sector: SectorMesh, nodal: Array, whole: bool) -> Array:
+    """Return the finite-element part of the influences of a flank (m/N), as in `WideFlank`."""
+    section, material = mesh.gears[gear], mesh.materials[gear]
+    integrals = section_integrals(sector.points, sector.triangles, material, mesh.turns[gear])
+    flank, n, steps, k = flank_of(sector, 4), mesh.count, _steps(mesh), len(nodal)
     bore = np.unique(sector.boundaries["bore"])
     sides = np.concatenate([sector.cut_right[:-1], sector.cut_left[:-1]])  # the last node of a cut lies on the bore
-    k = len(stations)
     influence = np.zeros((steps + 1, k, 2, n, k, 2, n))
     for system in axial_systems(mesh, gear):
         factor = condense_extruded(
@@ -296,17 +320,7 @@ def _wide_flank(mesh: WideMesh, gear: int, sector: SectorMesh, whole: bool) -> W
         of_steps[0] += eliminated.T @ eliminated
         shape = k, 2, loads.shape[-1]
         influence[:, :, :, chosen, :, :, chosen] = of_steps.reshape(-1, *shape, *shape)
-    inverse = material.contact_compliance("strain") / math.cos(mesh.base_helix_angle)
-    corner, wedge = corner_of(face)
-    length = max(2 * math.exp(-np.euler_gamma) * mesh.width / (math.pi * n), LEAST_LENGTH * mesh.module)
-    bare = FlankCompliance(face, inverse, corner, wedge, stations, bumps, {})
-    every = np.kron(np.ones((k, k)), 2 / math.pi * np.eye(2) + wedge)
-    bracket = inverse * (local_bracket(bare) - math.log(length) * every)
-    for a in range(n):
-        influence[0, :, :, a, :, :, a] += bracket.reshape(k, 2, k, 2)
-    even = influence[0, :, :, 0, :, :, 0].reshape(2 * k, 2 * k) + inverse * math.log(length) * every
-    local = FlankCompliance(face, inverse, corner, wedge, stations, bumps, {0: even / mesh.width})
-    return WideFlank(local, influence, length)
+    return influence
 
 
 def _over_width(mesh: WideMesh, functions: AxialFunctions) -> Array:

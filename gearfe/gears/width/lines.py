@@ -113,7 +113,7 @@ class ContactLines:
 def contact_lines(
     compliance: WideCompliance, flanks: WideFlanks | None = None, *, density: float = POINTS_PER_FUNCTION
 ) -> ContactLines:
-    """Prepare elastic gears with their flanks for positions: about a second for new profiles.
+    """Prepare elastic gears with their flanks for positions: seconds for new profiles, then from the cache.
 
     Parameters
     ----------

@@ -32,12 +32,13 @@ up to 0.6 % beyond the path of contact.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
+from ...base.cache import cached_arrays, source_hash, versions
 from ...base.errors import InputError
 from ...base.progress import one_thread
 from ...base.typing import Array, ComplexArray
@@ -46,7 +47,7 @@ from ..contact.half_plane_pair import HalfPlanePair
 from ..geometry.face import ToothDeviations
 from ..geometry.first_contact import FirstContacts, ToothFlanks
 from ..geometry.validity import MOST_YIELD
-from .compliance import TIPS, WideCompliance
+from .compliance import SOURCES, TIPS, WideCompliance
 from .mesh import WideMesh
 
 #: Intervals of the table over the pair angle. Linear between its marks, 501 err by 0.04 % of the transmission error,
@@ -127,13 +128,38 @@ class PairLaw:
 
 
 def pair_law(compliance: WideCompliance, profiles: tuple[ToothDeviations, ToothDeviations]) -> PairLaw:
-    """Return the law of a tooth pair whose flanks have the profiles of the first teeth.
+    """Return the law of a tooth pair whose flanks have the profiles of the first teeth; from the cache if it is there.
+
+    Parameters
+    ----------
+    compliance : WideCompliance
+        The gears.
+    profiles : pair of ToothDeviations
+        Profiles of pinion and wheel.
 
     Raises
     ------
     InputError
         For flanks whose contact is not solved at most loads.
     """
+    names = [entry.name for entry in fields(PairLaw)]
+    recipe = {
+        "mesh": compliance.mesh,
+        "profiles": profiles,
+        "influence": [side.influence for side in compliance.sides],
+        "code": [source_hash(*SOURCES, "gears/width/pair_law"), versions()],
+    }
+
+    def make() -> dict[str, Array]:
+        law = _solved_law(compliance, profiles)
+        return {name: np.asarray(getattr(law, name)) for name in names}
+
+    arrays = cached_arrays("pair-law", recipe, make)
+    low, high = arrays["path"].tolist()
+    return PairLaw(**arrays | {"path": (low, high), "forward": complex(arrays["forward"])})
+
+
+def _solved_law(compliance: WideCompliance, profiles: tuple[ToothDeviations, ToothDeviations]) -> PairLaw:
     mesh = compliance.mesh
     pair, cycle = mesh.sections, mesh.sections.mesh_cycle
     teeth = first_teeth(mesh, profiles)
