@@ -1,9 +1,9 @@
 """Keep computed objects on disk: meshes, condensed gears, curves, laws, reduced housings, compiled kernels.
 
 An entry is a file named by its kind and a hash of everything that decides it: geometry, sizes, versions as plain data.
-Entries are written whole under a temporary name and renamed, so two processes that make the same do no harm; one that
-cannot be read, is cut short or belongs to another key is ignored and written again. A folder that cannot be written to
-costs only the keeping. Entries that were not used for the longest time go when all together exceed a limit.
+Entries are written completely under a temporary name and renamed, so two processes may write the same entry. An entry
+that cannot be read, is truncated or belongs to another key is ignored and written again. A folder that cannot be
+written to costs only the keeping. Entries that were not used for the longest time go when all together exceed a limit.
 """
 
 from __future__ import annotations

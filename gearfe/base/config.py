@@ -179,9 +179,9 @@ def build(cls: type[T], table: Any, where: str, *, rules: bool = True) -> T:
     """Frozen dataclass `cls` from a parsed TOML table; `where` is the table's name for messages.
 
     Understands ``int``, ``float``, ``bool``, ``str``, ``X | None``, ``tuple[X, ...]``, fixed tuples, ``dict[str, X]``,
-    and nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields (left out
-    without `rules`), and ``REMOVED``: removed key -> what became of it, and what to write instead (see `Removed`); and
-    ``SHORT``: the key that a text instead of the table stands for.
+    and nested dataclasses. A dataclass may define ``check(self, where)`` for rules that join several fields (not
+    checked without `rules`). ``REMOVED`` maps each removed key to its replacement (see `Removed`). ``SHORT`` is the key
+    whose value may replace the whole table as a text.
 
     Raises
     ------

@@ -1,10 +1,10 @@
 """Arithmetic expressions of job files: one syntax, one table of functions and constants, never run as code.
 
-The syntax is Python's: numbers, ``+ - * / **``, the constants and functions below, and the names of a `Names`: plain
-ones (``time``), those of something (``x(rod.tip)``) and tables (``cam(time)``). Where names are columns of tables,
-there are also ``table.column``, texts, comparisons, ``&`` and ``|`` between these, ``[...]`` with a number, a text or a
-comparison, and functions that make one number of a column. `parse` makes a tree of `Node`; `compute` gives its value
-for numbers and arrays alike.
+The syntax is Python's: numbers, ``+ - * / **``, the constants and functions below, and the names of a `Names`. These
+are plain names (``time``), quantities of a part (``x(rod.tip)``) and tables (``cam(time)``). If names are columns of
+tables, there are also ``table.column``, texts, comparisons, and ``&`` and ``|`` between these. ``[...]`` takes a
+number, a text or a comparison. Functions reduce a column to one number. `parse` makes a tree of `Node`; `compute` gives
+its value for numbers and arrays alike.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """Keep code and settings that lie in the working folder out of the program, its libraries and its child processes.
 
 A job is often run in the folder in which it arrived, beside files of strangers. Python imports modules from there in
-these cases: ``python -m`` and ``python -c`` put the working folder first on the path of modules, a relative or empty
-entry of ``PYTHONPATH`` means it, and child processes do so again (multiprocessing starts its own by ``python -c``).
+three cases. ``python -m`` and ``python -c`` put the working folder first on the path of modules. A relative or empty
+entry of ``PYTHONPATH`` refers to it. Child processes repeat both (multiprocessing starts them by ``python -c``).
 Libraries read settings there: matplotlib ``matplotlibrc``, numba ``.numba_config.yaml``, ezdxf ``ezdxf.ini``.
 
-What Python itself loads before the first line of the program is out of reach: some modules of the standard library for
-``python -m gearfe``, and ``encodings`` and ``sitecustomize`` with a relative ``PYTHONPATH``. Without such an entry, the
-program ``gearfe`` and ``python -P -m gearfe`` have no such gap.
+The program cannot protect modules that Python loads before its first line. These are some modules of the standard
+library for ``python -m gearfe``, and ``encodings`` and ``sitecustomize`` with a relative ``PYTHONPATH``. Without such
+an entry, the program ``gearfe`` and ``python -P -m gearfe`` have no such gap.
 
 This module and the package's first lines import nothing that is not loaded already, not even ``__future__``.
 """

@@ -7,8 +7,8 @@ The A-weighting is the rational function of IEC 61672-1, annex E, (E.6):
 
 .. math:: A(f) = 20 \lg \frac{f_4^2 f^4}{(f^2 + f_1^2)\sqrt{(f^2 + f_2^2)(f^2 + f_3^2)}\,(f^2 + f_4^2)} - A_{1000} .
 
-Each line of a spectrum is weighted at its own frequency, and belongs to the band that holds it, whole: the sum over the
-bands is that over the lines. Where the resolution is wider than a band, some bands hold no line.
+Each line of a spectrum is weighted at its own frequency and belongs completely to the band that holds it. The sum over
+the bands is therefore that over the lines. Where the resolution is wider than a band, some bands hold no line.
 """
 
 from __future__ import annotations

@@ -324,8 +324,8 @@ class Stopwatch:
 def one_thread() -> Iterator[None]:
     """Hold the BLAS libraries of this process at one thread, and give them back their number afterwards.
 
-    The fronts of a tooth sector have a few hundred unknowns: there, the threads of a BLAS library wait for one another
-    more than they work (measured on two busy cores: 25 times slower than one thread).
+    The fronts of a tooth sector have a few hundred unknowns. At this size the threads of a BLAS library mostly wait for
+    each other (measured on two busy cores: 25 times slower than one thread).
     """
     from threadpoolctl import threadpool_limits
 

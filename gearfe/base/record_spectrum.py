@@ -6,14 +6,14 @@ For a record from :math:`t_0` to :math:`t_0 + T` with the window w of mean :math
     \hat x_k = \frac{2}{T \bar w}\int_0^T w\, x\, e^{-2\pi i f_k t}\,dt, \qquad f_k = k/T \le \frac{1}{2 h},
 
 half of it for the constant. The output step h only says up to where there are lines. The integral is the trapezoidal
-sum over samples m times as fine as the output (`samples_per_step`), which is exact for a record that repeats; for one
-that ends elsewhere than it began, the ramp between its ends is integrated exactly.
+sum over samples m times as fine as the output (`samples_per_step`), which is exact for a periodic record. If a record
+ends with another value than it began with, the ramp between its ends is integrated exactly.
 
 Samples may come piece by piece: they pass a linear-phase low-pass filter (a sinc with a Kaiser window; Oppenheim &
-Schafer, Discrete-Time Signal Processing, Sec. 7.5) and every (m/2)-th is kept, twice the output's number in all. What
-lies above three times the output's Nyquist frequency, which alone would fold below it, is weakened by 140 dB; what the
-filter does to lines below it is divided out. Its reach beyond the ends is wrapped round, as the coefficients of a
-record are those of its periodic continuation, so the filter has no transient either.
+Schafer, Discrete-Time Signal Processing, Sec. 7.5) and every (m/2)-th is kept, twice the output's number in all. Only
+components above three times the output's Nyquist frequency would be aliased below it; the filter reduces them by 140
+dB. Its effect on lines below the Nyquist frequency is divided out. Beyond its ends the record is continued
+periodically, because its coefficients are those of the periodic continuation. The filter therefore has no transient.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ For N samples :math:`x_n` at the step h and a window :math:`w_n` with mean :math
 
 with :math:`c_k = 2`, but 1 for the constant (k = 0) and, when N is even, for the Nyquist frequency (k = N/2): a
 constant c gives c at 0 Hz, a sine of amplitude A on a bin gives A there. Dividing by :math:`\bar w` keeps amplitudes
-right for every window (coherent gain); sums of squares over a band are divided by the window's noise bandwidth
+right for every window (coherent gain). Sums of squares over a band are divided by the window's noise bandwidth
 :math:`B = \overline{w^2}/\bar w^2` in bins (F. J. Harris, Proc. IEEE 66, 1978, Sec. IV).
 """
 

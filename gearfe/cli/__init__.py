@@ -1,7 +1,7 @@
 """Commands of the ``gearfe`` program, one module each, of the command's name.
 
-A command module provides ``add_arguments(parser)`` and ``run(args) -> int`` (0 done, 1 done but some part failed and is
-marked as such in the output, 2 is kept for bad input). It imports what it needs inside ``run``, and is itself imported
+A command module provides ``add_arguments(parser)`` and ``run(args) -> int``. It returns 0 if done, and 1 if some part
+failed, which the output marks. 2 is kept for bad input. It imports what it needs inside ``run``, and is itself imported
 only when that command runs or prints its help.
 """
 

@@ -1,8 +1,8 @@
 """What commands share: their parser, options, and what they print. What follows an option belongs to it where it can.
 
 ``argparse`` hands everything up to the next option to one that takes any number of values, so that
-``--fields JOB.toml`` leaves no job. Here such an option takes the values that its type accepts; one that takes any text
-gives the last ones back while a positional argument is missing.
+``--fields JOB.toml`` leaves no job. Here such an option takes the values that its type accepts. An option for any text
+returns its last values while a positional argument is missing.
 """
 
 from __future__ import annotations

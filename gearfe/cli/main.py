@@ -37,8 +37,9 @@ INTERRUPTED, CLOSED = 130, 141
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C.
 
-    Not KeyboardInterrupt itself: where that one leaves source text that is executed, and standard modules make their
-    classes so, CPython ends the process by the signal, whatever handles it later (``run_eval_code_obj``).
+    KeyboardInterrupt itself is not raised. Standard modules execute source text to make their classes. If
+    KeyboardInterrupt leaves such text, CPython ends the process by the signal, whatever handles it later
+    (``run_eval_code_obj``).
     """
 
 

@@ -16,9 +16,9 @@ the others those of v in the plane: :math:`\varepsilon = B_0 u + B_1 u_{,z}` wit
     K = A_{00}\otimes M + A_{01}\otimes C + A_{01}^T\otimes C^T + A_{11}\otimes S, \qquad
     A_{ij} = \int B_i^T E B_j, \quad M, C, S = \int\chi\chi,\ \int\chi\chi',\ \int\chi'\chi' .
 
-Nothing is integrated over the volume. Free ends are natural conditions. v and w may have different functions: without
-any for w and one constant for v, this is plane strain; of a prism that is symmetric about its middle, v even with w odd
-and v odd with w even are two systems of half the size each.
+Nothing is integrated over the volume. Free ends are natural conditions. v and w may have different functions. With one
+constant for v and none for w, this is plane strain. A prism that is symmetric about its middle has two separate systems
+of half the size: v even with w odd, and v odd with w even.
 
 Sections are six-node triangles; a node has the unknowns of v along x, of v along y, then of w. Kronecker products of
 arrays by NumPy: `scipy.sparse.kron` keeps zeros and orders the unknowns of a node apart.

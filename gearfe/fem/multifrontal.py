@@ -8,9 +8,9 @@ and what fronts before it left over for them, eliminates them and leaves an upda
 
 (the multifrontal method: Duff, Reid, ACM Trans. Math. Softw. 9, 1983; Liu, SIAM Review 34, 1992). Every step is one
 dense kernel of LAPACK or BLAS, and a solve with many right-hand sides reads the factor twice, however many there are.
-Where the last unknowns r are retained, what the fronts leave of their rows is the Schur complement
-:math:`A_{rr} - A_{re} A_{ee}^{-1} A_{er}` of the eliminated ones e; the backward pass recovers these, the forward pass
-takes loads on them to the retained ones.
+If the last unknowns r are retained, the fronts leave the Schur complement :math:`A_{rr} - A_{re} A_{ee}^{-1} A_{er}` of
+the eliminated ones e in their rows. The backward pass recovers the eliminated unknowns. The forward pass transfers
+loads on them to the retained ones.
 
 The unknowns of a mesh node stay together. Which nodes are a front: here by bisection of a mesh's elements (nested
 dissection: George, SIAM J. Numer. Anal. 10, 1973), for sparse matrices see `gearfe.fem.reduction.sparse_solver`.

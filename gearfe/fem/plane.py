@@ -7,10 +7,10 @@ Find :math:`u` with :math:`-\nabla\cdot\sigma(u) = 0`,
 :math:`w\int\sigma(u):\varepsilon(v)`, is `element_stiffness`: strains and stresses of the shape functions, and their
 product in space and over the quadrature points. Shape functions and quadrature are scikit-fem's.
 
-The form itself is a batched product of arrays, because a `BilinearForm` takes 6.4 times as long: 0.185 s and 0.029 s of
-processor time for 4,248 triangles in both sectors of a pair (scikit-fem 12.0.2, NumPy 2.4.6). That would be half of the
-0.30 s for 40 positions. Finite strain by scikit-fem's tensor products takes twice as long, 5 % of 40 positions.
-`tests/fem/test_plane_forms.py` compares stiffness, stresses and finite strain with forms.
+The form itself is a batched product of arrays, because a `BilinearForm` takes 6.4 times as long. For 4,248 triangles in
+both sectors of a pair it takes 0.185 s of processor time, the product 0.029 s (scikit-fem 12.0.2, NumPy 2.4.6). The
+former would be half of the 0.30 s for 40 positions. Finite strain by scikit-fem's tensor products takes twice as long,
+5 % of 40 positions. `tests/fem/test_plane_forms.py` compares stiffness, stresses and finite strain with forms.
 """
 
 from __future__ import annotations
@@ -285,10 +285,10 @@ def finite_strain_rates(
 
     With the Green strain :math:`E = \varepsilon + \eta`, :math:`\eta = \tfrac12\nabla u^T\nabla u`, a Saint
     Venant-Kirchhoff body stores :math:`\Delta W = \int \sigma(\varepsilon):\eta + \tfrac12\,\eta:C:\eta` more than the
-    linear one. The second term is of the order of what the body gives back when u adjusts itself to the first, and the
-    two cancel where they are large (in a body that hardly changes its volume, lambda tr(eta) would be the pressure that
-    keeps it from doing so). So the energy of first order is the first term alone; with :math:`\tau = C:\eta` and u'
-    the rate of u,
+    linear one. The second term is left out. When u adjusts to the first term, the energy falls by a term of the same
+    order, and the two cancel where they are large. In a nearly incompressible body, lambda tr(eta) would be the
+    pressure that keeps the volume constant. So the energy of first order is the first term alone; with
+    :math:`\tau = C:\eta` and u' the rate of u,
 
     .. math:: \Delta W' = \int \big(\tau + \nabla u\,\sigma(\varepsilon)\big) : \nabla u'.
 

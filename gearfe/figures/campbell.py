@@ -254,8 +254,8 @@ def _label_orders(
 ) -> None:
     """Names of orders where their lines leave the picture.
 
-    At the right end one that would stand on another's goes back along its line; at the top that one, and one that would
-    stand left of the picture, is left out.
+    At the right end, a label that would overlap another one moves back along its line. At the top it is left out, as is
+    one left of the picture.
     """
     taken = low  # no label leaves the picture
     before, back, width = math.inf, 0.0, 0.0

@@ -172,8 +172,8 @@ def _contacts(flank: FlankPressure) -> list[IntArray]:
 def ellipse(place: Array, pressure: Array) -> tuple[Array, Array]:
     """Hertz's semi-ellipse with the force and the second moment of a pressure at rising places, as points of a line.
 
-    With the mean m and the variance v of the places under p it reaches from m - b to m + b, b = 2 sqrt(v), and its peak
-    is 2 int p / (pi b) (Johnson, *Contact Mechanics*, 1985, eqs. 4.43 to 4.45).
+    With the mean m and the variance v of the positions weighted by p it reaches from m - b to m + b, b = 2 sqrt(v). Its
+    peak is 2 int p / (pi b) (Johnson, *Contact Mechanics*, 1985, eqs. 4.43 to 4.45).
     """
     load = pressure * np.gradient(place)
     force = load.sum()

@@ -1,7 +1,7 @@
 """Picture and animation of gears in their housing, drawn by VTK in a separate process.
 
-Off-screen drawing crashes the interpreter where a machine lacks the graphics libraries: in a second process that costs
-a picture and a message, not the results. The animation is a GIF, put together by Pillow.
+Off-screen drawing crashes the interpreter if a machine lacks the graphics libraries. In a second process this costs
+only a picture and gives a message. The animation is a GIF, put together by Pillow.
 """
 
 from __future__ import annotations

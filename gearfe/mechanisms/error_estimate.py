@@ -1,11 +1,11 @@
 """Estimate the error of a run from two more runs with finer steps and perturbed starts.
 
-With an error that falls with the tolerance, the difference to a finer run is the error of the coarser one up to the
-share of the finer one, 1/`SHARPER`. Rounding does not fall with the tolerance, and runs share part of it. It is
-measured by disturbing the start: each of N steps rounds a coordinate or velocity of size s by about eps s, which adds
-up like a random walk to eps s sqrt(N); put in at the start it has the whole run to grow. Both signs of the disturbance
-are run, because the larger of |e + d| and |e - d| is |e| + |d|: the difference e and the response d to the disturbance
-cannot cancel. A factor of `SAFETY` stands for what the runs share.
+The error falls with the tolerance. The difference to a finer run is therefore the error of the coarser run, except for
+the share of the finer one, 1/`SHARPER`. Rounding does not fall with the tolerance, and runs share part of it. It is
+measured by disturbing the start. Each of N steps rounds a coordinate or velocity of size s by about eps s, which
+accumulates like a random walk to eps s sqrt(N). Applied at the start, this disturbance grows over the whole run. Both
+signs of the disturbance are run, because the larger of |e + d| and |e - d| is |e| + |d|. The difference e and the
+response d to the disturbance thus cannot cancel. A factor of `SAFETY` stands for what the runs share.
 """
 
 from __future__ import annotations

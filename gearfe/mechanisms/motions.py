@@ -2,8 +2,8 @@
 
 A piece [a, b] has the polynomial through f at the Chebyshev points of degree `DEGREE`. It is kept where its last two
 Chebyshev coefficients are rounding (`ROUNDING` times the largest value of f), and halved elsewhere (L. N. Trefethen,
-Approximation Theory and Approximation Practice, SIAM 2013, chapters 4 and 8). For f with a jump in itself or in a
-derivative the halving does not end; such a motion would make a speed or an acceleration jump, and is refused.
+Approximation Theory and Approximation Practice, SIAM 2013, chapters 4 and 8). If f or a derivative jumps, the halving
+does not end. Such a motion would make a speed or an acceleration jump, and is refused.
 """
 
 from __future__ import annotations

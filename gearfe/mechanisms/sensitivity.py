@@ -4,13 +4,13 @@ With D(h) = (y(p + h) - y(p - h)) / (2 h) = y' + c2 h^2 + c4 h^4 + ... at h, h/2
 
     A_j0 = D(h / 2^j),        A_ji = A_j,i-1 + (A_j,i-1 - A_j-1,i-1) / (4^i - 1)
 
-takes one power of h after the other away, and every entry has the larger of its differences to the two that it is made
-of as its error: large steps leave powers of h, small ones the integrator's errors divided by h, and the entry of the
-least error is neither; twice its error is the estimate (Ridders, Adv. Eng. Software 4 (1982) 75-76; Press et al.,
+removes one power of h after the other. The error of an entry is the larger of its differences to the two entries from
+which it follows. Large steps leave powers of h, small ones the integrator's errors divided by h; the entry with the
+least error is taken. Twice its error is the estimate (Ridders, Adv. Eng. Software 4 (1982) 75-76; Press et al.,
 Numerical Recipes, Sec. 5.7).
 
-Runs with the same steps make the same error, whose slope no difference of them shows: the largest step is solved once
-more with a thirtieth of the tolerance, and what that changes is a part of the estimate.
+Runs with the same steps have the same error, and its slope does not show in their differences. The largest step is
+therefore solved again with a thirtieth of the tolerance; the change is a part of the estimate.
 """
 
 from __future__ import annotations

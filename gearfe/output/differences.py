@@ -1,22 +1,23 @@
-r"""Differences of the results of two or three runs of one kind, with the errors of the differences.
+r"""Compute the differences of two or three runs of one kind, with the errors of the differences.
 
-An error of a number n is known as *changes*: by how much n moves, signed, where a source of error is changed by its
-estimate, e.g. the housing softened by what its mesh is too stiff. Of two runs a and b with the same source, the
-difference n_b - n_a moves by the difference of the changes, so
+An error of a number n is known as *changes*: the signed changes of n when a source of error is changed by its estimate.
+An example is the housing softened by the error of its mesh. If two runs a and b have the same source, the difference
+n_b - n_a changes by the difference of the changes, so
 
 .. math:: e(n_b - n_a) = \sum_s \max_r |\Delta_{s,r} n_b - \Delta_{s,r} n_a|
 
-over the sources s and the changed runs r. A mesh that is 1 % too stiff in both leaves a difference of 5 % nearly alone,
-where the sum of both errors would be 2 %. By source:
+over the sources s and the changed runs r. A mesh that is 1 % too stiff in both runs hardly changes a difference of 5 %;
+the sum of both errors would be 2 %. By source:
 
 - changes of both runs, and a common source: the largest difference of the changes;
-- a common source, but only sizes are known (bounds of a reduction, files of older versions): the larger of both errors,
-  which covers the difference of two errors of one sign;
+- a common source of which only sizes are known (bounds of a reduction, files of older versions): the larger of both
+  errors. It covers the difference of two errors of one sign;
 - other sources (integration, start; housings or meshes that differ): the sum of both.
 
-The source ``gear mesh`` of a stiffness curve is common in this sense always: the changes are corrections by
-Richardson's extrapolation (`gearfe.gears.gearmesh.positions`), those of each run on meshes of its own, twice, on phases
-of the mesh cycle. An error that is unknown in either run leaves that of the difference unknown.
+The source ``gear mesh`` of stiffness curves is always common in this sense. Its changes are corrections by Richardson's
+extrapolation (`gearfe.gears.gearmesh.positions`), each on the meshes of its run. The error of the difference is twice
+their largest difference over the phases of the mesh cycle. If an error is unknown in either run, that of the difference
+is unknown.
 """
 
 from __future__ import annotations

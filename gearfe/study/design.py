@@ -83,7 +83,7 @@ def saltelli(points: Array) -> Array:
 def trajectories(count: int, d: int, rng: np.random.Generator) -> Array:
     """Points of Morris's trajectories in the unit cube, (count (d + 1), d).
 
-    Each begins on a random point of a grid and changes one coordinate after the other, in random order, by half of the
+    Each begins at a random point of a grid. It changes one coordinate after the other, in random order, by half of the
     levels (Morris, Technometrics 33 (1991) 161, section 3). Levels stand at (i + 1/2) / `LEVELS`, for distributions may
     have no ends.
     """

@@ -1,7 +1,7 @@
 """One case of each kind of job, in this process: tables of a job in, tables and summary out.
 
-What cases share is made once: a `Shared` keeps the condensed gears and the root meshes of
-the last pair, so that cases which differ in load or microgeometry alone cost positions only.
+Objects that cases share are computed once. A `Shared` keeps the condensed gears and the root meshes of the last pair,
+so cases that differ only in load or microgeometry only cost positions.
 """
 
 from __future__ import annotations

@@ -102,8 +102,9 @@ def interrupted_line(search: Search) -> str:
 
 
 def optimum(search: Search) -> Optimum:
-    """Differential evolution, Nelder's and Mead's method from the best of its points on, and the points within the
-    tolerances, together at most as many as the study's `cases`, however few that may be for the first population.
+    """Differential evolution comes first, then the Nelder-Mead method from the best of its points, then the points
+    within the tolerances. Together they are at most the study's `cases`, unless these are too few for the first
+    population.
 
     Raises
     ------

@@ -1,9 +1,9 @@
 """The cases of a study, one after the other, on processes, or on any executor; finished ones are handed on in groups.
 
 Groups take about `GROUP_SECONDS`, so that handing over and storing cost little; a kill loses no more than that. The
-cases of groups that never come back run again one by one, with nothing beside them, so that it is known whose fault a
-death is, `AGAIN` times at most. Processes that end as they start say nothing about cases: they are replaced.
-Where a case runs changes no digit of its row.
+cases of groups that never return run again one by one, at most `AGAIN` times. Nothing else runs then, so the case that
+ends a process is known. Processes that end as they start say nothing about cases: they are replaced. Where a case runs
+changes no digit of its row.
 """
 
 from __future__ import annotations
@@ -203,8 +203,8 @@ def processes(workers: int) -> Executor:
 def _begun(workers: int) -> tuple[Executor, Future[int] | None]:
     """Fresh processes, and a finished future that shows whether they begin.
 
-    No other process starts before: the library hands one that starts as another dies a closed queue, so that it ends
-    with an error of its own and not with the signal that ends the others.
+    No other process starts before. The library gives a process that starts while another one dies a closed queue. Such
+    a process ends with an error instead of the signal that ended the other one.
     """
     pool = processes(workers)
     begun = pool.submit(os.getpid)

@@ -215,8 +215,8 @@ def _number(cell: str) -> float:
 def spread(values: Array) -> dict[str, Any]:
     """Mean, deviation, ends and quantiles of a sample with the intervals that hold the true ones.
 
-    The interval of a quantile lies between two order statistics: how many of n values lie below it is binomial (David &
-    Nagaraja, Order Statistics, 3rd ed., section 7.1), whatever the distribution. It is null where n is too small.
+    The interval of a quantile lies between two order statistics. The number of values below it is binomial for every
+    distribution (David & Nagaraja, Order Statistics, 3rd ed., section 7.1). It is null where n is too small.
     """
     from scipy.stats import binom
 

@@ -141,8 +141,8 @@ class TrainCarrierTable(_Pins, _Named):
 def with_planets(raw: Mapping[str, Any], carriers: Mapping[str, CarrierTable]) -> dict[str, Any]:
     """Return a parsed job in which each planet has its own shaft, gears and meshes: NAME_1, NAME_2, ...
 
-    A shaft with a carrier, the gears on it and their meshes are written once. The first planet is where the file has
-    it, the others are turned about the axis of the carrier; planets that mesh with each other have one number.
+    A shaft with a carrier, the gears on it and their meshes are written once. The first planet has the position in the
+    file, the others are rotated about the axis of the carrier. Planets that mesh with each other have one number.
 
     Parameters
     ----------

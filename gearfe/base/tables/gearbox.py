@@ -2,7 +2,7 @@
 
 A file has [gears.NAME] and [meshes.NAME], or the shorthand of a pair ([pair], [microgeometry]), or the lists of a train
 ([[train.gears]], [[train.meshes]]). `named_gearbox`, `pair_gearbox` and `gearfe.base.tables.train_gearbox` turn them
-into a `Gearbox`; nothing below them knows which of the three it was, except the names of keys in messages.
+into a `Gearbox`. The code below them does not depend on the form of the file, except for the names of keys in messages.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""Table ``[housing]``: a gearbox housing of two bored walls on a base plate with four feet, or a mesh of the user's own
-or a reduced body in its place, and what is made of it.
+"""Define the table ``[housing]``: a parametric gearbox housing, a mesh, or a reduced body.
+
+The parametric housing has two bored walls on a base plate with four feet.
 
 All lengths in millimetres, in one frame: shafts run along y, z points up, the gap between the walls is centred on
 y = 0.

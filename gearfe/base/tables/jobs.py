@@ -1,7 +1,7 @@
 """Job files: which tables there are, and those that a command reads.
 
-A job file may hold the tables of several jobs: a command reads those it needs by `load_job`. Of the others, keys, types
-and ranges are checked, so a misspelt key is an error wherever it stands; the rules that join several keys are not.
+A job file may hold the tables of several jobs: a command reads those it needs by `load_job`. In the others, keys, types
+and ranges are checked, so a misspelt key is an error in any table. Rules that join several keys are not checked.
 """
 
 from __future__ import annotations

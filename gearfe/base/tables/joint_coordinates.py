@@ -1,8 +1,9 @@
 """Links of a mechanism file given by their joints: ``at_m``, the position of a joint at the start, and ``links``.
 
-Each link gets a frame with its origin in the first of its joints (in the order of the file) and the x axis towards the
+The frame of each link has its origin in the first of its joints, in the order of the file. Its x axis points to the
 next joint at another position. Lengths, start poses and points follow. A link whose joints lie on one line is a uniform
-slender rod unless [bodies.NAME] says more: mass m, mass centre in the middle, moment of inertia m L^2 / 12.
+slender rod, unless [bodies.NAME] gives other values. Its mass centre is in the middle, its moment of inertia m L^2 /
+12.
 """
 
 from __future__ import annotations

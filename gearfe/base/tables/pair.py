@@ -1,11 +1,14 @@
-"""The tables [pair] and [stiffness]: a pair of gears, their materials, and how its mesh stiffness is computed, in
-everyday units; which contact laws there are: their names, and where their classes stand. NumPy is not loaded for them.
+"""Define the tables [pair] and [stiffness], and register contact laws by name.
+
+They hold a pair of gears, their materials, and the settings of its mesh stiffness, in the units of job files. NumPy is
+not loaded for them.
 
 Keys of the tooth form may stand in [pair], for both gears, or in [pair.pinion] and [pair.wheel], which then win.
 
-A new law is one class (its contract is in `gears.contact.laws`) and one line: here, or for another package the entry
-point ``name = "module:Class"`` in the group ``gearfe.laws``. Job files, the command line and Python then know it by its
-name; its numbers are the table ``law_parameters``, the option ``--law-parameter``, the fields of the class.
+A new law is one class (its contract is in `gears.contact.laws`) and one line in this module. For another package the
+line is the entry point ``name = "module:Class"`` in the group ``gearfe.laws``. Job files, the command line and Python
+then accept its name. Its parameters are the fields of the class, the table ``law_parameters`` and the option
+``--law-parameter``.
 """
 
 from __future__ import annotations

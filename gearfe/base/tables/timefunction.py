@@ -1,5 +1,7 @@
-"""Functions in job files: of time by points, smoothed steps, sines and a CSV file that add up, or by an expression;
-of speed by points, a CSV file or an expression.
+"""Define functions in job files, of time or of speed.
+
+Functions of time are sums of points, smoothed steps, sines and a CSV file, or an expression. Functions of speed are
+points, a CSV file or an expression.
 """
 
 from __future__ import annotations

@@ -12,9 +12,9 @@ with Cowper's shear factor of a hollow circle, m the ratio of inner and outer di
 .. math:: \kappa = \frac{6(1+\nu)(1+m^2)^2}{(7+6\nu)(1+m^2)^2 + (20+12\nu)m^2} .
 
 **Shape functions.** In an element w has the degree p >= 3 and theta the degree p - 1: linear functions and integrals of
-Legendre polynomials. The exact static solution of a uniform beam between loaded ends (w cubic, theta quadratic, w'
-minus theta constant) is among them for every ratio of shear to bending stiffness; hence statics are exact at the nodes
-and elements do not lock. Mass and polar inertia are consistent. Cones are integrated by Gauss's rule.
+Legendre polynomials. They contain the exact static solution of a uniform beam between loaded ends (w cubic, theta
+quadratic, w' minus theta constant) for every ratio of shear to bending stiffness. Statics are therefore exact at the
+nodes, and elements do not lock. Mass and polar inertia are consistent. Cones are integrated by Gauss's rule.
 
 **Division.** There is a node at every end of a section, disc and station. The degree of an element follows from two
 rates. A wave of wave number k in elements of length h and degree q errs by the part (Ainsworth, SIAM J. Numer. Anal.

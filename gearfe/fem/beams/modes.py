@@ -1,9 +1,9 @@
 r"""Elastic vectors of a free shaft: its modes up to a frequency and the static responses that the modes leave out.
 
-For a family of motions with stiffness K, mass M and M-orthonormal rigid vectors R (K R = 0), the matrix ``K_s = K +
-alpha M R (M R)^T`` is positive definite. Its eigenvectors are the rigid ones, with ``alpha``, and the elastic ones of
-(K, M). They are taken from the largest eigenvalues of ``C^-1 M C^-T``, ``K_s = C C^T``, with the rigid ones taken out:
-low frequencies are then accurate to rounding, however high the highest ones of the elements are.
+For a family of motions with stiffness K, mass M and M-orthonormal rigid vectors R (K R = 0), the matrix
+``K_s = K + alpha M R (M R)^T`` is positive definite. Its eigenvectors are the rigid ones, with ``alpha``, and the
+elastic ones of (K, M). They follow from the largest eigenvalues of ``C^-1 M C^-T``, ``K_s = C C^T``, without the rigid
+ones. Low frequencies are then accurate to rounding, however high the highest ones of the elements are.
 
 **Residual vectors.** A load f with the rigid part removed, ``f - M R R^T f``, deforms the free shaft by ``K_s^-1 (f -
 M R R^T f)`` (inertia relief). What the modes Phi (squares Lambda) leave out of it, ``X = K_s^-1 (...) - Phi
@@ -11,8 +11,8 @@ Lambda^-1 Phi^T f``, is orthogonal to them in M and K. Turned to the principal a
 vectors of unit mass with diagonal stiffness. With all of them, displacements under static loads at the stations are
 exact.
 
-**Error of the elements.** Functions T of two more degrees in each element would lower the square of mode phi by about
-``r^T (T^T K T)^-1 r``, ``r = T^T (K - lambda M) phi``: the first term of a perturbation series.
+**Error of the elements.** Functions T of two more degrees in each element would lower the squared frequency of mode phi
+by about ``r^T (T^T K T)^-1 r``, ``r = T^T (K - lambda M) phi``. This is the first term of a perturbation series.
 """
 
 from __future__ import annotations

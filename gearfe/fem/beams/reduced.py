@@ -1,7 +1,7 @@
 r"""A shaft in few coordinates: rigid motion of the whole rotor, and elastic coordinates of unit mass orthogonal to it.
 
-Coordinates: displacement of the rotor's mass centre along x, y, z (m), small tilts about e1 and e2, spin about the axis
-a (rad), then n elastic coordinates (m kg^1/2), by ascending frequency:
+The first coordinates are the displacement of the rotor's mass centre along x, y, z (m), small tilts about e1 and e2,
+and the spin about the axis a (rad). Then follow n elastic coordinates (m kg^1/2), by ascending frequency:
 
 .. math::
     M = \mathrm{diag}(m, m, m, J_t, J_t, J_p, 1, \dots, 1),\qquad
@@ -19,8 +19,8 @@ e2 and the elastic coordinates of the plane of e1; ``a_k`` holds it at the tilt 
 the elastic ones of the plane of e2.
 
 **How many coordinates.** With a residual vector for each load that acts on the shaft, free modes up to 1.5 times the
-highest frequency of interest suffice; more raise the highest frequency of a train, which sets the steps of explicit
-integrators. A station should list the loads that act there and no others. `docs/beams.md` has the figures.
+highest frequency of interest suffice. More of them raise the highest frequency of a train, which sets the steps of
+explicit integrators. A station should list the loads that act there and no others. `docs/beams.md` has the figures.
 """
 
 from __future__ import annotations

@@ -5,8 +5,9 @@ marked (Rivara, Int. J. Numer. Meth. Eng. 20, 1984; Plaza, Carey, Appl. Numer. M
 order for all elements, longer ones first, so that the two elements at a face cut it alike. Whatever element has a
 marked edge has its longest one marked: angles stay bounded below, however often a mesh is refined.
 
-The new corner is the midside node that stands there. New midside nodes lie where the element's own quadratic map puts
-them, so the body does not change, and every field of the old elements is one of the new: frequencies can only fall.
+The new corner is the midside node that stands there. New midside nodes lie where the quadratic map of the element puts
+them, so the body does not change. Every field of the old elements is also one of the new elements, so frequencies can
+only fall.
 """
 
 from __future__ import annotations

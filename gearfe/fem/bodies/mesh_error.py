@@ -1,7 +1,7 @@
 r"""Estimate the excess stiffness of a mesh from elements of the next order.
 
 A field u_h of a mesh is in equilibrium with the functions v of its own elements (a mode:
-:math:`\omega^2 m(u_h, v) = a(u_h, v)`), and not with functions s that the elements lack. The energy that they would
+:math:`\omega^2 m(u_h, v) = a(u_h, v)`), but not with functions s that the elements lack. The energy that they would
 take,
 
 .. math::

@@ -1,7 +1,7 @@
 r"""Outer surface of a body: faces, normals, and the integral of the squared normal velocity.
 
-``integral of (v . n)^2 dA`` over faces with six nodes: with the shape functions N_a on a face this is
-``v^T G^T G v``, one row of G for each quadrature point, ``sqrt(w dA) N_a n_k`` in the column of node a, axis k.
+The integral of ``(v . n)^2 dA`` over faces with six nodes and shape functions N_a is ``v^T G^T G v``. G has a row for
+each quadrature point, with ``sqrt(w dA) N_a n_k`` in the column of node a and axis k.
 """
 
 from __future__ import annotations

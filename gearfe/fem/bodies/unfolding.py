@@ -1,9 +1,9 @@
 r"""Unfold curved tetrahedra: midside nodes on the true surface can turn thin elements below it inside out.
 
 The displacement d from straight edges to curved ones is continued into the body as that of an elastic solid whose
-surface is moved by d (Persson, Peraire, AIAA paper 2009-949): inner nodes near the folded elements follow the surface,
-which stays what it is. An element that is folded still has its midside nodes drawn back towards straight edges, no
-further than needed; only that changes the body's shape, and by how much is returned.
+surface is displaced by d (Persson, Peraire, AIAA paper 2009-949). Inner nodes near the folded elements follow the
+surface, which does not change. Midside nodes of elements that are still folded are drawn back towards straight edges,
+no further than needed. Only this changes the shape of the body; the change is returned.
 """
 
 from __future__ import annotations

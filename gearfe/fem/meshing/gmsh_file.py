@@ -1,9 +1,9 @@
 """Mesh files that gmsh reads: its own (.msh), I-DEAS' universal files (.unv), Salome's (.med), Medit's (.mesh).
 
-Files come from strangers, and gmsh is made for its user's own: it runs what looks like a script of its language,
-whatever the ending, and merges the options (``FILE.opt``, a script too) beside a file. So the file's first line is
-checked, and gmsh sees a copy alone in a folder. Damaged files can crash it (of 250 .unv files with random faults 24),
-so it reads them in a process of its own, which leaves arrays.
+Files may come from strangers, but gmsh trusts all files. It runs any file that looks like a script of its language,
+whatever the ending. It also merges the options next to a file (``FILE.opt``, which is a script, too). So the file's
+first line is checked, and gmsh sees a copy alone in a folder. Damaged files can crash it (24 of 250 .unv files with
+random faults). A separate process therefore reads them and returns arrays.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 r"""The parametric housing as an extrusion along y: triangles of order 3 in the plane, times layers of order 3.
 
-Faces of one plane arrangement are solid or empty in each interval between planes y = const, so plane triangles times
-layers are a mesh of the housing (prisms with 40 nodes). At its re-entrant edges the stress grows as
+The faces of one plane arrangement are solid or empty in each interval between planes y = const. Plane triangles times
+layers are therefore a mesh of the housing (prisms with 40 nodes). At its re-entrant edges the stress grows as
 :math:`r^{\alpha-1}` (:math:`\alpha = 0.544` at a right angle: Williams, J. Appl. Mech. 19, 1952); there the elements
-are thin across the edge and long along it: in the plane by gmsh's anisotropic mesher, along y in the layers. Built in
-millimetres, returned in metres; the nodes on bores and bosses lie on the true cylinders.
+are thin across the edge and long along it. In the plane gmsh's anisotropic mesher makes them, along y the layers do.
+Built in millimetres, returned in metres; the nodes on bores and bosses lie on the true cylinders.
 """
 
 from __future__ import annotations

@@ -66,11 +66,11 @@ def _pipes_as_before() -> Iterator[None]:
 def gmsh_session(name: str = "gearfe", *, options: Mapping[str, float] | None = None) -> Iterator[Any]:
     """Yield the gmsh module with a fresh model called `name`; quiet, on one thread, closed again on the way out.
 
-    With one thread meshes are the same on every run, except for those of its anisotropic mesher (the housing's), which
-    depend on where its vertices lie in memory.
+    With one thread meshes are the same on every run. The exception is the anisotropic mesher of the housing, whose
+    meshes depend on the memory addresses of its vertices.
 
-    Where the caller's own program has gmsh open already, only the model is added and removed again, and that
-    session's options are left as they were found.
+    If the calling program already has gmsh open, only the model is added and removed again. The options of that session
+    do not change.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Keyword lines of Abaqus' (CalculiX') input files with their data.
 
-A keyword line begins with one asterisk and continues after a final comma; blanks in keywords and case do not count,
-a comment begins with two asterisks (Abaqus Analysis User's Guide, section "Input syntax rules").
+A keyword line begins with one asterisk and continues after a final comma. Blanks in keywords and case do not matter. A
+comment begins with two asterisks (Abaqus Analysis User's Guide, section "Input syntax rules").
 """
 
 from __future__ import annotations

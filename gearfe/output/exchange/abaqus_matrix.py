@@ -1,9 +1,9 @@
-"""Matrices that Abaqus writes: of substructures, and of a whole model.
+"""Read matrices that Abaqus writes, of substructures and of complete models.
 
-*SUBSTRUCTURE MATRIX OUTPUT leaves a *USER ELEMENT whose nodes a comment names (``** ELEMENT NODES``), the degrees of
-freedom of its nodes (those of a node hold for the nodes after it), and for each *MATRIX the lower triangle, row by row.
-*MATRIX OUTPUT leaves lines of node, degree of freedom, node, degree of freedom, value (Abaqus Keywords Guide, *USER
-ELEMENT, *MATRIX, *MATRIX INPUT; Analysis User's Guide, "Generating matrices").
+*SUBSTRUCTURE MATRIX OUTPUT writes a *USER ELEMENT whose nodes a comment names (``** ELEMENT NODES``). It also writes
+the degrees of freedom of its nodes (those of a node are valid for the nodes after it). For each *MATRIX it writes the
+lower triangle, row by row. *MATRIX OUTPUT writes lines of node, degree of freedom, node, degree of freedom, value
+(Abaqus Keywords Guide, *USER ELEMENT, *MATRIX, *MATRIX INPUT; Analysis User's Guide, "Generating matrices").
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Mesh of an input file of Abaqus or CalculiX: parts and their instances, nodes, elements, sets and surfaces.
+"""Read the mesh of an input file of Abaqus or CalculiX: parts, instances, nodes, elements, sets and surfaces.
 
-Nodes and elements have their numbers in the part, in the instance, or in the assembly; an instance is its part moved,
-then turned about an axis; sets of the assembly name nodes by ``INSTANCE=`` or as ``instance.number``. Cards of
-materials, loads and steps are left to the job (Abaqus Keywords Guide: *NODE, *ELEMENT, *SYSTEM, *NSET, *ELSET,
-*SURFACE, *PART, *INSTANCE, *ASSEMBLY).
+Nodes and elements have their numbers in the part, in the instance, or in the assembly. An instance is its part,
+displaced and then rotated about an axis. Sets of the assembly name nodes by ``INSTANCE=`` or as ``instance.number``.
+Cards of materials, loads and steps are ignored; they come from the job (Abaqus Keywords Guide: *NODE, *ELEMENT,
+*SYSTEM, *NSET, *ELSET, *SURFACE, *PART, *INSTANCE, *ASSEMBLY).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""A CalculiX (Abaqus) deck of a gear pair in contact that runs as it is, and the torque from what it prints.
+"""Write a CalculiX (Abaqus) deck of a gear pair in contact, and read the torque from its output.
 
-Elements of second order in the plane or in space, linear elastic, large rotations (NLGEOM), contact surface to surface
-with a linear pressure of `PENALTY`; the bore of the pinion is held, that of the wheel turned by the twist, and of gears
-in space neither moves along the axis. Millimetres, N, MPa.
+Elements are of second order, in the plane or in space, and linear elastic, with large rotations (NLGEOM). Contact is
+surface to surface with a linear pressure of `PENALTY`. The bore of the pinion is held, that of the wheel rotated by the
+twist. Of gears in space neither bore moves along the axis. Units are mm, N, MPa.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Lines of a text file with the files that it includes in their places.
 
-Meshes come from strangers, so an included file must lie in the folder of the file that was named, or below it; cycles
-and expansions without end are refused.
+Meshes may come from strangers, so an included file must lie in the folder of the named file, or below it. Cycles and
+endless expansions are refused.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Matrices in Matrix Market format (Boisvert, Pozo & Remington, NISTIR 5935, 1996).
+"""Read matrices in Matrix Market format (Boisvert, Pozo & Remington, NISTIR 5935, 1996).
 
-Read here because SciPy's compiled reader writes beyond its memory where a file of the kind ``array`` holds more numbers
-than its size line says, and adds up entries that are given twice.
+SciPy's compiled reader is not used. It writes beyond its memory if a file of the kind ``array`` holds more numbers than
+its size line says, and adds up entries that are given twice.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Meshes of gears for other programs, through meshio: .msh (gmsh), .vtu (VTK), .inp (Abaqus, CalculiX). Millimetres.
+"""Write meshes of gears for other programs, through meshio: .msh (gmsh), .vtu (VTK), .inp (Abaqus, CalculiX). Units are
+mm.
 
-Every gear becomes a group of second-order triangles with its name; its outline pieces (bore, root, flank_right,
-flank_left, tip) become groups called ``<gear>_<piece>``, in the way that the format offers. Gears in space are wedges
-of 15 nodes, their outline pieces surfaces of four-sided faces.
+Every gear becomes a group of second-order triangles with its name. Its outline pieces (bore, root, flank_right,
+flank_left, tip) become groups called ``<gear>_<piece>``, in the form that the format has. Gears in space are wedges of
+15 nodes, their outline pieces surfaces of four-sided faces.
 
 ====== =============================================================================================================
 .msh   physical groups, of elements and of second-order lines or faces

@@ -1,6 +1,6 @@
-"""Matrices of Nastran: DMIG entries of a bulk data or punch file (NX/MSC Nastran Quick Reference Guide, entry DMIG).
+"""Read matrices from DMIG entries of a bulk data or punch file (NX/MSC Nastran Quick Reference Guide, entry DMIG).
 
-An entry is a header (matrix name, 0, form, type) or a column: node and degree of freedom of the column, then node,
+An entry is a header (matrix name, 0, form, type) or a column. A column has its node and degree of freedom, then node,
 degree of freedom and value of its rows, four fields each.
 """
 

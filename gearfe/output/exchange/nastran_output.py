@@ -1,10 +1,12 @@
-"""Matrices in files of Nastran: OUTPUT4, text or binary, and OUTPUT2.
+"""Read matrices from files of Nastran: OUTPUT4, text or binary, and OUTPUT2.
 
-OUTPUT4: per matrix a line (columns, rows, form, type, name, format), then its columns (number, first row, words of
-data, data), the last one without meaning; with first row 0 the data are strings of neighbouring rows, each after its
-length and first row: packed into one word, or where the number of rows is given negative two. OUTPUT2: Fortran records,
-each after the number of its words; a matrix is a name, a trailer (file, columns, rows, form, type, ...) and for each
-column records of first row and values. Tables of the kind MATPOOL hold DMIG entries (EXTSEOUT with DMIGOP2).
+OUTPUT4: each matrix has a line (columns, rows, form, type, name, format), then its columns (number, first row, words of
+data, data). The last column has no meaning. If the first row is 0, the data are strings of neighbouring rows, each
+after its length and first row. These are packed into one word, or into two words if the number of rows is negative.
+
+OUTPUT2: Fortran records, each after the number of its words. A matrix is a name, a trailer (file, columns, rows, form,
+type, ...), and for each column records of first row and values. Tables of the kind MATPOOL hold DMIG entries (EXTSEOUT
+with DMIGOP2).
 
 Sources: MSC Nastran DMAP Programmer's Guide, modules OUTPUT2, OUTPUT4; data block MATPOOL.
 """

@@ -1,7 +1,8 @@
-"""Local coordinate systems of Nastran, and nodes in the basic one (Quick Reference Guide: CORD1R to CORD2S, GRID).
+"""Transform nodes from local coordinate systems of Nastran to the basic one (Quick Reference Guide: CORD1R to CORD2S,
+GRID).
 
-CORD2x: a point A of the origin, B on the z axis and C in the half plane of x and z, in the system RID. CORD1x: the same
-by nodes. Cylindrical coordinates are r, theta (deg), z; spherical ones r, theta from the z axis, phi (deg).
+CORD2x has three points in the system RID: the origin A, B on the z axis, and C in the half plane of x and z. CORD1x:
+the same by nodes. Cylindrical coordinates are r, theta (deg), z; spherical ones r, theta from the z axis, phi (deg).
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Universal files: nodes, modes and functions of modal tests, as text or with binary functions.
+"""Read universal files: nodes, modes and functions of modal tests, as text or with binary functions.
 
-A file is a sequence of data sets, each between two lines of -1 and with its number in the first line: 15 and 2411
-(nodes), 164 (units), 55 (data at nodes, here mode shapes), 58 (a function; 58b in binary). Sources: Universal file data
-sets, Structural Dynamics Research Laboratory, University of Cincinnati (sdrl.uc.edu); binary functions as of its page
-on data set 58b.
+A file is a sequence of data sets, each between two lines of -1 and with its number in the first line. The numbers are
+15 and 2411 (nodes), 164 (units), 55 (data at nodes, here mode shapes), and 58 (a function; 58b in binary). Sources:
+Universal file data sets, Structural Dynamics Research Laboratory, University of Cincinnati (sdrl.uc.edu); binary
+functions as of its page on data set 58b.
 """
 
 from __future__ import annotations
@@ -264,8 +264,8 @@ def _mode(one: DataSet) -> Mode | None:
 def _function(one: DataSet) -> Function:
     """A data set 58.
 
-    Record 6 has the type of function, record 7 that of the ordinates (2, 4 real; 5, 6 complex), their number, the
-    spacing (1 even), the abscissa's begin and step; the data follow record 11.
+    Record 6 has the type of function. Record 7 has the type of the ordinates (2, 4 real; 5, 6 complex), their number,
+    the spacing (1 even), and start and step of the abscissa. The data follow record 11.
     """
     kind = int(one.lines[5].split()[0])
     words = one.lines[6].split()

@@ -1,8 +1,8 @@
-"""VTKHDF files: unstructured grids, one or a series in time, in one HDF5 file that ParaView and VTK open.
+"""Write VTKHDF files: unstructured grids, one or a series in time, in one HDF5 file for ParaView and VTK.
 
-The layout is VTK's own (VTK file formats, section "VTKHDF", type UnstructuredGrid, version 2.x): arrays of all steps
-stand one after the other, and ``Steps`` says for each step where its part begins. All steps share the cells of the
-first; points that do not change are stored once.
+The layout is that of VTK (VTK file formats, section "VTKHDF", type UnstructuredGrid, version 2.x). Arrays of all steps
+follow each other, and ``Steps`` gives the beginning of each step. All steps share the cells of the first; points that
+do not change are stored once.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Speeds and torques of a gear train: kinematics of its meshes, and the forces that do no work in them.
+"""Compute speeds and torques of a gear train from the kinematics of its meshes.
 
-Each mesh is one row A of the constraints A omega = 0: z_1 omega_1 + z_2 omega_2 = (z_1 + z_2) omega_c, with the
-carrier c of its axes if these turn, and z < 0 for an internal gear (Willis). Torques T on the shafts balance with the
-multipliers of the rows: T + A^T lambda = 0, lambda z being the torque of a mesh on its gear.
+Each mesh is one row A of the constraints A omega = 0: z_1 omega_1 + z_2 omega_2 = (z_1 + z_2) omega_c (Willis). The
+index c is the carrier of its axes if these rotate, and z < 0 for an internal gear. Torques T on the shafts balance with
+the multipliers of the rows: T + A^T lambda = 0. The torque of a mesh on its gear is lambda z.
 """
 
 from __future__ import annotations

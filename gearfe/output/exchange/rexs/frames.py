@@ -1,7 +1,7 @@
 """Locate components: local coordinate systems of REXS, each relative to another component.
 
-A component has the place of its origin (``support_vector``) and the directions of its u and w axis in the system of its
-reference component (https://spec.rexs.info, "Position and orientation in space"); v = w x u. Millimetres.
+A component has its origin (``support_vector``, mm) and the directions of its u and w axis in the system of its
+reference component; v = w x u (https://spec.rexs.info, "Position and orientation in space").
 """
 
 from __future__ import annotations

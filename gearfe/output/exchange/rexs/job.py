@@ -1,8 +1,8 @@
-"""A job file from a REXS model: tables with the names of the model, and the list of what became of each value.
+"""Convert a REXS model to a job file: tables with the names of the model, and a list of all its values.
 
-Order: materials, shafts, gears, meshes, bearings, couplings; from these the speeds and torques of all shafts
-(`balance`), hence drive, loads and the load of each mesh. What a job cannot have is a comment in it, with the
-reason. A file that this program wrote holds in attributes ``custom_gearfe_...`` what REXS has no attribute for.
+The order is materials, shafts, gears, meshes, bearings, couplings. From these follow the speeds and torques of all
+shafts (`balance`), and from them drive, loads and the load of each mesh. Parts that a job cannot have are comments with
+the reason. A file that gearfe wrote has attributes ``custom_gearfe_...`` for data without an attribute of REXS.
 """
 
 from __future__ import annotations
@@ -815,8 +815,9 @@ def _models(reading: Reading, tables: dict[str, Any]) -> None:
 def _ring_tips(reading: Reading, tables: dict[str, Any], box: Gearbox) -> None:
     """Addendum of rings that the file gives no tips: 1, or as much as stays on the involutes of their mates.
 
-    The rolling length at the tip of a ring less a sin(alpha_wt) is that of the mate there, which must not be less than
-    that of its form circle, r sin(alpha_t) - (h_fP - rho_fP (1 - sin(alpha_n)) - x) m_n/sin(alpha_t) (ISO 21771).
+    The roll length at the tip of a ring, minus a sin(alpha_wt), is that of the mate at this point. It must not be less
+    than that of the mate's form circle, r sin(alpha_t) - (h_fP - rho_fP (1 - sin(alpha_n)) - x) m_n/sin(alpha_t) (ISO
+    21771).
     """
     for name, ring in box.gears.items():
         entry = tables["gears"][name]
