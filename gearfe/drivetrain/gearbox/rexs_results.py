@@ -31,7 +31,7 @@ from ...output.results import Results, kinds_of, read_all
 from ..train import build_train
 from ..train.gear_train import as_matrix
 from ..train.kinematics import drive_sense, fastest
-from ..train.misalignment import pressed_direction, static_bearing_loads, static_state
+from ..train.misalignment import pressed_direction, static_bearing_loads, static_mesh_forces, static_state
 from ..train.model import TrainModel
 from .job import TrainJob, train_job
 from .mesh_loads import mesh_loads, with_train
@@ -260,13 +260,15 @@ def _statics(job: TrainJob) -> Iterator[Result]:
     for gear in rigid.gears:
         yield Result("gears", gear.name, "rotational_speed", speeds[gear.shaft], "rad / s")
     model = build_train(springs_train(job))
+    q = static_state(model)
+    carried = rolled.steady_forces if q is None else static_mesh_forces(model, q)
     loads = mesh_loads(rigid)
     pushes: dict[str, list[Array]] = {}
     turns: dict[str, float] = {}
     for number, line in enumerate(model.meshes):
-        force = float(rolled.steady_forces[number])
-        axis = model.train.frame[2]
-        push = abs(force) * (pressed_direction(model, number) + line.axial * math.copysign(1.0, force) * axis)
+        nominal, force = float(rolled.steady_forces[number]), float(carried[number])
+        flank = math.copysign(1.0, nominal)
+        push = flank * force * (pressed_direction(model, number) + flank * line.axial * model.train.frame[2])
         driver, driven = (model.train.gear(name) for name in (line.given.driver, line.given.driven))
         alike = -1.0 if driver.gear.internal or driven.gear.internal else 1.0
         turn = rolled.senses[number] * force
@@ -274,8 +276,8 @@ def _statics(job: TrainJob) -> Iterator[Result]:
         load = loads[line.name]
         pitch = math.cos(driver.gear.transverse_pressure_angle)
         of_mesh = {
-            "nominal_tangential_force_at_base_diameter": (abs(force), "N"),
-            "nominal_tangential_force_at_reference_diameter": (abs(force) * pitch, "N"),
+            "nominal_tangential_force_at_base_diameter": (abs(nominal), "N"),
+            "nominal_tangential_force_at_reference_diameter": (abs(nominal) * pitch, "N"),
             "tangential_velocity_at_reference_diameter": (
                 math.pi / 30.0 * load.speed * abs((driver, driven)[load.drives].gear.reference_radius), "m / s"
             ),
@@ -295,14 +297,12 @@ def _statics(job: TrainJob) -> Iterator[Result]:
         for attribute, value, unit in _along("force_acting_on_shaft_{}", np.sum(forces, axis=0), "N"):
             yield Result("gears", name, attribute, value, unit)
         yield Result("gears", name, "torque_acting_on_shaft_u", turns[name], "N m")
-    yield from _bearings(model)
+    if q is not None:
+        yield from _bearings(model, q)
 
 
-def _bearings(model: TrainModel) -> Iterator[Result]:
+def _bearings(model: TrainModel, q: Array) -> Iterator[Result]:
     """Forces of all bearings; of rolling bearings their displacements and their stiffness, too."""
-    q = static_state(model)
-    if q is None:
-        return
     for name, load in static_bearing_loads(model, q).items():
         values: list[tuple[str, float, str]] = []
         for side, sign in (("inner", -1.0), ("outer", 1.0)):

@@ -308,6 +308,28 @@ def static_state(model: TrainModel) -> Array | None:
     return None if y is None else np.asarray(modal.origin + modal.T @ y[:, 0])
 
 
+def static_mesh_forces(model: TrainModel, q: Array) -> Array:
+    """Return the force of each mesh (N) under the steady torques, < 0 on the back flanks, shape (meshes,).
+
+    Errors of pins and springs of different stiffness divide the torque unevenly among planets; the forces of
+    `TrainKinematics.steady_forces` are those of equal shares.
+
+    Parameters
+    ----------
+    model : TrainModel
+        A train with springs as meshes.
+    q : ndarray, shape (size,)
+        What `static_state` returned.
+    """
+    steady = model.kinematics.steady_forces.tolist()
+    return np.array(
+        [
+            -line.mean * float(line.columns[1] @ q) if force < 0.0 else line.mean * float(line.row @ q)
+            for line, force in zip(model.meshes, steady, strict=True)
+        ]
+    )
+
+
 def static_bearing_loads(model: TrainModel, q: Array) -> dict[str, Array]:
     """Return bore -> force (N) and moment (N m) of its shaft on it along x, y, z (6,), under the steady torques.
 

@@ -474,6 +474,26 @@ def test_forces_on_every_shaft_balance(name):
             assert turned == pytest.approx(-given, abs=1e-9 * largest)
 
 
+def test_forces_balance_where_errors_of_pins_divide_the_torque():
+    """On sun, ring and planets at a speed without centrifugal forces; the sun has the torque of the load."""
+    raw = tomllib.loads((GEOMETRY / "planetary.toml").read_text(encoding="utf-8"))
+    raw["carriers"]["arm"]["pin_tangential_errors_um"] = [60.0, 0.0, -20.0]
+    raw["train"]["drive"]["speed_rad_per_s"] = 0.01
+    number = {(r.table, r.name, r.attribute): r.value for r in gearfe.rexs_results(raw).results}
+    shares = [number["gear_data", f"sun_planet{k}/sun", "torque"] for k in ("", "_2", "_3")]
+    assert max(shares) - min(shares) > 0.01 * abs(sum(shares))
+    assert sum(shares) == pytest.approx(-7302.0 * 17 / 78)
+    for shaft in ("sun", "ring"):
+        largest = abs(number["gears", shaft, "force_acting_on_shaft_v"])
+        assert largest > 500.0
+        for axis in "vw":
+            push = number["gears", shaft, f"force_acting_on_shaft_{axis}"]
+            carried = number["bearings", shaft, f"force_acting_on_inner_component_{axis}"]
+            assert push + carried == pytest.approx(0.0, abs=1e-6 * largest)
+    for planet in ("planet", "planet_2", "planet_3"):
+        assert number["gears", planet, "torque_acting_on_shaft_u"] == pytest.approx(0.0, abs=1e-6 * 500.0)
+
+
 def test_results_are_those_of_the_rating_and_of_statics():
     """S_H of `gearfe.rate_mesh`; tooth forces of the last stage of the first model, 500 N m at its output."""
     name = next(name for name in TRAINS if name.startswith("SEW"))
