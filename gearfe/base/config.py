@@ -284,7 +284,7 @@ def _convert(hint: Any, value: Any, label: str, meta: Any) -> Any:
 
 
 def _written_like(hint: Any, value: Any) -> bool:
-    """Return whether a value of this kind is written in TOML as `value` is: a list, a table, a text, a number."""
+    """Return whether a value of this kind is written in TOML like `value`: as list, table, text or number."""
     if isinstance(value, list):
         return typing.get_origin(hint) is tuple
     if isinstance(value, dict):

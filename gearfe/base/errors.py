@@ -52,7 +52,7 @@ GEAR_TABLES = (
 
 
 class _Short(reprlib.Repr):
-    """Values as a message shows them: what is long is cut, what is huge is given by its power of ten."""
+    """Format values for a message: long ones are cut, huge ones given by their power of ten."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -82,7 +82,7 @@ def cut(text: str) -> str:
 
 
 class InputError(ValueError):
-    """A request that cannot be met as it stands; the message says which value is wrong and how to fix it.
+    """Report a request that cannot be met; the message gives the wrong value and its cure.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def unknown_name(field: str, name: str, known: Iterable[str]) -> InputError:
 
 
 def unknown_key(where: str, key: str, value: object, known: Iterable[str], *, field: str = "") -> InputError:
-    """Error for a key or table of a job that does not exist; of a gear job, what is out of scope is named.
+    """Return the error for an unknown key or table of a job. Gear jobs name what is out of scope.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def _symbol(key: str, known: Iterable[str]) -> str:
 
 
 def nearest(name: str, choices: Iterable[str]) -> str:
-    """Question for the known name that means the same as a wrong one, or is nearest to it; empty when none is."""
+    """Return a question with the known name that matches a wrong one best; empty if none does."""
     choices = list(choices)
     meant = [choice for choice in choices if choice.partition("(")[0] == SYNONYMS.get(name.lower())]
     if meant:

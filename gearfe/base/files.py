@@ -218,7 +218,7 @@ def read_numbers(
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path in the same folder; on success it replaces `path` in one step, on failure it is removed.
+    """Yield a temporary path in the same folder. On success it replaces `path` in one step, on failure it is removed.
 
     The temporary name keeps the suffix of `path`, because writers choose their format from it.
     """
@@ -287,7 +287,7 @@ def write_csvs(folder: Path, tables: Mapping[str, Columns]) -> None:
 
 @dataclass(frozen=True)
 class Table:
-    """A table under way: what writes its next rows, given as columns, and what its numbers are warned of at the end."""
+    """Hold a table that is being written: the writer of its next rows (columns), and its warnings."""
 
     write: Callable[[Columns], None]
     warnings: list[str]
@@ -358,7 +358,7 @@ def _cell(value: Any) -> str:
 
 
 def quoted(text: str) -> str:
-    """A text as RFC 4180 has it: within quotes where a comma, a quote or an end of line stands in it."""
+    """Quote a text by RFC 4180 if it contains a comma, a quote or an end of line."""
     return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\r\n') else text
 
 

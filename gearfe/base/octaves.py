@@ -123,7 +123,7 @@ def decibels(power: ArrayLike, reference: float = 1e-12) -> Array:
 
 
 def third_octaves(frequency: Array, power: Array) -> ThirdOctaves:
-    """Sum the powers (W) of lines (Hz) in third octaves; the constant and lines that are not finite are left out."""
+    """Sum the powers (W) of lines (Hz) in third octaves. The constant and lines that are not finite are left out."""
     inside = (frequency > 0.0) & np.isfinite(power)
     places, values = frequency[inside], power[inside]
     if not len(places):

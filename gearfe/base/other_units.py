@@ -58,7 +58,7 @@ def in_known_units(table: Mapping[str, Any], known: Iterable[str], where: str) -
 
 
 def as_written(error: InputError, known: str, written: str, value: Any) -> InputError:
-    """Return the error of a speed under the name, and with the value, that the user wrote in the other unit.
+    """Return the error of a speed with the name and the value that the user wrote in the other unit.
 
     Parameters
     ----------

@@ -164,7 +164,7 @@ def label(column: str) -> str:
 
 
 def scaled(column: str, largest: float) -> tuple[str, float]:
-    """Label of a column whose largest size is given, and the factor to its unit there: N/µm, ms, kHz read better.
+    """Return the label of a column by its largest value, and the factor to its unit (N/µm, ms, kHz, ...).
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def samples_per_step(step: float, highest: float) -> int:
 
 
 def finer(times: Array, highest: float) -> tuple[Array, int]:
-    """Times (s) at which to sample a motion with modes up to `highest` (Hz), and how many of them make an output step.
+    """Return times (s) to sample a motion with modes up to `highest` (Hz), and their number per output step.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ class RecordSpectrum:
 
 
 def low_pass(keep: int) -> Array:
-    """(2 REACH keep + 1,) weights, of sum 1: half of the response at the frequency of half the kept samples' rate.
+    """Return (2 REACH keep + 1,) weights of sum 1. Their response is a half at half the rate of the kept samples.
 
     Passes up to half of that frequency, stops from one and a half on; with every sample kept there is nothing to stop.
     """

@@ -88,7 +88,7 @@ class ShownTable(Shown):
 
 
 def as_numbers(cells: Iterable[Any]) -> Array:
-    """The cells of a column as an array: of numbers where all of them are, whole ones where they can be."""
+    """Return the cells of a column as an array: of numbers if all are, of whole ones if possible."""
     import numpy as np
 
     values = np.asarray(list(cells))

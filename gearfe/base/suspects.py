@@ -1,4 +1,4 @@
-"""Values of a job that look as if they were in another unit than their key says: remarks, and cures of errors."""
+"""Find values of a job that seem to be in another unit than that of their key."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _tables(raw: Any) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def other_unit(key: str, number: float) -> str:
-    """Return how to write a material's value that, as it is, may be in another unit; an empty text for all others."""
+    """Return how to write a material's value that may be in another unit; an empty text for others."""
     known = MATERIALS.get(key)
     if known is None or not 0.0 < number < LARGEST or known.low <= number <= known.high:
         return ""

@@ -189,7 +189,7 @@ def add_keys(parser: Any, table: type, *keys: str, **renamed: str) -> None:
 
 
 class _Converted(float):
-    """A speed in the unit of a key, with the option and the number that were written in the other unit."""
+    """Hold a speed in the unit of a key, with the option and number given in the other unit."""
 
     option = ""
     written = 0.0
@@ -242,7 +242,7 @@ def add_mesh(parser: argparse.ArgumentParser) -> None:
 def each_mesh(
     args: argparse.Namespace, run_mesh: Callable[[argparse.Namespace, NamedMesh], int], variant: str | None = None
 ) -> int:
-    """Run a command for the mesh that ``--mesh`` names, else for all of the file, each in a folder of its own.
+    """Run a command for the mesh of ``--mesh``, or for all meshes of the file, each in its own folder.
 
     Parameters
     ----------
@@ -347,8 +347,9 @@ def job_of(parsed: argparse.Namespace) -> JobFile | None:
 
 
 def completed(parsed: argparse.Namespace) -> argparse.Namespace:
-    """The arguments, the job file with the changes of ``--set``, ``--format`` as the names beside CSV; ``--out`` is by
-    default ``out/JOB/COMMAND``, so that no command writes over another's summary.
+    """Complete the arguments: the job file with the changes of ``--set``, and the names of ``--format``.
+
+    The default of ``--out`` is ``out/JOB/COMMAND``, so that no command overwrites the summary of another.
     """
     for dest, value in vars(parsed).items():
         if isinstance(value, JobFile):

@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _compile() -> None:
-    """Leave all kernels in the cache, each compiled in a process of its own on as many cores as there are.
+    """Compile all kernels into the cache, each in its own process, on all cores.
 
     Raises
     ------

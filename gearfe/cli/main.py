@@ -1,4 +1,4 @@
-"""The ``gearfe`` program: runs a command, prints and keeps results as its options say; mistakes are a line and a 2.
+"""Run a command of the ``gearfe`` program and print its results. User errors give one line and exit code 2.
 
 It listens to Ctrl-C from its first lines on; what takes time is imported after that, and help and version need nothing.
 """
@@ -198,7 +198,7 @@ def _watch_tables() -> list[str]:
 
 
 def _doubt(parsed: argparse.Namespace) -> None:
-    """Print which values of the job look as if they were in another unit: the run may not begin, or not end."""
+    """Print values of the job that seem to be in another unit, because the run may fail for them."""
     from contextlib import suppress
 
     from ..base.config import read_toml
@@ -267,7 +267,7 @@ class _Both(io.TextIOBase):
 
 
 def _keep(folder: Path, names: list[str], parsed: argparse.Namespace, said: str, line: list[str] | None) -> list[str]:
-    """Write the tables in other formats and the report; those of an earlier run that this one does not replace go."""
+    """Write the tables in other formats and the report; remove those of an earlier run that are not replaced."""
     if not parsed.format and line is None:
         return []
     import shlex

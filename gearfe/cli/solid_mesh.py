@@ -28,7 +28,7 @@ APART = 1e-6
 def write_solid_mesh(
     args: argparse.Namespace, mesh: NamedMesh, table: StiffnessTable, pair: GearPair
 ) -> tuple[dict[str, Part], dict[str, MeshPart], dict[str, float]]:
-    """Write a mesh or a deck of gears in space; return its parts, their sections, and what was solved for the deck.
+    """Write a mesh or a deck of gears in space; return its parts, their sections and the deck's solution.
 
     Parameters
     ----------

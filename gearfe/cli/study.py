@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Solve the cases that are missing and write the files; 1 when a case has no answer, except for a search's."""
+    """Solve the missing cases and write the files; return 1 if a case has no answer, except in a search."""
     started = time.perf_counter()
     from ..base.errors import InputError
     from ..base.shown import library

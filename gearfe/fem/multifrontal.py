@@ -102,9 +102,7 @@ class Factor:
         return cls(int(arrays["size"]), arrays["order"], tuple(fronts), arrays["schur"])
 
     def solve(self, b: Array) -> Array:
-        """(n,) or (n, p) right-hand sides to solutions of the same shape, where nothing is retained; several at a time
-        are much cheaper.
-        """
+        """Solve for right-hand sides (n,) or (n, p) if no unknowns are retained. Several at a time are much cheaper."""
         x = np.ascontiguousarray(np.atleast_2d(np.transpose(b)).T[self.order], dtype=float)
         self._forward(x)
         self._backward(x)

@@ -84,7 +84,7 @@ def triangle_maps(points: Array, triangles: IntArray) -> TriangleMaps:
 
 
 def volume_ratios(points: Array, triangles: IntArray) -> Array:
-    """(m,) smallest volume ratio of each triangle at the points of the rule, against its mean: 1 of a straight one."""
+    """Return (m,) smallest over mean volume ratio of each triangle at the points of the rule; 1 if straight."""
     det = np.linalg.det(np.einsum("eak,apm->epkm", points[triangles], triangle_rule().slopes, optimize=True))
     mean = det.mean(axis=1)
     return np.asarray((det * np.sign(mean)[:, None]).min(axis=1) / np.maximum(np.abs(mean), 1e-300))

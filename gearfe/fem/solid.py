@@ -232,7 +232,7 @@ def element_matrices(nodes: Array, tets: IntArray, material: Material, stiff: Pa
 
 
 def maps(nodes: Array, tets: IntArray, gradients: Array) -> tuple[Array, Array]:
-    """(m, p) volume ratio and (m, p, 3, 3) gradient of the inverse map [xi axis, x axis] where `gradients` are."""
+    """Return (m, p) volume ratio and (m, p, 3, 3) gradient [xi axis, x axis] of the inverse map at `gradients`."""
     forward = np.einsum("eak,amp->epkm", nodes[tets], gradients, optimize=True)
     det = np.asarray(np.linalg.det(forward))
     solvable = np.where((det != 0.0)[..., None, None], forward, np.eye(3))

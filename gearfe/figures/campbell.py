@@ -66,7 +66,7 @@ def signal_of(run: RunUp, bore: int) -> Signal:
 
 
 def bearing_signal(run: RunUp, bore: int) -> Signal:
-    """Force of the shaft on a bore: root of the sum of the squares of its amplitudes along x, y, z."""
+    """Return the force of the shaft on a bore: root of the summed squares of its amplitudes."""
     name = f"Force of the shaft on bearing {run.train.model.bores[bore]}"
     label = "level of the force  (dB re 1 N)"
     return Signal(name, "N", 1.0, label, lambda s: np.linalg.norm(np.abs(s.bearing[:, bore, :3]), axis=1))

@@ -23,7 +23,7 @@ COLUMNS = 2
 
 
 def comparison_picture(made: Comparison) -> Any:
-    """Panels of the curves of all runs, with bands of their errors, and the differences to the first run below them."""
+    """Draw panels of the curves of all runs with error bands, and below them the differences to the first."""
     panels = made.panels
     rows = max(1, -(-len(panels) // COLUMNS))
     figure = new_figure(6.2 * min(COLUMNS, max(len(panels), 1)), 0.9 + 3.4 * rows)

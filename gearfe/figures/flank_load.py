@@ -70,7 +70,7 @@ def flank_load_picture(
 
 
 def root_picture(columns: Mapping[str, Any], title: str = "") -> Any:
-    """Largest root stress over the mesh cycle along the width, a panel for each gear and a curve for each torque.
+    """Draw the largest root stress over the mesh cycle along the width: panels by gear, curves by torque.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ def _middle(layout: GearboxLayout, mesh: PlacedMesh) -> tuple[float, float]:
 def _free_box(
     layout: GearboxLayout, shaft: PlacedShaft, lines: Sequence[str], point: float, boxes: Sequence[_Box]
 ) -> _Box:
-    """Return the place of a shaft's text: above, below, left or right of its gears, where it lies on the fewest others.
+    """Return the position of a shaft's text next to its gears where it overlaps the fewest others.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def _free_box(
     middles = [_middle(layout, mesh) for mesh in layout.meshes]  # lines to the distances go down from here
 
     def covered(box: _Box) -> float:
-        """Depth (m) by which the text lies on gears, and its height for each text or line that it lies on."""
+        """Return the depth (m) by which the text overlaps gears, plus its height for each text or line."""
         on_gears = sum(max(gear.tip_radius - box.distance(gear.centre[0], gear.centre[2]), 0.0) for gear in others)
         on_lines = sum(abs(box.x - middle) < box.width and box.z - box.height < top for middle, top in middles)
         return on_gears + 2.0 * box.height * (on_lines + sum(map(box.covers, boxes)))

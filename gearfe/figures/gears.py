@@ -120,7 +120,7 @@ def _panels(pair: GearPair) -> tuple[Any, Any, Any]:
 
 
 def _draw_helices(axes: Any, pair: GearPair, pinion_angle: float) -> None:
-    """Both gears seen along +y: the middles of their tips on the tip cylinders, as far as they face the viewer."""
+    """Draw both gears seen along +y: the middles of their tips on the visible part of the tip cylinders."""
     wheel_angle = pair.wheel_angle_at(pinion_angle) + pair.wheel_phase
     placed = [
         (pair.pinion, pinion_angle, 0.0, 0.0, BLUE),

@@ -136,7 +136,7 @@ def _between(mechanism: Mechanism, results: Results) -> Results:
 
 
 def _broken(values: Array, period: float | None) -> Array:
-    """Values of which each that begins a new turn of a wrapped angle is left out, so that no line joins both ends."""
+    """Leave out the first value of each new turn of a wrapped angle, so that no line joins both ends."""
     if period is None:
         return values
     turns = np.abs(np.diff(values, prepend=values[:1])) > 0.5 * period

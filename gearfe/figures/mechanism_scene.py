@@ -135,7 +135,7 @@ def draw_paths(axes: Any, mechanism: Mechanism, q: Array) -> None:
 
 
 def drawn_states(mechanism: Mechanism, trajectory: Trajectory) -> Array:
-    """States over the run, shape (n, k), so close that chords between them leave no path by `SAGITTA` of the picture.
+    """Return states over the run, shape (n, k), whose chords leave the paths by at most `SAGITTA` of the picture.
 
     The paths are those of the file's points, and of the points of rigid bodies, which the frame of the picture holds.
     They follow from the solution between the output times, not from these.

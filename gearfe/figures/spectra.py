@@ -1,5 +1,7 @@
-"""Pictures of a gear train's spectra: acceleration at an attachment, radiated power, over short times, orders over the
-speed, measured ones; labels that keep apart.
+"""Draw spectra of a gear train, with labels that do not overlap.
+
+The spectra are the acceleration at an attachment, radiated power, short-time spectra, orders over the speed, and
+measured ones.
 """
 
 from __future__ import annotations
@@ -254,7 +256,7 @@ def _note(figure: Any, note: str) -> None:
 
 
 def largest_lines(frequency: Array, value: Array, highest: float) -> tuple[Array, Array]:
-    """Lines up to `highest`; of so many that they would lie on each other the largest of each group of neighbours.
+    """Return lines up to `highest`. If they are too many to be drawn, the largest of each group is returned.
 
     A group stands at the middle of its frequencies, the constant by itself.
     """
@@ -426,7 +428,7 @@ class _Box(NamedTuple):
 
 
 def label_lines(axes: Any, labels: Sequence[tuple[float, float, str]], x: Array, y: Array, **look: Any) -> None:
-    """Label some of the vertical lines from 0 to (x, y), each at the nearest free place, or not at all.
+    """Label vertical lines from 0 to (x, y), each at the nearest free position, if there is one.
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ def stress_figure(
 
 
 def _draw_zone(axes: Any, parts: Sequence[Part], zoom: tuple[float, float, float], top: float) -> Any:
-    """Draw the stress of both gears in the meshing zone, colours from 0 to `top`; the answer is for a colour bar."""
+    """Draw the stress of both gears in the meshing zone, colours from 0 to `top`; return them for a colour bar."""
     x, y, half = zoom
     drawn = None
     for points, triangles, stress in parts:
@@ -130,7 +130,7 @@ def _draw_zone(axes: Any, parts: Sequence[Part], zoom: tuple[float, float, float
 
 
 def color_limit(parts: Sequence[Part], *, share: float = 0.004) -> float:
-    """Stress that a `share` of the area exceeds: colours up to it show the roots too, not the contact's peak alone."""
+    """Return the stress that a `share` of the area exceeds. Colours up to it also show the roots."""
     level = np.concatenate([stress[triangles].mean(axis=1) for _, triangles, stress in parts])
     edges = [(p[t[:, 1]] - p[t[:, 0]], p[t[:, 2]] - p[t[:, 0]]) for p, t, _ in parts]
     area = np.abs(np.concatenate([a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] for a, b in edges]))

@@ -139,7 +139,7 @@ def last_part(response: TrainResponse) -> TrainResponse:
 
 
 def envelope(x: Array, y: Array, most: int = TRACED // 4) -> tuple[Array, Array, Array]:
-    """Middles of groups of neighbours of a curve, and the least and the largest value of each, which touch the next."""
+    """Return the middles of groups of neighbouring samples, and the least and largest value of each group."""
     group = -(-len(x) // most)
     starts = np.arange(0, len(x), group)
     low, high = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
@@ -250,7 +250,7 @@ def _draw_transmission(path: Path, train: GearTrain, response: TrainResponse, ti
 
 
 def _draw_load_shares(path: Path, train: GearTrain, response: TrainResponse, title: str) -> None:
-    """Force of each mesh of a planet over the mean of its kind, over the rotation of the carrier, under the load."""
+    """Draw the force of each planet mesh over the mean of its kind, over the rotation of the carrier."""
     rolled = train.kinematics
     families = [family for family in mesh_families(train.layout, rolled.phases) if len(family.meshes) > 1]
     late = response.time >= min(response.load_end_s, 0.5 * float(response.time[-1]))
@@ -279,7 +279,7 @@ def _draw_load_shares(path: Path, train: GearTrain, response: TrainResponse, tit
 
 
 def _apart(response: TrainResponse, sense: float) -> list[Spans]:
-    """Rotations of the drive (deg) between which the teeth of each mesh are apart; none for meshes that do not part.
+    """Return rotations of the drive (deg) between which the teeth of each mesh are apart.
 
     Where curves are the extremes of parts of the run, all of a part in which they are once. Before the load
     comes teeth only just touch: that is not drawn.

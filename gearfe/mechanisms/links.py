@@ -117,7 +117,8 @@ class FlexibleLink:
         return self.beam.link.node(self.points[point][0])
 
     def places(self, q: Array, stations: Array | None = None) -> Array:
-        """x, y, theta of the nodes, or at other stations (m) of the axis, for states (times, size): (times, n, 3)."""
+        """Return x, y, theta of the nodes, or at other stations (m) of the axis, for states (times, size): (times, n,
+        3)."""
         nodes = q[:, self.beam.places].reshape(len(q), -1, 3)
         return nodes if stations is None else np.einsum("sn,tnk->tsk", self.beam.shapes(stations)[0], nodes)
 

@@ -66,7 +66,9 @@ def body_of(file: MechanismFile, name: str, t: BodyTable, parts: Mapping[str, Pl
 def _place(
     file: MechanismFile, links: Links, where: str, point: str | Point | None, label: str, *, pointed: bool
 ) -> tuple[str, Point]:
-    """Body of the linkage, and the place in its frame, of a point of `where`: a body, or a point of a flexible link.
+    """Return the body of the linkage and the position in its frame of the point `where`.
+
+    `where` is a body, or a point of a flexible link.
 
     What takes no point (not `pointed`) acts on the section where a flexible link begins.
     """

@@ -251,7 +251,7 @@ class _Shape:
 
 @lru_cache(maxsize=16)
 def _reduced(shape: _Shape, text: str) -> Plate:
-    """Return the reduced plate of a table and a hash of its mesh, from the cache if the same was reduced before."""
+    """Return the reduced plate of a table and a hash of its mesh, from the cache if possible."""
     from ..fem.plane import Material
     from ..fem.reduction.plate import Plate
 

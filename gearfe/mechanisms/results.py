@@ -146,7 +146,9 @@ def energies(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
 
 
 def _work(mechanism: Mechanism, trajectory: Trajectory) -> Array:
-    """Work since the start: closed form for constant loads, else Gauss quadrature of the power between output times and
+    """Compute the work since the start.
+
+    For constant loads it has a closed form, otherwise it is a Gauss quadrature of the power between output times and
     ends of steps.
     """
     linkage, time = mechanism.linkage, trajectory.time

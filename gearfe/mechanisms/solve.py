@@ -1,5 +1,6 @@
-"""A mechanism solved by its analysis, once or with many values of its keys: tables without files, the same wherever and
-beside whatever it runs."""
+"""Solve a mechanism by its analysis, once or with many values of its keys, and return tables.
+
+Results do not depend on where the cases run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Keys of a mechanism file that change nothing beside its others: remarks, as a run by other options may need them."""
+"""Find keys of a mechanism file without effect. They get remarks, because runs with other options may need them."""
 
 from __future__ import annotations
 

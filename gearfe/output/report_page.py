@@ -1,4 +1,4 @@
-"""The report of one run or of a whole gearbox: one HTML file that opens offline and prints to a few pages.
+"""Write the report of one run or of a gearbox as one HTML file that opens offline.
 
 Job files, names and results come from strangers, so every text is escaped. There are no scripts and no external
 resources. What is needed for checking only (all figures, printed lines, first rows of the tables, the job file) is

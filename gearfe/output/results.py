@@ -165,7 +165,7 @@ def _newest(folder: Path, summary: str) -> Kind:
 
 
 def _of_table(path: Path, field: str, name: str) -> Results:
-    """Results of a main table, with the summary of its folder where it has the name that a command gives it."""
+    """Read the results of a main table; with the name of a command, also the summary of its folder."""
     known = next((kind for kind in KINDS if kind.table == path.name), None)
     if known is not None:
         of_it = _newest(path.parent, known.summary) is known

@@ -1,4 +1,4 @@
-"""Numbers that each kind of run is read for, with the sources of their errors, from its summary and its tables."""
+"""Read the numbers of each kind of run, with the sources of their errors, from summary and tables."""
 
 from __future__ import annotations
 

@@ -157,7 +157,7 @@ def _names_file(text: Any, folder: Path) -> bool:
 
 
 def job_beside(raw: Any, folder: Path, place: Path) -> Any:
-    """Tables of a job in `folder` for a job file in `place`, from where the files that they name are found."""
+    """Return the tables of a job in `folder` for a job file in `place`, with valid paths of named files."""
     if isinstance(raw, dict):
         return {key: job_beside(value, folder, place) for key, value in raw.items()}
     if isinstance(raw, (list, tuple)):

@@ -68,7 +68,7 @@ def _shares(table: StudyTable, d: int) -> Array:
 
 
 def saltelli(points: Array) -> Array:
-    """Points for Sobol's indices, (n (d + 2), d), from (n, 2 d) points: A, B, and A with one column of B.
+    """Return points (n (d + 2), d) for Sobol's indices from (n, 2 d) points: A, B, and A with one column of B.
 
     Saltelli et al., Comput. Phys. Commun. 181 (2010) 259, table 2.
     """

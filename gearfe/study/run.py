@@ -1,4 +1,4 @@
-"""The cases of a study, one after the other, on processes, or on any executor; finished ones are handed on in groups.
+"""Run the cases of a study in this process, on processes or on any executor, and return them in groups.
 
 Groups take about `GROUP_SECONDS`, so that handing over and storing cost little; a kill loses no more than that. The
 cases of groups that never return run again one by one, at most `AGAIN` times. Nothing else runs then, so the case that
@@ -213,7 +213,7 @@ def _begun(workers: int) -> tuple[Executor, Future[int] | None]:
 
 
 def _begin(folder: str) -> None:
-    """Enter the folder of the program that started this worker, leave Ctrl-C to it, and end with it in any case."""
+    """Enter the folder of the program that started this worker, ignore Ctrl-C, and end when it ends."""
     os.chdir(folder)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()

@@ -328,8 +328,10 @@ class Search(Facts):
         return self.best()
 
     def refine(self, points: int | None = None) -> Solution | None:
-        """Nelder's and Mead's method (by scipy) from the best point on; whole numbers stay, points beyond limits are
-        no better than any. It ends where its points agree within a tenth of the tolerances.
+        """Minimise by the Nelder-Mead method (by scipy) from the best point on.
+
+        Whole numbers stay constant. Points beyond limits count as the worst. The method ends when its points agree
+        within a tenth of the tolerances.
 
         Parameters
         ----------

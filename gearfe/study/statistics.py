@@ -268,7 +268,9 @@ def proportion(good: int, cases: int) -> dict[str, Any]:
 
 
 def pareto_set(values: Array) -> IntArray:
-    """Rows of (n, k) that no other row beats: none is as small in all columns and smaller in one; rising.
+    """Return the rows of (n, k) that no other row dominates, in rising order.
+
+    A row dominates another one if it is as small in all columns and smaller in one.
 
     Rows that are infinite take no part.
     """

@@ -535,7 +535,7 @@ def external_first(driver: NamedGear, driven: NamedGear) -> tuple[tuple[NamedGea
 def tooth_form_of(
     table: ToothFormTable, shared: ToothFormTable | None, shared_where: str
 ) -> tuple[dict[str, Any], dict[str, str]]:
-    """Keys of a gear's tooth form with module and bore, and where those come from that it does not give itself."""
+    """Return the keys of a gear's tooth form with module and bore, and the sources of those it inherits."""
     tables = (table,) if shared is None else (table, shared)
     module = next((t.module_mm for t in tables if t.module_mm is not None), None)
     form: dict[str, Any] = {"module_mm": module, **tooth_form(*tables)}

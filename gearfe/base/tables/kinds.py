@@ -1,4 +1,4 @@
-"""Types of joints and forces of a mechanism file: the class of each, and which keys are which of its fields.
+"""List the types of joints and forces of a mechanism file, with their classes and the keys of their fields.
 
 And integrators that jobs of mechanisms and of trains may not name any more.
 """

@@ -281,7 +281,7 @@ def module_mm_of(gear: GearBodyTable, written: float | None, common: float | Non
 
 
 def common_module_mm(gears: Iterable[GearBodyTable], helix_deg: float) -> float | None:
-    """Return the normal module (mm) that one of meshing gears gives, or that of the sum of all their pitch diameters.
+    """Return the normal module (mm) that one of the meshing gears gives, or that of their pitch diameters.
 
     `helix_deg` is their helix angle (deg).
     """

@@ -51,7 +51,7 @@ class _Named:
 
 @dataclass(frozen=True)
 class ShaftSectionTable:
-    """A piece of an elastic shaft: a cylinder, hollow or not, or a cone where the diameters of its ends differ."""
+    """Define a section of an elastic shaft: a solid or hollow cylinder, or a cone."""
 
     length_mm: float = quantity(above=0.0, doc="length (mm); the first section begins at the end of lowest y")
     outer_diameter_mm: float | None = quantity(None, above=0.0, doc="outer diameter (mm)")
@@ -233,7 +233,7 @@ class TrainShaftTable(ShaftTable, _Named):
 
 @dataclass(frozen=True)
 class TrainGearTable(ToothFormTable):
-    """A gear on a shaft: one of [pair], or one with its own teeth; missing keys come from [pair]'s shared ones."""
+    """Define a gear on a shaft: one of [pair], or one with its own teeth. Missing keys come from [pair]."""
 
     name: str = quantity(doc="name of the gear")
     shaft: str = quantity(doc="shaft that carries it")
@@ -502,7 +502,7 @@ class TrainLoadTable:
 
 @dataclass(frozen=True)
 class TrainForceTable:
-    """Force and moment on a shaft that stay as they are: belt pull, weight of an overhung part, force of a pump."""
+    """Define a constant force and moment on a shaft: belt pull, weight of an overhung part, force of a pump."""
 
     shaft: str = quantity(doc="shaft that is loaded")
     y_mm: float = quantity(doc="place along the axis where force and moment act (mm)")

@@ -271,7 +271,8 @@ def legendre(degree: int, points: int) -> tuple[Array, Array, Array]:
 
 
 def hierarchic(degree: int, x: Array) -> Array:
-    """Both linear functions and the integrals of Legendre's polynomials up to a degree at x in [-1, 1]: (k, d + 1)."""
+    """Evaluate both linear functions and the integrals of Legendre polynomials up to a degree at x in [-1, 1]: (k, d +
+    1)."""
     polynomials = np.polynomial.legendre.legvander(x, max(degree, 1))
     values = np.empty((len(x), degree + 1))
     values[:, 0], values[:, 1] = 0.5 * (1.0 - x), 0.5 * (1.0 + x)

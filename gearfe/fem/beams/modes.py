@@ -1,4 +1,4 @@
-r"""Elastic vectors of a free shaft: its modes up to a frequency and the static responses that the modes leave out.
+r"""Compute elastic vectors of a free shaft: modes up to a frequency, and static responses without these.
 
 For a family of motions with stiffness K, mass M and M-orthonormal rigid vectors R (K R = 0), the matrix
 ``K_s = K + alpha M R (M R)^T`` is positive definite. Its eigenvectors are the rigid ones, with ``alpha``, and the

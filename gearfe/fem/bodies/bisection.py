@@ -86,7 +86,7 @@ class _Middle(NamedTuple):
 
 
 class _Made:
-    """Nodes of a mesh that is being refined, those that were added by the pair of corners between which they lie."""
+    """Hold the nodes of a mesh during refinement; added ones by the corners between which they lie."""
 
     def __init__(self, nodes: Array, members: BoolArray) -> None:
         self.nodes, self.members = nodes, members

@@ -231,7 +231,7 @@ def _number(nodes: Array, tets: IntArray, rigid: list[IntArray]) -> _Numbers:
 
 
 def _residual(made: _Functions, matrices: ElementMatrices, field: Array, eigenvalues: Array) -> tuple[Array, Array]:
-    """(m, s, 3, k) residuals and (m, s, 3, 3) stiffnesses of the added functions, for fields (m, a, 3, k)."""
+    """Return (m, s, 3, k) residuals and (m, s, 3, 3) stiffnesses of added functions for fields (m, a, 3, k)."""
     (m, a, _, k), s = field.shape, len(made.added.values)
     stiffness = np.empty((m, s, 3, a, 3))
     for i in range(3):

@@ -169,7 +169,7 @@ class Prisms:
 def _chosen(
     nodes: Array, faces: IntArray, corners: IntArray, without: list[IntArray], outer: Outer | None
 ) -> BoolArray:
-    """(f,) whether faces lie within none of the sets of nodes and are outer ones by the mean of their `corners`."""
+    """Return (f,) whether faces lie in no set of nodes and are outer ones by the mean of their `corners`."""
     keep = np.ones(len(faces), dtype=bool) if outer is None else outer(nodes[corners].mean(axis=1))
     keep = np.asarray(keep, dtype=bool)
     for chosen in without:

@@ -1,4 +1,4 @@
-"""The one way to gmsh: a context manager that opens a quiet session with an empty model and always closes it.
+"""Open gmsh: a context manager for a quiet session with an empty model, which is always closed.
 
 gmsh keeps its state in globals of a shared library: one session at a time (a lock holds a second thread back), nothing
 left behind. Geometry is built in millimetres, because gmsh's CAD kernel has an absolute tolerance of 1e-7.

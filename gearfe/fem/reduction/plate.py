@@ -243,7 +243,7 @@ def _static_shapes(Z: np.ndarray, interfaces: list[Interface], n: int) -> Array:
 
 
 def _mean(modes: np.ndarray, interface: Interface, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement d of an interface's centre, and its turn and growth w = g + i f, by the modes: u = d + w arm."""
+    """Return displacement d of an interface's centre, growth and rotation w = g + i f, by the modes: u = d + w arm."""
     arm = Z[interface.nodes] - complex(*interface.centre)
     basis = np.stack([np.ones(len(arm)), arm], axis=1)
     shift, turn = np.linalg.lstsq(basis, modes[interface.nodes], rcond=None)[0]
@@ -300,7 +300,7 @@ def _derivatives(made: _Elements, shapes: Array, interfaces: list[Interface], Z:
 
 
 def _strain_basis(made: _Elements, shapes: Array) -> tuple[Array, Array]:
-    """Columns (L, pairs i <= j of Q) in an orthonormal basis of strain energy, and stresses at the points by it.
+    """Return columns (L, pairs i <= j of Q) in an orthonormal basis of strain energy, and its stresses at the points.
 
     Shapes (s, r + r (r + 1)/2) and (q, 3, s).
     """
@@ -320,7 +320,7 @@ def _strain_basis(made: _Elements, shapes: Array) -> tuple[Array, Array]:
 
 
 def _symmetric(pairs: Array, r: int) -> Array:
-    """Q from its pairs, shape (s, r, r): sym(H_i^T H_j) with twice the shear is d2 E / d eta_i d eta_j."""
+    """Return Q from its pairs, shape (s, r, r). With twice the shear, sym(H_i^T H_j) is d2 E / d eta_i d eta_j."""
     out = np.zeros((len(pairs), r, r))
     one, two = np.triu_indices(r)
     out[:, one, two] = out[:, two, one] = pairs

@@ -125,8 +125,9 @@ def elimination_order(graph: Any) -> IntArray:
 
 
 def _fronts(graph: Any, order: IntArray, leaf_nodes: int) -> tuple[IntArray, IntArray]:
-    """Nodes front by front, and where each front ends: runs of the elimination tree, which are subtrees of
-    `leaf_nodes` and chains without larger branches.
+    """Return the nodes front by front, and the ends of the fronts.
+
+    Fronts are subtrees of `leaf_nodes` in the elimination tree, and chains without larger branches.
     """
     parent = _elimination_tree(graph[order][:, order])
     nodes = len(parent)

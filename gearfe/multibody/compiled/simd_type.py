@@ -108,7 +108,8 @@ def _teach(key: Any, template: Any) -> None:
 
 
 def _operation(key: Any, count: int, result: Any, make: Any) -> None:
-    """Teach numba a function of so many vectors, of which numbers may be some but not all; `result` gives its type."""
+    """Register a function of vectors with numba. Some arguments, but not all, may be numbers; `result` gives its
+    type."""
 
     class Template(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:

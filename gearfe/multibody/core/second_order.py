@@ -83,8 +83,9 @@ def motions_of_second_order(system: System, time: float, q: Array, count: int) -
 
 
 def _forms(system: System, time: float, q: Array) -> tuple[Array, Array]:
-    """Motions V that the gradients leave free, shape (size, f), in coordinates that compare; V^T (w^T H) V of dependent
-    rows, shape (w, f, f)."""
+    """Return the motions V that the gradients leave free, shape (size, f), and V^T (w^T H) V of dependent rows.
+
+    Motions are in scaled coordinates; the second array has the shape (w, f, f)."""
     G = system.jacobian(time, q) * system.units / system.row_units[:, None]
     left, sizes, right = np.linalg.svd(G, full_matrices=True)
     rank = int((sizes > SINGULAR * sizes.max(initial=0.0)).sum())

@@ -164,7 +164,7 @@ def _regular(system: System, time: float, q: Array) -> bool:
 
 
 def _time_of_change(system: System, time: float, q: Array, size: float) -> float:
-    """Time until prescribed motions have changed a row by `size` of its unit, or the most they do; 0 without motion."""
+    """Return the time until prescribed motions change a row by `size` of its unit, or most; 0 without motion."""
     here, most, found = system.residual(time, q), 0.0, 0.0
     for step in 2.0 ** np.arange(-60.0, 40.0):
         change = float((np.abs(system.residual(time + step, q) - here) / system.row_units).max(initial=0.0))

@@ -88,7 +88,7 @@ class Pace:
         self._announced = False
 
     def hopeless(self, t: float, steps: int) -> bool:
-        """Report how far the run is at time t (s) after so many steps; whether the rest needs far too many."""
+        """Report the progress at time t (s) after so many steps, and whether the rest needs far too many."""
         if steps == 0:
             self._begun = time.monotonic()
         looked = steps >= FARTHER * self._marks[-1][0] and steps > 0
@@ -217,7 +217,7 @@ class StepControl:
         self._added, self.trial = True, self._step
 
     def fail(self, status: Status, share: float = LEAST) -> None:
-        """The step is not made, and its error has no size: `share` of it is next, or the run ends with `status`."""
+        """Reject a step without a finite error: try `share` of it next, or end the run with `status`."""
         self.rejected += 1
         self.trial = (0.5 if self.law.steady else share) * self._step
         if self._step < ROUNDING * max(1e-300, self.span):

@@ -206,7 +206,7 @@ def _reversal(system: System, time: float, state: tuple[Array, Array, Array], st
 
 
 def _steepest(value: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
-    """Return the part of a range in which a function makes most of its change, halved until it is about linear."""
+    """Return the part of a range with most of a function's change, halved until it is about linear."""
     while True:
         quarters = low + (high - low) * np.linspace(0.0, 1.0, 5)
         values = np.array([value(float(x)) for x in quarters])

@@ -199,7 +199,7 @@ class System:
         return ""
 
     def load_values(self, t: float, q: Array, v: Array) -> list[tuple[str, float]]:
-        """Return the loads that depend on the state, with the bodies that they act on, and their values (N, N m)."""
+        """Return loads that depend on the state, the bodies they act on, and their values (N, N m)."""
         return [load for element, index in self.forces for load in element.load_values(t, q[index], v[index])]
 
     @cached_property
@@ -402,7 +402,7 @@ def regular(S: Array, least: float) -> bool:
 
 
 def least_norm_solution(S: Array, right: Array, least: float) -> Array:
-    """Solution of S x = right of least norm in rows of equal size; singular values below the share `least` are zero.
+    """Solve S x = right with least norm in rows of equal size. Singular values below the share `least` are zero.
 
     NaN where S or `right` is not finite: the integrators then tell the state, LAPACK would raise.
     """

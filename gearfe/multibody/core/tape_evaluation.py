@@ -1,4 +1,4 @@
-"""Elements that are what they write on a tape: rows and forces in many states at once, with derivatives, by NumPy.
+"""Evaluate elements on a tape by NumPy: rows and forces with derivatives, in many states at once.
 
 Each variable z_i of a tape is a function of one coordinate, with the slope z_i' and the bend z_i''. Rows are
 

@@ -128,7 +128,7 @@ def _knot(system: System, path: Path) -> float:
 
 
 def _pole(system: System, t: float, h: float, path: Path, x: float) -> tuple[float, Array, Array] | None:
-    """The state (t, q, v) nearest to a pole that forces have at the share x of the step; None where they have none."""
+    """Return the state (t, q, v) nearest to a pole of forces at the fraction x of the step; None without pole."""
     side = -x if x > 0.5 else 1.0 - x
     sizes = []
     for distance in POLE_AT:

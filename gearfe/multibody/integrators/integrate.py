@@ -182,7 +182,7 @@ def chosen_method(system: System, start: Start, duration: float) -> str:
 
 
 def _stiff(system: System, start: Start, end: float, t: float, step: float, q: Array, v: Array) -> bool:
-    """Return whether a decay limits the mean step (s) of series at a state, and the rest of the run is long for it."""
+    """Return whether a decay limits the mean step (s) of series at a state in a long remaining run."""
     left = abs(end - t)
     if not left > MANY_LEFT * step:
         return False

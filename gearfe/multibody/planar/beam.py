@@ -249,7 +249,7 @@ class Tangent:
 
 
 def _gather(N: Array, D: Array) -> Array:
-    """P: from (x, y, theta) of the nodes to (x', y', theta, theta') at the points, shape (points, 4, 3 nodes)."""
+    """Return P from (x, y, theta) of the nodes to (x', y', theta, theta') at the points, shape (points, 4, 3 nodes)."""
     P = np.zeros((len(N), 4, N.shape[1], 3))
     P[:, 0, :, 0] = P[:, 1, :, 1] = P[:, 3, :, 2] = D
     P[:, 2, :, 2] = N

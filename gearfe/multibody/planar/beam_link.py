@@ -55,7 +55,7 @@ class Section:
 
 @dataclass(frozen=True)
 class BeamLink:
-    """A straight flexible link as plain data; its frame has the origin at the start of the axis, which is its x axis.
+    """Describe a straight flexible link. The origin of its frame is the start of its axis, the x axis.
 
     Parameters
     ----------

@@ -232,7 +232,7 @@ class Prescribed(Joint):
 
 
 def places(joint: Joint) -> dict[str, Point]:
-    """Points of bodies, by their names, at which the force of a joint acts; none for moments, and points that move."""
+    """Return the points of bodies, by name, where a joint force acts; none for moments and moving points."""
     if getattr(joint, "coordinate", "") in ("angle", "rate"):
         return {}
     keys = (("a", "point_a"), ("b", "point_b"), ("body", "point"), ("relative_to", "origin"))

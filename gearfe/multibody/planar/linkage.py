@@ -1,4 +1,4 @@
-"""Planar bodies with joints and forces as one element of the contract: what it writes on a tape, and its energies.
+"""Combine planar bodies, joints and forces to one element of the contract, with its tape and energies.
 
 In the variables x, y, theta, cos theta, sin theta of the bodies, forms (`multibody.planar.forms`) are affine or
 quadratic, and vectors have affine components. The tension T along a span D pulls with (T / |D|) D.

@@ -29,7 +29,9 @@ class Factor(NamedTuple):
 
 
 def symbolic_factor(m: int, coupled: Iterable[tuple[int, int]]) -> tuple[Factor, Callable[[int, int], int]]:
-    """Symbolic factor of m rows, and the place of an entry (r, s) of S: r for a diagonal one, else m + its number.
+    """Hold the symbolic factor of m rows and the positions of entries (r, s) of S.
+
+    A diagonal entry has the position r, another one m + its number.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""Rows of a program and its masses as flat arrays, for series: gradients, squares, and S = G M^-1 G^T = L D L^T.
+"""Lay out the rows and masses of a program as flat arrays for series.
+
+The arrays are gradients, squares, and S = G M^-1 G^T = L D L^T.
 
 The quadratic part of a row is a sum of squares of forms of the variables, sum_k d_k (w_k . z)^2, from its eigenvalues
 and eigenvectors. A distance has two squares, a line that rotates with a body four. They are variables behind those of

@@ -90,7 +90,7 @@ Point = tuple[float, float, float]
 
 @dataclass
 class _Members:
-    """Members of a set or surface as written: words of the file with the instance they belong to, and their places."""
+    """Hold the members of a set or surface: words of the file with their instance and position."""
 
     name: str
     #: (words of a line, instance, line); of GENERATE cards (first, last, increment)
@@ -136,7 +136,7 @@ def read_abaqus(path: Path, field: str) -> SourceMesh:
 
 
 class _Reader:
-    """State of reading: the spaces so far, the one that is open, and the system of coordinates that holds in it."""
+    """Hold the state of reading: the spaces so far, the open one, and its system of coordinates."""
 
     def __init__(self, fault: Fault) -> None:
         self.fault = fault

@@ -136,7 +136,7 @@ def _groups(mesh: Any) -> Iterator[tuple[str, IntArray]]:
 
 
 def _rows(key: str, values: Array, names: dict[int, list[str]]) -> Iterator[tuple[str, IntArray]]:
-    """Groups of one array: its numbers, where they are known to be groups; else, of marks 0 and 1, its own name."""
+    """Return the groups of one array: its numbers if they are groups, or its name for marks of 0 and 1."""
     if values.ndim != 1 or key in OTHER_NUMBERS:
         return
     if key in NUMBERED:

@@ -57,7 +57,7 @@ def read_nastran(path: Path, field: str) -> Matrices:
 
 @dataclass(frozen=True)
 class Words:
-    """Number format of a binary file: its order of bytes (``<`` or ``>``), and bytes of a word (4 or 8)."""
+    """Hold byte order (``<`` or ``>``) and bytes per word (4 or 8) of a binary file."""
 
     order: str
     size: int
@@ -222,7 +222,7 @@ def output4(data: bytes) -> Matrices:
 
 
 def _binary_column(column: Array, rest: bytes, row: int, words: Words, kind: int, two: bool) -> None:
-    """Fill a column from its data: one string from `row` on, or where that is 0 several with heads of their own."""
+    """Fill a column from its data: one string from `row` on, or several with their own heads if `row` is 0."""
     at = 0
     while at < len(rest):
         if row:

@@ -1,4 +1,4 @@
-"""A mesh as a file of another program holds it: the form that all readers return, and the check that they share."""
+"""Define the form in which all readers return a mesh of another program, and their common check."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ _DAMAGED = "the file may be cut short or damaged: write it again"
 
 
 class DataSet(NamedTuple):
-    """A data set: its number, its lines, the line of the file where they begin, and the bytes of a binary one."""
+    """Hold a data set: number, lines, position of its first line in the file, bytes of a binary one."""
 
     number: int
     lines: list[str]

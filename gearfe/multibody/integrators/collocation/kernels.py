@@ -1,4 +1,4 @@
-"""Solve one step by collocation of  M a = f(t, q, v) - G^T lambda,  g(t, q) = 0:  simplified Newton on all stages.
+"""Solve one collocation step of  M a = f(t, q, v) - G^T lambda,  g(t, q) = 0  by simplified Newton.
 
 Radau stages hold the constraints (index 3). Gauss stages hold their rates (index 2), because constraints on the
 positions would reduce the order (Ascher & Petzold, SIAM J. Numer. Anal. 28 (1991) 1097-1120). Radau stages hold the

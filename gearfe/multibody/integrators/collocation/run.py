@@ -369,7 +369,7 @@ def _before(coefficients: Array, h: Array, k: int, short: Array, derivative: int
 
 
 def _line_of_accelerations(count: int, h: float, begin: Array, a: Array | list[Array]) -> Array:
-    """Coefficients (count, n) about the middle of a step from (q, h v) at its begin, and from q'' at both ends."""
+    """Compute coefficients (count, n) about the middle of a step from (q, h v) at its start and q'' at both ends."""
     middle, slope = 0.5 * (a[0] + a[1]), (a[1] - a[0]) / h
     v = begin[1] / h + 0.5 * h * (a[0] + 0.25 * h * slope)
     coefficients = np.zeros((count, len(middle)))

@@ -25,7 +25,7 @@ AHEAD = 4
 
 
 class SideBySide(NamedTuple):
-    """The same coefficients for all stages at once, side by side, W = s + 1: the last one is the step's begin.
+    """Hold the coefficients of all stages side by side, W = s + 1; the last one is the start of the step.
 
     Of the r + 1 systems the SIMD vectors hold the real parts, then the imaginary ones.
     """
@@ -125,7 +125,9 @@ def scheme(family: str, stages: int, rates: bool = False) -> Scheme:
 
 
 def path_matrix(c: Array, accelerations: bool = False, origin: float = 0.0) -> Array:
-    """Compute coefficients of powers of x - origin from q and h v at 0 and 1, q at c, and h^2 q'' at 0 and 1.
+    """Compute coefficients of powers of x - origin for the path of a step.
+
+    They follow from q and h v at 0 and 1, q at c, and h^2 q'' at 0 and 1.
 
     About the middle of the step rounding weighs a thousand times less at the step's end than about its begin.
     """

@@ -414,7 +414,7 @@ def singular_frame(tb: Equations, w: Work, q: Array, v: Array, bound: float) -> 
 
 
 def border_share(tb: Equations, border: Border, count: int) -> float:
-    """Least share of a direction B that neither the regular rows nor the other directions hold (pivots of L D L^T)."""
+    """Return the least share of a direction B outside the regular rows and other directions (pivots of L D L^T)."""
     L = border.small
     least = 1.0
     for p in range(count):

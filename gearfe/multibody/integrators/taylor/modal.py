@@ -190,7 +190,8 @@ class SeriesRun:
 
 @dataclass(frozen=True)
 class SeriesPieces:
-    """Dense output of a run by series: the asked times are at hand, at others the run is taken up again."""
+    """Evaluate a run by series. States at output times are stored; other times are integrated again from a stored
+    step."""
 
     times: Array
     states: Array

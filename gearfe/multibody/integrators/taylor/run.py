@@ -42,7 +42,7 @@ NEAR_POLE = 1e-6
 
 
 class TaylorRun(NamedTuple):
-    """One run of a system at one order: constant tables, which all runs share, and a work space of its own.
+    """Hold one run of a system at one order: constant tables of all runs, and its own work space.
 
     `handed` are tables and work space as the kernels get them. Making a work space takes as long as a short run, so one
     that a run has left (`spare`) serves the next.
@@ -198,7 +198,7 @@ def run_taylor(
 
 
 def _load_problem(shared: TaylorRun, run: Run, t: float, status: Status) -> str:
-    """Return which load has no value at the state in the work space, or just beyond, or a pole within the step."""
+    """Return the load without a value at or just beyond the state in the work space, or with a pole."""
     system, tables, order, w, _, _ = shared
     python = KERNELS.python
     if problem := load_problem_ahead(system, t, (w.q, w.v, 2.0 * w.Z[: len(w.q), 2]), run.end - run.begin):

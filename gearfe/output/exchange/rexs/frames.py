@@ -137,7 +137,7 @@ class Axes:
 
 
 def axes_along(u: Vector) -> Axes:
-    """Return the axes of a job whose shafts run along a direction: y along it, z along v of the gear unit if it can."""
+    """Return the axes of a job: y along the shafts, z along v of the gear unit if possible."""
     size = max(abs(part) for part in u)
     along = (0.0, 1.0, 0.0) if abs(u[1]) < 0.9 * size else (0.0, 0.0, 1.0)
     share = dot(along, u)

@@ -1,4 +1,4 @@
-"""Convert a REXS model to a job file: tables with the names of the model, and a list of all its values.
+"""Convert a REXS model to a job file with the names of the model, and a list of all its values.
 
 The order is materials, shafts, gears, meshes, bearings, couplings. From these follow the speeds and torques of all
 shafts (`balance`), and from them drive, loads and the load of each mesh. Parts that a job cannot have are comments with
@@ -233,7 +233,7 @@ def _place_shafts(
     gears: Mapping[str, Mapping[str, Any]],
     shafts: dict[str, dict[str, Any]],
 ) -> None:
-    """Put shafts without a place beside those that they mesh with: at the centre distance, in the angle of the file.
+    """Place shafts without a position next to those that they mesh with: at the centre distance and angle of the file.
 
     ``rotating_angle_around_neg_u_axis`` is the angle of the line of centres from w towards v (the published examples).
     """
@@ -813,7 +813,7 @@ def _models(reading: Reading, tables: dict[str, Any]) -> None:
 
 
 def _ring_tips(reading: Reading, tables: dict[str, Any], box: Gearbox) -> None:
-    """Addendum of rings that the file gives no tips: 1, or as much as stays on the involutes of their mates.
+    """Return the addendum of rings without tip diameter: 1, or the largest on the involutes of their mates.
 
     The roll length at the tip of a ring, minus a sin(alpha_wt), is that of the mate at this point. It must not be less
     than that of the mate's form circle, r sin(alpha_t) - (h_fP - rho_fP (1 - sin(alpha_n)) - x) m_n/sin(alpha_t) (ISO

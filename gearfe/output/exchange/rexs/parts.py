@@ -221,7 +221,7 @@ def _carried(reading: Reading, shaft: Component) -> list[Component]:
 
 
 def diameter_at(entry: dict[str, Any], y: float, name: str = "outer") -> float | None:
-    """Return the diameter of a shaft's entry (mm) at a place along y; None beyond its ends, or of a rigid shaft."""
+    """Return the diameter of a shaft (mm) at a position along y; None beyond its ends or if it is rigid."""
     sections = entry.get("sections", [])
     start = entry["y_mm"] - 0.5 * sum(section["length_mm"] for section in sections)
     for section in sections:
@@ -544,7 +544,7 @@ def _rim(
     pitch: float,
     where: str,
 ) -> None:
-    """Outer diameter of the rim of a ring, negative as in ISO 21771: its body's, that of its shaft, or a usual one."""
+    """Return the rim diameter of a ring (negative, ISO 21771): that of its body, of its shaft, or a usual one."""
     key, module = f"{where}.rim_diameter_mm", entry.get("module_mm", 1.0)
     for item in bodies:
         value = reading.number(item, "outer_diameter", "mm")

@@ -108,7 +108,7 @@ def _stage(
 
 
 def _reach(reading: Reading, shafts: dict[str, Any], main: str, planet: Mapping[str, Any]) -> None:
-    """Lengthen the elastic shaft of a carrier up to the far end of its planets, where the file gives no more of it."""
+    """Lengthen the elastic shaft of a carrier to the far end of its planets if the file gives less."""
     body = shafts[main]
     if "sections" not in body:
         return
@@ -168,7 +168,7 @@ def _shafts(reading: Reading, stage: Component, relation: str) -> list[Component
 
 
 def _angles(shafts: Mapping[str, Any], carrier: str, planets: list[str]) -> list[float] | None:
-    """Angles of planets from the first one (deg, about +y, 0 to 360); None if they are not on a circle."""
+    """Return angles of planets from the first one (deg, about +y, 0 to 360); None if not on a circle."""
     x, z = shafts[carrier]["x_mm"], shafts[carrier]["z_mm"]
     places = [(shafts[name]["x_mm"] - x, z - shafts[name]["z_mm"]) for name in planets]
     radii = [math.hypot(*place) for place in places]
@@ -232,7 +232,7 @@ def _absorb(
     parts: list[str],
     left: dict[tuple[str, str], tuple[Any, str]],
 ) -> None:
-    """Take out the other shafts of a carrier, its pins, and what couplings hold on it: a job has one shaft for it."""
+    """Remove the other shafts of a carrier, its pins and coupled parts, because a job has one shaft for it."""
     shafts = tables["shafts"]
     with_gears = {entry.get("shaft") for entry in tables["gears"].values()}
     lost, merged = {name for name in parts if name in shafts and name != main}, set[str]()
@@ -298,7 +298,7 @@ def _joined(shafts: dict[str, Any], main: str, others: set[str]) -> list[str]:
 
 
 def _hold(reading: Reading, tables: dict[str, Any], shaft: str, name: str, carried: bool) -> None:
-    """A shaft on the housing: it does not turn, and where no bearing carries it, the stiffness of its coupling does."""
+    """Fix a shaft on the housing. If it has no bearing, the stiffness of its coupling supports it."""
     coupling, entry = reading.part("couplings", name), tables["shafts"][shaft]
     entry["speed_ratio"] = 0
     reading.derived(coupling, "side", f"shafts.{shaft}.speed_ratio", "held by the casing")

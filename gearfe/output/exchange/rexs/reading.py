@@ -1,4 +1,4 @@
-"""Hold the state of a conversion: the model, its frames, the names of the job's parts, and the list of values."""
+"""Hold the state of a conversion: the model, its frames, the names in the job, the list of values."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ class Reading:
         return "" if found is None else str(found.value)
 
     def flag(self, component: Component, name: str) -> bool | None:
-        """Return a truth value, of an array that of the gear that is engaged in the gear unit; None without it."""
+        """Return a truth value; of an array, that of the engaged gear of the gear unit; None without it."""
         found = self.attribute(component, name)
         if found is None:
             return None
@@ -221,7 +221,7 @@ class Reading:
         return found
 
     def place(self, component: Component) -> tuple[float, float, float] | None:
-        """Return x, y, z (mm) of the origin of a component in the axes of the job; None: it has no place."""
+        """Return x, y, z (mm) of a component's origin in the axes of the job; None if unknown."""
         frame = self.frames.get(component.number)
         if frame is None:
             return None

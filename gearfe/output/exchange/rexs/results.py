@@ -1,4 +1,4 @@
-"""Results that a REXS file has attributes for, and where they go: to a component, or to it in a load case.
+"""Collect the results that a REXS file has attributes for, by component or by component and load case.
 
 Geometry and accuracy belong to the component. What follows from loads and speeds is in the first load case of a load
 spectrum, as other programs write it.

@@ -137,6 +137,6 @@ def _scaled(number: Decimal, unit: str, target: str) -> Decimal:
 
 
 def _plain(number: Decimal) -> str:
-    """Text of a number as other programs read it: with a point, and a power of ten where it is large or small."""
+    """Format a number for other programs: with a point, and a power of ten if it is large or small."""
     text = f"{number.normalize():f}" if number and abs(number.adjusted()) < 16 else f"{number.normalize():E}"
     return text if any(mark in text for mark in ".E") else f"{text}.0"

@@ -1,4 +1,4 @@
-"""Write a job as REXS 2.0: what the schema has attributes for as these, the rest in attributes of gearfe's own.
+"""Write a job as REXS 2.0, with attributes of the schema, or of gearfe where the schema has none.
 
 The model is written, read back as any REXS file is, and compared with the job. Keys that differ, and tables without a
 component, go into ``custom_gearfe_keys`` and ``custom_gearfe_tables``, which the reader puts over what it derived. So a
@@ -82,7 +82,7 @@ class _Builder:
     loaded: dict[int, _Part] = field(default_factory=dict)
 
     def add(self, kind: str, name: str = "", table: str = "", **values: Any) -> _Part:
-        """Add a component; a value is (number, its unit), a text, a truth value, a whole number or None for nothing."""
+        """Add a component. A value is (number, its unit), a text, a truth value, a whole number or None for nothing."""
         part = _Part(len(self.parts) + 1, kind, name)
         self.parts.append(part)
         self.set(part, **values)
@@ -134,7 +134,7 @@ class _Builder:
 
 
 def write_rexs(job: str | Path | Mapping[str, Any], path: str | Path, results: Iterable[Result] = ()) -> None:
-    """Write a job as a REXS 2.0 file; its ending says the form: .rexs (XML), .rexsj (JSON), .rexsz (archive of XML).
+    """Write a job as a REXS 2.0 file. The ending gives the form: .rexs (XML), .rexsj (JSON), .rexsz (archive of XML).
 
     Parameters
     ----------
