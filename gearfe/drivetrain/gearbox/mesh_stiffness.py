@@ -282,6 +282,8 @@ class _WideLaw:
 
 def _wide_laws(job: TrainJob, train: GearTrain, numbers: Sequence[int]) -> dict[int, WidthLaw]:
     """Laws over the face width of meshes by number; equal gears and flanks share the one of the widest range."""
+    if not numbers:
+        return {}
     from ...gears.gearmesh.width_law_store import cached_width_law  # teeth in three dimensions, for these meshes
 
     plans = [_wide_law(job, train, number) for number in numbers]  # all are checked before the first is computed

@@ -178,8 +178,6 @@ def lattice(phases: Phases, count: int) -> Lattice:
 
 @lru_cache(maxsize=64)
 def _searched(phases: Phases, count: int) -> Lattice:
-    from scipy.fft import next_fast_len  # a train without steady motion needs no transforms
-
     waves, _ = harmonics(phases, count)
     several = len(phases.periods)
     every = np.concatenate([waves, -waves[1:]])
@@ -195,4 +193,6 @@ def _searched(phases: Phases, count: int) -> Lattice:
                 place = np.where(conjugate, samples - residue, residue)
                 plain = bool((place == np.arange(len(place))).all() and not conjugate.any())
                 return Lattice(theta, residue, place, conjugate, plain)
+        from scipy.fft import next_fast_len  # with one phase the first number of samples is enough
+
         samples = next_fast_len(math.ceil(MORE * samples) + 1, real=True)

@@ -31,7 +31,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from ...base.typing import Array, BoolArray, IntArray
 from .load_search import Response, approach_of_force
@@ -312,6 +311,8 @@ def law_coefficients(table: WidthTable, cycle: float) -> tuple[Array, Array]:
     cycle : float
         Mesh cycle (rad).
     """
+    from scipy.interpolate import CubicSpline  # a train with springs only needs none: its import takes half a second
+
     nodes = np.append(table.angles, table.angles[0] + cycle)
     tilts, jets = table.tilts, np.stack([table.energy, table.force, table.tangent])
     rise, stiffening = np.zeros_like(table.touch), np.zeros_like(table.tangent)
@@ -356,6 +357,8 @@ def _over_tilt(tilts: Array, values: Array, slopes: Array) -> Array:
 
 def _over_phase(nodes: Array, values: Array) -> Array:
     """Coefficients over the phase of periodic values (n, ...) at its nodes: shape (n, ..., 4)."""
+    from scipy.interpolate import CubicSpline
+
     spline = CubicSpline(nodes, np.concatenate([values, values[:1]]), bc_type="periodic")
     return np.moveaxis(spline.c[::-1], 0, -1)
 
