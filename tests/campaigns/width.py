@@ -7,6 +7,7 @@ crowning of -5 to 30 um, tilts of -60 to 60 um over the width, end reliefs up to
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from gearfe.gears.width import (
     wide_compliance,
 )
 from gearfe.gears.width.lines import ContactLines, own_twists, solve_position
+from gearfe.gears.width.sweep import resultants
 
 from .campaign import Campaign, Case
 from .outcome import Check, Finding
@@ -32,6 +34,8 @@ from .toml_text import toml_text
 
 #: Positions of a pair; largest gap of a loaded point and overlap of another (m).
 POSITIONS, CLOSED = 50, 1e-9
+#: Deviation of torque and axial force (-), and that which tables of arms and points, linear between angles, cause.
+BALANCED, TABLES = 1e-8, 1e-6
 
 
 def draw(random: np.random.Generator, number: int) -> Case:
@@ -78,29 +82,73 @@ def random_flanks(random: np.random.Generator, width: float) -> WideFlanks:
     )
 
 
-def miss(lines: ContactLines, angle: float, torque: float) -> float:
-    """Largest gap of a loaded point or overlap of another (m); infinite where the position is not solved."""
+@dataclass(frozen=True)
+class Violation:
+    """By how much a solved position violates the conditions of its contact.
+
+    Attributes
+    ----------
+    solved
+        Whether the iteration settled.
+    gap
+        Largest gap of a loaded point, or overlap of another (m).
+    pull
+        Largest tensile force of a point (N).
+    torque
+        Deviation from the given torque in parts of it (-).
+    moment
+        Deviation of the wheel's moment about its axis, by the forces in space, from the torque in parts of it (-).
+    axial
+        Deviation of the axial force from torque times tan(beta_b) over the base radius, in parts of it or of the
+        circumferential force (-).
+    """
+
+    solved: bool
+    gap: float = 0.0
+    pull: float = 0.0
+    torque: float = 0.0
+    moment: float = 0.0
+    axial: float = 0.0
+
+
+def violation(lines: ContactLines, angle: float, torque: float) -> Violation:
+    """Solve a position at a pinion angle (rad) and a torque (N m), and measure what its contact violates."""
     solution = solve_position(lines, angle, torque=torque)
-    if not solution.converged or not math.isclose(solution.torque, torque, rel_tol=1e-8):
-        return math.inf
-    points = solution.points
-    own = own_twists(lines.law, points, solution.moment / points.weight)[0]
-    gap = (points.touch + own + points.influence @ solution.moment - solution.twist) * points.rows.arm
-    return float(max(np.abs(gap[solution.moment > 0]).max(), -gap.min()))
+    if not solution.converged:
+        return Violation(False)
+    points, mesh, moment = solution.points, lines.compliance.mesh, solution.moment
+    own = own_twists(lines.law, points, moment / points.weight)[0]
+    gap = (points.touch + own + points.influence @ moment - solution.twist) * points.rows.arm
+    force, moments = resultants(lines, solution)
+    radius = mesh.sections.wheel.base_radius
+    axial = -torque / radius * math.tan(mesh.base_helix_angle)
+    return Violation(
+        True,
+        gap=float(max(np.abs(gap[moment > 0]).max(), -gap.min())),
+        pull=float(max(0.0, -moment.min() / radius)),
+        torque=abs(solution.torque / torque - 1.0),
+        moment=abs(abs(float(moments[1, 2])) / torque - 1.0),
+        axial=float(abs(force[2] - axial)) / max(abs(axial), torque / radius),
+    )
 
 
 def run(case: Case, folder: Path) -> Finding:
     """Solve the positions of a pair."""
     mesh, random = mesh_of(case.data), np.random.default_rng(case.data["seed"])
     lines = contact_lines(wide_compliance(mesh))
-    misses = []
+    found = []
     for _ in range(POSITIONS):
         flanked = lines.with_flanks(random_flanks(random, mesh.width))
         torque = log_uniform(random, 1.0, min(500.0, mesh.most_torque))
-        misses.append(miss(flanked, float(random.uniform(0.0, mesh.sections.mesh_cycle)), float(torque)))
-    unsolved = float(np.count_nonzero(np.isinf(misses)))
-    closed = max((one for one in misses if math.isfinite(one)), default=0.0)
-    checks = [Check("positions not solved", unsolved, 0.0), Check("largest gap or overlap (m)", closed, CLOSED)]
+        found.append(violation(flanked, float(random.uniform(0.0, mesh.sections.mesh_cycle)), float(torque)))
+    checks = [
+        Check("positions not solved", float(sum(not one.solved for one in found)), 0.0),
+        Check("largest gap or overlap (m)", max(one.gap for one in found), CLOSED),
+        Check("largest tensile force (N)", max(one.pull for one in found), 0.0),
+        Check("torque", max(one.torque for one in found), BALANCED),
+        Check("moment of the forces in space", max(one.moment for one in found), TABLES),
+        Check("axial force", max(one.axial for one in found), BALANCED),
+    ]
     return Finding("done", "", checks, {"functions": mesh.count, "helix_deg": round(case.data["helix"], 2)})
 
 

@@ -235,7 +235,7 @@ def _assembled(
         if len(loaded) == 0:
             status[cell] = NO_CONTACT
         torque[cell], twist[cell], tangent[cell] = solution.torque, solution.twist, solution.tangent
-        force[cell], moment[cell] = _resultants(lines, solution)
+        force[cell], moment[cell] = resultants(lines, solution)
         line_load = solution.moment / (points.weight * points.rows.arm)
         peak[cell] = line_load.max(initial=0.0)
         if len(loaded):
@@ -268,8 +268,8 @@ def _assembled(
     )
 
 
-def _resultants(lines: ContactLines, solution: Solution) -> tuple[Array, Array]:
-    """Force on the wheel (N), shape (3,), and moments on both gears (N m), shape (2, 3)."""
+def resultants(lines: ContactLines, solution: Solution) -> tuple[Array, Array]:
+    """Return the force on the wheel (N), shape (3,), and the moments on both gears (N m), shape (2, 3)."""
     mesh, points = lines.compliance.mesh, solution.points
     rows, z = points.rows, points.z
     size = solution.moment / rows.arm
