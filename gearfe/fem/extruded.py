@@ -32,9 +32,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.typing import Array, IntArray
+from ..base.typing import Array, BoolArray, IntArray
 from .multifrontal import BlockRows, Factor, eliminate, elimination_order
 from .plane import Material, physical_gradients, triangle_rule
+
+#: Stiffness of what is empty, in parts of the material's: small against all digits that are wanted, and large against
+#: rounding (the fictitious domain of J. Parvizian, A. Duester, E. Rank, Finite cell method, Comput. Mech. 41, 2007).
+VOID = 1e-9
 
 
 @dataclass(frozen=True)
@@ -180,6 +184,31 @@ def section_integrals(points: Array, triangles: IntArray, material: Material, tu
     return SectionIntegrals(product(zeroth, stresses[0]), product(zeroth, stresses[1]), product(first, stresses[1]))
 
 
+@dataclass(frozen=True)
+class Layers:
+    """Which triangles of a section have material between two places of the axis only.
+
+    Elsewhere they have `VOID` of it, which holds the functions there that no material holds.
+
+    Attributes
+    ----------
+    narrow : ndarray of bool, shape (m,)
+        Triangles that do.
+    ends
+        First and last place (m) of their material, between two points of the rule of the functions along the axis.
+    """
+
+    narrow: BoolArray
+    ends: tuple[float, float]
+
+    def groups(self, functions: AxialFunctions) -> list[tuple[BoolArray, Array]]:
+        """Return groups of triangles with weights of the rule: the material that they have there."""
+        low, high = self.ends
+        solid = (functions.points >= low) & (functions.points <= high)
+        weights = functions.weights
+        return [(~self.narrow, weights), (self.narrow, np.where(solid, weights, VOID * weights))]
+
+
 def elasticity(material: Material) -> Array:
     """Stresses xx, yy, zz, yz, xz, xy (Pa) of strains in this order, shear strains as gamma."""
     lam, mu = material.lame()
@@ -197,6 +226,7 @@ def condense_extruded(
     *,
     retained: IntArray,
     fixed: IntArray,
+    layers: Layers | None = None,
 ) -> Factor:
     """Factorise an extruded body down to the Schur complement of the retained nodes.
 
@@ -212,6 +242,8 @@ def condense_extruded(
         Along the axis, on one rule: of v, and of w (None: w is zero).
     retained, fixed : ndarray
         Nodes that are kept, and nodes held at zero over the whole length.
+    layers : Layers, optional
+        Where triangles have material along the axis; everywhere if not given.
 
     Returns
     -------
@@ -229,7 +261,7 @@ def condense_extruded(
     order, ends = elimination_order(triangles, centres, nodes=len(points), retained=retained, fixed=fixed, width=width)
     number = np.full(len(points), len(order))
     number[order] = np.arange(len(order))
-    matrix = _assembled(number[triangles], section, functions, len(order))
+    matrix = _assembled(number[triangles], section, functions, len(order), layers)
     return eliminate(matrix, ends, order, len(points), len(retained))
 
 
@@ -238,6 +270,7 @@ def _assembled(
     section: SectionIntegrals,
     functions: tuple[AxialFunctions, AxialFunctions | None],
     nodes: int,
+    layers: Layers | None = None,
 ) -> BlockRows:
     """Upper block rows of K on the first nodes, so many of them; the others are held."""
     shape = len(elements), 6, 6
@@ -249,25 +282,29 @@ def _assembled(
     key, kept = key[by_key], kept[by_key]
     first = np.flatnonzero(np.diff(key, prepend=-1))
 
-    def summed(integrals: Array) -> Array:
-        """Sums by couple of nodes, shape (couples, 3, 3)."""
-        of_couples = integrals.transpose(0, 1, 3, 2, 4).reshape(-1, 3, 3)
+    def summed(integrals: Array, chosen: BoolArray) -> Array:
+        """Sums over chosen triangles by couple of nodes, shape (couples, 3, 3)."""
+        of_couples = (integrals * chosen[:, None, None, None, None]).transpose(0, 1, 3, 2, 4).reshape(-1, 3, 3)
         return np.asarray(np.add.reduceat(of_couples[kept], first, axis=0))
 
     mixed = section.mixed
-    parts = [summed(a) for a in (section.straight, mixed, mixed.transpose(0, 3, 4, 1, 2), section.axial)]
+    integrals = section.straight, mixed, mixed.transpose(0, 3, 4, 1, 2), section.axial
+    every = np.ones(len(elements), dtype=bool)
+    groups = [(every, functions[0].weights)] if layers is None else layers.groups(functions[0])
     of_axis = [functions[0], functions[0], functions[1]]
     counts = [0 if one is None else one.count for one in of_axis]
     starts = np.cumsum([0, *counts])
     blocks = np.zeros((len(first), starts[-1], starts[-1]))
+    sums = [([summed(a, chosen) for a in integrals], weights) for chosen, weights in groups]
     for (i, row), (j, column) in itertools.product(enumerate(of_axis), repeat=2):
         if row is None or column is None:
             continue
-        weighted = row.weights[:, None] * column.values, row.weights[:, None] * column.slopes
-        line = [row.values.T @ weighted[0], row.values.T @ weighted[1], row.slopes.T @ weighted[0],
-                row.slopes.T @ weighted[1]]  # fmt: skip
-        block = np.stack([a[:, i, j] for a in parts], axis=1) @ np.stack(line).reshape(4, -1)
         span = slice(starts[i], starts[i + 1]), slice(starts[j], starts[j + 1])
-        blocks[:, span[0], span[1]] = block.reshape(-1, counts[i], counts[j])
+        for parts, weights in sums:
+            weighted = weights[:, None] * column.values, weights[:, None] * column.slopes
+            line = [row.values.T @ weighted[0], row.values.T @ weighted[1], row.slopes.T @ weighted[0],
+                    row.slopes.T @ weighted[1]]  # fmt: skip
+            block = np.stack([a[:, i, j] for a in parts], axis=1) @ np.stack(line).reshape(4, -1)
+            blocks[:, span[0], span[1]] += block.reshape(-1, counts[i], counts[j])
     row_of, column_of = np.divmod(key[first], nodes)
     return BlockRows(np.searchsorted(row_of, np.arange(nodes + 1)), column_of, blocks)

@@ -41,7 +41,7 @@ from ..contact.panels import ELLIPSE_W, ELLIPSE_X
 from ..teeth.tooth_sector import SectorMesh, sector_mesh, sector_recipes
 from ..teeth.whole_gear import WholeGear, whole_gear
 from ..width import ContactLines, WidthSweep
-from ..width.compliance import AxialSystem, axial_systems, cyclic_response, legendre, loads_of
+from ..width.compliance import AxialSystem, axial_systems, cyclic_response, layers_of, legendre, loads_of
 from ..width.lines import rows_at
 from ..width.pair_law import first_teeth, pair_contacts
 from ..width.sweep import CONVERGED, load_along
@@ -335,6 +335,7 @@ def field_gear(lines: ContactLines, gear: int) -> FieldGear:
         factor = condense_extruded(
             sector.points, sector.triangles, integrals, system.functions,
             retained=sides, fixed=np.unique(sector.boundaries["bore"]),
+            layers=layers_of(mesh, gear, sector),
         )  # fmt: skip
         loads = loads_of(mesh, gear, system, sector.points[flank.nodes], nodal)
         systems.append(FieldSystem(system, factor, loads.reshape(-1, *loads.shape[2:])))

@@ -31,7 +31,7 @@ from ...fem.multifrontal import unknowns_of
 from ..contact.flank import edge_shapes, flank_of
 from ..contact.flank_compliance import bumps
 from ..teeth.tooth_sector import sector_mesh, sector_recipes
-from ..width.compliance import HIGHER, AxialSystem, axial_systems, cyclic_response, legendre, loads_of
+from ..width.compliance import HIGHER, AxialSystem, axial_systems, cyclic_response, layers_of, legendre, loads_of
 from ..width.lines import ContactLines, rows_at
 from ..width.sweep import WidthSweep
 from .root_stress import GAUSS, REACH, peaks, root_recipe
@@ -185,6 +185,7 @@ def fillet_mesh(lines: ContactLines, gear: int, size: float, higher: int) -> Fil
         factor = condense_extruded(
             sector.points, sector.triangles, integrals, system.functions,
             retained=sides, fixed=np.unique(sector.boundaries["bore"]),
+            layers=layers_of(mesh, gear, sector),
         )  # fmt: skip
         loads = loads_of(mesh, gear, system, sector.points[flank.nodes], nodal)
         shape, width = loads.shape[2:], system.width

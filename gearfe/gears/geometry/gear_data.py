@@ -49,6 +49,34 @@ class TipRelief:
 
 
 @dataclass(frozen=True)
+class Web:
+    """Disc between rim and hub that is narrower than the face of an external gear.
+
+    Parameters
+    ----------
+    width
+        Along the axis (m).
+    outer_diameter
+        Inner diameter of the rim, where the web ends (m).
+    inner_diameter
+        Outer diameter of the hub (m); None: the web reaches down to the bore.
+    offset
+        Middle of the web less that of the face width, along the axis (m).
+    """
+
+    width: float
+    outer_diameter: float
+    inner_diameter: float | None = None
+    offset: float = 0.0
+
+    @property
+    def radii(self) -> tuple[float, ...]:
+        """Radii at which it ends within the gear (m), the outer one first."""
+        diameters = (self.outer_diameter, self.inner_diameter)
+        return tuple(0.5 * diameter for diameter in diameters if diameter is not None)
+
+
+@dataclass(frozen=True)
 class GearData:
     """Spur or helical gear, external or internal; `gears.geometry.spur_gear.Gear` is the checked one.
 
@@ -83,6 +111,8 @@ class GearData:
         Helix angle beta at the reference circle, not negative (rad); 0: a spur gear.
     hand
         ``right`` or ``left``, the hand of the helix.
+    web
+        Disc that carries the rim; None: the gear is as wide everywhere as its face.
     rim_diameter
         Outer diameter of the rim of an internal gear (m).
     rim
@@ -112,6 +142,7 @@ class GearData:
     tooth_thinning: float = field(default=0.0, kw_only=True)
     helix_angle: float = field(default=0.0, kw_only=True)
     hand: str = field(default="right", kw_only=True)
+    web: Web | None = field(default=None, kw_only=True)
     rim_diameter: float | None = field(default=None, kw_only=True)
     rim: str = field(default="bolted", kw_only=True)
     cutter_teeth: int | None = field(default=None, kw_only=True)
@@ -132,6 +163,12 @@ class GearData:
     def tooth_count(self) -> int:
         """Number of teeth |z| without sign."""
         return abs(self.teeth)
+
+    @property
+    def narrow_web(self) -> Web | None:
+        """Web if it is narrower than the face."""
+        web = self.web
+        return web if web is not None and web.width < (1.0 - ROUNDED) * self.face_width else None
 
     @cached_property
     def held_radius(self) -> float:

@@ -31,10 +31,14 @@ HANDS = ("right", "left")
 MOST_HELIX = math.radians(45.0)
 #: Modules and face widths beyond it (m) are mistakes, and large ones overflow.
 LARGEST = 1e4
+#: Rounding of lengths in parts of themselves.
+SAME_LENGTH = 1e-9
 #: Least tip round that is not a sharp corner, times module: meshers need seconds for less, and elements degenerate.
 LEAST_ROUND = 1e-6
 #: Least rim between bore and root circle, times module.
 LEAST_RIM = 0.25
+#: Least width of a web and least height of web, rim and hub, times module.
+LEAST_WEB = 0.1
 #: Least bore, times module: plane elasticity gives a point no stiffness, and a bore of a hundredth tears loose.
 LEAST_BORE = 0.05
 
@@ -120,6 +124,7 @@ def check_gear(gear: GearData) -> None:
         least = (gear.tooth_thinning / gear.module - 0.5 * math.pi) / slope
         problem = f"{what}: must be > {least:.6g}"
         raise InputError("profile_shift", gear.profile_shift, problem, "use more profile shift")
+    _check_web(gear)
     if gear.internal:
         _check_ring(gear)
     else:
@@ -143,6 +148,37 @@ def _check(name: str, value: float, low: float, high: float, closed: bool) -> No
         raise InputError(name, value, f"is too {'small' if small else 'large'}", "correct it", (sign, bound, ""))
     limits = [f"{sign} {limit:g}" for sign, limit in zip(signs, (low, high), strict=True) if math.isfinite(limit)]
     raise InputError(name, value, "must be a finite number" + "".join(f", {limit}" for limit in limits), "correct it")
+
+
+def _check_web(gear: GearData) -> None:
+    """Raise `InputError` unless the web of an external gear is between bore and root circle and within the face."""
+    web, least = gear.web, LEAST_WEB * gear.module
+    if web is None:
+        return
+    if gear.internal:
+        problem = "is of external gears: the ring of an internal gear is as wide as its teeth"
+        raise InputError("web.width", web.width, problem, "leave the keys of the web out")
+    bore = gear.bore_diameter
+    hub = bore if web.inner_diameter is None else web.inner_diameter
+    ranges = {
+        "web.width": (web.width, least, gear.face_width, "the face width"),
+        "web.outer_diameter": (
+            web.outer_diameter, hub + 2.0 * least, 2.0 * (gear.root_radius - LEAST_RIM * gear.module),
+            f"{LEAST_RIM:g} module inside the root circle",
+        ),
+        "web.inner_diameter": (hub, bore if hub == bore else bore + 2.0 * least, math.inf, "the web's outer diameter"),
+    }  # fmt: skip
+    for name, (value, low, high, what) in ranges.items():
+        _check(name, value, 0.0, LARGEST, False)
+        if not low <= value <= high:
+            problem = f"must be >= {1e3 * low:.6g} mm"
+            if math.isfinite(high):
+                problem += f" and <= {1e3 * high:.6g} mm, {what}"
+            raise InputError(name, value, problem, "the web is between hub or bore and rim")
+    most = 0.5 * (gear.face_width - web.width)
+    if not (math.isfinite(web.offset) and abs(web.offset) <= most * (1.0 + SAME_LENGTH) + SAME_LENGTH * web.width):
+        problem = f"must be >= {-1e3 * most:.6g} mm and <= {1e3 * most:.6g} mm, so that the web is within the face"
+        raise InputError("web.offset", web.offset, problem, "move the web less, or make it narrower")
 
 
 def _check_ring(gear: GearData) -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,10 +21,11 @@ from numpy.typing import NDArray
 
 from ...base.cache import cached_arrays
 from ...base.errors import InputError
-from ...base.typing import Array, ComplexArray, IntArray
+from ...base.typing import Array, BoolArray, ComplexArray, IntArray
 from ...fem.meshing.session import gmsh_session
 from ...fem.plane import least_jacobian, second_order
 from ..geometry.curves import coordinates
+from ..geometry.gear_data import Web
 from ..geometry.mesh_geometry import MeshGeometry
 from ..geometry.spur_gear import Gear
 
@@ -144,6 +146,13 @@ class SectorMesh:
         return np.concatenate([self.boundaries["flank_left"], root[: min(reachable, len(root) - 1)]])[::-1, ::-1]
 
 
+def web_triangles(sector: SectorMesh, web: Web) -> BoolArray:
+    """Return which triangles of a sector are of the web, shape (m,)."""
+    centre = np.linalg.norm(sector.points[sector.triangles[:, :3]].mean(axis=1), axis=1)
+    outer, *inner = web.radii
+    return np.asarray((centre < outer) & (centre > max(inner, default=0.0)))
+
+
 def sector_mesh(gear: Gear, recipe: SectorRecipe, *, cache: bool = True) -> SectorMesh:
     """Mesh of one tooth of `gear`; taken from the mesh cache when the same was made before.
 
@@ -194,11 +203,15 @@ def _outline(gear: Gear, recipe: SectorRecipe) -> dict[str, ComplexArray]:
     around = 2 * abs(half) * held
     edges = max(1, round(around / recipe.bore), int(np.ceil(MINIMUM_BORE_EDGES / gear.tooth_count)))
     depth = abs(gear.root_radius - held)
-    place = np.linspace(0, depth, 400)
+    marks = [0.0, *(gear.root_radius - radius for radius in web_radii(gear)), depth]
+    place = np.union1d(np.linspace(0, depth, 400), marks)
     size = np.minimum(recipe.body + recipe.deepening * place, depth)
     size[0], size[-1] = min(recipe.root, depth), min(recipe.bore, around / edges, depth)
+    size = _limited(place, size, 2 * recipe.growth)
+    cuts = [(place >= a) & (place <= b) for a, b in itertools.pairwise(marks)]
+    ends = [np.zeros(1), *(place[cut][0] + _nodes(place[cut] - place[cut][0], size[cut])[1:] for cut in cuts)]
     # negative radii for an internal gear, whose sector lies about the -x axis
-    radii = gear.sign * gear.root_radius - _nodes(place, _limited(place, size, 2 * recipe.growth))
+    radii = gear.sign * gear.root_radius - np.concatenate(ends)
     cut = _polar(_interleaved(radii, _middles(radii)), half)
     return {
         "cut_right": cut[::-1].conj(),
@@ -210,6 +223,11 @@ def _outline(gear: Gear, recipe: SectorRecipe) -> dict[str, ComplexArray]:
         "cut_left": cut,
         "rim" if gear.internal else "bore": _polar(gear.sign * held, np.linspace(half, -half, 2 * edges + 1)),
     }
+
+
+def web_radii(gear: Gear) -> tuple[float, ...]:
+    """Return the radii (m) at which the web of a gear ends, the outer one first; none without a web."""
+    return () if gear.narrow_web is None else gear.narrow_web.radii
 
 
 def _polar(radius: Array | float, angle: Array | float) -> ComplexArray:
@@ -305,26 +323,67 @@ def _filled(gear: Gear, recipe: SectorRecipe) -> dict[str, NDArray[np.generic]]:
     chains = _outline(gear, recipe)
     ring = coordinates(np.concatenate([nodes[:-1:2] for nodes in chains.values()]))
     depth = abs(gear.root_radius - gear.held_radius)
-    corners, triangles = _fill(ring, recipe.body + recipe.deepening * depth)
+    arcs = _arcs(gear, chains)
+    corners, triangles = _fill(ring, recipe.body + recipe.deepening * depth, arcs)
     points, quadratic, edges = second_order(corners, triangles)
     keys = edges[:, 0] * len(corners) + edges[:, 1]
+
+    def middles(start: IntArray, end: IntArray) -> IntArray:
+        key = np.minimum(start, end) * len(corners) + np.maximum(start, end)
+        return np.asarray(len(corners) + np.searchsorted(keys, key))
+
     arrays: dict[str, NDArray[np.generic]] = {}
     first = 0
     for name, nodes in chains.items():
         count = len(nodes) // 2
         start = np.arange(first, first + count)
         end = (start + 1) % len(ring)
-        key = np.minimum(start, end) * len(corners) + np.maximum(start, end)
-        middle = len(corners) + np.searchsorted(keys, key)
+        middle = middles(start, end)
         points[middle] = coordinates(nodes[1::2])
         arrays["on_" + name] = np.stack([start, middle, end], axis=1)
         first += count
+    first = len(ring)
+    for arc in arcs:
+        inner = np.arange(first, first + len(arc.nodes) // 2 - 1)
+        along = np.array([arc.right, *inner, arc.left])
+        points[middles(along[:-1], along[1:])] = coordinates(arc.nodes[1::2])
+        first += len(inner)
     return {"points": points, "triangles": quadratic, **arrays}
 
 
-def _fill(ring: Array, largest: float) -> tuple[Array, IntArray]:
+@dataclass(frozen=True)
+class _Arc:
+    """Circle from the right cut to the left one that element edges follow.
+
+    Attributes
+    ----------
+    right, left
+        Numbers of its first and last node among the corners of the outline.
+    nodes : ndarray of complex, shape (2 k + 1,)
+        Ends and middles of its edges (m).
+    """
+
+    right: int
+    left: int
+    nodes: ComplexArray
+
+
+def _arcs(gear: Gear, chains: dict[str, ComplexArray]) -> list[_Arc]:
+    """Arcs at which the web of a gear ends, the outer one first, on nodes of both cuts."""
+    right, left = np.abs(chains["cut_right"][::2]), np.abs(chains["cut_left"][::2])
+    first = sum(len(nodes) // 2 for name, nodes in chains.items() if name not in ("cut_left", "bore"))
+    half, arcs = math.pi / gear.teeth, []
+    for radius in web_radii(gear):
+        i, j = int(np.abs(right - radius).argmin()), int(np.abs(left - radius).argmin())
+        size = max(right[i + 1] - right[i], right[i] - right[i - 1])
+        edges = max(1, math.ceil(2.0 * half * radius / size), math.ceil(MINIMUM_BORE_EDGES / gear.tooth_count))
+        arcs.append(_Arc(i, first + j, _polar(radius, np.linspace(-half, half, 2 * edges + 1))))
+    return arcs
+
+
+def _fill(ring: Array, largest: float, arcs: Sequence[_Arc] = ()) -> tuple[Array, IntArray]:
     """Straight triangles of sizes up to `largest` (m) inside a closed ring of points, which keep their places and come
-    first.
+    first; then come the corners within arcs across the ring, the outer arc first.
 
     Returns
     -------
@@ -340,17 +399,28 @@ def _fill(ring: Array, largest: float) -> tuple[Array, IntArray]:
         geo = gmsh.model.geo
         tags = [geo.addPoint(x, y, 0.0) for x, y in (1e3 * ring).tolist()]
         lines = [geo.addLine(a, b) for a, b in zip(tags, tags[1:] + tags[:1], strict=True)]
-        geo.addPlaneSurface([geo.addCurveLoop(lines)])
+        chords = []
+        for arc in arcs:
+            inner = [geo.addPoint(x, y, 0.0) for x, y in (1e3 * coordinates(arc.nodes[2:-1:2])).tolist()]
+            ends = [tags[arc.right], *inner, tags[arc.left]]
+            chords.append([geo.addLine(a, b) for a, b in itertools.pairwise(ends)])
+        right, left = [*(arc.right for arc in arcs), 0], [*(arc.left for arc in arcs), len(lines)]
+        for i, chord in enumerate([*chords, []]):
+            outer = lines[right[i] : left[i]]
+            if i > 0:
+                outer = [*lines[right[i] : right[i - 1]], *chords[i - 1], *lines[left[i - 1] : left[i]]]
+            geo.addPlaneSurface([geo.addCurveLoop([*outer, *(-line for line in reversed(chord))])])
         geo.synchronize()
-        for line in lines:
+        for line in itertools.chain(lines, *chords):
             gmsh.model.mesh.setTransfiniteCurve(line, 2)
         gmsh.model.mesh.generate(2)
-        node_tags, coordinates, _ = gmsh.model.mesh.getNodes()
+        node_tags, flat, _ = gmsh.model.mesh.getNodes()
         _, _, connectivity = gmsh.model.mesh.getElements(2)
-    position = np.asarray(coordinates).reshape(-1, 3)[:, :2] * 1e-3
+    position = np.asarray(flat).reshape(-1, 3)[:, :2] * 1e-3
     number = np.empty(int(np.max(node_tags)) + 1, dtype=np.int64)
     number[np.asarray(node_tags, dtype=np.int64)] = np.arange(len(position))
     triangles = number[np.asarray(connectivity[0], dtype=np.int64)].reshape(-1, 3)
+    ring = np.concatenate([ring, *(coordinates(arc.nodes[2:-1:2]) for arc in arcs)])
     # gmsh numbers mesh nodes on geometry points first, in the order of the points; the exact coordinates are put back
     if not np.allclose(position[: len(ring)], ring, rtol=0, atol=1e-12):
         raise RuntimeError("gmsh did not keep the outline's points")

@@ -31,6 +31,7 @@ Spur gears that are symmetric about the middle of the common width part into two
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -44,6 +45,7 @@ from ...base.progress import Stopwatch, one_thread
 from ...base.typing import Array
 from ...fem.extruded import (
     AxialFunctions,
+    Layers,
     condense_extruded,
     lobatto_functions,
     lobatto_functions_at,
@@ -53,7 +55,7 @@ from ...fem.multifrontal import unknowns_of
 from ..contact.flank import flank_of
 from ..contact.flank_compliance import FlankCompliance, Shapes, corner_of, local_bracket, shapes_of, stations_of
 from ..geometry.face import face_of
-from ..teeth.tooth_sector import SectorMesh, sector_mesh, sector_recipes
+from ..teeth.tooth_sector import SectorMesh, sector_mesh, sector_recipes, web_triangles
 from .mesh import WideMesh
 
 #: Length beyond the common width (modules) up to which it is no element of its own.
@@ -65,6 +67,8 @@ BEYOND_ORDER, BEYOND_MODULES = 3, 1.0
 #: Least l in the logarithms (modules): the half-plane of a contact has to yield more under more load, so that l is
 #: longer than half of any contact's half width.
 LEAST_LENGTH = 0.5
+#: Order of a part of an element that the end of a web divides, beyond its share of the element's order.
+DIVIDED = 2
 #: Mesh cycles beyond both ends of the path of contact within which tips may bear.
 TIPS = 0.7
 #: Packages and modules whose text decides kept gears and laws of pairs.
@@ -159,9 +163,12 @@ def _steps(mesh: WideMesh) -> int:
     return math.ceil(length + 2 * TIPS + mesh.overlap_ratio)
 
 
-def _axial_elements(mesh: WideMesh, face: tuple[float, float], higher: int) -> tuple[list[float], list[int]]:
-    """Ends (m) and orders of the elements along a face: one on the common width, others beyond its ends."""
-    low, high = mesh.zone
+def _axial_elements(mesh: WideMesh, gear: int, higher: int) -> tuple[list[float], list[int]]:
+    """Ends (m) and orders of the elements along a face: one on the common width, others beyond its ends.
+
+    The ends of a web divide them.
+    """
+    (low, high), face = mesh.zone, mesh.faces[gear]
     if mesh.count == 1:
         return list(face), [0]
     order = mesh.count - 1 + higher
@@ -173,7 +180,15 @@ def _axial_elements(mesh: WideMesh, face: tuple[float, float], higher: int) -> t
         more = BEYOND_ORDER + math.ceil(beyond / (BEYOND_MODULES * mesh.module))
         orders.insert(0 if at == 0 else len(orders), min(order, more))
         ends.insert(0 if at == 0 else len(ends), face[0 if at == 0 else 1])
-    return ends, orders
+    marks = [at for at in mesh.web_ends(gear) or () if min(abs(at - end) for end in ends) > NO_ELEMENT * mesh.module]
+    divided = [ends[0]]
+    new_orders: list[int] = []
+    for (first, last), order in zip(itertools.pairwise(ends), orders, strict=True):
+        places = [first, *(at for at in marks if first < at < last), last]
+        shares = [(b - a) / (last - first) for a, b in itertools.pairwise(places)]
+        new_orders += [order if share == 1.0 else min(order, DIVIDED + math.ceil(order * share)) for share in shares]
+        divided += places[1:]
+    return divided, new_orders
 
 
 #: Functions of v and of w along the axis; of w none where it is zero.
@@ -221,19 +236,28 @@ def axial_systems(
     places : ndarray, shape (c,)
         Places (m) at which the functions are wanted besides.
     """
-    ends, orders = _axial_elements(mesh, mesh.faces[gear], higher)
-    functions = lobatto_functions(ends, orders, mesh.zone)
+    ends, orders = _axial_elements(mesh, gear, higher)
+    web = mesh.web_ends(gear)
+    functions = lobatto_functions(ends, orders, (*mesh.zone, *(web or ())))
     at = lobatto_functions_at(ends, orders, np.zeros(0) if places is None else places)
     if mesh.count == 1:
         yield AxialSystem((functions, None), (at, None), slice(0, 1))
         return
     (low, high), (first, last) = mesh.zone, mesh.faces[gear]
-    if mesh.base_helix_angle == 0.0 and math.isclose(low - first, last - high, abs_tol=1e-9 * mesh.width):
+    margins = [(low - first, last - high), *([] if web is None else [(web[0] - first, last - web[1])])]
+    symmetric = all(math.isclose(one, other, abs_tol=1e-9 * mesh.width) for one, other in margins)
+    if mesh.base_helix_angle == 0.0 and symmetric:
         (even, odd), (even_at, odd_at) = functions.by_parity(), at.by_parity()
         yield AxialSystem((even, odd), (even_at, odd_at), slice(0, None, 2))
         yield AxialSystem((odd, even), (odd_at, even_at), slice(1, None, 2))
         return
     yield AxialSystem((functions, functions), (at, at), slice(0, None))
+
+
+def layers_of(mesh: WideMesh, gear: int, sector: SectorMesh) -> Layers | None:
+    """Return where the web of a gear has material, of a mesh of its sector; None without a web."""
+    web, ends = mesh.webs[gear], mesh.web_ends(gear)
+    return None if web is None or ends is None else Layers(web_triangles(sector, web), ends)
 
 
 def loads_of(mesh: WideMesh, gear: int, system: AxialSystem, points: Array, nodal: Array) -> Array:
@@ -309,6 +333,7 @@ def _condensed(mesh: WideMesh, gear: int, sector: SectorMesh, nodal: Array, whol
             system.functions,
             retained=sides if whole else sides[:0],
             fixed=bore if whole else np.union1d(bore, sides),
+            layers=layers_of(mesh, gear, sector),
         )
         loads, chosen = loads_of(mesh, gear, system, sector.points[flank.nodes], nodal), system.loads
         unknowns = unknowns_of(flank.nodes, system.width)

@@ -14,6 +14,7 @@ from functools import cached_property
 from ...base.errors import InputError
 from ...fem.plane import Material
 from ..contact.laws import STEEL
+from ..geometry.gear_data import Web
 from ..geometry.mesh_geometry import MeshGeometry
 from ..geometry.spur_gear import Gear
 from ..geometry.validity import MOST_YIELD, check_external
@@ -46,6 +47,8 @@ class WideMesh:
         Face widths of pinion and wheel (m); None: those of the gears.
     centres
         Axial positions of their middles (m); None: the pinion at 0, the wheel as far from it as the gears are.
+    webs
+        Webs of pinion and wheel that are narrower than the faces, offsets along z; None: those of the gears.
     materials
         Of pinion and wheel.
     functions
@@ -64,6 +67,7 @@ class WideMesh:
     base_helix_angle: float = None  # type: ignore[assignment] # a number from `__post_init__` on
     widths: tuple[float, float] | None = None
     centres: tuple[float, float] = None  # type: ignore[assignment] # as above
+    webs: tuple[Web | None, Web | None] = None  # type: ignore[assignment] # as above
     materials: tuple[Material, Material] = (STEEL, STEEL)
     functions: int | None = None
     coarsen: float = 2.0
@@ -80,6 +84,8 @@ class WideMesh:
             raise InputError("base_helix_angle", self.base_helix_angle, problem, "leave it out")
         if self.centres is None:
             object.__setattr__(self, "centres", (0.0, self.sections.axial_offset))
+        if self.webs is None:
+            object.__setattr__(self, "webs", tuple(gear.narrow_web for gear in self.gears))
         if not abs(self.base_helix_angle) <= MOST_HELIX:
             problem = f"must be >= -{MOST_HELIX:.4g} and <= {MOST_HELIX:.4g} rad"
             raise InputError("base_helix_angle", self.base_helix_angle, problem, "use a smaller helix angle")
@@ -122,6 +128,14 @@ class WideMesh:
         """First and last z of pinion and wheel (m)."""
         (one, two), (at, mate) = self.face_widths, self.centres
         return (at - 0.5 * one, at + 0.5 * one), (mate - 0.5 * two, mate + 0.5 * two)
+
+    def web_ends(self, gear: int) -> tuple[float, float] | None:
+        """First and last z (m) of the web of a gear that is narrower than its face, or None."""
+        web, (low, high) = self.webs[gear], self.faces[gear]
+        if web is None:
+            return None
+        middle = 0.5 * (low + high) + web.offset
+        return max(low, middle - 0.5 * web.width), min(high, middle + 0.5 * web.width)
 
     @cached_property
     def zone(self) -> tuple[float, float]:
