@@ -335,11 +335,11 @@ duration T exceeds {decayed:g}, in trains {modal:g} ([the rule](../integrators.m
 
 `scripts/benchmarks/measure_rule.py` writes the table. Times are processor seconds at the same tolerance with compiled
 kernels, the least of three runs if these are short. "> x" means that the run was stopped after x seconds, or ended
-early. Flexible links have only one method (a dash). The numbers of the rule were not chosen on the scenes
-"held out". Times are those of whole calls.
+early. Flexible links have only one method (a dash). The scenes "held out" were not used to
+choose the numbers of the rule. Times are those of whole calls.
 
-The bound gives equal times only on average: a damped bar takes 4 ms by series and 13 ms by collocation, a linkage of
-81 bodies 0.3 s and 0.13 s.
+At the limit of d T both methods take equal times on average, but not in each scene. A damped bar takes 4 ms by series
+and 13 ms by collocation, a linkage of 81 bodies 0.3 s and 0.13 s.
 
 | kind | scene | d/w | d T | taylor (s) | implicit (s) | the rule takes | times the better |
 |---|---|---|---|---|---|---|---|

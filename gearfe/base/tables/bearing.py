@@ -82,8 +82,8 @@ class BearingTable:
     )
     stiffness_matrix_N_m_rad: Matrix | None = quantity(  # noqa: RUF009
         None,
-        doc="instead, five lists of five numbers: forces along x, y, z (N) and moments about x, z (N m), per "
-        "displacement along x, y, z (m) and tilt about x, z (rad); symmetric",
+        doc="instead, a symmetric 5 x 5 matrix: forces along x, y, z (N) and moments about x, z (N m) per "
+        "displacement (m) and tilt (rad)",
     )
     type: str | None = quantity(
         None,

@@ -50,13 +50,13 @@ class NamedMeshTable(TrainMeshTable):
     )
     misalignment_across_um: float = quantity(
         0.0,
-        doc="tilt of the axes across the plane of action (um over the common face width), > 0: the driven gear "
-        "moves to the left of the force on it towards larger y",
+        doc="tilt of the axes across the plane of action (um over the common face width); > 0: towards larger y "
+        "the driven gear moves to the left of the force on it",
     )
     misalignment_from_shafts: bool = quantity(
         False,
-        doc="true: shafts, bearings and housing of the train tilt the gears as the torque bends them, in addition "
-        "to the tilts above; for gearfe stiffness and gearfe loadmap",
+        doc="true: gearfe stiffness and gearfe loadmap add the tilts of the gears by shafts, bearings and housing "
+        "of the train under the torque",
     )
     stiffness: StiffnessTable | None = quantity(  # noqa: RUF009
         None, doc="keys of this mesh that override those of [stiffness]: load, positions, contact law, sizes"

@@ -156,8 +156,8 @@ class GearBodyTable(ToothFormTable):
     )
     form_diameter_mm: float | None = quantity(
         None,
-        doc="root form diameter of an internal gear (mm), from which a circular fillet leads to the root circle; left "
-        "out: the root follows from the cutter",
+        doc="root form diameter of an internal gear (mm); a circular fillet leads from it to the root circle; "
+        "left out: the root follows from the cutter",
     )
     pitch_diameter_mm: float | None = quantity(None, doc="reference diameter (mm), instead of module_mm")
     tip_diameter_mm: float | None = quantity(None, doc="tip diameter (mm), instead of addendum and tip_shortening")
@@ -337,8 +337,8 @@ class PairTable(ToothFormTable):
     )
     misalignment_across_um: float = quantity(
         0.0,
-        doc="tilt of the axes across the plane of action (um over the common face width), > 0: the driven gear "
-        "moves to the left of the force on it towards larger y",
+        doc="tilt of the axes across the plane of action (um over the common face width); > 0: towards larger y "
+        "the driven gear moves to the left of the force on it",
     )
     material: MaterialTable = quantity(MaterialTable, doc="material of both gears")  # noqa: RUF009
 
@@ -460,8 +460,8 @@ class StiffnessTable:
     )
     twist_from: Literal["contact", "centred"] = quantity(
         "contact",
-        doc="reference of twist_deg: contact (where unmodified driving flanks touch) or centred (a wheel space "
-        "faces the pinion tooth; half the backlash is then lost motion)",
+        doc="reference of twist_deg: contact (unmodified driving flanks touch) or centred (pinion tooth in the "
+        "middle of a wheel space, half the backlash on either side)",
         choices=("contact", "centred"),
     )
     angle_start_deg: float = quantity(0.0, doc="first pinion angle (deg)", low=-FAR_DEG, high=FAR_DEG)

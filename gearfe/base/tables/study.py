@@ -82,9 +82,9 @@ class StudyTable:
     design: str = quantity(
         "latin_hypercube",
         choices=DESIGNS,
-        doc="factorial: all combinations; latin_hypercube, sobol: that many random cases; saltelli: those that Sobol's "
-        "indices need; morris: those of elementary effects; rows: a CSV file; search: for the least of the output in "
-        "minimise or the largest of that in maximise, within the limits",
+        doc="factorial: all combinations; latin_hypercube, sobol: random cases; saltelli: cases for Sobol "
+        "indices; morris: cases for elementary effects; rows: a CSV file; search: the best value of the "
+        "output in minimise or maximise within the limits",
     )
     cases: int = quantity(
         64,
@@ -100,8 +100,9 @@ class StudyTable:
     )
     worst_over: dict[str, Any] = quantity(  # noqa: RUF009
         dict,
-        doc="dotted name of a key -> list of values: each case is solved at all their combinations, and the worst of "
-        "each output counts: the least of one in maximise or with a lower limit alone, else the largest",
+        doc="dotted name of a key -> list of values. Each case is solved at all their combinations, and the worst "
+        "value of each output counts: the smallest for outputs in maximise or with a lower limit only, "
+        "otherwise the largest",
     )
     outputs: dict[str, str] = quantity(  # noqa: RUF009
         doc="name -> expression of the job's columns and of summary, as `ptp(transmission_error_um)`"

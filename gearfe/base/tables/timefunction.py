@@ -89,8 +89,8 @@ class SpeedFunctionTable:
     largest_speed_rad_per_s: float | None = quantity(
         None,
         above=0.0,
-        doc="of an expression: it holds from minus to plus this speed, its ends beyond; left out: 5 times the speed "
-        "at which [train] turns that shaft",
+        doc="largest speed of an expression, in both directions; beyond it the torque is constant; left out: 5 "
+        "times the speed of the shaft in [train]",
     )
 
     def check(self, where: str) -> None:

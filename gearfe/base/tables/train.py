@@ -152,8 +152,8 @@ class ShaftTable:
     )
     speed_ratio: float | str | None = quantity(
         None,
-        doc='its rotation is prescribed as a multiple of the speed of the drive, a number or a fraction as "-1/3"; '
-        "0: it is fixed; left out: it follows from gears and couplings",
+        doc='speed over that of the drive, which prescribes the rotation: a number or a fraction as "-1/3"; 0: '
+        "fixed; left out: it follows from gears and couplings",
     )
     holding_stiffness_Nm_per_rad: float | None = quantity(
         None, above=0.0, doc="of a torsional spring to that rotation (N m/rad); left out: rigid"
@@ -276,17 +276,15 @@ class TrainMeshTable:
     driven: str = quantity(doc="name of the driven gear")
     phase_deg: float | None = quantity(
         None,
-        doc="rotation of the driver, in its driving sense, past a tooth on the line of centres at the start (deg), for "
-        "a gear keyed at an angle, of helical gears in the section y = 0; left out: 0, and where gears are shared by "
-        "meshes what their teeth make it",
+        doc="rotation of the driver at the start, in its driving sense, from a tooth on the line of centres (deg; "
+        "helical gears: section y = 0); left out: 0, or by the teeth if a gear has two meshes",
     )
     damping_N_s_per_m: float = quantity(0.0, low=0.0, doc="damping along the line of action (N s/m)")
     damping_acts: str | None = quantity(
         None,
         choices=("always", "in_contact"),
-        doc="when the damper of the mesh acts, its part of rayleigh_beta_s included: always, or in_contact, only while "
-        "teeth are in contact (with a potential in proportion to the force); left out: in_contact with a potential, "
-        "always with a stiffness",
+        doc="when damper and rayleigh_beta_s of the mesh act: always, or in_contact (with a potential in "
+        "proportion to the force); left out: in_contact with a potential, always with a stiffness",
     )
     centre_distance_mm: float | None = quantity(
         None,
@@ -296,9 +294,7 @@ class TrainMeshTable:
         None,
         choices=MESH_MODELS,
         gone=GONE_MODELS,
-        doc="potential: mesh law with transmission error and separation, of loads that vary along the face width with "
-        "moments and tilts; "
-        "variable_stiffness: k(phi) delta, of such loads with their transmission error; "
+        doc="potential: mesh law with transmission error and separation; variable_stiffness: k(phi) delta; "
         "mean_stiffness: the mean of k over the mesh cycle; left out: that of [train.curves]",
     )
     mesh_model_torque_Nm: float | None = quantity(
@@ -310,14 +306,14 @@ class TrainMeshTable:
         None,
         above=0.0,
         high=500.0,
-        doc="largest tilt of the gears in the plane of action, over the common face width (um), for which "
-        "the potential of a load that varies along it is computed; left out: twice the tilt by shafts and bearings "
-        "under mesh_model_torque_Nm, at least the steady torque",
+        doc="largest tilt in the plane of action (um over the common face width) of a potential over the width; "
+        "left out: twice the tilt by shafts and bearings under the larger of mesh_model_torque_Nm and the "
+        "steady torque",
     )
     backlash_um: float | None = quantity(
         None,
-        doc="normal backlash (um); left out: with a potential that of the gears, or no back flanks where they have "
-        "none; with a stiffness a spring that acts both ways",
+        doc="normal backlash (um); left out: with a potential that of the gears (0: no back flanks), with a "
+        "stiffness a spring that acts in both directions",
     )
     friction: float | None = quantity(
         None,
@@ -333,9 +329,8 @@ class TrainMeshTable:
     curve: str | None = quantity(None, doc="CSV file with pinion_angle_deg and k_mesh_N_per_m, next to the job file")
     mesh_table: str | None = quantity(
         None,
-        doc="CSV file of stiffness and static transmission error over a pitch, next to the job file: "
-        "fraction_of_pitch or driver_angle_deg, k_mesh_N_per_m or k_mesh_N_per_um, and "
-        "transmission_error_unloaded_um, or transmission_error_loaded_um with mesh_force_N or torque_driven_Nm",
+        doc="CSV file next to the job file: stiffness and static transmission error over a pitch; columns: "
+        "docs/vibration.md",
     )
     stiffness_N_per_m: float | None = quantity(
         None, above=0.0, doc="constant stiffness (N/m), dF/d approach in the transverse section"
@@ -591,8 +586,8 @@ class TrainCurvesTable:
     load: str | None = quantity(
         None,
         choices=("stiffness", "torque"),
-        doc="of curves: load and angles of [stiffness], or the torque that each mesh carries; left out: those of "
-        "[stiffness], of meshes whose load varies along the face width that torque",
+        doc="load of curves: stiffness (load and angles of [stiffness]) or the torque of each mesh; left out: "
+        "stiffness, or the torque of the mesh if its load varies along the face width",
     )
     positions: int | None = quantity(
         None, low=8, high=10_000, doc='positions in one mesh cycle, for load = "torque"; left out: 36'
