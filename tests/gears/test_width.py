@@ -12,6 +12,8 @@ from gearfe.base.errors import InputError
 from gearfe.base.typing import Array
 from gearfe.gears.contact.half_plane_pair import half_plane_pair
 from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
+from gearfe.gears.gearmesh.topography import MeasuredTopography
+from gearfe.gears.gearmesh.width_job import FlankTopography
 from gearfe.gears.geometry.face import NOMINAL, ToothDeviations
 from gearfe.gears.geometry.pair import GearPair
 from gearfe.gears.width import (
@@ -24,12 +26,50 @@ from gearfe.gears.width import (
     sweep_width,
     wide_compliance,
 )
-from gearfe.gears.width.lines import AT_END, _softer_ends, own_twists, rows_at, solve_position
+from gearfe.gears.width.lines import (
+    AT_END,
+    _approach_left,
+    _softer_ends,
+    look_at,
+    own_twists,
+    rows_at,
+    solve_position,
+)
 from tests.makers.half_plane_pairs import KINKED, PAIRS
 from tests.makers.wide_gears import SPUR, helical_lines, helical_mesh, spur_lines
 
 CROWNED = WideFlanks(leads=(LeadModification(crowning=10e-6), LeadModification()))
 TILTED = WideFlanks(misalignment=Misalignment.over_width(20e-6, 10e-3))
+#: Linear end reliefs of both gears, parabolic ones with a tilt, reliefs of two corners, a measured grid with a ridge.
+RELIEVED = WideFlanks(
+    leads=(
+        LeadModification(relief_low=EndRelief(20e-6, 3e-3), relief_high=EndRelief(20e-6, 3e-3)),
+        LeadModification(relief_low=EndRelief(10e-6, 2e-3), relief_high=EndRelief(10e-6, 2e-3)),
+    )
+)
+PARABOLIC = WideFlanks(
+    leads=(LeadModification(relief_high=EndRelief(20e-6, 5e-3, 2.0)), LeadModification()),
+    misalignment=Misalignment.over_width(20e-6, 20e-3),
+)
+CORNERS = WideFlanks(
+    topographies=(
+        FlankTopography((2e-3, 14e-3), (-10e-3, 10e-3), 0.0, ((30e-6, 8e-3, 8e-3, True, True),)),
+        FlankTopography((10e-3, 23e-3), (-10e-3, 10e-3), 5e-6, ((20e-6, 6e-3, 6e-3, False, False),)),
+    )
+)
+RIDGE = WideFlanks(
+    topographies=(
+        MeasuredTopography(
+            np.array([3e-3, 11e-3]), np.array([-8e-3, 1e-3, 9e-3]), 1e-6 * np.array([[[0, 14, 2], [-2, 14, 0]]]),
+            np.zeros(23, dtype=np.int64),
+        ),
+        None,
+    )
+)  # fmt: skip
+EVERY = {
+    "plain": WideFlanks(), "crowned": CROWNED, "tilted": TILTED, "relieved": RELIEVED, "parabolic": PARABOLIC,
+    "corners": CORNERS, "ridge": RIDGE,
+}  # fmt: skip
 
 
 def test_influence_of_one_function_is_that_of_plane_strain():
@@ -147,14 +187,51 @@ def test_free_ends_yield_more_under_narrow_pressures():
     assert added[1][narrow] == pytest.approx(expected, rel=0.02)
 
 
-@pytest.mark.parametrize("flanks", [WideFlanks(), CROWNED, TILTED], ids=["plain", "crowned", "tilted"])
+@pytest.mark.parametrize("flanks", EVERY.values(), ids=EVERY)
 def test_points_doubled_hardly_change_the_transmission_error(flanks):
-    """Peak to peak within 0.3 %: lines are broken where their load ends, on tips and within the width."""
+    """Peak to peak within 0.3 %: lines are divided at kinks of the gap, and where their load ends."""
     lines = helical_lines().with_flanks(flanks)
     found = [sweep_width(replace(lines, density=share * lines.density), [100.0]) for share in (1.0, 2.0)]
     error, doubled = (sweep.transmission_error[0] for sweep in found)
     assert np.ptp(error) == pytest.approx(np.ptp(doubled), rel=3e-3)
     assert np.abs(error - doubled).max() < 1e-3 * np.ptp(doubled)
+
+
+@pytest.mark.parametrize("flanks", EVERY.values(), ids=EVERY)
+def test_a_position_does_not_depend_on_where_its_iteration_starts(flanks):
+    """Alone, or from a neighbour on either side: the ends of the load are where the approach to the contacts ends."""
+    lines = helical_lines().with_flanks(flanks)
+    cycle = lines.compliance.mesh.sections.mesh_cycle
+    for angle in cycle * np.array([0.1, 0.45, 0.8]):
+        alone = solve_position(lines, angle, torque=100.0)
+        looks = look_at(lines, angle, alone.twist)
+        known = np.maximum(_approach_left(lines, looks, alone), 0.0)  # to which the line load belongs
+        assert alone.converged
+        for apart in (-cycle / 24, cycle / 24):
+            neighbour = solve_position(lines, angle + apart, torque=100.0)
+            after = solve_position(lines, angle, torque=100.0, before=neighbour)
+            left = np.maximum(_approach_left(lines, looks, after), 0.0)
+            assert after.twist == pytest.approx(alone.twist, rel=1e-5)
+            assert np.abs(left - known).max() < 1e-4 * known.max()
+
+
+@pytest.mark.parametrize("flanks", [RELIEVED, CORNERS, RIDGE], ids=["relieved", "corners", "ridge"])
+def test_lines_are_divided_where_the_material_has_kinks(flanks):
+    """Each slope of the material that jumps along a line does so at a kink: seen from differences 2 um apart."""
+    lines, step = helical_lines().with_flanks(flanks), 2e-6
+    mesh, angle = lines.compliance.mesh, 0.1
+    looks, jumps = look_at(lines, angle), 0
+    for k in np.unique(looks.pair).tolist():
+        on_line = looks.pair == k
+        z = np.arange(looks.z[on_line][0], looks.z[on_line][-1], step)
+        roll = rows_at(lines.law, angle + mesh.turns[0] * z + k * mesh.sections.mesh_cycle).roll
+        material = [flanks.material(g, roll[:, g], z, np.full(len(z), (k, -1 - k)[g]), mesh.faces[g]) for g in (0, 1)]
+        slopes = np.diff(material, axis=1) / step
+        at = z[1:-1][np.abs(np.diff(slopes, axis=1)).max(axis=0) > 1e-4]
+        apart = np.abs(at[:, None] - looks.z[on_line & looks.kink])
+        jumps += len(at)
+        assert len(at) == 0 or apart.min(axis=1).max() < 2 * step
+    assert jumps > 3
 
 
 @pytest.mark.parametrize("flanks", [WideFlanks(), TILTED], ids=["plain", "tilted"])
@@ -170,7 +247,7 @@ def test_hand_mirrored_with_z_is_the_same(flanks):
 @pytest.mark.parametrize("flanks", [WideFlanks(), CROWNED, TILTED], ids=["plain", "crowned", "tilted"])
 def test_exchanged_gears_are_the_same(flanks, monkeypatch):
     """Seen from behind the line of centres, in one position of both gears: the wheel is turned by the twist."""
-    monkeypatch.setattr("gearfe.gears.width.lines.TWIST_PLACED", 1e-8)
+    monkeypatch.setattr("gearfe.gears.width.lines.ENDS_PLACED", 1e-8)
     exchanged = WideFlanks(leads=flanks.leads[::-1], misalignment=flanks.misalignment)
     lines, other = helical_lines().with_flanks(flanks), helical_lines(swapped=True).with_flanks(exchanged)
     sections = lines.compliance.mesh.sections

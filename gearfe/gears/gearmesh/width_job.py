@@ -81,6 +81,20 @@ class FlankTopography:
     corners: tuple[tuple[float, float, float, bool, bool], ...]
     alike = True
 
+    @property
+    def kinks(self) -> Array:
+        """Lines a z + b s = c over z and roll length s (m) where reliefs of corners begin, shape (corners, 3)."""
+        (form, tip), (low, high) = self.rolls, self.face
+        lines = [
+            (
+                -1.0 / length if at_high else 1.0 / length,
+                -1.0 / height if at_tip else 1.0 / height,
+                1.0 - (high / length if at_high else -low / length) - (tip / height if at_tip else -form / height),
+            )
+            for _, length, height, at_tip, at_high in self.corners
+        ]
+        return np.reshape(lines, (-1, 3))
+
     def __call__(self, roll: Array, z: Array, tooth: IntArray) -> Array:  # noqa: ARG002 - alike on all teeth
         """Material (m, > 0: more) at roll lengths (m) and axial coordinates (m)."""
         (form, tip), (low, high) = self.rolls, self.face
@@ -261,6 +275,11 @@ class SumOfTopographies:
     def alike(self) -> bool:
         """Whether all teeth are alike."""
         return all(getattr(part, "alike", False) for part in self.parts)
+
+    @property
+    def kinks(self) -> Array:
+        """Lines over z and roll length where one of them has kinks, shape (lines, 3)."""
+        return np.concatenate([getattr(part, "kinks", np.zeros((0, 3))) for part in self.parts])
 
     def __call__(self, roll: Array, z: Array, tooth: IntArray) -> Array:
         """Material (m) at roll lengths and axial coordinates (m) of teeth."""

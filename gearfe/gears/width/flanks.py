@@ -25,7 +25,8 @@ from ...base.errors import InputError
 from ...base.typing import Array, IntArray
 from ..geometry.face import NOMINAL, ToothDeviations
 
-#: Material (m) that is added to a flank at roll lengths (m), axial coordinates z (m) and teeth, arrays of one shape.
+#: Material (m) that is added to a flank at roll lengths (m), axial coordinates z (m) and teeth, arrays of one shape. An
+#: attribute `kinks` gives the straight lines of its kinks as `WideFlanks.kinks` does; without it there are none.
 Topography = Callable[[Array, Array, IntArray], Array]
 
 
@@ -82,6 +83,12 @@ class LeadModification:
         for name in ("crowning", "slope"):
             if not math.isfinite(getattr(self, name)):
                 raise InputError(name, getattr(self, name), "must be finite", "give it in m")
+
+    def kinks(self, face: tuple[float, float]) -> list[float]:
+        """Return the z (m) at which end reliefs of a gear begin whose face reaches from one z to another (m)."""
+        (low, high), (first, second) = face, (self.relief_low, self.relief_high)
+        ends = [] if first is None else [low + first.length]
+        return ends if second is None else [*ends, high - second.length]
 
     def material(self, z: Array, face: tuple[float, float]) -> Array:
         """Material added (m) at z (m) of a gear whose face reaches from one z to another (m)."""
@@ -146,6 +153,28 @@ class WideFlanks:
         """Whether all mesh cycles are the same: topographies may differ by tooth where they do not say `alike`."""
         alike = (topography is None or getattr(topography, "alike", False) for topography in self.topographies)
         return all(own.alike for own in self.profiles) and all(alike)
+
+    def kinks(self, gear: int, face: tuple[float, float]) -> Array:
+        """Return the straight lines a z + b s = c over z and roll length s (m) along which a gear's material has kinks.
+
+        Parameters
+        ----------
+        gear : int
+            0 for the pinion, 1 for the wheel.
+        face : pair of float
+            First and last z of the gear (m).
+
+        Returns
+        -------
+        ndarray, shape (lines, 3)
+            a, b, c (m).
+        """
+        own, topography = self.profiles[gear], self.topographies[gear]
+        others = [own.profiles[i] for i in set(own.profile) - {own.profile[0]}]
+        rolls = {s for profile in others if profile is not None for s in profile.kinks}
+        along = [(1.0, 0.0, z) for z in self.leads[gear].kinks(face)] + [(0.0, 1.0, s) for s in sorted(rolls)]
+        of_topography = getattr(topography, "kinks", np.zeros((0, 3)))
+        return np.concatenate([np.reshape(along, (-1, 3)), of_topography])
 
     def material(self, gear: int, roll: Array, z: Array, tooth: IntArray, face: tuple[float, float]) -> Array:
         """Material that a gear's modifications add beyond the first tooth's profile (m).

@@ -2,8 +2,8 @@ r"""Lines of contact of all tooth pairs at one position, and how they share a lo
 
 A line is a tooth pair k over the common width; its point at z has the pair angle
 :math:`\psi = \varphi + \kappa z + 2\pi k/z_1 - \tfrac12 i\theta` of `.pair_law`, where the pair has its first contact
-t, its arms, and its compliance. Lines are broken at the ends of the path of contact, beyond which tips may be loaded,
-and have Gauss points with weights w in each stretch. With the gap d of `.flanks`, a twist :math:`\theta` and the
+t, its arms, and its compliance. Their loaded parts are divided at all kinks of the gap and of the compliance, and
+have Gauss points with weights w in each stretch. With the gap d of `.flanks`, a twist :math:`\theta` and the
 forces F of the points, f = F/w per width,
 
 .. math::
@@ -20,6 +20,16 @@ solution's to `PLACED`.
 Newton's method with an active set solves it at a given twist or, with the twist bordered, at a given torque. The
 tangent over twist and tilts follows from the same matrix: :math:`B^T(T + c')^{-1}B` over the loaded points, where the
 twist has :math:`d((1 + \delta)\,m)/dm` in B.
+
+**Ends of the load.** A loaded part of a line ends where the approach that is left to the contacts,
+:math:`\bar r(\theta - t) - d - \sum_l T_l F_l`, vanishes. It is evaluated at any places
+of the lines, all kinks among them. Points are placed on the loaded parts that follow from it, until these agree with
+those of the points to `ENDS_PLACED`. The load vanishes at its ends, so that an error of an end enters the solution by
+its square only.
+
+**Kinks** are the ends of the path of contact, beyond which tips may be loaded, kinks of the profiles, and those of the
+material over roll and z: where end reliefs and reliefs of corners begin, and lines of measured grids. Gauss points that
+straddle where an end relief begins err by 1 to 9 % of the peak to peak of the transmission error.
 
 **Free ends.** Close to an end of a gear the contact under a line load is more compliant than in plane strain, down to
 the width of its pressure. The finite elements contain this for bumps of half width a only. Between a and the half
@@ -47,11 +57,11 @@ from .flanks import WideFlanks
 from .pair_law import PairLaw, pair_law
 
 #: Gauss points of a line over the whole width for each function of the load, by the root of its share of the width;
-#: the least for a stretch, and those of a stretch beyond the path of contact.
-POINTS_PER_FUNCTION, LEAST_POINTS, TIP_POINTS = 2.0, 4, 6
-#: Change of the twist, in parts of its way since the first touch, that ends the placing of points: it moves the torque
-#: by 1e-3 of itself. How often they are placed, and how often their reach may become less from one to the next.
-PLACED, PLACINGS, FREE_PLACINGS = 1e-4, 12, 4
+#: the least for a stretch.
+POINTS_PER_FUNCTION, LEAST_POINTS = 2.0, 4
+#: Change of the twist, in parts of its way since the first touch, and of the ends of the load, in parts of its length,
+#: that end the placing of points. How often they are placed, and how often the ends may change.
+PLACED, ENDS_PLACED, PLACINGS, FREE_PLACINGS = 1e-3, 1e-3, 12, 8
 #: Steps in which any number of points may lose their load or be let in. That converges in a few steps or runs in a
 #: circle; afterwards one does at a time, along the way of the convex problem of the moments, which has no circles.
 QUICK_STEPS = 15
@@ -70,11 +80,8 @@ STIFFEST = 0.05
 LEAST_AHEAD = 0.1
 #: Gauss points over the load of what a contact stores.
 ENERGY_POINTS = 5
-#: Change of the torque in parts of itself that ends the placing of points at a twist: what is left is a tenth of it,
-#: since the ends of the load come nearer by that each time.
-TWIST_PLACED = 1e-4
-#: Points of a stretch without load, and the least length (widths) of a stretch that ends where the load does.
-FREE_POINTS, LEAST_STRETCH = 2, 1e-3
+#: Least length (widths) of a stretch that begins or ends at a kink, and of a loaded part.
+LEAST_STRETCH, SHORTEST = 1e-3, 1e-9
 #: Places on a line at which its gap is looked at.
 LOOKS = 33
 
@@ -177,10 +184,14 @@ class Points:
         Tooth pairs.
     rows : Rows
         Tables of the pair's law there.
+    twist : float
+        Twist of the wheel (rad) to which the pair angles belong.
     touch : ndarray, shape (n,)
         Twist at which a point touches (rad).
     levers : ndarray, shape (n, 3)
         Twist of the wheel that a unit of twist, tilt in the plane of action and tilt across are worth (-).
+    loads : list of ndarray, shapes (n, size)
+        Unit forces of the points on the stations and functions of both gears.
     influence : ndarray, shape (n, n)
         T (rad/(N m)).
     """
@@ -189,8 +200,10 @@ class Points:
     weight: Array
     pair: IntArray
     rows: Rows
+    twist: float
     touch: Array
     levers: Array
+    loads: list[Array]
     influence: Array
 
     def __len__(self) -> int:
@@ -215,37 +228,146 @@ def _slopes(values: Array) -> Array:
 
 @dataclass(frozen=True)
 class Looks:
-    """Where the lines at a pinion angle and a twist are closest: l lines that can meet.
+    """Places on all lines that can meet at a pinion angle and a twist, q of them, by tooth pair and z.
 
     Attributes
     ----------
-    pair : ndarray, shape (l,)
+    pair : ndarray, shape (q,)
         Tooth pairs.
-    gap : ndarray, shape (l,)
-        Least of the gap d along each line, as a twist (rad).
-    least
-        Twist at which the rigid gears touch first (rad), infinite where they do not.
+    z : ndarray, shape (q,)
+        Axial coordinates (m), with the ends of the lines and the kinks of their gaps.
+    kink : ndarray of bool, shape (q,)
+        Whether the gap or the compliance has a kink there.
+    rows : Rows
+        Tables of the pair's law there.
+    first : ndarray, shape (q,)
+        Twist of the first contact at this pair angle (rad).
     """
 
     pair: IntArray
-    gap: Array
-    least: float
+    z: Array
+    kink: BoolArray
+    rows: Rows
+    first: Array
+
+    @property
+    def least(self) -> float:
+        """Twist at which the rigid gears touch first (rad), infinite where they do not."""
+        return float(self.first.min(initial=math.inf))
 
 
-def look_at(lines: ContactLines, angle: float) -> Looks:
-    """Look at the gaps along all lines that can meet; the pair angle of pair 0 at z = 0 is `angle` (rad)."""
-    mesh, law = lines.compliance.mesh, lines.law
-    rule, cycle = np.linspace(*mesh.zone, LOOKS), mesh.sections.mesh_cycle
-    first, *_, last = np.sort(angle + mesh.turns[0] * rule)
-    numbers = np.arange(math.ceil((law.angle[0] - last) / cycle), math.floor((law.angle[-1] - first) / cycle) + 1)
-    psi = angle + mesh.turns[0] * rule + cycle * numbers[:, None]
-    rows = rows_at(law, np.clip(psi.ravel(), law.angle[0], law.angle[-1]))
-    gap = lines.gap(np.tile(rule, len(numbers)), rows, np.repeat(numbers, LOOKS)) / mean_arm(lines, rows)
-    outside = (psi < law.angle[0]) | (psi > law.angle[-1])
-    gap = np.where(outside, np.inf, gap.reshape(psi.shape))
-    least = float((gap + rows.touch.reshape(psi.shape)).min(initial=math.inf))
-    gaps = gap.min(axis=1, initial=math.inf)
-    return Looks(numbers[np.isfinite(gaps)], gaps[np.isfinite(gaps)], least)
+def look_at(lines: ContactLines, angle: float, twist: float = 0.0, runs: Runs | None = None) -> Looks:
+    """Look at the gaps along all lines that can meet at a pinion angle and a twist of the wheel (rad).
+
+    The ends of `runs` are among the places.
+    """
+    mesh, law, flanks = lines.compliance.mesh, lines.law, lines.flanks
+    middle, cycle, turn = _middle(lines, angle, twist), mesh.sections.mesh_cycle, mesh.turns[0]
+    low, high = sorted(middle + turn * z for z in mesh.zone)
+    numbers = np.arange(math.ceil((law.angle[0] - high) / cycle), math.floor((law.angle[-1] - low) / cycle) + 1)
+    psi, (first, last) = middle + cycle * numbers[:, None], np.broadcast_to(mesh.zone, (len(numbers), 2)).T
+    marks = np.zeros((len(numbers), 0))
+    if turn:
+        ends = np.sort((law.angle[[0, -1]] - psi) / turn, axis=1)
+        first, last = np.maximum(first, ends[:, 0]), np.minimum(last, ends[:, 1])
+        marks = (law.marks - psi) / turn
+    z = first[:, None] + (last - first)[:, None] * np.linspace(0.0, 1.0, LOOKS)
+    kinks = [marks]
+    for gear, face in enumerate(mesh.faces):
+        kinks.append(_kinks(flanks.kinks(gear, face), z, np.interp(psi + turn * z, law.angle, law.roll[:, gear])))
+    at = np.concatenate(kinks, axis=1)
+    inside = (at > first[:, None]) & (at < last[:, None])
+    lines_of, places = [np.repeat(np.arange(len(numbers)), LOOKS), np.nonzero(inside)[0]], [z.ravel(), at[inside]]
+    if runs is not None and len(numbers):
+        of_ends, ends = np.tile(runs.pair, 2) - numbers[0], np.append(runs.start, runs.end)
+        known = (of_ends >= 0) & (of_ends < len(numbers))
+        of_ends, ends = of_ends[known], ends[known]
+        known = (ends > first[of_ends]) & (ends < last[of_ends])
+        lines_of, places = [*lines_of, of_ends[known]], [*places, ends[known]]
+    kink = np.repeat([False, True, False], [z.size, len(places[1]), sum(map(len, places[2:]))])
+    line, z = np.concatenate(lines_of), np.concatenate(places)
+    order = np.lexsort((z, line))
+    line, z, kink = line[order], z[order], kink[order]
+    rows = rows_at(law, psi[line, 0] + turn * z)
+    return Looks(numbers[line], z, kink, rows, rows.touch + lines.gap(z, rows, numbers[line]) / mean_arm(lines, rows))
+
+
+def _kinks(seams: Array, z: Array, roll: Array) -> Array:
+    """Return where lines cross seams a z + b s = c of a flank, shape (lines, seams); NaN where they do not.
+
+    Parameters
+    ----------
+    seams : ndarray, shape (seams, 3)
+        a, b, c.
+    z, roll : ndarray, shape (lines, looks)
+        Axial coordinates and roll lengths s along the lines (m).
+    """
+    a, b, c = seams.T[:, :, None, None]
+    side = a * z + b * roll - c
+    crossed = (side[..., :-1] > 0.0) != (side[..., 1:] > 0.0)
+    i = crossed.argmax(axis=-1)[..., None]
+    before, behind = (np.take_along_axis(side, i + k, axis=-1)[..., 0] for k in (0, 1))
+    low, high = (np.take_along_axis(np.broadcast_to(z, side.shape), i + k, axis=-1)[..., 0] for k in (0, 1))
+    share = np.divide(before, before - behind, out=np.full(before.shape, np.nan), where=crossed.any(axis=-1))
+    return np.asarray((low + share * (high - low)).T)
+
+
+def _middle(lines: ContactLines, angle: float, twist: float) -> float:
+    """Pair angle (rad) of pair 0 at z = 0."""
+    return angle - 0.5 * lines.compliance.mesh.sections.gear_ratio * twist
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Loaded parts of the lines, r of them, by tooth pair and z.
+
+    Attributes
+    ----------
+    pair : ndarray, shape (r,)
+        Tooth pairs.
+    start, end : ndarray, shape (r,)
+        Between which z (m).
+    """
+
+    pair: IntArray
+    start: Array
+    end: Array
+
+    def near(self, other: Runs) -> bool:
+        """Return whether the ends are those of others, to `ENDS_PLACED` of the lengths."""
+        if not np.array_equal(self.pair, other.pair):
+            return False
+        apart = np.maximum(np.abs(self.start - other.start), np.abs(self.end - other.end))
+        return bool((apart <= ENDS_PLACED * (other.end - other.start)).all())
+
+    def within(self, looks: Looks) -> Runs:
+        """Return what of them is on the lines that were looked at."""
+        pairs, begin = np.unique(looks.pair, return_index=True)
+        stop = np.append(begin[1:], len(looks.pair)) - 1
+        kept = np.isin(self.pair, pairs)
+        line = np.searchsorted(pairs, self.pair[kept])
+        start = np.maximum(self.start[kept], looks.z[begin[line]])
+        end = np.minimum(self.end[kept], looks.z[stop[line]])
+        long = end - start > SHORTEST * np.ptp(looks.z)
+        return Runs(self.pair[kept][long], start[long], end[long])
+
+
+#: No loaded part.
+NO_RUNS = Runs(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+
+
+def _runs(pair: IntArray, z: Array, left: Array) -> Runs:
+    """Return where the approach `left` to the contacts is positive; it is straight between places, by pair and z."""
+    order = np.lexsort((z, pair))
+    pair, z, left = pair[order], z[order], left[order]
+    bears, same = left > 0.0, pair[1:] == pair[:-1]
+    size = np.abs(left)
+    zero = z[:-1] + np.diff(z) * np.divide(size[:-1], size[:-1] + size[1:], out=np.zeros(len(size) - 1), where=same)
+    starts, ends = np.where(np.append(False, same & ~bears[:-1]), np.append(0.0, zero), z), z
+    ends = np.where(np.append(same & ~bears[1:], False), np.append(zero, 0.0), z)
+    first = bears & np.append(True, ~(same & bears[:-1]))
+    last = bears & np.append(~(same & bears[1:]), True)
+    return Runs(pair[first], starts[first], ends[last])
 
 
 def mean_arm(lines: ContactLines, rows: Rows) -> Array:
@@ -253,8 +375,8 @@ def mean_arm(lines: ContactLines, rows: Rows) -> Array:
     return np.asarray(0.5 * (rows.arm + lines.compliance.mesh.sections.gear_ratio * rows.pinion_arm))
 
 
-def place_points(lines: ContactLines, angle: float, twist: float, before: Solution | None = None) -> Points:
-    """Place points on all lines that may bear.
+def place_points(lines: ContactLines, angle: float, twist: float, looks: Looks, runs: Runs) -> Points:
+    """Place points on the loaded parts of all lines, which are divided at their kinks.
 
     Parameters
     ----------
@@ -262,75 +384,27 @@ def place_points(lines: ContactLines, angle: float, twist: float, before: Soluti
         The gears.
     angle, twist : float
         Pinion angle and twist of the wheel (rad).
-    before : Solution, optional
-        With points at a twist nearby: lines are broken where their load ends there.
+    looks : Looks
+        Kinks of the lines there.
+    runs : Runs
+        Loaded parts.
     """
-    mesh, law = lines.compliance.mesh, lines.law
-    cycle, turn = mesh.sections.mesh_cycle, mesh.turns[0]
-    middle = angle - 0.5 * mesh.sections.gear_ratio * twist
-    looks = look_at(lines, middle)
-    breaks = {} if before is None else load_ends(before)
-    z, weight, pair = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=np.int64)]
-    for k, gap in zip(looks.pair.tolist(), looks.gap.tolist(), strict=True):
-        reached = _reached(law, twist - gap)
-        if reached is None:
-            continue
-        marks = np.clip([reached[0], *law.path, reached[1]], *reached).tolist()
-        for (start, end), tip in zip(itertools.pairwise(marks), (True, False, True), strict=True):
-            stretch = _stretch(start, end, middle + k * cycle, turn, mesh.zone, tip)
-            if stretch is None:
-                continue
-            apart = LEAST_STRETCH * mesh.width
-            inner = [(at, loaded) for at, loaded in breaks.get(k, ()) if stretch[0] + apart < at < stretch[1] - apart]
-            ends = [stretch[0], *(at for at, _ in inner), stretch[1]]
-            loaded = [True] * (len(inner) + 1)
-            for i, (_, before_it) in enumerate(inner):
-                loaded[i], loaded[i + 1] = before_it, not before_it
-            for (a, b), bears in zip(itertools.pairwise(ends), loaded, strict=True):
-                share = (b - a) / mesh.width
-                x, w = _gauss(_count(lines, share, tip=tip and turn != 0.0) if bears else FREE_POINTS)
-                z.append(0.5 * (a + b) + 0.5 * (b - a) * x)
-                weight.append(0.5 * (b - a) * w)
-                pair.append(np.full(len(x), k))
+    mesh = lines.compliance.mesh
+    z, weight, pair, apart = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=np.int64)], LEAST_STRETCH * mesh.width
+    kinks, of_kinks = looks.z[looks.kink], looks.pair[looks.kink]
+    for k, start, end in zip(runs.pair.tolist(), runs.start.tolist(), runs.end.tolist(), strict=True):
+        inner = kinks[(of_kinks == k) & (kinks > start + apart) & (kinks < end - apart)].tolist()
+        for a, b in itertools.pairwise([start, *inner, end]):
+            x, w = _gauss(_count(lines, (b - a) / mesh.width))
+            z.append(0.5 * (a + b) + 0.5 * (b - a) * x)
+            weight.append(0.5 * (b - a) * w)
+            pair.append(np.full(len(x), k))
+    middle = _middle(lines, angle, twist)
     return _points(lines, middle, twist, np.concatenate(z), np.concatenate(weight), np.concatenate(pair))
 
 
-def load_ends(solution: Solution) -> dict[int, list[tuple[float, bool]]]:
-    """Return where the load ends on each line, by tooth pair: z (m), rising, and whether it bears at smaller z.
-
-    The approach that is left to the contact itself vanishes there; it is straight between two points.
-    """
-    points = solution.points
-    left = solution.twist - points.touch - points.influence @ solution.moment
-    found: dict[int, list[tuple[float, bool]]] = {}
-    for k in np.unique(points.pair).tolist():
-        of_pair = np.flatnonzero(points.pair == k)
-        of_pair = of_pair[np.argsort(points.z[of_pair])]
-        z, approach = points.z[of_pair], left[of_pair]
-        i = np.flatnonzero((approach[:-1] > 0.0) != (approach[1:] > 0.0))
-        at = z[i] + (z[i + 1] - z[i]) * approach[i] / (approach[i] - approach[i + 1])
-        found[k] = list(zip(at.tolist(), (approach[i] > 0.0).tolist(), strict=True))
-    return found
-
-
-def _reached(law: PairLaw, twist: float) -> tuple[float, float] | None:
-    """First and last pair angle (rad) at which rigid flanks overlap at a twist (rad), or None."""
-    inside = np.flatnonzero(law.touch < twist)
-    if len(inside) == 0:
-        return None
-    ends = []
-    for i, beyond in ((inside[0], inside[0] - 1), (inside[-1], inside[-1] + 1)):
-        at = law.angle[i]
-        if 0 <= beyond < len(law.angle):
-            at += (law.angle[beyond] - at) * (twist - law.touch[i]) / (law.touch[beyond] - law.touch[i])
-        ends.append(float(at))
-    return ends[0], ends[1]
-
-
-def _count(lines: ContactLines, share: float, *, tip: bool) -> int:
-    """Points of a stretch over so much of the width; `tip`: beyond the path of contact."""
-    if tip:
-        return math.ceil(TIP_POINTS * lines.density / POINTS_PER_FUNCTION)
+def _count(lines: ContactLines, share: float) -> int:
+    """Points of a stretch over so much of the width."""
     return max(LEAST_POINTS, math.ceil(lines.density * lines.compliance.mesh.count * math.sqrt(share) - 1e-9))
 
 
@@ -339,38 +413,20 @@ def _gauss(count: int) -> tuple[Array, Array]:
     return np.polynomial.legendre.leggauss(count)
 
 
-def _stretch(
-    first: float, last: float, at: float, turn: float, zone: tuple[float, float], tip: bool
-) -> tuple[float, float] | None:
-    """Return the z (m) between which a line runs through pair angles from one to another (rad), or None.
-
-    Parameters
-    ----------
-    first, last : float
-        Pair angles (rad).
-    at, turn : float
-        Pair angle at z = 0 (rad), and its growth with z (rad/m).
-    zone : pair of float
-        Common width (m).
-    tip : bool
-        Whether both pair angles are beyond the path of contact, to which its ends belong.
-    """
-    if turn == 0.0:
-        inside = first < at < last if tip else first <= at <= last
-        return zone if inside else None
-    a, b = sorted(((first - at) / turn, (last - at) / turn))
-    a, b = max(a, zone[0]), min(b, zone[1])
-    return (a, b) if b - a > 1e-9 * (zone[1] - zone[0]) else None
-
-
 def _points(lines: ContactLines, middle: float, twist: float, z: Array, weight: Array, pair: IntArray) -> Points:
     mesh, law = lines.compliance.mesh, lines.law
     rows = rows_at(law, middle + mesh.turns[0] * z + pair * mesh.sections.mesh_cycle)
     levers = np.concatenate([np.ones((len(z), 1)), lines.levers(z, rows) / rows.arm[:, None]], axis=1)
-    approach = mean_arm(lines, rows) * (twist - rows.touch) - lines.gap(z, rows, pair)
+    first = rows.touch + lines.gap(z, rows, pair) / mean_arm(lines, rows)
     rows = replace(rows, yields=rows.yields + _softer_ends(lines, z, rows))
-    influence = _influence(lines.compliance, z, pair, rows) / (rows.arm[:, None] * rows.arm)
-    return Points(z, weight, pair, rows, twist - approach / rows.arm, levers, influence)
+    loads = _loads(lines.compliance, z, rows)
+    influence = _influence(lines.compliance, loads, pair) / (rows.arm[:, None] * rows.arm)
+    return Points(z, weight, pair, rows, twist, _touch(lines, rows, first, twist), levers, loads, influence)
+
+
+def _touch(lines: ContactLines, rows: Rows, first: Array, twist: float) -> Array:
+    """Twist (rad) at which places touch, to first order from a twist (rad); `first`: that of their first contact."""
+    return np.asarray(twist - mean_arm(lines, rows) * (twist - first) / rows.arm)
 
 
 def _softer_ends(lines: ContactLines, z: Array, rows: Rows) -> Array:
@@ -396,17 +452,24 @@ def _softer_ends(lines: ContactLines, z: Array, rows: Rows) -> Array:
     return added
 
 
-def _influence(compliance: WideCompliance, z: Array, pair: IntArray, rows: Rows) -> Array:
-    """Approach of the flanks at each point per force at each (m/N), shape (n, n)."""
+def _loads(compliance: WideCompliance, z: Array, rows: Rows) -> list[Array]:
+    """Return the loads of unit forces at points on the stations and functions of both gears, shapes (n, size)."""
     mesh = compliance.mesh
     over_width = legendre(z, mesh.zone, mesh.count)
     values = compliance.shapes.at(rows.arc)[:, :, 0]
-    found = np.zeros((len(z), len(z)))
-    of_pair = {k: np.flatnonzero(pair == k) for k in np.unique(pair).tolist()}
+    loads = []
     for gear, side in enumerate(compliance.sides):
         size = len(side.local.stations)
-        load = values[:, gear, :size, None, None] * rows.tooth_normal[:, gear, None, :, None]
-        load = (load * over_width[:, None, None]).reshape(len(z), 2 * size * mesh.count)
+        load = values[:, gear, :size, None] * rows.tooth_normal[:, gear, None]
+        loads.append((load[..., None] * over_width[:, None, None]).reshape(len(z), 2 * size * mesh.count))
+    return loads
+
+
+def _influence(compliance: WideCompliance, loads: list[Array], pair: IntArray) -> Array:
+    """Approach of the flanks at each point per force at each (m/N), shape (n, n)."""
+    found = np.zeros((len(pair), len(pair)))
+    of_pair = {k: np.flatnonzero(pair == k) for k in np.unique(pair).tolist()}
+    for gear, (side, load) in enumerate(zip(compliance.sides, loads, strict=True)):
         for step in range(compliance.steps + 1):
             # the wheel's teeth count the other way round
             way = step * (1 - 2 * gear)
@@ -426,6 +489,30 @@ def _influence(compliance: WideCompliance, z: Array, pair: IntArray, rows: Rows)
                     found[np.ix_(felt, source)] += block
                     found[np.ix_(source, felt)] += block.T
     return found
+
+
+def _approach_left(lines: ContactLines, looks: Looks, balance: _Balance) -> Array:
+    """Twist (rad) that the solution leaves to the contacts themselves at the places looked at, shape (q,)."""
+    compliance, points, rows = lines.compliance, balance.points, looks.rows
+    mesh, force = compliance.mesh, balance.moment / points.rows.arm
+    pairs, line = np.unique(looks.pair, return_inverse=True)
+    over_width = legendre(looks.z, mesh.zone, mesh.count)[:, :, None]
+    values = compliance.shapes.at(rows.arc)[:, :, 0]
+    approach = np.zeros(len(looks.z))
+    for gear, (side, load) in enumerate(zip(compliance.sides, points.loads, strict=True)):
+        size, moved = load.shape[1], np.zeros((len(pairs), load.shape[1]))
+        for k in np.unique(points.pair).tolist():
+            of_pair = points.pair == k
+            total = force[of_pair] @ load[of_pair]
+            for i, felt in enumerate(pairs.tolist()):
+                step = (felt - k) * (1 - 2 * gear)
+                if abs(step) <= compliance.steps:
+                    square = side.influence[abs(step)].reshape(size, size)
+                    moved[i] += square @ total if step >= 0 else total @ square
+        along = (moved.reshape(len(pairs), -1, mesh.count)[line] @ over_width)[..., 0]
+        shape = values[:, gear, : len(side.local.stations), None] * rows.tooth_normal[:, gear, None]
+        approach += (shape.reshape(len(line), -1) * along).sum(axis=1)
+    return balance.twist - _touch(lines, rows, looks.first, points.twist) - approach / rows.arm
 
 
 def own_twists(law: PairLaw, points: Points, moment: Array) -> tuple[Array, Array]:
@@ -474,21 +561,25 @@ class Solution:
         m = r_2 F of the points (N m), the unknowns.
     wheel_moment : ndarray, shape (n,)
         Moments of the points on the wheel (N m), whose sum is the torque.
+    runs
+        Loaded parts of the lines.
     tangent : ndarray, shape (3, 3)
         Torque and moments of the tilts by twist, tilt in the plane of action and tilt across (N m/rad).
     converged
         Whether the iteration settled.
-    steps
-        Newton steps.
+    steps, placings
+        Newton steps, and how often points were placed.
     """
 
     points: Points
     twist: float
     moment: Array
     wheel_moment: Array
+    runs: Runs
     tangent: Array
     converged: bool
     steps: int
+    placings: int
 
     @property
     def torque(self) -> float:
@@ -497,7 +588,12 @@ class Solution:
 
 
 def solve_position(
-    lines: ContactLines, angle: float, *, torque: float | None = None, twist: float | None = None, guess: float = 0.0
+    lines: ContactLines,
+    angle: float,
+    *,
+    torque: float | None = None,
+    twist: float | None = None,
+    before: Solution | None = None,
 ) -> Solution:
     """Solve the contact at a pinion angle.
 
@@ -511,39 +607,35 @@ def solve_position(
         At the wheel (N m), > 0.
     twist : float, optional
         Of the wheel (rad), from where unmodified flanks touch, instead of `torque`.
-    guess : float
-        Twist (rad) at which a torque is expected; 0: by a usual stiffness.
+    before : Solution, optional
+        Solved position close by, from which the iteration starts.
     """
-    if torque is None:
-        assert twist is not None
-        at_twist = _newton(lines, place_points(lines, angle, twist), twist=twist, torque=None)
-        for _ in range(PLACINGS):
-            torque_before = at_twist.torque
-            points = place_points(lines, angle, twist, at_twist)
-            at_twist = _newton(lines, points, twist=twist, torque=None, before=at_twist)
-            if abs(at_twist.torque - torque_before) <= TWIST_PLACED * torque_before:
-                break
-        return at_twist
-    least = look_at(lines, angle).least
-    if not math.isfinite(least):
-        return Solution(_nowhere(lines), math.nan, np.zeros(0), np.zeros(0), np.zeros((3, 3)), False, 0)
-    ahead = guess - least if guess > least else torque / lines.compliance.mesh.usual_stiffness
-    steps, settled, before = 0, False, None
-    broken = None
-    for number in range(PLACINGS):
-        broken = before if number < FREE_PLACINGS else broken  # ends of light loads may jump to and fro
-        points = place_points(lines, angle, least + ahead, broken)
-        solution = _newton(lines, points, torque=torque, twist=None, before=before)
-        steps, before = steps + solution.steps, solution
-        # between the places that are looked at, a line may touch a little earlier
-        new = max(solution.twist - least, LEAST_AHEAD * torque / lines.compliance.mesh.usual_stiffness)
-        free = number < FREE_PLACINGS
-        near = abs(new - ahead) <= PLACED * new or (not free and new <= ahead)
-        settled = solution.converged and number > 0 and near
-        if settled:
-            break
-        ahead = new if free else max(new, ahead)
-    return replace(solution, steps=steps, converged=settled)
+    mesh = lines.compliance.mesh
+    known: _Balance | Solution | None = before
+    runs = None if before is None else before.runs
+    at = before.twist if twist is None and before is not None else twist
+    if at is None:
+        assert torque is not None
+        at = look_at(lines, angle).least + torque / mesh.usual_stiffness
+    balance, steps, number, settled = None, 0, 0, False
+    while not settled and number < PLACINGS and math.isfinite(at):
+        number += 1
+        looks = look_at(lines, angle, at, runs)
+        rigid = at - _touch(lines, looks.rows, looks.first, at)
+        if torque is not None and not (rigid > 0.0).any():
+            at += LEAST_AHEAD * torque / mesh.usual_stiffness - rigid.max(initial=-math.inf)
+            continue
+        runs = _runs(looks.pair, looks.z, rigid) if runs is None else runs.within(looks)
+        points = place_points(lines, angle, at, looks, runs)
+        balance = known = _newton(lines, points, torque=torque, twist=twist, before=known)
+        steps, placed = steps + balance.steps, runs
+        if number <= FREE_PLACINGS:
+            runs = _runs(looks.pair, looks.z, _approach_left(lines, looks, balance))
+        near = abs(balance.twist - at) <= PLACED * max(balance.twist - looks.least, 0.0)
+        settled, at = balance.converged and near and runs.near(placed), balance.twist
+    if balance is None or runs is None:
+        return _solution(lines, _Balance(_nowhere(lines), math.nan, np.zeros(0), converged=False, steps=0), NO_RUNS, 0)
+    return _solution(lines, replace(balance, steps=steps, converged=settled), runs, number)
 
 
 def _nowhere(lines: ContactLines) -> Points:
@@ -552,14 +644,25 @@ def _nowhere(lines: ContactLines) -> Points:
     return _points(lines, lines.law.angle[0], 0.0, nothing, nothing, nothing.astype(np.int64))
 
 
+@dataclass(frozen=True)
+class _Balance:
+    """Moments (N m), shape (n,), of points at a twist (rad) that close their gaps if `converged`."""
+
+    points: Points
+    twist: float
+    moment: Array
+    converged: bool
+    steps: int
+
+
 def _newton(
     lines: ContactLines,
     points: Points,
     *,
     torque: float | None,
     twist: float | None,
-    before: Solution | None = None,
-) -> Solution:
+    before: _Balance | Solution | None = None,
+) -> _Balance:
     """Solve the complementary problem of the points at a torque (N m) or a twist (rad).
 
     It begins with the loads along the lines of the solution `before`.
@@ -569,12 +672,9 @@ def _newton(
     moment = np.zeros(n) if before is None else _density(before, points) * weight
     if moment.any():
         loaded = moment > 0
-    elif torque is None:
-        loaded = points.touch < twist
-        start = np.where(loaded, twist - points.touch, 0.0) * weight
-        moment = start * lines.compliance.mesh.usual_stiffness / lines.compliance.mesh.width
     else:
-        moment = torque * weight / max(weight.sum(), 1e-300)
+        rigid = np.maximum(points.twist - points.touch, 0.0)
+        moment = rigid * weight * lines.compliance.mesh.usual_stiffness / lines.compliance.mesh.width
     at, steps, converged = math.nan if twist is None else twist, 0, n == 0 and torque is None
     closed = CLOSED / lines.compliance.mesh.sections.wheel.base_radius
     while n and not converged and steps < STEPS:
@@ -614,11 +714,17 @@ def _newton(
         if not loaded.any():
             converged = torque is None and not (overlap > closed).any()
             loaded = points.touch <= points.touch.min()
+    return _Balance(points, at, moment, converged, steps)
+
+
+def _solution(lines: ContactLines, balance: _Balance, runs: Runs, placings: int) -> Solution:
+    law, points, moment = lines.law, balance.points, balance.moment
     on_wheel, worth = wheel_moments(law, points, moment)
-    return Solution(points, at, moment, on_wheel, _tangent(law, points, moment, worth), converged, steps)
+    tangent = _tangent(law, points, moment, worth)
+    return Solution(points, balance.twist, moment, on_wheel, runs, tangent, balance.converged, balance.steps, placings)
 
 
-def _density(before: Solution, points: Points) -> Array:
+def _density(before: _Balance | Solution, points: Points) -> Array:
     """Moments per width of a solution at other points, straight along its lines (N), shape (n,)."""
     density = before.moment / before.points.weight
     found = np.zeros(len(points))

@@ -96,6 +96,8 @@ class PairLaw:
         Rising forces per width (N/m), evenly spaced in their logarithms.
     path : tuple of float
         Pair angles of the ends A and E of the path of contact (rad).
+    marks : ndarray, shape (marks,)
+        Rising pair angles of these and of kinks of the flanks (rad), where the tables have kinks.
     forward : complex
         Normal on the path of contact.
     """
@@ -113,6 +115,7 @@ class PairLaw:
     excess: Array
     forces: Array
     path: tuple[float, float]
+    marks: Array
     forward: complex
 
     @cached_property
@@ -198,6 +201,7 @@ def _solved_law(compliance: WideCompliance, profiles: tuple[ToothDeviations, Too
         excess=tables[:, 1],
         forces=forces,
         path=path,
+        marks=marks,
         forward=complex(np.exp(1j * (0.5 * math.pi - pair.working_pressure_angle))),
     )
 

@@ -204,14 +204,11 @@ def _angles(lines: ContactLines, angles: ArrayLike | None, positions: int) -> Ar
 
 
 def _solved(lines: ContactLines, angles: Array, load: float, by_torque: bool) -> list[Solution]:
-    """Positions at one load; each starts from the twist of the one before."""
-    solved, guess = [], 0.0
+    """Positions at one load."""
+    solved = []
     for angle in angles.tolist():
-        load_is = {"torque": load, "guess": guess} if by_torque else {"twist": load}
-        solution = solve_position(lines, angle, **load_is)
-        if solution.converged:
-            guess = solution.twist
-        solved.append(solution)
+        torque, twist = (load, None) if by_torque else (None, load)
+        solved.append(solve_position(lines, angle, torque=torque, twist=twist))
     return solved
 
 
