@@ -316,8 +316,9 @@ def csv_table(path: str | Path, *, gaps: bool = True) -> Iterator[Table]:
                 stream.write(",".join(map(quoted, columns)) + "\n")
                 begun = True
             for first in range(0, max(map(len, columns.values()), default=0), AT_ONCE):
-                some = [_listed(values[first : first + AT_ONCE]) for values in columns.values()]
-                stream.writelines(",".join(map(_cell, row)) + "\n" for row in zip(*some, strict=True))
+                some = [_printed(values[first : first + AT_ONCE]) for values in columns.values()]
+                row = ",".join(printed for printed, _ in some) + "\n"
+                stream.writelines(row % cells for cells in zip(*(cells for _, cells in some), strict=True))
 
         table = Table(write, [])
         yield table
@@ -338,9 +339,12 @@ def _not_finite(values: Any, gaps: bool) -> Any:
     return np.flatnonzero(np.isinf(numbers) if gaps else ~np.isfinite(numbers))
 
 
-def _listed(values: Any) -> Sequence[Any]:
-    """Plain numbers of an array of them, which are faster to write."""
-    return values.tolist() if getattr(getattr(values, "dtype", None), "kind", "") in ("f", "i") else values
+def _printed(values: Any) -> tuple[str, Sequence[Any]]:
+    """Return the format of a column and its values: a format for a whole row is faster than one for each number."""
+    kind = getattr(getattr(values, "dtype", None), "kind", "")
+    if kind in ("f", "i"):
+        return "%.17g" if kind == "f" else "%d", values.tolist()
+    return "%s", [_cell(value) for value in values]
 
 
 def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
