@@ -53,6 +53,18 @@ def test_multipliers_of_oscillators_by_direct_integration():
             assert np.sort(np.abs(mine)) == pytest.approx(np.sort(np.abs(exact)), rel=1e-2 if parts else 1e-4)
 
 
+@pytest.mark.parametrize("turns_in_a_step", [1.0, 1.5, 2.0])
+def test_a_mode_far_above_the_mesh_frequency_follows_slow_changes(turns_in_a_step):
+    """Slow changes of the stiffness leave |mu| = exp(-c T/2), the decay of the free mode (adiabatic invariance).
+
+    Steps of a 64th of the period, in which the mode makes half-turns, would drive it.
+    """
+    system, speed = meshing(0.1, 5e-4, 1.0, gap=0.0).oscillator, 1.0 / (64 * turns_in_a_step)
+    found = np.abs(multipliers(system, settled_at(system, speed, 1e-6)))
+    decay = 0.5 * float(system.linear.damping[0, 0])
+    np.testing.assert_allclose(found, math.exp(-decay * 2.0 * math.pi / speed), rtol=1e-3)
+
+
 def test_branches_between_turning_points_are_unstable():
     system = duffing(0.05, 0.03, 0.2)
     made = response_curve(system.oscillator, np.arange(0.8, 1.4, 0.02))

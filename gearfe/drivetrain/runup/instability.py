@@ -71,11 +71,12 @@ def instability_map(
     if span.half is not None:
         problem = f"are asked for, but the meshes share no period of up to {LONGEST} mesh cycles"
         raise InputError("instability_loads", factors.tolist(), problem, "leave them out")
-    theta = kicks(system, span.turns, steps_of(span))
+    coarse, slowest = kicks(system, span.turns, steps_of(span)), float(np.abs(requested).min())
     with one_thread():
         for i, factor in enumerate(factors):
-            by = _tangents(train, theta, float(factor))
-            kept = strengths(system.linear, by) > REACHED
+            kept = strengths(system.linear, _tangents(train, coarse, float(factor))) > REACHED
+            steps = steps_of(span, system.linear.squares[kept], slowest)
+            by = _tangents(train, kicks(system, span.turns, steps), float(factor))
             for j, speed in enumerate(requested):
                 made[i, j] = around(system, float(speed), by, kept, span, damped=False)[0]
                 count(i * len(requested) + j + 1, made.size, "speeds")

@@ -29,10 +29,13 @@ from .monodromy import KICKS, PLACES, flow, kick_times, monodromy
 
 #: Least strength of the forces on a mode, in parts of its damping.
 REACHED = 0.01
-#: Steps, of seven kicks each: of a period at least, and of a mesh cycle; most in parts of the first number. Where the
-#: forces' derivatives jump they are doubled until the largest modulus stands still to this part.
-STEPS, OF_CYCLE, MOST, SETTLED = 64, 16, 4, 3e-3
-#: Most steps for a given accuracy.
+#: Steps, of seven kicks each, of a mesh cycle at least. Where the forces' derivatives jump, steps at least, and most in
+#: parts of the first number: they are doubled until the largest modulus stands still to this part.
+OF_CYCLE, STEPS, MOST, SETTLED = 16, 64, 4, 3e-3
+#: Phase (rad) of the highest integrated mode in a step, at most: pi, where steps become resonant with a mode and drive
+#: it, less a tenth for the mode's own frequency, which changes with the stiffness.
+TURNED = 2.8
+#: Most steps for a given accuracy, and for the highest mode.
 MOST_STEPS = 1 << 14
 #: Change of a stiffness from one kick to the next, in parts of that of the whole system, that is a jump.
 JUMP = 0.5
@@ -93,12 +96,18 @@ def multipliers(system: Oscillator, orbit: Orbit, accuracy: float | None = None)
     span = window(system)
     quick = accuracy is None or span.half is not None
     reached, accuracy = (REACHED, SETTLED) if accuracy is None or quick else (0.0, accuracy)
-    steps = steps_of(span)
+    along = _derivatives(system, orbit, span, reached, steps_of(span))
+    steps = steps_of(span, system.linear.squares[along.kept], orbit.speed)
+    if along.jumps:
+        steps = max(steps, STEPS)
+    if steps > along.steps:
+        along = _derivatives(system, orbit, span, reached, steps)
+    made = around(system, orbit.speed, along.by, along.kept, span)
     most = MOST * steps if quick else MOST_STEPS
-    made, jumps = _multipliers(system, orbit, span, reached, steps)
-    while (jumps or not quick) and steps < most:
+    while (along.jumps or not quick) and steps < most:
         steps, before = 2 * steps, made
-        made, _ = _multipliers(system, orbit, span, reached, steps)
+        finer = _derivatives(system, orbit, span, reached, steps)
+        made = around(system, orbit.speed, finer.by, finer.kept, span)
         compared = slice(1 if quick else None)
         with np.errstate(invalid="ignore"):  # both infinite
             off = np.abs(np.abs(made[compared]) - np.abs(before[compared])).max()
@@ -107,15 +116,34 @@ def multipliers(system: Oscillator, orbit: Orbit, accuracy: float | None = None)
     return made
 
 
-def steps_of(span: Window) -> int:
-    """Steps to begin with."""
-    return max(STEPS, math.ceil(OF_CYCLE * span.cycles - 1e-6))
+def steps_of(span: Window, squares: Array | None = None, speed: float = 1.0) -> int:
+    """Return the number of steps: those of mesh cycles, and those that modes need at a speed.
+
+    Parameters
+    ----------
+    span : Window
+        Time over which the multipliers are made.
+    squares : ndarray, shape (n,), optional
+        Squares of the natural frequencies (rad2/s2) of the modes that are integrated; None: mesh cycles alone.
+    speed : float
+        Speed of the drive (rad/s).
+    """
+    highest = 0.0 if squares is None else math.sqrt(float(squares.max(initial=0.0)))
+    phase = highest * 2.0 * math.pi * span.turns / abs(speed)
+    return max(math.ceil(OF_CYCLE * span.cycles - 1e-6), min(math.ceil(phase / TURNED), MOST_STEPS))
 
 
-def _multipliers(
-    system: Oscillator, orbit: Orbit, span: Window, reached: float, steps: int
-) -> tuple[ComplexArray, bool]:
-    """Multipliers with so many steps, and whether derivatives jump."""
+class _Derivatives(NamedTuple):
+    """Derivatives of the forces along a motion."""
+
+    steps: int
+    by: Changes  # at the kicks of these steps
+    kept: BoolArray  # (n,) modes that they reach
+    jumps: bool  # whether they jump
+
+
+def _derivatives(system: Oscillator, orbit: Orbit, span: Window, reached: float, steps: int) -> _Derivatives:
+    """Return the derivatives of the forces along an orbit at the kicks of so many steps."""
     theta, u, du = _along(system, orbit, span.turns, steps)
     pushes = system.forces(theta, orbit.speed, u, du)
     by = changes([*pushes.entries, *system.turned_entries(theta)], system.linear.size, len(theta))
@@ -128,8 +156,7 @@ def _multipliers(
         step = 2.0 * math.pi * span.turns / abs(orbit.speed) / steps
         by, touches = _with_momentum(by, pushes.momentum_by, step, system.linear.size)
         jumps |= touches
-    made = around(system, orbit.speed, by, kept, span)
-    return made, jumps
+    return _Derivatives(steps, by, kept, jumps)
 
 
 def _with_momentum(by: Changes, momentum: Changes, step: float, size: int) -> tuple[Changes, bool]:
