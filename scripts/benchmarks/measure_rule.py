@@ -371,7 +371,8 @@ class Row(NamedTuple):
         series = "-" if self.alone else late if math.isinf(self.taylor) else f"{self.taylor:.2g}"
         implicit = late if math.isinf(self.implicit) else f"{self.implicit:.2g}"
         better = f"{self.times_better:.2f}" if math.isfinite(self.times_better) else f"> {patience / self.implicit:.2g}"
-        values = [self.kind, self.name, f"{self.ratio:.2g}", f"{self.decayed:.2g}", series, implicit, self.took, better]
+        name = f"`{self.name}`" if "*" in self.name else self.name  # Markdown would take the stars as emphasis
+        values = [self.kind, name, f"{self.ratio:.2g}", f"{self.decayed:.2g}", series, implicit, self.took, better]
         return f"| {' | '.join(values)} |"
 
 
