@@ -55,6 +55,6 @@ def rows() -> list[str]:
 
 
 if __name__ == "__main__":
-    print("| rating | value | printed | found | difference (last digit) |")
+    print("| rating | value | printed | computed | difference (last digit) |")
     print("|---|---|---|---|---|")
     print("\n".join(rows()))

@@ -20,9 +20,9 @@ from gearfe.base.tables.train import ShaftTable, TrainMeshTable
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "keys.md"
 HEAD = """# Keys of the job files
 
-Made from the descriptions in `gearfe/base/tables/` by `python scripts/build/write_keys.py`; the messages, `gearfe new`
-and the options of the commands say the same. A key whose default is *required* must be given; where it is -, it may be
-left out.
+This page lists every key of every job file with its range, default and unit. A key whose default is *required* must be
+given; where it is -, it may be left out. Error messages, `gearfe new` and the options of the commands use the same
+descriptions (`gearfe/base/tables/`, written by `python scripts/build/write_keys.py`).
 """
 
 

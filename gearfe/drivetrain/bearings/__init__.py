@@ -1,7 +1,7 @@
 """Rolling bearings from their inner geometry: contacts of the rolling elements, equilibrium, stiffness.
 
-`BallBearing` and `RollerBearing` describe a bearing, `deflected` has its forces and its stiffness at given
-displacements, `carrying` finds the displacements at which it carries a given load.
+`BallBearing` and `RollerBearing` describe a bearing. `deflected` returns its forces and stiffness at given
+displacements. `carrying` finds the displacements at which it carries a given load.
 """
 
 from .equilibrium import carrying

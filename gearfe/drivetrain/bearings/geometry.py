@@ -16,10 +16,11 @@ The ball is pressed by :math:`s = |(A\cos\alpha - P_d/2 + d_r,\ \sigma(A\sin\alp
 clearance :math:`P_d`, the axial preload p, and the sense :math:`\sigma` (Harris and Kotzalas, Essential Concepts,
 ch. 7; A. B. Jones, J. Basic Eng. 82, 1960). So the contact angle changes with the load.
 
-**Roller.** Slice k at the place t along the roller is pressed by :math:`s = (d_r - P_d/2)\cos\alpha + \sigma(d_a +
-\sigma p)\sin\alpha - 2P(t)` (ISO/TS 16281:2008, eq. 38 to 41), P the profile of the roller. Left out: the taper of a
-tapered roller, whose raceways both have the contact angle of the outer ring here. With the angle 2 nu between them the
-inner raceway carries cos(2 nu) of the outer one's load, and the rib sin(2 nu): 7 % for 4 degrees.
+**Roller.** Slice k at the place t along the roller is pressed by
+:math:`s = (d_r - P_d/2)\cos\alpha + \sigma(d_a + \sigma p)\sin\alpha - 2P(t)` (ISO/TS 16281:2008, eq. 38 to 41), P the
+profile of the roller. Left out: the taper of a tapered roller, whose raceways both have the contact angle of the outer
+ring here. With the angle 2 nu between them the inner raceway carries cos(2 nu) of the load of the outer one. The rib
+carries sin(2 nu) of it: 7 % for 4 degrees.
 
 Without speed: centrifugal forces and gyroscopic moments of the elements are left out.
 """

@@ -1,6 +1,6 @@
 """Values that gears and meshes of a train take from elsewhere: other tables, the gears themselves, defaults.
 
-A gear of its own takes keys that it lacks from [pair]; a mesh takes its model, material, damping and backlash from
+A gear with its own teeth takes missing keys from [pair]. A mesh takes its model, material, damping and backlash from
 other tables or its gears. The summary names each such value with its source, so that nothing is inherited unseen.
 """
 

@@ -7,11 +7,11 @@ velocity :math:`v_n` of the outer surface S and the impedance :math:`\rho c` of 
     P(t) = \rho c \int_S v_n^2\,dA = \rho c\; \dot q^T R\, \dot q , \qquad
     P(f) = \tfrac12 \rho c \int_S |\hat v_n|^2 dA = \tfrac12\rho c\; \hat{\dot q}^H R\, \hat{\dot q} ,
 
-where R is the surface matrix of the reduced body (`gearfe.ModalBody.radiation`) and a hat marks complex
-amplitudes: no field is needed. The constant and, with an even number of samples, the Nyquist line count twice as much
-(the mean of their square is the amplitude's square itself), so without a window the lines sum to the mean power.
-Levels are :math:`10\lg(P/10^{-12}\,\mathrm W)` (ISO 3744). At low frequencies a surface radiates less than this: the
-estimate is an upper one.
+where R is the surface matrix of the reduced body (`gearfe.ModalBody.radiation`) and a hat marks complex amplitudes: no
+field is needed. The constant and, with an even number of samples, the Nyquist line count twice, because their mean
+square is the square of the amplitude. Without a window the lines therefore sum to the mean power. Levels are
+:math:`10\lg(P/10^{-12}\,\mathrm W)` (ISO 3744). At low frequencies a surface radiates less than this: the estimate is
+an upper one.
 """
 
 from __future__ import annotations

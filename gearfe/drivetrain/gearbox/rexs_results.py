@@ -1,6 +1,6 @@
 """What gearfe computes of a job and REXS has attributes for: geometry, statics, ratings, curves of stiffness.
 
-Geometry and statics are computed at once: speeds, torques, tooth forces, and the forces of the bearings with the mesh
+Geometry and statics are always computed: speeds, torques, tooth forces and bearing forces. The latter use the mesh
 stiffness of ISO 6336-1 in a rigid housing. A rating is made where the job has [rating]. Curves of stiffness are read
 from the folders of `gearfe stiffness`.
 

@@ -27,8 +27,8 @@ def housing_from_job(path: str | Path) -> Housing:
 def housing_from_table(table: HousingTable, folder: str | Path = ".") -> Housing:
     """Mesh (from the cache when it is there) with the bores as attachments 1, 2, ... and the feet held.
 
-    Bores are numbered shaft by shaft, the +y wall before the -y wall; those of a mesh file, which is looked for in
-    `folder`, as they are listed.
+    Bores are numbered shaft by shaft, the +y wall before the -y wall. Those of a mesh file (searched for in `folder`)
+    are numbered as listed.
     """
     table.check("housing")
     if table.reduced:

@@ -329,8 +329,8 @@ class Housing(Facts):
     def _check_frequency(self, below_hz: float, mass_kg: float) -> None:
         """Raise `InputError` where more modes lie below a frequency than can be found, before any is sought.
 
-        Weyl's law counts ``V 4 pi/3 f^3 (1/c_l^3 + 2/c_t^3)`` modes of an elastic body below f, c_l and c_t the speeds
-        of its waves; thin bodies have more (Courant, Hilbert, Methods of Mathematical Physics I, ch. VI.4).
+        Weyl's law counts ``V 4 pi/3 f^3 (1/c_l^3 + 2/c_t^3)`` modes of an elastic body below f, with the speeds of its
+        waves c_l and c_t. Thin bodies have more (Courant, Hilbert, Methods of Mathematical Physics I, ch. VI.4).
         """
         lam, mu = self.material.lame()
         density = self.material.density

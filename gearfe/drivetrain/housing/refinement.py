@@ -23,8 +23,8 @@ MODES = 20
 def refined(housing: Housing, unknowns: int, outer: Outer | None = None) -> Housing:
     """The housing on a mesh with up to so many unknowns, finer where the energy of its modes and static fields errs.
 
-    Nodes of attachments and held nodes stay what they are, new nodes between them belong to them; the body's shape is
-    that of the given mesh.
+    Nodes of attachments and held nodes stay the same, and new nodes between them belong to them. The shape of the body
+    is that of the given mesh.
 
     Parameters
     ----------

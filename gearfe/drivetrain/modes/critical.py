@@ -1,7 +1,7 @@
 r"""Critical speeds: where the frequency of an order is that of a mode, :math:`n\,\Omega/2\pi = f(\Omega)`.
 
-Between the speeds at which modes are known their frequencies are cubics with the values and slopes there (Hermite), and
-an intersection is a root of its cubic. Whatever names critical speeds takes these same intersections.
+Between the speeds with known modes the frequencies are cubics with the values and slopes there (Hermite). An
+intersection is a root of its cubic. Whatever names critical speeds takes these same intersections.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 """Modes followed over the speed by their shapes.
 
-A mode goes on in the one whose state resembles its own most (the square of their product, a modal assurance criterion
-in the energy of the train, Allemang 2003); pairs that resemble each other most come first. Where a mode that matters
-keeps less than `ALIKE` of itself, the step is halved, up to `HALVINGS` times. Modes that cross keep their shapes. Modes
-that repel each other within less than the smallest step count as crossing: what the train does there is that of a
-crossing.
+A mode continues in the one with the most similar state; the most similar pairs come first. Similarity is the square of
+their product, a modal assurance criterion in the energy of the train (Allemang 2003). Where a mode that matters keeps
+less than `ALIKE` of itself, the step is halved, up to `HALVINGS` times. Modes that cross keep their shapes. Modes that
+repel each other within less than the smallest step count as crossing: what the train does there is that of a crossing.
 """
 
 from __future__ import annotations

@@ -73,9 +73,9 @@ def train_orders(model: TrainModel, multiples: int, shaft_multiples: int) -> lis
 def _sidebands(model: TrainModel, multiples: int) -> Iterator[tuple[Fraction, str, tuple[int, ...]]]:
     """Sidebands of mesh orders that carry something in an elastic housing, where carriers turn.
 
-    The mesh forces across the axis turn with the carrier, so their harmonics of the order n push the housing at n + c
-    and n - c, c the rotations of the carrier. With pins out of place both carry something. Sidebands of more passes, of
-    a housing that is not alike in all directions, are much smaller: orders.csv of a run-up has them.
+    The mesh forces across the axis rotate with the carrier. Their harmonics of the order n therefore act on the housing
+    at n + c and n - c, with the rotations c of the carrier. With pins out of place both carry something. Sidebands of
+    more passes, of a housing that is not alike in all directions, are much smaller: orders.csv of a run-up has them.
     """
     train, rolled = model.train, model.kinematics
     turned = set(model.turned_carriers)

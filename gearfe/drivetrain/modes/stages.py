@@ -1,7 +1,7 @@
 r"""Kinds of the modes of planetary stages: rotational, translational, planet (Lin & Parker, J. Vib. Acoust. 121, 1999).
 
-In a rotational mode carrier, sun and ring turn and stay on the axis, in a translational one they move across it and do
-not turn, in a planet mode only planets move. Stages with equal planets at equal distances have these alone, the
+In a rotational mode carrier, sun and ring rotate without translation. In a translational mode they translate without
+rotation. In a planet mode only planets move. Stages with equal planets at equal distances have these alone, the
 translational ones in pairs, the planet modes N - 3 times; others have mixed ones. Motions count by their kinetic
 energy; modes whose energy is elsewhere, along the axis or in tilts, are none of the stage.
 """

@@ -24,8 +24,8 @@ FRAMES = 16
 
 
 def mesh_modes(modes: WhirlModes, least: float = STRONG) -> list[int]:
-    """Numbers, from 0, of modes with at least a part of their strain energy in the meshes at the fastest speed; the
-    largest of all where none has.
+    """Return the numbers, from 0, of modes with at least a part of their strain energy in the meshes at the fastest
+    speed. If there is none, the mode with the largest part is returned.
     """
     share = modes.mesh_strain[modes.fastest].sum(axis=1)
     return np.flatnonzero(share >= least).tolist() or np.argsort(-share)[:1].tolist()

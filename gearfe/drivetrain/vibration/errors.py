@@ -2,9 +2,9 @@
 
 The number is computed again with what may be wrong changed by its own estimate:
 
-- *mesh*: what the estimate of the mesh's error allows the housing to be softer (`housing.mesh_error`). The true
-  error softens each mode by a share of its own. Modes that are softened together may change a number to both sides and
-  seem to leave it alone, and a resonance may move past a line and leave it as high as it was. So random halves of the
+- *mesh*: what the estimate of the mesh's error allows the housing to be softer (`housing.mesh_error`). The true error
+  softens each mode by a share of its own. Modes that are softened together may change a number in opposite directions,
+  which hides the changes. A resonance may also pass a line and leave its height unchanged. So random halves of the
   modes are softened, each half and the other one, `PAIRS` times. To first order the changes by two halves add up to
   that by all, so the larger one times two covers that, too;
 - *curve*: each computed stiffness larger by the worst relative error of its curve; given ones are taken as exact;
@@ -13,12 +13,12 @@ The number is computed again with what may be wrong changed by its own estimate:
   acceleration of the first instant is known to its own size only, and so is a peak;
 - *integration*: its estimate, relative, of the signal's largest value.
 
-The parts are added. Each covers its own source whatever its sign, and nothing says that the signs differ, so only the
-sum is an estimate that covers all; the mesh is by far the largest, so little is given away.
+The parts are added. Each part covers its own source for either sign. Because the signs may agree, only the sum covers
+all parts. The mesh is by far the largest part, so the sum is not much too large.
 
 **Differences of two runs.** What may be wrong in the housing's mesh and in the curves is the same in two runs of one
-housing. ``headline_error_changes`` keeps by how much each changed run moves each number, with its sign and with the
-factor of its part; `gearfe.output.differences` takes the largest difference of these changes.
+housing. ``headline_error_changes`` holds the signed change of each number in each changed run, with the factor of its
+part. `gearfe.output.differences` takes the largest difference of these changes.
 """
 
 from __future__ import annotations

@@ -198,8 +198,8 @@ def _table(path: Path | None) -> AbstractContextManager[Table | None]:
 class RunningMean:
     """Mean over the last whole periods after `begin` of values that arrive piece by piece.
 
-    The integral is that of cubics through the samples, so its ends need not lie on them. Without a whole period
-    (or without any) the mean is that of all times after `begin`, of the last step at least, and `periods` is 0.
+    The integral is that of cubics through the samples, so its ends need not lie on them. Without a complete period the
+    mean is that of all times after `begin`, at least of the last step, and `periods` is 0.
 
     Parameters
     ----------

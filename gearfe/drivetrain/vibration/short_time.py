@@ -10,8 +10,8 @@ Hann's window w over a part of :math:`\Phi` round :math:`\varphi_0`,
 which resamples the signal over the angle without interpolation: the trapezoidal sum is taken over the samples at hand,
 whose angles are known exactly. An order whose frequency lies above the band of the samples has no value.
 
-**Steady.** The run is cut into parts of whole periods; a signal is steady from the first part on after which its mean
-and its rms about that stay within `STEADY_WITHIN` of those of the last quarter.
+**Steady.** The run is cut into parts of whole periods. A signal is steady from the first part on after which its mean,
+and its rms about the mean, stay within `STEADY_WITHIN` of those of the last quarter.
 """
 
 from __future__ import annotations
@@ -211,8 +211,8 @@ def steady_from(time: Array, groups: list[Array], period: float | None) -> float
 class Tracked:
     """Contact forces, transmission errors and attachments' accelerations, and the drive's angle.
 
-    The signals pass the low-pass filter of `base.record_spectrum`, and every (m/2)-th sample is kept, m in an output
-    step: up to half the output's sampling frequency nothing is folded into them. Beyond its ends the run is held.
+    The signals pass the low-pass filter of `base.record_spectrum`. Of m samples per output step every (m/2)-th is kept,
+    so nothing is aliased up to half the output's sampling frequency. Beyond its ends the run is held.
 
     Parameters
     ----------

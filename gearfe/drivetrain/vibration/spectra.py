@@ -85,8 +85,8 @@ def response_columns(response: TrainResponse, radiation: Array | None = None) ->
 class TrainRecord:
     """Spectra of all signals of a response that arrives piece by piece.
 
-    The record is a part of the output times. It holds its first sample and not its last: n steps are n samples, as a
-    period that repeats has them, so 7 ms in 200 steps give lines 1/(7 ms) apart.
+    The record is a part of the output times. It holds its first sample but not its last: n steps are n samples, as in a
+    period that repeats. Thus 7 ms in 200 steps give lines 1/(7 ms) apart.
 
     Parameters
     ----------

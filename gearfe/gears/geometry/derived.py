@@ -1,5 +1,6 @@
-"""What follows from the data of a gear pair: geometry in everyday units with the unit in every name (ISO 21771 names),
-and plain geometry for pictures in millimetres.
+"""Derive the geometry of a gear pair, with names of ISO 21771 and the unit in every name.
+
+Plain geometry for pictures is in mm.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-r"""The working flank of a tooth, root, involute with its relief, and tip round, by a parameter and by its arc length;
-and which flanks the teeth of a gear have.
+r"""Describe the working flank of a tooth by a parameter and by its arc length, and list the flanks of a gear.
+
+A working flank consists of root, involute with its relief, and tip round.
 
 Roots take no part in the first contact of rigid flanks, except where one is undercut: the involute then starts with an
 edge, which can bear as a sharp tip does, and the mate's tip passes so close below it that the root may be touched

@@ -7,9 +7,9 @@ of the pinion's teeth and the left flanks, in the wheel's own frame, of the whee
 the pinion's base circle at polar angle -alpha_w; with s1 and s2 the roll lengths on pinion and wheel, s1 + s2 =
 a sin(alpha_w) along it, and a pinion flank passes s1 at the pinion angle s1/r_b1 - alpha_w - psi1 - inv(alpha).
 
-The wheel may be an internal gear: with the negative z2, a, r_b2 and s2 of ISO 21771 all of this holds for it, too, so
-its centre lies at (-|a|, 0) and it turns with the pinion. A positive twist closes the driving flanks always: it turns
-an internal wheel clockwise. Centre distances and radii here are magnitudes, roll lengths and the gear ratio have signs.
+The wheel may be an internal gear. All relations hold with the negative z2, a, r_b2 and s2 of ISO 21771. Its centre lies
+at (-|a|, 0), and it rotates in the sense of the pinion. A positive twist closes the driving flanks always: it turns an
+internal wheel clockwise. Centre distances and radii here are magnitudes, roll lengths and the gear ratio have signs.
 
 SI units and radians.
 """
@@ -218,8 +218,10 @@ class MeshGeometry:
 
     @cached_property
     def contact_ratio(self) -> float:
-        """Nominal transverse contact ratio eps_alpha (-): path between the tip circles (or form points, when they
-        cut it short) over the base pitch; tip rounds and relief do not count."""
+        """Nominal transverse contact ratio eps_alpha (-): path between the tip circles (or form points, if they shorten
+        it) over the base pitch.
+
+        Tip rounds and relief are not considered."""
         start, end = self.path_limits(rounded=False)
         return (end - start) / self.base_pitch
 

@@ -43,8 +43,9 @@ def tooth_outline(gear: Gear, per_piece: int = 48, kinks: Iterable[float] = ()) 
 
     That of an internal gear is on the -x axis, and its outline runs clockwise round the gear, material on the left.
 
-    The flanks hold reliefs and rounds. Pieces end where the curvature jumps, so a spline through the points of one is
-    smooth: with 48 edges it is within 1e-5 mm of the exact curve. They end at the roll lengths `kinks` (m), too.
+    The flanks hold reliefs and rounds. Pieces end where the curvature jumps, so a spline through the points of one
+    piece is smooth. With 48 edges it is within 1e-5 mm of the exact curve. They end at the roll lengths `kinks` (m),
+    too.
     """
     left: list[Piece] = []
     for segment in gear.profile.segments:

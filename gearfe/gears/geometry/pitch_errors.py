@@ -5,8 +5,8 @@ the material of that flank. It turns the flank by :math:`F_j/r` and moves it alo
 :math:`F_j \cos\alpha`. The single pitch deviations are :math:`f_j = F_j - F_{j-1}`, the cumulative pitch deviation is
 the range of F.
 
-**Both sides of a tooth.** A tooth that stands off its place by :math:`F_j`, counter-clockwise, has :math:`F_j` on its
-left flank and :math:`-F_j` on its right one: it is displaced, not thicker. With teeth counted counter-clockwise
+**Both sides of a tooth.** A tooth that is displaced by :math:`F_j`, counter-clockwise, has :math:`F_j` on its left
+flank and :math:`-F_j` on its right one. Its thickness does not change. With teeth counted counter-clockwise
 :math:`f_j > 0` is then a pitch that is too large, on both sides.
 
 **Run-out.** Teeth that are cut about an axis off the one they run about are all displaced by the same vector, of length
@@ -82,9 +82,9 @@ def run_out(gear: Gear, amplitude: float, phase: float = 0.0) -> tuple[Array, Ar
 def sampled(gear: Gear, class_: int, seed: int) -> Array:
     """Index deviations (m) drawn at random, as large as the class allows.
 
-    A sine of one turn with a range of F_pT and a random phase, and independent errors of the teeth of standard
-    deviation f_pT/4; then all scaled so that neither tolerance is exceeded and one of them is reached. The same seed
-    gives the same gear.
+    They are a sine over one rotation with a range of F_pT and a random phase, plus independent errors of the teeth with
+    the standard deviation f_pT/4. All are scaled so that neither tolerance is exceeded and one of them is reached. The
+    same seed gives the same gear.
     """
     allowed, rng = tolerances(gear, class_), np.random.default_rng(seed)
     made = sine(gear.tooth_count, 0.5 * allowed.cumulative, rng.uniform(0, 2 * math.pi))

@@ -1,12 +1,12 @@
 """What pairs are meant for: what lies beyond is refused, loads beyond it are flagged. `spur_gear` checks single gears.
 
-- *Pair*: gears that run together, with a contact ratio of 1 and more, of helical gears the total one; whether
-  tips enter the material of the mate is answered by rolling the pair.
+- *Pair*: gears with a contact ratio of at least 1, for helical gears the total one. Rolling the pair shows whether tips
+  enter the material of the mate.
 - *Overlap* r_b times twist, by which rigid flanks would overlap along the line of action: up to 0.12 modules. That is
   how far the contact laws were held against each other (0.5 deg of twist of the 20/30 pair, docs/contact_laws.md). Each
   tooth, 2.25 modules high and 1.8 thick at its root, then yields by d = 0.06 modules: as a cantilever it has the strain
-  3 t d/(2 h^2), 3 %, there. Steel would not bear it, and linear elasticity is a first order of it. A torque that
-  makes twice that by the standard's stiffness is refused.
+  3 t d/(2 h^2), 3 %, there. Steel would not bear it, and linear elasticity is a first order of it. A torque that makes
+  twice that by the standard's stiffness is refused.
 - *Width of contacts* of internal pairs: a half width of up to 0.1 of the smaller radius of curvature. A half-plane's
   surface is straight: what a contact of the half width b on a cylinder of the radius R has besides is of the order of
   (b/R)^2 (Johnson, *Contact Mechanics*, 1985, sec. 5.3). Nearly conforming flanks reach it at loads that teeth bear.
