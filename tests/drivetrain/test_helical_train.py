@@ -38,7 +38,7 @@ def at_rest(model: TrainModel) -> dict[str, np.ndarray]:
     assert q is not None
     acting = sum(direction * float(torque(1.0)) for direction, torque in model.torques)
     still = np.zeros((1, len(q)))
-    return dict(zip(model.bores, model.bearings(q[None], still, still, acting[None])[0], strict=True))
+    return dict(zip(model.bores, model.bearings(q[None], still, still, acting[None], 0.0)[0], strict=True))
 
 
 def carried(force: np.ndarray, place: np.ndarray, x: float) -> dict[str, np.ndarray]:

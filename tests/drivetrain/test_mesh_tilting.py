@@ -43,7 +43,7 @@ def tilting_pair(
 def bearing_forces(model: TrainModel, q: np.ndarray) -> dict[str, np.ndarray]:
     """Forces of shafts on bearings (springs) in a state."""
     still = np.zeros((1, len(q)))
-    found = model.bearings(q[None], still, still, still)[0]
+    found = model.bearings(q[None], still, still, still, 0.0)[0]
     return {bore: load[:3] for bore, load in zip(model.bores, found, strict=True)}
 
 

@@ -15,10 +15,21 @@ from gearfe.drivetrain.modes.whirl import WhirlModes, train_modes
 from gearfe.drivetrain.runup.condensed import condense
 from gearfe.drivetrain.runup.report import far_shafts, warnings
 from gearfe.drivetrain.runup.run_up import run_up, steady_state
-from gearfe.drivetrain.train import Damping, Drive, GearMesh, Guide, TrainResponse, build_train, simulate
+from gearfe.drivetrain.train import (
+    Damping,
+    Drive,
+    GearMesh,
+    GearTrain,
+    Guide,
+    TrainResponse,
+    build_train,
+    simulate,
+)
 from gearfe.drivetrain.train.misalignment import static_state
 from gearfe.drivetrain.train.planetary import mesh_families
-from gearfe.multibody import constant, smoothed_step
+from gearfe.drivetrain.train.states import train_states
+from gearfe.fem.beams import Section
+from gearfe.multibody import constant, integrate, smoothed_step
 from tests.makers.planetary import ALONG, ALPHA, LIN_PARKER, MODULE, SPEED, TILT, TORQUE, gear, stage
 from tests.makers.trains import curve
 
@@ -194,12 +205,14 @@ def test_sidebands_at_the_ring_are_of_orders_that_the_number_of_planets_divides(
     assert others.max() < 1e-6 * lines[102]
 
 
-def test_a_steady_state_of_the_run_up_is_what_the_transient_comes_to() -> None:
+@pytest.mark.parametrize("damping", [Damping(ratio=0.2), Damping(alpha=1500.0, beta=3e-5)])
+def test_a_steady_state_of_the_run_up_is_what_the_transient_comes_to(damping: Damping) -> None:
     """With planets out of phase and one pin out of place: translational modes swing, Coriolis forces act.
 
-    The centrifugal forces of the planets are m W^2/k = 0.1 % of the stiffness of a pin: it yields by 0.1 mm.
+    The centrifugal forces of the planets are m W^2/k = 0.1 % of the stiffness of a pin: it yields by 0.1 mm. Dampers
+    in fixed axes pull the displaced sun, ring and carrier backwards, so that bearings have forces across.
     """
-    train = stage(3, (31, 35), mesh=_rigid_curve, errors=[5e-6, 0.0, 0.0], damping=Damping(ratio=0.2))
+    train = stage(3, (31, 35), mesh=_rigid_curve, errors=[5e-6, 0.0, 0.0], damping=damping)
     speed = math.sqrt(1e-3 * 1e8 / LIN_PARKER["planet"][0]) * (31 + 101) / 31
     model = build_train(dataclasses.replace(train, drive=Drive("sun", "sun", constant(speed))))
     state = steady_state(model, speed, tolerance=1e-5)
@@ -208,6 +221,11 @@ def test_a_steady_state_of_the_run_up_is_what_the_transient_comes_to() -> None:
     np.testing.assert_allclose(state.force.mean(axis=0), force.mean(axis=0), atol=1e-4 * size)
     np.testing.assert_allclose(state.force.min(axis=0), force.min(axis=0), atol=1e-3 * size)
     np.testing.assert_allclose(state.force.max(axis=0), force.max(axis=0), atol=1e-3 * size)
+    load = response.bearing_load[-65:-1, :, :3]  # in fixed axes
+    turned = model.fixed_axes(
+        response.time[-65:-1], np.broadcast_to(state.bearing[0].real.reshape(1, 3, 2, 3), (64, 3, 2, 3))
+    )
+    np.testing.assert_allclose(turned[:, :, 0].mean(axis=0), load.mean(axis=0), atol=1e-3 * np.abs(load).max())
 
 
 @pytest.mark.parametrize("pin", [1e8, 3e7])
@@ -265,6 +283,85 @@ def test_coriolis_forces_split_translational_modes_by_the_speed_of_the_carrier(g
     for sign in (-1.0, 1.0):
         expected = (rest + sign * turning) / (2.0 * math.pi)
         assert np.abs(found.frequency[0] - expected).min() < 1e-6 * expected
+
+
+#: A bearing whose damper couples displacements with tilts, alike in all directions across the axis.
+COUPLED = np.diag([900.0, 0.0, 900.0, 0.7, 0.7])
+COUPLED[[0, 4, 2, 3], [4, 0, 3, 2]] = [20.0, 20.0, -20.0, -20.0]
+DAMPERS = {
+    "bearings": ({"damping": (900.0, 0.0, 900.0, 0.7, 0.7)}, Damping()),
+    "coupled": ({"damping": tuple(map(tuple, COUPLED.tolist()))}, Damping()),
+    "alpha": ({}, Damping(alpha=300.0)),
+    "beta": ({}, Damping(beta=3e-5)),
+    "elastic": ({"damping": (900.0, 0.0, 900.0, 0.7, 0.7)}, Damping(alpha=100.0, beta=2e-6)),
+}
+
+
+def sun_alone(case: str, *, carrier_turns: bool) -> GearTrain:
+    """A stage whose sun turns with 300 rad/s in dampers, and whose meshes are next to nothing."""
+    keys, damping = DAMPERS[case]
+    guides = (Guide("ring"),) if carrier_turns else (Guide("carrier"),)
+    drive = Drive("sun", "sun", constant(300.0))
+    train = stage(3, (31, 35), mesh=1e-6, loads=(), damping=damping, guides=guides, drive=drive)
+    sun = dataclasses.replace(train.bearings[0], stiffness=(2e7, 1e9, 2e7, 4e3, 4e3), **keys)
+    shafts = train.shafts
+    if case == "elastic":
+        section = Section(0.03, 0.03, 0.03, 0.0, 0.0, young=2e11, poisson=0.3, density=7800.0)
+        changes = {"mass": None, "polar_inertia": None, "transverse_inertia": None}
+        made = dataclasses.replace(shafts[0], radius=0.015, sections=(section,), damping_ratio=0.02, **changes)
+        shafts = (made, *shafts[1:])
+        train = dataclasses.replace(train, rigid_bores={**train.rigid_bores, "sun": (0.0, 0.013, 0.0)})
+    return dataclasses.replace(train, shafts=shafts, bearings=(sun, *train.bearings[1:]))
+
+
+@pytest.mark.parametrize("case", list(DAMPERS))
+def test_a_whirl_decays_as_in_axes_that_stand_still(case: str) -> None:
+    """Seen from a frame that turns with W, a whirl of the pole p has p - iW or, against it, p + iW."""
+    poles, ratio = [], 0.0
+    for turns in (False, True):
+        model = build_train(sun_alone(case, carrier_turns=turns))
+        ratio = float(model.frame_ratios[0])
+        found = train_modes(model, [300.0], 3e4)
+        chosen = np.flatnonzero(found.share("bending", "sun")[0] > 0.999)
+        size, zeta = 2.0 * math.pi * found.frequency[0, chosen], found.damping_ratio[0, chosen]
+        poles.append(size * (-zeta + 1j * np.sqrt(1.0 - zeta**2)))
+    still, turning = poles
+    assert len(still) == len(turning) >= 4
+    assert (still.real < -10.0).all()
+    expected = [p + sense * 300j * ratio for p in still for sense in (-1.0, 1.0)]
+    for pole in turning:
+        assert min(abs(pole - p) for p in expected) < 1e-8 * abs(pole)
+    np.testing.assert_allclose(np.sort(turning.real), np.sort(still.real), rtol=1e-8)
+
+
+def test_a_damped_ring_moves_as_in_axes_that_stand_still() -> None:
+    """Its motion and the load on its bore in closed form; what its energy loses, it does to the bore."""
+    k, c, m = 1e8, 4e3, LIN_PARKER["ring"][0]
+    train = stage(3, (31, 35), mesh=1e-6, loads=(), drive=Drive("sun", None, constant(900.0)), guides=(Guide("ring"),))
+    ring = dataclasses.replace(train.bearings[1], damping=(c, 0.0, c, 0.0, 0.0))
+    model = build_train(dataclasses.replace(train, bearings=(train.bearings[0], ring, train.bearings[2])))
+    start = model.start.v.copy()
+    start[model.first[1]], start[model.first[1] + 2] = 0.3, -0.2
+    begun = dataclasses.replace(model, start=dataclasses.replace(model.start, v=start))
+    t = np.linspace(0.0, 0.01, 6401)
+    states = train_states(model, integrate(model.system, t, method="taylor", tolerance=1e-12, start=begun.start))
+    at = slice(int(model.first[1]), int(model.first[1]) + 3)
+    turns, spin = model.frame_turns(t, [1])[:, 0], 900.0 * float(model.frame_ratios[1])
+    assert spin * t[-1] > 2.0
+    e1, e2, _ = train.frame
+    across = spin * (np.outer(e2, e1) - np.outer(e1, e2))
+    place = np.einsum("nij,nj->ni", turns, states.q[:, at])
+    rate = np.einsum("nij,nj->ni", turns, states.v[:, at] + states.q[:, at] @ across.T)
+    decay, swing = c / (2.0 * m), math.sqrt(k / m - (c / (2.0 * m)) ** 2)
+    free = np.exp(-decay * t) * np.sin(swing * t) / swing
+    moved = free[:, None] * [0.3, 0.0, -0.2]
+    np.testing.assert_allclose(place, moved, atol=1e-8 * np.abs(moved).max())
+    load = states.bearing[:, 1, :3]
+    np.testing.assert_allclose(load, k * place + c * rate, atol=1e-9 * np.abs(load).max())
+    power = (load * rate).sum(axis=1)
+    work = t[1] / 3.0 * (power[0:-2:2] + 4.0 * power[1:-1:2] + power[2::2]).cumsum()
+    energy = 0.5 * m * (rate**2).sum(axis=1)
+    np.testing.assert_allclose(energy[2::2] + work, energy[0], rtol=2e-9)
 
 
 def test_mesh_phases_follow_from_the_places_of_the_planets() -> None:

@@ -21,7 +21,7 @@ from gearfe.drivetrain.train import Damping, Drive, GearTrain, Guide, TrainRespo
 from gearfe.drivetrain.train.model import TrainModel
 from gearfe.drivetrain.train.states import TrainStates, train_states
 from gearfe.multibody import constant, integrate
-from tests.makers.planetary import ALONG, TILT, stage
+from tests.makers.planetary import stage
 from tests.makers.trains import curve, elastic
 
 DAMPED = Damping(beta=2e-6)
@@ -60,14 +60,17 @@ def fixed(model: TrainModel, moved: TrainStates, shaft: int) -> np.ndarray:
     return np.einsum("nij,nj->ni", model.frame_turns(moved.time, [shaft])[:, 0], q)[:, [0, 2]]
 
 
-def test_a_ring_in_a_housing_moves_as_in_axes_that_stand_still() -> None:
+@pytest.mark.parametrize("damper", [0.0, 5e3])
+def test_a_ring_in_a_housing_moves_as_in_axes_that_stand_still(damper: float) -> None:
     """Meshes and the other bearings next to nothing: ring and housing are linear and constant seen from the ground.
 
     There an exponential of their matrix has their motion; the train describes the ring in the frame of the carrier.
     """
     train = stage(3, (31, 35), mesh=1e-2, loads=(), drive=Drive("sun", None, constant(900.0)), guides=(Guide("ring"),))
     slight = [dataclasses.replace(b, stiffness=(1e-2,) * 5) for b in train.bearings]
-    train = in_housing(dataclasses.replace(train, bearings=(slight[0], train.bearings[1], slight[2])))
+    dampers = damper, 0.0, damper, 1e-4 * damper, 1e-4 * damper
+    ring = dataclasses.replace(train.bearings[1], stiffness=(1e8, 1e8, 1e8, 1e5, 1e5), damping=dampers)
+    train = in_housing(dataclasses.replace(train, bearings=(slight[0], ring, slight[2])))
     assert train.housing is not None
     train = dataclasses.replace(train, housing=dataclasses.replace(train.housing, damping=0.0 * train.housing.damping))
     model = build_train(train)
@@ -78,20 +81,21 @@ def test_a_ring_in_a_housing_moves_as_in_axes_that_stand_still() -> None:
     times = np.linspace(0.0, 0.01, 101)
     moved = states(model, times)
     rotor, n = model.shafts[1].rotor, train.housing.size
-    M, K = np.zeros((n + 5, n + 5)), np.zeros((n + 5, n + 5))
+    M, C, K = np.zeros((3, n + 5, n + 5))
     M[:n, :n], K[:n, :n] = train.housing.mass, train.housing.stiffness
     M[at[4], at[4]] += rotor.polar  # the ring is held against turning in its bore
     inertia = rotor.mass, rotor.mass, rotor.mass, rotor.transverse, rotor.transverse
-    for row, (axis, mass, spring) in enumerate(
-        zip((0, 1, 2, 3, 5), inertia, (1e8, ALONG, 1e8, TILT, TILT), strict=True)
+    for row, (axis, mass, spring, loss) in enumerate(
+        zip((0, 1, 2, 3, 5), inertia, (1e8, 1e8, 1e8, 1e5, 1e5), dampers, strict=True)
     ):
         pull = np.zeros(n + 5)
         pull[n + row], pull[at[axis]] = 1.0, -1.0
         M[n + row, n + row] = mass
         K += spring * np.outer(pull, pull)
+        C += loss * np.outer(pull, pull)
     turning = float(model.kinematics.ratios[2]) * 900.0 * times[-1]
     assert turning > 2.0
-    A = np.block([[np.zeros_like(M), np.eye(n + 5)], [-np.linalg.solve(M, K), np.zeros_like(M)]])
+    A = np.block([[np.zeros_like(M), np.eye(n + 5)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
     start = np.concatenate([np.zeros(n + 5), v[:n], np.zeros(5)])
     step, state, expected = expm(A * times[1]), start, [np.zeros(2)]
     for _ in times[1:]:
@@ -103,7 +107,9 @@ def test_a_ring_in_a_housing_moves_as_in_axes_that_stand_still() -> None:
 
 def test_forces_between_shafts_and_housing_balance() -> None:
     """What the bearings do to the housing moves it, and its reaction the shafts, seen from the ground, to 1e-9."""
-    train = in_housing(planets([5e-6, 0.0, 0.0], damping=DAMPED))
+    train = planets([5e-6, 0.0, 0.0], damping=DAMPED)
+    dampers = tuple(dataclasses.replace(b, damping=(5e3, 0.0, 5e3, 0.5, 0.5)) for b in train.bearings)
+    train = in_housing(dataclasses.replace(train, bearings=dampers))
     model = build_train(train)
     body = train.housing
     assert body is not None
@@ -253,7 +259,9 @@ def unequal_in_housing() -> GearTrain:
     """A pin out of place, in an uneven frame with much damping: motions settle within some turns of the carrier."""
     alpha = 1200.0
     drive = Drive("sun", "sun", constant(1500.0))
-    train = in_housing(planets([5e-6, 0.0, 0.0], damping=Damping(alpha=alpha, beta=2e-6), drive=drive))
+    train = planets([5e-6, 0.0, 0.0], damping=Damping(alpha=alpha, beta=2e-6), drive=drive)
+    dampers = tuple(dataclasses.replace(b, damping=(5e3, 0.0, 5e3, 0.5, 0.5)) for b in train.bearings)
+    train = in_housing(dataclasses.replace(train, bearings=dampers))
     assert train.housing is not None
     body = dataclasses.replace(train.housing, damping=alpha * train.housing.mass)
     return dataclasses.replace(train, housing=body)

@@ -19,7 +19,8 @@ def test_a_mass_in_a_turning_frame_on_a_bore_alike_in_all_directions(sense: floa
     .. math:: m(\ddot z + 2i\Omega\dot z - \Omega^2 z) = f + k(\zeta - z), \qquad
         M(\ddot\zeta + 2i\Omega\dot\zeta - \Omega^2\zeta) = -K\zeta + k(z - \zeta)
 
-    A damper of the rates in their own axes, as those of bearings are, adds :math:`-c(\dot z - \dot Z e^{-i\Omega t})`.
+    A damper in the axes of the housing adds :math:`-c(\dot x - \dot Z)` to these forces, x the mass in these axes, so
+    the spring becomes :math:`k + i(\omega + \Omega)c`. Of this the constant part has :math:`c\Omega` across z.
     """
     speed = sense * CARRIER
     phases = torus.Phases.of((1.0, MESH / CARRIER), (1,))
@@ -31,6 +32,7 @@ def test_a_mass_in_a_turning_frame_on_a_bore_alike_in_all_directions(sense: floa
     )
     mass = np.diag([BORE_MASS, BORE_MASS, MASS, MASS])
     stiffness = spring + np.diag([GROUND, GROUND, -MASS * speed**2, -MASS * speed**2])
+    stiffness[2, 3], stiffness[3, 2] = -DAMPER * speed, DAMPER * speed
     coriolis = np.zeros((4, 4))
     coriolis[2, 3], coriolis[3, 2] = -2.0 * MASS * speed, 2.0 * MASS * speed
     H = np.linalg.inv(stiffness + 1j * omega[:, None, None] * (damper + coriolis) - omega[:, None, None] ** 2 * mass)
@@ -47,9 +49,8 @@ def test_a_mass_in_a_turning_frame_on_a_bore_alike_in_all_directions(sense: floa
     def answer(w: float) -> complex:
         """Frequency response of z to a force at w in the frame."""
         fixed = w + speed
-        own = -MASS * fixed**2 + SPRING + 1j * w * DAMPER
-        bore = GROUND + SPRING - BORE_MASS * fixed**2 + 1j * fixed * DAMPER
-        return 1.0 / (own - (SPRING + 1j * fixed * DAMPER) * (SPRING + 1j * w * DAMPER) / bore)
+        bearing = SPRING + 1j * fixed * DAMPER
+        return 1.0 / (bearing - MASS * fixed**2 - bearing**2 / (bearing + GROUND - BORE_MASS * fixed**2))
 
     one, two = found[number[1, 0], 2:]
     assert 0.5 * (one + 1j * two) == pytest.approx(0.5 * FORCE * answer(MESH), rel=1e-10)

@@ -8,7 +8,8 @@ r"""Eigenvalue problem of a train that turns at a steady speed.
 
 y are the modal coordinates of unit mass of the train at rest, with the mean stiffness of its meshes, G the gyroscopic
 moments for unit speed of the drive. Carriers add :math:`\Omega^2 S y` on the right, the centrifugal forces of their
-frames; G then has those of Coriolis. The squared length of a state is twice its energy. Without damping and carriers
+frames, and :math:`\Omega N y`, what dampers in fixed axes do to motions that the frames carry round; G then has the
+forces of Coriolis. The squared length of a state is twice its energy. Without damping and carriers
 the matrix is skew: modes of one speed are orthogonal in energy, and :math:`d\lambda/d\Omega = x^H B x` with
 :math:`B = diag(0, G)`.
 """
@@ -47,8 +48,8 @@ class TurningTrain:
     ----------
     squares : (n,)
         Squares of the natural frequencies at rest (rad2/s2).
-    damping, gyroscopic, stiffening : (n, n)
-        D (1/s), G for unit speed of the drive, and S for its square.
+    damping, gyroscopic, stiffening, circulating : (n, n)
+        D (1/s), G and N for unit speed of the drive, and S for its square.
     kinds : (n, n)
         A weight of the kinetic energies of the parts, different for each: of modes that agree in all speeds those are
         taken that belong to different parts.
@@ -58,6 +59,7 @@ class TurningTrain:
     damping: Array
     gyroscopic: Array
     stiffening: Array
+    circulating: Array
     kinds: Array
 
     @cached_property
@@ -75,8 +77,9 @@ class TurningTrain:
         """Modes at a speed of the drive (rad/s)."""
         n, stiff = len(self.rates), np.diag(self.rates)
         below = -stiff
-        if self.stiffening.any():
-            below = below + speed**2 * self.stiffening @ np.linalg.pinv(stiff)
+        carried = speed**2 * self.stiffening + speed * self.circulating
+        if carried.any():
+            below = below + carried @ np.linalg.pinv(stiff)
         A = np.block([[np.zeros((n, n)), stiff], [below, speed * self.gyroscopic - self.damping]])
         values, vectors = np.linalg.eig(A)
         least = np.sqrt(ROUND_OFF) * float(self.rates.max(initial=0.0))
@@ -129,8 +132,9 @@ def turning_train(model: TrainModel, kinds: Array) -> TurningTrain:
             along = modal.T.T @ line.row
             damping += line.given.damping * np.outer(along, along)
     turning = model.spinning if model.forces.turned else model.turning
-    gyroscopic, stiffening = (modal.T.T @ x @ modal.T for x in turning[:2])
-    return TurningTrain(modal.eigenvalues, damping, gyroscopic, stiffening, kinds)
+    parts = turning.gyroscopic, turning.stiffening, turning.circulating
+    gyroscopic, stiffening, circulating = (modal.T.T @ part @ modal.T for part in parts)
+    return TurningTrain(modal.eigenvalues, damping, gyroscopic, stiffening, circulating, kinds)
 
 
 def _clusters(values: ComplexArray) -> list[slice]:

@@ -231,13 +231,10 @@ class Oscillator:
             self._last[key] = known
         return known(places)
 
-    def turned_entries(self, theta: Array) -> list[Entries]:
-        """Derivatives of the forces of the springs of carriers at phases theta (S, n)."""
-        made = []
-        for spring in self.turned:
-            rows, columns, values = spring.entries(theta)
-            made.append((rows, columns + self.linear.size * spring.of_rates, values))
-        return made
+    def turned_entries(self, theta: Array, speed: float) -> list[Entries]:
+        """Derivatives of the forces of the springs of carriers at phases theta (S, n) and a speed (rad/s)."""
+        rates = abs(speed) / np.array(self.turns)
+        return [entry for spring in self.turned for entry in spring.entries(theta, rates, self.linear.size)]
 
     def whole_forces(self, orbit: Orbit) -> ComplexArray:
         """Amplitudes (K + 1, m) of the forces of an orbit, with those of the springs of carriers."""
@@ -247,7 +244,7 @@ class Oscillator:
         rates = 1j * self.omega(orbit.speed, orbit.harmonics)[:, None] * orbit.places
         both = lattice.synthesis(np.hstack([orbit.places, rates]))
         forces = np.zeros((len(both), self.linear.size))
-        for rows, columns, values in self.turned_entries(lattice.theta):
+        for rows, columns, values in self.turned_entries(lattice.theta, orbit.speed):
             np.add.at(forces.T, rows, (values * both[:, columns]).T)
         return np.asarray(orbit.forces + lattice.analysis(forces)[: len(orbit.places)])
 

@@ -152,6 +152,7 @@ def condense(model: TrainModel, shared: int = SHARED, speeds: Sequence[float] = 
     linear = Linear(
         modal.eigenvalues, _damping(model), modal.T.T @ directions, push, modal.T.T @ turning.gyroscopic @ modal.T,
         modal.T.T @ turning.stiffening @ modal.T, modal.T.T @ (turning.thrown + turning.stiffening @ modal.origin),
+        modal.T.T @ turning.circulating @ modal.T, modal.T.T @ turning.circulating @ modal.origin,
     )  # fmt: skip
     steady = model.kinematics.steady_forces
     ends = np.cumsum([0, *(len(line.flanks) for line in model.meshes)]).tolist()

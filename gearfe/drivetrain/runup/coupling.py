@@ -1,22 +1,22 @@
 r"""Harmonics that carriers couple in an elastic housing: the linear part of a train with turning carriers.
 
 The bearings between shafts in the frame of a carrier, turned by :math:`\vartheta`, and bores that stand still are
-springs and dampers with the forces
+springs with the forces
 
-.. math::
-    f = \big[(\cos\vartheta - 1)\,P + \sin\vartheta\,Q\big]\,u
-      + \big[(\cos\vartheta - 1)\,P' + \sin\vartheta\,Q'\big]\,\dot u
+.. math:: f = \big[(\cos\vartheta - 1)\,P + \sin\vartheta\,Q\big]\,u
 
 beside what the constant part has, that at :math:`\vartheta = 0` (`gearfe.drivetrain.train.forces.Turned`). They are
 periodic with the rotation of the carrier, so each harmonic :math:`U_n` (n counts these rotations, mesh cycles are the
 same) is coupled with its neighbours,
 
-.. math:: F_n = -P_n U_n + \tfrac12(P_{n-1} - iQ_{n-1})\,U_{n-1} + \tfrac12(P_{n+1} + iQ_{n+1})\,U_{n+1},
-    \qquad P_n = P + i\omega_n P',
+.. math:: F_n = -P U_n + \tfrac12(P - iQ)\,U_{n-1} + \tfrac12(P + iQ)\,U_{n+1} .
 
-and :math:`U = G + H F` with the motion G that the constant part has without them: Hill's method for an inhomogeneous
-system with periodic coefficients (Nayfeh & Mook, Nonlinear Oscillations, Sec. 5.2). The equations are linear, with a
-block for each harmonic and its neighbours, and are solved at once. What the rest of the balance sees is linear.
+A damper acts in the axes of the housing. On the bore its force is the rate of what a spring would have, so these rows
+have the factor :math:`i\omega_n` of the force; on the shaft it has the rate of the bore, so these rows have that of
+the motion, :math:`i\omega_{n \pm 1}`. With the motion G that the constant part has without these forces,
+:math:`U = G + H F`: Hill's method for an inhomogeneous system with periodic coefficients (Nayfeh & Mook, Nonlinear
+Oscillations, Sec. 5.2). The equations are linear, with a block for each harmonic and its neighbours, and are solved at
+once. What the rest of the balance sees is linear.
 """
 
 from __future__ import annotations
@@ -54,15 +54,37 @@ class TurnedSpring:
     phase: int
     sense: float
 
-    def entries(self, theta: Array) -> tuple[IntArray, IntArray, Array]:
-        """Return numbers of forces and of freedoms, and derivatives (S, 8), at phases theta (S, n)."""
+    def entries(self, theta: Array, rates: Array, size: int) -> list[tuple[IntArray, IntArray, Array]]:
+        """Return derivatives of its forces with the motion.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (S, n)
+            Phases (rad).
+        rates : ndarray, shape (n,)
+            Their rates (rad/s).
+        size : int
+            Number of freedoms: from there on columns count their rates.
+
+        Returns
+        -------
+        entries : list of tuples
+            Numbers of forces and of motions, and derivatives (S, entries).
+        """
         turned = self.sense * theta[:, self.phase]
-        cosine, sine = np.cos(turned) - 1.0, np.sin(turned)
-        values = np.column_stack([cosine, -sine, sine, cosine, cosine, sine, -sine, cosine])
-        return self.freedoms[ROWS], self.freedoms[COLUMNS], values * self.factors[ROWS] * self.factors[COLUMNS]
+        cosine, sine = np.cos(turned), np.sin(turned)
+        less = cosine - 1.0
+        values = np.column_stack([less, -sine, sine, less, less, sine, -sine, less])
+        rows, columns, scale = self.freedoms[ROWS], self.freedoms[COLUMNS], self.factors[ROWS] * self.factors[COLUMNS]
+        entries = [(rows, columns + size * self.of_rates, values * scale)]
+        if self.of_rates:  # on the bore, the rate of the rotation times the displacement
+            speed = self.sense * float(rates[self.phase])
+            values = speed * np.column_stack([-sine, -cosine, cosine, -sine])
+            entries.append((rows[:4], columns[:4], values * scale[:4]))
+        return entries
 
     def matrices(self, size: int) -> tuple[Array, Array]:
-        """Return P and Q (size, size) along the phase."""
+        """Return P and Q (size, size) along the phase; rates are left out."""
         cosine, sine = np.zeros((size, size)), np.zeros((size, size))
         rows, columns = self.freedoms[ROWS], self.freedoms[COLUMNS]
         values = self.factors[ROWS] * self.factors[COLUMNS]
@@ -151,21 +173,24 @@ def coupling(
     number = {tuple(vector): n for n, vector in enumerate(vectors.tolist())}
     own = flexibility[:, freedoms[:, None], freedoms][harmonic]
     own[conjugate] = own[conjugate].conj()
-    parts: dict[tuple[int, bool], tuple[Array, Array]] = {}
+    # by phase: of springs, and of dampers on bores (rates of forces) and on shafts (of rates)
+    parts: dict[tuple[int, str], tuple[Array, Array]] = {}
     for spring in springs:
-        P, Q = parts.setdefault((spring.phase, spring.of_rates), (np.zeros((t, t)), np.zeros((t, t))))
         local = np.searchsorted(freedoms, spring.freedoms)
-        cosine, sine = TurnedSpring(local, spring.factors, spring.of_rates, spring.phase, spring.sense).matrices(t)
-        P += cosine
-        Q += sine
+        matrices = TurnedSpring(local, spring.factors, spring.of_rates, spring.phase, spring.sense).matrices(t)
+        groups = {"bore": local[:2], "shaft": local[2:]} if spring.of_rates else {"spring": local}
+        for group, among in groups.items():
+            totals = parts.setdefault((spring.phase, group), (np.zeros((t, t)), np.zeros((t, t))))
+            for total, of_spring in zip(totals, matrices, strict=True):
+                total[among] += of_spring[among]
     rows, columns, blocks = list[IntArray](), list[IntArray](), list[ComplexArray]()
-    for (phase, of_rates), (P, Q) in parts.items():
+    for (phase, group), (P, Q) in parts.items():
         for step, block in ((0, -P), (-1, 0.5 * (P - 1j * Q)), (1, 0.5 * (P + 1j * Q))):
             other = vectors.copy()
             other[:, phase] += step
             met = [(n, number[key]) for n, key in enumerate(map(tuple, other.tolist())) if key in number]
             row, column = np.array(met, dtype=np.int64).reshape(-1, 2).T
-            rates = 1j * frequency[column] if of_rates else np.ones(len(column))
+            rates = {"bore": 1j * frequency[row], "shaft": 1j * frequency[column]}.get(group, np.ones(len(row)))
             rows.append(row)
             columns.append(column)
             blocks.append(np.asarray(rates[:, None, None] * block, dtype=complex))

@@ -98,4 +98,5 @@ def _tangents(train: CondensedTrain, theta: Array, factor: float) -> Changes:
         else:
             u[:, along] = flank.gap + flank.law.approach(phase, factor * steady)
     entries, size = train.forces(theta, 1.0, u, np.zeros_like(u)).entries, train.system.linear.size
-    return changes([*entries, *train.system.turned_entries(theta)], size, len(theta)).of_freedoms(size)
+    springs = train.system.turned_entries(theta, 0.0)  # dampers have derivatives with the rates only, at this speed
+    return changes([*entries, *springs], size, len(theta)).of_freedoms(size)

@@ -1,11 +1,12 @@
 r"""What is linear in a train: modal coordinates behind a few freedoms, as a dynamic flexibility.
 
 .. math::
-    \ddot y + D\dot y + \Lambda y = c + P f + \Omega\,G\dot y + \Omega^2 (S y + h), \qquad u = P^T y,
+    \ddot y + D\dot y + \Lambda y = c + P f + \Omega\,(G\dot y + N y + r) + \Omega^2 (S y + h), \qquad u = P^T y,
     \qquad \hat u = H(i\omega)\,\hat f
 
 G (skew) has the gyroscopic moments of steady spins and the Coriolis forces of frames that turn with carriers, S and h
-the centrifugal forces of these frames. Both act along few directions B: :math:`G = B g B^T`, :math:`S = B s B^T`. The
+the centrifugal forces of these frames, N (skew) and r what dampers in fixed axes do to motions that these frames carry
+round. All act along few directions B: :math:`G = B g B^T`, :math:`S = B s B^T`, :math:`N = B n B^T`. The
 poles without them are computed once for all speeds and frequencies. At each frequency they are reaction forces to the
 motion along B, from a small system (Woodbury's identity). With more than half as many directions as modes the poles of
 the whole are found at each speed instead, which costs less.
@@ -56,11 +57,12 @@ class Poles(NamedTuple):
 
 
 class Reacting(NamedTuple):
-    """Forces G and S along few directions."""
+    """Forces G, S and N along few directions."""
 
     basis: Array  # (n, r) orthonormal directions B
     gyroscopic: Array  # (r, r) g
     stiffening: Array  # (r, r) s
+    circulating: Array  # (r, r) n
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +79,10 @@ class Linear:
         P: modal coordinates to the freedoms along which other forces act.
     constant : (n,)
         c: constant modal force.
-    gyroscopic, stiffening : (n, n)
-        G and S.
-    thrown : (n,)
-        h.
+    gyroscopic, stiffening, circulating : (n, n)
+        G, S and N.
+    thrown, dragged : (n,)
+        h and r.
     """
 
     squares: Array
@@ -90,12 +92,16 @@ class Linear:
     gyroscopic: Array = field(default_factory=lambda: np.zeros((0, 0)))
     stiffening: Array = field(default_factory=lambda: np.zeros((0, 0)))
     thrown: Array = field(default_factory=lambda: np.zeros(0))
+    circulating: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    dragged: Array = field(default_factory=lambda: np.zeros(0))
     _last: dict[float, tuple[Array, ComplexArray, ComplexArray]] = field(default_factory=dict, repr=False)
     _known: dict[float, Poles] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         n = len(self.squares)
-        for name, shape in (("gyroscopic", (n, n)), ("stiffening", (n, n)), ("thrown", (n,))):
+        square, line = (n, n), (n,)
+        shapes = {"gyroscopic": square, "stiffening": square, "circulating": square, "thrown": line, "dragged": line}
+        for name, shape in shapes.items():
             if not getattr(self, name).size:
                 object.__setattr__(self, name, np.zeros(shape))
         if (self.squares <= ROUND_OFF * self.squares.max(initial=0.0)).any():
@@ -110,22 +116,24 @@ class Linear:
 
     @cached_property
     def _reacting(self) -> Reacting | None:
-        """G and S along few directions; None where there are too many of them."""
+        """G, S and N along few directions; None where there are too many of them."""
         n = len(self.squares)
-        basis, sizes, _ = np.linalg.svd(np.hstack([self.gyroscopic, self.stiffening]), full_matrices=False)
+        forms = self.gyroscopic, self.stiffening, self.circulating
+        basis, sizes, _ = np.linalg.svd(np.hstack(forms), full_matrices=False)
         basis = basis[:, sizes > ROUND_OFF * sizes.max(initial=0.0)]
         if 2 * basis.shape[1] > n:
             return None
-        return Reacting(basis, basis.T @ self.gyroscopic @ basis, basis.T @ self.stiffening @ basis)
+        return Reacting(basis, *(basis.T @ form @ basis for form in forms))
 
     @cached_property
     def _every(self) -> Array:
         """(n, p) directions of the flexibility that partial fractions give: P, and B where its forces react."""
         return self.places if self._reacting is None else np.hstack([self.places, self._reacting.basis])
 
-    def stiffness(self, speed: float) -> Array:
-        """(n, n) stiffness at a speed, that of frames that turn included."""
-        return np.asarray(np.diag(self.squares) - speed**2 * self.stiffening)
+    def stiffness(self, speed: float, *, damped: bool = True) -> Array:
+        """(n, n) stiffness at a speed, that of frames that turn included, with or without what dampers do there."""
+        stiffness = np.diag(self.squares) - speed**2 * self.stiffening
+        return np.asarray(stiffness - speed * self.circulating if damped else stiffness)
 
     def poles(self, speed: float) -> Poles:
         """Poles at a speed, without forces that react; those of the last `REMEMBERED` speeds are kept.
@@ -137,7 +145,7 @@ class Linear:
         if known is not None:
             return known
         n, rates = len(self.squares), np.sqrt(self.squares)
-        below = speed**2 * self.stiffening / rates - np.diag(rates)
+        below = -self.stiffness(speed) / rates
         A = np.block([[np.zeros((n, n)), np.diag(rates)], [below, speed * self.gyroscopic - self.damping]])
         values, vectors = np.linalg.eig(A)
         forces = np.vstack([np.zeros_like(self._every), self._every])
@@ -206,7 +214,7 @@ class Linear:
 
     def still(self, speed: float, forces: Array) -> Array:
         """Modal coordinates (n, k) under constant modal forces (n, k) at a speed."""
-        if not (speed and self.stiffening.any()):
+        if not (speed and (self.stiffening.any() or self.circulating.any())):
             return np.asarray(forces / self.squares[:, None])
         return np.asarray(np.linalg.solve(self.stiffness(speed), forces))
 
@@ -215,7 +223,7 @@ class Linear:
         return np.asarray(self.places.T @ self.still(speed, self._constant(speed)[:, None])[:, 0])
 
     def _constant(self, speed: float) -> Array:
-        return np.asarray(self.constant + speed**2 * self.thrown)
+        return np.asarray(self.constant + speed**2 * self.thrown + speed * self.dragged)
 
     def _turning(self, omega: Array, speed: float) -> tuple[ComplexArray, ComplexArray]:
         """Flexibility at the freedoms, (k, m, m), and forces that react to unit forces, (k, r, m).
@@ -230,7 +238,8 @@ class Linear:
         reactions = np.zeros((count, 0, m), dtype=complex)
         if reacting is not None:
             whole, r = made, made.shape[1] - m
-            turning = 1j * speed * omega[:, None, None] * reacting.gyroscopic + speed**2 * reacting.stiffening
+            turning = 1j * speed * omega[:, None, None] * reacting.gyroscopic
+            turning += speed**2 * reacting.stiffening + speed * reacting.circulating
             react = turning @ whole[:, m:]
             reactions = np.asarray(np.linalg.solve(np.eye(r) - react[..., m:], react[..., :m]), dtype=complex)
             made = np.asarray(whole[:, :m, :m] + whole[:, :m, m:] @ reactions)

@@ -200,9 +200,10 @@ def _bearing(
             acting += line.rayleigh * real_times(v, np.outer(line.row, line.row))
     q[0] += model.modal.origin
     turns = model.turning
-    acting += speed * real_times(v, turns.gyroscopic.T) + speed**2 * real_times(q, turns.stiffening)
+    acting += speed * (real_times(v, turns.gyroscopic.T) + real_times(q, turns.circulating.T))
+    acting += speed**2 * real_times(q, turns.stiffening)
     acting[0] += train.torque + speed**2 * turns.thrown
-    loads, still = model.bearings.parts(q, v, a, acting)
+    loads, still = model.bearings.parts(q, v, a, acting, speed)
     if train.frames.any():
         vectors = lattice.synthesis(loads.reshape(len(q), -1)).reshape(-1, len(model.bores), 2, 3)
         turned = model.on_bores(lattice.theta @ train.frames.T, vectors)

@@ -2,7 +2,7 @@ r"""Stability of a steady motion: Floquet multipliers of the motion itself.
 
 Small motions beside it feel the forces' derivatives along it,
 
-.. math:: \ddot y + D\dot y + \Lambda y = P\,[A(t)\,P^T y + B(t)\,P^T\dot y] + \Omega\,G\dot y ,
+.. math:: \ddot y + D\dot y + \Lambda y = P\,[A(t)\,P^T y + B(t)\,P^T\dot y] + \Omega\,(G\dot y + N y) + \Omega^2 S y ,
 
 so it is stable where all multipliers, eigenvalues of the map of (y, y') over a time T after which A and B repeat, have
 a modulus below 1 (Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 3.2). `runup.monodromy` integrates the
@@ -146,7 +146,7 @@ def _derivatives(system: Oscillator, orbit: Orbit, span: Window, reached: float,
     """Return the derivatives of the forces along an orbit at the kicks of so many steps."""
     theta, u, du = _along(system, orbit, span.turns, steps)
     pushes = system.forces(theta, orbit.speed, u, du)
-    by = changes([*pushes.entries, *system.turned_entries(theta)], system.linear.size, len(theta))
+    by = changes([*pushes.entries, *system.turned_entries(theta, orbit.speed)], system.linear.size, len(theta))
     order = np.argsort(kick_times(np.linspace(0.0, 1.0, steps + 1)).ravel(), kind="stable")  # kicks step back, too
     own = by.forces == by.freedoms
     steepest = np.abs(np.diff(by.values[order][:, own], axis=0)).max(axis=0)
@@ -243,7 +243,8 @@ def around(
     free = linear.squares[~kept], np.diag(D)[~kept]
     with np.errstate(over="ignore", invalid="ignore"):
         among = np.ix_(kept, kept)
-        constant = flow(linear.stiffness(speed)[among], (D - speed * linear.gyroscopic)[among], edges[-1])
+        stiffness = linear.stiffness(speed, damped=damped)
+        constant = flow(stiffness[among], (D - speed * linear.gyroscopic)[among], edges[-1])
 
         def map_over(first: int, last: int) -> Array:
             return monodromy(constant, edges[first : last + 1], places[:, pushed], reads, by_step[first:last])

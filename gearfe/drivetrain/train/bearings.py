@@ -1,7 +1,8 @@
 r"""Forces and moments of the bearings: what each shaft does to the bores that carry it.
 
 Of a hinge they are its multipliers, :math:`G^T\lambda = f - C\dot q - K q - M\ddot q`, of bearing springs
-:math:`k x + c\dot x` of the shaft's motion x against the bore. In a rigid housing statics do not tell how the hinges of
+:math:`k x + c\dot x` of the shaft's motion x against the bore; in a frame that turns with :math:`\Omega` the rate is
+:math:`\dot x + \Omega J x`, J a quarter turn. In a rigid housing statics do not tell how the hinges of
 a shaft share its load. Then moments are as small as can be, so two bores carry a shaft like simple supports, and of the
 forces that are left open those of least squares are taken.
 """
@@ -23,6 +24,9 @@ from .mesh_element import Shafts
 
 #: What a moment counts beside a force (1/m) where shares are open: so much that it is taken only where it must be.
 MOMENT = 1e6
+#: Quarter turn about the axis of a motion along e1, a, e2 and tilts about e1, e2: rate of a unit rotation.
+QUARTER = np.zeros((5, 5))
+QUARTER[[0, 3], [2, 4]], QUARTER[[2, 4], [0, 3]] = -1.0, 1.0
 Values = TypeVar("Values", Array, ComplexArray)
 
 
@@ -36,6 +40,8 @@ class BearingLoads:
         Of the train's forces on the coordinates, the coordinates and their rates.
     of_still_places, of_still_rates : (size, 6 bores)
         Of the bores' own motion in bearings whose shaft is in a frame that turns.
+    of_carried_places : (size, 6 bores)
+        Of the coordinates times the speed of the drive: what dampers feel because the frame carries the shaft round.
     """
 
     of_forces: Array
@@ -44,8 +50,9 @@ class BearingLoads:
     of_accelerations: Array
     of_still_places: Array
     of_still_rates: Array
+    of_carried_places: Array
 
-    def __call__(self, q: Values, v: Values, a: Values, acting: Values) -> Values:
+    def __call__(self, q: Values, v: Values, a: Values, acting: Values, speed: Array | float) -> Values:
         """Force (N) and moment (N m) on each bore about its reference point, along x, y, z; shape (n, bores, 6).
 
         Bearings of shafts in frames that turn, in an elastic housing, have it where these are as at the start.
@@ -56,16 +63,18 @@ class BearingLoads:
             Coordinates, rates, second rates.
         acting : (n, size)
             Forces of the train on the coordinates, those of `TrainForces`.
+        speed : float or (n,)
+            Of the drive (rad/s).
         """
-        turning, still = self.parts(q, v, a, acting)
+        turning, still = self.parts(q, v, a, acting, speed)
         return turning + still
 
-    def parts(self, q: Values, v: Values, a: Values, acting: Values) -> tuple[Values, Values]:
+    def parts(self, q: Values, v: Values, a: Values, acting: Values, speed: Array | float) -> tuple[Values, Values]:
         """Return the loads in two parts: along axes of the frames of the shafts, and along axes that stand still.
 
         Parameters
         ----------
-        q, v, a, acting : (n, size)
+        q, v, a, acting, speed
             As of a call.
 
         Returns
@@ -73,12 +82,13 @@ class BearingLoads:
         turning, still : (n, bores, 6)
         """
         found = acting @ self.of_forces + q @ self.of_places + v @ self.of_rates + a @ self.of_accelerations
+        found += np.reshape(speed, (-1, 1)) * (q @ self.of_carried_places)
         still = q @ self.of_still_places + v @ self.of_still_rates
         return found.reshape(len(found), -1, 6), still.reshape(len(found), -1, 6)
 
 
 def bearing_loads(
-    train: GearTrain, system: System, shafts: Shafts, bores: tuple[str, ...], *, shared: bool, turning: Sequence[bool]
+    train: GearTrain, system: System, shafts: Shafts, bores: tuple[str, ...], *, shared: bool, turns: Sequence[float]
 ) -> BearingLoads:
     """Loads on the bores that carry shafts.
 
@@ -90,8 +100,8 @@ def bearing_loads(
         Names of the bores, in the order of the results.
     shared
         Whether statics leave open how the hinges of a shaft share its load.
-    turning
-        For each shaft, whether it is described in a frame that turns.
+    turns
+        For each shaft the speed of the frame in which it is described, in parts of that of the drive.
     """
     e1, e2, axis = train.frame
     to_global = np.zeros((5, 6))
@@ -106,7 +116,7 @@ def bearing_loads(
                 counts[row + 3 : row + 5] = MOMENT
     multipliers = np.linalg.pinv(G / counts[:, None]) / counts
     springs = {bearing.bore: bearing for bearing in train.bearings}
-    parts = [np.zeros((system.size, 6 * len(bores))) for _ in range(5)]
+    parts = [np.zeros((system.size, 6 * len(bores))) for _ in range(6)]
     for number, bore in enumerate(bores):
         at = slice(6 * number, 6 * number + 6)
         if bore not in springs:
@@ -117,13 +127,14 @@ def bearing_loads(
         of_shaft, of_bore = motion_parts(train, shafts, shaft, bore)
         stiffness = springs[bore].stiffness_matrix
         damping = springs[bore].damping_matrix + train.damping.beta * stiffness
-        for first_part, rows in ((1, of_shaft), (3 if turning[shaft] else 1, -of_bore)):
+        for first_part, rows in ((1, of_shaft), (3 if turns[shaft] else 1, -of_bore)):
             for part, matrix in enumerate((stiffness, damping), start=first_part):
                 parts[part][:, at] += rows.T @ (matrix @ to_global)
-    hinges, places, rates, still_places, still_rates = parts
+        parts[5][:, at] = turns[shaft] * (QUARTER @ of_shaft).T @ (damping @ to_global)
+    hinges, places, rates, still_places, still_rates, carried_places = parts
     return BearingLoads(
         hinges, places - system.stiffness.T @ hinges, rates - system.damping.T @ hinges, -system.mass.T @ hinges,
-        still_places, still_rates,
+        still_places, still_rates, carried_places,
     )  # fmt: skip
 
 

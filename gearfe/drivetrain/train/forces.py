@@ -17,9 +17,12 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
   :math:`-(G - \kappa_0 u_t)` along the tilt, whose mean stiffness :math:`\kappa_0` the system has, too;
 - *gyroscopic*: :math:`-J_p\Omega\,(u_{d+1}', -u_d')`, :math:`\Omega = g\psi' + u_s'`, on the tilts d, d + 1 of a
   shaft with the spin s;
+- *dampers in a frame that turns*, of a damping constant c in fixed axes: with :math:`\Omega = g\psi'` they feel
+  :math:`u' + \Omega J u`, J a quarter turn, and add :math:`c\,\Omega\,(u_{d+1}, -u_d)` on the directions d, d + 1;
 - *turned springs and dampers* between a shaft in the frame of a carrier and a bore of an elastic housing: with its two
   directions b of the bore, the w of the shaft times the stiffness, and the rotation R of the frame,
-  :math:`(R - 1)\,u_w` along b and :math:`(R^T - 1)\,u_b` along w, for R = 1 at the start is in the system's stiffness;
+  :math:`(R - 1)\,u_w` along b and :math:`(R^T - 1)\,u_b` along w, for R = 1 at the start is in the system's stiffness.
+  A damper has the rates in fixed axes: :math:`\frac{d}{dt}[(R - 1)\,u_w]` and :math:`(R^T - 1)\,u_b'`;
 - *torques*: functions of time along a direction d, and of the true speed there, :math:`T(g\psi' + u_d') + c\,u_d'`,
   c the slope that the system's damping has already.
 
@@ -372,7 +375,9 @@ class Gyro:
     With :math:`H = p\,(g\psi' + u_s')`, p the polar inertia and s the direction of the spin, the moments on two tilts
     are :math:`-H u_2'` and :math:`H u_1'`. In a frame that turns with :math:`\Omega = g\psi'` a mass m has the Coriolis
     forces with :math:`p = -2m`, the centrifugal ones :math:`m g^2\psi'^2 u` and those of Euler, :math:`-H' u_2/2` and
-    :math:`H' u_1/2`; of its place on the first direction, `offset` (m) is part beside u.
+    :math:`H' u_1/2`; of its place on the first direction, `offset` (m) is part beside u. A damper c in fixed axes feels
+    :math:`u' + \Omega J u`: the system has :math:`-c u'`, and :math:`c\,\Omega u_2` and :math:`-c\,\Omega u_1` are the
+    rest.
 
     Attributes
     ----------
@@ -388,6 +393,8 @@ class Gyro:
         Whether those forces act.
     offset
         m.
+    circulating
+        c g (N s/m, N m s/rad), of a damper in fixed axes.
     """
 
     direction: int
@@ -397,11 +404,12 @@ class Gyro:
     stiffening: float = 0.0
     euler: bool = False
     offset: float = 0.0
+    circulating: float = 0.0
 
     @property
     def of_frame(self) -> bool:
         """Whether its motion is described in a frame that turns."""
-        return self.euler or self.stiffening != 0.0
+        return self.euler or self.stiffening != 0.0 or self.circulating != 0.0
 
 
 @dataclass(frozen=True)
@@ -424,14 +432,29 @@ class Turned:
     ratio: float
     of_rates: bool
 
-    def add(self, angle: Array, motion: Array, out: Array) -> None:
-        """Add its forces at rotations (n,) of the drive (rad), motion and forces of shape (n, directions)."""
+    def add(self, angle: Array, rate: Array, u: Array, du: Array, out: Array) -> None:
+        """Add its forces.
+
+        Parameters
+        ----------
+        angle, rate : ndarray, shape (n,)
+            Rotation (rad) and speed (rad/s) of the drive.
+        u, du : ndarray, shape (n, directions)
+            Motion and its rate.
+        out : ndarray, shape (n, directions)
+            Forces to add to.
+        """
         b, w = self.still, self.turning
+        motion = du if self.of_rates else u
         cosine, sine = np.cos(self.ratio * angle) - 1.0, np.sin(self.ratio * angle)
         out[:, b] += cosine * motion[:, w] - sine * motion[:, w + 1]
         out[:, b + 1] += sine * motion[:, w] + cosine * motion[:, w + 1]
         out[:, w] += cosine * motion[:, b] + sine * motion[:, b + 1]
         out[:, w + 1] += cosine * motion[:, b + 1] - sine * motion[:, b]
+        if self.of_rates:  # the rotation itself moves what is displaced
+            speed = self.ratio * rate
+            out[:, b] -= speed * (sine * u[:, w] + (cosine + 1.0) * u[:, w + 1])
+            out[:, b + 1] += speed * ((cosine + 1.0) * u[:, w] - sine * u[:, w + 1])
 
 
 @dataclass(frozen=True)
@@ -527,9 +550,11 @@ class TrainForces:
                 half = 0.5 * gyro.euler * gyro.polar * gyro.ratio * self.angle(t, 2)
                 out[:, d] += gyro.stiffening * rate**2 * first - half * second
                 out[:, d + 1] += gyro.stiffening * rate**2 * second + half * first
+                out[:, d] += gyro.circulating * rate * second
+                out[:, d + 1] -= gyro.circulating * rate * first
         angle = self.angle(t)
         for spring in self.turned:
-            spring.add(angle, du if spring.of_rates else u, out)
+            spring.add(angle, rate, u, du, out)
         for direction, torque in self.torques:
             out[:, direction] += torque(t)
         for over in self.speed_torques:

@@ -230,7 +230,8 @@ class TiltingTrain:
             - self.rows.T @ moments
         )
         if operating.bearings:
-            point = operating_point(operating.geometry, self._motions, stiffness, T, push)
+            even = 0.5 * (stiffness + stiffness.T)  # drag has no energy, and loads no shaft in rolling bearings
+            point = operating_point(operating.geometry, self._motions, even, T, push)
             q = point.coordinates
             for name, state in point.bearings.items():
                 stiffness = stiffness + self._motions[name].T @ state.stiffness @ self._motions[name]
@@ -268,7 +269,8 @@ def _held(model: TrainModel) -> Array:
 
 def _changed(model: TrainModel) -> Array:
     """What the stiffness (size, size) of the running train has more than that of its system."""
-    return np.asarray(model.back_flanks - model.steady_speed**2 * model.turning.stiffening)
+    speed, turning = model.steady_speed, model.turning
+    return np.asarray(model.back_flanks - speed**2 * turning.stiffening - speed * turning.circulating)
 
 
 def _thrown(model: TrainModel) -> Array:
@@ -286,12 +288,13 @@ def _steady_push(model: TrainModel) -> Array:
 
 def _solved(K: Array, forces: Array) -> Array | None:
     """Solutions y of K y = forces (n, k) that move nothing freely; None where the first of these does."""
-    squares, shapes = np.linalg.eigh(K)
+    squares, shapes = np.linalg.eigh(0.5 * (K + K.T))  # what dampers in frames that turn add to K is skew
     pushed = shapes.T @ forces
     free = squares <= ROUND_OFF * max(float(squares.max(initial=0.0)), 1e-300)
     if np.abs(pushed[free, 0]).max(initial=0.0) > ROUND_OFF * float(np.abs(pushed[:, 0]).max(initial=0.0)):
         return None
-    return np.asarray(shapes[:, ~free] @ (pushed[~free] / squares[~free, None]))
+    held = shapes[:, ~free]
+    return np.asarray(held @ np.linalg.solve(held.T @ K @ held, pushed[~free]))
 
 
 def static_state(model: TrainModel) -> Array | None:
@@ -342,7 +345,8 @@ def static_bearing_loads(model: TrainModel, q: Array) -> dict[str, Array]:
     """
     acting = model.preload + _steady_push(model) + _thrown(model) - _changed(model) @ q
     still = np.zeros((1, len(q)))
-    loads = dict(zip(model.bores, model.bearings(q[None], still, still, acting[None])[0], strict=True))
+    found = model.bearings(q[None], still, still, acting[None], model.steady_speed)[0]
+    loads = dict(zip(model.bores, found, strict=True))
     e1, e2, axis = model.train.frame
     for name, state in model.operating.bearings.items():  # not linear from no load on
         loads[name] = np.concatenate(

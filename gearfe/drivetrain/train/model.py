@@ -64,12 +64,14 @@ UNHELD = 1e-6
 class Turning(NamedTuple):
     """Forces on the coordinates of a system that grow with the speed of the drive, in small motions beside rolling.
 
-    They are gyroscopic moments, and Coriolis and centrifugal forces of the frames of carriers.
+    They are gyroscopic moments, Coriolis and centrifugal forces of the frames of carriers, and forces of dampers in
+    fixed axes on what these frames move.
     """
 
     gyroscopic: Array  # (size, size) of rates, times the speed
     stiffening: Array  # (size, size) of coordinates, times its square
     thrown: Array  # (size,) constant ones, times its square
+    circulating: Array  # (size, size) of coordinates, times the speed: skew
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -227,8 +229,8 @@ class TrainModel(Facts):
     def bearings(self) -> BearingLoads:
         """Loads on the bores that carry shafts."""
         shared = len(self.start.freedoms.redundant) > 0
-        turning = [bool(ratio) for ratio in self.frame_ratios]
-        return bearing_loads(self.train, self.system, self.placed, self.bores, shared=shared, turning=turning)
+        turns = self.frame_ratios.tolist()
+        return bearing_loads(self.train, self.system, self.placed, self.bores, shared=shared, turns=turns)
 
     @cached_property
     def frame_ratios(self) -> Array:
@@ -300,17 +302,21 @@ class TrainModel(Facts):
     @cached_property
     def spinning(self) -> Turning:
         """The same of a train whose carriers stay where they are at the start, while its shafts turn."""
-        return self._turning([replace(gyro, stiffening=0.0) for gyro in self.forces.gyros if not gyro.euler])
+        resting = [replace(gyro, stiffening=0.0, circulating=0.0) for gyro in self.forces.gyros if not gyro.euler]
+        return self._turning(resting)
 
     def _turning(self, gyros: Sequence[Gyro]) -> Turning:
         size = self.system.size
-        gyroscopic, stiffening, thrown = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
+        gyroscopic, stiffening, circulating = np.zeros((3, size, size))
+        thrown = np.zeros(size)
         for gyro in gyros:
             first, second = self.directions[:, gyro.direction : gyro.direction + 2].T
-            gyroscopic += gyro.polar * gyro.ratio * (np.outer(second, first) - np.outer(first, second))
+            across = np.outer(second, first) - np.outer(first, second)
+            gyroscopic += gyro.polar * gyro.ratio * across
+            circulating -= gyro.circulating * across
             stiffening += gyro.stiffening * (np.outer(first, first) + np.outer(second, second))
             thrown += gyro.stiffening * gyro.offset * first
-        return Turning(gyroscopic, stiffening, thrown)
+        return Turning(gyroscopic, stiffening, thrown, circulating)
 
     @cached_property
     def sections(self) -> ShaftSections | None:
@@ -608,6 +614,7 @@ def _forces(
         for number, turn in enumerate(turns):
             if turn and not (train.hinged(train.shafts[number].name) and shafts.bodies[number].size == 6):
                 gyros += _of_frame(train, shafts, number, turn, columns, still)
+                gyros += _dragged(train, shafts, number, turn, columns, still)
     flanks = tuple(flank for line in lines for flank in line.flanks)
     at = len(columns)
     columns += [direction for direction, _ in torques]
@@ -662,6 +669,40 @@ def _of_frame(
         columns += [first, second - moves]
         gyros += [coriolis, centrifugal]
     return gyros
+
+
+def _dragged(
+    train: GearTrain, shafts: Shafts, number: int, turn: float, columns: list[Array], still: int
+) -> list[Gyro]:
+    """Dampers in fixed axes on a shaft whose motion is described in a frame that turns: bearings, and the shaft's.
+
+    Parameters and result are those of `_of_frame`. The damping matrix C of a bearing is alike in all directions, so its
+    root S is, too: motion S x has the damping constant 1 along each direction.
+    """
+    body = shafts.bodies[number]
+    own = body.blocks()
+    inner = train.damping.alpha * body.mass() + (0.0 if own is None else own[0])
+    dampers = [
+        (float(p.first @ inner @ p.first), shafts.whole(number, p.first), shafts.whole(number, p.second))
+        for p in planes(body, train.frame)
+    ]
+    for item in train.bearings:
+        if item.bore in train.shafts[number].bores:
+            damping = item.damping_matrix + train.damping.beta * item.stiffness_matrix
+            moved = _root(damping) @ motion_parts(train, shafts, number, item.bore)[0]
+            dampers += [(1.0, moved[0], moved[2]), (1.0, moved[3], moved[4])]
+    gyros = list[Gyro]()
+    for loss, first, second in dampers:
+        if loss > 0.0 and (first.any() or second.any()):
+            gyros.append(Gyro(len(columns), still, turn, 0.0, circulating=loss * turn))
+            columns += [first, second]
+    return gyros
+
+
+def _root(matrix: Array) -> Array:
+    """Symmetric root of a symmetric matrix that is positive semi-definite."""
+    values, vectors = np.linalg.eigh(matrix)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
 
 
 def _carried(train: GearTrain, shafts: Shafts, number: int) -> tuple[float, float, Array]:

@@ -47,7 +47,7 @@ COUPLE, NUMBERS, COUPLE_SLOPE, BOTH, PER_COUPLE = range(5)
 #: its square, half the rate of the momentum, and both places.
 MOMENTUM, TILT, OTHER, TURN, TURN2, EULER, FIRST, SECOND, PER_GYRO = range(9)
 #: Rows of a turned spring: cosine less 1 and sine of the frame's rotation, motion of both directions that stand still
-#: and of both that turn.
+#: (of a damper its rate) and of both that turn.
 COSINE, SINE, STILL1, STILL2, TURNS1, TURNS2, PER_TURNED = range(7)
 #: Rows of a torque over speed: the speed from the origin of its piece, then Horner's sums of its polynomial.
 PLACE, SUMS = range(2)
@@ -77,6 +77,7 @@ class Gyros(NamedTuple):
     stiffening: Array
     euler: Array
     offset: Array
+    circulating: Array
 
 
 class Turneds(NamedTuple):
@@ -196,21 +197,27 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
     for i in range(p.gyros.polar.shape[0]):
         d = p.gyros.direction[i]
         row = 1 + p.torques.shape[0] + PER_GYRO * i
-        turned = p.gyros.ratio[i] * memory[0, j + 1] + u[p.gyros.spin[i], j + 1]
-        memory[row + MOMENTUM, j] = p.gyros.polar[i] * rate * turned
-        memory[row + TILT, j] = rate * u[d, j + 1]
-        memory[row + OTHER, j] = rate * u[d + 1, j + 1]
-        out[d] -= product(j, row + MOMENTUM, row + OTHER, memory)
-        out[d + 1] += product(j, row + MOMENTUM, row + TILT, memory)
-        if p.gyros.stiffening[i] != 0.0 or p.gyros.euler[i] != 0.0:
+        if p.gyros.polar[i] != 0.0:
+            turned = p.gyros.ratio[i] * memory[0, j + 1] + u[p.gyros.spin[i], j + 1]
+            memory[row + MOMENTUM, j] = p.gyros.polar[i] * rate * turned
+            memory[row + TILT, j] = rate * u[d, j + 1]
+            memory[row + OTHER, j] = rate * u[d + 1, j + 1]
+            out[d] -= product(j, row + MOMENTUM, row + OTHER, memory)
+            out[d + 1] += product(j, row + MOMENTUM, row + TILT, memory)
+        if p.gyros.stiffening[i] != 0.0 or p.gyros.euler[i] != 0.0 or p.gyros.circulating[i] != 0.0:
             memory[row + FIRST, j] = u[d, j]
             memory[row + SECOND, j] = u[d + 1, j]
             if j == 0:
                 memory[row + FIRST, 0] += p.gyros.offset[i]
             memory[row + TURN, j] = rate * memory[0, j + 1]
+        if p.gyros.circulating[i] != 0.0:
+            out[d] += p.gyros.circulating[i] * product(j, row + TURN, row + SECOND, memory)
+            out[d + 1] -= p.gyros.circulating[i] * product(j, row + TURN, row + FIRST, memory)
+        if p.gyros.stiffening[i] != 0.0:
             memory[row + TURN2, j] = product(j, row + TURN, row + TURN, memory)
             out[d] += p.gyros.stiffening[i] * product(j, row + TURN2, row + FIRST, memory)
             out[d + 1] += p.gyros.stiffening[i] * product(j, row + TURN2, row + SECOND, memory)
+        if p.gyros.euler[i] != 0.0:
             if j + 2 < memory.shape[1]:
                 twice = (j + 2) * (j + 1) / (s * s) * memory[0, j + 2]
                 memory[row + EULER, j] = 0.5 * p.gyros.euler[i] * p.gyros.polar[i] * p.gyros.ratio[i] * twice
@@ -261,19 +268,23 @@ def train_order(j: int, t: float, s: float, u: Array, p: Program, memory: Array,
 
 
 def _turned(j: int, k: int, rate: float, u: Array, p: Program, memory: Array, out: Array) -> None:
-    """Add order j of the forces of the turned spring or damper k."""
+    """Add order j of the forces of the turned spring or damper k; on the bore a damper has the rate of (R - 1) w."""
     row = p.turned.row[k]
     b = p.turned.still[k]
     w = p.turned.turning[k]
+    order = j
+    scale = 1.0
+    if p.turned.of_rates[k] != 0:
+        order = j + 1
+        scale = rate
     for i in range(2):
-        if p.turned.of_rates[k] != 0:
-            memory[row + STILL1 + i, j] = rate * u[b + i, j + 1]
-            memory[row + TURNS1 + i, j] = rate * u[w + i, j + 1]
-        else:
-            memory[row + STILL1 + i, j] = u[b + i, j]
-            memory[row + TURNS1 + i, j] = u[w + i, j]
-    out[b] += product(j, row + COSINE, row + TURNS1, memory) - product(j, row + SINE, row + TURNS2, memory)
-    out[b + 1] += product(j, row + SINE, row + TURNS1, memory) + product(j, row + COSINE, row + TURNS2, memory)
+        memory[row + TURNS1 + i, j] = u[w + i, j]
+        memory[row + TURNS1 + i, order] = u[w + i, order]
+        memory[row + STILL1 + i, j] = scale * u[b + i, order]
+    first = product(order, row + COSINE, row + TURNS1, memory) - product(order, row + SINE, row + TURNS2, memory)
+    second = product(order, row + SINE, row + TURNS1, memory) + product(order, row + COSINE, row + TURNS2, memory)
+    out[b] += scale * first
+    out[b + 1] += scale * second
     out[w] += product(j, row + COSINE, row + STILL1, memory) + product(j, row + SINE, row + STILL2, memory)
     out[w + 1] += product(j, row + COSINE, row + STILL2, memory) - product(j, row + SINE, row + STILL1, memory)
 

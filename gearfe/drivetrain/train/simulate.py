@@ -19,7 +19,7 @@ from ...fem.reduction.error import reduction_error
 from ...multibody import IntegrationError, Start, Status, Trajectory, integrate
 from ...multibody.integrators.integrate import chosen_method
 from .gear_train import Drive, Load
-from .model import FREE, TrainModel
+from .model import TrainModel
 from .parting import Parting, apart_in_steps, beyond_law, parted
 from .planetary import mesh_families
 from .response import TrainResponse, joined
@@ -325,14 +325,6 @@ def _frames(model: TrainModel, response: TrainResponse) -> list[str]:
         for shaft in train.shafts
         if train.carriers and train.between_frames(shaft.name)
     ]
-    squares = model.modal.eigenvalues
-    lowest = math.sqrt(squares[squares > FREE * squares.max(initial=0.0)].min(initial=math.inf))
-    fastest = float(np.abs(model.frame_ratios * model.steady_speed).max(initial=0.0))
-    if fastest > lowest:
-        said.append(
-            f"a carrier turns at {fastest:.5g} rad/s, faster than the lowest natural frequency, {lowest:.5g} rad/s: "
-            "dampers of bearings act on the motion seen from the carrier, and so may excite a whirl there"
-        )
     if train.carriers and train.driven.torque is not None and len(response.time):
         late = response.speed[3 * len(response.time) // 4 :, train.shaft_number(train.driven.shaft)]
         nominal, mean = model.steady_speed, float(late.mean())

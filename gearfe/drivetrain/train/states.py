@@ -84,7 +84,7 @@ def train_states(model: TrainModel, trajectory: Trajectory) -> TrainStates:
     power = speed * (arms * force + drag)
     ring_drives = np.array([line.given.ring_drives for line in model.meshes], dtype=bool)
     power = np.where(ring_drives, loss - power, power)  # what the external gear does not take away, friction does
-    turning, still = model.bearings.parts(q, v, a, acting)
+    turning, still = model.bearings.parts(q, v, a, acting, model.angle(t, 1))
     loads = model.fixed_axes(t, turning.reshape(len(t), -1, 2, 3)).reshape(len(t), -1, 6) + still
     return TrainStates(t, q, v, a, force, q @ rows.T, apart, push, power, loss, loads)
 
