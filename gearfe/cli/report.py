@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .arguments import REPORT, add_heading, add_job, add_json, print_results
+
+if TYPE_CHECKING:
+    from ..output.report_page import Run
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     from ..base.errors import InputError
     from ..base.files import output_folder, whole_set
     from ..base.progress import stage
-    from ..output.report_sheets import PICTURES_OF_RUN, PICTURES_OF_SEVERAL, date_of, run_of
+    from ..output.report_sheets import PICTURES_OF_RUN, PICTURES_OF_SEVERAL, date_of, joined, run_of
     from ..output.results import KINDS, kinds_of, read_all
     from .reporting import heading_of, write_report
 
@@ -57,14 +62,20 @@ def run(args: argparse.Namespace) -> int:
     newest = max((results.path for results in found), key=lambda path: path.stat().st_mtime)
     old = dict.fromkeys(results.name for results in found if results.path.stat().st_mtime < job.stat().st_mtime)
     most = PICTURES_OF_RUN if len(found) == 1 else PICTURES_OF_SEVERAL
-    runs, drawn = [], set()
+    kinds: dict[str, dict[str, Run]] = {}
+    drawn = set()
     for results in found:
-        title = f"{results.kind.title[:1].upper()}{results.kind.title[1:]} ({results.name})"
         place_of = results.path.parent
-        alike = sum(other.path.parent == place_of for other in found)
+        here = sum(other.path.parent == place_of for other in found)
         # the pictures of a folder with several kinds of results are in the first of them
-        runs.append(run_of(results, title=title, most=0 if place_of in drawn else alike * most))
+        run = run_of(results, most=0 if place_of in drawn else here * most)
+        kinds.setdefault(run.title, {})[results.name.removeprefix(f"{results.kind.name}/")] = run
         drawn.add(place_of)
+    runs = [
+        joined(title, alike) if len(alike) > 1 else replace(run, title=f"{title} ({name})")
+        for title, alike in kinds.items()
+        for name, run in list(alike.items())[:1]
+    ]
     folder = output_folder(args.out or place)
     with whole_set(folder, (REPORT,)) as made, stage("report"):
         heading = heading_of(args, raw, job.stem, date_of(newest))

@@ -44,7 +44,7 @@ def gears_of(raw: dict[str, Any], job: str) -> tuple[list[Picture], list[Sheet]]
     """Picture of the whole gearbox, or of the one pair, and data of the gears; nothing for jobs without gears."""
     from ..base.errors import InputError
     from ..base.tables.jobs import whole_gearbox
-    from ..output.report_sheets import gear_sheets, merged
+    from ..output.report_sheets import gear_sheets
 
     if not {"pair", "gears"} & raw.keys():
         return [], []
@@ -52,30 +52,27 @@ def gears_of(raw: dict[str, Any], job: str) -> tuple[list[Picture], list[Sheet]]
     from ..gears.geometry.derived import derived_geometry
     from ..gears.geometry.pair import pair_of
 
-    sheets: list[Sheet] = []
+    gears: dict[str, dict[str, Any]] = {}
+    pairs: dict[str, dict[str, Any]] = {}
     pictures: list[Picture] = []
     try:
         meshes = list(whole_gearbox(raw, job).meshes.values())
         for mesh in meshes[:MOST_MESHES]:
             pair = pair_of(mesh)
-            geometry = derived_geometry(pair)
-            data = [
-                {
-                    **geometry[name],
+            pairs[mesh.name] = geometry = derived_geometry(pair)
+            both = zip(mesh.gears, ("pinion", "wheel"), (pair.pinion, pair.wheel), materials_of(mesh), strict=True)
+            for named, side, gear, material in both:
+                gears[named.name] = {
+                    **geometry[side],
                     "pressure_angle_deg": math.degrees(gear.pressure_angle),
                     "helix_angle_deg": math.degrees(gear.helix_angle) if gear.helical else None,
                     "face_width_mm": 1e3 * gear.face_width,
                     "youngs_modulus_GPa": 1e-9 * material.youngs_modulus,
                 }
-                for name, gear, material in zip(
-                    ("pinion", "wheel"), (pair.pinion, pair.wheel), materials_of(mesh), strict=True
-                )
-            ]
-            sheets += gear_sheets(mesh.name, [named.name for named in mesh.gears], geometry, data)
         pictures = _drawn(raw, job, pair_of(meshes[0]))
     except InputError as error:
         print(f"gearfe: warning: the gears are not in the report: {error}", file=sys.stderr)
-    return pictures, merged(sheets)
+    return pictures, gear_sheets(gears, pairs)
 
 
 def loads_of(raw: dict[str, Any], job: str) -> list[Sheet]:

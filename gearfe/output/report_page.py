@@ -36,15 +36,22 @@ figcaption, summary { color: #57606a; font-size: .9em }
 table { border-collapse: collapse; font-size: .86em; font-variant-numeric: tabular-nums }
 td, th { border-bottom: 1px solid #e4e8ec; padding: .15em .9em .15em 0; text-align: left; vertical-align: top }
 th { font-weight: 600 } td.n, th.n { text-align: right }
-.side { display: flex; flex-wrap: wrap; gap: 0 2.5em; align-items: flex-start } .side figure { flex: 1 1 420px }
-.wide { overflow-x: auto } .wide td { white-space: nowrap }
+.side { display: flex; flex-wrap: wrap; gap: 0 2.5em; align-items: flex-start }
+.pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(420px, 100%), 1fr)); gap: 0 1.5em }
+.wide { overflow-x: auto; max-width: 100% } .wide td { white-space: nowrap }
 pre { background: #f6f8fa; padding: .8em 1em; font-size: .84em; white-space: pre-wrap; overflow-wrap: anywhere }
 details { margin: .4em 0 } details table { margin-left: 1.2em }
-@page { size: A4; margin: 15mm 14mm }
+@page { size: A4; margin: 12mm }
 @media print {
-  body { max-width: none; margin: 0; padding: 0; font-size: 9.5pt }
-  figure img { max-height: 88mm; width: auto } figure, tr, .side { break-inside: avoid }
-  h2, h3 { break-after: avoid } h2 { margin-top: .8em } details { display: none } .wide { overflow: visible }
+  body { max-width: none; margin: 0; padding: 0; font: 8pt/1.22 system-ui, sans-serif }
+  td, th { padding: .02em .6em .02em 0 }
+  .side { gap: 0 1.2em } .pictures { grid-template-columns: repeat(2, 1fr); gap: 0 4mm }
+  .many { grid-template-columns: repeat(3, 1fr) } .single { grid-template-columns: 1fr }
+  .single img { max-height: 70mm }
+  figure { margin: .4em 0 } figure img { max-height: 58mm; width: auto } figure, tr { break-inside: avoid }
+  h2, h3 { break-after: avoid } h2 { margin: .7em 0 .3em } h3 { margin: .6em 0 .2em } .under { margin: .1em 0 }
+  details { display: none } .wide { overflow: visible } .wide td { white-space: normal }
+  .wide td:first-child { white-space: nowrap }
 }
 """
 
@@ -107,7 +114,7 @@ class Run:
     tables
         Name -> columns; their first rows are folded.
     pictures
-        Files.
+        Caption -> file.
     """
 
     title: str
@@ -116,7 +123,7 @@ class Run:
     sheets: Sequence[Sheet] = ()
     summary: Mapping[str, Any] = field(default_factory=dict)
     tables: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
-    pictures: Sequence[Path] = ()
+    pictures: Mapping[str, Path] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -144,18 +151,17 @@ class Report:
     loads: Sequence[Sheet] = ()
 
 
-def picture_of(path: Path) -> Picture:
-    """A picture from a file."""
-    return Picture(path.name, PICTURES[path.suffix], path.read_bytes())
+def picture_of(path: Path, name: str = "") -> Picture:
+    """A picture from a file, with its own name by default."""
+    return Picture(name or path.name, PICTURES[path.suffix], path.read_bytes())
 
 
 def report_page(report: Report) -> str:
     """Return the page."""
     pictures, sheets = report.gears
-    gears = "".join(map(_figure, pictures)) + "<div>" + "".join(map(_sheet, sheets)) + "</div>"
-    parts = [("Gears", f'<div class="side">{gears}</div>')] if pictures or sheets else []
+    parts = [("Gears", _figures(pictures) + _sheets(sheets))] if pictures or sheets else []
     if report.loads:
-        parts.append(("Loads", "".join(map(_sheet, report.loads))))
+        parts.append(("Loads", _sheets(report.loads)))
     parts += [(run.title, _run(run)) for run in report.runs]
     parts.append(("Provenance", _provenance(report)))
     body = "".join(f"<h2>{html.escape(name)}</h2>\n{text}\n" for name, text in parts)
@@ -177,7 +183,7 @@ def _run(run: Run) -> str:
         "All figures": _mapping(run.summary),
         "Tables": "".join(_table(name, columns) for name, columns in run.tables.items()),
     }
-    text = "".join(map(_sheet, run.sheets)) + "".join(_figure(picture_of(path)) for path in run.pictures)
+    text = _sheets(run.sheets) + _figures([picture_of(path, name) for name, path in run.pictures.items()])
     if not run.sheets and run.said:
         text = f"<pre>{html.escape(run.said)}</pre>{text}"
         del folded["What the command printed"]
@@ -195,6 +201,25 @@ def _provenance(report: Report) -> str:
     libraries = f"<details><summary>Versions</summary>{_mapping(versions(LIBRARIES))}</details>"
     job = f"<details><summary>Job file</summary><pre>{html.escape(text)}</pre></details>" if text else ""
     return _mapping(rows) + libraries + job
+
+
+def _sheets(sheets: Sequence[Sheet]) -> str:
+    """Tables, narrow ones next to each other."""
+    return '<div class="side">' + "".join(f"<div>{_sheet(sheet)}</div>" for sheet in sheets) + "</div>\n"
+
+
+def _figures(pictures: Sequence[Picture]) -> str:
+    """Pictures, on paper two or three in a row."""
+    if not pictures:
+        return ""
+    across = " single" if len(pictures) == 1 else " many" if all(map(_upright, pictures)) else ""
+    return f'<div class="pictures{across}">' + "".join(map(_figure, pictures)) + "</div>\n"
+
+
+def _upright(picture: Picture) -> bool:
+    """Whether a PNG is less than 1.3 times as wide as it is high."""
+    width, height = (int.from_bytes(picture.content[i : i + 4], "big") for i in (16, 20))
+    return picture.kind == "image/png" and width < 1.3 * height
 
 
 def _sheet(sheet: Sheet) -> str:

@@ -19,6 +19,8 @@ from .run_numbers import NUMBERS, Number, entries, finite, mapping
 
 #: Rows of a table at most, and pictures of a kind in this order; others follow up to `PICTURES_OF_RUN`.
 MOST_ROWS, PICTURES_OF_RUN, PICTURES_OF_SEVERAL = 14, 4, 2
+#: Columns of numbers of a table, and meshes with a column of a quantity over the speed, at most.
+MOST_COLUMNS, MOST_MESHES = 6, 3
 FIRST = (
     "stiffness.png", "loadmap.png", "loadmap_load.png", "response.png", "spectrum.png", "radiated_power.png",
     "meshes.png", "waterfall.png", "campbell.png", "rating.png",
@@ -42,33 +44,42 @@ OVER_LOAD = (
     "transmission_error_peak_to_peak", "transmission_error_mean", "k_mesh_mean", "k_tangent_mean", "peak_pressure",
     "largest_hertzian", "edge_pressure", "root_stress", "largest_root_stress", "K_H_beta", "K_H_alpha",
 )  # fmt: skip
+#: Contact forces of a run: a column for each.
+FORCES = ("mean contact force", "smallest contact force under load", "largest contact force")
 #: Columns over the speed.
 OVER_SPEED = ("dynamic_factor", "share_without_contact", "peak_to_peak_transmission_error", "radiated_power")
+#: Those that are left out where they are 0 at all speeds.
+UNLESS_ZERO = ("share_without_contact", "acceleration_rms_")
 
 
-def gear_sheets(
-    mesh: str, names: Sequence[str], geometry: Mapping[str, Any], gears: Sequence[Mapping[str, Any]]
-) -> list[Sheet]:
-    """Table of the data of two gears and their mesh.
+def gear_sheets(gears: Mapping[str, Mapping[str, Any]], meshes: Mapping[str, Mapping[str, Any]]) -> list[Sheet]:
+    """Tables of the data of gears and meshes, a column for each.
 
     Parameters
     ----------
-    mesh : str
-        Name of the mesh, for the title.
-    names : sequence of str
-        Names of both gears.
-    geometry : mapping
-        Derived geometry of the pair.
-    gears : sequence of mapping
-        Data of both gears.
+    gears : mapping
+        Name of a gear -> its data.
+    meshes : mapping
+        Name of a mesh -> derived geometry of its pair.
     """
-    rows = [
-        [text, *(_text(gear.get(key)) for gear in gears)]
-        for key, text in OF_GEAR.items()
-        if any(gear.get(key) is not None for gear in gears)
+    sheets = [Sheet("Gears", ("", *names), _data_rows(OF_GEAR, data)) for names, data in _parts(gears)]
+    return sheets + [Sheet("Meshes", ("", *names), _data_rows(OF_MESH, data)) for names, data in _parts(meshes)]
+
+
+def _parts(data: Mapping[str, Mapping[str, Any]]) -> list[tuple[list[str], list[Mapping[str, Any]]]]:
+    """Names and data, as many at a time as a table is wide."""
+    names = list(data)
+    chosen = [names[i : i + MOST_COLUMNS] for i in range(0, len(names), MOST_COLUMNS)]
+    return [(some, [data[name] for name in some]) for some in chosen]
+
+
+def _data_rows(texts: Mapping[str, str], data: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """A row for each key that one of them has."""
+    return [
+        [text, *(_text(item.get(key)) for item in data)]
+        for key, text in texts.items()
+        if any(item.get(key) is not None for item in data)
     ]
-    pair = [[text, _text(geometry[key])] for key, text in OF_MESH.items() if key in geometry]
-    return [Sheet(f"Gears of {mesh}", ("", *names), rows), Sheet("", (), pair)]
 
 
 def _text(value: Any) -> str:
@@ -106,7 +117,7 @@ def run_of(results: Results, *, title: str = "", command: str = "", said: str = 
         sheets=sheets_of(results),
         summary=results.summary,
         tables=tables,
-        pictures=pictures[:most],
+        pictures={path.name: path for path in pictures[:most]},
     )
 
 
@@ -115,15 +126,84 @@ def sheets_of(results: Results) -> list[Sheet]:
     return SHEETS.get(results.kind.name, _of_numbers)(results)
 
 
-def merged(sheets: Sequence[Sheet]) -> list[Sheet]:
-    """Tables, those with the same cells as one with both titles."""
-    found: dict[tuple[tuple[str, ...], ...], list[Sheet]] = {}
-    for sheet in sheets:
-        found.setdefault(tuple(tuple(row) for row in sheet.rows), []).append(sheet)
-    return [
-        Sheet("; ".join(dict.fromkeys(one.title for one in alike if one.title)), alike[0].head, rows, alike[0].note)
-        for rows, alike in found.items()
-    ]
+def joined(title: str, runs: Mapping[str, Run]) -> Run:
+    """One run of runs of the same kind, one for each mesh: their tables as one, with columns or rows for each.
+
+    Parameters
+    ----------
+    title : str
+        Heading.
+    runs : mapping
+        Name of the mesh -> its run.
+    """
+    titles = dict.fromkeys(sheet.title for run in runs.values() for sheet in run.sheets)
+    sheets: list[Sheet] = []
+    for text in titles:
+        alike = {name: sheet for name, run in runs.items() for sheet in run.sheets if sheet.title == text}
+        sheets += _in_columns(text, alike) if all(_has_units(sheet) for sheet in alike.values()) else [
+            _in_rows(text, alike)
+        ]  # fmt: skip
+    return Run(
+        title,
+        command="; ".join(run.command for run in runs.values() if run.command),
+        said="\n".join(run.said for run in runs.values() if run.said),
+        sheets=sheets,
+        summary={name: run.summary for name, run in runs.items()},
+        tables={f"{name}/{table}": columns for name, run in runs.items() for table, columns in run.tables.items()},
+        pictures={f"{name}: {file}": path for name, run in runs.items() for file, path in run.pictures.items()},
+    )
+
+
+def _has_units(sheet: Sheet) -> bool:
+    """Whether a table has a quantity in each row, with its unit in the last column."""
+    return bool(sheet.head) and sheet.head[-1] == "unit"
+
+
+def _in_columns(title: str, sheets: Mapping[str, Sheet]) -> list[Sheet]:
+    """Tables of quantities as one or more with columns for each."""
+    found: list[Sheet] = []
+    names = list(sheets)
+    wide = max(
+        1, MOST_COLUMNS // max(1 if "error" in sheets[name].head else len(sheets[name].head) - 2 for name in names)
+    )
+    for some in (names[i : i + wide] for i in range(0, len(names), wide)):
+        quantities: dict[str, str] = {row[0]: row[-1] for name in some for row in sheets[name].rows}
+        head, columns = [], []
+        for name in some:
+            sheet = sheets[name]
+            cells = {row[0]: list(row[1:-1]) for row in sheet.rows}
+            if "error" in sheet.head:
+                cells = {quantity: [" ".join(values).strip()] for quantity, values in cells.items()}
+                head.append(name)
+            else:
+                head += list(sheet.head[1:-1])
+            count = len(next(iter(cells.values()), []))
+            columns.append([cells.get(quantity, ["-"] * count) for quantity in quantities])
+        rows = [
+            [quantity, *(cell for column in columns for cell in column[i]), unit]
+            for i, (quantity, unit) in enumerate(quantities.items())
+        ]
+        found.append(Sheet(title, ("", *head, "unit"), rows, _notes({name: sheets[name] for name in some})))
+    return found
+
+
+def _in_rows(title: str, sheets: Mapping[str, Sheet]) -> Sheet:
+    """Tables of columns as one with the rows of each."""
+    heads = dict.fromkeys(cell for sheet in sheets.values() for cell in sheet.head)
+    rows = []
+    for name, sheet in sheets.items():
+        for row in sheet.rows:
+            cells = dict(zip(sheet.head, row, strict=True))
+            rows.append([name, *(cells.get(head, "-") for head in heads)])
+    return Sheet(title, ("mesh", *heads), rows, _notes(sheets))
+
+
+def _notes(sheets: Mapping[str, Sheet]) -> str:
+    """Notes of several tables; what all of them say, once."""
+    notes = {name: sheet.note for name, sheet in sheets.items() if sheet.note}
+    if len(notes) == len(sheets) and len(set(notes.values())) == 1:
+        return next(iter(notes.values()))
+    return "; ".join(f"{name}: {note}" for name, note in notes.items())
 
 
 def _number_rows(numbers: Sequence[Number]) -> list[list[str]]:
@@ -149,6 +229,27 @@ def _of_numbers(results: Results) -> list[Sheet]:
     """The first numbers of a run."""
     rows = _number_rows(_numbers(results)[: 2 * MOST_ROWS])
     return [Sheet("Results", ("quantity", "value", "error", "unit"), rows, _note(results, rows))]
+
+
+def _of_vibration(results: Results) -> list[Sheet]:
+    """Contact forces by mesh, then the other numbers."""
+    numbers = [number for number in _numbers(results) if np.isfinite(number.value)]
+    forces: dict[str, dict[str, str]] = {}
+    others: list[Number] = []
+    lines: list[Number] = []
+    for number in numbers:
+        text, _, mesh = number.name.partition(" of ")
+        if text in FORCES:
+            forces.setdefault(mesh, {})[text] = f"{_text(number.value)} {_error(number)}".strip()
+        else:
+            (lines if ", line " in number.name else others).append(number)
+    rows = [[mesh, *(cells.get(text, "-") for text in FORCES)] for mesh, cells in forces.items()]
+    sheets = [Sheet("Contact forces", ("mesh", *(f"{text} (N)" for text in FORCES)), rows)] if rows else []
+    head = ("quantity", "value", "error", "unit")
+    for title, chosen in (("Results", others), ("Largest lines", lines)):
+        if chosen:
+            sheets.append(Sheet(title, head, _number_rows(chosen[:MOST_ROWS])))
+    return [*sheets, Sheet("", (), (), _note(results, [row for sheet in sheets[1:] for row in sheet.rows]))]
 
 
 def _note(results: Results, rows: Sequence[Sequence[str]]) -> str:
@@ -204,20 +305,31 @@ def _over_speed(results: Results) -> list[Sheet]:
     if rms:
         chosen.append(max(rms, key=lambda name: float(np.nanmax(main[name], initial=0.0))))
     rows = np.unique(np.linspace(0, len(main["speed_rad_per_s"]) - 1, MOST_ROWS).round().astype(int))
-    columns = {name: main[name][rows] for name in ("speed_rpm", "speed_rad_per_s", *chosen) if name in main}
+    columns: dict[str, Array] = {name: main[name][rows] for name in ("speed_rpm", "speed_rad_per_s") if name in main}
+    for begin in (*OVER_SPEED, "acceleration_rms_"):
+        family = {name: main[name][rows] for name in chosen if name.startswith(begin)}
+        if begin in UNLESS_ZERO and not any(np.nan_to_num(main[name]).any() for name in family):
+            continue
+        if len(family) > MOST_MESHES:
+            unit = unit_of(next(iter(family))).key
+            largest = np.nanmax(np.array(list(family.values()), dtype=float), axis=0)
+            family = {f"largest_{begin}" + (f"_{unit}" if unit else ""): largest}
+        columns |= family
     sheets = [
         _columns_sheet(
             "Results over the speed", columns, f"{len(rows)} of {len(main['speed_rad_per_s'])} steady states"
         )
     ]
-    peaks = [peak for peak in results.summary.get("peaks") or () if isinstance(peak, Mapping)]
+    peaks: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
+    for peak in results.summary.get("peaks") or ():
+        if isinstance(peak, Mapping):
+            excitation = f"{_short(str(peak.get('order')))} at {_text(peak.get('frequency_Hz'))} Hz"
+            where = _text(peak.get("speed_rad_per_s")), excitation, str(peak.get("mode") or "no mode near")
+            peaks.setdefault(where, []).append(peak)
     found = [
-        [
-            _text(peak.get("speed_rad_per_s")), f"{peak.get('order')} at {_text(peak.get('frequency_Hz'))} Hz",
-            str(peak.get("mode") or "no mode near"), f"{_text(peak.get('dynamic_factor'))} in {peak.get('mesh')}",
-        ]
-        for peak in peaks[:6]
-    ]  # fmt: skip
+        [*where, f"{_text(alike[0].get('dynamic_factor'))} in {', '.join(str(peak.get('mesh')) for peak in alike)}"]
+        for where, alike in list(peaks.items())[:6]
+    ]
     if found:
         sheets.append(Sheet("Peaks of the dynamic factor", ("speed (rad/s)", "order", "mode", "dynamic factor"), found))
     largest = results.summary.get("largest_error_estimate")
@@ -225,6 +337,13 @@ def _over_speed(results: Results) -> list[Sheet]:
         note = f"error of the harmonic balance: at most {_percent(largest)} of the approach under the steady force"
         sheets.append(Sheet("", (), (), note))
     return sheets
+
+
+def _short(order: str) -> str:
+    """An order of meshes that coincide, "3 x mesh 1 = 3 x mesh 2 = 3 x mesh 3", as "3 x mesh 1 to mesh 3"."""
+    terms = order.split(" = ")
+    factors = {term.partition(" x ")[0] for term in terms}
+    return order if len(terms) < 3 or len(factors) > 1 else f"{terms[0]} to {terms[-1].partition(' x ')[2]}"
 
 
 def _columns_sheet(title: str, columns: Mapping[str, Array], note: str) -> Sheet:
@@ -295,12 +414,11 @@ def _of_modes(results: Results) -> list[Sheet]:
         [
             str(mode.get("name")), _text(mode.get("frequency_Hz")),
             _text(mode.get("frequency_at_the_fastest_speed_Hz")), _text(100.0 * finite(mode.get("damping_ratio"))),
-            str(mode.get("label") or ""),
         ]
-        for mode in modes[: 2 * MOST_ROWS]
+        for mode in modes[:MOST_ROWS]
     ]  # fmt: skip
     if rows:
-        head = ("mode", "first speed (Hz)", "last speed (Hz)", "damping (%)", "what moves")
+        head: tuple[str, ...] = ("mode", "first speed (Hz)", "last speed (Hz)", "damping (%)")
         note = f"{len(rows)} of {len(modes)} modes" if len(rows) < len(modes) else ""
         sheets.append(Sheet("Natural frequencies", head, rows, note))
     drive = finite(summary.get("speed_of_the_drive_rad_per_s"))
@@ -311,7 +429,7 @@ def _of_modes(results: Results) -> list[Sheet]:
     rows = [
         [
             _text(c.get("speed_rad_per_s")), _text(30.0 / math.pi * finite(c.get("speed_rad_per_s"))),
-            _text(c.get("frequency_Hz")), str(c.get("order")), f"{c.get('mode')}: {c.get('label')}",
+            _text(c.get("frequency_Hz")), _short(str(c.get("order"))), f"{c.get('mode')}: {c.get('label')}",
         ]
         for c in met[:MOST_ROWS]
     ]  # fmt: skip
@@ -331,6 +449,7 @@ SHEETS: dict[str, Callable[[Results], list[Sheet]]] = {
     "runup": _over_speed,
     "rating": _of_rating,
     "modes": _of_modes,
+    "vibration": _of_vibration,
 }
 
 

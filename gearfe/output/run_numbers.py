@@ -203,6 +203,8 @@ def _vibration_numbers(run: Results) -> list[Number]:
         found.append(Number(text, "Hz", finite(value), *entry(name, i)))
     name = "peak_attachment_accelerations_m_per_s2"
     for bore, value in mapping(summary.get(name)).items():
+        if value == 0.0:  # of a rigid housing
+            continue
         text = f'largest acceleration at attachment "{bore}"'
         found.append(Number(text, "m/s²", finite(value), *entry(name, bore)))
     power = mapping(summary.get("radiated_power"))

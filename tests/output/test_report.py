@@ -19,7 +19,7 @@ from gearfe.base.files import write_csv, write_json
 from gearfe.base.tables.examples import job_file
 from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.overview import overview_sheets
-from gearfe.output.report_sheets import run_of
+from gearfe.output.report_sheets import joined, run_of
 from gearfe.output.results import kinds_of, read_all
 from gearfe.output.run_curves import PANELS
 from tests.places import GEOMETRY
@@ -215,6 +215,46 @@ def test_forces_of_bearings_do_not_need_the_rating(tmp_path: Path, monkeypatch: 
     raw = tomllib.loads(path.read_text(encoding="utf-8"))
     titles = [sheet.title for sheet in overview_sheets(path, raw)]
     assert titles == ["Loads in steady running", "Bearing forces in steady running", ""]
+
+
+def test_meshes_of_a_gearbox_share_one_table(tmp_path: Path) -> None:
+    """Ratings of two meshes are columns, those of run-ups rows; each gear has one column of data."""
+    path = gearbox(tmp_path)
+    out = tmp_path / "out"
+    assert main(["rating", str(path), "--out", str(out / "rating"), "--no-pictures"]) == 0
+    assert main(["report", str(path), "--results", str(out)]) == 0
+    page = page_of(out / "report.html")
+    assert page.printed.count("Load capacity by ISO 6336:2019") == 1
+    assert page.printed.count("number of teeth") == 1
+    raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    runs = {
+        run.name: run_of(run) for mesh in raw["meshes"] for run in read_all(out / "rating" / mesh, "--results", mesh)
+    }
+    (sheet,) = joined("Rating", runs).sheets
+    gears = [gear for mesh in raw["meshes"].values() for gear in (mesh["driver"], mesh["driven"])]
+    assert list(sheet.head) == ["", *gears, "unit"]
+    for number, run in enumerate(runs.values()):
+        row = next(row for row in run.sheets[0].rows if row[0].startswith("S_H"))
+        both = next(row for row in sheet.rows if row[0].startswith("S_H"))
+        assert both[1 + 2 * number : 3 + 2 * number] == row[1:3]
+
+
+def test_contact_forces_are_a_row_for_each_mesh(tmp_path: Path) -> None:
+    write_csv(tmp_path / "response.csv", {"time_s": [0.0, 1.0], "contact_force_1": [1.0, 2.0]})
+    summary = {
+        "meshes": ["first", "second"],
+        "mean_contact_forces_N": [10.0, 20.0],
+        "largest_contact_forces_N": [11.0, 21.0],
+        "peak_attachment_accelerations_m_per_s2": {"a": 0.0, "b": 2.0},
+    }
+    write_json(tmp_path / "summary.json", summary)
+    (run,) = read_all(tmp_path, "results")
+    forces, others, _ = run_of(run).sheets
+    assert [list(row) for row in forces.rows] == [
+        ["first", "10 ± ?", "-", "11 ± ?"],
+        ["second", "20 ± ?", "-", "21 ± ?"],
+    ]
+    assert [row[0] for row in others.rows] == ['largest acceleration at attachment "b"']  # of a rigid housing all are 0
 
 
 def test_values_of_modes_that_are_null_are_left_out(tmp_path: Path) -> None:

@@ -301,7 +301,7 @@ class _Written:
         notes: list[str] = []
         if self.derived:
             x = self.named[self.derived].form["profile_shift"]
-            notes.append(f"profile_shift of {self.called[self.derived]} by the centre distance: {x:.6g}")
+            notes.append(f"profile_shift of {self.called[self.derived]} by the centre distance: {x + 0.0:.6g}")
         for side, thinned in self.thinned_um.items():
             if thinned < 0.0:
                 off = -thinned * math.cos(self._angle(side))
