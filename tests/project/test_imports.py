@@ -50,6 +50,6 @@ def test_a_sweep_on_stored_gears_loads_no_mesher_no_finite_elements_and_no_plots
 @pytest.mark.parametrize("program", [False, True])
 def test_only_the_program_leaves_out_the_property_lists_of_matplotlib(program):
     start = "from gearfe.base.isolation import leave_working_folder as leave; leave()\n" if program else ""
-    code = "import gearfe.figures\nfrom matplotlib.lines import Line2D\nprint('linestyle' in Line2D.set.__doc__)"
+    code = "import gearfe.figures\nfrom matplotlib.lines import Line2D\nprint('linestyle' in str(Line2D.set.__doc__))"
     done = subprocess.run([sys.executable, "-c", start + code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.split() == [str(not program)]
