@@ -18,9 +18,9 @@ Mechanics*, 1985, eq. 2.30), :math:`\tan\theta_{1,2} = z/(x-\xi\pm\tfrac12 w)` a
     \tau_{xz} = \tfrac{p}{2\pi}(\cos 2\theta_2-\cos 2\theta_1).
 
 Both pressures have the same resultant at the same place. The stress of their difference falls with the cube of the
-distance, so the shape of the tooth hardly affects it. Depths are those below the curved flank. Where a contact is
-wider than a bump the elements resolve it, and where it is nearer to an end of the flank than a, there is no room for
-one: nothing is changed.
+distance, so the shape of the tooth hardly affects it. Depths are those below the curved flank. If a contact is wider
+than a bump, the elements resolve it. If it is closer to an end of the flank than a, there is no room for a bump. In
+both cases nothing is changed.
 """
 
 from __future__ import annotations

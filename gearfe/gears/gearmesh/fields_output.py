@@ -112,8 +112,8 @@ def write_fields(
 def fields_size(elastic: MeshingPair, positions: int) -> int:
     """Bytes of ``fields.vtkhdf`` with so many positions, without headers and the rounding of its arrays to whole MB.
 
-    A position has at each node three coordinates of 8 bytes and eight values of 4, and a byte for each element; the
-    elements themselves, six numbers of 8 bytes, an offset and a kind, stand once.
+    A position has three coordinates of 8 bytes and eight values of 4 bytes at each node, and a byte for each element.
+    The elements themselves (six numbers of 8 bytes, an offset and a kind) are stored once.
     """
     nodes = sum(body.teeth * (len(body.mesh.points) - len(body.mesh.cut_left)) for body in elastic.bodies)
     elements = sum(body.teeth * len(body.mesh.triangles) for body in elastic.bodies)

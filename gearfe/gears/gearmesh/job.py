@@ -2,8 +2,8 @@
 
 Curves are kept on disk: a second run with the same gears, load and mesh sizes reads its curve.
 
-A stored curve is named by a hash of all that decides it: the pair, materials, contact law, sizes and positions, the
-versions of numpy, scipy and gmsh, and the source of the packages that compute it.
+A stored curve is named by a hash of everything that affects it. This is the pair, materials, contact law, sizes and
+positions, the versions of numpy, scipy and gmsh, and the source of the packages that compute it.
 """
 
 from __future__ import annotations

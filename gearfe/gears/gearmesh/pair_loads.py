@@ -11,8 +11,9 @@ The computed pressure has a half width b by its own second moment (`gears.contac
 contact, teeth that are no half-planes. On flanks with deviations of micrometres the curvature at first contact may be
 that of a wave shorter than the contact; there :math:`2F/(\pi b w)` is the pressure.
 
-Where the contact reaches an edge of a face, the pressure of linear elasticity has no bound (a sharp tip, the kink where
-a linear relief starts, the edge of an undercut), or the radius of a tip round decides it. The pressure given there is
+If the contact reaches an edge of a face, the pressure of linear elasticity has no bound, or depends on the radius of a
+tip round. Unbounded are sharp tips, the kink where a linear relief starts, and the edge of an undercut. The pressure
+given there is
 
 .. math:: p_e = \frac{2F}{\pi w \sqrt{b^2 + \epsilon^2}}, \qquad \epsilon = 0.01\,m,
 

@@ -1,8 +1,9 @@
 """Computed values next to those that a rating takes: stiffness, pressure, root stress, load factor of the width.
 
-Loads are nominal, those of the rating without its factors K. Where one pair of teeth carries all of it, the standard's
-stress at B, C and D holds Z_eps for the other pair, which the computed pressure lacks. Root stresses are the largest at
-positions with one loaded pair, next to sigma_F0 with the load at the outer point of single pair contact.
+Loads are nominal, those of the rating without its factors K. If one pair of teeth carries the whole load, the
+standard's stress at B, C and D still contains Z_eps for the other pair. The computed pressure does not. Root stresses
+are the largest at positions with one loaded pair, next to sigma_F0 with the load at the outer point of single pair
+contact.
 """
 
 from __future__ import annotations

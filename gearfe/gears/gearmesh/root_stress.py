@@ -11,11 +11,12 @@ surface, with the arc length s and the unit tangent t
 displacement are most accurate (Barlow, Int. J. Numer. Meth. Eng. 10, 1976), and the largest stress along the fillet
 from a parabola through the three largest values that lie together.
 
-What the fillet feels of the flank is linear in the flank forces and hardly knows how these are spread (Saint-Venant):
-each gear gets two meshes with a fine fillet and a coarse flank, of sizes h and h/2, and from each the rows "stress at
-the fillet for forces on the flank nodes of the contact mesh" of a loaded tooth and of its neighbours. The value is that
-of h/2, and :math:`|\sigma_{h/2} - \sigma_h|` the estimate of its error: with errors of order two about three times the
-error itself, because the little that is left (0.1 %) no longer falls smoothly enough to be extrapolated.
+The stress at the fillet is linear in the flank forces and hardly depends on their distribution (Saint-Venant). Each
+gear therefore has two meshes with a fine fillet and a coarse flank, of sizes h and h/2. Each mesh gives the rows
+"stress at the fillet for forces on the flank nodes of the contact mesh" of a loaded tooth and of its neighbours. The
+value is that of h/2, and :math:`|\sigma_{h/2} - \sigma_h|` the estimate of its error. With errors of order two this is
+about three times the error itself. The value is not extrapolated, because the remaining error (0.1 %) does not fall
+smoothly enough.
 """
 
 from __future__ import annotations

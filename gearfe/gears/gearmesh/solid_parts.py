@@ -1,8 +1,8 @@
 r"""Meshes in space of gears whose load varies along the face width, with their modifications: for other programs.
 
 A gear is its section, turned by :math:`\kappa z` along the axis, in layers of wedges. Its driving flanks have the
-material h(s, z) of all their modifications: nodes of the flanks move by it along the normal of the section, nodes below
-them by less, down to nothing at the depth `FADED`, so that no element is turned inside out. The tilts of the axes
+material h(s, z) of all their modifications. Nodes of the flanks are displaced by it along the normal of the section,
+nodes below them by less, and by zero at the depth `FADED`. No element is inverted by this. The tilts of the axes
 displace the wheel's sections, as in `gearfe.gears.width.flanks`.
 """
 

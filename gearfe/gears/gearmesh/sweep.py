@@ -1,12 +1,12 @@
 r"""The sweep of a gear pair over pinion angle and load: a stiffness curve is a map with one load.
 
-Conventions: pinion centre at the origin, wheel at +x; at pinion angle 0 a pinion tooth stands on the line of centres
-and a wheel space faces it; angles are counter-clockwise; wheel angle = -pinion angle z1/z2 + lost motion + twist. The
-lost motion is half the backlash: it brings unmodified driving flanks to touch, and a positive twist presses them
+Conventions: the pinion centre is at the origin, the wheel at +x. At pinion angle 0 a pinion tooth is on the line of
+centres and faces a wheel space. Angles are counter-clockwise. Wheel angle = -pinion angle z1/z2 + lost motion + twist.
+The lost motion is half the backlash: it brings unmodified driving flanks to touch, and a positive twist presses them
 together.
 
 All cells, angle by load, are solved side by side in `Grid.solve`, at given twists or at the twists that carry given
-torques; angles after which the same teeth meet again are solved once.
+torques. Angles after which the same teeth meet again are solved once.
 
     >>> curve = sweep_stiffness(pair, twist=math.radians(0.05))   # one mesh cycle in 20 positions
     >>> k, slope = curve.interpolate(math.radians(7.3))           # N/m and N/(m rad)
