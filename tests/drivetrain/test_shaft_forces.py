@@ -182,6 +182,26 @@ def test_means_begin_after_the_ramps_of_forces() -> None:
     assert early.load_end == free.load_end
 
 
+@pytest.mark.parametrize(("table", "named"), [("drive", "drive"), ("loads", "load 1"), ("forces", "force 1")])
+def test_a_ramp_that_begins_after_the_end_of_the_run_is_named(table: str, named: str) -> None:
+    """A ramp of 2 ms about its middle: in a run of 0.1 ms it begins after the end, or before it."""
+    raw = gearbox("y_mm = 0.0\nforce_x_N = 300.0")
+    entry = raw["train"][table] if table == "drive" else raw["train"][table][0]
+    for middle, late in ((3.0, True), (1.0, False)):
+        entry |= {"ramp_centre_ms": middle, "ramp_width_ms": 2.0}
+        said = simulate(model_of(raw), np.linspace(0.0, 1e-4, 3), method="taylor").warnings
+        assert any(f"the ramp of the {named}" in text and "never acts" in text for text in said) == late
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_the_force_that_is_refused_is_named_by_its_number(number: int) -> None:
+    raw = gearbox("y_mm = 0.0\nforce_x_N = 1.0")
+    raw["train"]["forces"] = 2 * raw["train"]["forces"]
+    raw["train"]["forces"][number - 1] = raw["train"]["forces"][number - 1] | {"y_mm": 1e4}
+    with pytest.raises(InputError, match=f"force {number} on"):
+        model_of(raw)
+
+
 def test_unknown_shafts_and_turning_frames_are_refused() -> None:
     raw = gearbox("y_mm = 0.0\nforce_x_N = 1.0")
     raw["train"]["forces"][0]["shaft"] = "ouput"

@@ -374,15 +374,14 @@ def _check_ends(train: GearTrain) -> None:
         _check_machine(train, label, part)
     for load in train.loads:
         _check_orders(train, load)
-    for force in train.forces:
-        _check_force(train, force)
+    for number, force in enumerate(train.forces, 1):
+        _check_force(train, force, f"force {number} on {force.shaft!r}")
     if not train.meshes and len(train.shafts) > 1:
         raise InputError("train.meshes", None, "no gear is driven: the train has no mesh", "add a mesh")
 
 
-def _check_force(train: GearTrain, force: ShaftForce) -> None:
+def _check_force(train: GearTrain, force: ShaftForce, label: str) -> None:
     """A force acts on its shaft, whose motion is not described in a frame that turns."""
-    label = f"force on {force.shaft!r}"
     _known(label, "shaft", force.shaft, [shaft.name for shaft in train.shafts])
     if not all(math.isfinite(value) for value in (*force.values, force.along)):
         raise InputError(label, None, "must be finite", "give N, N m and m")

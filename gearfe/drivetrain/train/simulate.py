@@ -16,7 +16,7 @@ from ...base.progress import count, stage
 from ...base.record_spectrum import FASTEST, OVERSAMPLING
 from ...base.typing import Array
 from ...fem.reduction.error import reduction_error
-from ...multibody import IntegrationError, Start, Status, Trajectory, integrate
+from ...multibody import IntegrationError, Start, Status, Trajectory, constant, integrate
 from ...multibody.integrators.integrate import chosen_method
 from .gear_train import Drive, Load
 from .model import TrainModel
@@ -284,7 +284,9 @@ def _whole(
     """The last piece with estimates and warnings of the whole run."""
     warnings = model.mesh_notes + model.operating.warnings + totals.pulls(model) + _loose(model)
     warnings += totals.beyond(model) + unbalanced(model) + _frames(model, response)
-    if response.status != "done":
+    if response.status == "done":
+        warnings += _late_ramps(model, response.time_reached)
+    else:
         warnings.append(f"the run ended at {1e3 * response.time_reached:.6g} ms {ended}")
     estimates: dict[str, float] = {}
     if finer is not None:
@@ -292,6 +294,20 @@ def _whole(
         if model.train.housing is not None:
             estimates["reduction"] = reduction_error(model.train.housing, options.band_hz).response
     return replace(response, estimates=estimates, warnings=tuple(warnings))
+
+
+def _late_ramps(model: TrainModel, end: float) -> list[str]:
+    """Return sentences about ramps that begin at the end of the run (s) or later."""
+    train = model.train
+    ramps = [("drive", train.driven.speed), ("drive", train.driven.torque or constant(0.0))]
+    ramps += [(f"load {number} on shaft {load.shaft}", load.torque) for number, load in enumerate(train.loads, 1)]
+    ramps += [(f"force {number} on shaft {force.shaft}", force.over) for number, force in enumerate(train.forces, 1)]
+    return [
+        f"the ramp of the {name} begins at {1e3 * ramp.breaks[0]:.6g} ms, and the run ends at {1e3 * end:.6g} ms: it "
+        "never acts; begin the ramp earlier, or simulate longer"
+        for name, ramp in ramps
+        if ramp.breaks and ramp.breaks[0] >= end
+    ]
 
 
 def unbalanced(model: TrainModel) -> list[str]:
