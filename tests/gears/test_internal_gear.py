@@ -372,15 +372,24 @@ def test_mistakes_are_named_with_field_range_and_cure(
     assert not (tmp_path / "out").exists()
 
 
-def test_contact_over_the_width_refuses_internal_pairs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_contact_over_the_width_takes_internal_pairs_with_held_rims(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     helix = (
-        ("face_width_mm = 50.0", "face_width_mm = 50.0\nhelix_angle_deg = 15.0"),
+        ("face_width_mm = 50.0", "face_width_mm = 8.0\nhelix_angle_deg = 15.0"),
         ("\ncentre_distance_mm = -78.0", ""),
     )
     other = ("addendum = 0.9\n", "addendum = 0.85\n"), ("rim_diameter_mm = 280.0", "rim_diameter_mm = 300.0")
-    path = job(tmp_path, *helix, *other, ("[meshes.outer]", "[stiffness]\ntorque_Nm = 500.0\n\n[meshes.outer]"))
-    assert main(["stiffness", path, "--out", str(tmp_path / "out")]) == 2
-    assert "contact over the width takes external gears only" in capsys.readouterr().err
+    table = ("[meshes.outer]", "[stiffness]\ntorque_Nm = 50.0\nangle_step_deg = 5.0\n\n[meshes.outer]")
+    run = ["stiffness", job(tmp_path, *helix, *other, table), "--out", str(tmp_path / "out"), "--no-pictures"]
+    assert main([*run, "--no-estimate"]) == 0
+    axial = 50.0 * math.tan(math.radians(15.0)) / (0.5 * 61 * 4e-3 / math.cos(math.radians(15.0)))
+    assert f"axial force on the wheel {-axial:.4g} N" in capsys.readouterr().out
+    free = ("rim_diameter_mm = 300.0", 'rim_diameter_mm = 300.0\nrim = "free"')
+    assert main(["stiffness", job(tmp_path, *helix, *other, free, table), "--out", str(tmp_path / "free")]) == 2
+    message = capsys.readouterr().err
+    assert "rim" in message
+    assert 'give rim = "bolted"' in message
 
 
 def test_hands_of_helical_internal_pairs_are_equal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

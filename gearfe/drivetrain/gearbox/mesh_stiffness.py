@@ -343,13 +343,6 @@ def _check_wide(job: TrainJob, train: GearTrain, number: int) -> None:
     """Raise `InputError` for what a law or spring over the face width does not take, with what a train can do."""
     named, table = job.meshes[number], job.table.meshes[number]
     cause, _ = named.along_width(("left", "right"), places=False) or ("", None)
-    gear = train.gear(train.meshes[number].driven).gear
-    if gear.internal:
-        problem = (
-            f"is an internal gear, whose load {cause} makes vary along the face width: only external ones have that"
-        )
-        cure = "give the mesh stiffness_N_per_m, mesh_table or curve"
-        raise InputError(f"{named.driven.where}.teeth", -abs(gear.teeth), problem, cure)
     if table.friction or table.roughness_um:
         key = "friction" if table.friction else "roughness_um"
         problem = f"needs forces of single tooth pairs, and {cause} makes the load vary along the face width"

@@ -219,7 +219,7 @@ class FieldGear:
             widths = 2 * system.axial.functions[0].count, system.axial.width
             every = np.eye(len(at_sides))
             teeth = self.sector.teeth
-            found.append(cyclic_response(system.factor.schur, every, at_sides, widths, teeth, range(teeth)))
+            found.append(cyclic_response(system.factor.schur, every, at_sides, widths, self.sector.pitch, range(teeth)))
         return found
 
     def nodal(self, system: FieldSystem, loads: Array) -> Array:
@@ -334,7 +334,7 @@ def field_gear(lines: ContactLines, gear: int) -> FieldGear:
     for system in axial_systems(mesh, gear, places=z):
         factor = condense_extruded(
             sector.points, sector.triangles, integrals, system.functions,
-            retained=sides, fixed=np.unique(sector.boundaries["bore"]),
+            retained=sides, fixed=np.unique(sector.held),
             layers=layers_of(mesh, gear, sector),
         )  # fmt: skip
         loads = loads_of(mesh, gear, system, sector.points[flank.nodes], nodal)
@@ -409,7 +409,7 @@ def line_contacts(lines: ContactLines, sweep: WidthSweep, cell: tuple[int, int],
     """
     mesh, law, points = lines.compliance.mesh, lines.law, sweep.points
     here = np.flatnonzero((points.load == cell[0]) & (points.position == cell[1]))
-    middle = sweep.angle[cell[1]] - 0.5 * mesh.sections.gear_ratio * sweep.twist[cell]
+    middle = sweep.angle[cell[1]] - 0.5 * mesh.ratio * sweep.twist[cell]
     teeth = first_teeth(mesh, lines.flanks.profiles)
     soft = sum(side.local.inverse_modulus for side in lines.compliance.sides)
     found = []

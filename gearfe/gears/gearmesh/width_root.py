@@ -176,7 +176,7 @@ def fillet_mesh(lines: ContactLines, gear: int, size: float, higher: int) -> Fil
     flank, edges = flank_of(sector, 4), sector.boundaries["root_left"]
     nodal = bumps(flank, side.stations[:, None], side.bumps[:, None])
     nodes, of_edges = np.unique(edges, return_inverse=True)
-    reach = min(REACH, (section.teeth - 1) // 2)
+    reach = min(REACH, (section.tooth_count - 1) // 2)
     steps = tuple(range(-reach, reach + 1))
     sides = np.concatenate([sector.cut_right[:-1], sector.cut_left[:-1]])
     z = np.linspace(*mesh.faces[gear], PLACES)
@@ -184,7 +184,7 @@ def fillet_mesh(lines: ContactLines, gear: int, size: float, higher: int) -> Fil
     for system in axial_systems(mesh, gear, higher=higher, places=z):
         factor = condense_extruded(
             sector.points, sector.triangles, integrals, system.functions,
-            retained=sides, fixed=np.unique(sector.boundaries["bore"]),
+            retained=sides, fixed=np.unique(sector.held),
             layers=layers_of(mesh, gear, sector),
         )  # fmt: skip
         loads = loads_of(mesh, gear, system, sector.points[flank.nodes], nodal)
@@ -199,7 +199,7 @@ def fillet_mesh(lines: ContactLines, gear: int, size: float, higher: int) -> Fil
             held.append(forms.T @ eliminated)
             felt.append(at)
         widths = 2 * system.functions[0].count, width
-        response = cyclic_response(factor.schur, np.concatenate(felt, axis=1), at_sides, widths, section.teeth, steps)
+        response = cyclic_response(factor.schur, np.concatenate(felt, axis=1), at_sides, widths, sector.pitch, steps)
         response[reach] += np.concatenate(held)
         systems.append(FilletSystem(system, response.reshape(len(steps), len(nodes), width, *shape)))
     nu = material.poisson_ratio
@@ -332,7 +332,7 @@ def line_loads(lines: ContactLines, sweep: WidthSweep, gear: int, of_point: IntA
     """
     mesh, points = lines.compliance.mesh, sweep.points
     twist = sweep.twist[points.load, points.position]
-    angle = sweep.angle[points.position] - 0.5 * mesh.sections.gear_ratio * twist
+    angle = sweep.angle[points.position] - 0.5 * mesh.ratio * twist
     rows = rows_at(lines.law, angle + mesh.turns[0] * points.z + points.pair * mesh.sections.mesh_cycle)
     force = points.line_load * points.weight * (-1.0 if gear == 0 else 1.0)
     k = len(lines.compliance.sides[gear].local.stations)

@@ -98,15 +98,6 @@ def check_spur(pair: MeshGeometry, what: str) -> None:
         raise InputError("axial_offset", getattr(pair, "axial_offset", None), problem, cure)
 
 
-def check_external(pair: MeshGeometry, what: str) -> None:
-    """Raise `InputError` for internal pairs; `what` names the computation that takes external gears only."""
-    if pair.internal:
-        problem = f"is an internal gear: {what} takes external gears only"
-        raise InputError(
-            "wheel.teeth", pair.wheel.teeth, problem, "gearfe gear computes the geometry of internal pairs"
-        )
-
-
 def check_pair(pair: MeshGeometry) -> None:
     """Raise `InputError` for gears that cannot run together; `check_seat` comes first."""
     pinion, wheel = pair.pinion, pair.wheel

@@ -319,11 +319,11 @@ def _wide_flank(mesh: WideMesh, gear: int, sector: SectorMesh, whole: bool) -> W
 
 def _condensed(mesh: WideMesh, gear: int, sector: SectorMesh, nodal: Array, whole: bool) -> Array:
     """Return the finite-element part of the influences of a flank (m/N), as in `WideFlank`."""
-    section, material = mesh.gears[gear], mesh.materials[gear]
+    material = mesh.materials[gear]
     integrals = section_integrals(sector.points, sector.triangles, material, mesh.turns[gear])
     flank, n, steps, k = flank_of(sector, 4), mesh.count, _steps(mesh), len(nodal)
-    bore = np.unique(sector.boundaries["bore"])
-    sides = np.concatenate([sector.cut_right[:-1], sector.cut_left[:-1]])  # the last node of a cut lies on the bore
+    held = np.unique(sector.held)
+    sides = np.concatenate([sector.cut_right[:-1], sector.cut_left[:-1]])  # the last node of a cut is held
     influence = np.zeros((steps + 1, k, 2, n, k, 2, n))
     for system in axial_systems(mesh, gear):
         factor = condense_extruded(
@@ -332,7 +332,7 @@ def _condensed(mesh: WideMesh, gear: int, sector: SectorMesh, nodal: Array, whol
             integrals,
             system.functions,
             retained=sides if whole else sides[:0],
-            fixed=bore if whole else np.union1d(bore, sides),
+            fixed=held if whole else np.union1d(held, sides),
             layers=layers_of(mesh, gear, sector),
         )
         loads, chosen = loads_of(mesh, gear, system, sector.points[flank.nodes], nodal), system.loads
@@ -341,7 +341,7 @@ def _condensed(mesh: WideMesh, gear: int, sector: SectorMesh, nodal: Array, whol
         of_steps = np.zeros((steps + 1, eliminated.shape[1], eliminated.shape[1]))
         if whole:
             widths = 2 * system.functions[0].count, system.width
-            of_steps = cyclic_response(factor.schur, at_sides, at_sides, widths, section.teeth, range(steps + 1))
+            of_steps = cyclic_response(factor.schur, at_sides, at_sides, widths, sector.pitch, range(steps + 1))
         of_steps[0] += eliminated.T @ eliminated
         shape = k, 2, loads.shape[-1]
         influence[:, :, :, chosen, :, :, chosen] = of_steps.reshape(-1, *shape, *shape)
@@ -356,7 +356,7 @@ def _over_width(mesh: WideMesh, functions: AxialFunctions) -> Array:
 
 
 def cyclic_response(
-    stiffness: Array, felt: Array, loads: Array, widths: tuple[int, int], teeth: int, steps: Sequence[int]
+    stiffness: Array, felt: Array, loads: Array, widths: tuple[int, int], pitch: float, steps: Sequence[int]
 ) -> Array:
     """Linear forms of the displacement of the sector so many steps on from loads, of the whole gear, by its cut sides.
 
@@ -368,8 +368,8 @@ def cyclic_response(
         Forms (-) and loads (N) there.
     widths : pair of int
         Unknowns of a node that turn with the tooth, and all.
-    teeth : int
-        Number of teeth.
+    pitch : float
+        Angle from one sector to the next (rad), < 0 for an internal gear.
     steps : sequence of int
         Steps.
 
@@ -378,8 +378,9 @@ def cyclic_response(
     ndarray, shape (steps, r, c)
     """
     half, (plane, width) = len(stiffness) // 2, widths
-    angle = 2 * math.pi / teeth
-    c, s = math.cos(angle), math.sin(angle)
+    count = round(2 * math.pi / abs(pitch))
+    angle = 2 * math.pi / count
+    c, s = math.cos(pitch), math.sin(pitch)
     turn = np.eye(width)
     turn[:plane, :plane] = np.kron([[c, -s], [s, c]], np.eye(plane // 2))
 
@@ -392,7 +393,7 @@ def cyclic_response(
     right, left = loads[:half], turned(loads[half:])
     felt_right, felt_left = felt[:half].T, turned(felt[half:]).T
     found = np.zeros((len(steps), felt.shape[1], loads.shape[1]))
-    for n in range(teeth // 2 + 1):
+    for n in range(count // 2 + 1):
         phase = np.exp(1j * n * angle)
         root = cholesky(beside + phase * to_next + np.conj(phase) * to_next.T, check_finite=False)
         reduced = solve_triangular(root, right + np.conj(phase) * left, trans="C", check_finite=False)
@@ -401,8 +402,8 @@ def cyclic_response(
         else:
             moved = solve_triangular(root, reduced, check_finite=False)
             product = felt_right @ moved + phase * (felt_left @ moved)
-        twice = 1 if n == 0 or 2 * n == teeth else 2
+        twice = 1 if n == 0 or 2 * n == count else 2
         for i, k in enumerate(steps):
-            share = twice * np.exp(1j * n * k * angle) / teeth
+            share = twice * np.exp(1j * n * k * angle) / count
             found[i] += share.real * product.real - share.imag * product.imag
     return found

@@ -314,7 +314,7 @@ def _kinks(seams: Array, z: Array, roll: Array) -> Array:
 
 def _middle(lines: ContactLines, angle: float, twist: float) -> float:
     """Pair angle (rad) of pair 0 at z = 0."""
-    return angle - 0.5 * lines.compliance.mesh.sections.gear_ratio * twist
+    return angle - 0.5 * lines.compliance.mesh.ratio * twist
 
 
 @dataclass(frozen=True)
@@ -372,7 +372,7 @@ def _runs(pair: IntArray, z: Array, left: Array) -> Runs:
 
 def mean_arm(lines: ContactLines, rows: Rows) -> Array:
     """Approach of the flanks per twist from their first contact (m), shape (n,)."""
-    return np.asarray(0.5 * (rows.arm + lines.compliance.mesh.sections.gear_ratio * rows.pinion_arm))
+    return np.asarray(0.5 * (rows.arm + lines.compliance.mesh.ratio * rows.pinion_arm))
 
 
 def place_points(lines: ContactLines, angle: float, twist: float, looks: Looks, runs: Runs) -> Points:
@@ -436,7 +436,7 @@ def _softer_ends(lines: ContactLines, z: Array, rows: Rows) -> Array:
     if mesh.count == 1:
         return added
     soft = sum(side.local.inverse_modulus for side in compliance.sides)
-    rolls = np.maximum(rows.roll, LEAST_ROLL * mesh.module)
+    rolls = np.maximum(np.abs(rows.roll), LEAST_ROLL * mesh.module) * [1, mesh.sections.sign]
     radius = rolls.prod(axis=1) / rolls.sum(axis=1)
     hertz = np.sqrt(4.0 / math.pi * soft * radius[:, None] * forces)
     for side, material, face in zip(compliance.sides, mesh.materials, mesh.faces, strict=True):

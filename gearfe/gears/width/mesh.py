@@ -17,7 +17,7 @@ from ..contact.laws import STEEL
 from ..geometry.gear_data import Web
 from ..geometry.mesh_geometry import MeshGeometry
 from ..geometry.spur_gear import Gear
-from ..geometry.validity import MOST_YIELD, check_external
+from ..geometry.validity import MOST_YIELD
 
 #: Largest base helix angle (rad). Elastic teeth are checked up to 30 degrees at the reference circle.
 MOST_HELIX = math.radians(45.0)
@@ -75,7 +75,9 @@ class WideMesh:
 
     def __post_init__(self) -> None:
         pinion = self.sections.pinion
-        check_external(self.sections, "contact over the width")
+        if self.sections.wheel.rim == "free":
+            problem = "is not held: contact over the width takes internal gears that are bolted at the rim"
+            raise InputError("wheel.rim", "free", problem, 'give rim = "bolted"')
         angle = -pinion.base_helix_angle if pinion.hand == "left" else pinion.base_helix_angle
         if self.base_helix_angle is None:
             object.__setattr__(self, "base_helix_angle", angle)
@@ -152,7 +154,7 @@ class WideMesh:
     def turns(self) -> tuple[float, float]:
         """kappa of pinion and wheel (rad/m)."""
         slope = math.tan(self.base_helix_angle)
-        return slope / self.gears[0].base_radius, -slope / self.gears[1].base_radius
+        return slope / self.gears[0].base_radius, -slope / self.gears[1].signed_base_radius
 
     @property
     def count(self) -> int:
@@ -165,6 +167,11 @@ class WideMesh:
     def overlap_ratio(self) -> float:
         """Overlap ratio eps_beta = b tan(beta_b)/p_bt (-)."""
         return self.width * abs(math.tan(self.base_helix_angle)) / self.sections.base_pitch
+
+    @property
+    def ratio(self) -> float:
+        """Magnitude of the gear ratio |z2/z1| (-): a twist of the wheel is worth so many of the pinion."""
+        return abs(self.sections.gear_ratio)
 
     @property
     def usual_stiffness(self) -> float:

@@ -4,7 +4,9 @@ r"""One tooth pair in the transverse section: where it touches, and how its cont
 than the length of the path of contact. The pair angle counts the half of it on either gear, so that the place on the
 path belongs to both and gears may be exchanged: the section at z of the pair k, pinion tooth k, has
 
-.. math:: \psi = \varphi + \kappa z + \frac{2\pi k}{z_1} - \tfrac12\,i\,\theta, \qquad i = z_2/z_1 .
+.. math:: \psi = \varphi + \kappa z + \frac{2\pi k}{z_1} - \tfrac12\,i\,\theta, \qquad i = |z_2/z_1| .
+
+A twist turns the wheel of an internal pair the other way, in which it drives its flank too.
 
 Both gears turned by their halves of :math:`t(\psi)` touch first. From there a twist approaches the flanks by
 :math:`\bar r(\theta - t)`, :math:`\bar r = \tfrac12(r_2 + i\,r_1)` with the arms of both gears, which are the base
@@ -185,7 +187,7 @@ def _solved_law(compliance: WideCompliance, profiles: tuple[ToothDeviations, Too
     known_angles = solved_angles[known]
     tables = PchipInterpolator(known_angles, at_marks[known])(np.clip(angles, known_angles[0], known_angles[-1]))
     arc, tooth_normal = _on_teeth(model, contacts)
-    radius = np.abs(np.stack([contacts.point, contacts.point - pair.working_centre_distance], axis=1))
+    radius = np.abs(np.stack([contacts.point, contacts.point - pair.wheel_centre], axis=1))
     base = np.array([gear.base_radius for gear in mesh.gears])
     return PairLaw(
         angle=angles,
@@ -194,7 +196,7 @@ def _solved_law(compliance: WideCompliance, profiles: tuple[ToothDeviations, Too
         pinion_arm=contacts.arm[:, 0],
         normal=contacts.normal,
         point=contacts.point,
-        roll=np.sqrt(np.maximum(radius**2 - base**2, 0.0)),
+        roll=np.sqrt(np.maximum(radius**2 - base**2, 0.0)) * [1, pair.sign],
         arc=arc,
         tooth_normal=tooth_normal,
         yields=tables[:, 0],
@@ -218,7 +220,7 @@ def pair_contacts(teeth: ToothFlanks, angles: Array) -> tuple[Array, FirstContac
 
     def met_at(pinion_angle: Array) -> tuple[FirstContacts, Array]:
         found = teeth.first_contacts_of(np.arange(len(pinion_angle)), pinion_angle, np.zeros(len(pinion_angle), int))
-        return found, found.angle - 0.5 * pair.gear_ratio * (found.twist - pair.contact_twist)
+        return found, found.angle - 0.5 * abs(pair.gear_ratio) * (found.twist - pair.contact_twist)
 
     found, reached = met_at(angles)
     goal = angles[found.position]
@@ -293,7 +295,7 @@ def _solved_contacts(
     n, pair = len(contacts), model.pair
     arc, tooth_normal = _on_teeth(model, contacts)
     far_field = plane_far_field(compliance, arc, tooth_normal)
-    ratio, touch = pair.gear_ratio, contacts.twist - pair.contact_twist
+    ratio, touch = compliance.mesh.ratio, contacts.twist - pair.contact_twist
     mean_arm = 0.5 * (contacts.arm[:, 1] + ratio * contacts.arm[:, 0])
     # of one curvature, so that a place between two marks of the flanks does not decide
     alone = replace(contacts, position=np.arange(n), curvature=np.full(n, 1 / compliance.mesh.module))

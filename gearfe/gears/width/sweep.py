@@ -269,16 +269,16 @@ def resultants(lines: ContactLines, solution: Solution) -> tuple[Array, Array]:
     """Return the force on the wheel (N), shape (3,), and the moments on both gears (N m), shape (2, 3)."""
     mesh, points = lines.compliance.mesh, solution.points
     rows, z = points.rows, points.z
-    size = solution.moment / rows.arm
+    size, sign = solution.moment / rows.arm, mesh.sections.sign
     transverse = size * rows.normal
-    force = np.stack([transverse.real, transverse.imag, mesh.turns[1] * solution.wheel_moment], axis=1)
+    force = np.stack([transverse.real, transverse.imag, sign * mesh.turns[1] * solution.wheel_moment], axis=1)
     moments = []
     excess = solution.torque - solution.moment.sum()  # of the wheel's moment as the arms change under load
-    for sign, centre, more in (
-        (-1.0, 0.0, excess / mesh.sections.gear_ratio), (1.0, mesh.sections.working_centre_distance, -excess)
+    for side, centre, more in (
+        (-1.0, 0.0, excess / mesh.ratio), (1.0, mesh.sections.wheel_centre, -sign * excess)
     ):  # fmt: skip
         place = np.stack([rows.point.real - centre, rows.point.imag, z], axis=1)
-        moments.append(sign * np.cross(place, force).sum(axis=0) + [0.0, 0.0, more])
+        moments.append(side * np.cross(place, force).sum(axis=0) + [0.0, 0.0, more])
     return force.sum(axis=0), np.array(moments)
 
 
