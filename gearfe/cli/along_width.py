@@ -56,6 +56,12 @@ def run_along_width(
             problem = f"is for loads alike along the face width, which {cause[0] if cause else 'the mesh'} makes vary"
             raise InputError(f"--{name}", getattr(args, name) or None, problem, "leave it out")
 
+    if getattr(args, "fields", None) is not None:
+        for gear in mesh.gears:
+            if gear.has_web:
+                problem, cure = "is not implemented for gears with a web", "leave --fields out"
+                raise InputError(f"{gear.where}.web_width_mm", gear.form["web_width_mm"], problem, cure)
+
     import numpy as np
 
     from ..base.files import output_folder, whole_set, write_csvs, write_json

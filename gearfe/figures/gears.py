@@ -11,7 +11,9 @@ import numpy as np
 
 from ..base.typing import Array
 from ..gears.geometry.derived import gear_outline, path_place, zone
+from ..gears.geometry.gear_data import Web
 from ..gears.geometry.pair import GearPair
+from ..gears.geometry.spur_gear import Gear
 from .style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save
 
 if TYPE_CHECKING:
@@ -110,8 +112,8 @@ def pair_picture(pair: GearPair, pinion_angle: float = 0.0, notes: str = "") -> 
 
 
 def _panels(pair: GearPair) -> tuple[Any, Any, Any]:
-    """Axes of the whole gears, of the meshing zone, and of the view of helical gears along y (else None)."""
-    if not pair.pinion.helical:
+    """Axes of the whole gears, of the meshing zone, and of the view along y of helical gears and webs (else None)."""
+    if not (pair.pinion.helical or any(gear.narrow_web for gear in (pair.pinion, pair.wheel))):
         return *new_figure(12.5, 6.4).subplots(1, 2, width_ratios=(1.0, 1.0)), None
     figure = new_figure(12.5, 7.0)
     grid = figure.add_gridspec(2, 2, height_ratios=(3.0, 1.0))
@@ -120,7 +122,10 @@ def _panels(pair: GearPair) -> tuple[Any, Any, Any]:
 
 
 def _draw_helices(axes: Any, pair: GearPair, pinion_angle: float) -> None:
-    """Draw both gears seen along +y: the middles of their tips on the visible part of the tip cylinders."""
+    """Draw both gears seen along +y: the middles of their tips on the visible part of the tip cylinders.
+
+    Hidden edges of webs are dashed.
+    """
     wheel_angle = pair.wheel_angle_at(pinion_angle) + pair.wheel_phase
     placed = [
         (pair.pinion, pinion_angle, 0.0, 0.0, BLUE),
@@ -138,11 +143,25 @@ def _draw_helices(axes: Any, pair: GearPair, pinion_angle: float) -> None:
             turned = angle + 2 * np.pi * tooth / gear.teeth + 1e-3 * gear.twist_rate * z
             seen = np.where(np.sin(turned) < 0.0, 1e3 * x + radius * np.cos(turned), np.nan)
             axes.plot(seen, z, color=colour, linewidth=0.8)
+        if gear.narrow_web is not None:
+            _draw_web(axes, gear, gear.narrow_web, (1e3 * x, middle), half)
     helix = f"{math.degrees(pair.pinion.helix_angle):g}°, pinion {pair.pinion.hand}, wheel {pair.wheel.hand}"
-    axes.set_title(f"along y: helix angle {helix}", loc="left", fontsize=11)
+    axes.set_title(f"along y: helix angle {helix}" if pair.pinion.helical else "along y", loc="left", fontsize=11)
     axes.set_aspect("equal")
     axes.set_xlabel("x (mm)")
     axes.set_ylabel("z (mm)")
+
+
+def _draw_web(axes: Any, gear: Gear, web: Web, place: tuple[float, float], half: float) -> None:
+    """Draw the empty rings on both sides of a web, dashed; place and half of the face width in mm."""
+    outer, inner = 1e3 * web.radii[0], 1e3 * max(gear.held_radius, *web.radii[1:])
+    low, high = 1e3 * (web.offset - 0.5 * web.width), 1e3 * (web.offset + 0.5 * web.width)
+    for side in (-1, 1):
+        for end, start in ((-half, low), (half, high)):
+            x = place[0] + side * np.array([inner, outer, outer, inner])
+            y = place[1] + np.array([end, end, start, start])
+            axes.fill(x, y, facecolor="white", alpha=0.45, zorder=3)
+            axes.plot(x[[0, 3, 2, 1]], y[[0, 3, 2, 1]], color="#374151", linestyle=(0, (3, 2)), lw=0.9, zorder=4)
 
 
 def _circles(pair: GearPair) -> list[tuple[str, float, float]]:

@@ -89,7 +89,7 @@ def test_sections_have_edges_along_the_circles_of_the_web():
     mesh = mesh_of(WEB)
     wheel = mesh.gears[1]
     sector = sector_mesh(wheel, sector_recipes(mesh.sections, coarsen=3.0)[1], cache=False)
-    web = web_triangles(sector, WEB)
+    web = web_triangles(sector.points, sector.triangles, WEB)
     corners = sector.points[sector.triangles[:, [0, 3, 1, 4, 2, 5]]]
     x, y = corners.transpose(2, 0, 1)
     # twice the polygon's area; the bulges of the arcs beyond their three nodes are of fourth order

@@ -20,6 +20,7 @@ from .pair import (
     ROUNDING_MM,
     SAME,
     SIGNED,
+    WEB_KEYS,
     GearBodyTable,
     GearTable,
     MaterialTable,
@@ -110,6 +111,11 @@ class NamedGear:
         """Return whether it is an internal gear."""
         return self.teeth < 0
 
+    @property
+    def has_web(self) -> bool:
+        """Return whether its rim stands on a web that is narrower than the face."""
+        return bool(self.form.get("web_width_mm", math.inf) < self.form["face_width_mm"])
+
     def written(self, key: str) -> str:
         """Table that a key of the gear stands in; an empty text for one that the file does not give."""
         if key in self.drawn:
@@ -197,9 +203,10 @@ class NamedMesh:
         places
             Whether places of the gears along the axis and tilts by the shafts count: a train has both itself.
         """
-        for gear in self.gears:
-            if gear.form["helix_angle_deg"]:
-                return f"{gear.written('helix_angle_deg')}.helix_angle_deg", gear.form["helix_angle_deg"]
+        bodies = [(gear, "helix_angle_deg") for gear in self.gears if gear.form["helix_angle_deg"]]
+        bodies += [(gear, "web_width_mm") for gear in self.gears if gear.has_web]
+        for gear, key in bodies[:1]:
+            return f"{gear.written(key)}.{key}", gear.form[key]
         for gear in self.gears if self.deviates else ():
             for side in tuple(sides) or (self.flank,):
                 flank = FlankTable() if gear.microgeometry is None else gear.microgeometry.flank(side)
@@ -562,6 +569,7 @@ def tooth_form_of(
             form |= ring | {key: getattr(table, key) for key in ("rim", "cutter_teeth", "cutter_shift")}
         else:
             form["bore_diameter_mm"] = table.bore_diameter_mm
+            form |= {key: getattr(table, key) for key in WEB_KEYS if getattr(table, key) is not None}
     return form, places
 
 

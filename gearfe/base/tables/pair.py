@@ -60,6 +60,8 @@ SIGNED = (
     *("pitch_diameter_mm", "tip_diameter_mm", "root_diameter_mm"),
     *("rim_diameter_mm", "form_diameter_mm", "span_mm"),
 )
+#: Keys of the web of an external gear.
+WEB_KEYS = ("web_width_mm", "web_outer_diameter_mm", "web_inner_diameter_mm", "web_offset_mm")
 #: What the bore is.
 BORE_DOC = "diameter of the rigid bore (mm); it decides the stiffness level"
 
@@ -135,6 +137,20 @@ class GearBodyTable(ToothFormTable):
         None, doc="hand of the helix; left out: opposite to that of the mate, right for the driver", choices=HANDS
     )
     bore_diameter_mm: float | None = quantity(None, doc=BORE_DOC, above=0.0)
+    web_width_mm: float | None = quantity(
+        None,
+        doc="width of the web between rim and hub (mm); left out: the gear is as wide everywhere as its face",
+        above=0.0,
+    )
+    web_outer_diameter_mm: float | None = quantity(
+        None, doc="inner diameter of the rim, where the web ends (mm), required with web_width_mm", above=0.0
+    )
+    web_inner_diameter_mm: float | None = quantity(
+        None, doc="outer diameter of the hub (mm); left out: the web reaches down to the bore", above=0.0
+    )
+    web_offset_mm: float | None = quantity(
+        None, doc="middle of the web less that of the face width, along y (mm), by default 0"
+    )
     rim_diameter_mm: float | None = quantity(
         None, doc="outer diameter of the rim of an internal gear (mm), required there"
     )
@@ -231,6 +247,16 @@ def _check_kind(gear: GearBodyTable, where: str) -> None:
     if -LEAST_RING < gear.teeth < LEAST_TEETH:
         problem = f"must be >= {LEAST_TEETH} for an external gear, <= {-LEAST_RING} for an internal gear"
         raise InputError(f"{where}.teeth", gear.teeth, problem, "use another number of teeth")
+    for key in WEB_KEYS:
+        value = getattr(gear, key)
+        if value is not None and gear.internal:
+            problem = "is of external gears: the ring of an internal gear is as wide as its teeth"
+            raise InputError(f"{where}.{key}", value, problem, "leave it out")
+        if value is not None and gear.web_width_mm is None:
+            raise InputError(f"{where}.{key}", value, "is of a web, whose web_width_mm is missing", "add web_width_mm")
+    if gear.web_width_mm is not None and gear.web_outer_diameter_mm is None:
+        cure = "give the inner diameter of the rim (mm)"
+        raise InputError(f"{where}.web_outer_diameter_mm", None, "is required with web_width_mm", cure)
     if gear.internal:
         if gear.bore_diameter_mm is not None:
             problem, cure = "is of external gears: an internal gear is held at its rim", "give rim_diameter_mm instead"

@@ -109,7 +109,18 @@ def gear_masses(item: ShaftGear, shaft: Shaft, middle: float) -> Masses:
     inner = max(radius, 0.5 * gear.bore_diameter)
     mass = item.density * width * (area - math.pi * inner**2)
     polar = item.density * width * (second - 0.5 * math.pi * inner**4)
-    return Masses(mass, polar, 0.5 * polar + mass * width**2 / 12.0, item.along)
+    transverse, along = 0.5 * polar + mass * width**2 / 12.0, 0.0
+    if (web := gear.narrow_web) is not None:  # less the empty rings on both sides of the web
+        outer, hub = web.radii[0], max(inner, *web.radii[1:])
+        for low, high in ((-0.5 * width, web.offset - 0.5 * web.width), (web.offset + 0.5 * web.width, 0.5 * width)):
+            ring = item.density * (high - low) * math.pi * (outer**2 - hub**2)
+            middle = 0.5 * (low + high)
+            ring_polar = 0.5 * ring * (outer**2 + hub**2)
+            mass, polar, along = mass - ring, polar - ring_polar, along - ring * middle
+            transverse -= 0.5 * ring_polar + ring * ((high - low) ** 2 / 12.0 + middle**2)
+        along /= mass
+        transverse -= mass * along**2
+    return Masses(mass, polar, transverse, item.along + along)
 
 
 @lru_cache(maxsize=64)

@@ -8,19 +8,22 @@ displace the wheel's sections, as in `gearfe.gears.width.flanks`.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.typing import Array, ComplexArray, IntArray
+from ...base.typing import Array, BoolArray, ComplexArray, IntArray
 from ...output.exchange.mesh_export import MeshPart, SolidPart
 from ..geometry.modifications import ends_of
-from ..teeth.tooth_sector import SectorMesh
+from ..teeth.tooth_sector import SectorMesh, web_triangles
 from ..teeth.whole_gear import WholeGear
 from ..width import WideFlanks, WideMesh
 
+#: Least thickness of a layer beside the end of a web (modules).
+LEAST_LAYER = 0.05
 #: Depth below a flank at which nothing is left of its modifications (modules), at most half of the tooth's thickness.
 FADED = 0.6
 
@@ -132,6 +135,7 @@ def solid_part(
     levels: Array,
     place: Callable[[float], tuple[complex, complex]],
     moved: Callable[[float], Array] | None = None,
+    solid: Callable[[float], BoolArray] | None = None,
 ) -> SolidPart:
     """Return the wedges of a section between levels along the axis.
 
@@ -145,6 +149,8 @@ def solid_part(
         Unit complex number by which the section is turned at z (m), and displacement x + i y (m).
     moved : callable, optional
         Displacements of the nodes at z in the section's axes (m), shape (n, 2).
+    solid : callable, optional
+        Elements of the section that have material at z (m), shape (m,); all if not given.
     """
     plane = section.points @ np.array([1, 1j])
     corners = np.zeros(len(plane), dtype=bool)
@@ -173,7 +179,21 @@ def solid_part(
         element, side = np.divmod(behind[edges[:, 1]], 3)
         rows = [np.stack([element + i * len(edge), side + 3], axis=1) for i in range(len(layers))]
         boundaries[name] = np.concatenate(rows)
-    return SolidPart(np.concatenate(points), np.concatenate(layers), boundaries)
+    part = SolidPart(np.concatenate(points), np.concatenate(layers), boundaries)
+    if solid is None:
+        return part
+    return _part_of(part, np.concatenate([solid(0.5 * (a + b)) for a, b in itertools.pairwise(levels.tolist())]))
+
+
+def _part_of(part: SolidPart, kept: BoolArray) -> SolidPart:
+    """Return some of the elements, with their nodes and their faces on boundaries."""
+    nodes, wedges = np.unique(part.wedges[kept], return_inverse=True)
+    number = np.cumsum(kept) - 1
+    boundaries = {
+        name: np.stack([number[rows[:, 0]], rows[:, 1]], axis=1)[kept[rows[:, 0]]]
+        for name, rows in part.boundaries.items()
+    }
+    return SolidPart(part.points[nodes], wedges.reshape(-1, part.wedges.shape[1]), boundaries)
 
 
 def graded_levels(face: tuple[float, float], layers: int) -> Array:
@@ -218,4 +238,12 @@ def gear_solid(
     part = section if isinstance(section, MeshPart) else MeshPart(
         section.points, section.triangles, {**section.boundaries, "contact": section.contact_edges()}
     )  # fmt: skip
-    return solid_part(part, levels, at, modified(flank_feet(section, mesh, gear), mesh, flanks, gear))
+    moved = modified(flank_feet(section, mesh, gear), mesh, flanks, gear)
+    web, ends = mesh.webs[gear], mesh.web_ends(gear)
+    if web is None or ends is None:
+        return solid_part(part, levels, at, moved)
+    narrow = web_triangles(part.points, part.triangles, web)
+    low, high = ends
+    between = levels[np.abs(levels[:, None] - ends).min(axis=1) > LEAST_LAYER * mesh.module]
+    heights = np.unique([*mesh.faces[gear], *between.tolist(), *ends])
+    return solid_part(part, heights, at, moved, lambda z: ~narrow | (low < z < high))

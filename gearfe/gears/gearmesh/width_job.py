@@ -146,10 +146,13 @@ def wide_mesh(job: StiffnessJob) -> WideMesh:
     """
     sense = axial_sense(job)
     places = [1e-3 * sense * gear.y_mm for gear in job.mesh.gears]
+    given = [gear.narrow_web for gear in (job.pair.pinion, job.pair.wheel)]
+    webs = [None if web is None else replace(web, offset=sense * web.offset) for web in given]
     try:
         return WideMesh(
             job.pair,
             centres=(places[0], places[1]),
+            webs=(webs[0], webs[1]),
             materials=job.materials,
             coarsen=SECTION_COARSEN * job.table.coarsen,
             flank_coarsen=FLANK_COARSEN * job.table.flank_coarsen,

@@ -18,7 +18,7 @@ from ...base.errors import InputError, given
 from ...base.shown import Shown
 from ...base.tables.gearbox import NamedGear, NamedMesh, pair_gearbox, shift_by_distance
 from ...base.tables.pair import FROM_DISTANCE, RING_KEYS, PairTable, transverse_teeth
-from .gear_data import TipRelief, nominal_span, rounding
+from .gear_data import TipRelief, Web, nominal_span, rounding
 from .mesh_geometry import MeshGeometry, PathPoint
 from .spur_gear import Gear
 from .validity import check_pair, check_seat, missing_addendum, pair_warnings, rounding_notes
@@ -105,6 +105,10 @@ KEYS: dict[str, tuple[str, float]] = {
     "pressure_angle": ("pressure_angle_deg", math.pi / 180.0),
     "face_width": ("face_width_mm", 1e-3),
     "bore_diameter": ("bore_diameter_mm", 1e-3),
+    "web.width": ("web_width_mm", 1e-3),
+    "web.outer_diameter": ("web_outer_diameter_mm", 1e-3),
+    "web.inner_diameter": ("web_inner_diameter_mm", 1e-3),
+    "web.offset": ("web_offset_mm", 1e-3),
     "rim_diameter": ("rim_diameter_mm", 1e-3),
     "form_diameter": ("form_diameter_mm", 1e-3),
     "tip_round": ("tip_round_mm", 1e-3),
@@ -155,6 +159,10 @@ def _shared_pair(
     return GearPair(pinion, wheel, centre_distance, notes=notes, axial_offset=axial_offset)
 
 
+#: Arguments of `Web`.
+WEB = ("width", "outer_diameter", "inner_diameter", "offset")
+
+
 def gear_of_form(teeth: int, form: Mapping[str, Any]) -> Gear:
     """Gear with the keys of `gearfe.base.tables.pair.tooth_form`, ``module_mm``, and those of its bore or rim."""
     made = {key: value for key, value in form.items() if value is not None or key not in RING_KEYS}
@@ -163,6 +171,9 @@ def gear_of_form(teeth: int, form: Mapping[str, Any]) -> Gear:
             value = made.pop(key)
             made[name] = value if isinstance(value, str) else value * unit
     amount, length, exponent = (made.pop(f"tip_relief.{name}", None) for name in ("amount", "length", "exponent"))
+    web = {name: made.pop(f"web.{name}") for name in WEB if f"web.{name}" in made}
+    if web:
+        made["web"] = Web(**web)
     if amount:
         made["tip_relief"] = TipRelief(amount, given(length, "tip_relief_length_mm"), exponent)
     return Gear(teeth, **{name: made[name] for name in made if name != "tip_relief_length_mm"})

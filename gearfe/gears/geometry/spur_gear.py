@@ -174,7 +174,7 @@ def _check_web(gear: GearData) -> None:
             problem = f"must be >= {1e3 * low:.6g} mm"
             if math.isfinite(high):
                 problem += f" and <= {1e3 * high:.6g} mm, {what}"
-            raise InputError(name, value, problem, "the web is between hub or bore and rim")
+            raise InputError(name, value, problem, "keep the web between hub or bore and rim")
     most = 0.5 * (gear.face_width - web.width)
     if not (math.isfinite(web.offset) and abs(web.offset) <= most * (1.0 + SAME_LENGTH) + SAME_LENGTH * web.width):
         problem = f"must be >= {-1e3 * most:.6g} mm and <= {1e3 * most:.6g} mm, so that the web is within the face"

@@ -12,6 +12,7 @@ from typing import Any
 
 from ...fem.meshing.session import gmsh_session
 from ..geometry.face import NOMINAL, ToothDeviations
+from ..geometry.gear_data import Web
 from ..geometry.outline import Piece, whole_outline
 from ..geometry.pair import Gear
 
@@ -40,6 +41,8 @@ def write_solid(path: Path, gear: Gear, deviations: tuple[ToothDeviations, Tooth
             held = occ.addCurveLoop([occ.addCircle(0.0, 0.0, -0.5 * width, 1e3 * gear.held_radius)])
             loops = [held, loop] if gear.internal else [loop, held]
             occ.extrude([(2, occ.addPlaneSurface(loops))], 0.0, 0.0, width)
+        if gear.narrow_web is not None:
+            _cut_web(occ, gear, gear.narrow_web)
         occ.synchronize()
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
         with _without_words():
@@ -74,6 +77,25 @@ def _add_helical(occ: Any, gear: Gear, teeth: list[list[Piece]]) -> None:
     cylinder = [(3, occ.addCylinder(0.0, 0.0, -0.5 * width, 0.0, 0.0, width, 1e3 * gear.held_radius))]
     sections = [pair for pair in solid if pair[0] == 3]
     occ.cut(*((cylinder, sections) if gear.internal else (sections, cylinder)))
+
+
+def _cut_web(occ: Any, gear: Gear, web: Web) -> None:
+    """Cut the empty rings on both sides of a web out of the gear."""
+    half, outer = 0.5e3 * gear.face_width, 1e3 * web.radii[0]
+    hub = 1e3 * web.radii[1] if web.radii[1:] else 0.0
+    low, high = 1e3 * (web.offset - 0.5 * web.width), 1e3 * (web.offset + 0.5 * web.width)
+    gears = [pair for pair in occ.getEntities(3) if pair[0] == 3]
+    rings = []
+    for start, end in ((-half, low), (high, half)):
+        if end - start <= 1e-9 * half:
+            continue
+        # longer than the groove at the open end, so that no skin is left
+        begin, length = (start - half, end - start + half) if start < low else (start, end - start + half)
+        ring = [(3, occ.addCylinder(0.0, 0.0, begin, 0.0, 0.0, length, outer))]
+        if hub:
+            ring, _ = occ.cut(ring, [(3, occ.addCylinder(0.0, 0.0, begin, 0.0, 0.0, length, hub))])
+        rings += ring
+    occ.cut(gears, rings)
 
 
 def _outline(occ: Any, teeth: list[list[Piece]], z: float) -> list[int]:

@@ -146,9 +146,9 @@ class SectorMesh:
         return np.concatenate([self.boundaries["flank_left"], root[: min(reachable, len(root) - 1)]])[::-1, ::-1]
 
 
-def web_triangles(sector: SectorMesh, web: Web) -> BoolArray:
-    """Return which triangles of a sector are of the web, shape (m,)."""
-    centre = np.linalg.norm(sector.points[sector.triangles[:, :3]].mean(axis=1), axis=1)
+def web_triangles(points: Array, triangles: IntArray, web: Web) -> BoolArray:
+    """Return which triangles of a section about the origin are of the web, shape (m,)."""
+    centre = np.linalg.norm(points[triangles[:, :3]].mean(axis=1), axis=1)
     outer, *inner = web.radii
     return np.asarray((centre < outer) & (centre > max(inner, default=0.0)))
 

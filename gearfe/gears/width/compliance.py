@@ -257,7 +257,7 @@ def axial_systems(
 def layers_of(mesh: WideMesh, gear: int, sector: SectorMesh) -> Layers | None:
     """Return where the web of a gear has material, of a mesh of its sector; None without a web."""
     web, ends = mesh.webs[gear], mesh.web_ends(gear)
-    return None if web is None or ends is None else Layers(web_triangles(sector, web), ends)
+    return None if web is None or ends is None else Layers(web_triangles(sector.points, sector.triangles, web), ends)
 
 
 def loads_of(mesh: WideMesh, gear: int, system: AxialSystem, points: Array, nodal: Array) -> Array:
