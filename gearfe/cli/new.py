@@ -6,6 +6,7 @@ A kind of job with all its keys, a shipped job with its files, or the gearbox of
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 
 from ..base.tables.examples import JOBS, RUN_BY, job_file
@@ -19,6 +20,11 @@ RUNS = {
     "train": "vibration",
     "housing": "housing",
 }
+
+#: Endings of REXS files, not of version numbers in a name.
+ENDING = re.compile(r"(\.(rexs[jz]?|xml|json|zip))+$", re.IGNORECASE)
+#: Parts of one kind without a key that are printed each with its reason.
+MOST_LEFT = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -96,7 +102,7 @@ def _from_rexs(args: argparse.Namespace) -> int:
         given = args.file if args.file is not None else "--list"
         raise InputError("file", given, "conflicts with --from", "write gearfe new --from MODEL.rexs [FILE]")
     source = Path(args.source)
-    target = Path(args.kind or f"{source.name.partition('.')[0] or 'rexs'}.toml")
+    target = Path(args.kind or f"{re.sub(ENDING, '', source.name) or 'rexs'}.toml")
     if target.is_dir():
         raise InputError("file", str(target), "is a folder", f"name a file in it, as {target / 'gearbox.toml'}")
     job = rexs_job(source, load_case=args.load_case)
@@ -105,8 +111,12 @@ def _from_rexs(args: argparse.Namespace) -> int:
         temporary.write_text(job.text(source.name), encoding="utf-8", newline="\n")
     print(f"written: {target}")
     print("values of the model: " + ", ".join(f"{job.count(kind)} {kind}" for kind in KINDS) + " (listed in the file)")
-    for (kind, name), (_, reason) in job.left.items():
-        print(f"not in the job, a comment in the file: {kind} {name}: {reason}".replace(" :", ":"))
+    for kind in dict.fromkeys(kind for kind, _ in job.left):
+        reasons = {name: reason for (table, name), (_, reason) in job.left.items() if table == kind}
+        for name, reason in list(reasons.items())[:MOST_LEFT]:
+            print(f"not in the job, a comment in the file: {kind} {name}: {reason}".replace(" :", ":"))
+        if len(reasons) > MOST_LEFT:
+            print(f"... and {len(reasons) - MOST_LEFT} more {kind}, comments in the file")
     print(f"look at it:  gearfe gear {target}")
     return 0
 

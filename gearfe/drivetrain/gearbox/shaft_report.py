@@ -13,6 +13,8 @@ from .over_speed import operating_speed
 
 #: Tilts and displacements (rad, m) below which nothing yields: a rigid train in hinges of a rigid housing.
 STILL = 1e-12
+#: Misalignments (um) below which only rounding is left.
+ROUND_OFF = 1e-6
 
 
 def shaft_entries(model: TrainModel) -> dict[str, Any]:
@@ -99,12 +101,17 @@ def shaft_lines(summary: Mapping[str, Any]) -> list[str]:
             f"operating point: drive at {point['drive_speed_rad_per_s']:.6g} rad/s; torque over speed {torques}"
         )
     for name, mesh in summary.get("misalignment", {}).items():
-        parts = ", ".join(f"{part} {mesh[f'f_sh_by_{part}_um']:.3g}" for part in PARTS)
+        parts = ", ".join(f"{part} {_shown(mesh[f'f_sh_by_{part}_um'])}" for part in PARTS)
         lines.append(
-            f"mesh {name}: misalignment f_sh {mesh['f_sh_um']:.3g} um over {mesh['common_face_width_mm']:.4g} mm "
-            f"({parts}), across the plane of action {mesh['across_um']:.3g} um"
+            f"mesh {name}: misalignment f_sh {_shown(mesh['f_sh_um'])} um over {mesh['common_face_width_mm']:.4g} mm "
+            f"({parts}), across the plane of action {_shown(mesh['across_um'])} um"
         )
     return lines
+
+
+def _shown(value: float) -> str:
+    """A misalignment (um); round-off is 0."""
+    return f"{value if abs(value) >= ROUND_OFF else 0.0:.3g}"
 
 
 def _parts(values: Any) -> zip[tuple[str, Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+import shutil
 import tomllib
 from decimal import Decimal
 from typing import Any
@@ -703,6 +704,17 @@ def test_the_planetary_model_balances():
     # the carrier is Steg 1, the shaft between its cheeks and Steg 2: 100, 50 and 8 mm
     assert [section["length_mm"] for section in job.tables["shafts"]["Steg_1"]["sections"]] == [100.0, 50.0, 8.0]
     assert len(job.tables["shafts"]) == 4
+
+
+def test_a_job_has_the_name_of_its_model(tmp_path, monkeypatch, capsys):
+    """A version number in the name stays; parts without a key are printed for two of each kind, the others counted."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(FVA, tmp_path / "stage_1.1.rexs")
+    assert main(["new", "--from", "stage_1.1.rexs"]) == 0
+    assert (tmp_path / "stage_1.1.toml").is_file()
+    said = capsys.readouterr().out
+    assert said.count("not in the job, a comment in the file: bearings") == 2
+    assert "... and 4 more bearings, comments in the file" in said
 
 
 def test_the_command(tmp_path, capsys):

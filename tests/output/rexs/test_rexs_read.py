@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import base64
+import re
 import struct
 import zipfile
 from decimal import Decimal
+from random import Random
 
 import pytest
 
 from gearfe.base.errors import InputError
 from gearfe.output.exchange.rexs import read as reading
-from gearfe.output.exchange.rexs import read_rexs
+from gearfe.output.exchange.rexs import read_rexs, rexs_job
 from gearfe.output.exchange.rexs.frames import frames_of
 from tests.makers.rexs_models import json_of, pose, saved, spur_pair, with_attributes, xml_of, zip_of
 
@@ -252,3 +254,29 @@ def test_numbers_keep_their_digits(tmp_path):
     text = "0.1234567890123456789012345"
     model = read_rexs(saved(tmp_path, xml_of(with_attributes(PARTS, 5, normal_module=text))))
     assert model.components[5].attributes["normal_module"].value == Decimal(text)
+
+
+def test_damaged_models_are_read_or_refused_in_words():
+    """Lines lost, doubled and with other values, units and numbers: a job, or an error that names the place."""
+    random = Random(47)
+    lines = XML.replace("><", ">\n<").split("\n")
+    refused_files = 0
+    for _ in range(60):
+        damaged = list(lines)
+        for _ in range(random.choice((1, 2, 4))):
+            i = random.randrange(len(damaged))
+            value = random.choice(("0", "-1", "1e308", "nan", "", "abc", "99999999999", "furlong", "mm", "none"))
+            change = random.randrange(4)
+            if change == 0:
+                del damaged[i]
+            elif change == 1:
+                damaged.insert(i, random.choice(lines))
+            elif change == 2:
+                damaged[i] = re.sub(r">[^<]*<", f">{value}<", damaged[i], count=1)
+            else:
+                damaged[i] = re.sub(r'="[^"]*"', f'="{value}"', damaged[i], count=1)
+        try:
+            rexs_job(reading.read_model("\n".join(damaged).encode(), "damaged.rexs"))
+        except InputError:
+            refused_files += 1
+    assert 10 < refused_files < 60

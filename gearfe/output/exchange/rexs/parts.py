@@ -6,6 +6,7 @@ import itertools
 import math
 from typing import Any
 
+from ....base.errors import InputError
 from ....base.tables.bearing import ANGULAR, CYLINDRICAL, DEEP_GROOVE, TAPERED
 from .frames import PARALLEL, cross, dot
 from .ledger import DERIVED, READ
@@ -289,6 +290,9 @@ def gears(
         if teeth is None:
             reading.ignored(item, "number_of_teeth", "a gear without a number of teeth is left out")
             continue
+        if not teeth:
+            problem, cure = "must not be 0", "correct it in the file"
+            raise InputError(f"number_of_teeth of {item.label}", teeth, problem, cure)
         entry: dict[str, Any] = {"teeth": -abs(teeth) if item.kind == "ring_gear" else teeth}
         flanks = _flanks(reading, item)
         _form(reading, item, flanks, entry, key)
