@@ -213,6 +213,11 @@ def test_a_position_does_not_depend_on_where_its_iteration_starts(flanks):
             left = np.maximum(_approach_left(lines, looks, after), 0.0)
             assert after.twist == pytest.approx(alone.twist, rel=1e-5)
             assert np.abs(left - known).max() < 1e-4 * known.max()
+        angles = angle + cycle / 24 * np.arange(-2, 1)
+        swept = sweep_width(lines, [100.0], angles=angles)  # the third position continues the first two
+        assert swept.twist[0, 2] == pytest.approx(alone.twist, rel=1e-5)
+        line_load = alone.moment / (alone.points.weight * alone.points.rows.arm)
+        assert swept.peak_line_load[0, 2] == pytest.approx(line_load.max(), rel=1e-4)
 
 
 @pytest.mark.parametrize("flanks", [RELIEVED, CORNERS, RIDGE], ids=["relieved", "corners", "ridge"])

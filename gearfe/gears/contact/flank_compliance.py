@@ -127,6 +127,13 @@ class Shapes:
         powers = t[:, :, None, None] ** np.arange(4)[:, None]
         return np.asarray((self.powers.take(piece, axis=0) @ powers).reshape(*s.shape, 3, count))
 
+    def values_at(self, s: Array) -> Array:
+        """Return the shape functions at arc lengths s (m) of shape (p, 2), shape (p, 2, k)."""
+        count = self.stations.shape[1]
+        piece = (s[:, :, None] >= self.stations).sum(axis=2) + np.array([0, count + 1])
+        powers = (s - self.origin.take(piece))[:, :, None, None] ** np.arange(4)[:, None]
+        return np.asarray((self.powers[:, :count].take(piece, axis=0) @ powers)[..., 0])
+
     def along(self, values: ComplexArray, s: Array) -> ComplexArray:
         """What has the values at the stations, shape (p, 2, k), at many arc lengths s (m), shape (p, 2, m)."""
         count = self.stations.shape[1]

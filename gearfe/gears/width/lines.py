@@ -61,15 +61,17 @@ from .pair_law import PairLaw, pair_law
 POINTS_PER_FUNCTION, LEAST_POINTS = 2.0, 4
 #: Change of the twist, in parts of its way since the first touch, and of the ends of the load, in parts of its length,
 #: that end the placing of points. How often they are placed, and how often the ends may change.
-PLACED, ENDS_PLACED, PLACINGS, FREE_PLACINGS = 1e-3, 1e-3, 12, 8
+PLACED, ENDS_PLACED, PLACINGS, FREE_PLACINGS = 2e-3, 1e-3, 12, 8
 #: Steps in which any number of points may lose their load or be let in. That converges in a few steps or runs in a
 #: circle; afterwards one does at a time, along the way of the convex problem of the moments, which has no circles.
 QUICK_STEPS = 15
 #: Change of the moments in parts of their sum in a whole step, below which another point is let in.
 ONE_BY_ONE = 1e-3
-#: Newton steps, change of the moments in parts of their sum in the last one, and the overlap (m) of a point that
-#: carries nothing that is none.
-STEPS, SETTLED, CLOSED = 300, 1e-9, 1e-12
+#: Newton steps, and the overlap (m) of a point that carries nothing that is none.
+STEPS, CLOSED = 300, 1e-12
+#: Change of the moments in parts of their sum in the last step, and in that for points that may be placed anew. The
+#: iteration converges quadratically: what is left after it is about the square.
+SETTLED, ROUGH = 1e-6, 3e-3
 #: A, k and q of free ends at Poisson's ratios (-), within 2 % of the resolved block.
 AT_END = {0.2: (2.79, 0.264, 2.03), 0.3: (2.35, 0.301, 1.60), 0.4: (2.13, 0.329, 1.43)}
 #: Least roll length (modules) for the curvature that the half widths at free ends follow from.
@@ -82,8 +84,10 @@ LEAST_AHEAD = 0.1
 ENERGY_POINTS = 5
 #: Least length (widths) of a stretch that begins or ends at a kink, and of a loaded part.
 LEAST_STRETCH, SHORTEST = 1e-3, 1e-9
-#: Places on a line at which its gap is looked at.
-LOOKS = 33
+#: Places on a line at which its gap is looked at; distance of those beside an end of the load in parts of its length.
+LOOKS, BESIDE = 21, 0.01
+#: Steps by secants to where a line crosses a seam of the material.
+SECANTS = 4
 
 
 @dataclass(frozen=True)
@@ -257,9 +261,16 @@ class Looks:
 
 
 def look_at(lines: ContactLines, angle: float, twist: float = 0.0, runs: Runs | None = None) -> Looks:
-    """Look at the gaps along all lines that can meet at a pinion angle and a twist of the wheel (rad).
+    """Look at the gaps along all lines that can meet at a pinion angle.
 
-    The ends of `runs` are among the places.
+    Parameters
+    ----------
+    lines : ContactLines
+        The gears.
+    angle, twist : float
+        Pinion angle and twist of the wheel (rad).
+    runs : Runs, optional
+        Loaded parts, whose ends are among the places, with two more beside each.
     """
     mesh, law, flanks = lines.compliance.mesh, lines.law, lines.flanks
     middle, cycle, turn = _middle(lines, angle, twist), mesh.sections.mesh_cycle, mesh.turns[0]
@@ -274,12 +285,18 @@ def look_at(lines: ContactLines, angle: float, twist: float = 0.0, runs: Runs | 
     z = first[:, None] + (last - first)[:, None] * np.linspace(0.0, 1.0, LOOKS)
     kinks = [marks]
     for gear, face in enumerate(mesh.faces):
-        kinks.append(_kinks(flanks.kinks(gear, face), z, np.interp(psi + turn * z, law.angle, law.roll[:, gear])))
+        seams = flanks.kinks(gear, face)
+        if seams[:, 1].any():
+            kinks.append(_kinks(seams, z, psi, turn, law.angle, law.roll[:, gear]))
+        elif len(seams):
+            kinks.append(np.broadcast_to(seams[:, 2] / seams[:, 0], (len(numbers), len(seams))))
     at = np.concatenate(kinks, axis=1)
     inside = (at > first[:, None]) & (at < last[:, None])
     lines_of, places = [np.repeat(np.arange(len(numbers)), LOOKS), np.nonzero(inside)[0]], [z.ravel(), at[inside]]
     if runs is not None and len(numbers):
-        of_ends, ends = np.tile(runs.pair, 2) - numbers[0], np.append(runs.start, runs.end)
+        beside = BESIDE * (runs.end - runs.start)
+        of_ends = np.tile(runs.pair, 6) - numbers[0]
+        ends = np.concatenate([end + i * beside for end in (runs.start, runs.end) for i in (-1.0, 0.0, 1.0)])
         known = (of_ends >= 0) & (of_ends < len(numbers))
         of_ends, ends = of_ends[known], ends[known]
         known = (ends > first[of_ends]) & (ends < last[of_ends])
@@ -292,24 +309,38 @@ def look_at(lines: ContactLines, angle: float, twist: float = 0.0, runs: Runs | 
     return Looks(numbers[line], z, kink, rows, rows.touch + lines.gap(z, rows, numbers[line]) / mean_arm(lines, rows))
 
 
-def _kinks(seams: Array, z: Array, roll: Array) -> Array:
+def _kinks(seams: Array, z: Array, psi: Array, turn: float, angle: Array, roll: Array) -> Array:
     """Return where lines cross seams a z + b s = c of a flank, shape (lines, seams); NaN where they do not.
 
     Parameters
     ----------
     seams : ndarray, shape (seams, 3)
         a, b, c.
-    z, roll : ndarray, shape (lines, looks)
-        Axial coordinates and roll lengths s along the lines (m).
+    z : ndarray, shape (lines, looks)
+        Axial coordinates along the lines (m).
+    psi : ndarray, shape (lines, 1)
+        Pair angles of the lines at z = 0 (rad).
+    turn : float
+        Their growth along z (rad/m).
+    angle, roll : ndarray, shape (n,)
+        Table of roll lengths s (m) over rising pair angles (rad).
     """
     a, b, c = seams.T[:, :, None, None]
-    side = a * z + b * roll - c
+    side = a * z + b * np.interp(psi + turn * z, angle, roll) - c
     crossed = (side[..., :-1] > 0.0) != (side[..., 1:] > 0.0)
     i = crossed.argmax(axis=-1)[..., None]
     before, behind = (np.take_along_axis(side, i + k, axis=-1)[..., 0] for k in (0, 1))
     low, high = (np.take_along_axis(np.broadcast_to(z, side.shape), i + k, axis=-1)[..., 0] for k in (0, 1))
-    share = np.divide(before, before - behind, out=np.full(before.shape, np.nan), where=crossed.any(axis=-1))
-    return np.asarray((low + share * (high - low)).T)
+    a, b, c = (one[..., 0] for one in (a, b, c))
+    at = np.full(low.shape, np.nan)
+    for _ in range(SECANTS):  # roll lengths have a kink at an end of the path
+        share = np.divide(before, before - behind, out=np.full(before.shape, np.nan), where=crossed.any(axis=-1))
+        at = low + np.clip(share, 0.0, 1.0) * (high - low)
+        off = a * at + b * np.interp(psi[:, 0] + turn * at, angle, roll) - c
+        same = (off > 0.0) == (before > 0.0)
+        low, before = np.where(same, at, low), np.where(same, off, before)
+        high, behind = np.where(same, high, at), np.where(same, behind, off)
+    return np.asarray(at.T)
 
 
 def _middle(lines: ContactLines, angle: float, twist: float) -> float:
@@ -456,7 +487,7 @@ def _loads(compliance: WideCompliance, z: Array, rows: Rows) -> list[Array]:
     """Return the loads of unit forces at points on the stations and functions of both gears, shapes (n, size)."""
     mesh = compliance.mesh
     over_width = legendre(z, mesh.zone, mesh.count)
-    values = compliance.shapes.at(rows.arc)[:, :, 0]
+    values = compliance.shapes.values_at(rows.arc)
     loads = []
     for gear, side in enumerate(compliance.sides):
         size = len(side.local.stations)
@@ -492,27 +523,30 @@ def _influence(compliance: WideCompliance, loads: list[Array], pair: IntArray) -
 
 
 def _approach_left(lines: ContactLines, looks: Looks, balance: _Balance) -> Array:
-    """Twist (rad) that the solution leaves to the contacts themselves at the places looked at, shape (q,)."""
+    """Twist (rad) left to the contacts themselves at the places looked at, shape (q,); that of rigid gears below 0."""
     compliance, points, rows = lines.compliance, balance.points, looks.rows
     mesh, force = compliance.mesh, balance.moment / points.rows.arm
-    pairs, line = np.unique(looks.pair, return_inverse=True)
-    over_width = legendre(looks.z, mesh.zone, mesh.count)[:, :, None]
-    values = compliance.shapes.at(rows.arc)[:, :, 0]
-    approach = np.zeros(len(looks.z))
+    left = balance.twist - _touch(lines, rows, looks.first, points.twist)
+    overlaps = left > 0.0  # of rigid gears, without which nothing is loaded
+    pairs, line = np.unique(looks.pair[overlaps], return_inverse=True)
+    over_width = legendre(looks.z[overlaps], mesh.zone, mesh.count)[:, :, None]
+    values, normal = compliance.shapes.values_at(rows.arc[overlaps]), rows.tooth_normal[overlaps]
+    approach = np.zeros(len(line))
+    loaded = [(k, points.pair == k) for k in np.unique(points.pair).tolist()]
     for gear, (side, load) in enumerate(zip(compliance.sides, points.loads, strict=True)):
         size, moved = load.shape[1], np.zeros((len(pairs), load.shape[1]))
-        for k in np.unique(points.pair).tolist():
-            of_pair = points.pair == k
+        steps = side.influence.reshape(-1, size, size)
+        for k, of_pair in loaded:
             total = force[of_pair] @ load[of_pair]
-            for i, felt in enumerate(pairs.tolist()):
-                step = (felt - k) * (1 - 2 * gear)
+            way = (pairs - k) * (1 - 2 * gear)
+            for i, step in enumerate(way.tolist()):
                 if abs(step) <= compliance.steps:
-                    square = side.influence[abs(step)].reshape(size, size)
-                    moved[i] += square @ total if step >= 0 else total @ square
-        along = (moved.reshape(len(pairs), -1, mesh.count)[line] @ over_width)[..., 0]
-        shape = values[:, gear, : len(side.local.stations), None] * rows.tooth_normal[:, gear, None]
-        approach += (shape.reshape(len(line), -1) * along).sum(axis=1)
-    return balance.twist - _touch(lines, rows, looks.first, points.twist) - approach / rows.arm
+                    moved[i] += steps[step] @ total if step >= 0 else total @ steps[-step]
+        along = (moved.reshape(len(pairs), size // mesh.count, mesh.count)[line] @ over_width)[..., 0]
+        shape = values[:, gear, : len(side.local.stations), None] * normal[:, gear, None]
+        approach += (shape.reshape(len(line), size // mesh.count) * along).sum(axis=1)
+    left[overlaps] -= approach / rows.arm[overlaps]
+    return left
 
 
 def own_twists(law: PairLaw, points: Points, moment: Array) -> tuple[Array, Array]:
@@ -586,6 +620,25 @@ class Solution:
         """Torque at the wheel (N m)."""
         return float(self.wheel_moment.sum())
 
+    def continued(self, before: Solution, share: float) -> Solution:
+        """Return this solution with the twist and the ends of the load that continue those before it, to start from.
+
+        Parameters
+        ----------
+        before : Solution
+            Solution at the position before this one.
+        share : float
+            How far, in their distance (-).
+        """
+        start, end = self.runs.start.copy(), self.runs.end.copy()
+        for k in np.unique(self.runs.pair).tolist():
+            i, j = self.runs.pair == k, before.runs.pair == k
+            if np.count_nonzero(i) == np.count_nonzero(j):
+                start[i] += share * (start[i] - before.runs.start[j])
+                end[i] += share * (end[i] - before.runs.end[j])
+        twist = self.twist + share * (self.twist - before.twist)
+        return replace(self, twist=twist, runs=Runs(self.runs.pair, start, end))
+
 
 def solve_position(
     lines: ContactLines,
@@ -627,12 +680,15 @@ def solve_position(
             continue
         runs = _runs(looks.pair, looks.z, rigid) if runs is None else runs.within(looks)
         points = place_points(lines, angle, at, looks, runs)
-        balance = known = _newton(lines, points, torque=torque, twist=twist, before=known)
+        balance = known = _newton(lines, points, torque=torque, twist=twist, before=known, settled=ROUGH)
         steps, placed = steps + balance.steps, runs
         if number <= FREE_PLACINGS:
             runs = _runs(looks.pair, looks.z, _approach_left(lines, looks, balance))
         near = abs(balance.twist - at) <= PLACED * max(balance.twist - looks.least, 0.0)
-        settled, at = balance.converged and near and runs.near(placed), balance.twist
+        at = balance.twist
+        if balance.converged and near and runs.near(placed):
+            balance = _newton(lines, points, torque=torque, twist=twist, before=balance)
+            steps, settled = steps + balance.steps, balance.converged
     if balance is None or runs is None:
         return _solution(lines, _Balance(_nowhere(lines), math.nan, np.zeros(0), converged=False, steps=0), NO_RUNS, 0)
     return _solution(lines, replace(balance, steps=steps, converged=settled), runs, number)
@@ -662,10 +718,12 @@ def _newton(
     torque: float | None,
     twist: float | None,
     before: _Balance | Solution | None = None,
+    settled: float = SETTLED,
 ) -> _Balance:
     """Solve the complementary problem of the points at a torque (N m) or a twist (rad).
 
-    It begins with the loads along the lines of the solution `before`.
+    It begins with the loads along the lines of the solution `before`, and ends after a step that changes the moments by
+    less than `settled` of their sum.
     """
     law, n, weight = lines.law, len(points), points.weight
     loaded: BoolArray = np.ones(n, dtype=bool)
@@ -708,7 +766,7 @@ def _newton(
         entering = overlap > closed
         if steps > QUICK_STEPS and entering.any():  # after a whole step the deepest alone
             entering = (overlap == overlap.max()) & (share == 1.0) & (change < ONE_BY_ONE)
-        if not (leaving.any() or (overlap > closed).any()) and change < SETTLED:
+        if not (leaving.any() or (overlap > closed).any()) and change < settled:
             converged = True
         loaded = (loaded & ~leaving) | entering
         if not loaded.any():

@@ -31,6 +31,8 @@ from .lines import ContactLines, Solution, look_at, solve_position
 
 #: Pinion angles of a mesh cycle where none are given; places along the width of the mean load.
 ANGLES, ALONG = 24, 65
+#: Distance (mesh cycles) of a position from which the next one starts, and how far two are continued in theirs (-).
+NEIGHBOUR, FARTHEST = 0.13, 2.0
 #: Kinds of status of a position.
 CONVERGED, NOT_CONVERGED, NO_CONTACT = "converged", "not_converged", "no_contact"
 
@@ -204,11 +206,17 @@ def _angles(lines: ContactLines, angles: ArrayLike | None, positions: int) -> Ar
 
 
 def _solved(lines: ContactLines, angles: Array, load: float, by_torque: bool) -> list[Solution]:
-    """Positions at one load."""
-    solved = []
-    for angle in angles.tolist():
+    """Positions at one load; each starts from those before it where they are close."""
+    near = NEIGHBOUR * lines.compliance.mesh.sections.mesh_cycle
+    solved: list[Solution] = []
+    for i, angle in enumerate(angles.tolist()):
+        before = solved[-1] if i and solved[-1].converged and abs(angle - angles[i - 1]) <= near else None
+        if before is not None and i > 1 and angles[i - 1] != angles[i - 2]:
+            share = (angle - angles[i - 1]) / (angles[i - 1] - angles[i - 2])
+            if solved[-2].converged and 0.0 < share <= FARTHEST:
+                before = before.continued(solved[-2], share)
         torque, twist = (load, None) if by_torque else (None, load)
-        solved.append(solve_position(lines, angle, torque=torque, twist=twist))
+        solved.append(solve_position(lines, angle, torque=torque, twist=twist, before=before))
     return solved
 
 
