@@ -1,6 +1,7 @@
 """Two formulations of the same contact: condensed compliance against plain scikit-fem forms on whole gears."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ from scipy.sparse import coo_matrix
 
 from gearfe.fem.plane import element_stiffness
 from gearfe.gears.contact.laws import ContactLaw, Nitsche, Penalty
+from gearfe.gears.contact.whole_gears.bodies import Bodies
+from gearfe.gears.contact.whole_gears.pair import ElasticGear
 from gearfe.gears.contact.whole_gears.position import solve_position as solve_whole
 from gearfe.gears.teeth.whole_gear import whole_gear
 from tests.makers.contact_cases import STEEL, WIDTH, condensed, meshes, whole
@@ -65,14 +68,29 @@ def test_whole_gear_is_closed_and_made_of_turned_sectors() -> None:
     np.testing.assert_allclose(turned, sector.points @ rotation.T, rtol=0, atol=1e-15)
 
 
+@pytest.mark.parametrize(("name", "angle"), [("sharp", 9.0), ("modified", 10.0)])
+def test_condensed_teeth_are_those_of_the_whole_gears(name: str, angle: float) -> None:
+    """Static condensation is exact: torques, and the reaction of supports of which some are condensed."""
+    pair, place = whole(name, COARSE, "strain"), (math.radians(angle), math.radians(0.05))
+    arcs = pair.arcs(*place)
+    assert arcs is not None
+    assert 1 <= len(arcs.arcs[0].mesh.contact) < pair.pinion.mesh.teeth
+    part = solve_whole(pair, Nitsche(), *place)
+    full = solve_whole(replace(pair, condensed=False), Nitsche(), *place)
+    assert part.status == full.status == "converged"
+    for quantity in ("torque_wheel", "torque_pinion", "torque_wheel_reaction"):
+        assert getattr(part, quantity) == pytest.approx(getattr(full, quantity), rel=1e-9), quantity
+
+
 def test_scikit_fem_form_and_batched_element_stiffness_agree() -> None:
-    pair = whole("modified", COARSE, "stress")
-    gear = pair.gears[0]
+    sector = meshes("modified", COARSE)[0]
+    gear = whole_gear(sector)
+    bodies = Bodies((ElasticGear(sector, STEEL, "stress", WIDTH).body(gear),))
     blocks = element_stiffness(gear.points[gear.triangles], STEEL, "stress", WIDTH)
-    unknowns = pair.bodies.unknowns[pair.bodies.node_of[0]][gear.triangles].reshape(-1, 12)
+    unknowns = bodies.unknowns[bodies.node_of[0]][gear.triangles].reshape(-1, 12)
     rows, columns = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
-    size = pair.bodies.stiffness.shape[0]
+    size = bodies.stiffness.shape[0]
     mine = coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsr()
     own = np.unique(unknowns)
-    difference = abs(pair.bodies.stiffness[own][:, own] - mine[own][:, own]).max()
+    difference = abs(bodies.stiffness[own][:, own] - mine[own][:, own]).max()
     assert difference < 1e-13 * abs(mine).max()

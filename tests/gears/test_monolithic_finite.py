@@ -37,13 +37,23 @@ def test_tangent_is_the_derivative_of_the_forces() -> None:
 def test_moments_balance_in_the_deformed_place() -> None:
     """Finite strain fulfils the balance of moments where the bodies are: the reactions at the bore carry the moment of
     the contact forces. Small strain fulfils it in the undeformed place only."""
-    pair = whole("modified", 10.0, "strain")
+    pair = replace(whole("modified", 10.0, "strain"), condensed=False)
     place = math.radians(10.0), math.radians(0.3)
     small = solve_position(pair, Nitsche(), *place)
     finite = solve_position(replace(pair, kinematics="finite"), Nitsche(), *place, tolerance=1e-9)
     assert small.status == finite.status == "converged"
     assert finite.torque_wheel_reaction == pytest.approx(finite.torque_wheel, rel=1e-8)
     assert abs(small.torque_wheel_reaction / small.torque_wheel - 1) > 1e-4
+
+
+def test_a_light_load_converges_quadratically() -> None:
+    """Strains of some 1e-7 keep their digits: the last step squares the residual, until rounding."""
+    pair = replace(whole("modified", 10.0, "strain"), kinematics="finite")
+    found = solve_position(pair, Nitsche(), math.radians(10.0), math.radians(2e-4))
+    assert found.status == "converged"
+    assert found.solution is not None
+    assert found.iterations <= 8
+    assert found.solution.residuals[-1] < 1e-10
 
 
 def both_routes(angle_deg: float, twist_deg: float, neighbours: int = NEIGHBOURS) -> tuple[float, float]:

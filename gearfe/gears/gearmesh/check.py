@@ -243,7 +243,7 @@ def check_positions(
     positions = []
     with stage("whole gears"), one_thread():
         whole = whole_pair(pair, model.changed(law=law), kinematics)
-        unknowns = int(whole.bodies.unknowns.size)
+        unknowns = whole.unknowns
         for k, (angle, deflection) in enumerate(zip(curve.pinion_angle[at], twist, strict=True)):
             if math.isnan(deflection):
                 positions.append(WholePosition(NO_TWIST))

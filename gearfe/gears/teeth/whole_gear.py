@@ -35,12 +35,24 @@ class WholeGear(MeshPart):
 
 def whole_gear(mesh: SectorMesh) -> WholeGear:
     """Join `mesh.teeth` turned copies of a sector."""
-    return _joined([mesh] * mesh.teeth)
+    return gear_arc(mesh, mesh.teeth)
+
+
+def gear_arc(mesh: SectorMesh, count: int) -> WholeGear:
+    """Join `count` turned copies of a sector, tooth 0 first: an arc of the gear, or the whole gear."""
+    return _joined([mesh] * count)
 
 
 def _joined(sectors: Sequence[SectorMesh]) -> WholeGear:
-    """The gear of these sectors, tooth by tooth: neighbours have the same nodes on their common side."""
-    own = [np.setdiff1d(np.arange(len(sector.points)), sector.cut_left) for sector in sectors]
+    """Join these sectors, tooth by tooth: neighbours have the same nodes on their common side.
+
+    Fewer sectors than the gear has teeth are an arc, whose ends stay apart.
+    """
+    last = len(sectors) - 1 if len(sectors) < sectors[0].teeth else None
+    own = [
+        np.arange(len(sector.points)) if k == last else np.setdiff1d(np.arange(len(sector.points)), sector.cut_left)
+        for k, sector in enumerate(sectors)
+    ]
     first = np.cumsum([0, *map(len, own)])
     numbers, points = [np.zeros(len(sector.points), dtype=np.int64) for sector in sectors], []
     for k, (sector, kept) in enumerate(zip(sectors, own, strict=True)):
@@ -48,7 +60,7 @@ def _joined(sectors: Sequence[SectorMesh]) -> WholeGear:
         turn = k * sector.pitch
         (x, y), c, s = sector.points[kept].T, math.cos(turn), math.sin(turn)
         points.append(np.stack([c * x - s * y, s * x + c * y], axis=-1))
-    for k, sector in enumerate(sectors):  # the left side of a sector is the right side of the next one
+    for k, sector in enumerate(sectors[:last]):  # the left side of a sector is the right side of the next one
         after = (k + 1) % len(sectors)
         numbers[k][sector.cut_left] = numbers[after][sectors[after].cut_right]
     numbered = list(zip(sectors, numbers, strict=True))

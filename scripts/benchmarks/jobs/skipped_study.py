@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -56,9 +57,9 @@ def one_sector(quick: bool) -> tuple[float, float, str]:
     short = _cpu(lambda: elastic_pair(pair, coarsen=coarsen))
 
     def whole() -> None:
-        gears = assembled_pair(pair, coarsen)
+        gears = replace(assembled_pair(pair, coarsen), condensed=False).arcs(0.0, 1e-3)
         stiffness = gears.bodies.stiffness.tocsr()
-        bores = [n[np.unique(g.boundaries["bore"])] for n, g in zip(gears.bodies.node_of, gears.gears, strict=True)]
+        bores = [n[np.unique(g.mesh.boundaries["bore"])] for n, g in zip(gears.bodies.node_of, gears.arcs, strict=True)]
         free = np.setdiff1d(np.arange(stiffness.shape[0]), gears.bodies.unknowns[np.concatenate(bores)].ravel())
         factorize(stiffness[free][:, free], block=2)
 

@@ -145,13 +145,11 @@ def verification(record: Record) -> None:
 
 
 def assembled_pair(pair: GearPair, coarsen: float) -> Any:
-    """Both whole gears, assembled (plane strain, steel)."""
+    """Both whole gears (plane strain, steel)."""
     from gearfe.gears.contact.laws import Nitsche, PairModel
     from gearfe.gears.contact.whole_gears.pair import whole_pair
 
-    gears = whole_pair(pair, PairModel(law=Nitsche(), coarsen=coarsen))
-    _ = gears.bodies.stiffness  # assembled on first use, shared by all positions
-    return gears
+    return whole_pair(pair, PairModel(law=Nitsche(), coarsen=coarsen))
 
 
 def stages(record: Record) -> None:

@@ -1,8 +1,8 @@
 r"""Internal forces, tangent and surface stress of bodies, at small strain or of Saint Venant-Kirchhoff.
 
 Small strain: :math:`\sigma = C:\varepsilon(u)` on the undeformed bodies. Finite strain, total Lagrangian, with
-:math:`F = I + \nabla u`, :math:`E = \tfrac12(F^T F - I)`, :math:`S = C:E` (Bonet & Wood, *Nonlinear Continuum Mechanics
-for Finite Element Analysis*, 2008, sec. 6.4),
+:math:`h = \nabla u`, :math:`F = I + h`, :math:`E = \mathrm{sym}\,h + \tfrac12 h^T h`, :math:`S = C:E`
+(Bonet & Wood, *Nonlinear Continuum Mechanics for Finite Element Analysis*, 2008, sec. 6.4),
 
 .. math::
     f(v) = \int F S : \nabla v, \qquad
@@ -78,10 +78,14 @@ def internal_tangent(u: Any, v: Any, w: Any) -> Any:
 
 @dataclass(frozen=True)
 class SaintVenantKirchhoff:
-    """Hyperelastic bodies; `mesh` holds them undeformed, in their present places."""
+    """Hyperelastic bodies; `mesh` holds them undeformed, in their present places.
+
+    `remainder` is the stiffness of parts that are condensed away, at small strain (N/m, sparse).
+    """
 
     bodies: Bodies
     mesh: Any
+    remainder: Any
 
     @cached_property
     def bases(self) -> list[Any]:
@@ -90,11 +94,11 @@ class SaintVenantKirchhoff:
 
     def forces(self, u: Array) -> Array:
         """Return the internal forces (N)."""
-        return np.asarray(self._assembled(internal_work, u))
+        return np.asarray(self._assembled(internal_work, u) + self.remainder @ u)
 
     def tangent(self, u: Array) -> Any:
         """Return their derivative, sparse (N/m)."""
-        return self._assembled(internal_tangent, u)
+        return self._assembled(internal_tangent, u) + self.remainder
 
     def _assembled(self, form: Any, u: Array) -> Any:
         total: Any = 0
@@ -125,10 +129,12 @@ class SaintVenantKirchhoff:
 
 
 def deformation(h: Array, lam: Any, mu: Any) -> tuple[Array, Array]:
-    """Return F = I + grad u and S = C : E of h = grad u."""
-    identity = eye(np.ones(h.shape[2:]), 2)
-    f = identity + h
-    return f, isotropic(0.5 * (mul(transpose(f), f) - identity), lam, mu)
+    """Return F = I + grad u and S = C : E of h = grad u.
+
+    E is sym(h) + h^T h / 2: the difference F^T F - I leaves only nine digits of a strain of 1e-7.
+    """
+    strain = _sym(h) + 0.5 * mul(transpose(h), h)
+    return eye(np.ones(h.shape[2:]), 2) + h, isotropic(strain, lam, mu)
 
 
 def isotropic(strain: Array, lam: Any, mu: Any) -> Array:

@@ -1,39 +1,71 @@
-"""Two whole gears as a contact problem."""
+"""Two whole gears as a contact problem.
+
+Teeth that may touch, and those between them, keep all their unknowns; the others are condensed (`.remainder`).
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.spatial import KDTree
 
 from ....base.errors import InputError
-from ....base.typing import Array
-from ....fem.plane import Material, Plane
+from ....base.typing import Array, IntArray
 from ...geometry.pair import GearPair
 from ...geometry.validity import check_spur
-from ...teeth.tooth_sector import SectorMesh, sector_mesh, sector_recipes
-from ...teeth.whole_gear import WholeGear, whole_gear
+from ...teeth.tooth_sector import sector_mesh, sector_recipes
 from ..laws import ElementLaw, PairModel
-from .bodies import Bodies, ElasticBody
+from .bodies import Bodies
 from .constitution import Kinematics
 from .problem import ContactProblem, Surface
+from .remainder import ElasticGear, GearArc, arc_of, rotation
 from .segments import Quadrature
-
-#: Tooth pairs on either side of the one nearest to the line of centres whose flanks are searched for contact.
-PAIRS = 3
 
 
 @dataclass(frozen=True)
-class ElasticGear:
-    """Sector mesh, material, plane state and face width (m) of a gear."""
+class MeshingArcs:
+    """Arcs of pinion and wheel whose teeth may touch, in one mesh.
 
-    mesh: SectorMesh
-    material: Material
-    plane: Plane
-    thickness: float
+    Attributes
+    ----------
+    elastic
+        Both gears.
+    arcs
+        Their arcs.
+    pairs
+        Numbers of the tooth pairs that may touch: pair k joins the pinion's tooth k and the wheel's tooth -1 - k.
+    """
+
+    elastic: tuple[ElasticGear, ElasticGear]
+    arcs: tuple[GearArc, GearArc]
+    pairs: tuple[int, ...]
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """Both arcs, each in the axes of its first tooth, in one mesh."""
+        return Bodies(tuple(gear.body(arc.mesh) for gear, arc in zip(self.elastic, self.arcs, strict=True)))
+
+    @cached_property
+    def remainder(self) -> Any:
+        """Stiffness of all other sectors on the unknowns of the bodies, sparse (N/m)."""
+        total = coo_matrix((self.bodies.unknowns.size,) * 2).tocsr()
+        for arc, of in zip(self.arcs, self.bodies.node_of, strict=True):
+            unknowns = self.bodies.unknowns[of[arc.nodes]].ravel()
+            rows, columns = np.broadcast_arrays(unknowns[:, None], unknowns)
+            total = total + coo_matrix((arc.remainder.ravel(), (rows.ravel(), columns.ravel())), total.shape)
+        return total
+
+    def chains(self, pair: int) -> tuple[IntArray, IntArray]:
+        """Return the edges of the flanks of pinion and wheel of a tooth pair: nodes of the joined mesh."""
+        edges = []
+        for gear, arc, of, tooth in zip(self.elastic, self.arcs, self.bodies.node_of, (pair, -1 - pair), strict=True):
+            edges.append(of[arc.mesh.contact[(tooth - arc.first) % gear.mesh.teeth]])
+        return edges[0], edges[1]
 
 
 @dataclass(frozen=True)
@@ -50,6 +82,9 @@ class WholePair:
         Common face width (m).
     points_per_edge, quadrature, kinematics
         As in `.problem.ContactProblem`.
+    condensed
+        Whether teeth that touch nothing are condensed. At small strain this changes nothing; at finite strain the
+        condensed teeth keep small strain.
     """
 
     pinion: ElasticGear
@@ -59,6 +94,12 @@ class WholePair:
     points_per_edge: int = 4
     quadrature: Quadrature = "points"
     kinematics: Kinematics = "small"
+    condensed: bool = True
+
+    @property
+    def elastic(self) -> tuple[ElasticGear, ElasticGear]:
+        """Pinion and wheel."""
+        return self.pinion, self.wheel
 
     @property
     def sign(self) -> int:
@@ -70,21 +111,10 @@ class WholePair:
         """x of the wheel's centre (m)."""
         return self.sign * self.centre_distance
 
-    @cached_property
-    def gears(self) -> tuple[WholeGear, WholeGear]:
-        """Whole meshes of pinion and wheel."""
-        return whole_gear(self.pinion.mesh), whole_gear(self.wheel.mesh)
-
-    @cached_property
-    def bodies(self) -> Bodies:
-        """Both gears, each in the frame of its hub, in one mesh."""
-        parts = [
-            ElasticBody(
-                whole.points, whole.triangles, whole.boundaries, gear.material, gear.plane, thickness=gear.thickness
-            )
-            for whole, gear in zip(self.gears, (self.pinion, self.wheel), strict=True)
-        ]
-        return Bodies(tuple(parts))
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of both whole gears."""
+        return sum(2 * gear.mesh.teeth * (len(gear.mesh.points) - len(gear.mesh.cut_left)) for gear in self.elastic)
 
     def angles(self, pinion_angle: float, twist: float) -> tuple[float, float]:
         """Return the angles of tooth 0 of both gears (rad).
@@ -94,31 +124,62 @@ class WholePair:
         z1, z2 = self.pinion.mesh.teeth, self.sign * self.wheel.mesh.teeth
         return pinion_angle, self.sign * twist - pinion_angle * z1 / z2 + np.pi + np.pi / z2
 
-    def problem(self, law: ElementLaw, pinion_angle: float, twist: float) -> ContactProblem | None:
-        """Return the contact problem of all flanks that come near each other, or None where none do."""
-        unknowns, nodes = self.bodies.unknowns, self.bodies.node_of
+    def arcs(self, pinion_angle: float, twist: float) -> MeshingArcs | None:
+        """Return the arcs with the teeth that may touch between no twist and `twist`, or None if none do."""
+        z1 = self.pinion.mesh.teeth
+        central = round(-pinion_angle * z1 / (2 * np.pi))
+        near = []
+        for pair in range(central - z1 // 2, central - z1 // 2 + z1):
+            chains = []
+            for gear, centre, angle, tooth in zip(
+                self.elastic,
+                (0.0, self.wheel_centre),
+                self.angles(pinion_angle, twist),
+                (pair, -1 - pair),
+                strict=True,
+            ):
+                turned = gear.mesh.points @ rotation(angle + tooth * gear.mesh.pitch).T + np.array([centre, 0.0])
+                chains.append(turned[gear.mesh.contact_edges()])
+            if all(len(edges) for edges in self._near(chains[0], chains[1], twist)):
+                near.append(pair)
+        if not near:
+            return None
+        count = near[-1] - near[0] + 1 if self.condensed else math.inf
+        arcs = [
+            arc_of(gear, first, int(min(count, gear.mesh.teeth)))
+            for gear, first in zip(self.elastic, (near[0], -1 - near[-1]), strict=True)
+        ]
+        return MeshingArcs(self.elastic, (arcs[0], arcs[1]), tuple(near))
+
+    def problem(
+        self, meshing: MeshingArcs, law: ElementLaw, pinion_angle: float, twist: float
+    ) -> ContactProblem | None:
+        """Return the contact problem of the flanks of arcs that come near each other, or None if none do."""
+        bodies = meshing.bodies
+        unknowns, nodes = bodies.unknowns, bodies.node_of
         turns = np.empty((len(unknowns), 2, 2))
-        for of_gear, angle in zip(nodes, self.angles(pinion_angle, twist), strict=True):
-            c, s = np.cos(angle), np.sin(angle)
-            turns[of_gear] = [[c, -s], [s, c]]
-        places = np.einsum("nij,jn->in", turns, self.bodies.mesh.doflocs)
+        for of, arc, angle in zip(nodes, meshing.arcs, self.angles(pinion_angle, twist), strict=True):
+            turns[of] = rotation(angle + arc.angle)
+        places = np.einsum("nij,jn->in", turns, bodies.mesh.doflocs)
         places[0, nodes[1]] += self.wheel_centre
-        mesh = self.bodies.moved(np.ascontiguousarray(places))
-        facing = self._facing(places.T, pinion_angle, twist)
+        mesh = bodies.moved(np.ascontiguousarray(places))
+        facing = []
+        for pair in meshing.pairs:
+            chains = meshing.chains(pair)
+            near = self._near(places.T[chains[0]], places.T[chains[1]], twist)
+            if len(near[0]) and len(near[1]):
+                facing.append((Surface(0, chains[0], near[0]), Surface(1, chains[1], near[1])))
         if not facing:
             return None
-        stiffness = None
-        if self.kinematics == "small":
-            rows, columns = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
-            turn = coo_matrix((turns.ravel(), (rows.ravel(), columns.ravel()))).tocsr()
-            stiffness = turn @ self.bodies.stiffness @ turn.T
+        rows, columns = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
+        turn = coo_matrix((turns.ravel(), (rows.ravel(), columns.ravel()))).tocsr()
         rims = ("bore", "rim" if self.wheel.mesh.internal else "bore")
-        bores = [of[np.unique(gear.boundaries[rim])] for of, gear, rim in zip(nodes, self.gears, rims, strict=True)]
-        fixed = unknowns[np.concatenate(bores)].ravel()
+        held = [of[np.unique(arc.mesh.boundaries[rim])] for of, arc, rim in zip(nodes, meshing.arcs, rims, strict=True)]
+        fixed = unknowns[np.concatenate(held)].ravel()
         return ContactProblem(
-            bodies=self.bodies,
+            bodies=bodies,
             mesh=mesh,
-            facing=facing,
+            facing=tuple(facing),
             law=law,
             width=self.width,
             fixed=fixed,
@@ -127,29 +188,20 @@ class WholePair:
             points_per_edge=self.points_per_edge,
             quadrature=self.quadrature,
             kinematics=self.kinematics,
-            stiffness=stiffness,
+            stiffness=turn @ bodies.stiffness @ turn.T if self.kinematics == "small" else None,
+            remainder=turn @ meshing.remainder @ turn.T,
         )
 
-    def _facing(self, places: Array, pinion_angle: float, twist: float) -> tuple[tuple[Surface, Surface], ...]:
-        """Return the flanks that may touch, pinion and wheel of each tooth pair.
-
-        Edges farther apart than the twist reaches get no contact points.
-        """
-        z1, z2 = self.pinion.mesh.teeth, self.wheel.mesh.teeth
-        central = round(-pinion_angle * z1 / (2 * np.pi))
-        couples = []
-        for k in range(central - PAIRS, central + PAIRS + 1):
-            teeth = (self.gears[0].contact[k % z1], self.gears[1].contact[(-1 - k) % z2])
-            chains = [of[tooth] for of, tooth in zip(self.bodies.node_of, teeth, strict=True)]
-            longest = max(np.linalg.norm(np.ptp(places[edges], axis=1), axis=-1).max() for edges in chains)
-            reach = 2 * abs(twist) * self.centre_distance + 2 * longest
-            near = [
-                np.flatnonzero(KDTree(places[np.unique(mate)]).query(places[edges])[0].min(axis=1) < reach)
-                for edges, mate in (chains, chains[::-1])
-            ]
-            if len(near[0]) and len(near[1]):
-                couples.append((Surface(0, chains[0], near[0]), Surface(1, chains[1], near[1])))
-        return tuple(couples)
+    def _near(self, pinion: Array, wheel: Array, twist: float) -> tuple[IntArray, IntArray]:
+        """Return the edges of two flanks, shapes (e, 3, 2) (m), that the twist can bring together."""
+        longest = max(np.linalg.norm(np.ptp(edges, axis=1), axis=-1).max() for edges in (pinion, wheel))
+        radius = np.linalg.norm(wheel - [self.wheel_centre, 0.0], axis=-1).max()
+        reach = 2 * abs(twist) * max(radius, self.centre_distance) + 2 * longest
+        near = [
+            np.flatnonzero(KDTree(mate.reshape(-1, 2)).query(edges, distance_upper_bound=reach)[0].min(axis=1) < reach)
+            for edges, mate in ((pinion, wheel), (wheel, pinion))
+        ]
+        return near[0], near[1]
 
 
 def whole_pair(pair: GearPair, model: PairModel, kinematics: Kinematics = "small") -> WholePair:

@@ -11,7 +11,7 @@ from ....base.typing import Array
 from ..laws import ElementLaw
 from .contact_state import contact_at
 from .newton import TOLERANCE, ContactSolution, elastic_start, solve_contact
-from .pair import WholePair
+from .pair import MeshingArcs, WholePair
 from .problem import ContactProblem
 
 #: First and smallest step of the twist, as shares of it, where it is raised in steps.
@@ -79,7 +79,17 @@ def solve_position(
     tolerance
         Out-of-balance forces relative to the contact forces.
     """
-    problem = pair.problem(law, pinion_angle, twist)
+    meshing = pair.arcs(pinion_angle, twist)
+    if meshing is None:
+        return APART
+    return _solved(pair, meshing, law, (pinion_angle, twist), tolerance)
+
+
+def _solved(
+    pair: WholePair, meshing: MeshingArcs, law: ElementLaw, place: tuple[float, float], tolerance: float
+) -> WholePosition:
+    """Return the solution on arcs of the gears at a place: pinion angle and twist (rad)."""
+    problem = pair.problem(meshing, law, *place)
     if problem is None:
         return APART
     start = contact_at(problem, np.zeros(problem.unknowns.size))
@@ -88,29 +98,30 @@ def solve_position(
         return WholePosition("under_resolved") if overlap else APART
     if pair.kinematics == "finite":
         # strains of the rigid overlap are out of all proportion: start from the solution of small strain
-        small = solve_position(replace(pair, kinematics="small"), law, pinion_angle, twist, tolerance=ROUGHLY)
+        small = _solved(replace(pair, kinematics="small"), meshing, law, place, ROUGHLY)
         if small.solution is not None:
             start = contact_at(problem, small.solution.u)
     else:
         start = elastic_start(problem)
     solution = solve_contact(problem, start, tolerance=tolerance)
     if solution.status == "converged":
-        return _position(pair, problem, solution, solution.iterations)
-    raised, more = _raised(pair, law, pinion_angle, twist, tolerance)
+        return _position(pair, meshing, problem, solution, solution.iterations)
+    raised, more = _raised(pair, meshing, law, place, tolerance)
     iterations = solution.iterations + more
     if raised is None:
         return WholePosition("not_converged", iterations=iterations)
-    return _position(pair, *raised, iterations)
+    return _position(pair, meshing, *raised, iterations)
 
 
 def _raised(
-    pair: WholePair, law: ElementLaw, pinion_angle: float, twist: float, tolerance: float
+    pair: WholePair, meshing: MeshingArcs, law: ElementLaw, place: tuple[float, float], tolerance: float
 ) -> tuple[tuple[ContactProblem, ContactSolution] | None, int]:
     """Return problem and solution at the end of steps of the twist, and the iterations of all of them."""
     done, step, iterations, u = 0.0, FIRST_STEP, 0, None
+    pinion_angle, twist = place
     while step > SMALLEST_STEP:
         share = min(1.0, done + step)
-        problem = pair.problem(law, pinion_angle, share * twist)
+        problem = pair.problem(meshing, law, pinion_angle, share * twist)
         if problem is not None:
             start = contact_at(problem, np.zeros(problem.unknowns.size) if u is None else u * (share / done))
         if problem is None or (share < 1 and not (start.projection.gap < 0).any()):  # nothing touches yet
@@ -127,18 +138,25 @@ def _raised(
     return None, iterations
 
 
-def _position(pair: WholePair, problem: ContactProblem, solution: ContactSolution, iterations: int) -> WholePosition:
-    placed = problem.mesh.doflocs.T + solution.u[problem.unknowns]
+def _position(
+    pair: WholePair, meshing: MeshingArcs, problem: ContactProblem, solution: ContactSolution, iterations: int
+) -> WholePosition:
+    """Return the numbers of a solution: moments about the shafts, pressure, width of the contact."""
+    u = solution.u[problem.unknowns]
+    placed = problem.mesh.doflocs.T + u
     force, internal = solution.state.forces[problem.unknowns], solution.internal[problem.unknowns]
-    pinion, wheel = pair.bodies.node_of
+    # the supports of condensed sectors carry the moment of the forces on their faces, at small strain
+    on_remainder = (problem.remainder @ solution.u)[problem.unknowns]
+    pinion, wheel = meshing.bodies.node_of
     bore = wheel[np.isin(problem.unknowns[wheel, 0], problem.fixed)]
     from_wheel = placed - [pair.wheel_centre, 0.0]
+    reaction = _moment(from_wheel[bore], internal[bore]) - _moment((from_wheel - u)[wheel], on_remainder[wheel])
     loaded = np.bincount(solution.state.points.mate, solution.state.pressure > 0) / problem.points_per_edge
     return WholePosition(
         status="converged",
         torque_wheel=-pair.sign * _moment(from_wheel[wheel], force[wheel]),
         torque_pinion=-_moment(placed[pinion], force[pinion]),
-        torque_wheel_reaction=pair.sign * _moment(from_wheel[bore], internal[bore]),
+        torque_wheel_reaction=pair.sign * reaction,
         peak_pressure=float(solution.state.pressure.max()),
         elements_per_contact=float(loaded[loaded > 0].min()) if pair.quadrature == "points" else math.nan,
         iterations=iterations,

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ....base.errors import InputError
 from ....base.typing import Array, ComplexArray, IntArray
@@ -108,6 +109,9 @@ class ContactProblem:
         ``small`` or ``finite``: strain of the bodies.
     stiffness
         Small-strain stiffness in the places of the mesh (N/m); assembled when left out.
+    remainder
+        Stiffness of parts that are condensed onto nodes of the mesh, at small strain (N/m, sparse); left out if there
+        are none.
     """
 
     bodies: Bodies
@@ -122,6 +126,7 @@ class ContactProblem:
     quadrature: Quadrature = "points"
     kinematics: Kinematics = "small"
     stiffness: Any = None
+    remainder: Any = None
 
     def __post_init__(self) -> None:
         for name, allowed in (("quadrature", ("points", "segments")), ("kinematics", ("small", "finite"))):
@@ -136,9 +141,10 @@ class ContactProblem:
     @cached_property
     def constitution(self) -> SmallStrain | SaintVenantKirchhoff:
         """Internal forces of the bodies."""
+        remainder = csr_matrix((self.unknowns.size,) * 2) if self.remainder is None else self.remainder
         if self.kinematics == "finite":
-            return SaintVenantKirchhoff(self.bodies, self.mesh)
-        return SmallStrain(self.bodies.stiffness if self.stiffness is None else self.stiffness)
+            return SaintVenantKirchhoff(self.bodies, self.mesh, remainder)
+        return SmallStrain((self.bodies.stiffness if self.stiffness is None else self.stiffness) + remainder)
 
     @cached_property
     def chain_nodes(self) -> IntArray:
