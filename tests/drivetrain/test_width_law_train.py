@@ -232,20 +232,24 @@ def test_equal_planets_share_the_law_of_the_largest_range(monkeypatch: pytest.Mo
         return sliced_law()
 
     monkeypatch.setattr(width_law_store, "cached_width_law", recorded)
-    found = train_curves(helical_stage())
-    assert len(asked) == 1
+    found = train_curves(helical_stage(**RING))
+    assert len(asked) == 2
     assert found[0] is found[1] is found[2]
-    assert asked[0][1] > 0.0
+    assert found[3] is found[4] is found[5]
+    assert min(tilt for _, tilt in asked) > 0.0
 
 
 RING = {"meshes__planet_ring__stiffness_N_per_m": None, "meshes__planet_ring__mesh_model": "potential"}
+FREE = {"gears__ring__rim": "free"}
+SPRING = {"meshes__planet_ring__mesh_model": "variable_stiffness"}
 PITCHES = {"gears__planet__microgeometry__pitch_um": [1.0, -1.0] * 11}
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (RING, "is an internal gear, whose load .* give the mesh stiffness_N_per_m, mesh_table or curve"),
+        (RING | FREE, r"^gears\.ring\.rim = 'free': is not held.* give rim = \"bolted\""),
+        (RING | FREE | SPRING, r"^gears\.ring\.rim = 'free': is not held"),
         ({"meshes__sun_planet__friction": 0.05}, "leave it out, or .*helix_angle_deg"),
         (PITCHES, "has pitch errors, and .*helix_angle_deg"),
     ],

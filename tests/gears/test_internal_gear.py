@@ -388,7 +388,7 @@ def test_contact_over_the_width_takes_internal_pairs_with_held_rims(
     free = ("rim_diameter_mm = 300.0", 'rim_diameter_mm = 300.0\nrim = "free"')
     assert main(["stiffness", job(tmp_path, *helix, *other, free, table), "--out", str(tmp_path / "free")]) == 2
     message = capsys.readouterr().err
-    assert "rim" in message
+    assert "gears.ring.rim = 'free': is not held" in message
     assert 'give rim = "bolted"' in message
 
 

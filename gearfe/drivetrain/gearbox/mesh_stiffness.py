@@ -341,7 +341,12 @@ def _wide_law(job: TrainJob, train: GearTrain, number: int) -> _WideLaw:
 
 def _check_wide(job: TrainJob, train: GearTrain, number: int) -> None:
     """Raise `InputError` for what a law or spring over the face width does not take, with what a train can do."""
+    from ...gears.gearmesh.width_job import wide_mesh  # teeth in three dimensions, for these meshes
+
     named, table = job.meshes[number], job.table.meshes[number]
+    mesh = train.meshes[number]
+    pair = gear_pair(train.gear(mesh.driver).gear, train.gear(mesh.driven).gear, mesh.centre_distance)
+    wide_mesh(StiffnessJob(_driving(job, train, number), pair, job.path.parent))
     cause, _ = named.along_width(("left", "right"), places=False) or ("", None)
     if table.friction or table.roughness_um:
         key = "friction" if table.friction else "roughness_um"

@@ -142,7 +142,7 @@ def wide_mesh(job: StiffnessJob) -> WideMesh:
     Raises
     ------
     InputError
-        For gears that have no common width.
+        For gears that have no common width, and a ring that is not held.
     """
     sense = axial_sense(job)
     places = [1e-3 * sense * gear.y_mm for gear in job.mesh.gears]
@@ -165,6 +165,8 @@ def wide_mesh(job: StiffnessJob) -> WideMesh:
             gear = min(job.mesh.gears, key=lambda gear: gear.form["face_width_mm"])
             where, width = gear.written("face_width_mm"), gear.form["face_width_mm"]
             raise InputError(f"{where}.face_width_mm", width, error.problem, "use a narrower gear") from None
+        if error.field == "wheel.rim":
+            raise InputError(f"{job.mesh.driven.where}.rim", error.value, error.problem, error.cure) from None
         raise
 
 
