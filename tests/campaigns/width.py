@@ -34,8 +34,9 @@ from .toml_text import toml_text
 
 #: Positions of a pair; largest gap of a loaded point and overlap of another (m).
 POSITIONS, CLOSED = 50, 1e-9
-#: Deviation of torque and axial force (-), and that which tables of arms and points, linear between angles, cause.
-BALANCED, TABLES = 1e-8, 1e-6
+#: Deviation of torque and axial force (-), and that which tables of arms and points, linear between angles, cause:
+#: up to 8e-5 of the arm on tip rounds, which carry a tenth of a light load.
+BALANCED, TABLES = 1e-8, 1e-5
 
 
 def draw(random: np.random.Generator, number: int) -> Case:

@@ -71,7 +71,7 @@ ONE_BY_ONE = 1e-3
 STEPS, CLOSED = 300, 1e-12
 #: Change of the moments in parts of their sum in the last step, and in that for points that may be placed anew. The
 #: iteration converges quadratically: what is left after it is about the square.
-SETTLED, ROUGH = 1e-6, 3e-3
+SETTLED, ROUGH = 1e-7, 3e-3
 #: A, k and q of free ends at Poisson's ratios (-), within 2 % of the resolved block.
 AT_END = {0.2: (2.79, 0.264, 2.03), 0.3: (2.35, 0.301, 1.60), 0.4: (2.13, 0.329, 1.43)}
 #: Least roll length (modules) for the curvature that the half widths at free ends follow from.
@@ -449,7 +449,7 @@ def _points(lines: ContactLines, middle: float, twist: float, z: Array, weight: 
     rows = rows_at(law, middle + mesh.turns[0] * z + pair * mesh.sections.mesh_cycle)
     levers = np.concatenate([np.ones((len(z), 1)), lines.levers(z, rows) / rows.arm[:, None]], axis=1)
     first = rows.touch + lines.gap(z, rows, pair) / mean_arm(lines, rows)
-    rows = replace(rows, yields=rows.yields + _softer_ends(lines, z, rows))
+    rows = replace(rows, yields=_rising(rows.yields + _softer_ends(lines, z, rows), law.forces))
     loads = _loads(lines.compliance, z, rows)
     influence = _influence(lines.compliance, loads, pair) / (rows.arm[:, None] * rows.arm)
     return Points(z, weight, pair, rows, twist, _touch(lines, rows, first, twist), levers, loads, influence)
@@ -481,6 +481,16 @@ def _softer_ends(lines: ContactLines, z: Array, rows: Rows) -> Array:
             wide, narrow = (apart + a * k / (1.0 + q * apart / a) for a in (bump, half))
             added += scale * np.log(wide / narrow)
     return added
+
+
+def _rising(yields: Array, forces: Array) -> Array:
+    """Raise C (m2/N) under heavy loads so far that the approach C f rises with f by `STIFFEST` at least.
+
+    Half-planes under loads beyond all materials yield less under more load. The problem of the moments would have
+    several solutions there.
+    """
+    least = STIFFEST * yields[:, :1]
+    return np.asarray(np.maximum.accumulate((yields - least) * forces, axis=1) / forces + least)
 
 
 def _loads(compliance: WideCompliance, z: Array, rows: Rows) -> list[Array]:
@@ -677,6 +687,7 @@ def solve_position(
         rigid = at - _touch(lines, looks.rows, looks.first, at)
         if torque is not None and not (rigid > 0.0).any():
             at += LEAST_AHEAD * torque / mesh.usual_stiffness - rigid.max(initial=-math.inf)
+            runs = None
             continue
         runs = _runs(looks.pair, looks.z, rigid) if runs is None else runs.within(looks)
         points = place_points(lines, angle, at, looks, runs)
