@@ -295,7 +295,7 @@ def _keep(folder: Path, names: list[str], parsed: argparse.Namespace, said: str,
             if table is not None:
                 run = run_of(read_results(folder / table, "--out"), command=command, said=said)
             else:
-                pictures = [folder / name for name in names if Path(name).suffix in PICTURES]
+                pictures = {name: folder / name for name in names if Path(name).suffix in PICTURES}
                 run = Run(
                     f"gearfe {line[0]}",
                     command,

@@ -130,7 +130,9 @@ def write_report(folder: Path, heading: Heading, runs: Sequence[Run], raw: dict[
     from ..output.report_page import Report, report_page
 
     text = "" if job is None else Path(job).read_text(encoding="utf-8-sig")
-    gears = gears_of(raw, job) if job is not None else ((), ())
+    pictures, sheets = gears_of(raw, job) if job is not None else ([], [])
+    shown = {name for run in runs for name in run.pictures}
+    gears = [picture for picture in pictures if picture.name not in shown], sheets
     loads = [] if job is None else loads_of(raw, job)
     page = Report(heading, gears, runs, ("", "") if job is None else (Path(job).name, text), loads)
     (folder / REPORT).write_text(report_page(page), encoding="utf-8", errors="backslashreplace", newline="\n")

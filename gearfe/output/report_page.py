@@ -38,7 +38,7 @@ td, th { border-bottom: 1px solid #e4e8ec; padding: .15em .9em .15em 0; text-ali
 th { font-weight: 600 } td.n, th.n { text-align: right }
 .side { display: flex; flex-wrap: wrap; gap: 0 2.5em; align-items: flex-start }
 .pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(420px, 100%), 1fr)); gap: 0 1.5em }
-.wide { overflow-x: auto; max-width: 100% } .wide td { white-space: nowrap }
+.wide + .under { font-size: .86em } .wide { overflow-x: auto; max-width: 100% } .wide td { white-space: nowrap }
 pre { background: #f6f8fa; padding: .8em 1em; font-size: .84em; white-space: pre-wrap; overflow-wrap: anywhere }
 details { margin: .4em 0 } details table { margin-left: 1.2em }
 @page { size: A4; margin: 12mm }
@@ -47,8 +47,8 @@ details { margin: .4em 0 } details table { margin-left: 1.2em }
   td, th { padding: .02em .6em .02em 0 }
   .side { gap: 0 1.2em } .pictures { grid-template-columns: repeat(2, 1fr); gap: 0 4mm }
   .many { grid-template-columns: repeat(3, 1fr) } .single { grid-template-columns: 1fr }
-  .single img { max-height: 70mm }
   figure { margin: .4em 0 } figure img { max-height: 58mm; width: auto } figure, tr { break-inside: avoid }
+  .single img { max-height: 95mm } pre { columns: 60mm; font-size: 6.4pt }
   h2, h3 { break-after: avoid } h2 { margin: .7em 0 .3em } h3 { margin: .6em 0 .2em } .under { margin: .1em 0 }
   details { display: none } .wide { overflow: visible } .wide td { white-space: normal }
   .wide td:first-child { white-space: nowrap }
@@ -185,7 +185,7 @@ def _run(run: Run) -> str:
     }
     text = _sheets(run.sheets) + _figures([picture_of(path, name) for name, path in run.pictures.items()])
     if not run.sheets and run.said:
-        text = f"<pre>{html.escape(run.said)}</pre>{text}"
+        text += f"<pre>{html.escape(run.said)}</pre>"
         del folded["What the command printed"]
     details = (f"<details><summary>{name}</summary>{inside}</details>" for name, inside in folded.items() if inside)
     return text + "".join(details)

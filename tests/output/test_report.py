@@ -172,6 +172,16 @@ def test_mistakes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "author" in capsys.readouterr().err  # the nearest key
 
 
+def test_a_report_of_a_command_without_results_to_compare(tmp_path: Path) -> None:
+    """Its picture of the gears is on the page, once, and what it printed, as there is no table of results."""
+    line = ["gear", str(GEOMETRY / "fzg_c.toml"), "--out", str(tmp_path), "--report"]
+    assert main(line) == 0
+    page = page_of(tmp_path / "report.html")
+    assert page.tags.count("img") == 1
+    assert "gear_pair.png" in page.printed
+    assert "working_pitch_diameter_mm" in page.printed
+
+
 def test_a_report_without_gears(tmp_path: Path) -> None:
     line = ["mechanism", str(GEOMETRY / "slider_crank.toml"), "--until", "0.1", "--out", str(tmp_path), "--no-pictures"]
     assert main([*line, "--report", "--remark", "short run"]) == 0
