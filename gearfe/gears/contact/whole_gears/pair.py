@@ -26,6 +26,10 @@ from .problem import ContactProblem, Surface
 from .remainder import ElasticGear, GearArc, arc_of, rotation
 from .segments import Quadrature
 
+#: Teeth on either side of those that may touch whose finite strain counts: with 3, the torque of the shipped pair at
+#: 0.5 deg is 7e-5 off that of whole gears, without any 4.5e-4.
+BESIDE = 3
+
 
 @dataclass(frozen=True)
 class MeshingArcs:
@@ -144,9 +148,10 @@ class WholePair:
                 near.append(pair)
         if not near:
             return None
-        count = near[-1] - near[0] + 1 if self.condensed else math.inf
+        beside = BESIDE if self.kinematics == "finite" else 0
+        count = near[-1] - near[0] + 1 + 2 * beside if self.condensed else math.inf
         arcs = [
-            arc_of(gear, first, int(min(count, gear.mesh.teeth)))
+            arc_of(gear, first - beside, int(min(count, gear.mesh.teeth)))
             for gear, first in zip(self.elastic, (near[0], -1 - near[-1]), strict=True)
         ]
         return MeshingArcs(self.elastic, (arcs[0], arcs[1]), tuple(near))
