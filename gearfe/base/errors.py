@@ -25,7 +25,8 @@ OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
     r"internal|(^|_)ring(_|$)|annulus":
         ("internal gears by this name", "those among spur gears and helical gears have a negative number of teeth"),
     r"planet|carrier|sun(_|$)|epicyclic":
-        ("planetary gears by this name", "[carriers.NAME] has planets, of spur gears, and shafts name it as carrier"),
+        ("planetary gears by this name", "[carriers.NAME] has planets, of spur gears or helical ones, and shafts name "
+         "it as carrier"),
     r"bevel|hypoid|cone_(angle|dist)|pitch_cone|miter|spiral|^zerol": ("bevel gears", "spur gears only"),
     r"worm|lead_angle": ("worm gears", "spur gears only"),
     r"crossed|(shaft|axis|axes)_angle|non_parallel": ("shafts that are not parallel", "spur gears only"),
@@ -36,7 +37,9 @@ OUT_OF_SCOPE: dict[str, tuple[str, str]] = {
     r"temperature|thermal|heat|conductiv|expansion": ("temperatures", "elastic spur gears without heat only"),
     r"yield|plastic|creep|hardening|damage|fatigue|wear":
         ("materials that yield, creep or wear", "spur gears of linear elastic material only"),
-    r"(web|hub|spoke)_|rim_(?!diameter)": ("webs and thin rims", "spur gears with a solid body on a rigid bore only"),
+    r"(web|hub|spoke)_|rim_(?!diameter)":
+        ("webs and rims by this name", "those of spur gears and helical gears are web_width_mm, web_outer_diameter_mm, "
+         "web_inner_diameter_mm and web_offset_mm, of internal ones rim_diameter_mm"),
     r"^crown|^lead_|barrel|face_load|flank_line|parallelism|slope_deviation":
         ("modifications along the face width by this name", "those of spur gears and helical gears are "
          "helix_crowning_um, helix_slope_um, end_relief_low_um in [microgeometry], and misalignment_um in [pair]"),

@@ -55,7 +55,8 @@ def refused(capsys: pytest.CaptureFixture[str], *line: str) -> str:
         ("pair.pinion.rack=true", "racks"),
         ("pair.temperature_C=80", "temperatures"),
         ("pair.material.yield_strength_MPa=400", "materials that yield"),
-        ("pair.wheel.rim_thickness_mm=5", "thin rims"),
+        ("pair.wheel.rim_thickness_mm=5", "webs and rims by this name"),
+        ("pair.pinion.web_thickness_mm=8", "web_width_mm"),
     ],
 )
 def test_well_known_names_are_not_taken_for_slips(change: str, what: str, capsys: pytest.CaptureFixture[str]) -> None:
