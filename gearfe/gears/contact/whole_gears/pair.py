@@ -159,7 +159,21 @@ class WholePair:
     def problem(
         self, meshing: MeshingArcs, law: ElementLaw, pinion_angle: float, twist: float
     ) -> ContactProblem | None:
-        """Return the contact problem of the flanks of arcs that come near each other, or None if none do."""
+        """Return the contact problem of the flanks of arcs that come near each other, or None if none do.
+
+        Parameters
+        ----------
+        meshing : MeshingArcs
+            The teeth that may touch.
+        law : ElementLaw
+            Law of contact.
+        pinion_angle, twist : float
+            Rotation of the pinion and twist of the wheel (rad).
+
+        Returns
+        -------
+        problem : ContactProblem or None
+        """
         bodies = meshing.bodies
         unknowns, nodes = bodies.unknowns, bodies.node_of
         turns = np.empty((len(unknowns), 2, 2))
