@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="N",
         help="solve these positions again on whole gears, with all their unknowns, and compare: rows of the table, "
-        "counted from 1; minutes each on the default mesh",
+        "counted from 1; 5 to 40 s each on the default mesh",
     )
     parser.add_argument("--no-estimate", action="store_true", help="leave out the error estimate")
     parser.add_argument(
