@@ -276,7 +276,7 @@ def _show(values: dict[str, Any], indent: str = "") -> None:
         if isinstance(value, dict):
             print(f"{indent}{name}")
             _show(value, indent + "  ")
-        elif isinstance(value, float):
-            print(f"{indent}{name:<{34 - len(indent)}} {value:.9g}")
-        else:
-            print(f"{indent}{name:<{34 - len(indent)}} {value}")
+            continue
+        several = value if isinstance(value, (list, tuple)) else [value]
+        texts = [f"{one:.9g}" if isinstance(one, float) else str(one) for one in several]
+        print(f"{indent}{name:<{34 - len(indent)}} {', '.join(texts)}")

@@ -48,7 +48,9 @@ details { margin: .4em 0 } details table { margin-left: 1.2em }
   .side { gap: 0 1.2em } .pictures { grid-template-columns: repeat(2, 1fr); gap: 0 4mm }
   .many { grid-template-columns: repeat(3, 1fr) } .single { grid-template-columns: 1fr }
   figure { margin: .4em 0 } figure img { max-height: 58mm; width: auto } figure, tr { break-inside: avoid }
-  .single img { max-height: 95mm } pre { columns: 60mm; font-size: 6.4pt }
+  .one .pictures { grid-template-columns: 1fr } .one img, .single img { max-height: 82mm }
+  pre { columns: 60mm; font-size: 6.4pt }
+  table { break-inside: avoid }
   h2, h3 { break-after: avoid } h2 { margin: .7em 0 .3em } h3 { margin: .6em 0 .2em } .under { margin: .1em 0 }
   details { display: none } .wide { overflow: visible } .wide td { white-space: normal }
   .wide td:first-child { white-space: nowrap }
@@ -166,12 +168,13 @@ def report_page(report: Report) -> str:
     parts.append(("Provenance", _provenance(report)))
     body = "".join(f"<h2>{html.escape(name)}</h2>\n{text}\n" for name, text in parts)
     heading = report.heading
+    one = ' class="one"' if len(report.runs) == 1 else ""
     title = html.escape(heading.title)
     under = " &middot; ".join(html.escape(text) for text in (heading.author, heading.date) if text)
     remark = f'<p class="remark">{html.escape(heading.remark)}</p>' if heading.remark else ""
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head>\n<body><h1>{title}</h1>'
+        f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head>\n<body{one}><h1>{title}</h1>'
         f'<p class="under">{under}</p>{remark}\n{body}</body></html>\n'
     )
 
@@ -231,7 +234,8 @@ def _sheet(sheet: Sheet) -> str:
     )
     title = f"<h3>{html.escape(sheet.title)}</h3>" if sheet.title else ""
     note = f'<p class="under">{html.escape(sheet.note)}</p>' if sheet.note else ""
-    return f'{title}<div class="wide"><table>{f"<tr>{head}</tr>" if head else ""}{rows}</table></div>{note}\n'
+    head = f"<thead><tr>{head}</tr></thead>" if head else ""
+    return f'{title}<div class="wide"><table>{head}{rows}</table></div>{note}\n'
 
 
 def _right(column: int) -> str:

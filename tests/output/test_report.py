@@ -216,6 +216,15 @@ def test_a_report_begins_with_the_loads_of_the_gearbox(tmp_path: Path) -> None:
     assert of_input == pytest.approx(float(rows["first: input_pinion"][4]) / math.cos(math.radians(20.0)), rel=0.02)
 
 
+def test_a_gearbox_that_is_not_rated_has_no_empty_columns(tmp_path: Path) -> None:
+    path = tmp_path / "box.toml"
+    path.write_text(job_file("gearbox"), encoding="utf-8")
+    meshes = overview_sheets(path, tomllib.loads(path.read_text(encoding="utf-8")))[0]
+    assert not {"S_H", "S_F"} & set(meshes.head)
+    assert all(len(row) == len(meshes.head) and "-" not in row for row in meshes.rows)
+    assert "S_H" not in meshes.note
+
+
 def test_forces_of_bearings_do_not_need_the_rating(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: object) -> None:
         raise InputError("rating", None, "fails", "none")

@@ -62,9 +62,13 @@ def _meshes(meshes: Mapping[str, tuple[str, str]], edition: int, values: Mapping
                 of_gear.get(f"safety_factor_tooth_root_iso_6336_{edition}", math.nan),
             )
             rows.append([f"{name}: {gear}", *map(_text, cells)])
-    head = ("mesh: gear", "speed (1/min)", "torque on it (N m)", "power into it (kW)", "F_t (N)", "S_H", "S_F")
-    note = f"without losses; power is > 0 where the mesh drives the gear; S_H, S_F: ISO 6336:{edition}, method B"
-    return Sheet("Loads in steady running", head, [row for row in rows if row[1] != "-"], note)
+    head = ["mesh: gear", "speed (1/min)", "torque on it (N m)", "power into it (kW)", "F_t (N)", "S_H", "S_F"]
+    note = "without losses; power is > 0 where the mesh drives the gear"
+    rows = [row for row in rows if row[1] != "-"]
+    if all(cell == "-" for row in rows for cell in row[-2:]):  # not rated
+        return Sheet("Loads in steady running", head[:-2], [row[:-2] for row in rows], note)
+    note += f"; S_H, S_F: ISO 6336:{edition}, method B"
+    return Sheet("Loads in steady running", head, rows, note)
 
 
 def _bearings(train: TrainTable, values: Mapping[tuple[str, str, str], Any]) -> Sheet:
