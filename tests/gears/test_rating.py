@@ -20,7 +20,7 @@ from gearfe.gears.geometry.cutter import ring_root
 from gearfe.gears.geometry.mesh_geometry import MeshGeometry
 from gearfe.gears.rating import root
 from gearfe.gears.rating.data import Strength, pair_data
-from gearfe.gears.rating.flank import auxiliary_factors, work_hardening
+from gearfe.gears.rating.flank import auxiliary_factors, contact_ratio_factor, work_hardening
 from gearfe.gears.rating.life import FatigueCurve, flank_life, root_life
 from gearfe.gears.rating.load_factors import running_in, running_in_beta
 from gearfe.gears.rating.loss import loss
@@ -566,12 +566,81 @@ def test_tables_that_are_refused(keys: dict[str, Any], field: str) -> None:
         rate(spur_stage(), table)
 
 
-def test_high_contact_ratios_are_refused() -> None:
-    gear = Gear(60, 2e-3, math.radians(20), 20e-3, 20e-3, addendum=1.25, dedendum=1.5, rack_tip_radius=0.2)
-    made = MeshGeometry(gear, gear)
-    assert made.contact_ratio > 2.0
-    with pytest.raises(InputError, match=r"contact ratio.*< 2"):
-        rate(made, {"torque_Nm": 100.0, "speed_rpm": 100.0})
+def deep_pair(addendum: float) -> MeshGeometry:
+    """Spur gears 60/60 of module 2 mm and 20 degrees; their contact ratio is 2 at an addendum of 1.15 modules."""
+    gear = Gear(60, 2e-3, math.radians(20), 20e-3, 20e-3, addendum=addendum, dedendum=1.75, rack_tip_radius=0.2)
+    return MeshGeometry(gear, gear)
+
+
+def test_deep_teeth_against_hand_calculation() -> None:
+    """60/60, addendum 1.3: the inner point of double pair contact is two base pitches before the end of contact."""
+    made = deep_pair(1.3)
+    value = rate(made, SPUR | {"edition": 2019})
+    d_b, d_a, slope = 120.0 * math.cos(math.radians(20)), 125.2, math.tan(math.radians(20))
+    tip, p_b = 0.5 * math.sqrt(d_a**2 - d_b**2), 2.0 * math.pi * math.cos(math.radians(20))
+    g = 2.0 * (tip - 0.5 * d_b * slope)
+    assert value.pair.eps_alpha == pytest.approx(g / p_b, rel=1e-12)
+    assert 2.05 < g / p_b < 2.5  # the range of Y_DT
+    one = tip - 2.0 * p_b
+    other = d_b * slope - one
+    M = math.sqrt((1.0 / one + 1.0 / other) / (4.0 / (d_b * slope)))
+    assert value.flank.M == pytest.approx((M, M), rel=1e-12)
+    assert value.flank.Z_BD == value.flank.M
+    assert value.flank.Z_eps == pytest.approx(math.sqrt((4.0 - g / p_b) / 3.0), rel=1e-12)
+    assert value.root.f_eps == 0.7
+    assert value.root.Y_DT == 1.0  # accuracy above grade 4
+    assert any("double pair contact" in text for text in value.warnings)
+    fine = rate(made, SPUR | {"edition": 2019, "quality": 4})
+    assert fine.root.Y_DT == pytest.approx(2.366 - 0.666 * g / p_b, rel=1e-12)
+
+
+def test_factors_are_continuous_where_two_pairs_always_touch() -> None:
+    """All that the standard states on both sides of a contact ratio of 2 has no step there; f_eps and Z_B have one."""
+    low, high = 1.0, 1.3
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if deep_pair(middle).contact_ratio < 2.0 else (low, middle)
+    before, after = (rate(deep_pair(ha), SPUR | {"edition": 2019}) for ha in (low - 1e-9, high + 1e-9))
+    assert before.pair.eps_alpha < 2.0 <= after.pair.eps_alpha
+    for group, names in {
+        "general": ("K_v", "K_Halpha", "K_Falpha", "c_gamma_alpha_N_per_mm_um"),
+        "flank": ("Z_H", "Z_eps", "sigma_H0_MPa"),
+        "root": ("Y_S", "d_en_mm", "Y_DT"),
+        "loss": ("H_V",),
+    }.items():
+        for name in names:
+            old, new = (getattr(getattr(value, group), name) for value in (before, after))
+            assert new == pytest.approx(old, rel=1e-6), name
+    assert after.root.Y_F[0] == pytest.approx(0.7 * before.root.Y_F[0], rel=1e-6)
+    assert before.flank.Z_BD[0] < after.flank.Z_BD[0]
+
+
+def test_contact_ratio_of_two_and_a_half_has_the_pressure_of_half_of_the_load() -> None:
+    """Z_eps^2 = 1/2 at 2.5: sigma_H0 Z_B is Hertz's pressure of half of the force at the inner point."""
+    data = replace(pair_data(deep_pair(1.3)), eps_alpha=2.5)
+    assert contact_ratio_factor(data) ** 2 == pytest.approx(0.5, rel=1e-12)
+
+
+def test_loss_factor_of_three_pairs_by_quadrature() -> None:
+    value = loss(pair_data(deep_pair(1.35)))
+    one, two = value.eps
+    assert one + two > 2.2
+    x = np.linspace(-two, one, 400_001)
+    pairs = sum(((x + k > -two) & (x + k < one)).astype(float) for k in range(-3, 4))
+    integral = np.trapezoid(np.abs(x) / pairs, x)
+    assert value.H_V == pytest.approx(2.0 * math.pi * 2.0 / 60.0 * integral, rel=1e-4)
+
+
+def test_too_high_contact_ratios_are_refused() -> None:
+    with pytest.raises(InputError, match=r"contact ratio.*<= 2\.5"):
+        rate(deep_pair(1.55), {"torque_Nm": 100.0, "speed_rpm": 100.0})
+
+
+def test_scuffing_of_deep_teeth_is_left_out_with_a_warning() -> None:
+    oil = {"oil_temperature_C": 90.0, "viscosity_100_mm2_per_s": 11.0, "scuffing_load_stage": 12}
+    value = rate(deep_pair(1.3), SPUR | oil)
+    assert value.scuffing is None
+    assert any("no rating of scuffing" in text for text in value.warnings)
 
 
 def test_materials_count() -> None:

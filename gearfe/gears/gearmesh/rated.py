@@ -139,9 +139,11 @@ def _of_sections(job: StiffnessJob, rating: Rating, torque: float) -> list[Compa
         )
     mean = 1e-9 * float(np.nanmean(tangent[:POSITIONS])) / width
     rows.append(Compared("c_gamma", "N/(mm um)", general.c_gamma_alpha_N_per_mm_um, mean, "mean stiffness of the mesh"))
-    # the pinion of the pair has its inner point of single pair contact at B
+    # the pinion of the pair has its inner point of single pair contact at B; two pairs: M is of other points
     inner = {("B", "D")[of_pair]: M for of_pair, M in zip(rating.of_pair, rating.flank.M, strict=True)}
     for at, (name, point) in enumerate(points.items()):
+        if name in inner and not single.any():
+            continue
         found, share = _pressure(load_map, POSITIONS + SINGLE + at, point.pinion_roll)
         standard = rating.flank.sigma_H0_MPa * inner.get(name, 1.0)
         meaning = f"nominal contact stress; computed where this pair carries {share:.3g} of the load"

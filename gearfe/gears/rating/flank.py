@@ -10,6 +10,10 @@ r"""Surface durability (pitting), ISO 6336-2:2006, with what the edition of 2019
 :math:`\sqrt{f_{ZCa}}`; between them both editions interpolate over :math:`\varepsilon_\beta`. :math:`f_{ZCa}` is 1 for
 modifications that a load distribution has proven, and 1.2 without modifications.
 
+**Contact ratios from 2 to 2.5**: :math:`M_{1,2}` are those of the inner points of double pair contact, and
+:math:`Z_\varepsilon` is unchanged. Its square is 1/2 at 2.5, the share of each of two pairs, and larger below: this
+choice of the program is on the safe side.
+
 **Helix angle factor**: :math:`Z_\beta = 1/\sqrt{\cos\beta}`, as ISO 6336-2:2006/Cor 1:2008 and the edition of 2019 have
 it; the text of 2006 had the reciprocal.
 
@@ -32,6 +36,8 @@ from .load_factors import Influence
 
 _PART = "ISO 6336-2:2006"
 _PAIR = tuple[float, float]
+#: Transverse contact ratio from which on two pairs always touch, and the largest one of ISO 6336-1, 1.
+TWO_PAIRS, HIGHEST_RATIO = 2.0, 2.5
 #: K_Hbeta from which on the load is on a part of the width, ISO 6336-1, (39).
 NOTABLE = 2.0
 
@@ -82,12 +88,17 @@ def contact_ratio_factor(pair: PairData) -> float:
 
 
 def auxiliary_factors(pair: PairData) -> _PAIR:
-    """M_1 and M_2, (17) and (18): signed tooth numbers give those of internal gears."""
+    """M_1 and M_2, (17) and (18): signed tooth numbers give those of internal gears.
+
+    From a contact ratio of 2 on they are those of the inner points of double pair contact, two base pitches from the
+    end of contact instead of one.
+    """
     tips = [math.sqrt((a / b) ** 2 - 1.0) for a, b in zip(pair.d_a, pair.d_b, strict=True)]
     steps = [2.0 * math.pi / z for z in pair.z]
+    pitches = 1.0 if pair.eps_alpha < TWO_PAIRS else 2.0
 
     def of(i: int, j: int) -> float:
-        product = (tips[i] - steps[i]) * (tips[j] - (pair.eps_alpha - 1.0) * steps[j])
+        product = (tips[i] - pitches * steps[i]) * (tips[j] - (pair.eps_alpha - pitches) * steps[j])
         return math.tan(pair.alpha_wt) / math.sqrt(product) if product > 0.0 else math.inf
 
     return of(0, 1), of(1, 0)
@@ -181,10 +192,10 @@ def flank(
     Raises
     ------
     InputError
-        For a transverse contact ratio of 2 and more, whose Z_B the standard has in another clause.
+        For a transverse contact ratio above 2.5, which the standard excludes.
     """
-    if pair.eps_alpha >= 2.0:
-        problem = f"is {pair.eps_alpha:.4g}: must be < 2, as Z_B and Z_D here are those of single pair contact"
+    if pair.eps_alpha > HIGHEST_RATIO:
+        problem = f"is {pair.eps_alpha:.4g}: must be <= {HIGHEST_RATIO:g}, the range of ISO 6336-1"
         raise InputError("contact ratio", None, problem, "use a smaller addendum or a larger pressure angle")
     Z_H, Z_E, Z_eps = zone_factor(pair), elasticity_factor(modulus, poisson), contact_ratio_factor(pair)
     Z_beta = 1.0 / math.sqrt(math.cos(pair.beta))

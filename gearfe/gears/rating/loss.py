@@ -34,7 +34,7 @@ class Loss:
 
 
 def loss(pair: PairData, heat: float | None = None) -> Loss:
-    """Return the loss factor of a pair with a transverse contact ratio below 2.
+    """Return the loss factor of a pair with a transverse contact ratio below 3.
 
     `heat`: power of the mesh times the mean coefficient of friction (W), None: not known.
     """
@@ -48,6 +48,10 @@ def loss(pair: PairData, heat: float | None = None) -> Loss:
         return 0.5 * x * abs(x)
 
     # half of the load on the whole path, and again half of it where one pair alone touches
-    shared = moment(one) - moment(-two) + moment(1.0 - two) - moment(one - 1.0)
+    shared = moment(one) - moment(-two)
+    if one + two < 2.0:
+        shared += moment(1.0 - two) - moment(one - 1.0)
+    else:  # a sixth less where three pairs touch; `shared` is twice the integral
+        shared -= sum(moment(one - 2.0 + i) - moment(-two + i) for i in range(3)) / 3.0
     H_V = math.pi * (pair.u + 1.0) / (pair.z[0] * pair.u * math.cos(pair.beta_b)) * shared
     return Loss(eps=(one, two), H_V=H_V, P_V_W=None if heat is None else heat * H_V)

@@ -15,7 +15,7 @@ from ...base.tables.rating import EDITIONS, RatingTable
 from ..geometry.mesh_geometry import MeshGeometry
 from ..geometry.pair import pair_of
 from .data import Load, PairData, Strength, load_of, pair_data, strength_of
-from .flank import NOTABLE, Flank, contact_ratio_factor, flank
+from .flank import HIGHEST_RATIO, NOTABLE, TWO_PAIRS, Flank, contact_ratio_factor, flank
 from .ledger import Entry, entries
 from .load_factors import Influence, influence, speed_range
 from .loss import Loss, loss
@@ -127,6 +127,19 @@ class Rating(ShownTable):
             made.append(f"x_1 + x_2 = {total:.3g} is beyond -0.5 to 2, the range of c' in ISO 6336-1")
         if pair.eps_alpha < 1.2:
             made.append(f"eps_alpha = {pair.eps_alpha:.3g} < 1.2: c_gamma may be up to 10 % too large (ISO 6336-1)")
+        if pair.eps_alpha >= TWO_PAIRS:
+            made.append(
+                f"eps_alpha = {pair.eps_alpha:.3g} >= 2: Z_B and Z_D are those of the inner points of double pair "
+                "contact, on the safe side of even load shares"
+            )
+            if self.load.oil is not None:
+                made.append(
+                    f"eps_alpha = {pair.eps_alpha:.3g} >= 2: no rating of scuffing, whose load shares are below 2"
+                )
+        if self.root.eps_alphan > HIGHEST_RATIO:
+            made.append(
+                f"eps_alphan = {self.root.eps_alphan:.3g} > {HIGHEST_RATIO:g} is beyond the range of Y_F in ISO 6336-3"
+            )
         for name, q_s in zip(self.names, self.root.q_s, strict=True):
             if not NOTCHES[0] <= q_s < NOTCHES[1]:
                 made.append(f"q_s = {q_s:.3g} of {name} is beyond 1 to 8, the range of Y_S in ISO 6336-3")
@@ -317,7 +330,7 @@ def _rated(
         {"flank": load.flank_safety, "root": load.root_safety},
     )
     heated, losses = None, loss(data)
-    if load.oil is not None:
+    if load.oil is not None and data.eps_alpha < TWO_PAIRS:
         heated = scuffing(
             data,
             two,
