@@ -11,7 +11,7 @@ What a gear here has:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from numbers import Integral, Real
 from typing import Any
@@ -52,6 +52,11 @@ class Gear(GearData):
     InputError
         For data that no gear here has, and profiles that no rack or cutter makes.
     """
+
+    def __repr__(self) -> str:
+        """Return the call that makes the gear, without arguments that have their defaults."""
+        entries = [(entry, getattr(self, entry.name)) for entry in fields(self)]
+        return f"Gear({', '.join(f'{entry.name}={value!r}' for entry, value in entries if value != entry.default)})"
 
     def __post_init__(self) -> None:
         check_gear(self)
