@@ -48,7 +48,7 @@ details { margin: .4em 0 } details table { margin-left: 1.2em }
   .side { gap: 0 1.2em } .pictures { grid-template-columns: repeat(2, 1fr); gap: 0 4mm }
   .many { grid-template-columns: repeat(3, 1fr) } .single { grid-template-columns: 1fr }
   figure { margin: .4em 0 } figure img { max-height: 58mm; width: auto } figure, tr { break-inside: avoid }
-  .one .pictures { grid-template-columns: 1fr } .one img, .single img { max-height: 82mm }
+  .one .pictures { grid-template-columns: 1fr } .one img { max-height: 76mm } .single img { max-height: 82mm }
   pre { columns: 60mm; font-size: 6.4pt }
   table { break-inside: avoid }
   h2, h3 { break-after: avoid } h2 { margin: .7em 0 .3em } h3 { margin: .6em 0 .2em } .under { margin: .1em 0 }
