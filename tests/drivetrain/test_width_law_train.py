@@ -242,6 +242,10 @@ def test_equal_planets_share_the_law_of_the_largest_range(monkeypatch: pytest.Mo
 RING = {"meshes__planet_ring__stiffness_N_per_m": None, "meshes__planet_ring__mesh_model": "potential"}
 FREE = {"gears__ring__rim": "free"}
 SPRING = {"meshes__planet_ring__mesh_model": "variable_stiffness"}
+LEFT = {
+    "gears__planet__microgeometry__left": {"helix_crowning_um": 8.0},
+    "meshes__sun_planet__mesh_model": "variable_stiffness", "meshes__sun_planet__backlash_um": 100.0,
+}  # fmt: skip
 PITCHES = {"gears__planet__microgeometry__pitch_um": [1.0, -1.0] * 11}
 
 
@@ -252,6 +256,7 @@ PITCHES = {"gears__planet__microgeometry__pitch_um": [1.0, -1.0] * 11}
         (RING | FREE | SPRING, r"^gears\.ring\.rim = 'free': is not held"),
         ({"meshes__sun_planet__friction": 0.05}, "leave it out, or .*helix_angle_deg"),
         (PITCHES, "has pitch errors, and .*helix_angle_deg"),
+        (LEFT, 'one stiffness for both; .* leave backlash_um out, or write mesh_model = "potential"'),
     ],
 )
 def test_what_laws_over_the_width_refuse_is_refused_before_the_first(

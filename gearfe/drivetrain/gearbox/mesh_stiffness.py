@@ -419,7 +419,7 @@ def _check_back_flanks(mesh: NamedMesh) -> None:
     for gear in mesh.gears:
         if _sides_differ(gear):
             problem = f"left and right flanks differ, but mesh {mesh.name!r} has one stiffness for both"
-            cure = "make them alike, or leave backlash_um out"
+            cure = 'make them alike, leave backlash_um out, or write mesh_model = "potential"'
             raise InputError(gear.microgeometry_where, None, problem, cure)
 
 

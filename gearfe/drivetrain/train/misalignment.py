@@ -230,7 +230,9 @@ class TiltingTrain:
             - self.rows.T @ moments
         )
         if operating.bearings:
-            even = 0.5 * (stiffness + stiffness.T)  # drag has no energy, and loads no shaft in rolling bearings
+            # dampers on shafts in turning frames add a skew part, which has no energy; `checks` refuses rolling
+            # bearings on such shafts
+            even = 0.5 * (stiffness + stiffness.T)
             point = operating_point(operating.geometry, self._motions, even, T, push)
             q = point.coordinates
             for name, state in point.bearings.items():
