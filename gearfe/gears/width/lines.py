@@ -29,7 +29,8 @@ its square only.
 
 **Kinks** are the ends of the path of contact, beyond which tips may be loaded, kinks of the profiles, and those of the
 material over roll and z: where end reliefs and reliefs of corners begin, and lines of measured grids. Gauss points that
-straddle where an end relief begins err by 1 to 9 % of the peak to peak of the transmission error.
+straddle where an end relief begins, with ends of the load between them, err by up to 9 % of the peak to peak of the
+transmission error.
 
 **Free ends.** Close to an end of a gear the contact under a line load is more compliant than in plane strain, down to
 the width of its pressure. The finite elements contain this for bumps of half width a only. Between a and the half
