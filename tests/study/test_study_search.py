@@ -182,7 +182,7 @@ def test_optuna_asks_and_is_told(study):
         names: dict = {"search": search}
         begin, _, body = block.partition("with Search(")  # on this study in place of the page's
         body = textwrap.dedent(body.partition("\n")[2]).replace("range(10)", "range(12)")
-        body = body.replace('found["root_stress_MPa"] - 285.0', 'found["g"] - 2.0').replace('"error_um"', '"f"')
+        body = body.replace('outputs["root_stress_MPa"] - 285.0', 'outputs["g"] - 2.0').replace('"error_um"', '"f"')
         exec(compile(begin + body, "page", "exec"), names)
         best = search.best()
     assert best.outputs["g"] <= 2.0
