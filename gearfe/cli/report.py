@@ -66,9 +66,9 @@ def run(args: argparse.Namespace) -> int:
     drawn = set()
     for results in found:
         place_of = results.path.parent
-        here = sum(other.path.parent == place_of for other in found)
+        kinds_there = sum(other.path.parent == place_of for other in found)
         # the pictures of a folder with several kinds of results are in the first of them
-        run = run_of(results, most=0 if place_of in drawn else here * most)
+        run = run_of(results, most=0 if place_of in drawn else kinds_there * most)
         kinds.setdefault(run.title, {})[results.name.removeprefix(f"{results.kind.name}/")] = run
         drawn.add(place_of)
     runs = [

@@ -136,7 +136,7 @@ def _lobatto_points(order: int) -> Array:
 
 @dataclass(frozen=True)
 class SectionIntegrals:
-    """Return A_00, A_01, A_11 of m triangles, each of shape (m, 6, 3, 6, 3): node and axis of both functions.
+    """Hold A_00, A_01 and A_11 of m triangles, each of shape (m, 6, 3, 6, 3): node and axis of both functions.
 
     Units N/m2 (A_00), N/m (A_01) and N (A_11), of functions without unit.
     """

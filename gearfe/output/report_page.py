@@ -168,14 +168,14 @@ def report_page(report: Report) -> str:
     parts.append(("Provenance", _provenance(report)))
     body = "".join(f"<h2>{html.escape(name)}</h2>\n{text}\n" for name, text in parts)
     heading = report.heading
-    one = ' class="one"' if len(report.runs) == 1 else ""
+    kind = ' class="one"' if len(report.runs) == 1 else ""
     title = html.escape(heading.title)
     under = " &middot; ".join(html.escape(text) for text in (heading.author, heading.date) if text)
     remark = f'<p class="remark">{html.escape(heading.remark)}</p>' if heading.remark else ""
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head>\n<body{one}><h1>{title}</h1>'
-        f'<p class="under">{under}</p>{remark}\n{body}</body></html>\n'
+        f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head>\n<body{kind}>'
+        f'<h1>{title}</h1><p class="under">{under}</p>{remark}\n{body}</body></html>\n'
     )
 
 

@@ -49,7 +49,7 @@ def helical_lines(hand: str = "right", functions: int = 6) -> ContactLines:
 
 
 def test_one_function_is_the_plane_law_of_an_internal_pair() -> None:
-    """Twists within 0.02 %, but for the one position at which a tip of the ring begins to carry load."""
+    """Twists agree within 0.02 %, except at the one position where a tip of the ring begins to carry load."""
     pair = internal_pair()
     compliance = wide_compliance(WideMesh(pair, functions=1, coarsen=1.0, flank_coarsen=4.0))
     for side, known in zip(compliance.sides, half_plane_pair(elastic_pair(pair)).sides, strict=True):

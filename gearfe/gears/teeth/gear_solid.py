@@ -84,8 +84,7 @@ def _cut_web(occ: Any, gear: Gear, web: Web) -> None:
     half, outer = 0.5e3 * gear.face_width, 1e3 * web.radii[0]
     hub = 1e3 * web.radii[1] if web.radii[1:] else 0.0
     low, high = 1e3 * (web.offset - 0.5 * web.width), 1e3 * (web.offset + 0.5 * web.width)
-    gears = [pair for pair in occ.getEntities(3) if pair[0] == 3]
-    rings = []
+    gears, rings = occ.getEntities(3), []
     for start, end in ((-half, low), (high, half)):
         if end - start <= 1e-9 * half:
             continue

@@ -390,15 +390,13 @@ NO_RUNS = Runs(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
 
 def _runs(pair: IntArray, z: Array, left: Array) -> Runs:
     """Return where the approach `left` to the contacts is positive; it is straight between places, by pair and z."""
-    order = np.lexsort((z, pair))
-    pair, z, left = pair[order], z[order], left[order]
-    bears, same = left > 0.0, pair[1:] == pair[:-1]
+    loaded, same = left > 0.0, pair[1:] == pair[:-1]
     size = np.abs(left)
     zero = z[:-1] + np.diff(z) * np.divide(size[:-1], size[:-1] + size[1:], out=np.zeros(len(size) - 1), where=same)
-    starts, ends = np.where(np.append(False, same & ~bears[:-1]), np.append(0.0, zero), z), z
-    ends = np.where(np.append(same & ~bears[1:], False), np.append(zero, 0.0), z)
-    first = bears & np.append(True, ~(same & bears[:-1]))
-    last = bears & np.append(~(same & bears[1:]), True)
+    starts = np.where(np.append(False, same & ~loaded[:-1]), np.append(0.0, zero), z)
+    ends = np.where(np.append(same & ~loaded[1:], False), np.append(zero, 0.0), z)
+    first = loaded & np.append(True, ~(same & loaded[:-1]))
+    last = loaded & np.append(~(same & loaded[1:]), True)
     return Runs(pair[first], starts[first], ends[last])
 
 

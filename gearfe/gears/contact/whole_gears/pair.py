@@ -5,7 +5,6 @@ Teeth that may touch, and those between them, keep all their unknowns; the other
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -149,9 +148,10 @@ class WholePair:
         if not near:
             return None
         beside = BESIDE if self.kinematics == "finite" else 0
-        count = near[-1] - near[0] + 1 + 2 * beside if self.condensed else math.inf
+        every = max(gear.mesh.teeth for gear in self.elastic)
+        count = near[-1] - near[0] + 1 + 2 * beside if self.condensed else every
         arcs = [
-            arc_of(gear, first - beside, int(min(count, gear.mesh.teeth)))
+            arc_of(gear, first - beside, count)
             for gear, first in zip(self.elastic, (near[0], -1 - near[-1]), strict=True)
         ]
         return MeshingArcs(self.elastic, (arcs[0], arcs[1]), tuple(near))
