@@ -72,9 +72,9 @@ class GearBody:
     width
         Width of the contact (m): the mate may be narrower.
     stress_own, stress_interface : ndarray, shapes (e q, f), (e q, b)
-        Normal stress at the quadrature points for the same two (Pa/N, Pa/m), per area of contact: the body's own times
-        thickness/width, as a pressure on the width of the contact spreads over the thickness. No rows where no law asks
-        for it.
+        Normal stress at the quadrature points for the same two (Pa/N, Pa/m), per area of contact. It is the body's own
+        times thickness/width, as a pressure on the width of the contact spreads over the thickness. No rows where no
+        law asks for it.
     condensed
         The way back to the full field.
     """
@@ -427,8 +427,8 @@ def sector_displacements(
 def finite_strain_shares(pair: MeshingPair, found: Positions, neighbours: int = NEIGHBOURS) -> Array:
     """First-order effect of finite strain on the torque: Delta T / T, shape (n,), from loads; 0 where there are none.
 
-    The equilibrium minimises the energy, so by the envelope theorem the energy at given twist changes by what finite
-    strain adds to that of the small-strain solution, and the torque by its derivative with the twist
+    The equilibrium minimises the energy. So, by the envelope theorem, the energy at given twist changes by what finite
+    strain adds to that of the small-strain solution. The torque changes by the derivative of this with the twist
     (`gearfe.fem.plane.finite_strain_rates`). So many `neighbours` of a loaded tooth on either side take part.
     """
     shares = np.zeros(len(found))
@@ -457,8 +457,8 @@ def flank_loads(
     """Return the loads on the flanks of pinion and wheel: for fields, root stress and finite strain.
 
     They are the consistent ones of the pressures on the panels, at their places on the deformed flanks and along the
-    common normal. Displacements recovered from them are those of the teeth; nearer to a contact than an element or two
-    they show what the coarse flank makes of the pressure. Stresses there: `gearfe.gears.gearmesh.fields`.
+    common normal. Displacements recovered from them are those of the teeth. Nearer to a contact than one or two
+    elements they depend on the coarse mesh of the flank. Stresses there: `gearfe.gears.gearmesh.fields`.
 
     Parameters
     ----------
@@ -493,8 +493,9 @@ def panel_pressures(elastic: MeshingPair, contacts: Contacts) -> PointPressures:
 
 
 def _nodal(flank: Flank, contacts: Contacts, gear: int) -> tuple[Array, Array]:
-    """Of each pair the shares of the force on the nodes of the flank, which add up to 1, and their rates with the twist
-    (1/rad) as the pressure moves along the flank and widens, both of shape (m, nodes).
+    """Return for each pair the shares of the force on the nodes of the flank, which add up to 1, and their rates with
+    the twist (1/rad). Both have the shape (m, nodes). The rates come from the pressure, which moves along the flank and
+    widens.
     """
     load = contacts.pressure * contacts.width
     edge, xi = flank.place(contacts.panel_arc[:, gear])

@@ -69,8 +69,7 @@ class Batch:
         Area of each contact point (m2).
     end_weighting : ndarray, shape (q,)
         Half of the point's own stretch of surface, in edges of the mate. Where a stretch lies across the end of the
-        mate's surface (a sharp tip), the part that is past it does not count, so that sliding past the corner is
-        continuous.
+        mate's surface (a sharp tip), the part past the end does not count. So sliding past the corner is continuous.
     parameter : ndarray, shape (q,)
         The law's gamma (Pa/m).
     blocks : list of Block

@@ -3,18 +3,18 @@ r"""Nitsche's and the penalty law by finite elements: positions of a gear pair f
 Those are the half-plane law's. They give the loaded tooth pairs and their positions. The contact is solved in windows
 of the mesh about them (`.element_batch`), and Newton's method on the pressures at their points starts there.
 
-With the rows :math:`G = n\cdot D` of the gaps' variation at the present state u = C f, the areas W, the compliance C of
-the flanks and the stress rows S, a step solves
+The flanks have the compliance C, the contact points the areas W and the stress rows S. With the rows
+:math:`G = n\cdot D` of the gaps' variation at the present state u = C f, a step solves
 
 .. math::
     f^+ = G^T W p, \qquad p = \max(0,\; -\gamma\,(g + G\,(C f^+ - u)) - S f^+) .
 
-What G leaves out (the normals turn and the forces move with the faces; across blended normals the gap also changes as
-its foot point slides) enters with the next step, where gaps and rows are updated. Errors shrink by about the ratio of
-pressure to modulus a step; steps are mixed with those before, so that they shrink faster and settle beside corners.
-The matrix is updated until the solution is near: under sharp corners pressures come to a third of the modulus, and the
-rows turn with the faces. A position has converged when its pressures satisfy the law *and* its forces agree with the
-pressures at the displaced points.
+G leaves out that the normals turn, that the forces move with the faces, and that the gap changes as its foot point
+slides across blended normals. This enters with the next step, where gaps and rows are updated. A step reduces errors by
+about the ratio of pressure to modulus. Steps are mixed with those before: errors shrink faster, and steps settle beside
+corners. The matrix is updated until the solution is near. Under sharp corners pressures reach a third of the modulus,
+and the rows turn with the faces. A position has converged when its pressures satisfy the law *and* its forces agree
+with the pressures at the displaced points.
 """
 
 from __future__ import annotations
@@ -375,8 +375,9 @@ def _errors(
 ) -> tuple[Array, Array]:
     """Of each position its error, and the least that rounding lets the law reach, both of shape (B,).
 
-    The error is how far its pressures are from what the law asks or its forces from those of its pressures at the
-    places reached, `now`, the larger, relative to their sums; the least is gamma times the last bit of a coordinate.
+    The error is the larger of two differences, relative to the sums: of the pressures from those of the law, and of the
+    forces from those of the pressures at the places reached, `now`. The least possible error is gamma times the last
+    bit of a coordinate.
     """
 
     def total(at: IntArray, values: Array) -> Array:

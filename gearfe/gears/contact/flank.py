@@ -5,9 +5,9 @@ lies to the right of the chain, so the outward normal is the tangent turned by +
 
 **Closest points.** For a slave point :math:`x_s` and the master curve :math:`x_m(\xi)` with :math:`a = x_m'` the
 projection satisfies :math:`x_s - x_m(\xi) = g\,n(\xi)`. The normal is the edge's own, blended linearly into the mean of
-both neighbours' at each vertex: it is then continuous along the whole chain, and so are gap and forces. (With each
-edge's own normal a point that faces a vertex jumps between two solutions and Newton's method cycles.) The contact force
-acts along n at both points, so it is in equilibrium with itself whatever the blending.
+both neighbours' at each vertex. It is then continuous along the whole chain, and so are gap and forces. (With each
+edge's own normal a point that faces a vertex jumps between two solutions, and Newton's method cycles.) The contact
+force acts along n at both points, so both forces are in equilibrium with any blending.
 
 With :math:`a = x_m'`, :math:`\kappa = -a\cdot n'` is the normal's own turning.
 """
@@ -239,8 +239,8 @@ def project(
 def _edges(nodes: ComplexArray, counts: IntArray) -> tuple[IntArray, IntArray, ComplexArray]:
     """First edge of each chain, first node of each edge, and of each edge the table of `_evaluate`, shape (5, e).
 
-    That is start, linear and quadratic coefficient of x_m = start + xi linear + xi^2 quadratic (m), what the blended
-    normal adds to the edge's own at its start, and how much more than that at its end.
+    That is start, linear and quadratic coefficient of x_m = start + xi linear + xi^2 quadratic (m). After them come
+    what the blended normal adds to the edge's own at its start, and how much more than that at its end.
     """
     first = np.concatenate([[0], np.cumsum(counts)])
     node = 2 * np.arange(first[-1]) + np.repeat(np.arange(len(counts)), counts)

@@ -5,21 +5,21 @@ A line load f per width at the arc t of a tooth moves the flank of the tooth k s
 .. math::
     u(s) = w\,H_k(s,t)\,f - \delta_{k0}\,\tfrac{1}{E'}\Big(\tfrac2\pi\ln|s-t|\,I + W\ln(y(s)+y(t))\Big) f
 
-with the width w and the surface of a half-plane and of a wedge (`.panels`), y the distance from the corner in which
-flank and tip circle meet, virtual under a tip round. What is left, the far-field influence H, is smooth: no load is
-near it any more. It is known from the finite-element answers to elliptic bumps of pressure at some fifteen stations,
-less the bracket under the same bumps,
+with the width w and the surface of a half-plane and of a wedge (`.panels`). y is the distance from the corner of flank
+and tip circle, which is virtual under a tip round. What is left, the far-field influence H, is smooth: no load is near
+it any more. It is known from the finite-element answers to elliptic bumps of pressure at some fifteen stations, less
+the bracket under the same bumps,
 
 .. math::
     H_k(s_i, s_j) = b_i^T C^{FE}_k b_j
     + \delta_{k0}\,\tfrac{1}{w E'}\,\langle\tfrac2\pi\ln|s-t|\,I + W\ln(y+y)\rangle_{ij},
 
 and runs between them on cubic splines, as a parabola beyond the last station. Bumps average over their half width a,
-which adds a^2/8 of the second derivative on either side; who evaluates H at a contact takes that off with the contact's
-own width (`gearfe.gears.contact.half_plane`).
+which adds a^2/8 of the second derivative on either side. Where H is evaluated at a contact, that is corrected to the
+contact's width (`gearfe.gears.contact.half_plane`).
 
-The bumps are two elements wide, so a mesh whose flank elements are 0.1 module serves as well as a fine one, and at
-least 0.2 module, since second derivatives of H magnify the noise of the elements.
+The bumps are two elements wide, so a mesh whose flank elements are 0.1 module serves as well as a fine one. They are at
+least 0.2 module wide, since second derivatives of H magnify the noise of the elements.
 """
 
 from __future__ import annotations

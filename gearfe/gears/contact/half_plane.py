@@ -1,28 +1,28 @@
 r"""One contact law for every load: finite elements for the teeth, half-planes for the contacts, exact moved flanks.
 
-Teeth and rims move the faces by the far-field influence H of `.flank_compliance`; the contact itself is that of
-half-planes and wedges on panels, which no mesh resolves. (Vijayakar, *Int. J. Numer. Meth. Eng.* 31, 1991, joins a
-finite-element and a half-space solution at a depth below the contact; here they join in the influence function.)
+Teeth and rims move the faces by the far-field influence H of `.flank_compliance`. The contact itself is that of
+half-planes and wedges on panels, so no mesh has to resolve it. (Vijayakar, *Int. J. Numer. Meth. Eng.* 31, 1991, joins
+a finite-element and a half-space solution at a depth below the contact; here they join in the influence function.)
 
 **One position.** Every contact has a centre O with the common normal n, and panels at x along the tangent over the
-window in which the gap may close; a tooth pair has as many contacts as it bears on stretches of its flanks (`.zones`;
-`.half_plane_pair` has their mutual terms). With the pressure p, its force per width :math:`F=\int p`, the gap g
-between the faces as moved by the loads :math:`F_0` of the step before (`gearfe.gears.geometry.first_contact`),
+window in which the gap may close. A tooth pair has a contact for each stretch of its flanks that carries load
+(`.zones`); `.half_plane_pair` has their mutual terms. With the pressure p, its force per width :math:`F=\int p`, the
+gap g between the faces as moved by the loads :math:`F_0` of the step before (`gearfe.gears.geometry.first_contact`),
 
 .. math::
     p \ge 0,\qquad g(x) + \frac{2}{\pi}\Big(\frac1{E_1'}+\frac1{E_2'}\Big)\int -\ln|x-\xi|\,p\,d\xi
     + \sum_i \frac{n W_i n}{E_i'}\int -\ln(y_i+\eta_i)\,p + \sum_l T_l\,(F_l-F_{0,l}) \ge 0,
 
-complementary, :math:`T = w\, n H n` over all contacts l of the position. Then O moves to the mean place of p, n to
-the mean normal of the deformed faces under p (of the face that is further from its edges), H is taken at the material
-that is at O now, and so on until F stays.
+complementary, :math:`T = w\, n H n` over all contacts l of the position. Then O moves to the mean place of p, and n to
+the mean normal of the deformed faces under p (of the face that is further from its edges). H is taken at the material
+that is at O now. This is repeated until F no longer changes.
 
-**Why this is an equilibrium.** H is symmetric, and with O at the mean place of p the energy does not change to first
-order with the arcs at which H is taken; with n the mean normal under p, it does not change with n either. What is left
-is the work of the twist, so that the torque F times lever is the derivative of the energy (a test).
+**Why this is an equilibrium.** H is symmetric. With O at the mean place of p, the energy does not change to first order
+with the arcs at which H is taken. With n the mean normal under p, it does not change with n either. What is left is the
+work of the twist, so that the torque F times lever is the derivative of the energy (a test).
 
-The gap of a panel is that at its middle; where a kink of a face lies in it (start of a linear relief, edge of an
-undercut) it is the mean over the panel.
+The gap of a panel is that at its middle. Where the panel has a kink of a face (start of a linear relief, edge of an
+undercut), it is the mean over the panel.
 
 The faces' displacement is taken at O with its slope. Across n it includes the wedge's part; along n that is in the
 equation above. The influence at the stations is a mean over bumps and the contact has a width of its own: together they
@@ -320,7 +320,7 @@ def coupling_compliances(
     -------
     angle, apart, compliance : ndarray, shape (c,)
         Pinion angle of the tooth of the couple's lower pair (rad), teeth between both pairs, and the approach of the
-        gears at one pair by a unit force on the other (m/N); forces count as moments on the wheel over its base radius.
+        gears at one pair by a unit force on the other (m/N). Forces are moments on the wheel over its base radius.
     """
     met = contact_model.first_contacts(pinion_angles)
     met = met.take(np.flatnonzero(met.twist < twists[met.position]))

@@ -6,8 +6,8 @@ at s by
 
 .. math:: u(s) = -\tfrac1{E'}\Big(\tfrac2\pi\ln|s-t|\,n_j + W n_j\ln(y(s)+y(t))\Big) f_j .
 
-Its part along :math:`n_i` acts between the panels of both (exactly integrated over each, so that two windows may lie
-side by side); its part across moves the face as a whole.
+Its part along :math:`n_i` acts between the panels of both. It is integrated exactly over each panel, so that two
+windows may lie side by side. Its part across moves the face as a whole.
 
 Arrays are over the q couples of `.panels.Couplings.beside`, a contact with itself among them, then over pinion and
 wheel.
@@ -184,7 +184,7 @@ class HalfPlanePair:
     @cached_property
     def kinks(self) -> tuple[Array, Array]:
         """Arc lengths (m) of the kinks of each flank, the edge of an undercut among them, and by how much its normal
-        turns away there (rad), both of shape (f, k); no kink lies at infinity.
+        turns away there (rad). Both have the shape (f, k); a kink at infinity stands for none.
         """
         places = [face.arc_at([*([0.0] if face.undercut else []), *face.kinks]) for face in self.teeth.faces]
         arcs, angles = np.zeros((2, len(places), max(map(len, places))))
@@ -241,8 +241,8 @@ def half_plane_pair(elastic: MeshingPair) -> HalfPlanePair:
 def local_influence(
     contact_model: HalfPlanePair, couples: Couplings, normal: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """What a unit force per width along the normal of the second contact does to the face at the first: by the
-    half-plane, per ln of their distance, and by the wedge, per ln(y + y), both of shape (q, 2) (m2/N).
+    """Return what a unit force per width along the normal of the second contact does to the face at the first. That is
+    by the half-plane, per ln of their distance, and by the wedge, per ln(y + y), both of shape (q, 2) (m2/N).
 
     Displacements in units of the first contact's normal, real along it and imaginary across.
 

@@ -94,8 +94,8 @@ class State:
     arc : ndarray, shape (p, 2)
         The material at O (m).
     ends : ndarray, shape (p, 2, 2)
-        First and last arc (m) of both flanks that may belong to the contact: all of the wheel's, and of the pinion's
-        the stretch up to the next contacts of the tooth pair.
+        First and last arc (m) of both flanks that may belong to the contact. That is the whole flank of the wheel, and
+        of the pinion's the stretch up to the next contacts of the tooth pair.
     force, variance : ndarray, shape (p,)
         Force per width (N/m) that displaces the faces, and the variance of its pressure (m2).
     low, high : ndarray, shape (p,)
@@ -188,8 +188,8 @@ def far_field_influence(
 ) -> FarField:
     r"""Return the far-field influence H between all contacts of a position, with its slope.
 
-    The bumps average over their widths, the contacts have widths of their own: with the variances v of the pressures
-    and a^2/4 of the bumps, H on one tooth is more by
+    The bumps average over their widths, and the contacts have other widths. With the variances v of the pressures and
+    a^2/4 of the bumps, H on one tooth is larger by
     :math:`\tfrac12(v_i-\tfrac14a_i^2)\,\partial_{ss}H+\tfrac12(v_j-\tfrac14a_j^2)\,\partial_{tt}H` along the normals.
 
     Parameters
@@ -359,8 +359,8 @@ def unseen_force(contact_model: HalfPlanePair) -> float:
     approach of a usual contact.
 
     Gaps are differences of places and have the rounding of these, whatever the load. Places and widths of contacts, in
-    units of these, change by about as much: with :math:`b^2\kappa = 2CF` a gap tilted by e over b moves its place by
-    :math:`e/(b\kappa)`, which is :math:`e/(2CF)` of b.
+    units of the widths, change by about as much. With :math:`b^2\kappa = 2CF`, a gap tilted by e over b moves its place
+    by :math:`e/(b\kappa)`, which is :math:`e/(2CF)` of b.
     """
     return ANGLE_ROUNDING * contact_model.pair.wheel.base_radius / reference_approach(contact_model)
 
@@ -410,8 +410,8 @@ def _opened(setting: Setting, state: State, near: tuple[ComplexArray, ComplexArr
 
 
 def _mean_over_kinks(setting: Setting, arcs: Array, width: Array) -> Array:
-    """How much larger the mean gap of a panel is than that at its middle where a kink of a face lies in it, (m), shape
-    (p, n): with the gap at the middle, pressures would swing with the places of the kinks among the panels.
+    """Return how much larger the mean gap of a panel with a kink of a face is than the gap at its middle (m), shape (p,
+    n). With the gap at the middle, pressures would swing with the places of the kinks among the panels.
     """
     places, angles = (values[setting.found.flank][:, :, None] for values in setting.contact_model.kinks)
     inside = np.maximum(0.5 * width[:, None, :, None] - np.abs(arcs[..., None] - places), 0.0)
@@ -419,8 +419,8 @@ def _mean_over_kinks(setting: Setting, arcs: Array, width: Array) -> Array:
 
 
 def _distances(setting: Setting, arc: Array) -> tuple[Array, Array]:
-    """Distances y (m) of the faces at arcs (m) from their corners, and shares of the faces by the square of their
-    distance from all edges, both of shape (p, 2).
+    """Return distances y (m) of the faces at arcs (m) from their corners, and shares of the faces by the square of
+    their distance from all edges. Both have the shape (p, 2).
     """
     y = setting.distances(arc[:, :, None])[:, :, 0]
     near = 1 / y**2 + setting.contact_model.undercut / np.maximum(np.abs(arc), LEAST_DISTANCE) ** 2

@@ -8,13 +8,13 @@ the gap instead of its negative)
 .. math::
     a(u, v) = \int_{\Gamma_C} p\,\delta g(v), \qquad p = \max(0,\; -\gamma g - s\,\sigma_n).
 
-The part :math:`\Gamma_C` is the contact surface (round of the tip included) of the gears on the law's `sides`; with
-both gears on it, each takes half of the integral. `gearfe.gears.contact.whole_gears` solves the same on whole gears.
+The part :math:`\Gamma_C` is the contact surface (tip round included) of the gears on the law's `sides`. If these are
+both gears, each takes half of the integral. `gearfe.gears.contact.whole_gears` solves the same on whole gears.
 
 **On half-planes** (half_plane): `gearfe.gears.contact.half_plane`, without contact elements.
 
 A law is a frozen dataclass whose fields are its parameters, and a line that names it (`gearfe.base.tables.pair`; for
-another package an entry point); nothing else needs to be touched to add it. It has a ``name``, the text that selects
+another package an entry point). Nothing else has to be changed to add a law. It has a ``name``, the text that selects
 it. One that derives from `HalfPlane` is solved as that is. One on the elements (`ElementLaw`) provides besides:
 
 1. ``uses_stress``: s above (0 or 1); with 1 the bodies keep the stress rows of their flanks;
@@ -118,9 +118,9 @@ class Penalty:
         0.07 mm then overlaps by 2 nm at 1.5 GPa. Far stiffer, the points over-constrain the edges and rounding shows
         in the pressures.
     sides
-        One side: two would ask twice for the same thing. By default the one whose tip is nearer, for each tooth pair:
-        points of the flank that a sharp tip digs into hold the corner from either side of it, which costs up to 0.5 %
-        and lets deep overlaps have several solutions.
+        One side: two would ask twice for the same thing. By default that is the gear whose tip is nearer, for each
+        tooth pair. Points of the flank that a sharp tip digs into would hold the corner from either side of it. That
+        costs up to 0.5 %, and deep overlaps have several solutions.
     """
 
     stiffness: float | None = None

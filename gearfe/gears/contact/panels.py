@@ -9,10 +9,10 @@ would have without these pressures, and the influence K of all panels of one pos
 The gap is closed on the loaded panels. An active-set iteration finds them: it removes panels that pull and adds panels
 that overlap, until none does.
 
-**Surfaces.** A line load f per width at t moves the surface of a half-plane at s by :math:`-\tfrac{2}{\pi
-E'}\ln|s-t|\,f` plus a constant, with :math:`E' = E/(1-\nu^2)` in plane strain and E in plane stress (Flamant); at the
-corner of a wedge of half angle :math:`\alpha` points at the distance y from it by :math:`-\tfrac{1}{E'}\,A\ln y\,f`
-with the tensor
+**Surfaces.** A line load f per width at t moves the surface of a half-plane at s by
+:math:`-\tfrac{2}{\pi E'}\ln|s-t|\,f` plus a constant (Flamant). :math:`E'` is :math:`E/(1-\nu^2)` in plane strain and E
+in plane stress. At the corner of a wedge of half angle :math:`\alpha` it moves points at the distance y from the corner
+by :math:`-\tfrac{1}{E'}\,A\ln y\,f` with the tensor
 
 .. math:: A = \mathrm{diag}\Big(\frac{1}{\alpha+\tfrac12\sin 2\alpha},\;\frac{1}{\alpha-\tfrac12\sin 2\alpha}\Big)
 
@@ -196,9 +196,9 @@ def unilateral(
 ) -> tuple[Array, Array, BoolArray]:
     r"""Solve the unilateral problems of m positions with n panels a contact.
 
-    Tooth pairs feel each other by forces alone. With those of all contacts, F, the panels of one tooth pair bear
-    :math:`p = p_0 - P\,T F`, where :math:`p_0` closes the gap and P an approach of 1 of each of its contacts; the sums
-    of that over the panels are the equations for F.
+    Tooth pairs feel each other by forces alone. Under the forces of all contacts, F, the panels of one tooth pair carry
+    :math:`p = p_0 - P\,T F`. The pressures :math:`p_0` close the gap, and P are those of an approach of 1 at each of
+    the pair's contacts. The sums of p over the panels are the equations for F.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Solved positions of a gear pair: what the hubs feel, the contacts, and the nodal loads that make fields.
 
-Arrays have one entry a position. What belongs to the contacts, teeth and points of the positions stands in records of
-its own, sorted by the number of the position that they are of.
+Arrays have one entry a position. Contacts, teeth and points of the positions have records of their own, sorted by the
+number of the position.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def ranges(starts: IntArray, lengths: IntArray) -> IntArray:
 class Contacts:
     """Loaded contacts, m of them over all positions, by position, pair number and place on the pinion's flank.
 
-    By the half-plane law a tooth pair has one for each stretch of its flanks on which it bears; by laws on the mesh it
-    has one, without panels.
+    By the half-plane law a tooth pair has one contact for each stretch of its flanks that carries load. By laws on the
+    mesh it has one, without panels.
 
     Attributes
     ----------
@@ -154,8 +154,8 @@ class FlankLoads:
     def felt(self, position: IntArray, tooth: IntArray, teeth: int) -> tuple[IntArray, IntArray, IntArray]:
         """All couples of c teeth at positions, both of shape (c,), with the loads of the same position.
 
-        Returns the numbers of the tooth and of the load, and how many teeth the first is ahead of the second: the least
-        in size on a gear with so many `teeth`.
+        Returns the numbers of the tooth and of the load, and how many teeth the first is ahead of the second. That is
+        the number least in size on a gear with so many `teeth`.
         """
         first, end = (np.searchsorted(self.position, position, side=side) for side in ("left", "right"))
         of, load = np.repeat(np.arange(len(position)), end - first), ranges(first, end - first)

@@ -6,16 +6,17 @@ becomes a contact of its own, with its own centre, normal and window:
 
 - *pressure with a hole*: the window of the contact is cut in the middle of the hole;
 - *overlap outside of all windows*: with the solved forces, the faces must be clear of each other everywhere. Where
-  they are not, a window that ends there is made wider, or, where the faces are clear in between, a contact is added and
-  the flank cut where they are furthest apart.
+  they are not, a window that ends there is made wider. Where the faces are clear in between, a contact is added
+  instead, and the flank is cut where they are furthest apart.
 
-Contacts of one pair act on each other exactly as the panels of one window do (`.half_plane_pair`), so one contact more
+Contacts of one pair act on each other exactly as the panels of one window do (`.half_plane_pair`). So one contact more
 or less only changes the discretisation of the same pressure.
 
-**The gap of the deformed faces** over all of their length, seen from a contact's centre along its normal n, is that of
-the rigid faces (`geometry.first_contact`) and :math:`n\cdot(u_2-u_1)`: u by the far-field influence of all pairs of
-the position, by the half-planes and wedges of the pair's own contacts. It is of the first order in the
-displacements, which is enough to look with: a contact that is added by mistake carries no force.
+**The gap of the deformed faces** is seen from a contact's centre along its normal n, over the whole length of the
+faces. It is the gap of the rigid faces (`geometry.first_contact`) and :math:`n\cdot(u_2-u_1)`. The displacements u come
+from the far-field influence of all pairs of the position, and from the half-planes and wedges of the pair's own
+contacts. It is of the first order in the displacements, which is enough to look with: a contact that is added by
+mistake carries no force.
 """
 
 from __future__ import annotations
@@ -104,8 +105,8 @@ def _copies(state: State, i: int, place: Array) -> State:
 
 
 def _gaps(setting: Setting, state: State) -> tuple[Array, Array, Array]:
-    """Places x over the stretches of flank of all contacts, shape (p, m), the faces' arcs there, shape (p, 2, m), and
-    the gap of the deformed faces under elliptic pressures, shape (p, m), all in m.
+    """Return places x over the stretches of flank of all contacts, shape (p, m), and the faces' arcs there, shape (p,
+    2, m). The third is the gap of the deformed faces under elliptic pressures, shape (p, m). All are in m.
     """
     contact_model, couples, tables = setting.contact_model, setting.couples, setting.tables
     turn, normal = setting.turn / state.normal[:, None], state.normal[:, None] / setting.turn
@@ -136,8 +137,8 @@ def _half_widths(state: State) -> Array:
 
 
 def _beside_ellipses(setting: Setting, state: State, made: Step, i: int, arcs: Array) -> Array:
-    """What the pressures of the contacts of i's tooth pair make of the gap at arcs (m) of the pinion's face, shape
-    (m,), beside what ellipses would (m): one that ends at a cut is none.
+    """Return by how much the pressures of the contacts of i's tooth pair change the gap at arcs (m) of the pinion's
+    face, against ellipses (m), shape (m,). A pressure that ends at a cut is no ellipse.
     """
     found = setting.found
     own = np.flatnonzero((found.position == found.position[i]) & (found.pair == found.pair[i]))
@@ -150,8 +151,8 @@ def _beside_ellipses(setting: Setting, state: State, made: Step, i: int, arcs: A
 def _added(
     setting: Setting, state: State, i: int, seen: tuple[Array, Array, Array], sides: BoolArray, bound: float
 ) -> State:
-    """The contact i, and others where the faces overlap most beyond either end of its window, if they are clear of
-    each other in between; else its window is to be wider.
+    """Return the contact i, and others where the faces overlap most beyond either end of its window, if they are clear
+    in between. Otherwise the window of i is to be wider.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ def touching_ball(gear: GearData) -> float:
     """Diameter (m) of the balls that touch the flanks at the circle d + 2 x m_n.
 
     The ball touches where the roll length is that of its centre less D_M/2 cos(beta_b), as the normal is inclined by
-    the base helix angle: alpha_K = pi/z - psi - inv(alpha_t) + tan(alpha_v) - D_M/d_b sin(beta_b) tan(beta_b).
+    the base helix angle. So alpha_K = pi/z - psi - inv(alpha_t) + tan(alpha_v) - D_M/d_b sin(beta_b) tan(beta_b).
     """
     radius = gear.reference_radius + gear.sign * gear.profile_shift * gear.module
     slope = abs(gear.roll_length(radius)) / gear.base_radius  # tan(alpha_v)

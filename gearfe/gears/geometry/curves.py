@@ -5,13 +5,13 @@ tau = B - s/r_b, e1 = exp(i tau), e2 = i e1 and B = psi + inv(alpha),
 
     P(s) = r_b e1 + s e2,    radius = sqrt(r_b^2 + s^2),    polar angle = B - (s/r_b - atan(s/r_b)),    normal = e2.
 
-The root is the envelope of a rack tip rounded with radius rho. Its round's centre lies d below the pitch line; with the
-contact normal n = (sin g, -cos g) through the pitch point (0, r), rack and gear touch at (0, r) + L n with
-L = d/cos g + rho, after the rack has moved by X_m = d tan g - c_x and the gear has rolled by X_m/r (Litvin & Fuentes,
-*Gear Geometry and Applied Theory*, ch. 6: the common normal of a cutter and its envelope passes through the
-instantaneous centre). The transverse section of a helical gear's rack is stretched along the pitch line by
-q = 1/cos(beta): the round is an ellipse, whose point with the normal n lies q^2 rho sin(g)/w beside and rho cos(g)/w
-below its centre, w^2 = 1 + (q^2 - 1) sin^2 g. So L = d/cos g + rho/w and X_m = d tan g - (q^2 - 1) rho sin(g)/w - c_x.
+The root is the envelope of a rack tip rounded with radius rho. Its round's centre lies d below the pitch line. The
+common normal of a cutter and its envelope passes through the instantaneous centre (Litvin & Fuentes, *Gear Geometry and
+Applied Theory*, ch. 6). So the contact normal n = (sin g, -cos g) passes through the pitch point (0, r), and rack and
+gear touch at (0, r) + L n with L = d/cos g + rho. By then the rack has moved by X_m = d tan g - c_x, and the gear has
+rolled by X_m/r. The transverse section of a helical gear's rack is stretched along the pitch line by q = 1/cos(beta),
+so the round is an ellipse. Its point with the normal n lies q^2 rho sin(g)/w beside and rho cos(g)/w below its centre,
+w^2 = 1 + (q^2 - 1) sin^2 g. So L = d/cos g + rho/w and X_m = d tan g - (q^2 - 1) rho sin(g)/w - c_x.
 """
 
 from __future__ import annotations
@@ -75,8 +75,9 @@ def bisect(function: Callable[[float], float], low: float, high: float) -> float
 class Arc:
     """Circular arc, passed clockwise with the material on the side of its centre; angles in rad, lengths in m.
 
-    With a negative radius the angle is that of the outward normal still, the point lies opposite to it, and the
-    material on the far side from the centre: tip and root circles of internal gears, and concave fillets.
+    With a negative radius the angle is still that of the outward normal, but the point lies opposite to it, and the
+    material is on the far side from the centre. Tip and root circles of internal gears and concave fillets are such
+    arcs.
     """
 
     centre: Point
@@ -99,7 +100,7 @@ class Trochoid:
     """Envelope of the rack's tip round, from the root circle (g = 0) to the normal angle `end` (rad).
 
     `depth` d (m), `radius` rho (m) and `offset` c_x (m) place the round of the rack tooth, whose middle meets the
-    gear's space at polar angle `space_angle` (rad); `reference_radius` r (m); `stretch` q is that of the round along
+    gear's space at polar angle `space_angle` (rad). `reference_radius` is r (m). `stretch` q is that of the round along
     the pitch line. Its speed is L + X' (L/r - cos g), rho + L d/(r cos^2 g) for q = 1, and d(R^2)/dg = 2 r sin g times
     it: the radius R grows all along the curve.
     """
@@ -150,12 +151,12 @@ class CutterTrochoid:
     """Envelope of a pinion-type cutter's tip round in an internal gear, from the root circle (g = 0) to the flank.
 
     Gear and cutter roll on pitch circles of the radii `gear_radius` R and `cutter_radius` R_0 (m) about centres on one
-    side of the pitch point P. The round of radius `radius` rho (m) has its centre Q at the radius `centre_radius` r_c
-    (m) of the cutter and the polar angle `half_angle` theta (rad) from the middle of its tooth, which faces the middle
-    of the gear's space at polar angle pi + `space_angle` (rad). The normal at the angle g to the line of centres passes
-    P (Litvin & Fuentes, ch. 6), so that with D = sqrt(r_c^2 - R_0^2 sin^2 g) Q lies L = D - R_0 cos g from P, and the
-    gear has turned by chi = R_0/R (arg(R_0 + L exp(i g)) - theta). The speed along the curve is
-    (L + rho) - chi' (R cos g + L + rho) with chi' = R_0 L/(R D).
+    side of the pitch point P. The round has the radius `radius` rho (m). Its centre Q lies at the radius
+    `centre_radius` r_c (m) of the cutter, and at the polar angle `half_angle` theta (rad) from the middle of the
+    cutter's tooth. That tooth faces the middle of the gear's space at polar angle pi + `space_angle` (rad). The normal
+    at the angle g to the line of centres passes through P (Litvin & Fuentes, ch. 6). With D = sqrt(r_c^2 - R_0^2 sin^2
+    g), Q lies L = D - R_0 cos g from P. The gear has then turned by chi = R_0/R (arg(R_0 + L exp(i g)) - theta). The
+    speed along the curve is (L + rho) - chi' (R cos g + L + rho) with chi' = R_0 L/(R D).
     """
 
     gear_radius: float

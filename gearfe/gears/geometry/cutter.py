@@ -84,8 +84,8 @@ class Cutter:
         return working + self.pitch_radii[0] / self.pitch_radii[1] * space
 
     def round_centre(self, radius: float) -> tuple[float, float, float]:
-        """Centre of a tip round of `radius` (m): its radius (m), its polar angle (rad) and the distance of its normal
-        to the flank from the base circle's point of tangency (m)."""
+        """Return the centre of a tip round of `radius` (m): its radius (m), its polar angle (rad), and the distance of
+        its normal to the flank from the base circle's point of tangency (m)."""
         centre = self.tip_radius - radius
         core = (centre - self.base_radius) * (centre + self.base_radius)
         along = math.sqrt(max(core, 0.0))

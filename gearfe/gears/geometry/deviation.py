@@ -48,8 +48,8 @@ class Deviation:
     def through(cls, roll: ArrayLike, height: ArrayLike) -> Deviation:
         """Smooth curve through measured points (m): monotone cubics (Fritsch & Carlson, SIAM J. Numer. Anal. 17, 1980).
 
-        Between two points it does not leave their values, so nothing rings beside a kink; one at a point, with a change
-        of slope d, is missed by 4/27 d h at most in the intervals h beside it.
+        Between two points it stays within their values, so it does not oscillate beside a kink. A kink at a point, with
+        a change of slope d, is missed by 4/27 d h at most in the intervals h beside it.
         """
         from scipy.interpolate import PchipInterpolator  # only measured flanks need it
 

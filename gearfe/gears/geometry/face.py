@@ -2,17 +2,17 @@ r"""Describe the working flank of a tooth by a parameter and by its arc length, 
 
 A working flank consists of root, involute with its relief, and tip round.
 
-Roots take no part in the first contact of rigid flanks, except where one is undercut: the involute then starts with an
-edge, which can bear as a sharp tip does, and the mate's tip passes so close below it that the root may be touched
-first.
+Roots take no part in the first contact of rigid flanks, except where one is undercut. The involute then starts with an
+edge, which can carry load as a sharp tip does. The mate's tip passes so close below this edge that the root may be
+touched first.
 
-**By arc length** it is one tabulated curve. Between knots on the exact curve, points are cubic in the arc length s with
-the exact points and unit tangents at both ends (Hermite): with :math:`\tau = s - s_i`,
+**By arc length** it is one tabulated curve. Between knots on the exact curve, points are cubic in the arc length s,
+with the exact points and unit tangents at both ends (Hermite). With :math:`\tau = s - s_i` that is
 :math:`z(s) = z_i + t_i\tau + c_i\tau^2 + d_i\tau^3`. The knots include all marks, so kinks stay sharp; the error is
 :math:`h^4\kappa''/384` of the curvature :math:`\kappa`, 1e-15 m on usual flanks, more near a base circle.
 
-A flank with a deviation is tabulated by the arc length of the flank without: the same material has the same s, however
-far a waviness lengthens the curve, and the tangents are longer than 1 by half the square of the deviation's slope.
+A flank with a deviation is tabulated by the arc length of the flank without it, so the same material has the same s
+however far a waviness lengthens the curve. The tangents are longer than 1 by half the square of the deviation's slope.
 """
 
 from __future__ import annotations
@@ -379,8 +379,8 @@ class ToothDeviations:
         Number of each tooth's profile, one entry a tooth, or one for all.
     turn : tuple of float
         Pitch errors as the turn (rad) of each tooth's flank about the gear's centre, > 0 counter-clockwise (internal
-        gears: clockwise): out of the material of the driving flanks, which then touch earlier. One entry a tooth, or
-        one for all.
+        gears: clockwise). That is out of the material of the driving flanks, which then touch earlier. One entry a
+        tooth, or one for all.
     """
 
     profiles: tuple[Deviation | None, ...] = (None,)

@@ -1,15 +1,15 @@
 r"""First contact of the rigid driving flanks of each tooth pair: place and twist on exact curves, to rounding.
 
-About the wheel's centre every point of the wheel's flank moves on a circle. With the polar angles of the pinion's
-flank, seen from there, :math:`\varphi_1(u)` at its parameter u, and of the wheel's flank at the same radius and zero
-twist, :math:`\varphi_2(r(u))`, that point of the pinion's flank is met at the twist
+About the wheel's centre every point of the wheel's flank moves on a circle. Seen from there, the pinion's flank has the
+polar angle :math:`\varphi_1(u)` at its parameter u. The wheel's flank has :math:`\varphi_2(r(u))` at the same radius
+and zero twist. That point of the pinion's flank is met at the twist
 
 .. math:: D(u) = \varphi_1(u) - \varphi_2(r(u)),
 
 of an internal gear, which a positive twist turns clockwise, at its negative; the pair touches at
-:math:`\varphi_k = \min_u D`. The minimum is smooth on the path of contact and on rounds and reliefs, where parabolas
-close in on it, a kink of D at the kink of a relief, and an end of the range where a sharp tip bears before or after the
-path.
+:math:`\varphi_k = \min_u D`. On the path of contact and on rounds and reliefs the minimum is smooth, and parabolas
+close in on it. At the kink of a relief it is a kink of D. Before and after the path, where a sharp tip carries load, it
+is an end of the range.
 
 Each tooth may have deviations of its own: a profile, and a turn about the gear's centre by its pitch error.
 
@@ -19,9 +19,9 @@ turned by the unit number q about the gear's centre c, and displaced by d + d'(s
 
 .. math:: Z(s) = q\,(z(s) + d + d'\,(s-s_0)) + c, \qquad h - i x = (Z(s) - O)/n .
 
-At a given x its arc follows from Newton's method on the exact curve, and the gap between the faces is the difference of
-their heights h at the same x: exact for any rotation and displacement of the faces. Arrays hold pinion and wheel in
-their second axis.
+At a given x its arc follows from Newton's method on the exact curve. The gap between the faces is the difference of
+their heights h at the same x, which is exact for any rotation and displacement of the faces. Arrays hold pinion and
+wheel in their second axis.
 """
 
 from __future__ import annotations
@@ -174,8 +174,8 @@ class ToothFlanks:
 
 
 def _met_at(pinion: Face, wheel: Face, a: float, frames: Array, u: Array) -> tuple[Array, Array]:
-    """D (rad) at parameters u of the pinion's flank, infinite where the wheel's flank has no such radius, and the radii
-    there about the wheel's centre (m), both of shape (n, m).
+    """Return D (rad) at parameters u of the pinion's flank, and the radii there about the wheel's centre (m), both of
+    shape (n, m). D is infinite where the wheel's flank has no such radius.
 
     Parameters
     ----------
@@ -194,8 +194,8 @@ def _met_at(pinion: Face, wheel: Face, a: float, frames: Array, u: Array) -> tup
 
 
 def _least(pinion: Face, wheel: Face, a: float, frames: Array) -> tuple[Array, Array]:
-    """Parameters of the pinion's flank at which n tooth pairs touch first, and the least twists (rad) there, infinite
-    where they do not meet; the arguments are those of `_met_at`.
+    """Return the parameters of the pinion's flank at which n tooth pairs touch first, and the least twists (rad) there.
+    These are infinite where the pairs do not meet. The arguments are those of `_met_at`.
     """
     pieces = [len(face.flank.deviation.pieces) for face in (pinion, wheel) if face.flank.deviation is not None]
     coarse, low, high = COARSE + PER_PIECE * max(pieces, default=0), pinion.start, pinion.end
@@ -263,8 +263,8 @@ def _marks_below(
 
 
 def _going_on(values: Array, row: IntArray, k: IntArray) -> tuple[Array, Array]:
-    """Lowest that D can be between the points k and k + 1 of a row, when it goes on from both sides as it comes, and
-    the larger second difference of both sides, by which it may be lower yet (rad); infinite values do not count.
+    """Return the lowest value of D between the points k and k + 1 of a row if it is extrapolated from both sides, and
+    the larger second difference of both sides, by which it may be lower still (rad). Infinite values do not count.
     """
     near = values[row[:, None], np.clip(k[:, None] + np.arange(-2, 4), 0, values.shape[1] - 1)]
     a, b, c, d, e, f = np.where(np.isfinite(near), near, np.nan).T
@@ -282,8 +282,9 @@ def _at_radius(
     *,
     larger: bool = False,
 ) -> Array:
-    """Parameters of the pinion's flank with the radii `goal` about the wheel's centre (m), shape (n,), just within the
-    smaller radii, or the larger ones; `inner` and `outer` are parameters on either side with the radii there.
+    """Return the parameters of the pinion's flank with the radii `goal` about the wheel's centre (m), shape (n,), just
+    within the smaller radii, or the larger ones. `inner` and `outer` are parameters on either side with the radii
+    there.
     """
     turn, side = np.exp(1j * frames[:, 0]), np.where((inner[1] < outer[1]) != larger, -AT_AN_END, AT_AN_END)
     (u, off), (u_outer, off_outer) = (inner[0], inner[1] - goal), (outer[0], outer[1] - goal)
@@ -297,8 +298,9 @@ def _at_radius(
 
 
 def _lowest(u: Array, values: Array, step: float) -> tuple[Array, Array, BoolArray]:
-    """Place and value of the lowest point of the parabola through the lowest value of each row and those beside it,
-    `step` apart; and whether these are finite, so that no end of the mate's flank lies between them.
+    """Return the place and the value of the lowest point of the parabola through the lowest value of each row and those
+    beside it, `step` apart. The third value tells whether these are finite, so that no end of the mate's flank lies
+    between them.
     """
     rows, last = np.arange(len(u)), u.shape[1] - 1
     k = np.argmin(values, axis=1)

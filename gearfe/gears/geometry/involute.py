@@ -1,7 +1,7 @@
 """Exact transverse profile of an involute gear tooth as a rack cuts it, or a pinion-type cutter an internal gear.
 
 The half profile of a tooth centred on the +x axis runs from the middle of the space (polar angle pi/z) to the tip
-centreline (polar angle 0) through up to five curves: root circle, trochoid, involute, tip round, tip circle. That of an
+centreline (polar angle 0). It has up to five curves: root circle, trochoid, involute, tip round, tip circle. That of an
 internal gear is at y > 0 of the -x axis, from which its polar angles count. Names after ISO 21771; the curves
 themselves are in `gears.geometry.curves`. What a rack leaves at the root, the trochoid, the form point and the
 undercut, stands first.

@@ -47,8 +47,8 @@ def backlash_limits(
     pair : MeshGeometry
         The gears; what thins their teeth does not count.
     thickness
-        Upper and lower allowance of the tooth thickness of pinion and wheel, A_sne and A_sni, at the reference circle,
-        in the normal section; negative for thinner teeth (m).
+        Return upper and lower allowance of the tooth thickness of pinion and wheel, A_sne and A_sni (m). They are those
+        at the reference circle in the normal section, negative for thinner teeth.
     distance
         Upper and lower allowance of the centre distance (m).
 

@@ -2,10 +2,11 @@
 
 Convention of a pair: pinion centre at the origin, wheel centre at (a, 0). At pinion angle 0 a pinion tooth (tooth 0) is
 centred on the line of centres and a wheel space faces it. Angles are positive counter-clockwise; the wheel turns by
--pinion angle * z1/z2 + twist. A positive twist presses the driving flanks together: the left (counter-clockwise) flanks
-of the pinion's teeth and the left flanks, in the wheel's own frame, of the wheel's teeth. Their line of action touches
-the pinion's base circle at polar angle -alpha_w; with s1 and s2 the roll lengths on pinion and wheel, s1 + s2 =
-a sin(alpha_w) along it, and a pinion flank passes s1 at the pinion angle s1/r_b1 - alpha_w - psi1 - inv(alpha).
+-pinion angle * z1/z2 + twist. A positive twist presses the driving flanks together. These are the left
+(counter-clockwise) flanks of the pinion's teeth, and the left flanks of the wheel's teeth in the wheel's own frame.
+Their line of action touches the pinion's base circle at polar angle -alpha_w. The roll lengths s1 on the pinion and s2
+on the wheel satisfy s1 + s2 = a sin(alpha_w) along it. A pinion flank passes s1 at the pinion angle s1/r_b1 - alpha_w -
+psi1 - inv(alpha).
 
 The wheel may be an internal gear. All relations hold with the negative z2, a, r_b2 and s2 of ISO 21771. Its centre lies
 at (-|a|, 0), and it rotates in the sense of the pinion. A positive twist closes the driving flanks always: it turns an
@@ -270,9 +271,9 @@ class MeshGeometry:
     def path(self) -> dict[str, PathPoint]:
         """Points A, B, C, D, E of the active path (tip rounds respected, relief not).
 
-        A: start of contact, at the wheel's tip; B = E - p_b: the tooth pair ahead leaves contact; C: pitch point;
-        D = A + p_b: the next pair comes into contact; E: end, at the pinion's tip. Between B and D one pair carries
-        when 1 <= contact ratio <= 2.
+        A: start of contact, at the wheel's tip. B = E - p_b: the tooth pair ahead leaves contact. C: pitch point. D = A
+        + p_b: the next pair comes into contact. E: end, at the pinion's tip. Between B and D one pair carries when 1 <=
+        contact ratio <= 2.
         """
         start, end = self.path_limits()
         pitch_point = self.pinion.base_radius * math.tan(self.working_pressure_angle)

@@ -74,8 +74,8 @@ def whole_outline(
 ) -> list[list[Piece]]:
     """Outline of all teeth in their places, with the deviations of their left and right flanks.
 
-    A deviation h along the normal of an involute at the roll length s gives the point at s + h of the same involute
-    turned about the gear's centre by h/r_b (r_b: base radius): both normals touch the base circle at one point. A pitch
+    A deviation h along the normal of an involute at the roll length s gives the point at s + h of the same involute,
+    turned about the gear's centre by h/r_b (r_b: base radius). Both normals touch the base circle at one point. A pitch
     error turns the flank, out of its material. Root and tip round turn with the ends of the flank; towards the middles
     of space and tip circle the turn falls to zero.
     """

@@ -1,28 +1,28 @@
 r"""Pitch errors of a gear: lists, the run-out of its mounting, or drawn at random for a class of ISO 1328-1.
 
-The index deviation :math:`F_j` of tooth j is how far its flank is off its place along the reference circle, > 0: out of
-the material of that flank. It turns the flank by :math:`F_j/r` and moves it along the line of action by
-:math:`F_j \cos\alpha`. The single pitch deviations are :math:`f_j = F_j - F_{j-1}`, the cumulative pitch deviation is
-the range of F.
+The index deviation :math:`F_j` of tooth j is the distance of its flank from its nominal place along the reference
+circle, > 0 out of the material of that flank. It turns the flank by :math:`F_j/r` and moves it along the line of action
+by :math:`F_j \cos\alpha`. The single pitch deviations are :math:`f_j = F_j - F_{j-1}`, the cumulative pitch deviation
+is the range of F.
 
 **Both sides of a tooth.** A tooth that is displaced by :math:`F_j`, counter-clockwise, has :math:`F_j` on its left
 flank and :math:`-F_j` on its right one. Its thickness does not change. With teeth counted counter-clockwise
 :math:`f_j > 0` is then a pitch that is too large, on both sides.
 
-**Run-out.** Teeth that are cut about an axis off the one they run about are all displaced by the same vector, of length
-e in the direction :math:`\beta`; the radial run-out of ISO 1328-1, the range of a ball's radial places in the tooth
-spaces, is :math:`F_r = 2e`. At the reference circle the flanks of tooth j stand at :math:`\theta_j \pm \tau`,
-:math:`\theta_j = 2\pi j/z`, :math:`\tau` half the tooth thickness angle, and their normals lie at the pressure angle
-to the tangent, both outwards. The vector along these normals, over :math:`\cos\alpha`, is
+**Run-out.** If the axis of cutting is not the axis of rotation, all teeth are displaced by the same vector, of length e
+in the direction :math:`\beta`. The radial run-out of ISO 1328-1, the range of a ball's radial places in the tooth
+spaces, is :math:`F_r = 2e`. At the reference circle the flanks of tooth j are at :math:`\theta_j \pm \tau`, with
+:math:`\theta_j = 2\pi j/z` and :math:`\tau` half the tooth thickness angle. Their normals lie at the pressure angle to
+the tangent, both outwards. The vector along these normals, over :math:`\cos\alpha`, is
 
 .. math::
     F_j = \frac{e}{\cos\alpha}\sin(\beta - \theta_j - \tau + \alpha) \text{ (left)}, \quad
     -\frac{e}{\cos\alpha}\sin(\beta - \theta_j + \tau - \alpha) \text{ (right)} :
 
-both sides of a place on the circle differ in phase by twice the pressure angle, besides the opposite sign, and the
-backlash varies with the distance of the centres. One value a tooth leaves out that the vector turns while it meets.
-Teeth of an internal gear are counted clockwise, its :math:`\theta_j` and :math:`\tau` are negative, and > 0 is towards
-the next tooth, as elsewhere.
+both sides of a place on the circle have opposite signs and differ in phase by twice the pressure angle. The backlash
+varies with the distance of the centres. One value a tooth leaves out that the vector turns while it meets. Teeth of an
+internal gear are counted clockwise, its :math:`\theta_j` and :math:`\tau` are negative, and > 0 is towards the next
+tooth, as elsewhere.
 
 Tolerances by class are in `gears.geometry.tolerances`.
 """
@@ -124,8 +124,8 @@ def seen_from_behind(values: Sequence[Value], *, wheel: bool = False) -> tuple[V
 
 
 def back_turns(turns: Sequence[float], *, wheel: bool = False) -> tuple[float, ...]:
-    """Turns (rad) of the back flanks of displaced teeth from those of their driving flanks, in the order of the pair
-    seen from the other side, as ``sweep_loads(..., back=...)`` takes them.
+    """Return the turns (rad) of the back flanks of displaced teeth from those of their driving flanks. They are in the
+    order of the pair seen from the other side, as ``sweep_loads(..., back=...)`` takes them.
 
     What turns a driving flank out of its material turns the back flank of the same tooth into it.
     """

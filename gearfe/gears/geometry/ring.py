@@ -1,11 +1,11 @@
 r"""Where an internal gear's tips and those of its mate collide, and whether the mate can be moved in radially.
 
 Tips of a pinion and an internal gear of nearly as many teeth meet beside the path of contact, where the teeth come
-together and part (trochoid interference; DIN 3993; Colbourne, *The Geometry of Involute Gears*, 1987, ch. 8). Here the
-pair is rolled, and the points of either outline are looked up in the other one, so roots count as well.
+together and part. This is trochoid interference (DIN 3993; Colbourne, *The Geometry of Involute Gears*, 1987, ch. 8).
+Here the pair is rolled, and the points of either outline are looked up in the other one, so roots count as well.
 
 *Radial assembly*: a pinion that is moved along the line of centres does not turn. Each of its points beyond the corner
-of a neighbouring tip has to pass this corner, so it must not lie farther from the line of centres than it.
+of a neighbouring tip has to pass this corner. So it must not lie farther from the line of centres than the corner.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 r"""Tolerances of gears by class: ISO 1328-1:2013, and ISO 1328-1:1995 for reports by that edition.
 
-For the reference diameter d, the normal module m and the face width b in mm and the class A, in um (ISO 1328-1:2013,
-5.3, formulae 5 to 14, and annex for the run-out):
+The reference diameter d, the normal module m and the face width b are in mm, A is the class, and the tolerances are in
+um (ISO 1328-1:2013, 5.3, formulae 5 to 14, and annex for the run-out):
 
 .. math::
     f_{pT} = 0.001\,d + 0.4\,m + 5, \quad F_{pT} = 0.002\,d + 0.55\sqrt{d} + 0.7\,m + 12, \quad F_{rT} = 0.9\,F_{pT}, \\

@@ -311,7 +311,7 @@ def tip_penetration(gear: Gear, mate: Gear, centre_distance: float, twist: float
 
     The left flanks are in contact. The mate's outline from the middle of its addendum outwards is followed through the
     space of the gear. In the gear's frame the outline of its tooth is a single-valued polar angle over the radius,
-    which separates inside from outside; the depth of a point inside is its distance to that outline.
+    which separates inside from outside. The depth of a point inside is its distance to that outline.
 
     Parameters
     ----------

@@ -6,8 +6,8 @@ r"""Surface durability (pitting), ISO 6336-2:2006, with what the edition of 2019
     \sigma_{HG} = \sigma_{H\,lim} Z_{NT} Z_L Z_v Z_R Z_W Z_X, \quad S_H = \sigma_{HG}/\sigma_H.
 
 **Single pair contact factors**, clause 6: :math:`Z_B = \max(1, M_1)`, :math:`Z_D = \max(1, M_2)` for spur gears, with
-:math:`M` by (17), (18); the edition of 2006 has 1 for helical gears with :math:`\varepsilon_\beta \ge 1`, that of 2019
-:math:`\sqrt{f_{ZCa}}`; between them both editions interpolate over :math:`\varepsilon_\beta`. :math:`f_{ZCa}` is 1 for
+:math:`M` by (17), (18). For helical gears with :math:`\varepsilon_\beta \ge 1` the edition of 2006 has 1, that of 2019
+:math:`\sqrt{f_{ZCa}}`. In between, both editions interpolate over :math:`\varepsilon_\beta`. :math:`f_{ZCa}` is 1 for
 modifications that a load distribution has proven, and 1.2 without modifications.
 
 **Contact ratios from 2 to 2.5**: :math:`M_{1,2}` are those of the inner points of double pair contact, and
@@ -90,8 +90,8 @@ def contact_ratio_factor(pair: PairData) -> float:
 def auxiliary_factors(pair: PairData) -> _PAIR:
     """M_1 and M_2, (17) and (18): signed tooth numbers give those of internal gears.
 
-    From a contact ratio of 2 on they are those of the inner points of double pair contact, two base pitches from the
-    end of contact instead of one.
+    From a contact ratio of 2 on they are those of the inner points of double pair contact. These are two base pitches
+    from the end of contact instead of one.
     """
     tips = [math.sqrt((a / b) ** 2 - 1.0) for a, b in zip(pair.d_a, pair.d_b, strict=True)]
     steps = [2.0 * math.pi / z for z in pair.z]

@@ -1,9 +1,9 @@
 r"""Strength over the number of load cycles: life factors of ISO 6336-2 and -3, and the permissible stress between.
 
-A stress number holds its static value up to :math:`N_{stat}` cycles and its reference value at :math:`N_{ref}`; between
-them the strength is a straight line of logarithms (ISO 6336-2:2006, 5.4; ISO 6336-3:2006, 5.4), and from
-:math:`N_{ref}` on it falls to the factor 0.85 at :math:`10^{10}` cycles, or stays at 1 for optimum lubrication,
-material and manufacture with experience (Tables 2 and 1). Beyond :math:`10^{10}` cycles it does not fall further.
+A stress number has its static value up to :math:`N_{stat}` cycles and its reference value at :math:`N_{ref}`. Between
+them the strength is a straight line of logarithms (ISO 6336-2:2006, 5.4; ISO 6336-3:2006, 5.4). From :math:`N_{ref}` on
+it falls to the factor 0.85 at :math:`10^{10}` cycles. With optimum lubrication, material and manufacture, proven by
+experience, it stays at 1 (Tables 2 and 1). Beyond :math:`10^{10}` cycles it does not fall further.
 """
 
 from __future__ import annotations

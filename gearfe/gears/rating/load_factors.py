@@ -1,9 +1,9 @@
 r"""Factors of general influence, ISO 6336-1:2006: dynamic factor, face load factors, transverse load factors.
 
-**Dynamic factor**, clause 6, method B: see `gears.rating.dynamics`. The reduced mass of two discs without shafts is,
-with the moment of inertia per width of a ring from the bore to the mean of tip and root circle,
-:math:`m_{red} = 1/(1/m_1^* + 1/m_2^*)`, :math:`m^* = 4J^*/d_b^2` (30) to (32). A gear whose torque p mates share, as
-planets at a sun, counts with :math:`m^*/p`, and a ring that the casing holds does not count (6.4.7).
+**Dynamic factor**, clause 6, method B: see `gears.rating.dynamics`. The reduced mass of two discs without shafts is
+:math:`m_{red} = 1/(1/m_1^* + 1/m_2^*)`, :math:`m^* = 4J^*/d_b^2` (30) to (32). :math:`J^*` is the moment of inertia per
+width of a ring from the bore to the mean of tip and root circle. A gear whose torque p mates share, as planets at a
+sun, counts with :math:`m^*/p`, and a ring that the casing holds does not count (6.4.7).
 
 **Face load factors**, clause 7, method C:
 

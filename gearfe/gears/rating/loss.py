@@ -6,9 +6,10 @@ With the load shared evenly where two pairs touch, sliding takes the share :math
     \varepsilon_{1,2} = \frac{z_{1,2}}{2\pi}\,(\tan\alpha_{a1,2} - \tan\alpha_{wt}), \quad
     H_V = \frac{\pi\,(u + 1)}{z_1 u\cos\beta_b}\,(1 - \varepsilon_\alpha + \varepsilon_1^2 + \varepsilon_2^2).
 
-That is where one pair alone touches at the pitch point. Elsewhere, as with many planets and rings, the same mean of
-load share times sliding is taken, :math:`H_V = \frac{2\pi(u + 1)}{z_1 u\cos\beta_b}\int X|x|\,dx` over the path from
-:math:`-\varepsilon_2` to :math:`\varepsilon_1` base pitches from the pitch point, X = 1/2 where two pairs touch.
+That is where one pair alone touches at the pitch point. Where that formula does not hold, as with many planets and
+rings, the same mean of load share times sliding is taken. It is
+:math:`H_V = \frac{2\pi(u + 1)}{z_1 u\cos\beta_b}\int X|x|\,dx` over the path from :math:`-\varepsilon_2` to
+:math:`\varepsilon_1` base pitches from the pitch point, X = 1/2 where two pairs touch.
 
 The power lost, :math:`P_V = P\mu_m H_V`, has the mean coefficient of friction of ISO/TS 6336-21.
 """

@@ -3,9 +3,9 @@ r"""Allowable stress numbers and groups of materials, ISO 6336-5:2016, Table 1.
 :math:`\sigma_{H\,lim},\ \sigma_{F\,lim} = A\,x + B` for the surface hardness x in HBW or HV, within the range of the
 row. The table was compared entry by entry with a second program that quotes it.
 
-Of case-hardened steel of grade MQ the bending number depends on the hardness of the core: 425 (at least 25 HRC), 461
-(at least 25 HRC and 28 HRC in the Jominy test at 12 mm) and 500 N/mm^2 (at least 30 HRC). Induction-hardened steel of
-grade MQ has 0.138 x + 290 up to 570 HV and 369 N/mm^2 from there to 615 HV.
+The bending number of case-hardened steel of grade MQ depends on the hardness of the core. It is 425 (at least 25 HRC),
+461 (at least 25 HRC and 28 HRC in the Jominy test at 12 mm) or 500 N/mm^2 (at least 30 HRC). Induction-hardened steel
+of grade MQ has 0.138 x + 290 up to 570 HV and 369 N/mm^2 from there to 615 HV.
 """
 
 from __future__ import annotations

@@ -6,9 +6,9 @@ r"""Tooth bending strength, ISO 6336-3:2006, method B, with what the edition of 
     \sigma_{FG} = \sigma_{F\,lim} Y_{ST} Y_{NT} Y_{\delta\,rel\,T} Y_{R\,rel\,T} Y_X Y_M, \quad
     S_F = \sigma_{FG}/\sigma_F.
 
-**Tooth form**, clause 6: the chord :math:`s_{Fn}` where tangents of 30 degrees touch the fillet of the virtual spur
-gear that the rack generates, and the lever :math:`h_{Fe}` of the load at the outer point of single pair contact
-(:math:`d_{en}`), (9) to (31); :math:`Y_S` by (36) to (38).
+**Tooth form**, clause 6: the chord :math:`s_{Fn}` is where tangents of 30 degrees touch the fillet of the virtual spur
+gear that the rack generates. The lever :math:`h_{Fe}` is that of the load at the outer point of single pair contact
+(:math:`d_{en}`), (9) to (31). :math:`Y_S` is by (36) to (38).
 
 **Edition of 2019**: :math:`Y_F` has the factor :math:`f_\varepsilon` of the load distribution, 1 for spur gears,
 :math:`\sqrt{1 - \varepsilon_\beta + \varepsilon_\beta/\varepsilon_{\alpha n}}` for :math:`\varepsilon_\beta < 1`,
@@ -179,10 +179,10 @@ def _rack_section(pair: PairData, i: int) -> _Section:
 def _cut_section(pair: PairData, i: int) -> _Section:
     """Section of the root that the pinion-type cutter of an internal gear generates, with tangents of 60 degrees.
 
-    Gear and cutter roll on circles of R and R_0 about centres on one side of the pitch point P. The normal at the
-    angle g to the line of centres passes P and the centre of the cutter's tip round, L = D - R_0 cos(g) from P, with
-    D^2 = r_c^2 - R_0^2 sin^2(g); the gear turns chi' = R_0 L/(R D) times as fast as g grows (Litvin & Fuentes, *Gear
-    Geometry and Applied Theory*, ch. 6).
+    Gear and cutter roll on circles of R and R_0 about centres on one side of the pitch point P. The normal at the angle
+    g to the line of centres passes through P and the centre of the cutter's tip round. This centre lies L = D - R_0
+    cos(g) from P, with D^2 = r_c^2 - R_0^2 sin^2(g). The gear turns chi' = R_0 L/(R D) times as fast as g grows (Litvin
+    & Fuentes, *Gear Geometry and Applied Theory*, ch. 6).
     """
     m, alpha, z, x = pair.m_n, pair.alpha_n, abs(pair.z_n[i]), pair.x[i]
     z_0, x_0 = pair.cutter or (0.5 * z, 0.0)

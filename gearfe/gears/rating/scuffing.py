@@ -16,8 +16,8 @@ are :math:`\Gamma`, the distance from the pitch point over that of the pitch poi
 
 This is Blok's temperature of a Hertzian line contact [#]_. On the way in,
 :math:`X_J = 1 + (C_{eff} - C_a)/50\,|\Gamma|^3` with the relief of the driven gear. Load shares :math:`X_\Gamma` are
-those of the technical specification for profiles without relief: 1/3 to 2/3 where two pairs of a spur gear touch,
-:math:`1/\varepsilon_\alpha` for helical gears, with up to 1.3 times as much at both ends. With the relief
+those of the technical specification for profiles without relief. Where two pairs of a spur gear touch they are 1/3 to
+2/3. For helical gears they are :math:`1/\varepsilon_\alpha`, with up to 1.3 times as much at both ends. With the relief
 :math:`C_{eff}` spur gears have 0 to 1 and helical ones no excess; between both the share is interpolated.
 
 **Integral temperature**: :math:`\Theta_{int} = \Theta_{MC} + 1.5\,\Theta_{fla\,int}`,

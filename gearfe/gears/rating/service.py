@@ -1,7 +1,8 @@
 r"""Service life under a load spectrum by Miner's rule, ISO 6336-6:2006.
 
-Each part of the spectrum has its own stress :math:`\sigma_i` with its own factors of influence and its number of cycles
-:math:`n_i`; the S-N curve of the gear gives the number :math:`N_i` that is borne at :math:`S\sigma_i`, and
+Each part of the spectrum has its own stress :math:`\sigma_i` with its own factors of influence, and its number of
+cycles :math:`n_i`. The S-N curve of the gear gives the permissible number of cycles :math:`N_i` at :math:`S\sigma_i`,
+and
 
 .. math:: U = \sum_i n_i/N_i.
 

@@ -1,8 +1,9 @@
 r"""Tooth stiffness by ISO 6336-1:2006, clause 9, method B: the one place of its formulas.
 
-The minimum flexibility q' of a tooth pair is a series in the virtual tooth numbers and profile shifts of the pinion,
-the gear with fewer teeth, and the wheel (82), valid for :math:`x_1 \ge x_2` and :math:`-0.5 \le x_1 + x_2 \le 2`; an
-internal wheel has :math:`1/z_{n2} = 0`. With (80), (81), (83) to (86), (88), (91), (92)
+The minimum flexibility q' of a tooth pair is a series in the virtual tooth numbers and profile shifts of pinion and
+wheel (82). The pinion is the gear with fewer teeth. The series is valid for :math:`x_1 \ge x_2` and
+:math:`-0.5 \le x_1 + x_2 \le 2`. An internal wheel has :math:`1/z_{n2} = 0`. With (80), (81), (83) to (86), (88), (91),
+(92)
 
 .. math::
     c'_{th} = 1/q', \quad c' = c'_{th}\,C_M C_R C_B\cos\beta\,E/E_{St}, \quad

@@ -1,12 +1,11 @@
 """One tooth sector of a gear as second-order curved triangles, with the nodes of its outline on the exact profile.
 
-The outline is cut into edges here (sizes graded along it, nodes at chosen arc lengths of the exact curves), gmsh fills
-it with straight triangles, and the mid-edge nodes are then placed here too: on the exact profile along the outline, in
-the middle elsewhere. gmsh works in millimetres; metres leave this module. Default sizes are in
-proportion to the module.
+The outline is divided into edges: sizes are graded along it, and nodes lie at chosen arc lengths of the exact curves.
+gmsh fills it with straight triangles. Mid-edge nodes are then placed on the exact profile along the outline, and in the
+middle elsewhere. gmsh works in millimetres; metres leave this module. Default sizes are in proportion to the module.
 
-The sector of an internal gear lies about the -x axis: its tooth points to +x, as others do, and what is its bore side
-is the outside of the rim.
+The sector of an internal gear lies about the -x axis. Its tooth points to +x, as others do, and the outside of the rim
+takes the place of the bore.
 """
 
 from __future__ import annotations
@@ -100,7 +99,7 @@ class SectorMesh:
     triangles : ndarray, shape (m, 6)
         Corner nodes counter-clockwise, then the nodes in the middle of edges 01, 12, 20.
     boundaries : dict of str to ndarray, shape (k, 3)
-        Outline edges (start, middle, end node), in order counter-clockwise round the sector, under the names
+        Outline edges (start, middle, end node), in order counter-clockwise round the sector. Their names are
         ``cut_right``, ``root_right``, ``flank_right``, ``tip``, ``flank_left``, ``root_left``, ``cut_left``, ``bore``
         (``rim`` of an internal gear). Tip rounds belong to the flanks.
     cut_right, cut_left : ndarray, shape (c,)
@@ -136,8 +135,8 @@ class SectorMesh:
         """Edges of the driving (left) flank that can touch the mate, from root to tip, each (root side, middle, tip
         side).
 
-        They are the flank with its tip round and the upper half of the fillet, which a bent mate's tip can reach; never
-        the node on the cut side.
+        They are the flank with its tip round and the upper half of the fillet, which the tip of a bent mate can reach.
+        The node on the cut side is never among them.
         """
         root = self.boundaries["root_left"]
         ends = self.points[root[:, 2]]
@@ -194,8 +193,8 @@ def _cut_nodes(edges: IntArray, *, reverse: bool) -> IntArray:
 
 
 def _outline(gear: Gear, recipe: SectorRecipe) -> dict[str, ComplexArray]:
-    """Outline of the sector by boundary name, counter-clockwise from the bore (or rim) end of the right cut: nodes of
-    its edges, end, middle, end, ..., end, as complex numbers (m).
+    """Return the outline of the sector by boundary name, counter-clockwise from the bore (or rim) end of the right cut.
+    It has the nodes of the edges, end, middle, end, ..., end, as complex numbers (m).
     """
     left = _half_profile(gear, recipe, fine=True)
     right = _half_profile(gear, recipe, fine=False)
@@ -382,8 +381,8 @@ def _arcs(gear: Gear, chains: dict[str, ComplexArray]) -> list[_Arc]:
 
 
 def _fill(ring: Array, largest: float, arcs: Sequence[_Arc] = ()) -> tuple[Array, IntArray]:
-    """Straight triangles of sizes up to `largest` (m) inside a closed ring of points, which keep their places and come
-    first; then come the corners within arcs across the ring, the outer arc first.
+    """Return straight triangles of sizes up to `largest` (m) inside a closed ring of points, which keep their places
+    and come first. Then come the corners within arcs across the ring, the outer arc first.
 
     Returns
     -------

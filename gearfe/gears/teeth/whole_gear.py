@@ -97,8 +97,8 @@ def mixed_gear(gear: Gear, recipe: SectorRecipe, fine: Collection[int]) -> Whole
     Returns
     -------
     WholeGear
-        With a boundary ``contact`` more: the driving flanks of the fine teeth with their tip rounds and the upper half
-        of the fillets, each edge (root side, middle, tip side).
+        It has one boundary more, ``contact``: the driving flanks of the fine teeth with their tip rounds and the upper
+        half of the fillets. Each edge is (root side, middle, tip side).
     """
     mesh, numbered = sector_mesh(gear, recipe), {k % gear.tooth_count for k in fine}
     coarse = mesh if len(numbered) == gear.tooth_count else _coarse(gear, recipe, mesh)

@@ -1,9 +1,9 @@
 r"""The weak form of the contact as scikit-fem forms on pairs of points.
 
-A contact point x_s of one body and its closest point x_m on the deformed mate, :math:`x_s - x_m(\xi) = g\,n(\xi)`, form
-a pair; fields of the first carry the index s, those of the second m. Find u such that for all v (Chouly, Mlika &
-Renard, *Numer. Math.* 139, 2018, with theta = 0 and the gap g instead of its negative; gamma and s are those of
-`gearfe.gears.contact.laws`)
+A contact point x_s of one body and its closest point x_m on the deformed mate form a pair:
+:math:`x_s - x_m(\xi) = g\,n(\xi)`. Fields of the first have the index s, those of the second m. Find u such that for
+all v (Chouly, Mlika & Renard, *Numer. Math.* 139, 2018, with theta = 0 and the gap g instead of its negative; gamma and
+s are those of `gearfe.gears.contact.laws`)
 
 .. math::
     a(u, v) = \ell(v) + \int p\; n\cdot[v], \qquad [v] = v_s - v_m, \qquad p = \max(0,\; -\gamma g - s\,\sigma_n) .

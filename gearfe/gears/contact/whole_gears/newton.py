@@ -106,9 +106,9 @@ def solve_contact(
 def elastic_start(problem: ContactProblem) -> ContactState:
     """Return a contact near the solution of bodies whose rigid shapes overlap.
 
-    Each of `PASSES` moves the bodies along their deflection under the forces that are out of balance, by the share at
-    which these do no more work. The deep and wide overlap of the rigid bodies shrinks to about the contact's; from the
-    overlap itself Newton's method takes twice as many steps, or fails where it is beyond a hundredth of a tooth.
+    Each of `PASSES` moves the bodies along their deflection under the forces that are out of balance, up to where these
+    do no more work. The deep and wide overlap of the rigid bodies shrinks to about that of the contact. From the
+    overlap itself Newton's method takes twice as many steps, or fails beyond a hundredth of a tooth.
     """
     stiffness = problem.constitution.tangent(np.zeros(problem.unknowns.size))
     free = np.setdiff1d(np.arange(problem.unknowns.size), problem.fixed)

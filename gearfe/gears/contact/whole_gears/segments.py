@@ -1,10 +1,10 @@
 r"""Quadrature points on slave edges: a Gauss rule on each edge, or on each of its segments.
 
-The virtual work of the pressure is smooth between the points of a slave edge that face vertices of the mate, and has a
-kink there: shape functions and normal of the mate are only continuous. With a Gauss rule across such a kink a uniform
-pressure on a flat interface is no solution; with one on each segment between the kinks it is (Puso & Laursen, *Comput.
-Methods Appl. Mech. Eng.* 193, 2004; Farah, Popp & Wall, *Comput. Mech.* 55, 2015, compare both). A vertex :math:`x_v`
-with the blended normal :math:`n_v` faces the slave point with
+The virtual work of the pressure has a kink at the points of a slave edge that face vertices of the mate, and is smooth
+between them. Shape functions and normal of the mate are only continuous at vertices. With a Gauss rule across such a
+kink a uniform pressure on a flat interface is no solution. With a rule on each segment between the kinks it is one
+(Puso & Laursen, *Comput. Methods Appl. Mech. Eng.* 193, 2004; Farah, Popp & Wall, *Comput. Mech.* 55, 2015, compare
+both). A vertex :math:`x_v` with the blended normal :math:`n_v` faces the slave point with
 
 .. math:: (x_s(\xi) - x_v) \times n_v = 0,
 
