@@ -491,8 +491,8 @@ def solve(
 def error_of(system: Oscillator, orbit: Orbit, at: Evaluated) -> tuple[float, ComplexArray]:
     """Error estimate of an orbit, and the amplitudes that twice the harmonics would make at once.
 
-    What is left of the equations on four times the samples is taken to a change of the orbit's harmonics by the
-    Jacobian; the others change by it themselves.
+    The residual of the equations on four times the samples gives a change of the orbit's harmonics by the Jacobian. The
+    higher harmonics change by the residual itself.
     """
     count, speed, scale = 2 * orbit.harmonics, orbit.speed, system.scale
     H = system.flexibility(speed, count)

@@ -11,9 +11,9 @@ same) is coupled with its neighbours,
 
 .. math:: F_n = -P U_n + \tfrac12(P - iQ)\,U_{n-1} + \tfrac12(P + iQ)\,U_{n+1} .
 
-A damper acts in the axes of the housing. On the bore its force is the rate of what a spring would have, so these rows
-have the factor :math:`i\omega_n` of the force; on the shaft it has the rate of the bore, so these rows have that of
-the motion, :math:`i\omega_{n \pm 1}`. With the motion G that the constant part has without these forces,
+A damper acts in the axes of the housing. On the bore its force is the rate of a spring's force, so these rows have the
+factor :math:`i\omega_n` of the force. On the shaft it has the rate of the bore, so these rows have the factor
+:math:`i\omega_{n \pm 1}` of the motion. With the motion G that the constant part has without these forces,
 :math:`U = G + H F`: Hill's method for an inhomogeneous system with periodic coefficients (Nayfeh & Mook, Nonlinear
 Oscillations, Sec. 5.2). The equations are linear, with a block for each harmonic and its neighbours, and are solved at
 once. What the rest of the balance sees is linear.

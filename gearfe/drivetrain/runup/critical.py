@@ -75,8 +75,9 @@ def critical_speeds(run: RunUp, multiples: int, shaft_multiples: int = 2) -> Cri
 
 
 def peaks_of(run: RunUp, critical: CriticalSpeeds) -> list[dict[str, Any]]:
-    """Peaks of the dynamic factors over the speed, highest first, each with the order that makes it and the mode that
-    this meets within `NEAR`: of the larger one of the motions that a slow run-up and a slow run-down meet.
+    """Return the peaks of the dynamic factors over the speed, highest first. Each has the order that causes it, and the
+    mode that this order meets within `NEAR`. Of the motions that a slow run-up and a slow run-down meet, the larger one
+    counts.
     """
     both = list(zip(run.sweep(), run.sweep(up=False), strict=True))
     named, found = named_orders(run), []

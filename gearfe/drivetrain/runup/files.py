@@ -40,8 +40,8 @@ class Pictures(Protocol):
 
 @dataclass(frozen=True)
 class RunUpChoice:
-    """Outputs of a run-up: highest multiple of the mesh frequencies, attachment whose acceleration is drawn, whether
-    the modes with much strain in the meshes are written as fields, highest multiple of the shafts' turns.
+    """Outputs of a run-up: highest multiples of the mesh frequencies and of the shafts' turns, the attachment whose
+    acceleration is drawn, and whether the modes with much strain in the meshes are written as fields.
     """
 
     multiples: int

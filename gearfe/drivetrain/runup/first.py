@@ -1,8 +1,8 @@
 r"""A first motion at a speed, without a guess: it grows out of the state without vibration.
 
 Of the flexibility for all that swings a part s is taken, :math:`s\,H(ik\cdot\omega)` for :math:`k \ne 0`. Without it
-only the mean forces are in balance; from there the curve of solutions over s, followed round its turning points, leads
-to s = 1: it can neither end before nor, as damping bounds the motions, go to infinity (homotopy; Allgower & Georg,
+only the mean forces are in balance. From there the curve of solutions over s, followed round its turning points, leads
+to s = 1. It cannot end before, and it cannot go to infinity, as damping bounds the motions (homotopy; Allgower & Georg,
 Introduction to Numerical Continuation Methods, 2003, Ch. 11).
 """
 

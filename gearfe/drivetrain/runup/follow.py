@@ -5,9 +5,9 @@ With the harmonics x in parts of their scale and :math:`\sigma = \Omega/\Omega_u
 
 .. math:: t_x\cdot(x - x_0) + t_\sigma(\sigma - \sigma_0) = s
 
-(Keller 1977; Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 6.1). Where the curve goes on smoothly from one
-given speed to the next, extrapolation of the forces (which know nothing of the resonances behind them) and Newton's
-method at that speed do, as long as each of its steps contracts; else the short steps decide.
+(Keller 1977; Nayfeh & Balachandran, Applied Nonlinear Dynamics, Sec. 6.1). Where the curve is smooth from one given
+speed to the next, the forces are extrapolated, as they are smooth across resonances, and Newton's method is applied at
+that speed. If one of its steps does not contract, the short steps along the curve are taken.
 """
 
 from __future__ import annotations

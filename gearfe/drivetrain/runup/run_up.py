@@ -40,8 +40,8 @@ class RunUp(ShownTable):
         Given speeds (rad/s).
     states
         Steady states at these speeds in the order in which their curve passes them: on branch 0 upwards, after a
-        turning point on branch 1 back, after the next one on branch 2 upwards again; and one next to each turning
-        point, as the last of its branch.
+        turning point on branch 1 back, after the next one on branch 2 upwards again. There is also one next to each
+        turning point, as the last of its branch.
     turning_speeds : (turns,)
         Speeds of the turning points (rad/s) in the order in which the curves pass them; `bifurcations` name branches.
     bifurcations
@@ -79,8 +79,8 @@ class RunUp(ShownTable):
     def sweep(self, *, up: bool = True) -> tuple[SteadyState, ...]:
         """One state at each speed that was reached: what a slow run-up, or a slow run-down, meets there.
 
-        Where a branch ends, or is stable no longer, the motion jumps to the stable one that is left; where none is
-        known the first of all is taken, whose `stable` says so.
+        Where a branch ends, or is no longer stable, the motion jumps to the remaining stable one. Where no stable one
+        is known, the first of all is taken; its `stable` is false.
         """
         found: dict[float, list[SteadyState]] = {}
         given = set(self.speeds.tolist())

@@ -1,7 +1,7 @@
 """Gear trains: rigid or elastic shafts with gears in an elastic or rigid housing, on the rigid core.
 
-The path of a job: `drivetrain.gearbox.job` reads the tables and makes a `GearTrain`; `build_train` turns it into a
-`TrainModel` (a `gearfe.multibody` system with its hinges eliminated); `simulate` integrates it and returns a
+The path of a job: `drivetrain.gearbox.job` reads the tables and makes a `GearTrain`. `build_train` turns it into a
+`TrainModel` (a `gearfe.multibody` system with its hinges eliminated). `simulate` integrates it and returns a
 `TrainResponse`.
 """
 

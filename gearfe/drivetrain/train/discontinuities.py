@@ -1,5 +1,5 @@
-"""Where a step of a train's series ends: phases and pair forces that leave their cells, flanks that meet or part,
-flanks that slide fast enough for full friction, torques over speed that go on to another piece.
+"""Find where a step of a train's series ends: phases and pair forces that leave their cells, flanks that meet or part,
+flanks that slide fast enough for full friction, and torques over speed that enter another piece.
 
 The functions see each other and their constants by name, in plain Python and compiled.
 """

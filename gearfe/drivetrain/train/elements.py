@@ -1,13 +1,13 @@
 r"""Elements of a train for the rigid core: shaft, hinge, bearing, constant springs and dampers.
 
 First coordinates of a shaft: displacement of its mass centre along x, y, z (m), small tilts about e1 and e2 (rad), and
-the rest of its spin about the axis a beside rolling with the drive (rad), all of its mean motion. What is fixed on a
-shaft moves as the section that carries it (`ShaftBody`). A housing has the six coordinates of each bore, then its
+the difference of its spin about the axis a from rolling with the drive (rad). All are of its mean motion. What is fixed
+on a shaft moves as the section that carries it (`ShaftBody`). A housing has the six coordinates of each bore, then its
 internal ones. Forces of second order in the small motions (torque times tilt) are left out.
 
 **Mass and inertia** of a shaft with its gears follow from geometry and density. A gear is its exact tooth outline of
-width b outside the shaft (or its bore, where that is wider), an internal gear what its rim has outside of the outline.
-With the polygon's :math:`A = \tfrac12\sum c_i`, :math:`J = \tfrac1{12}\sum c_i(|p_i|^2 + p_i\cdot p_{i+1} +
+width b outside the shaft (or its bore, where that is wider). An internal gear is the part of its rim outside of the
+outline. With the polygon's :math:`A = \tfrac12\sum c_i`, :math:`J = \tfrac1{12}\sum c_i(|p_i|^2 + p_i\cdot p_{i+1} +
 |p_{i+1}|^2)`, :math:`c_i = p_i \times p_{i+1}` (Green's theorem), its mass is :math:`\rho b A`, its polar inertia
 :math:`\rho b J`, its transverse one :math:`\rho b J/2 + m b^2/12`. All are summed about the common mass centre.
 """

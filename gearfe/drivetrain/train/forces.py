@@ -26,8 +26,8 @@ angle, g the shaft's ratio to it, u a coordinate. With u, u' along the direction
 - *torques*: functions of time along a direction d, and of the true speed there, :math:`T(g\psi' + u_d') + c\,u_d'`,
   c the slope that the system's damping has already.
 
-A mesh has one flank, or two: the back flank has its own approach, along the other line of action, and its law is
-the driving one's at the mirrored phase, behind the backlash j.
+A mesh has one flank, or two. The back flank has its own approach, along the other line of action. Its law is that of
+the driving flank at the mirrored phase, behind the backlash j.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ from .friction import Sliding, smooth_sign
 
 class Drag(NamedTuple):
     """Friction of a flank at n times, (n, 2) each: force across the line of action (N) and its moment about the pitch
-    point (N m), with their derivatives: with approach and phase, with the rates of approach, of the way across, and of
-    the turn. Last the power (W) that it takes, (n,).
+    point (N m). Their derivatives are by approach and phase, and by the rates of approach, of the displacement across,
+    and of the turn. Last the power (W) that it takes, (n,).
     """
 
     value: Array
@@ -114,9 +114,9 @@ class MeshFlank(ABC):
         Approach (m) at which unmodified flanks touch.
 
     Flanks also have a `mean_damping` (N s/m), which the system's constant part has along the approach already, and a
-    `damping` that acts while their teeth bear. `tilt` is the number of the tilt of the gears among the directions, of
-    flanks that act along the face width, else -1; `against` is the stiffness against it (N m/rad) that the system's
-    constant part has and the flank's own moment, too.
+    `damping` that acts while their teeth bear. `tilt` is the number of the tilt of the gears among the directions, for
+    flanks that act along the face width, else -1. `against` is the stiffness against the tilt (N m/rad), which is in
+    the system's constant part and in the flank's own moment.
     """
 
     tilt = -1
@@ -419,8 +419,8 @@ class Turned:
     Attributes
     ----------
     still, turning
-        Numbers of the directions of the motion that stands still, and of the other one times a stiffness or a damping
-        constant; the second of each is the next.
+        Numbers of the directions of the motion in fixed axes, and of the other motion times a stiffness or a damping
+        constant. The second direction of each has the next number.
     ratio
         Speed of the frame over that of the drive.
     of_rates

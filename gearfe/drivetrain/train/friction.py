@@ -6,12 +6,13 @@ with
 
 .. math:: v_k = q\cdot\big(\dot u_1(P) - \dot u_2(P)\big) + e_k\,(\Omega_1 - \Omega_2) ,
 
-:math:`\Omega` the whole speeds about the axis a: rolling gears slide with :math:`e_k(\Omega_1 - \Omega_2)`. The driver
-feels :math:`-\mu N_k s(v_k/v_0)\,q`, the driven gear its opposite, :math:`N_k` the pair's normal force, damping
-included, with the sign :math:`s(x) = x\,(15 - 10 x^2 + 3 x^4)/8` within :math:`\pm 1` and :math:`\pm 1` beyond: a
-polynomial between two borders that steps end on, where a function as tanh has terms that show too late in a series. As
-:math:`v_k` belongs to this force, the loss is :math:`\sum \mu N_k v_k s(v_k/v_0) \ge 0` whatever the motion. The pair's
-place is that on the path of contact: beyond its ends, where edges bear, the lever arms are some per cent off.
+:math:`\Omega` the whole speeds about the axis a: rolling gears slide with :math:`e_k(\Omega_1 - \Omega_2)`. The
+friction on the driver is :math:`-\mu N_k s(v_k/v_0)\,q`, on the driven gear its opposite. :math:`N_k` is the pair's
+normal force, damping included. The sign is :math:`s(x) = x\,(15 - 10 x^2 + 3 x^4)/8` within :math:`\pm 1`, and
+:math:`\pm 1` beyond. It is a polynomial between two borders at which steps end; a function such as tanh has terms that
+show too late in a series. As :math:`v_k` belongs to this force, the loss is :math:`\sum \mu N_k v_k s(v_k/v_0) \ge 0`
+whatever the motion. The pair's place is that on the path of contact: beyond its ends, where edges bear, the lever arms
+are some per cent off.
 
 :math:`\mu` is given, or the mean coefficient along the path by Schlenk (ISO/TR 14179-2:2001; Niemann and Winter,
 Maschinenelemente II):

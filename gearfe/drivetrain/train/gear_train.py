@@ -129,9 +129,9 @@ class ShaftGear:
         kg/m3.
     pitch_errors : (left, right), each a tuple of z numbers, or empty
         How much earlier the flanks of each tooth touch along the line of action (m): index deviations times the cosine
-        of the pressure angle; a displaced tooth has opposite values on its sides. Teeth count about the axis of the
-        train, from the one that stands at the gear's angle in `train.kinematics.Kinematics`. Left flanks drive
-        where the driver turns about the axis. For meshes with a law.
+        of the pressure angle. A displaced tooth has opposite values on its two sides. Teeth count about the axis of the
+        train, from the one that stands at the gear's angle in `train.kinematics.Kinematics`. Left flanks drive where
+        the driver turns about the axis. For meshes with a law.
     """
 
     name: str
@@ -177,8 +177,8 @@ class GearMesh:
     name
         How results call it; empty: ``driver-driven``.
     transmission_error
-        Unloaded static transmission error e over the driver's rotation (m over rad), of one pitch: the approach at
-        which the flanks touch, positive where the driven gear stays behind. For meshes with a curve or a constant.
+        Unloaded static transmission error e over the driver's rotation (m over rad), of one pitch. It is the approach
+        at which the flanks touch, positive where the driven gear stays behind. For meshes with a curve or a constant.
     tilting
         How the driving flanks act along the face width; beside a transmission error on the same phases. None: in the
         middle of the common width, without a stiffness against tilting.
@@ -431,8 +431,8 @@ class Load:
     orders
         Sines ``amplitude sin(order angle + phase)`` beside it: order, amplitude (N m), phase (rad).
     mesh
-        Mesh of the orders, whose angle grows by 2 pi a pitch from where a driver's tooth stands on the line of centres;
-        empty: the angle is that by which the shaft has turned.
+        Mesh of the orders. Its angle grows by 2 pi a pitch from where a driver's tooth stands on the line of centres.
+        Empty: the angle is the rotation of the shaft.
     along
         Coordinate along the train's axis (m) of the section of the shaft on which it acts; None: that of the bore.
     machine
@@ -483,8 +483,8 @@ class Damping:
     Parameters
     ----------
     ratio
-        Modal damping ratio of the modes of the coupled system (mean mesh stiffnesses): one, or one a mode from the
-        lowest up, the last one holding for all above.
+        Modal damping ratio of the modes of the coupled system (mean mesh stiffnesses). It is one number, or one for
+        each mode from the lowest up; the last one holds for all above.
     alpha, beta
         Rayleigh damping ``alpha M + beta K`` (1/s, s) of all bodies, bearings and meshes, for motion beside the
         rolling.
@@ -531,7 +531,7 @@ class Carrier:
         Its name, and that of its shaft.
     pins
         One for each planet. Planets with equal gears that mesh with the same central gears are one set, numbered in the
-        order of their pins; of planets that mesh with each other those of one number do.
+        order of their pins. Planets that mesh with each other do so by equal numbers.
     """
 
     name: str

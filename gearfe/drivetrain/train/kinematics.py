@@ -1,10 +1,10 @@
 r"""Kinematics of a train: ratios of the shafts, driving senses, common period, teeth at the start, steady forces.
 
-All ratios are rational (`gearfe.drivetrain.train.rolling`), so the common period is exact: a mesh repeats after
-:math:`1/(|g| z)` turns of the drive (g the speed of its driver over that of the drive, against the carrier of a
-planetary stage, z the driver's teeth), and fractions have a least common multiple. In steady running the moments about
-the axis of each shaft that is not held balance: base radius times force at each mesh, and on a carrier the opposite of
-what its meshes exert on their gears.
+All ratios are rational (`gearfe.drivetrain.train.rolling`), so the common period is exact. A mesh repeats after
+:math:`1/(|g| z)` turns of the drive, with g the speed of its driver over that of the drive (against the carrier of a
+planetary stage) and z the driver's teeth. Fractions have a least common multiple. In steady running the moments about
+the axis of each shaft that is not held balance. They are base radius times force at each mesh, and on a carrier the
+opposite of what its meshes exert on their gears.
 """
 
 from __future__ import annotations

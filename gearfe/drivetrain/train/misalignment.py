@@ -1,26 +1,26 @@
 r"""Misalignment of the gears in mesh under the steady torques: what shafts, bearings and housing yield.
 
 With the mean stiffness of the meshes the train solves :math:`K q = f`, f the torques that it carries in the end, on the
-flanks that statics press: at rest, but in planetary stages with the centrifugal forces of the planets at the speed in
-the end. Gears are rigid discs: their tilts :math:`\theta_1` of the driver and :math:`\theta_2` of the driven gear are
-those of the sections at the middles of their faces. With the axis a and n the direction of the force on the driven
+flanks that statics press. It is at rest. Planetary stages also have the centrifugal forces of the planets at the speed
+in the end. Gears are rigid discs: their tilts :math:`\theta_1` of the driver and :math:`\theta_2` of the driven gear
+are those of the sections at the middles of their faces. With the axis a and n the direction of the force on the driven
 gear,
 
 .. math::
     \gamma = (\theta_1 - \theta_2)\cdot(a\times n), \qquad \gamma_\perp = (\theta_1 - \theta_2)\cdot n
 
-are the tilt in the plane of action, > 0 where it closes the gap towards larger y, and the one across it, > 0 where the
-driven gear moves to the left of n towards larger y. Over the common face width b, :math:`f_{sh} = b\,\gamma` is the
-misalignment by deformation of ISO 6336-1; that of ISO counts its amount.
+are the tilt in the plane of action and the one across it. The first is > 0 where it closes the gap towards larger y,
+the second where the driven gear moves to the left of n towards larger y. Over the common face width b,
+:math:`f_{sh} = b\,\gamma` is the misalignment by deformation of ISO 6336-1; that of ISO counts its amount.
 
-Of a gear's motion the part of the *housing* is that of the straight line through the bores of its shaft, the part of
-the *bearings* that of the line through the displacements of the shaft against the bores, the part of the *shafts* what
-is left: bending. On a shaft in one bore the lines have the tilts there.
+A gear's motion has three parts. That of the *housing* is the motion of the straight line through the bores of its
+shaft. That of the *bearings* is the motion of the line through the displacements of the shaft against the bores. That
+of the *shafts* is the remainder: bending. On a shaft in one bore the lines have the tilts there.
 
-**Loads that vary along the face width** tilt the gears further. Contact at given tilts :math:`t = (\gamma,
-\gamma_\perp)` stores the energy :math:`V(t)`; its moments about the middle of the common width,
-:math:`M = \partial V/\partial t`, push the driven gear, and the driver against it. With R the rows of t in q the train
-is at rest where
+**Loads that vary along the face width** tilt the gears further. Contact at given tilts
+:math:`t = (\gamma, \gamma_\perp)` stores the energy :math:`V(t)`. Its moments about the middle of the common width are
+:math:`M = \partial V/\partial t`. They act on the driven gear, and with the opposite sign on the driver. With R the
+rows of t in q the train is at rest where
 
 .. math::
     t = R\,K^{-1}(f - R^T M(t)) .

@@ -1,9 +1,9 @@
 r"""From a `GearTrain` to a system of the rigid core, with all hinges eliminated at set-up.
 
 The rotation of shaft i is :math:`\varphi_i = g_i\psi(t) + u_i`: rolling with the drive, :math:`\psi = \int\Omega\,dt`,
-and a small coordinate. So every constraint is linear and constant, the drive's too: :math:`u_d - a\cdot\theta_b = 0`
-makes the rotation relative to the bore b equal to psi, and its multiplier is the torque that reacts on that bore. A
-drive of changing speed adds :math:`-J_p g_i\ddot\psi` on every shaft.
+and a small coordinate. So every constraint is linear and constant, the drive's too. :math:`u_d - a\cdot\theta_b = 0`
+makes the rotation relative to the bore b equal to psi. Its multiplier is the torque that reacts on that bore. A drive
+of changing speed adds :math:`-J_p g_i\ddot\psi` on every shaft.
 """
 
 from __future__ import annotations

@@ -4,11 +4,11 @@ The coordinates q that the constraints allow minimise the energy
 
 .. math:: \tfrac12\,q^T K q + \sum_b V_b(R_b q) - f^T q ,
 
-K the stiffness of housing, shafts and meshes (mean stiffness, along the flanks that the loads press), :math:`V_b` the
-energy of a rolling bearing under the motion :math:`R_b q` of its shaft against its bore, f the torques of the loads at
-their end. The energy is convex; Newton's method finds its minimum. There every bearing has its load and its tangent
-stiffness, which is that of the linear train from then on. In planetary stages K and f have the centrifugal forces of
-the planets. Weights, other effects of speed, and friction are left out.
+K is the stiffness of housing, shafts and meshes (mean stiffness, along the flanks that the loads press). :math:`V_b` is
+the energy of a rolling bearing under the motion :math:`R_b q` of its shaft against its bore, and f are the torques of
+the loads at their end. The energy is convex; Newton's method finds its minimum. There every bearing has its load and
+its tangent stiffness, which is that of the linear train from then on. In planetary stages K and f have the centrifugal
+forces of the planets. Weights, other effects of speed, and friction are left out.
 """
 
 from __future__ import annotations

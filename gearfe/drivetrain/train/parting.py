@@ -42,8 +42,8 @@ class Parting:
 
 
 def apart_in_steps(model: TrainModel, trajectory: Trajectory, until: float) -> tuple[Array, BoolArray]:
-    """Ends of the steps up to a time (s + 1,), and whether the teeth of each mesh are apart in the middle of each step,
-    (s, meshes): there, approaches and phases follow from both ends by cubics.
+    """Return the ends of the steps up to a time (s + 1,), and whether the teeth of each mesh are apart in the middle of
+    each step, (s, meshes). Approaches and phases in the middle follow from both ends by cubics.
     """
     dense, n = trajectory.dense, model.modal.T.shape[1]
     ends = dense.times

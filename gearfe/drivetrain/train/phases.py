@@ -6,13 +6,13 @@ from driver (1) to driven gear (2), driving flanks touch when
 .. math::
     z_1(\tau_1 - \beta) + z_2(\tau_2 - \beta - \pi) = \pi + s\,z_2\,h \pmod{2\pi} ,
 
-s the driver's sense (+1 or -1) and h half the backlash as a twist of the driven gear: for h = 0 a tooth on the line
-of centres faces a space. An internal driven gear has a negative z_2, and its teeth face the driver's at beta, the
-direction from the driver's axis to the pitch point: the term is :math:`z_2(\tau_2 - \beta)`, with :math:`+s|z_2|h`. The
-curve of the mesh begins at :math:`\varphi_0 = s(\tau_1 - \beta)`; an internal gear that drives is then at
-:math:`\varphi_2 = -s(\tau_2 - \beta)`, with :math:`z_1\varphi_0 + |z_2|\varphi_2 = \pi + |z_2|h`.
-Gears joined by meshes are one group, so one angle places all their teeth; gears on one shaft that are joined by no mesh
-are keyed on it independently of each other.
+s the driver's sense (+1 or -1) and h half the backlash as a twist of the driven gear: for h = 0 a tooth on the line of
+centres faces a space. An internal driven gear has a negative z_2. Its teeth face the driver's at beta, the direction
+from the driver's axis to the pitch point. So the term is :math:`z_2(\tau_2 - \beta)`, with :math:`+s|z_2|h`. The curve
+of the mesh begins at :math:`\varphi_0 = s(\tau_1 - \beta)`; an internal gear that drives is then at
+:math:`\varphi_2 = -s(\tau_2 - \beta)`, with :math:`z_1\varphi_0 + |z_2|\varphi_2 = \pi + |z_2|h`. Gears joined by
+meshes are one group, so one angle places all their teeth. Gears on one shaft that are joined by no mesh are keyed on it
+independently of each other.
 """
 
 from __future__ import annotations

@@ -147,8 +147,8 @@ class MeshFamily:
         harmonic
             Of the mesh.
         passes
-            Rotations of the carrier, about the axis of the train, that are added to it: the planets push there one
-            after the other, with the phases of their meshes (McFadden & Smith, Proc. IMechE C 199, 1985).
+            Rotations of the carrier, about the axis of the train, that are added to the phase. The planets act there
+            one after the other, with the phases of their meshes (McFadden & Smith, Proc. IMechE C 199, 1985).
         """
         turns = [
             cmath.exp(1j * (2.0 * math.pi * harmonic * phase + passes * angle))

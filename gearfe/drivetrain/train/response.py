@@ -61,8 +61,8 @@ class TrainResponse(ShownTable):
     drive_torque : (n,)
         Torque of the drive on its shaft (N m), about the axis.
     contact_force : (n, m)
-        Force of each mesh along its line of action (N); positive presses the driving flanks together, negative the back
-        flanks (or it pulls, where a spring acts both ways).
+        Force of each mesh along its line of action (N). Positive forces press the driving flanks together, negative
+        ones the back flanks (or they pull, where a spring acts both ways).
     transmission_error : (n, m)
         Approach of both gears along the line of action (m), by turns, tilts and displacements: the dynamic transmission
         error. 0 where unmodified driving flanks touch.
@@ -82,8 +82,8 @@ class TrainResponse(ShownTable):
         Acceleration along the shaft axis at each bore's reference point (m/s2).
     gear_names : tuple of g names
     gear_pose : (n, g, 6)
-        Displacement of each gear's centre (m) and its rotation (rad) about x, y, z; the part about the axis of the
-        train is the whole angle turned since the start, the others are small.
+        Displacement of each gear's centre (m) and its rotation (rad) about x, y, z. The part about the axis of the
+        train is the whole rotation since the start; the others are small.
     gear_centres : (g, 3)
         Where the gears' centres are at rest (m).
     section_coordinates : (n, c) or None

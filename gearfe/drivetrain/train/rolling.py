@@ -63,8 +63,8 @@ def rolling(layout: TrainLayout) -> Rolling:
     Raises
     ------
     InputError
-        For shafts that neither drive nor mesh hold, loops of gears whose ratios contradict each other, and more members
-        of a planetary stage that are held than the stage needs.
+        For shafts that neither drive nor mesh hold, and for loops of gears whose ratios contradict each other. Also for
+        planetary stages with more members held than needed.
     """
     given = [Fraction(1), *(ratio for _, ratio in layout.guided)]
     solved: dict[int, tuple[Terms, Terms]] = {}  # pivot -> the other shafts and the holders that its speed follows from

@@ -53,8 +53,8 @@ class TransientOptions:
     method
         ``auto``, ``taylor`` or ``implicit``, see `gearfe.multibody.integrators.integrate`.
     estimate
-        Estimate the errors: of the integration from a second run with a hundredth of the tolerance and shorter steps,
-        and of the housing's reduction up to `band_hz` (Hz).
+        Estimate the errors. That of the integration comes from a second run with a hundredth of the tolerance and
+        shorter steps, that of the housing's reduction holds up to `band_hz` (Hz).
     """
 
     tolerance: float = 1e-6

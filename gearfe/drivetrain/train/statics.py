@@ -1,9 +1,9 @@
 """Statics of a train: which flanks bear, and the static transmission error.
 
 The loads must press the driving flanks of every mesh together, for a mesh has the curve of its driving flanks only. By
-statics at each time, inertia of the rolling shafts included, a mesh force below 0 means that the back flanks bear: a
-torque of the wrong sign, or a mesh whose driven gear drives. The static transmission error is the approach of a mesh
-that carries its steady force while the gears roll slowly.
+statics at each time, inertia of the rolling shafts included, a mesh force below 0 means that the back flanks carry the
+load. The torque has the wrong sign, or the driven gear of the mesh drives. The static transmission error is the
+approach of a mesh that carries its steady force while the gears roll slowly.
 """
 
 from __future__ import annotations

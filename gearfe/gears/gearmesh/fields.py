@@ -5,8 +5,8 @@ their nodes, averaged over the elements that meet there; they are linear in the 
 
 **Beside contacts of the half-plane law.** The elements of a flank are wider than most contacts. As in the influence
 function (`gearfe.gears.contact.flank_compliance`), the finite elements therefore carry the force as a bump that they
-resolve: an elliptic pressure of the same resultant at the same place, whose half width a is two elements. What the
-contact's own pressure p does besides is local, and known without a mesh:
+resolve. This is an elliptic pressure of the same resultant at the same place, whose half width a is two elements. What
+the contact's own pressure p does besides is local, and known without a mesh:
 
 .. math:: \sigma = \sigma^{FE}[\text{bump}] + \sigma^{HP}[p] - \sigma^{HP}[\text{bump}]
 

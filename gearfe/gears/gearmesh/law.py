@@ -7,8 +7,8 @@ With the pinion angle :math:`\varphi`, the approach :math:`\delta` of the gears 
     W(\varphi, \delta) = \max_{F_k \ge 0} \sum_k \big[F_k\,(\delta - t(\psi_k)) - \Phi(\psi_k, F_k)\big]
     - \sum_{k<l} C_{l-k}(\psi_k)\,F_k F_l ,
 
-t the approach at which the rigid flanks of a pair touch (transmission error and reliefs are in it), :math:`\Phi` the
-pair's complementary energy and C the compliance of the gear bodies that pairs share. Where the maximum lies,
+t is the approach at which the rigid flanks of a pair touch; it contains transmission error and reliefs. :math:`\Phi` is
+the pair's complementary energy, and C the compliance of the gear bodies that pairs share. Where the maximum lies,
 
 .. math::
     t(\psi_k) + \Lambda(\psi_k, F_k) + \sum_{l \ne k} C_{|k-l|} F_l = \delta,\qquad
@@ -25,8 +25,8 @@ for the loaded pairs, and the derivatives of W need none of :math:`F_k`:
     \frac{\partial F}{\partial\delta} = 1^T J^{-1} 1,\quad J = \mathrm{diag}(\Lambda_F) + C .
 
 On the driver acts the torque :math:`-r_{b1} F - M`, on the driven gear :math:`r_{b2} F`. :math:`\Phi` is a polynomial
-on each cell of phase and pair force: cubic splines over the phase, of degree 4 over the force (:math:`\Lambda` is
-cubic, with continuous slope), so the law has Taylor series.
+on each cell of phase and pair force, so the law has Taylor series. It consists of cubic splines over the phase, and is
+of degree 4 over the force (:math:`\Lambda` is cubic, with continuous slope).
 """
 
 from __future__ import annotations

@@ -183,8 +183,9 @@ def force_cells(largest: float, force: float) -> Array:
 def _level_beyond(P: sparse.csr_array) -> sparse.csr_array:
     """Coefficients of all splines over the phase from those in reach of data; P has the splines at the data's places.
 
-    Before the first and behind the last of these, where pairs touch beyond the reach, b is level: going on as it rises
-    at the ends of contact it would make compliances negative, and with these there is more than one set of pair forces.
+    Before the first and behind the last of these, where pairs touch beyond the reach, b is constant. If it went on
+    rising as at the ends of contact, compliances would be negative, and there would be more than one set of pair
+    forces.
     """
     n = P.shape[1]
     known = np.flatnonzero(P.max(axis=0).toarray().ravel() >= EDGE)

@@ -3,10 +3,10 @@ r"""Stiffness, transmission error, load share, pressure and root stress over pin
 A stiffness curve is a map with one load, so a map holds the positions of all its torques as one curve. The angles cover
 one mesh cycle, or where teeth differ the full period, after which every tooth meets the same mate again.
 
-The transmission error is the wheel's lag on the line of action, :math:`r_{b2}` (twist - lost motion): unloaded that of
-the rigid flanks, :math:`\min_k t_k(\psi)`; loaded it includes the deflection of the teeth. Material out of the driving
-flanks makes the wheel lead, so it counts negative. An order is so many times a turn of the pinion; the mesh has the
-order :math:`z_1`.
+The transmission error is the wheel's lag on the line of action, :math:`r_{b2}` (twist - lost motion). Unloaded it is
+that of the rigid flanks, :math:`\min_k t_k(\psi)`. Loaded it includes the deflection of the teeth. Material out of the
+driving flanks makes the wheel lead, so it counts negative. An order is so many times a turn of the pinion; the mesh has
+the order :math:`z_1`.
 """
 
 from __future__ import annotations

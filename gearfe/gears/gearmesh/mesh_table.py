@@ -81,8 +81,8 @@ def read_mesh_table(
     Parameters
     ----------
     path : str or Path
-        Its columns: one of `PHASES` in the driving sense, 0 where a driver's tooth stands on the line of centres; one
-        of `STIFFNESSES`; one of `UNLOADED` and `LOADED`, the latter beside `FORCE` or `TORQUE`.
+        It has one column of `PHASES` in the driving sense, 0 where a driver's tooth stands on the line of centres, and
+        one of `STIFFNESSES`. A third is of `UNLOADED` or `LOADED`, the latter beside `FORCE` or `TORQUE`.
     pitch : float
         Pitch of the driver (rad).
     driven_base_radius : float
@@ -97,8 +97,8 @@ def read_mesh_table(
     Raises
     ------
     InputError
-        For columns that are missing, unknown or given twice, cells that are no numbers, stiffnesses that are not > 0,
-        and tables that do not cover the pitch or contradict themselves one pitch on.
+        For columns that are missing, unknown or given twice, cells that are no numbers, and stiffnesses that are not >
+        0. Also for tables that do not cover the pitch, or contradict themselves one pitch on.
     """
     columns = read_csv(path, TABLE)
     known = (*PHASES, *STIFFNESSES, UNLOADED, LOADED, FORCE, TORQUE)

@@ -6,10 +6,10 @@ Mechanics*, 1985, eq. 4.45)
 
 .. math:: p_H = \sqrt{\frac{F E^*}{\pi\rho w}} = \frac{2F}{\pi b_H w} .
 
-The computed pressure has a half width b by its own second moment (`gears.contact.elements.half_widths`), so
-:math:`|b/b_H - 1|` is the contact's distance from Hertz's: the discretisation, flanks whose curvature changes along the
-contact, teeth that are no half-planes. On flanks with deviations of micrometres the curvature at first contact may be
-that of a wave shorter than the contact; there :math:`2F/(\pi b w)` is the pressure.
+The computed pressure has a half width b by its own second moment (`gears.contact.elements.half_widths`). So
+:math:`|b/b_H - 1|` is how far the contact is from Hertz's. Causes are the discretisation, flanks whose curvature
+changes along the contact, and teeth that are no half-planes. On flanks with deviations of micrometres the curvature at
+first contact may be that of a wave shorter than the contact; there :math:`2F/(\pi b w)` is the pressure.
 
 If the contact reaches an edge of a face, the pressure of linear elasticity has no bound, or depends on the radius of a
 tip round. Unbounded are sharp tips, the kink where a linear relief starts, and the edge of an undercut. The pressure

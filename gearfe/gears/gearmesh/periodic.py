@@ -219,8 +219,8 @@ def check_repeats(phase: Array, values: Array, period: float, source: str | None
 
 
 def _between(places: Array, phase: Array, period: float) -> tuple[IntArray, Array, Array]:
-    """Number of the last of rising places in [0, period) that is at or before each phase, the share of the way to the
-    next one, and the distance between the two."""
+    """Return the number of the last of rising places in [0, period) at or before each phase, the share of the way to
+    the next one, and the distance between the two."""
     wrapped = np.mod(phase, period)
     low = np.searchsorted(places, wrapped + 1e-9 * period, side="right") - 1
     start = np.where(low < 0, places[-1] - period, places[low])

@@ -26,10 +26,10 @@ no mesh. From the truth they are as far as from that, and that from the truth, a
 
 What a law yields by itself (the overlap of a soft penalty) is in it.
 
-Not in it: the model (plane, no friction, rigid bores, small strain with its first-order correction) and what no
-refinement of one mesh family shows: of the half-plane law, the wedge that stands for a sharp tip (0.2 to 0.4 % where
-one bears; docs/contact_laws.md). `scripts/benchmarks/measure_curve_accuracy.py` measures over random pairs how often
-it covers the true error.
+Not in it are the errors of the model (plane, no friction, rigid bores, small strain with its first-order correction),
+and errors that no refinement of one mesh family shows. In the half-plane law that is the wedge in place of a sharp tip,
+0.2 to 0.4 % where a tip carries load (docs/contact_laws.md). `scripts/benchmarks/measure_curve_accuracy.py` measures
+over random pairs how often it covers the true error.
 """
 
 from __future__ import annotations
@@ -208,11 +208,11 @@ def at_torques(
 ) -> Positions:
     """Solve positions that carry given torques.
 
-    The twist is expected by the half-plane law (laws on elements start from its solution, so that they are asked for
-    loads near the goal) and searched for until the torque is off by no more than `NEARLY`; the last step is Newton's,
-    whose error is some hundredths of the square of the step. Finite strain changes the torque by a share c, which grows
-    about as the torque does: at the goal T of the whole, small strain carries T/(1 + c') with c' = c/(1 + c). What that
-    misses is of the second order in c, as is what the share itself leaves out.
+    The half-plane law predicts the twist; laws on elements start from its solution, so that their loads are near the
+    goal. The twist is improved until the torque is off by no more than `NEARLY`. The last step is Newton's, whose error
+    is some hundredths of the square of the step. Finite strain changes the torque by a share c, which grows about as
+    the torque does: at the goal T of the whole, small strain carries T/(1 + c') with c' = c/(1 + c). What that misses
+    is of the second order in c, as is what the share itself leaves out.
 
     Parameters
     ----------
@@ -342,8 +342,9 @@ def curve_error(solver: PositionSolver, coarse: MeshingPair, solved: Positions, 
 
 
 def unseen_twists(contact_model: HalfPlanePair, found: Positions) -> Array:
-    """Twists (rad) from the touch that mean nothing at positions of the half-plane law, shape (n,): the rounding of the
-    gears' angles, and what the tabulated flanks miss of the exact ones, whose touch it is.
+    """Return the twists (rad) from the first touch that are below the resolution of the half-plane law, shape (n,).
+    They come from the rounding of the gears' angles, and from the difference of the tabulated flanks from the exact
+    ones.
     """
     contacts, worst = found.contacts, np.zeros(len(found))
     tables = contact_model.tables.of(contact_model.teeth.flank(contacts.pair))

@@ -76,8 +76,8 @@ def body_flexibility(job: StiffnessJob) -> float:
     r"""Flexibility along the line of action (m/N) by the twist of both gear bodies between held rim and root circle.
 
     Under a torque T a disc of the width b that is held at the radius :math:`r_0` turns at :math:`r_f` by
-    :math:`T\,|1/r_0^2 - 1/r_f^2|/(4\pi G b)` (Timoshenko and Goodier, *Theory of Elasticity*, 3rd ed., 1970, art. 43);
-    along the line of action that is times :math:`r_b^2/T`. NaN for a ring with a free rim.
+    :math:`T\,|1/r_0^2 - 1/r_f^2|/(4\pi G b)` (Timoshenko and Goodier, *Theory of Elasticity*, 3rd ed., 1970, art. 43).
+    Along the line of action, the flexibility is this angle times :math:`r_b^2/T`. NaN for a ring with a free rim.
     """
     total = 0.0
     for gear, material in zip((job.pair.pinion, job.pair.wheel), job.materials, strict=True):

@@ -120,8 +120,8 @@ def root_size(gear: Gear) -> float:
 
 
 def root_recipe(recipe: SectorRecipe, gear: Gear, factor: float) -> SectorRecipe:
-    """Sizes of a mesh with a fine fillet, a coarse flank and half as many edges round the bore, whose stiffness does
-    not matter here; `factor` multiplies every size.
+    """Return the sizes of a mesh with a fine fillet, a coarse flank and half as many edges round the bore, whose
+    stiffness does not matter for this stress. `factor` multiplies every size.
     """
     flank = FLANK_SIZE * gear.module
     back, bore = max(recipe.back, flank), 2 * recipe.bore
@@ -165,7 +165,7 @@ def _lengths(corners: Array) -> Array:
 def spread_of(chain: Flank, points: Array) -> Array:
     """Forces on a chain's nodes that do the same work as forces at `points` on the same profile, shape (2 c, 2 n).
 
-    The radius of a flank rises from its root, of an internal gear it falls, so a point's place on the chain is where
+    The radius of a flank rises from its root; that of an internal gear falls. So a point's place on the chain is where
     the radius is the same.
     """
     xi = np.linspace(0.0, 1.0, 65)

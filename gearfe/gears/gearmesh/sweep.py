@@ -201,15 +201,15 @@ def sweep_loads(
     angles : array_like, shape (n,), optional
         Pinion angles (rad), instead of `positions`. Those after which all teeth meet again are solved once.
     positions, mesh_cycles
-        Pinion angles in a mesh cycle, and how many cycles; None: one where the teeth of each gear are alike on both
-        sides, else the full period, the least common multiple of the teeth.
+        Pinion angles in a mesh cycle, and how many cycles. None: one cycle where the teeth of each gear are alike on
+        both sides, else the full period, the least common multiple of the teeth.
     root_stress
         Also the tension at the tooth roots, on separate refined meshes, see `gearfe.gears.gearmesh.root_stress`.
     back
-        Deviations of the back flanks of pinion and wheel, of the pair seen from the other side as
-        `geometry.deviation_job.deviations_of` and, for displaced teeth, `geometry.pitch_errors.back_turns` give
-        them, to know the room behind the teeth: positions without
-        have the status `gearfe.gears.gearmesh.curve.BACK` and no numbers.
+        Deviations of the back flanks of pinion and wheel, of the pair seen from the other side. They are given by
+        `geometry.deviation_job.deviations_of` and, for displaced teeth, by `geometry.pitch_errors.back_turns`. They
+        tell whether the back flanks would touch: such positions have the status `gearfe.gears.gearmesh.curve.BACK` and
+        no numbers.
 
     Returns
     -------

@@ -116,8 +116,8 @@ class WidthLaw:
     largest_force
         Mesh force (N) up to which the law is known at every phase without a tilt.
     error, rms_error
-        Largest error found of force, or moment over half the width, in parts of the force, and root of their mean
-        square; NaN where there is none.
+        Largest error of the force, or of the moment over half the width, in parts of the force, and their root mean
+        square. NaN where there is none.
     back
         Law of the back flanks, of the pair seen from behind; None: they are the mirror image of the driving ones.
     """

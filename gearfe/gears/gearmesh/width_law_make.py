@@ -1,9 +1,9 @@
 """Compute the mesh law of gears whose load varies along the face width from their lines of contact.
 
 Contacts are solved on a grid of phases, approaches beyond the first contact and tilts (`.width_law`). Approaches are
-square steps up to the reach, closer where the flanks begin to bear. Where the law misses contacts half way between the
-nodes of one of the three directions by more than the tolerance, that direction gets twice as many nodes. Contacts at
-places all over the law then say its error.
+square steps up to the reach, closer where the flanks begin to bear. The law is compared with contacts half way between
+its nodes. Where it misses them by more than the tolerance in one of the three directions, that direction gets twice as
+many nodes. Contacts at places all over the law then say its error.
 """
 
 from __future__ import annotations

@@ -161,7 +161,7 @@ def hertzian_pressures(job: StiffnessJob, roll: Array, line_load: Array) -> Arra
     r"""Largest pressures (Pa) of Hertz's line contact under line loads (N/m); NaN beyond the path of contact.
 
     :math:`p^2 = f \cos\beta_b/(\pi \varrho_t \sum 1/E')` with :math:`\varrho_t = s_1 s_2/(s_1 + s_2)`: the force per
-    length of the line of contact is that per width in the transverse section, the normal radius
+    length of the line of contact is that per width in the transverse section. The normal radius is
     :math:`\varrho_t/\cos\beta_b`. Modifications of the profile do not count.
 
     Parameters

@@ -12,8 +12,8 @@ With b the unit vector of the surface across t, Hooke's law for a plane stress g
 the root stress is the larger principal one. Loads that are even over the width leave that of
 `gearfe.gears.gearmesh.root_stress`, :math:`E' t\cdot v_{,s}`.
 
-Each gear has two meshes with a fine fillet and a coarse flank, as there. The value is that of the finer one; the
-coarser has elements twice as large and polynomials along the axis of an order two lower, and the difference is the
+Each gear has two meshes with a fine fillet and a coarse flank, as there. The value is that of the finer one. The
+coarser has elements twice as large, and polynomials along the axis of an order two lower. The difference is the
 estimate of the error.
 """
 

@@ -11,9 +11,9 @@ that of the contact. A mean stiffness :math:`k_m` has :math:`e = \delta_0 - F_0/
 
 **Tilting.** With the approach at y from the middle of the common width, :math:`\delta + y\gamma` under a tilt
 :math:`\gamma` in the plane of action, the tangent of force and moment is :math:`k, k\ell, k_{\gamma\gamma}`. So the
-spring acts at the lever :math:`\ell`, has the stiffness :math:`\kappa = k_{\gamma\gamma} - k\ell^2` against tilting
-about there, whose mean over the positions is taken, and the moment :math:`m = M_0 - \ell F_0` there
-(`.mesh_table.Tilting`). Tilts across the plane of action do nothing to involutes.
+spring acts at the lever :math:`\ell`. Against tilting about that point it has the stiffness
+:math:`\kappa = k_{\gamma\gamma} - k\ell^2`, whose mean over the positions is taken, and the moment
+:math:`m = M_0 - \ell F_0` (`.mesh_table.Tilting`). Tilts across the plane of action do nothing to involutes.
 """
 
 from __future__ import annotations
