@@ -402,7 +402,7 @@ def whole_set(folder: Path, may_write: Sequence[str] = (), beside: Sequence[str]
     Parameters
     ----------
     may_write
-        Patterns of all files that this kind of run can write: those of an earlier run that this one does not replace
+        Patterns of all files that this kind of run can write. Files of an earlier run that this one does not replace
         are removed, so that no old picture remains next to new tables.
     beside
         Files of the same run that are in the folder already.

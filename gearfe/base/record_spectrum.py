@@ -9,8 +9,8 @@ half of it for the constant. The output step h only says up to where there are l
 sum over samples m times as fine as the output (`samples_per_step`), which is exact for a periodic record. If a record
 ends with another value than it began with, the ramp between its ends is integrated exactly.
 
-Samples may come piece by piece: they pass a linear-phase low-pass filter (a sinc with a Kaiser window; Oppenheim &
-Schafer, Discrete-Time Signal Processing, Sec. 7.5) and every (m/2)-th is kept, twice the output's number in all. Only
+Samples may come piece by piece. They pass a linear-phase low-pass filter (a sinc with a Kaiser window; Oppenheim &
+Schafer, Discrete-Time Signal Processing, Sec. 7.5). Every (m/2)-th is kept, twice the output's number in all. Only
 components above three times the output's Nyquist frequency would be aliased below it; the filter reduces them by 140
 dB. Its effect on lines below the Nyquist frequency is divided out. Beyond its ends the record is continued
 periodically, because its coefficients are those of the periodic continuation. The filter therefore has no transient.

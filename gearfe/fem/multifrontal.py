@@ -1,7 +1,7 @@
 r"""Cholesky factorisation of large sparse matrices on dense fronts, whole or down to a few retained unknowns.
 
-The unknowns are eliminated in groups, the *fronts*. A front collects the rows of A that belong to its own unknowns i
-and what fronts before it left over for them, eliminates them and leaves an update of the outer ones o behind,
+The unknowns are eliminated in groups, the *fronts*. A front collects the rows of A that belong to its own unknowns i,
+and the updates of earlier fronts for them. It eliminates these unknowns and leaves an update of the outer ones o,
 
 .. math::
     F_{ii} = L_{ii} L_{ii}^T,\qquad L_{oi} = F_{oi} L_{ii}^{-T},\qquad U = F_{oo} - L_{oi} L_{oi}^T
@@ -57,8 +57,8 @@ class Factor:
     size
         Order of the matrix.
     order : ndarray, shape (n,)
-        Number in the matrix of each unknown in the order of elimination, the retained ones last; unknowns of the
-        matrix that do not appear are held at zero.
+        Number in the matrix of each unknown in the order of elimination, the retained ones last. Unknowns of the matrix
+        that do not appear are held at zero.
     fronts
         In the order of elimination.
     schur : ndarray, shape (r, r)

@@ -125,8 +125,8 @@ def finer_run(mechanism: Mechanism, start: Start, run: Trajectory, tolerance: fl
     Returns
     -------
     finer : Trajectory or None
-        At the same output times, or as far as it came; None if the run has fewer than two times or the finer one cannot
-        start.
+        It has the same output times, or as many as it reached. None if the run has fewer than two times or the finer
+        one cannot start.
     """
     ends: Array = np.asarray(run.dense.times)
     if len(ends) < 2 or len(run.time) < 2:

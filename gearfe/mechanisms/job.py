@@ -84,8 +84,8 @@ def run_mechanism(
     Raises
     ------
     InputError
-        If the end is not positive, gives too many rows or lies after the end of a table over time, if the method does
-        not suit flexible links, or if no step can be made from the start.
+        If the end is not positive, gives too many rows or lies after the end of a table over time. Also if the method
+        does not suit flexible links, or no step is possible from the start.
     """
     began = clock.perf_counter()
     run = mechanism.file.run

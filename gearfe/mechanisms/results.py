@@ -37,8 +37,8 @@ class Results:
         Named outputs of the file.
     energy : dict
         kinetic_J, potential_J (gravity with datum y = 0, springs), work_J (of moments, point forces, dampers and
-        prescribed motions, from the start), total_J = kinetic + potential - work; elastic_J of flexible links, a part
-        of the potential energy.
+        prescribed motions, from the start), and total_J = kinetic + potential - work. elastic_J is that of flexible
+        links, a part of the potential energy.
     sections : dict
         Flexible link -> axial force (N), shear force (N), bending moment (N m) at its nodes, shape (n, nodes, 3); of
         finite elements the stresses of the core, shape (n, s), see `PlateLink.von_mises`.

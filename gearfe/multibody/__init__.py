@@ -1,7 +1,7 @@
 """Multibody dynamics: elements, a system, a consistent start, integrators, a trajectory.
 
-The five packages are `core` (contract, system, start, results), `planar` (mechanisms), `series` (the tape and its
-compiled loops), `integrators` (Taylor series, collocation, selection rule) and `compiled` (numba). Begin with
+`core` has the contract, the system, the start and the results, `planar` the mechanisms. `series` is the tape with its
+compiled loops, `integrators` has Taylor series, collocation and the rule of choice, and `compiled` numba. Begin with
 `core.contract`. The names below are the public ones.
 """
 

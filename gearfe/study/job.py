@@ -224,8 +224,8 @@ def run_study(
     Raises
     ------
     InputError
-        Outputs that the job does not give, a folder with another study or that another program writes, a study whose
-        first cases all have no answer, or whose cases are not known beforehand.
+        For outputs that the job does not give, and a folder with another study or in use by another program. For a
+        study whose first cases all fail, or whose cases are not known beforehand.
     """
     if study.table.design == "search":
         raise InputError("study.design", "search", "has no cases beforehand", "gearfe study runs it; or gearfe.Search")

@@ -4,8 +4,8 @@ The database is the only record; ``study.csv`` and ``study.json`` are exports, w
 survives, and by what:
 
 kill, full disk
-    A transaction for each arrival of results: all of its rows are there, or none. A rollback journal, not a
-    write-ahead log: all committed rows stand in the one file that a user sees and copies, a damaged log would drop the
+    A transaction for each arrival of results: all of its rows are there, or none. It is a rollback journal, not a
+    write-ahead log, so all committed rows are in the one file that a user sees and copies. A damaged log would drop the
     rows behind the damage without an error, and its shared memory does not work in network folders.
 loss of power
     Full synchronisation. It takes some 20 ms on a slow disk, so rows come in groups (`gearfe.study.run`).

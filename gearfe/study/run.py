@@ -77,8 +77,8 @@ def side_by_side(
     Raises
     ------
     InputError
-        When processes of our own end before they work: those of a script that starts a study wherever it is read do,
-        and those that something kills every time.
+        When worker processes end before they work. That happens to a script that starts a study at import, and where
+        something kills each process.
     """
     pool, begun = (executor, None) if executor is not None else _begun(workers)
     ahead = iter(cases)
@@ -162,8 +162,8 @@ class IsolatedPool(ProcessPoolExecutor):
         Raises
         ------
         BrokenExecutor
-            Also where a process died so recently that only the queue is closed yet: the library then starts a process
-            with the closed queue, whose error has no number of the operating system.
+            That is also the case where a process died so recently that only the queue is closed yet. The library then
+            starts a process with the closed queue, whose error has no number of the operating system.
         """
         try:
             with away():

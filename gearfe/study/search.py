@@ -278,8 +278,8 @@ class Search(Facts):
         Parameters
         ----------
         rounds
-            Generations at most, after the first population; it ends before where the outputs of its members agree
-            within 1 %, or their parameters as well as a tenth of the tolerances.
+            Largest number of generations after the first population. The search ends earlier where the outputs of its
+            members agree within 1 %, or their parameters within a tenth of the tolerances.
         population
             Members for each parameter.
         seed

@@ -121,8 +121,8 @@ class StudyResult(ShownTable):
     def effects(self, name: str) -> dict[str, Any]:
         """Return the changes of an output over the parameters, from a linear model of the solved cases.
 
-        ``change``: parameter -> change of the output from the 5 to the 95 % quantile of the parameter; ``explained``:
-        share R^2 of the variance that the linear model explains; ``rank_correlation``: Spearman's.
+        ``change``: parameter -> change of the output from the 5 to the 95 % quantile of the parameter. ``explained``:
+        share R^2 of the variance that the linear model explains. ``rank_correlation``: Spearman's.
         """
         from scipy.stats import spearmanr
 

@@ -1,9 +1,9 @@
 r"""Inner geometry of rolling bearings, and the contacts of their rolling elements.
 
 A bearing moves by :math:`u = (u_1, u_a, u_2, \theta_1, \theta_2)`: the inner ring (shaft) relative to the outer ring
-(bore), displacements (m) along the transverse direction e1, the axis a and the transverse direction e2, and small tilts
-(rad) about e1 and e2; e1, e2, a are right-handed. The element at the angle :math:`\varphi` from e1 towards e2 sees the
-point of the inner ring at the radius R and the axial place x move by
+(bore). These are displacements (m) along the transverse direction e1, the axis a and the transverse direction e2, and
+small tilts (rad) about e1 and e2. e1, e2, a are right-handed. The element at the angle :math:`\varphi` from e1 towards
+e2 sees the point of the inner ring at the radius R and the axial place x move by
 
 .. math::
     d_r = u_1\cos\varphi + u_2\sin\varphi + x(\theta_2\cos\varphi - \theta_1\sin\varphi),\quad

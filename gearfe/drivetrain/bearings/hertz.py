@@ -14,9 +14,9 @@ approach :math:`\delta` is
     \delta^* = \frac{2K}{\pi}\Big(\frac{\pi}{2\kappa^2E}\Big)^{1/3},\quad
     \frac1{E'} = \frac{1-\nu_1^2}{E_1} + \frac{1-\nu_2^2}{E_2} .
 
-**Line contact.** Of a steel roller of the effective length L between both its raceways, ISO/TS 16281:2008, eq. 37, has
-:math:`Q = c\,L^{8/9}\delta^{10/9}`, a fit to measurements as Palmgren's (:math:`\delta = 2\cdot3.84\cdot10^{-5}
-Q^{0.9}/L^{0.8}` in N and mm, which is 3 % stiffer).
+**Line contact.** For a steel roller of the effective length L between its two raceways, ISO/TS 16281:2008, eq. 37, has
+:math:`Q = c\,L^{8/9}\delta^{10/9}`, a fit to measurements as Palmgren's
+(:math:`\delta = 2\cdot3.84\cdot10^{-5} Q^{0.9}/L^{0.8}` in N and mm, which is 3 % stiffer).
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ Every contact stores the energy :math:`V = c\,s_+^{n+1}/(n+1)`, with the approac
 .. math::
     F = \sum Q\,\nabla s,\quad K = \sum Q'\,\nabla s\,\nabla s^T + Q\,\nabla^2 s,\quad Q = c\,s_+^n .
 
-The approach of a ball, a distance of two points that move linearly with u, is convex in u, that of a roller linear:
-so K is positive semi-definite, and the equilibrium under a load has no second one.
+The approach of a ball, a distance of two points that move linearly with u, is convex in u; that of a roller is linear.
+So K is positive semi-definite, and the equilibrium under a load is unique.
 """
 
 from __future__ import annotations

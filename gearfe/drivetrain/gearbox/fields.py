@@ -1,7 +1,7 @@
 r"""Fields of a gear train over time: the housing's vibration and the turning gears, as VTKHDF series and as pictures.
 
-A point of a gear or shaft at :math:`X_0`, with c the gear's centre at rest, d its displacement, :math:`\varphi` the
-angle turned about the axis a and :math:`\theta` the small tilt, is at
+A gear has its centre c at rest, its displacement d, the rotation :math:`\varphi` about the axis a and the small tilt
+:math:`\theta`. A point of the gear or its shaft at :math:`X_0` is then at
 
 .. math:: X = c + d + (I + \theta\times)\, R(a, \varphi)\,(X_0 - c) .
 """

@@ -486,8 +486,9 @@ def _contact(job: TrainJob, train: GearTrain, number: int) -> tuple[Any, ...]:
 def _deviations(
     job: TrainJob, train: GearTrain, number: int, pair: GearPair, law: ContactLaw
 ) -> tuple[tuple[ToothDeviations, ToothDeviations], tuple[ToothDeviations, ToothDeviations]]:
-    """Deviations of the driving flanks of a mesh, the left ones where the driver turns about the axis of the shafts,
-    and of its back flanks, those of the driving ones where these never bear. A mesh law's have no pitch errors.
+    """Return the deviations of the driving flanks of a mesh, the left ones where the driver turns about the axis of the
+    shafts, and those of its back flanks. Back flanks that never carry load get those of the driving flanks. A mesh
+    law's have no pitch errors.
 
     Raises
     ------

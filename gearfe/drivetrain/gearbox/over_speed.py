@@ -5,8 +5,8 @@ the drive comes to. A drive by torque comes to where its torque and those of the
 
 .. math:: F(\Omega) = T_d(\Omega) + \sum_i g_i\,T_i(g_i\Omega) = 0,\qquad F'(\Omega) < 0,
 
-g the ratios of the loads' shafts: of several such speeds the one next to the nominal speed, or from rest the first one
-in the sense in which the drive starts. Without any it is the nominal speed.
+g are the ratios of the loads' shafts. Of several such speeds the one next to the nominal speed is taken, or from rest
+the first one in the sense in which the drive starts. Without any it is the nominal speed.
 """
 
 from __future__ import annotations

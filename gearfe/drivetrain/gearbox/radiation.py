@@ -1,6 +1,6 @@
 r"""Equivalent radiated power: an estimate of the sound that a vibrating surface sends into air.
 
-Each piece of the surface is taken to radiate like a piston in a plane wave (radiation efficiency 1), so with the normal
+Each piece of the surface is taken to radiate like a piston in a plane wave (radiation efficiency 1). With the normal
 velocity :math:`v_n` of the outer surface S and the impedance :math:`\rho c` of the air
 
 .. math::

@@ -55,8 +55,8 @@ def stage_entries(model: TrainModel, mean_forces: Sequence[float] | None = None)
 def _orders(model: TrainModel, family: MeshFamily) -> list[dict[str, Any]]:
     """Orders of a mesh, and those of its sidebands at a point that stands still, in cycles a turn of the drive.
 
-    A force in the frame of the carrier that is of harmonic l of the mesh and pushes across the axis is of the orders
-    l n - c and l n + c in the housing, n the cycles of the mesh and c the turns of the carrier in a turn of the drive.
+    A force of harmonic l of the mesh acts across the axis, in the frame of the carrier. In the housing it has the
+    orders l n - c and l n + c. n are the cycles of the mesh and c the turns of the carrier in a turn of the drive.
     """
     rolled = model.kinematics
     carrier = next(c for c in model.train.carriers if c.name == family.carrier)

@@ -1,8 +1,8 @@
 """From functions of time and of speed in a job file to those that the integrators take: pieces of polynomials, sines.
 
 An expression becomes pieces of polynomials of degree `DEGREE` through Chebyshev's points (Trefethen, Approximation
-Theory and Approximation Practice, 2nd ed. 2020, chapters 2 and 8), halved until each has the accuracy `CLOSE`;
-a kink, at which halving would not end, stays within `KINK` of the largest value.
+Theory and Approximation Practice, 2nd ed. 2020, chapters 2 and 8). Pieces are halved until each has the accuracy
+`CLOSE`. At a kink, where halving would not end, the error stays within `KINK` of the largest value.
 """
 
 from __future__ import annotations

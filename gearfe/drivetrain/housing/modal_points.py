@@ -1,14 +1,15 @@
 r"""How each measured point of a modal test moves beside the model: points that are exchanged or reversed show there.
 
-With the shapes a of a test and b of its partners in the model, each scaled to the test's mode (least squares) and all
-modes to one size, the amplitudes of a point over all modes and its directions agree by
+a are the shapes of a test and b those of its partners in the model, each scaled to the test's mode (least squares), and
+all modes to one size. The amplitudes of a point over all modes and its directions agree by
 
 .. math:: c = 1 - |a - b|^2 \,/\, (|a|^2 + |b|^2 + s^2),
 
-1 where it moves as the model, -1 where its sign is turned round, about 0 where it is somewhere else; s is the part
-`STILL` of the mean motion of a point, below which noise decides. Without s it is twice the real part of a correlation
-over the modes, as in the coordinate modal assurance criterion (Lieven, N. A. J., & Ewins, D. J., "Spatial correlation
-of mode shapes, the coordinate modal assurance criterion", Proc. 6th IMAC, 1988), but with sign and size.
+That is 1 where the point moves as the model does, -1 where its sign is wrong, and about 0 where it belongs to another
+point. s is the part `STILL` of the mean motion of a point, below which noise decides. Without s it is twice the real
+part of a correlation over the modes, as in the coordinate modal assurance criterion (Lieven, N. A. J., & Ewins, D. J.,
+"Spatial correlation of mode shapes, the coordinate modal assurance criterion", Proc. 6th IMAC, 1988), but with sign and
+size.
 """
 
 from __future__ import annotations

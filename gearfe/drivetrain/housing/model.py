@@ -121,8 +121,8 @@ class Housing(Facts):
         attachments
             Further attachments with node numbers of their own, after the bores.
         outer
-            Picks the outer surface (which radiates sound and is shown) from the surface without bores and held faces:
-            a function of the faces' centres (f, 3) (m) that returns f flags. By default all of it.
+            Selects the outer surface, which radiates sound and is shown, from the surface without bores and held faces.
+            It is a function of the faces' centres (f, 3) (m) that returns f flags. By default all of it.
 
         Raises
         ------

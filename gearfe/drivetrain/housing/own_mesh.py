@@ -1,8 +1,8 @@
 r"""A housing from a mesh file of the user's own: bores by axis, radius and range or by groups, held faces likewise.
 
-A group that is a bore is a cylinder: its axis and radius are those that minimise :math:`\sum_i (d_i - r)^2` over the
-distances d of its nodes from the axis, and it must be one within a thousandth of the radius. The reference point is the
-point of the axis in the middle of the nodes' range.
+A group that is a bore is a cylinder. Its axis and radius minimise :math:`\sum_i (d_i - r)^2` over the distances d of
+its nodes from the axis. It must be a cylinder within a thousandth of the radius. The reference point is the point of
+the axis in the middle of the nodes' range.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@ r"""A housing from the matrices of another program: stiffness and mass over atta
 
 With the attachments' six coordinates :math:`q_b` each and whatever the program put inside, :math:`q_i`, the modes with
 the attachments held, :math:`K_{ii}\Phi = M_{ii}\Phi\Lambda`, and the constraint modes :math:`\Psi = -K_{ii}^{-1}K_{ib}`
-turn the coordinates to those of `gearfe.ModalBody`, all of them kept: frequencies and response stay the matrices'.
+change the coordinates to those of `gearfe.ModalBody`. All are kept, so frequencies and response stay those of the
+matrices.
 
 The files are of any format that `output.exchange.matrix_file` reads.
 """

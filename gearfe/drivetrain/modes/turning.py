@@ -6,11 +6,11 @@ r"""Eigenvalue problem of a train that turns at a steady speed.
     \begin{pmatrix} 0 & \Lambda^{1/2}\\ -\Lambda^{1/2} & \Omega G - D\end{pmatrix}
     \begin{pmatrix} w\\ \dot y\end{pmatrix}, \qquad w = \Lambda^{1/2}y
 
-y are the modal coordinates of unit mass of the train at rest, with the mean stiffness of its meshes, G the gyroscopic
-moments for unit speed of the drive. Carriers add :math:`\Omega^2 S y` on the right, the centrifugal forces of their
-frames, and :math:`\Omega N y`, what dampers in fixed axes do to motions that the frames carry round; G then has the
-forces of Coriolis. The squared length of a state is twice its energy. Without damping and carriers
-the matrix is skew: modes of one speed are orthogonal in energy, and :math:`d\lambda/d\Omega = x^H B x` with
+y are the modal coordinates of unit mass of the train at rest, with the mean stiffness of its meshes. G has the
+gyroscopic moments for unit speed of the drive. Carriers add :math:`\Omega^2 S y` on the right, the centrifugal forces
+of their frames, and :math:`\Omega N y`, the forces of dampers in fixed axes on motions in the turning frames. G then
+contains the Coriolis forces. The squared length of a state is twice its energy. Without damping and carriers the matrix
+is skew: modes of one speed are orthogonal in energy, and :math:`d\lambda/d\Omega = x^H B x` with
 :math:`B = diag(0, G)`.
 """
 
@@ -51,8 +51,8 @@ class TurningTrain:
     damping, gyroscopic, stiffening, circulating : (n, n)
         D (1/s), G and N for unit speed of the drive, and S for its square.
     kinds : (n, n)
-        A weight of the kinetic energies of the parts, different for each: of modes that agree in all speeds those are
-        taken that belong to different parts.
+        A weight of the kinetic energies of the parts, different for each. Of modes that agree in all speeds, those that
+        belong to different parts are taken.
     """
 
     squares: Array

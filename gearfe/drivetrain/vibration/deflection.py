@@ -7,10 +7,10 @@ has the complex amplitude
     \hat a_k = \frac{2}{N\bar w}\sum_{n=0}^{N-1} w_n\,\frac{x_{n+1} - 2x_n + x_{n-1}}{h^2}\,e^{-2\pi i k n / N} ,
     \qquad \hat x_k = -\Big(\frac{h}{2\sin(\pi k/N)}\Big)^2\hat a_k .
 
-The motion follows from its accelerations, as in a measurement: what loads deflect on the way is a thousand times the
-vibration, and would leak into all lines of a record that does not repeat. x are the housing's coordinates, those of
-elastic shafts, and the gears' motion beside rolling. All samples of the run count, so nothing from above the spectrum
-is folded in.
+The motion follows from its accelerations, as in a measurement. The static deflection under the loads is a thousand
+times the vibration, and would leak into all lines of a record that does not repeat. x are the housing's coordinates,
+those of elastic shafts, and the gears' motion beside rolling. All samples of the run count, so nothing from above the
+spectrum is folded in.
 """
 
 from __future__ import annotations

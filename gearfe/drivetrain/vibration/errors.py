@@ -78,8 +78,8 @@ def with_errors(
     -------
     dict
         The summary with ``headline_errors`` (name -> estimates like the numbers, NaN where unknown),
-        ``headline_error_parts`` (the same of each source), ``headline_error_changes`` (signed, of each changed run),
-        and ``error_estimate``, ``error_parts`` and ``error_changes`` in each dominant line.
+        ``headline_error_parts`` (the same of each source) and ``headline_error_changes`` (signed, of each changed run).
+        Each dominant line has ``error_estimate``, ``error_parts`` and ``error_changes``.
     """
     summary = dict(run.summary)
     if summary.get("status") != "done" or FORCES[0] not in summary:

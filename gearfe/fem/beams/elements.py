@@ -12,8 +12,8 @@ with Cowper's shear factor of a hollow circle, m the ratio of inner and outer di
 .. math:: \kappa = \frac{6(1+\nu)(1+m^2)^2}{(7+6\nu)(1+m^2)^2 + (20+12\nu)m^2} .
 
 **Shape functions.** In an element w has the degree p >= 3 and theta the degree p - 1: linear functions and integrals of
-Legendre polynomials. They contain the exact static solution of a uniform beam between loaded ends (w cubic, theta
-quadratic, w' minus theta constant) for every ratio of shear to bending stiffness. Statics are therefore exact at the
+Legendre polynomials. They contain the exact static solution of a uniform beam between loaded ends, for every ratio of
+shear to bending stiffness: w is cubic, theta quadratic, w' minus theta constant. Statics are therefore exact at the
 nodes, and elements do not lock. Mass and polar inertia are consistent. Cones are integrated by Gauss's rule.
 
 **Division.** There is a node at every end of a section, disc and station. The degree of an element follows from two

@@ -1,7 +1,7 @@
 """Second-order tetrahedra of a CAD file (STEP, IGES, BREP), by gmsh.
 
-gmsh meshes the faces first, each in its own plane of parameters. If two faces are closer to each other than an element
-is long (thin walls, rings around bores), triangles of one can cross those of the other. Then no volume can be meshed.
+gmsh meshes the faces first, each in its own plane of parameters. Where two faces are closer than the length of an
+element (thin walls, rings around bores), triangles of one can cross those of the other. Then no volume can be meshed.
 Which triangles cross depends on the algorithm, so that of the faces is exchanged before a size is given up.
 """
 

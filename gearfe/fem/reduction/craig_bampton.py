@@ -1,7 +1,8 @@
 r"""Craig-Bampton reduction of a sparse pair (K, M) with interface rows, corrected for what the left-out modes carry.
 
 The unknowns of the full model are ``u = B q_b + E u_i``: the interface coordinates ``q_b`` (rigid attachments: six
-each) move their rows through the constant matrix B, the internal unknowns ``u_i`` are free, all other rows are held.
+each) move their rows through the constant matrix B. The internal unknowns ``u_i`` are free, and all other rows are
+held.
 
 .. math::
     u_i = \Psi q_b + \Phi \eta + \tilde X \xi,\qquad

@@ -48,8 +48,9 @@ class BodyError:
         pairs.
     frequency_errors : (N,)
         Relative ones of the natural frequencies with free attachments; 0 for rigid-body modes. Infinite where there is
-        no estimate: of the reduction beyond the first frequency that was left out; of the mesh above the highest mode
-        kept, and where it is as large as the stiffness itself: such a mesh (linear tetrahedra) is too coarse for one.
+        no estimate. For the reduction that is beyond the first frequency that was left out. For the mesh it is above
+        the highest mode kept, and where the estimate is as large as the stiffness itself: such a mesh (linear
+        tetrahedra) is too coarse.
     """
 
     response: float

@@ -47,8 +47,8 @@ class Reduction:
     modes
         How many of the internal coordinates are modes.
     truncation, corrections, next_hz
-        Matrix S, levels of corrections and frequency of the error bound in `fem.reduction.craig_bampton`: infinite
-        where no mode is left out, 0 where nothing is known of what was.
+        Matrix S, levels of corrections and frequency of the error bound in `fem.reduction.craig_bampton`. The frequency
+        is infinite where no mode is left out, and 0 where nothing is known of those that were.
     """
 
     mass: Array
@@ -215,10 +215,10 @@ class ModalBody(Reduction, Shown):
     def softened(self, part: float | Array = 1.0) -> ModalBody:
         r"""The body as soft as the estimate of the mesh's error allows, or a `part` of the way there.
 
-        In the modes with free attachments, squares of their circular frequencies L, the stiffness L becomes
-        ``L^(1/2) (1 + P)^-1 L^(1/2)`` with P = E^(1/2) part E^(1/2) and E = L^(-1/2) S L^(-1/2), S the softening:
-        L - part S where that is small, and never negative. A `part` may be given for each mode, N of them: parts that
-        add up to one then share the softening out. Rigid-body motions stay free, the damping stays.
+        L are the squares of the circular frequencies of the modes with free attachments, and S is the softening. The
+        stiffness L becomes ``L^(1/2) (1 + P)^-1 L^(1/2)`` with P = E^(1/2) part E^(1/2) and E = L^(-1/2) S L^(-1/2).
+        That is L - part S where it is small, and never negative. A `part` may be given for each mode, N of them: parts
+        that add up to one then share the softening out. Rigid-body motions stay free, the damping stays.
         """
         eigenvalues = (2.0 * math.pi * self.coupled.frequencies_hz) ** 2
         elastic = eigenvalues > 0.0

@@ -49,8 +49,8 @@ class Interface(NamedTuple):
 class Plate:
     """A reduced plane part and the way back to its mesh.
 
-    With N = (1, Z, phi_1 ... phi_r), Z the points in the frame as complex numbers and phi the modes, the strain in an
-    orthonormal basis of its energy is e = L eta + 1/2 Q(eta, eta) for shares eta of the modes.
+    N = (1, Z, phi_1 ... phi_r), with Z the points in the frame as complex numbers and phi the modes. For shares eta of
+    the modes the strain, in an orthonormal basis of its energy, is e = L eta + 1/2 Q(eta, eta).
 
     Attributes
     ----------

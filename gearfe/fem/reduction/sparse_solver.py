@@ -152,7 +152,7 @@ def _elimination_tree(graph: Any) -> list[int]:
     """Parent of each node (-1: none) when the nodes are eliminated in order (Liu, SIAM J. Matrix Anal. Appl. 11, 1990).
 
     The tree depends only on which nodes are connected through nodes up to each j. A minimum spanning tree with the
-    larger node of an edge as its weight keeps that, so only its few edges need be gone through one by one.
+    larger node of an edge as its weight keeps that, so only its few edges are processed one by one.
     """
     nodes = graph.shape[0]
     edges = sparse.triu(graph, 1, format="coo")

@@ -219,8 +219,8 @@ class SeriesLaw:
     Parameters
     ----------
     begin
-        ``begin(t, sign, u, du, memory, pieces)``: sets the pieces at the start, and what the memory holds from one step
-        to the next; u, du are values and rates, sign tells where time runs. Called from Python.
+        ``begin(t, sign, u, du, memory, pieces)`` sets the pieces at the start, and what the memory holds from one step
+        to the next. u, du are values and rates; sign is the direction of time. Called from Python.
     order
         ``order(j, t, s, u, parameters, memory, pieces, out)``: order j of the forces into ``out[k]``, from orders up to
         j of u and up to j + 1 for u'.

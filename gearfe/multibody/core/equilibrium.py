@@ -5,7 +5,7 @@ Newton's method on the motions y that the joints leave free, dq = dq_g + T y wit
     (T^T K T + sigma) y = T^T (f - K dq_g),        K = -df/dq + d(G^T lambda)/dq
 
 sigma >= 0 makes the matrix positive definite, so that every step goes downhill (Nocedal & Wright, Numerical
-Optimization, Sec. 3.4), and is zero at the end: what is found is a minimum of the energy, no saddle.
+Optimization, Sec. 3.4). It is zero at the end, so the solution is a minimum of the energy and no saddle.
 """
 
 from __future__ import annotations

@@ -73,9 +73,9 @@ def integrate(
         Times at which results are wanted (s), rising or falling; the first is the start.
     method : {"auto", "taylor", "implicit", "symplectic"}
         "taylor": Taylor series of the index-3 equations, where rows and forces can be written on a tape (planar
-        linkages, loads by expression, frames in vectors); in modal coordinates where the constraints are linear and the
-        only force has a law with a series: gear trains. "implicit": collocation at 7 points of Radau IIA, for stiff
-        systems, flexible links and elements without a series. "auto" takes one of these two by a rule
+        linkages, loads by expression, frames in vectors). Gear trains, whose constraints are linear and whose only
+        force has a law with a series, are integrated in modal coordinates. "implicit": collocation at 7 points of Radau
+        IIA, for stiff systems, flexible links and elements without a series. "auto" takes one of these two by a rule
         (`chosen_method`). "symplectic": collocation at Gauss's points in steps of one length, which keeps the energy
         where nothing takes any.
     tolerance : float

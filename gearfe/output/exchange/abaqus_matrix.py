@@ -2,8 +2,8 @@
 
 *SUBSTRUCTURE MATRIX OUTPUT writes a *USER ELEMENT whose nodes a comment names (``** ELEMENT NODES``). It also writes
 the degrees of freedom of its nodes (those of a node are valid for the nodes after it). For each *MATRIX it writes the
-lower triangle, row by row. *MATRIX OUTPUT writes lines of node, degree of freedom, node, degree of freedom, value
-(Abaqus Keywords Guide, *USER ELEMENT, *MATRIX, *MATRIX INPUT; Analysis User's Guide, "Generating matrices").
+lower triangle, row by row. *MATRIX OUTPUT writes lines of node, degree of freedom, node, degree of freedom, value. See
+the Abaqus Keywords Guide (*USER ELEMENT, *MATRIX, *MATRIX INPUT) and the Analysis User's Guide, "Generating matrices".
 """
 
 from __future__ import annotations

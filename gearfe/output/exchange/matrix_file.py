@@ -36,8 +36,8 @@ def read_matrix(path: Path, field: str, initial: str = "K") -> Matrix:
     field : str
         Name of its key in messages.
     initial : str
-        K for the stiffness, M for the mass: the type in a substructure of Abaqus; of several matrices in a file of
-        Nastran that one is taken whose name begins so.
+        K for the stiffness, M for the mass: the type in a substructure of Abaqus. Of several matrices in a file of
+        Nastran, the one whose name begins with this letter is taken.
 
     Raises
     ------

@@ -64,8 +64,8 @@ class SolidPart:
     points : ndarray, shape (n, 3)
         m.
     wedges : ndarray, shape (m, 15)
-        Second-order wedges: corners of one triangle, of the other, then the nodes in the middle of the edges of the
-        first, of the second, and of those in between.
+        Second-order wedges: corners of one triangle and of the other, then the nodes in the middle of edges: of the
+        first triangle, of the second, and in between.
     boundaries : dict of str to ndarray, shape (k, 2)
         Wedge and number of its face, see `SIDES`.
     """

@@ -33,8 +33,8 @@ the strains.
 
 The matrices are complex banded saddle matrices [[T, G^T], [G, 0]] of one pattern. So is the matrix of masses, with
 equal entries in the SIMD vectors. They are stored by columns, real and imaginary parts in turn: B[j, i, 0] is the real
-part of row i of column j. If the diagonal is small in the sum of all matrices, rows are exchanged in all of them
-(threshold pivoting: Duff, Erisman & Reid, Direct Methods for Sparse Matrices, 2nd ed., Oxford 2017, Sec. 5.2).
+part of row i of column j. Rows are exchanged in all matrices where the diagonal is small in their sum (threshold
+pivoting: Duff, Erisman & Reid, Direct Methods for Sparse Matrices, 2nd ed., Oxford 2017, Sec. 5.2).
 """
 
 from __future__ import annotations

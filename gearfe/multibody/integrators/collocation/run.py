@@ -355,8 +355,8 @@ class Stepper:
 def _before(coefficients: Array, h: Array, k: int, short: Array, derivative: int = 2) -> Array:
     """Evaluate a derivative of polynomials about the middles of steps h (s), just before step k.
 
-    It is that at the end of the last earlier step without the flag `short`, because Radau stages are most exact near
-    the end of a step. If there is none, it is that at the start of the next such step, or zero.
+    It is that at the end of the last earlier step without the flag `short`: Radau stages are most exact near the end of
+    a step. If there is none, it is that at the start of the next such step, or zero.
     """
     before, behind = np.flatnonzero(~short[:k])[-1:], k + 1 + np.flatnonzero(~short[k + 1 :])[:1]
     for step, x in ((before, 0.5), (behind, -0.5)):

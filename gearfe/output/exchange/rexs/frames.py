@@ -46,7 +46,7 @@ def frames_of(model: Model) -> dict[int, Frame]:
     Raises
     ------
     InputError
-        For references to components that do not exist or that go in a circle, vectors of another length than three,
+        For references to components that do not exist or that are circular, vectors of another length than three, and
         axes that are no unit vectors at right angles.
     """
     frames: dict[int, Frame] = {}

@@ -65,9 +65,9 @@ def read_rexs(path: str | Path) -> Model:
     Raises
     ------
     InputError
-        For a file that is no REXS, is too large, holds entities or names of paths outside of the archive; for numbers
-        of components that are missing or twice, relations to components that do not exist, values of a wrong type, and
-        units that do not exist or measure something else.
+        For a file that is no REXS, is too large, or holds entities or paths outside of the archive. For numbers of
+        components that are missing or given twice, and relations to components that do not exist. For values of a wrong
+        type, and units that do not exist or measure something else.
     """
     return read_model(read_bytes(path, FIELD, LARGEST_ARCHIVE), str(path))
 
