@@ -17,7 +17,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "gearfe loadmap pair.toml --torques-Nm 20 50 100 200 --root-stress",
     ),
     "gear": (
-        "derived geometry of a gear pair, and a drawing of it in mesh",
+        "geometry of a gear pair or gearbox, and a drawing of it in mesh",
         "gearfe gear pair.toml --angle-deg 5 --export dxf,step",
     ),
     "rating": (
@@ -29,7 +29,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "gearfe mesh pair.toml --teeth 3 --out gears.msh",
     ),
     "mechanism": (
-        "trajectories, energies and reactions of a planar mechanism",
+        "planar mechanism: motion, reactions, equilibrium, vibration modes",
         "gearfe mechanism mechanism.toml --reactions --animation",
     ),
     "housing": (
@@ -41,7 +41,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "gearfe vibration gearbox.toml --report --format mat",
     ),
     "modes": (
-        "gear train over its speed without a run-up: whirl modes, Campbell diagram, critical speeds",
+        "natural modes of a gear train over its speed: whirl, Campbell diagram, critical speeds",
         "gearfe modes gearbox.toml --speed-stop-rad-per-s 1200 --fields",
     ),
     "runup": (

@@ -129,10 +129,13 @@ def _run(arguments: list[str]) -> int:
     from ..base.errors import InputError, unknown_name
     from . import COMMANDS
 
+    if arguments[:1] == ["help"]:
+        arguments = [*arguments[1:2], "--help"]
     if not arguments or arguments[0] in ("-h", "--help"):
         print(f"usage: {USAGE}\n")
         for name, (summary, _) in COMMANDS.items():
             print(f"  {name:<13} {summary}")
+        print("\nStart with a commented job file: gearfe new stiffness pair.toml. Version: gearfe --version.")
         return 0
     if arguments[0] in ("-V", "--version"):
         print(f"gearfe {__version__}")

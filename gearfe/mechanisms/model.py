@@ -325,7 +325,7 @@ def load_mechanism(path: str | Path) -> Mechanism:
     Raises
     ------
     InputError
-        For anything that the file has wrong, with the name of the entry and the cure.
+        If the file has a mistake; the message names the key and the cure.
     """
     return make_mechanism(read_mechanism_file(path), Path(path))
 

@@ -101,7 +101,7 @@ def solved_rows(
     workers : int or None
         Cases that the executor runs side by side; None: its own number, else 4.
     check : callable, optional
-        Called now and then while cases run; raises if the executor stopped.
+        Function called regularly while cases run; it raises if the executor has stopped.
     """
     if executor is not None:
         return side_by_side(task, cases, workers or getattr(executor, "_max_workers", None) or 4, executor, check)
@@ -110,7 +110,7 @@ def solved_rows(
 
 
 def read_study(path: str | Path) -> Study:
-    """Read a study and its base job; every parameter's key exists, every output can be read.
+    """Read a study and its base job, and check its parameters and outputs.
 
     Raises
     ------
@@ -217,9 +217,9 @@ def run_study(
     workers
         How many cases the executor runs side by side; None: its own number, else 4.
     check
-        Called now and then while the executor works; raises when that will not answer any more.
+        Function called regularly while the executor works; it raises if the executor has stopped.
     restart
-        Begin again, whatever the folder holds.
+        Begin again, and delete earlier results in the folder.
 
     Raises
     ------

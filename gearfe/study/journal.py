@@ -117,7 +117,7 @@ class Journal:
     cases
         Values of the parameters by number of the case: rows in the folder must have them. None: not known beforehand.
     restart
-        Begin again, whatever the folder holds.
+        Begin again, and delete earlier results in the folder.
 
     Raises
     ------

@@ -72,7 +72,7 @@ def side_by_side(
     executor
         Where the cases run; it stays open. None: on processes of our own, and one that dies is replaced.
     check
-        Called now and then while cases run; raises when the executor will not answer any more.
+        Function called regularly while cases run; it raises if the executor has stopped.
 
     Raises
     ------

@@ -23,7 +23,7 @@ class LoadMapTable:
     )
     torques_pinion_Nm: tuple[float, ...] | None = quantity(
         None,
-        doc="torques at the pinion's (the driver's) hub (N m), instead: times z2/z1 they are torques_Nm",
+        doc="torques at the hub of the pinion, the driver (N m); torques_Nm are these times z2/z1",
         above=0.0,
     )
     torque_start_Nm: float | None = quantity(None, doc="least torque at the wheel's hub (N m)", above=0.0)

@@ -482,7 +482,7 @@ class StiffnessTable:
     )
     torque_Nm: float | None = quantity(None, doc="torque at the wheel's hub (N m), or give twist_deg", above=0.0)
     torque_pinion_Nm: float | None = quantity(
-        None, doc="torque at the pinion's (the driver's) hub (N m), instead: times z2/z1 it is torque_Nm", above=0.0
+        None, doc="torque at the hub of the pinion, the driver (N m); torque_Nm is this times z2/z1", above=0.0
     )
     twist_from: Literal["contact", "centred"] = quantity(
         "contact",
@@ -511,7 +511,7 @@ class StiffnessTable:
         choices=("small", "finite"),
     )
     nitsche_gamma0: float | None = quantity(
-        None, doc="parameter of the law nitsche, gamma h/E (-), by default 1, the most accurate", low=1e-6, high=1e9
+        None, doc="parameter of the law nitsche, gamma h/E (-); left out: 1, the most accurate", low=1e-6, high=1e9
     )
     penalty_stiffness_N_per_mm3: float | None = quantity(
         None,
@@ -521,7 +521,7 @@ class StiffnessTable:
     )
     points_per_edge: int = quantity(4, doc="contact points on each element edge of a flank", low=2, high=10)
     coarsen: float = quantity(
-        1.0, doc="factor on all element sizes; 2 is faster and about four times less accurate", low=0.2, high=5.0
+        1.0, doc="factor on all element sizes; 2 is faster and two to four times less accurate", low=0.2, high=5.0
     )
     flank_coarsen: float = quantity(
         1.0, doc="factor on the element sizes of the driving flanks, in addition to coarsen", low=0.1, high=10.0

@@ -11,7 +11,7 @@ from ..config import quantity
 class ReportTable:
     """Heading of a report."""
 
-    title: str = quantity("", doc="title; left out: the command and the job file")
+    title: str = quantity("", doc="title; left out: command and job file")
     author: str = quantity("", doc="author")
     remark: str = quantity("", doc="remark under the heading")
     date: str = quantity("", doc="date under the heading; left out: that of the results")

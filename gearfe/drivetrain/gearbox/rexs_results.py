@@ -117,7 +117,7 @@ class RexsResults:
 
 
 def rexs_results(job: str | Path | Mapping[str, Any], folder: str | Path | None = None) -> RexsResults:
-    """Return the results of a job that REXS has attributes for.
+    """Return those results of a job for which REXS has attributes.
 
     Parameters
     ----------

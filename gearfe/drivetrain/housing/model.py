@@ -68,9 +68,9 @@ class Housing(Facts):
     original : (n,)
         Number that each node had in the arrays that were given.
     notes
-        What the user should know.
+        Remarks for the user.
     added_kg
-        Mass that moved nodes of folded elements add (kg); zero where the body has the shape of its mesh.
+        Mass that was added by moving nodes of folded elements (kg); zero where the body has the shape of its mesh.
     """
 
     mesh: Tetrahedra | Prisms

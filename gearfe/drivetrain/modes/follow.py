@@ -54,7 +54,7 @@ def follow_modes(train: TurningTrain, speeds: Array, highest_hz: float) -> Track
     speeds : ndarray, shape (s,)
         Of the drive (rad/s), rising or falling in size.
     highest_hz : float
-        Modes count that come below this frequency at some speed.
+        Highest frequency: modes that lie below it at some speed are returned.
 
     Returns
     -------

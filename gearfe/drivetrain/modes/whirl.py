@@ -234,7 +234,7 @@ def train_modes(model: TrainModel, speeds: ArrayLike, highest_hz: float = 5000.0
     speeds : array_like, shape (s,)
         Of the drive (rad/s), rising or falling in size, of one sense; 0 is the limit of slow turning.
     highest_hz : float
-        Modes count that come below this frequency at some speed (Hz).
+        Highest frequency (Hz): modes that lie below it at some speed are returned.
 
     Raises
     ------

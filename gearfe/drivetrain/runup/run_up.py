@@ -102,9 +102,9 @@ def steady_state(
     Parameters
     ----------
     model
-        From `gearfe.drivetrain.train.build_train`; the loads count as they are in the end.
+        From `gearfe.drivetrain.train.build_train`; loads have their final values.
     speed
-        Of the drive (rad/s), in the sense of the model's.
+        Speed of the drive (rad/s), with the sign of the model's.
     guess
         A state to begin with, such as that of a neighbouring speed: it decides between two branches.
     tolerance
@@ -144,7 +144,7 @@ def run_up(
     model: TrainModel, speeds: ArrayLike, *, tolerance: float = 1e-3, band_hz: float = 5000.0, stability: bool = True,
     executor: Executor | None = None,
 ) -> RunUp:  # fmt: skip
-    """Find the steady states of a train along a range of speeds, round the turning points of their curve.
+    """Find the steady states of a train along a range of speeds, beyond turning points of their curve.
 
     Parameters
     ----------

@@ -70,7 +70,7 @@ class BearingLoads:
         return turning + still
 
     def parts(self, q: Values, v: Values, a: Values, acting: Values, speed: Array | float) -> tuple[Values, Values]:
-        """Return the loads in two parts: along axes of the frames of the shafts, and along axes that stand still.
+        """Return the loads in two parts: along axes of the frames of the shafts, and along fixed axes.
 
         Parameters
         ----------

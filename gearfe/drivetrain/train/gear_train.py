@@ -163,8 +163,8 @@ class GearMesh:
     damping
         N s/m along the line of action; with a law that damps in contact only, at the force of steady running.
     damping_acts
-        ``always``, or ``in_contact``: only while teeth bear. None: in contact with a law, else always. The part of
-        `Damping.beta` acts alike.
+        ``always``, or ``in_contact``: only while teeth are in contact. None: in contact with a law, else always. The
+        part of `Damping.beta` acts alike.
     interpolation
         ``cubic`` (monotone) or ``linear``, for a curve.
     centre_distance
@@ -175,7 +175,7 @@ class GearMesh:
     friction
         Coefficient of friction, or what it follows from; for meshes with a law. See `gearfe.drivetrain.train.friction`.
     name
-        How results call it; empty: ``driver-driven``.
+        Name in results; empty: ``driver-driven``.
     transmission_error
         Unloaded static transmission error e over the driver's rotation (m over rad), of one pitch. It is the approach
         at which the flanks touch, positive where the driven gear stays behind. For meshes with a curve or a constant.
@@ -183,7 +183,8 @@ class GearMesh:
         How the driving flanks act along the face width; beside a transmission error on the same phases. None: in the
         middle of the common width, without a stiffness against tilting.
     moments
-        Whether moments that tilt the gears act in a mesh without `tilting`: elastic shafts then keep what these bend.
+        Whether the tilting moments of the mesh force act on the shafts where the mesh has no `tilting`. Elastic shafts
+        need them for their bending.
     ring_drives
         Whether the internal gear, `driven`, drives.
     """
@@ -220,7 +221,7 @@ class GearMesh:
 
     @property
     def damps_in_contact(self) -> bool:
-        """Whether its damper acts only while teeth bear."""
+        """Whether its damper acts only while teeth are in contact."""
         if self.damping_acts is None:
             return self.has_law
         return self.damping_acts == IN_CONTACT
@@ -334,7 +335,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class Coupling:
-    """A torsional spring between two shafts on one axis, which turn alike.
+    """A torsional spring between two shafts on one axis, which rotate together.
 
     Parameters
     ----------
@@ -377,7 +378,7 @@ class SpeedCurve:
 
     @property
     def slope(self) -> float:
-        """By how much the torque falls with the speed at the reference (N m s/rad)."""
+        """Decrease of the torque per speed at the reference (N m s/rad)."""
         return -float(self.function(self.reference, 1))
 
 
@@ -397,11 +398,11 @@ class Drive:
     along
         Coordinate along the train's axis (m) of the section of the shaft that it drives; None: that of the bore.
     machine
-        Name of a machine of the shaft that turns so, or that the torque acts on; empty: the shaft itself.
+        Name of the machine of the shaft that is driven; empty: the shaft itself.
     torque
         Over time (N m), instead of a prescribed rotation.
     slope
-        By how much the torque falls with the speed beyond the nominal one (N m s/rad).
+        Decrease of the torque per speed above the nominal speed (N m s/rad).
     over_speed
         Further torque over the true speed; `torque` holds its steady part.
     """
@@ -436,9 +437,9 @@ class Load:
     along
         Coordinate along the train's axis (m) of the section of the shaft on which it acts; None: that of the bore.
     machine
-        Name of a machine of the shaft on which it acts; empty: the shaft itself.
+        Name of the machine of the shaft on which the torque acts; empty: the shaft itself.
     slope
-        By how much the torque falls with the speed beyond rolling with the drive's (N m s/rad).
+        Decrease of the torque per speed above the kinematic speed, that of rolling with the drive (N m s/rad).
     over_speed
         Further torque over the true speed; `torque` holds its steady part.
     """

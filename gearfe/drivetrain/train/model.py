@@ -239,7 +239,7 @@ class TrainModel(Facts):
         return np.array([0.0 if f is None else self.ratios[self.train.shaft_number(f.shaft)] for f in frames])
 
     def frame_turns(self, t: Array, shafts: Sequence[int]) -> Array:
-        """Rotations (n, shafts, 3, 3) from the frames of shafts to axes that stand still, at times (n,)."""
+        """Rotations (n, shafts, 3, 3) from the frames of shafts to fixed axes, at times (n,)."""
         return self._about_axis(self.angle(t)[:, None] * self.frame_ratios[list(shafts)])
 
     def _about_axis(self, turned: Array) -> Array:
@@ -265,7 +265,7 @@ class TrainModel(Facts):
         return np.asarray(moved.reshape(size, -1))
 
     def fixed_axes(self, t: Array, vectors: Array) -> Array:
-        """Vectors (n, bores, k, 3) at the bores, in the frames of their shafts, along axes that stand still."""
+        """Vectors (n, bores, k, 3) at the bores, in the frames of their shafts, along fixed axes."""
         if not self.train.carriers:
             return vectors
         return self.on_bores(self.angle(t)[:, None] * self.frame_ratios, vectors)
@@ -340,7 +340,7 @@ def build_train(train: GearTrain) -> TrainModel:
     Raises
     ------
     InputError
-        For the first thing in the train that does not fit, with the cure.
+        If the parts of the train do not fit together; the message names the first mistake and the cure.
     """
     check_train(train)
     point = _operating_point(train)

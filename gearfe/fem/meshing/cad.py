@@ -39,7 +39,7 @@ class CadMesh(NamedTuple):
     groups : dict
         Number of each surface in gmsh, as text -> its nodes.
     notes
-        What the user should know about how it was meshed.
+        Remarks on the meshing, for the user.
     """
 
     nodes: Array

@@ -45,7 +45,7 @@ class MeshFile(NamedTuple):
     groups : dict
         Name, or number as text, of each group of nodes, faces or elements -> its nodes.
     notes
-        What the user should know about how the file was read.
+        Remarks on the reading of the file, for the user.
     """
 
     nodes: Array

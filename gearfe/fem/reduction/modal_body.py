@@ -70,7 +70,7 @@ class ModalBody(Reduction, Shown):
     damping : (N, N)
         C (SI).
     attachment_names
-        One a attachment.
+        One name for each attachment.
     attachment_points : (a, 3)
         Reference points (m), on the bores' axes.
     attachment_axes : (a, 3)
@@ -96,10 +96,10 @@ class ModalBody(Reduction, Shown):
     held
         Whether a part of the body is fixed to the frame; a free body has six rigid-body modes.
     notes
-        What the user should know about how it was made.
+        Remarks on the reduction, for the user.
     added_kg
-        Mass that moved nodes of folded elements added (kg). Unless it is zero, the body has another shape than its
-        mesh, and frequencies may err to either side.
+        Mass that was added by moving nodes of folded elements (kg). Unless it is zero, the body has another shape than
+        its mesh, and frequencies may err to either side.
     """
 
     damping: Array

@@ -229,7 +229,7 @@ HALF_PLANE_FLANK, HALF_PLANE_COARSEST = 4.0, 6.0
 
 @dataclass(frozen=True)
 class PairModel(ContactModel):
-    """Model of a pair: what `gearfe.gears.gearmesh.sweep.elastic_pair` makes of its gears.
+    """Materials, contact law and element sizes of a gear pair, for `gearfe.gears.gearmesh.sweep.elastic_pair`.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ class PairModel(ContactModel):
     law
         Contact law.
     coarsen, flank_coarsen
-        Factor on all element sizes, and besides on those of the driving flanks.
+        Factor on all element sizes, and additional factor on those of the driving flanks.
     points_per_edge
         Contact points on each edge of a flank.
     deviations

@@ -104,7 +104,7 @@ OUTLIER = 2.0
 class StiffnessCurve(ShownTable):
     """Mesh stiffness of a gear pair over the pinion's rotation; all arrays have one entry per position, shape (n,).
 
-    What is not given is unknown: NaN, -1 or an empty word; an array of another length is an `InputError`.
+    Entries that are not given are NaN, -1 or an empty string. An array of another length is an `InputError`.
 
     Attributes
     ----------
@@ -135,7 +135,8 @@ class StiffnessCurve(ShownTable):
         Largest Hertzian pressure of the tooth pairs that bear on smooth flanks (Pa), and how far the computed contacts
         are from Hertz's (-), see `gearfe.gears.gearmesh.pair_loads`; NaN where none does.
     edge_pressure
-        The like where an edge bears (Pa), blunted by a hundredth of a module; NaN where none bears.
+        Comparative pressure at a loaded edge (Pa), with the edge rounded by a hundredth of a module; NaN where no edge
+        is loaded.
     edge
         ``none``; ``rounded``: a tip round bears; ``singular``: a sharp edge bears, under which the pressure of linear
         elasticity has no bound. Empty where unknown.
@@ -309,7 +310,7 @@ class StiffnessCurve(ShownTable):
         Raises
         ------
         InputError
-            When the file is not such a table, says nothing of the mesh cycle, or contradicts itself one mesh cycle on.
+            If the file is no such table, the mesh cycle is unknown, or values one mesh cycle apart differ.
         """
         columns = read_csv(path, "stiffness curve")
         curve = cls.from_columns(columns, path, mesh_cycle=mesh_cycle, base_radius=base_radius)

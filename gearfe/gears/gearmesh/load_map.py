@@ -101,13 +101,13 @@ class LoadMap(ShownTable):
     root
         Root stresses, where they were computed.
     loads
-        Loaded tooth pairs, whose positions are numbers of cells; None for a map from a file.
+        Loaded tooth pairs, whose ``position`` is the number of the cell; None for a map from a file.
     transmission_error_unloaded_back : ndarray, shape (n,), or None
         Unloaded transmission error (m) of the back flanks, > 0 where they lie behind those without deviations.
     back_clearance : ndarray, shape (m, n), or None
         Normal clearance (m) of the back flanks, unloaded themselves; < 0 where they would touch.
     mesh_cycles
-        Mesh cycles that the angles divide into equal steps; 0 where they do not.
+        Number of mesh cycles that the angles cover in equal steps; 0 for other angles.
     pair
         The gears; None for a map from a file.
     timings
@@ -137,7 +137,8 @@ class LoadMap(ShownTable):
 
     @cached_property
     def pairs(self) -> tuple[PairLoads, ...]:
-        """Loaded tooth pairs of each torque, whose positions are numbers of the angles; empty for a map from a file."""
+        """Loaded tooth pairs of each torque, whose ``position`` is the number of the angle; empty for a map from a
+        file."""
         m, n = self.shape
         return () if self.loads is None else tuple(of_positions(self.loads, n * k + np.arange(n)) for k in range(m))
 

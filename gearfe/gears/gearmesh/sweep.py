@@ -141,7 +141,7 @@ def sweep_stiffness(
     estimate_error
         Estimate the discretisation error from coarser meshes.
     elastic
-        The pair from `elastic_pair`, when it is there already; the model is not looked at then.
+        Result of an earlier `elastic_pair`, which replaces `model`.
     store
         Whether the cache keeps the condensed gears of the estimate, too, and of the curve; see `elastic_pair`.
 
@@ -199,7 +199,7 @@ def sweep_loads(
     model, kinematics, elastic, changes
         See `sweep_stiffness`; teeth may differ (``deviations=(pinion, wheel)``).
     angles : array_like, shape (n,), optional
-        Pinion angles (rad), instead of `positions`. Those after which all teeth meet again are solved once.
+        Pinion angles (rad), instead of `positions`. Angles that differ by the full period are solved once.
     positions, mesh_cycles
         Pinion angles in a mesh cycle, and how many cycles. None: one cycle where the teeth of each gear are alike on
         both sides, else the full period, the least common multiple of the teeth.

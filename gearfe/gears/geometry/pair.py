@@ -37,8 +37,8 @@ class GearPair(MeshGeometry, Shown):
     axial_offset
         Middle of the wheel's face width less that of the pinion's, along the axes (m).
     centre_distance
-        Centre distance |a| (m); None: without backlash for the unthinned teeth, from the profile shifts. Where it jams
-        the teeth by no more than rounding (`gear_data.rounding`), the wheel's teeth are made so much thinner.
+        Centre distance |a| (m); None: from the profile shifts, without backlash of unthinned teeth. One that is too
+        small only by rounding (`gear_data.rounding`) makes the wheel's teeth thinner by that.
     notes
         How given data were taken that fit each other except for rounding, one sentence each.
 

@@ -187,7 +187,7 @@ def rate(
     pair : GearPair
         The gears; the pinion of the pair drives.
     table : RatingTable or mapping
-        Keys of the table [rating]: load, strength, lubricant; what they say is in docs/keys.md.
+        Keys of the table [rating]: load, strength, lubricant; see docs/keys.md.
     materials : (MaterialTable, MaterialTable)
         Elastic constants and densities of driver and driven gear.
     names, mesh : (str, str), str

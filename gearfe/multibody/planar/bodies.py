@@ -26,9 +26,9 @@ class Body:
     name : str
         Name used by joints and forces.
     mass : float
-        Mass (kg), >= 0; without mass where the joints hold the body to others that have some.
+        Mass (kg), >= 0. It may be 0 where joints hold the body to others with mass.
     inertia : float
-        Moment of inertia about the mass centre (kg m2), >= 0, likewise.
+        Moment of inertia about the mass centre (kg m2), >= 0; 0 as for the mass.
     centre : (float, float)
         Mass centre in the body's frame (m).
     position, angle : (float, float), float

@@ -47,7 +47,7 @@ RUNUP, SPEEDS = (0.2, 1.2), 60
 
 @dataclass(frozen=True)
 class RexsJob:
-    """A job, and how it follows from the model.
+    """A job from a REXS model, with the lists of used, derived, defaulted and ignored values.
 
     Attributes
     ----------
