@@ -94,7 +94,7 @@ class Parameter:
             return (least + (most - least) * share).tolist()
         from scipy.special import ndtr, ndtri
 
-        deviation = given(d.deviation, f"{self.name}.deviation")
+        deviation = given(d.standard_deviation, f"{self.name}.standard_deviation")
         low, high = (None if end is None else (end - d.mean) / deviation for end in (d.low, d.high))
         below, upto = 0.0 if low is None else ndtr(low), 1.0 if high is None else ndtr(high)
         # a share of 0 has no value in a tail without an end
@@ -151,7 +151,7 @@ def read_parameters(given: Mapping[str, Any], kind: str, base: Mapping[str, Any]
             raise InputError(label, None, "is no number: low, high, mean do not apply", "give a list of values")
         if distribution.iso_class is not None:
             distribution = _of_class(distribution, distribution.iso_class, name, base)
-        for end in ("low", "high", "mean", "deviation") if whole else ():
+        for end in ("low", "high", "mean", "standard_deviation") if whole else ():
             if abs(getattr(distribution, end) or 0.0) > WHOLE:
                 problem = f"must be of a size up to {WHOLE:.3g}, for the key takes whole numbers"
                 raise InputError(f"{label}.{end}", getattr(distribution, end), problem, "take a smaller one")
@@ -178,7 +178,7 @@ def _check_sizes(value: Any, label: str) -> None:
 
 
 def _of_class(found: DistributionTable, class_: int, name: str, base: Mapping[str, Any]) -> DistributionTable:
-    """Normal, three deviations to the tolerance of the profile or helix slope, f_HaT or f_HbT, and cut off there."""
+    """Normal, with three standard deviations to the tolerance f_HaT or f_HbT of the slope, and truncated there."""
 
     parts = name.split(".")
     slopes = ("profile_slope_um", "helix_slope_um")
@@ -191,7 +191,7 @@ def _of_class(found: DistributionTable, class_: int, name: str, base: Mapping[st
     slope = helix_tolerances(gear, class_).helix_slope if of_helix else tolerances(gear, class_).slope
     allowed = 1e6 * slope
     mean = found.mean or 0.0
-    return DistributionTable(mean=mean, deviation=allowed / 3.0, low=mean - allowed, high=mean + allowed)
+    return DistributionTable(mean=mean, standard_deviation=allowed / 3.0, low=mean - allowed, high=mean + allowed)
 
 
 def _gear_named(parts: Sequence[str], base: Mapping[str, Any]) -> NamedGear | None:
@@ -215,7 +215,7 @@ def _flat(given: Mapping[str, Any], above: str) -> dict[str, Any]:
                 raise unknown_name(f"{WHERE}.{name}", wrong, _KEYS)
             flat |= _once(flat, _flat(value, f"{name}."))
         else:
-            cure = "write [a, b, c], { low = a, high = b }, { mean = a, deviation = b } or { iso_class = 6 }"
+            cure = "write [a, b, c], { low = a, high = b }, { mean = a, standard_deviation = b } or { iso_class = 6 }"
             raise InputError(f"{WHERE}.{name}", value, "must be a list of values or a distribution", cure)
     return flat
 

@@ -30,8 +30,8 @@ PAIR = {"pair": {"pinion": {"teeth": 20}, "wheel": {"teeth": 40}}}  # tables tha
 def test_distributions_have_their_quantiles():
     given = {
         "pair.addendum": {"low": 0.9, "high": 1.1},
-        "pair.dedendum": {"mean": 1.25, "deviation": 0.05},
-        "pair.tip_round_mm": {"mean": 0.1, "deviation": 0.05, "low": 0.0, "high": 0.2},
+        "pair.dedendum": {"mean": 1.25, "standard_deviation": 0.05},
+        "pair.tip_round_mm": {"mean": 0.1, "standard_deviation": 0.05, "low": 0.0, "high": 0.2},
         "pair.pinion.teeth": {"low": 18, "high": 20},
         "stiffness.plane": ["strain", "stress"],
     }

@@ -74,7 +74,7 @@ OUTPUT = 'y = "'
             for value, (shown, most) in HUGE.items()
         ),
         (PLACE, f"bodies.a.mass_kg = {{ low = 1, high = {10**400} }}\n{PLACE}", "high = 1.000e+400: must be finite"),
-        (PLACE, f"bodies.a.mass_kg = {{ mean = nan, deviation = 1 }}\n{PLACE}", "mean = nan: must be finite"),
+        (PLACE, f"bodies.a.mass_kg = {{ mean = nan, standard_deviation = 1 }}\n{PLACE}", "mean = nan: must be finite"),
         ('"base.toml"', '"bse.toml"', "there is no such file"),
         ('design = "sobol"', 'design = "rows"\nrows_csv = "rows.csv"', "columns are the parameters"),
     ],
@@ -295,8 +295,8 @@ def _kill(pid: int) -> None:
     [
         ("[20, 99999999999999999999]", "= 1.000e+20: must be finite, of a size up to 9.22e+18"),
         ("{ low = 1, high = 1e30 }", "high = 1e+30: must be of a size up to 9.01e+15, for the key takes whole numbers"),
-        ("{ mean = -1e17, deviation = 2.0 }", "mean = -1e+17: must be of a size up to 9.01e+15"),
-        ("{ mean = 1.0, deviation = 1e17 }", "deviation = 1e+17: must be of a size up to 9.01e+15"),
+        ("{ mean = -1e17, standard_deviation = 2.0 }", "mean = -1e+17: must be of a size up to 9.01e+15"),
+        ("{ mean = 1.0, standard_deviation = 1e17 }", "standard_deviation = 1e+17: must be of a size up to 9.01e+15"),
         ("{ low = 1, high = 1e15 }", "combinations, more than 10000000"),
     ],
 )

@@ -54,7 +54,7 @@ STUDY: dict[str, Any] = {
     "parameters": {
         "microgeometry.pinion.tip_relief_um": {"low": 0.0, "high": 30.0},
         "microgeometry.pinion.tip_relief_length_mm": {"low": 1.0, "high": 4.0},
-        "microgeometry.pinion.profile_slope_um": {"mean": 0.0, "deviation": 3.0},
+        "microgeometry.pinion.profile_slope_um": {"mean": 0.0, "standard_deviation": 3.0},
         "microgeometry.wheel.tip_relief_um": {"low": 0.0, "high": 30.0},
     },
     "outputs": {

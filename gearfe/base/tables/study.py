@@ -20,7 +20,7 @@ class DistributionTable:
     low: float | None = quantity(None, doc="lower end, in the unit of the key")
     high: float | None = quantity(None, doc="upper end")
     mean: float | None = quantity(None, doc="mean of a normal distribution")
-    deviation: float | None = quantity(None, above=0.0, doc="its standard deviation")
+    standard_deviation: float | None = quantity(None, above=0.0, doc="its standard deviation")
     iso_class: int | None = quantity(
         None,
         low=1,
@@ -33,22 +33,22 @@ class DistributionTable:
     also: tuple[str, ...] = quantity((), doc="dotted names of further keys that take the same value")
 
     def check(self, where: str) -> None:
-        """Ends or mean and deviation, not half of them; or a class."""
+        """Ends or mean and standard deviation, not half of them; or a class."""
         if self.iso_class is not None:
-            for name in ("low", "high", "deviation", "count"):
+            for name in ("low", "high", "standard_deviation", "count"):
                 if getattr(self, name) is not None:
                     problem = "conflicts with iso_class"
                     raise InputError(
                         f"{where}.{name}", getattr(self, name), problem, "the class gives it: leave it out"
                     )
             return
-        for one, other in (("mean", "deviation"), ("deviation", "mean")):
+        for one, other in (("mean", "standard_deviation"), ("standard_deviation", "mean")):
             if getattr(self, one) is not None and getattr(self, other) is None:
                 raise InputError(f"{where}.{other}", None, f"is required with {one}", "add it")
         if self.mean is None:
             for name in ("low", "high"):
                 if getattr(self, name) is None:
-                    cure = "give low and high, mean and deviation, or a list of values"
+                    cure = "give low and high, mean and standard_deviation, or a list of values"
                     raise InputError(f"{where}.{name}", None, "is required", cure)
         elif self.count is not None:
             raise InputError(f"{where}.count", self.count, "conflicts with mean", "steps are even between low and high")
