@@ -122,7 +122,7 @@ def _show_gearbox(args: argparse.Namespace) -> None:
                 save(gearbox_picture(layout), made / "gearbox.png")
         write_json(made / "gearbox.json", asdict(layout))
         names = sorted(path.name for path in made.iterdir())
-    print_results([mesh.line() for mesh in layout.meshes], folder, names, {}, ())
+    print_results([*(mesh.line() for mesh in layout.meshes), *layout.collisions()], folder, names, {}, ())
 
 
 def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:

@@ -97,6 +97,22 @@ def test_the_command_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert gearbox_layout(tomllib.loads((GEOMETRY / "microgeometry.toml").read_text()), "pair.toml") is None
 
 
+def test_planets_that_overlap_are_named() -> None:
+    """Six planets of 22 teeth on the shipped carrier are 78 mm apart, twice its radius times the sine of 30 degrees."""
+    raw = tomllib.loads((GEOMETRY / "planetary.toml").read_text())
+    layout = gearbox_layout(raw, "box.toml")
+    assert layout is not None
+    assert layout.collisions() == []
+    raw["carriers"]["arm"]["planets"] = 6
+    del raw["carriers"]["arm"]["pin_tangential_errors_um"]
+    layout = gearbox_layout(raw, "box.toml")
+    assert layout is not None
+    common = 2e3 * layout.gear("planet_1").tip_radius - 2.0 * 78.0 * math.sin(math.pi / 6)
+    lines = layout.collisions()
+    assert len(lines) == 6
+    assert lines[0].startswith(f"gears planet_1 and planet_2 overlap by {common:.4g} mm over 50 mm of width")
+
+
 def test_sections_of_an_elastic_shaft_are_drawn() -> None:
     """A step and a cone between the ends of the shaft, as the sections of the job file say."""
     raw = tomllib.loads(text())

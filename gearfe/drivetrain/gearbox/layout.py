@@ -5,6 +5,7 @@ Nothing has to fit for it: shafts that are not where the gears need them are wha
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,6 +101,23 @@ class GearboxLayout:
     def gear(self, name: str) -> PlacedGear:
         """The gear of that name."""
         return next(gear for gear in self.gears if gear.name == name)
+
+    def collisions(self) -> list[str]:
+        """Return a line for each couple of gears that are not in mesh, and whose tip circles overlap in one plane."""
+        meshing = {frozenset((mesh.driver, mesh.driven)) for mesh in self.meshes}
+        lines = []
+        for one, two in itertools.combinations(self.gears, 2):
+            facing = 0.5 * (one.width + two.width) - abs(one.centre[1] - two.centre[1])
+            if one.teeth < 0 or two.teeth < 0 or one.shaft == two.shaft or facing <= CLOSE:
+                continue
+            apart = math.hypot(two.centre[0] - one.centre[0], two.centre[2] - one.centre[2])
+            common = one.tip_radius + two.tip_radius - apart
+            if common > CLOSE and frozenset((one.name, two.name)) not in meshing:
+                lines.append(
+                    f"gears {one.name} and {two.name} overlap by {1e3 * common:.4g} mm over {1e3 * facing:.4g} mm of "
+                    "width: move their shafts apart, or one gear along its shaft"
+                )
+        return lines
 
 
 def gearbox_layout(raw: dict[str, Any], path: str | Path) -> GearboxLayout | None:
