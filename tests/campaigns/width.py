@@ -118,7 +118,7 @@ def violation(lines: ContactLines, angle: float, torque: float) -> Violation:
     if not solution.converged:
         return Violation(False)
     points, mesh, moment = solution.points, lines.compliance.mesh, solution.moment
-    own = own_twists(lines.law, points, moment / points.weight)[0]
+    own = own_twists(lines.law, points.rows, moment / points.weight)[0]
     gap = (points.touch + own + points.influence @ moment - solution.twist) * points.rows.arm
     force, moments = resultants(lines, solution)
     radius = mesh.sections.wheel.base_radius

@@ -16,7 +16,7 @@ from gearfe.gears.contact.flank import edge_shapes
 from gearfe.gears.contact.flank_compliance import local_bracket
 from gearfe.gears.contact.panels import EDGES
 from gearfe.gears.gearmesh.fields import half_plane_stress
-from gearfe.gears.gearmesh.width_fields import SolidField, ellipse_stress, solid_fields
+from gearfe.gears.gearmesh.width_fields import SolidField, ellipse_stress, line_contacts, solid_fields
 from gearfe.gears.gearmesh.width_root import line_loads
 from gearfe.gears.width import WidthSweep, sweep_width
 from tests.makers.wide_gears import HELICAL_JOB, helical_lines
@@ -110,8 +110,8 @@ def test_stress_is_that_of_the_displacement_in_space() -> None:
 
 
 def test_pressure_carries_the_torque() -> None:
-    """Nodal pressures times shares of flank and width: the torque on both gears, by their base radii."""
-    _, found = fields()
+    """Nodal pressures times shares of flank and width: line loads at the levels, by the base radii, and the torque."""
+    sweep, found = fields()
     mesh = helical_lines().compliance.mesh
     for gear, field in enumerate(found):
         edges = np.sort(field.triangles[:, [[0, 3], [3, 1], [1, 4], [4, 2], [2, 5], [5, 0]]].reshape(-1, 2), axis=1)
@@ -121,8 +121,10 @@ def test_pressure_carries_the_torque() -> None:
         squares = (places**2).sum(axis=-1)[:, outline]
         # moment of a pressure on a straight piece: p (x dx + y dy) = p d(r^2)/2
         moments = field.pressure[:, outline].mean(axis=-1) * np.abs(np.diff(squares, axis=-1)[..., 0]) / 2.0
-        expected = TORQUE * (1.0 if gear else mesh.gears[0].base_radius / mesh.gears[1].base_radius)
+        loads = sum(contact.line_load for contact in line_contacts(helical_lines(), sweep, (0, 0), field.z))
+        expected = np.trapezoid(loads, field.z) * mesh.gears[gear].base_radius
         assert np.trapezoid(moments.sum(axis=1), field.z) == pytest.approx(expected, rel=0.02)
+        assert expected == pytest.approx(TORQUE * mesh.gears[gear].base_radius / mesh.gears[1].base_radius, rel=0.01)
 
 
 def test_seen_from_the_other_side() -> None:

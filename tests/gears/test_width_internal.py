@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from gearfe import Gear, GearPair
+from gearfe import GearPair
 from gearfe.base.errors import InputError
 from gearfe.gears.contact.half_plane_pair import half_plane_pair
 from gearfe.gears.gearmesh.sweep import elastic_pair, sweep_stiffness
 from gearfe.gears.width import (
-    ContactLines,
     LeadModification,
     Misalignment,
     WideFlanks,
@@ -25,27 +23,11 @@ from gearfe.gears.width import (
 )
 from gearfe.gears.width.lines import solve_position
 from tests.gears.test_width import energy
+from tests.makers.wide_gears import INTERNAL_WIDTH, internal_lines, internal_pair
 
-MODULE, WIDTH, TORQUE = 4e-3, 20e-3, 600.0
+TORQUE = 600.0
 CROWNED = WideFlanks(leads=(LeadModification(crowning=10e-6), LeadModification()))
-TILTED = WideFlanks(misalignment=Misalignment.over_width(20e-6, WIDTH))
-
-
-def internal_pair(helix: float = 0.0, hand: str = "right") -> GearPair:
-    """A planet of 22 teeth in a ring of 61, module 4 mm (of the normal section), tips that stay on the involutes."""
-    c = math.cos(helix)
-    form = {
-        "module": MODULE, "pressure_angle": math.radians(20.0), "face_width": WIDTH, "tip_round": 1e-4,
-        "helix_angle": helix, "hand": hand,
-    }  # fmt: skip
-    planet = Gear(22, bore_diameter=40e-3, **form)
-    return GearPair(planet, Gear(-61, rim_diameter=290e-3 / c, addendum=0.85, **form))
-
-
-@lru_cache(maxsize=8)
-def helical_lines(hand: str = "right", functions: int = 6) -> ContactLines:
-    mesh = WideMesh(internal_pair(math.radians(12.0), hand), functions=functions, coarsen=3.0)
-    return contact_lines(wide_compliance(mesh))
+TILTED = WideFlanks(misalignment=Misalignment.over_width(20e-6, INTERNAL_WIDTH))
 
 
 def test_one_function_is_the_plane_law_of_an_internal_pair() -> None:
@@ -55,7 +37,7 @@ def test_one_function_is_the_plane_law_of_an_internal_pair() -> None:
     for side, known in zip(compliance.sides, half_plane_pair(elastic_pair(pair)).sides, strict=True):
         size = 2 * len(known.stations)
         for step in (1, 2):
-            expected = WIDTH * known.far_field[step]
+            expected = INTERNAL_WIDTH * known.far_field[step]
             assert np.abs(side.influence[step].reshape(size, size) - expected).max() < 1e-10 * np.abs(expected).max()
     angles = (np.arange(12) + 0.5) * pair.mesh_cycle / 12
     plane = sweep_stiffness(pair, torque=300.0, angles=angles, kinematics="small")
@@ -67,7 +49,7 @@ def test_one_function_is_the_plane_law_of_an_internal_pair() -> None:
 
 @pytest.mark.parametrize("angle", [0.0, 0.07, 0.19])
 def test_torque_is_the_derivative_of_the_energy(angle: float) -> None:
-    lines = replace(helical_lines().with_flanks(CROWNED), density=4.0)
+    lines = replace(internal_lines().with_flanks(CROWNED), density=4.0)
     base = solve_position(lines, angle, torque=TORQUE)
     step = 0.01 * base.twist
     before, after = (solve_position(lines, angle, twist=base.twist + way * step) for way in (-1, 1))
@@ -78,7 +60,7 @@ def test_torque_is_the_derivative_of_the_energy(angle: float) -> None:
 
 def test_moments_follow_from_the_energy_and_axial_forces_from_the_helix() -> None:
     """The ring turns with the pinion: moments of one sign, axial forces as in an external pair."""
-    lines, angle, step = helical_lines(), 0.1, 2e-3
+    lines, angle, step = internal_lines(), 0.1, 2e-3
     found = sweep_width(lines, [TORQUE], angles=[angle])
     twist = found.twist[0, 0]
     pinion, wheel = found.moment[0, 0, :, 2]
@@ -94,20 +76,20 @@ def test_moments_follow_from_the_energy_and_axial_forces_from_the_helix() -> Non
 def test_hand_mirrored_with_z_is_the_same(flanks: WideFlanks) -> None:
     mirrored = replace(flanks, misalignment=Misalignment(-flanks.misalignment.in_plane))
     angles = np.array([0.0, 0.1])
-    one = sweep_width(helical_lines().with_flanks(flanks), [TORQUE], angles=angles)
-    other = sweep_width(helical_lines("left").with_flanks(mirrored), [TORQUE], angles=angles)
+    one = sweep_width(internal_lines().with_flanks(flanks), [TORQUE], angles=angles)
+    other = sweep_width(internal_lines("left").with_flanks(mirrored), [TORQUE], angles=angles)
     np.testing.assert_allclose(one.twist, other.twist, rtol=1e-9)
     np.testing.assert_allclose(one.axial_force, -other.axial_force, rtol=1e-9)
 
 
 def test_two_more_functions_hardly_change_the_transmission_error() -> None:
-    errors = [sweep_width(helical_lines(functions=n), [TORQUE]).transmission_error[0] for n in (6, 8)]
+    errors = [sweep_width(internal_lines(functions=n), [TORQUE]).transmission_error[0] for n in (6, 8)]
     assert np.ptp(errors[0]) == pytest.approx(np.ptp(errors[1]), rel=0.01)
 
 
 def test_rigid_helical_flanks_touch_along_the_whole_line() -> None:
     """Under 0.1 N m the transmission error of unmodified flanks is 2 to 6 nm of deflection, 0.01 um at most."""
-    found = sweep_width(helical_lines(), [0.1])
+    found = sweep_width(internal_lines(), [0.1])
     assert (found.status == "converged").all()
     assert (np.abs(found.transmission_error[0] - 5e-9) < 5e-9).all()
 

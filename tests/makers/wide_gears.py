@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from gearfe import Gear
+from gearfe import Gear, GearPair
 from gearfe.gears.geometry.mesh_geometry import MeshGeometry
 from gearfe.gears.width import ContactLines, WideMesh, contact_lines, wide_compliance
 from gearfe.gears.width.lines import POINTS_PER_FUNCTION
@@ -15,6 +15,8 @@ from .gears import pair as gear_pair
 #: The spur pair of the comparisons with CalculiX: 20/30 teeth of 2.5 mm, 25 degrees, 10 mm wide.
 SPUR = gear_pair(tip_round=1e-4)
 
+#: Width (m) of the internal pair.
+INTERNAL_WIDTH = 20e-3
 
 #: A job file of a small helical pair: 14/16 teeth of 2.5 mm, 15 degrees, 5 mm wide.
 HELICAL_JOB = """
@@ -61,3 +63,20 @@ def spur_lines(
 ) -> ContactLines:
     compliance = wide_compliance(WideMesh(SPUR, functions=functions), whole=whole)
     return contact_lines(compliance, density=density)
+
+
+def internal_pair(helix: float = 0.0, hand: str = "right") -> GearPair:
+    """A planet of 22 teeth in a ring of 61, module 4 mm (of the normal section), tips that stay on the involutes."""
+    c = math.cos(helix)
+    form = {
+        "module": 4e-3, "pressure_angle": math.radians(20.0), "face_width": INTERNAL_WIDTH, "tip_round": 1e-4,
+        "helix_angle": helix, "hand": hand,
+    }  # fmt: skip
+    planet = Gear(22, bore_diameter=40e-3, **form)
+    return GearPair(planet, Gear(-61, rim_diameter=290e-3 / c, addendum=0.85, **form))
+
+
+@lru_cache(maxsize=8)
+def internal_lines(hand: str = "right", functions: int = 6) -> ContactLines:
+    mesh = WideMesh(internal_pair(math.radians(12.0), hand), functions=functions, coarsen=3.0)
+    return contact_lines(wide_compliance(mesh))

@@ -415,7 +415,7 @@ def line_contacts(lines: ContactLines, sweep: WidthSweep, cell: tuple[int, int],
     found = []
     for pair in np.unique(points.pair[here]).tolist():
         of_pair = here[points.pair[here] == pair]
-        line_load = load_along(points.z[of_pair], points.weight[of_pair], points.line_load[of_pair], z)
+        line_load = load_along(points.z[of_pair], points.line_load[of_pair], z)
         angle = np.clip(middle + mesh.turns[0] * z + pair * mesh.sections.mesh_cycle, law.angle[0], law.angle[-1])
         rows = rows_at(law, angle)
         order = np.argsort(angle)

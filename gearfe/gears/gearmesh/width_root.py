@@ -331,14 +331,15 @@ def line_loads(lines: ContactLines, sweep: WidthSweep, gear: int, of_point: IntA
         Number of lines.
     """
     mesh, points = lines.compliance.mesh, sweep.points
-    twist = sweep.twist[points.load, points.position]
-    angle = sweep.angle[points.position] - 0.5 * mesh.ratio * twist
-    rows = rows_at(lines.law, angle + mesh.turns[0] * points.z + points.pair * mesh.sections.mesh_cycle)
-    force = points.line_load * points.weight * (-1.0 if gear == 0 else 1.0)
+    carries = points.weight > 0.0
+    z, position = points.z[carries], points.position[carries]
+    angle = sweep.angle[position] - 0.5 * mesh.ratio * sweep.twist[points.load[carries], position]
+    rows = rows_at(lines.law, angle + mesh.turns[0] * z + points.pair[carries] * mesh.sections.mesh_cycle)
+    force = (points.line_load * points.weight)[carries] * (-1.0 if gear == 0 else 1.0)
     k = len(lines.compliance.sides[gear].local.stations)
     values = lines.compliance.shapes.at(rows.arc)[:, gear, 0, :k]
-    along = legendre(points.z, mesh.zone, mesh.count)
+    along = legendre(z, mesh.zone, mesh.count)
     each = np.einsum("p,pk,pi,pn->pkin", force, values, rows.tooth_normal[:, gear], along, optimize=True)
     loads = np.zeros((count, *each.shape[1:]))
-    np.add.at(loads, of_point, each)
+    np.add.at(loads, of_point[carries], each)
     return loads

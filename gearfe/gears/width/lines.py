@@ -81,6 +81,12 @@ LEAST_ROLL = 0.2
 STIFFEST = 0.05
 #: Least twist beyond the first touch that points are placed for, in those of a usual stiffness.
 LEAST_AHEAD = 0.1
+#: Intervals between the places of a loaded part at which its line load is computed, for a stretch by the root of its
+#: share, and the least of a stretch.
+DENSE, LEAST_DENSE = 32, 4
+#: Steps to the line load of an approach, their change of its logarithm at the end, and the least approach looked for
+#: in parts of the largest.
+LOAD_STEPS, LOAD_SETTLED, LEAST_LEFT = 30, 1e-10, 1e-12
 #: Gauss points over the load of what a contact stores.
 ENERGY_POINTS = 5
 #: Least length (widths) of a stretch that begins or ends at a kink, and of a loaded part.
@@ -155,6 +161,16 @@ class Rows:
     yields: Array
     excess: Array
 
+    @cached_property
+    def slopes(self) -> Array:
+        """Slopes of the cubics between the loads of C, shape (n, loads)."""
+        return _slopes(self.yields)
+
+    @cached_property
+    def excess_slopes(self) -> Array:
+        """Slopes of the cubics between the loads of delta, shape (n, loads)."""
+        return _slopes(self.excess)
+
 
 def rows_at(law: PairLaw, angle: Array) -> Rows:
     """Tables of a pair's law, linear between their marks, at pair angles (rad), shape (n,)."""
@@ -213,16 +229,6 @@ class Points:
 
     def __len__(self) -> int:
         return len(self.z)
-
-    @cached_property
-    def slopes(self) -> Array:
-        """Slopes of the cubics between the loads of C, shape (n, loads)."""
-        return _slopes(self.rows.yields)
-
-    @cached_property
-    def excess_slopes(self) -> Array:
-        """Slopes of the cubics between the loads of delta, shape (n, loads)."""
-        return _slopes(self.rows.excess)
 
 
 def _slopes(values: Array) -> Array:
@@ -305,9 +311,14 @@ def look_at(lines: ContactLines, angle: float, twist: float = 0.0, runs: Runs | 
     kink = np.repeat([False, True, False], [z.size, len(places[1]), sum(map(len, places[2:]))])
     line, z = np.concatenate(lines_of), np.concatenate(places)
     order = np.lexsort((z, line))
-    line, z, kink = line[order], z[order], kink[order]
-    rows = rows_at(law, psi[line, 0] + turn * z)
-    return Looks(numbers[line], z, kink, rows, rows.touch + lines.gap(z, rows, numbers[line]) / mean_arm(lines, rows))
+    return _looks(lines, middle, numbers[line[order]], z[order], kink[order])
+
+
+def _looks(lines: ContactLines, middle: float, pair: IntArray, z: Array, kink: BoolArray) -> Looks:
+    """Look at places, where the pair angle of pair 0 at z = 0 is `middle` (rad)."""
+    mesh = lines.compliance.mesh
+    rows = rows_at(lines.law, middle + mesh.turns[0] * z + pair * mesh.sections.mesh_cycle)
+    return Looks(pair, z, kink, rows, rows.touch + lines.gap(z, rows, pair) / mean_arm(lines, rows))
 
 
 def _kinks(seams: Array, z: Array, psi: Array, turn: float, angle: Array, roll: Array) -> Array:
@@ -419,18 +430,25 @@ def place_points(lines: ContactLines, angle: float, twist: float, looks: Looks, 
     runs : Runs
         Loaded parts.
     """
-    mesh = lines.compliance.mesh
-    z, weight, pair, apart = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=np.int64)], LEAST_STRETCH * mesh.width
-    kinks, of_kinks = looks.z[looks.kink], looks.pair[looks.kink]
-    for k, start, end in zip(runs.pair.tolist(), runs.start.tolist(), runs.end.tolist(), strict=True):
-        inner = kinks[(of_kinks == k) & (kinks > start + apart) & (kinks < end - apart)].tolist()
-        for a, b in itertools.pairwise([start, *inner, end]):
-            x, w = _gauss(_count(lines, (b - a) / mesh.width))
+    z, weight, pair = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=np.int64)]
+    for stretches in _divided(lines, looks, runs):
+        for k, a, b in stretches:
+            x, w = _gauss(_count(lines, (b - a) / lines.compliance.mesh.width))
             z.append(0.5 * (a + b) + 0.5 * (b - a) * x)
             weight.append(0.5 * (b - a) * w)
             pair.append(np.full(len(x), k))
     middle = _middle(lines, angle, twist)
     return _points(lines, middle, twist, np.concatenate(z), np.concatenate(weight), np.concatenate(pair))
+
+
+def _divided(lines: ContactLines, looks: Looks, runs: Runs) -> list[list[tuple[int, float, float]]]:
+    """Return the stretches between kinks of each loaded part: tooth pair, first and last z (m)."""
+    kinks, of_kinks, apart = looks.z[looks.kink], looks.pair[looks.kink], LEAST_STRETCH * lines.compliance.mesh.width
+    parts = []
+    for k, start, end in zip(runs.pair.tolist(), runs.start.tolist(), runs.end.tolist(), strict=True):
+        inner = kinks[(of_kinks == k) & (kinks > start + apart) & (kinks < end - apart)].tolist()
+        parts.append([(k, a, b) for a, b in itertools.pairwise([start, *inner, end])])
+    return parts
 
 
 def _count(lines: ContactLines, share: float) -> int:
@@ -448,7 +466,7 @@ def _points(lines: ContactLines, middle: float, twist: float, z: Array, weight: 
     rows = rows_at(law, middle + mesh.turns[0] * z + pair * mesh.sections.mesh_cycle)
     levers = np.concatenate([np.ones((len(z), 1)), lines.levers(z, rows) / rows.arm[:, None]], axis=1)
     first = rows.touch + lines.gap(z, rows, pair) / mean_arm(lines, rows)
-    rows = replace(rows, yields=_rising(rows.yields + _softer_ends(lines, z, rows), law.forces))
+    rows = _with_ends(lines, z, rows)
     loads = _loads(lines.compliance, z, rows)
     influence = _influence(lines.compliance, loads, pair) / (rows.arm[:, None] * rows.arm)
     return Points(z, weight, pair, rows, twist, _touch(lines, rows, first, twist), levers, loads, influence)
@@ -457,6 +475,11 @@ def _points(lines: ContactLines, middle: float, twist: float, z: Array, weight: 
 def _touch(lines: ContactLines, rows: Rows, first: Array, twist: float) -> Array:
     """Twist (rad) at which places touch, to first order from a twist (rad); `first`: that of their first contact."""
     return np.asarray(twist - mean_arm(lines, rows) * (twist - first) / rows.arm)
+
+
+def _with_ends(lines: ContactLines, z: Array, rows: Rows) -> Rows:
+    """Tables at z (m) with what free ends of the gears add to C."""
+    return replace(rows, yields=_rising(rows.yields + _softer_ends(lines, z, rows), lines.law.forces))
 
 
 def _softer_ends(lines: ContactLines, z: Array, rows: Rows) -> Array:
@@ -531,7 +554,7 @@ def _influence(compliance: WideCompliance, loads: list[Array], pair: IntArray) -
     return found
 
 
-def _approach_left(lines: ContactLines, looks: Looks, balance: _Balance) -> Array:
+def _approach_left(lines: ContactLines, looks: Looks, balance: _Balance | Solution) -> Array:
     """Twist (rad) left to the contacts themselves at the places looked at, shape (q,); that of rigid gears below 0."""
     compliance, points, rows = lines.compliance, balance.points, looks.rows
     mesh, force = compliance.mesh, balance.moment / points.rows.arm
@@ -558,22 +581,35 @@ def _approach_left(lines: ContactLines, looks: Looks, balance: _Balance) -> Arra
     return left
 
 
-def own_twists(law: PairLaw, points: Points, moment: Array) -> tuple[Array, Array]:
+def own_twists(law: PairLaw, rows: Rows, moment: Array) -> tuple[Array, Array]:
     """How contacts yield at moments per width (N), shape (n,): C f/r_2 (rad) and its derivative (rad per N)."""
-    force, spacing = moment / points.rows.arm, math.log(law.forces[1] / law.forces[0])
+    force, spacing = moment / rows.arm, math.log(law.forces[1] / law.forces[0])
     x = np.log(np.maximum(force / law.forces[0], 1e-9)) / spacing
-    share, slope, inside = _cubic(points.rows.yields, points.slopes, x)
+    share, slope, inside = _cubic(rows.yields, rows.slopes, x)
     slope = np.where(x > inside, 0.0, slope)  # beyond the forces of the table C stays, so that C f rises
     share = share + (x - inside) * slope
-    rate = np.maximum(share + slope / spacing, STIFFEST * points.rows.yields[:, 0])
-    return share * force / points.rows.arm, rate / points.rows.arm**2
+    rate = np.maximum(share + slope / spacing, STIFFEST * rows.yields[:, 0])
+    return share * force / rows.arm, rate / rows.arm**2
+
+
+def _load_of(law: PairLaw, rows: Rows, left: Array) -> Array:
+    """Force per width (N/m) with which contacts yield by twists `left` to them (rad), shape (n,); 0 for none."""
+    target = np.maximum(left, LEAST_LEFT * left.max(initial=0.0) + 1e-300)
+    moment, change = target * rows.arm**2 / rows.yields[:, 0], math.inf
+    for _ in range(LOAD_STEPS):  # of the logarithm of the load, with which that of C f is nearly straight
+        twist, rate = own_twists(law, rows, moment)
+        step = np.log(target / twist) * twist / (rate * moment)
+        moment, change = moment * np.exp(step), np.abs(step).max(initial=0.0)
+        if change < LOAD_SETTLED:
+            break
+    return np.where(left > 0.0, moment / rows.arm, 0.0)
 
 
 def wheel_moments(law: PairLaw, points: Points, moment: Array) -> tuple[Array, Array]:
     """Moments of the points on the wheel (1 + delta) m (N m), and their derivatives with m = `moment`, shape (n,)."""
     force, spacing = moment / (points.weight * points.rows.arm), math.log(law.forces[1] / law.forces[0])
     x = np.log(np.maximum(force / law.forces[0], 1e-9)) / spacing
-    excess, slope, inside = _cubic(points.rows.excess, points.excess_slopes, x)
+    excess, slope, inside = _cubic(points.rows.excess, points.rows.excess_slopes, x)
     slope = np.where(x == inside, slope, 0.0)  # beyond the forces of the table delta stays
     return (1.0 + excess) * moment, 1.0 + excess + slope / spacing
 
@@ -606,6 +642,8 @@ class Solution:
         Moments of the points on the wheel (N m), whose sum is the torque.
     runs
         Loaded parts of the lines.
+    looks
+        Looks at the lines, with the kinks that divide these.
     tangent : ndarray, shape (3, 3)
         Torque and moments of the tilts by twist, tilt in the plane of action and tilt across (N m/rad).
     converged
@@ -619,6 +657,7 @@ class Solution:
     moment: Array
     wheel_moment: Array
     runs: Runs
+    looks: Looks
     tangent: Array
     converged: bool
     steps: int
@@ -647,6 +686,51 @@ class Solution:
                 end[i] += share * (end[i] - before.runs.end[j])
         twist = self.twist + share * (self.twist - before.twist)
         return replace(self, twist=twist, runs=Runs(self.runs.pair, start, end))
+
+
+def line_load(lines: ContactLines, angle: float, solution: Solution) -> tuple[Looks, Array]:
+    """Return places along the loaded parts of a solved position, their ends and kinks too, and the line loads (N/m).
+
+    The line load is the force per width with which the contact yields by the approach that is left to it, as at the
+    points of the lines. Where it is larger than on both sides, the place is the vertex of the parabola through all
+    three, except at kinks.
+
+    Parameters
+    ----------
+    lines : ContactLines
+        The gears.
+    angle : float
+        Pinion angle (rad).
+    solution : Solution
+        The position.
+    """
+    pair, z, kink = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], [np.zeros(0, dtype=bool)]
+    for stretches in _divided(lines, solution.looks, solution.runs):
+        whole = stretches[-1][2] - stretches[0][1]
+        for i, (k, a, b) in enumerate(stretches):
+            intervals = max(LEAST_DENSE, math.ceil(DENSE * math.sqrt((b - a) / whole)))
+            x = _dense(intervals)[min(i, 1) :]  # a kink once
+            pair.append(np.full(len(x), k))
+            z.append(a + (b - a) * x)
+            kink.append((x == 0.0) | (x == 1.0))
+    middle = _middle(lines, angle, solution.points.twist)
+    looks = _looks(lines, middle, np.concatenate(pair), np.concatenate(z), np.concatenate(kink))
+    left = _approach_left(lines, looks, solution)
+    load = _load_of(lines.law, _with_ends(lines, looks.z, looks.rows), left)
+    tops = np.flatnonzero((load[1:-1] >= load[:-2]) & (load[1:-1] > load[2:]) & ~looks.kink[1:-1]) + 1
+    before, top, behind = (looks.z[tops + i] for i in (-1, 0, 1))
+    rise, fall = (load[tops] - load[tops - 1]) / (top - before), (load[tops + 1] - load[tops]) / (behind - top)
+    bend = (fall - rise) / (behind - before)
+    vertex = 0.5 * (before + top - rise / bend)
+    load[tops] += (vertex - top) * (rise + bend * (vertex - before))
+    looks.z[tops] = vertex
+    return _looks(lines, middle, looks.pair, looks.z, looks.kink), load
+
+
+@cache
+def _dense(count: int) -> Array:
+    """Ends of so many intervals from 0 to 1, close to each other at both."""
+    return np.asarray(0.5 - 0.5 * np.cos(math.pi * np.arange(count + 1) / count))
 
 
 def solve_position(
@@ -700,8 +784,9 @@ def solve_position(
             balance = _newton(lines, points, torque=torque, twist=twist, before=balance)
             steps, settled = steps + balance.steps, balance.converged
     if balance is None or runs is None:
-        return _solution(lines, _Balance(_nowhere(lines), math.nan, np.zeros(0), converged=False, steps=0), NO_RUNS, 0)
-    return _solution(lines, replace(balance, steps=steps, converged=settled), runs, number)
+        nothing = _Balance(_nowhere(lines), math.nan, np.zeros(0), converged=False, steps=0)
+        return _solution(lines, nothing, NO_RUNS, look_at(lines, angle), 0)
+    return _solution(lines, replace(balance, steps=steps, converged=settled), runs, looks, number)
 
 
 def _nowhere(lines: ContactLines) -> Points:
@@ -747,7 +832,7 @@ def _newton(
     closed = CLOSED / lines.compliance.mesh.sections.wheel.base_radius
     while n and not converged and steps < STEPS:
         steps += 1
-        own, rate = own_twists(law, points, moment / weight)
+        own, rate = own_twists(law, points.rows, moment / weight)
         i = np.flatnonzero(loaded)
         system = points.influence[i[:, None], i]
         rate /= weight
@@ -785,11 +870,12 @@ def _newton(
     return _Balance(points, at, moment, converged, steps)
 
 
-def _solution(lines: ContactLines, balance: _Balance, runs: Runs, placings: int) -> Solution:
+def _solution(lines: ContactLines, balance: _Balance, runs: Runs, looks: Looks, placings: int) -> Solution:
     law, points, moment = lines.law, balance.points, balance.moment
     on_wheel, worth = wheel_moments(law, points, moment)
     tangent = _tangent(law, points, moment, worth)
-    return Solution(points, balance.twist, moment, on_wheel, runs, tangent, balance.converged, balance.steps, placings)
+    converged, steps = balance.converged, balance.steps
+    return Solution(points, balance.twist, moment, on_wheel, runs, looks, tangent, converged, steps, placings)
 
 
 def _density(before: _Balance | Solution, points: Points) -> Array:
@@ -809,7 +895,7 @@ def _tangent(law: PairLaw, points: Points, moment: Array, worth: Array) -> Array
     i = np.flatnonzero(moment > 0)
     if len(i) == 0:
         return np.zeros((3, 3))
-    rate = own_twists(law, points, moment / points.weight)[1]
+    rate = own_twists(law, points.rows, moment / points.weight)[1]
     system = points.influence[i[:, None], i]
     system.flat[:: len(i) + 1] += rate[i] / points.weight[i]
     levers = points.levers[i] * np.stack([worth[i], np.ones(len(i)), np.ones(len(i))], axis=1)
@@ -822,6 +908,6 @@ def stored_energy(law: PairLaw, solution: Solution) -> float:
     x, w = _gauss(ENERGY_POINTS)
     per_width = moment / points.weight
     parts = zip(0.5 * (x + 1.0), 0.5 * w, strict=True)
-    complementary = sum((b * own_twists(law, points, a * per_width)[0] for a, b in parts), np.zeros(len(points)))
-    own = own_twists(law, points, per_width)[0] - complementary
+    complementary = sum((b * own_twists(law, points.rows, a * per_width)[0] for a, b in parts), np.zeros(len(points)))
+    own = own_twists(law, points.rows, per_width)[0] - complementary
     return float(own @ moment + 0.5 * moment @ points.influence @ moment)

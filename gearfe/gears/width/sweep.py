@@ -27,7 +27,7 @@ from ...base.errors import InputError
 from ...base.progress import Stopwatch, one_thread
 from ...base.typing import Array, IntArray
 from ..geometry.validity import MOST_YIELD
-from .lines import ContactLines, Solution, look_at, solve_position
+from .lines import ContactLines, Solution, line_load, look_at, solve_position
 
 #: Pinion angles of a mesh cycle where none are given; places along the width of the mean load.
 ANGLES, ALONG = 24, 65
@@ -39,7 +39,9 @@ CONVERGED, NOT_CONVERGED, NO_CONTACT = "converged", "not_converged", "no_contact
 
 @dataclass(frozen=True)
 class LinePoints:
-    """Loaded points of all positions, p of them, by position, tooth pair and z.
+    """Points on the loaded parts of all lines, p of them, by load, position, tooth pair and z.
+
+    Gauss points carry the forces. Places between them, at ends and kinks too, have no length: they show the line load.
 
     Attributes
     ----------
@@ -48,7 +50,7 @@ class LinePoints:
     pair : ndarray, shape (p,)
         Tooth pair k: pinion tooth k, wheel tooth -1 - k.
     z, weight : ndarray, shape (p,)
-        Axial coordinate, and the length along z that the point has of its line (m).
+        Axial coordinate, and the length along z whose force the point carries, or 0 (m).
     roll : ndarray, shape (p, 2)
         Roll lengths on pinion and wheel (m).
     line_load : ndarray, shape (p,)
@@ -232,24 +234,19 @@ def _assembled(
     records = []
     for cell in np.ndindex(shape):
         solution = solved[cell[0]][cell[1]]
-        points = solution.points
-        loaded = np.flatnonzero(solution.moment > 0)
         if not solution.converged:
             status[cell] = NOT_CONVERGED if math.isfinite(solution.twist) else NO_CONTACT
             continue
-        if len(loaded) == 0:
-            status[cell] = NO_CONTACT
         torque[cell], twist[cell], tangent[cell] = solution.torque, solution.twist, solution.tangent
         force[cell], moment[cell] = resultants(lines, solution)
-        line_load = solution.moment / (points.weight * points.rows.arm)
-        peak[cell] = line_load.max(initial=0.0)
-        if len(loaded):
-            most = int(np.argmax(line_load))
-            peak_z[cell], peak_pair[cell] = points.z[most], points.pair[most]
-            peak_roll[cell] = points.rows.roll[most]
-        record = [np.full(len(loaded), cell[0]), np.full(len(loaded), cell[1]), points.pair[loaded], points.z[loaded]]
-        record += [points.weight[loaded], points.rows.roll[loaded], line_load[loaded]]
-        records.append(record)
+        if not (solution.moment > 0).any():
+            status[cell], peak[cell] = NO_CONTACT, 0.0
+            continue
+        pair, z, weight, roll, per_width = _along_lines(lines, float(angles[cell[1]]), solution)
+        most = int(np.argmax(per_width))
+        peak[cell], peak_z[cell], peak_pair[cell], peak_roll[cell] = per_width[most], z[most], pair[most], roll[most]
+        load, position = (np.full(len(z), number) for number in cell)
+        records.append([load, position, pair, z, weight, roll, per_width])
     empty = [np.zeros(0, dtype=np.int64)] * 3 + [np.zeros(0)] * 2 + [np.zeros((0, 2)), np.zeros(0)]
     points_ = LinePoints(*(np.concatenate(arrays) for arrays in zip(*(records or [empty]), strict=True)))
     factors = [_load_factors(lines, angles, points_, number) for number in range(len(solved))]
@@ -273,6 +270,17 @@ def _assembled(
     )
 
 
+def _along_lines(lines: ContactLines, angle: float, solution: Solution) -> tuple[Array, ...]:
+    """Tooth pairs, z, lengths, roll lengths and line loads of a position: its points, and places between them."""
+    points, (looks, between) = solution.points, line_load(lines, angle, solution)
+    at_points = solution.moment / (points.weight * points.rows.arm)
+    pair, z = np.concatenate([points.pair, looks.pair]), np.concatenate([points.z, looks.z])
+    weight = np.concatenate([points.weight, np.zeros(len(looks.z))])
+    roll, load = np.concatenate([points.rows.roll, looks.rows.roll]), np.concatenate([at_points, between])
+    order = np.lexsort((z, pair))
+    return pair[order], z[order], weight[order], roll[order], load[order]
+
+
 def resultants(lines: ContactLines, solution: Solution) -> tuple[Array, Array]:
     """Return the force on the wheel (N), shape (3,), and the moments on both gears (N m), shape (2, 3)."""
     mesh, points = lines.compliance.mesh, solution.points
@@ -293,7 +301,7 @@ def resultants(lines: ContactLines, solution: Solution) -> tuple[Array, Array]:
 def mean_line_load(points: LinePoints, load: int, along: Array, positions: int) -> Array:
     """Return the load per width of all tooth pairs at places along z, the mean of positions (N/m), shape (k,).
 
-    It runs straight between the points of each line, over the lengths that these have.
+    It runs straight between the points of each line.
 
     Parameters
     ----------
@@ -311,26 +319,23 @@ def mean_line_load(points: LinePoints, load: int, along: Array, positions: int) 
     line = np.stack([points.position[of_load], points.pair[of_load]])
     for one in np.unique(line, axis=1).T:
         chosen = of_load[(line == one[:, None]).all(axis=0)]
-        mean += load_along(points.z[chosen], points.weight[chosen], points.line_load[chosen], along)
+        mean += load_along(points.z[chosen], points.line_load[chosen], along)
     return mean / max(1, positions)
 
 
-def load_along(z: Array, weight: Array, line_load: Array, along: Array) -> Array:
+def load_along(z: Array, line_load: Array, along: Array) -> Array:
     """Return the line load of one line of contact at places along the width (N/m), shape (k,).
 
-    It runs straight between the loaded points, over the lengths that these have, and is zero beyond.
+    It runs straight between the points, and is zero beyond.
 
     Parameters
     ----------
-    z, weight, line_load : ndarray, shape (n,)
-        Places of the points, their lengths (m), and their loads (N/m).
+    z, line_load : ndarray, shape (n,)
+        Rising places of the points (m), and their loads (N/m).
     along : ndarray, shape (k,)
         Places (m).
     """
-    order = np.argsort(z)
-    z, reach = z[order], 0.5 * weight[order]
-    inside = (along >= z[0] - reach[0]) & (along <= z[-1] + reach[-1])
-    return np.where(inside, np.interp(along, z, line_load[order]), 0.0)
+    return np.interp(along, z, line_load, left=0.0, right=0.0)
 
 
 def _load_factors(lines: ContactLines, angles: Array, points: LinePoints, load: int) -> tuple[float, float]:
@@ -341,8 +346,8 @@ def _load_factors(lines: ContactLines, angles: Array, points: LinePoints, load: 
     along = np.linspace(*mesh.zone, ALONG)
     loaded = np.unique(points.position[of_load])
     mean = mean_line_load(points, load, along, len(loaded))
-    face = float(mean.max() / np.trapezoid(mean, along) * mesh.width)
     force = np.bincount(points.position[of_load], (points.line_load * points.weight)[of_load], len(angles))[loaded]
+    face = float(mean.max() * mesh.width / force.mean())
     length = np.array([_line_length(lines, angle) for angle in angles[loaded].tolist()])
     even = float(np.divide(force, length, out=np.zeros_like(force), where=length > 0.0).max())
     return face, float(points.line_load[of_load].max()) / even / face if even > 0.0 else math.nan
