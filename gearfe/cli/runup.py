@@ -22,6 +22,12 @@ KEYS = (
     "multiples",
     "shaft_multiples",
 )
+#: Bifurcations in words.
+MEANING = {
+    "turning point": "turning points of the steady motion (jumps)",
+    "period doubling": "loss of stability with twice the period (period doubling)",
+    "Neimark-Sacker": "loss of stability with a new frequency (Neimark-Sacker bifurcation)",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -95,7 +101,7 @@ def _report_lines(summary: dict[str, Any]) -> list[str]:
     changes: dict[str, list[str]] = {}
     for change in summary["bifurcations"]:
         changes.setdefault(change["kind"], []).append(f"{change['speed_rad_per_s']:.6g}")
-    lines += [f"{kind} at {', '.join(speeds)} rad/s" for kind, speeds in changes.items()]
+    lines += [f"{MEANING.get(kind, kind)} at {', '.join(speeds)} rad/s" for kind, speeds in changes.items()]
     factors, open_shares = summary["largest_dynamic_factor"], summary["largest_share_without_contact"]
     for i, (name, factor, open_) in enumerate(zip(summary["mesh_names"], factors, open_shares, strict=True)):
         parts = []
@@ -108,7 +114,7 @@ def _report_lines(summary: dict[str, Any]) -> list[str]:
     for peak in summary["peaks"][:6]:
         where = f"{peak['order']} at {peak['frequency_Hz']:.0f} Hz"
         if peak["mode"] is None:
-            beside = f"{where} grows most, and meets no mode within {100.0 * peak['searched_within']:g} % of the speed"
+            beside = f"{where} dominates, and meets no mode within {100.0 * peak['searched_within']:g} % of the speed"
             lines.append(f"peak at {peak['speed_rad_per_s']:.6g} rad/s: {beside}; {_factor(peak)}")
         else:
             met = f"{where} meets {peak['mode']}, {peak['mode_frequency_Hz']:.0f} Hz"

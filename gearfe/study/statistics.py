@@ -287,7 +287,7 @@ def pareto_set(values: Array) -> IntArray:
 def report_lines(summary: Mapping[str, Any]) -> list[str]:
     """Lines for the terminal."""
     statuses = ", ".join(f"{n} {status}" for status, n in summary["statuses"].items())
-    lines = [f"{summary['cases']} cases: {statuses}; {summary['seconds_of_all_cases']:.3g} s of work"]
+    lines = [f"{summary['cases']} cases: {statuses}; {summary['seconds_of_all_cases']:.3g} s of computing time"]
     for name, one in summary["outputs"].items():
         if not one["solved"]:
             lines.append(f"{name}: no case has a value")
@@ -310,7 +310,7 @@ def _effects(one: Mapping[str, Any]) -> list[str]:
     morris = one.get("morris")
     if morris:
         sizes = sorted(morris.items(), key=lambda item: -item[1]["mean_size"])
-        parts = [f"{name} {e['mean_size']:.3g} (deviation {e['deviation']:.2g})" for name, e in sizes[:4]]
+        parts = [f"{name} {e['mean_size']:.3g} (standard deviation {e['deviation']:.2g})" for name, e in sizes[:4]]
         return ["  elementary effects, mean size: " + ", ".join(parts)]
     sobol, change = one.get("sobol"), one["effects"]["change"]
     if sobol:
@@ -321,7 +321,8 @@ def _effects(one: Mapping[str, Any]) -> list[str]:
         return []
     largest = sorted(change.items(), key=lambda item: -abs(item[1]))[:4]
     parts = [f"{name} {value:+.3g}" for name, value in largest]
-    return [f"  change over a parameter's range: {', '.join(parts)} (linear, R2 {one['effects']['explained']:.2f})"]
+    explained = f"linear model, R2 {one['effects']['explained']:.2f}"
+    return [f"  change over the range of each parameter: {', '.join(parts)} ({explained})"]
 
 
 def _share(found: Mapping[str, Any]) -> str:

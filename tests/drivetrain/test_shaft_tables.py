@@ -153,7 +153,7 @@ def test_the_command_reports_shafts_and_misalignment(tmp_path: Path, capsys: pyt
     assert "shaft in: elastic" in said
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     mesh = summary["misalignment"]["a-b"]
-    assert f"mesh a-b: misalignment f_sh {mesh['f_sh_um']:.3g} um over 12 mm" in said
+    assert f"mesh a-b: misalignment in the plane of action, f_sh: {mesh['f_sh_um']:.3g} um over 12 mm" in said
     (row,) = csv_rows(out / "misalignment.csv")
     assert row["mesh"] == "a-b"
     assert float(row["f_sh_um"]) == pytest.approx(mesh["f_sh_um"])

@@ -103,7 +103,8 @@ def shaft_lines(summary: Mapping[str, Any]) -> list[str]:
     for name, mesh in summary.get("misalignment", {}).items():
         parts = ", ".join(f"{part} {_shown(mesh[f'f_sh_by_{part}_um'])}" for part in PARTS)
         lines.append(
-            f"mesh {name}: misalignment f_sh {_shown(mesh['f_sh_um'])} um over {mesh['common_face_width_mm']:.4g} mm "
+            f"mesh {name}: misalignment in the plane of action, f_sh: "
+            f"{_shown(mesh['f_sh_um'])} um over {mesh['common_face_width_mm']:.4g} mm "
             f"({parts}), across the plane of action {_shown(mesh['across_um'])} um"
         )
     return lines

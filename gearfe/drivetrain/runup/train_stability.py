@@ -49,8 +49,8 @@ def why_not(model: TrainModel) -> str:
         (not len(model.modal.eigenvalues), "nothing can vibrate: rigid meshes in a rigid housing follow the drive"),
         (
             any(not (line.rigid or line.pulls) for line in model.meshes),
-            "the teeth may part, and which motion they settle to is open: `gearfe runup` finds the periodic motions "
-            "and the multipliers of each",
+            "teeth may separate, so a transient does not tell which periodic motion it approaches: `gearfe runup` "
+            "finds these motions and the multipliers of each",
         ),
     )
     return next((note for there, note in reasons if there), "")
