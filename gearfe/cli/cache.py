@@ -9,8 +9,9 @@ import os
 
 from .arguments import add_json
 
-#: Groups of kernels: both integrators of mechanisms, the series of a train and a mesh law; the longest first.
-KERNELS = ("taylor", "implicit", "train", "mesh law")
+#: Groups of kernels: both integrators of mechanisms, the series of a train, a mesh law and Floquet multipliers; the
+#: longest first.
+KERNELS = ("taylor", "implicit", "train", "mesh law", "multipliers")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -103,6 +104,11 @@ def _use(name: str) -> None:
         from ..gears.gearmesh.law_kernel import load_kernel
 
         load_kernel()
+        return
+    if name == "multipliers":
+        from ..drivetrain.runup import monodromy_kernel
+
+        monodromy_kernel.load_kernel()
         return
     from ..multibody import Body, Hinge, Linkage, System, constant, integrate
 

@@ -172,3 +172,27 @@ def test_undamped_rigid_train_can_be_unstable() -> None:
     assert found is not None
     # y'' + w^2 (1 + e cos 2 w t) y: growth exp(e w T/4) per period T of the stiffness, to first order in e
     assert abs(found[0]) == pytest.approx(math.exp(0.4 * math.pi / 4), rel=0.02)
+
+
+@pytest.mark.parametrize("damping", [[0.1, 0.3, 0.2], [0.1, 4.0, 0.2]], ids=["eigenvectors", "critically damped"])
+def test_several_forces_that_other_modes_yield_to_by_direct_integration(damping: list[float]) -> None:
+    """Four forces f = A(t) (S y + R f) on three modes; DOP853 integrates them with f from a linear system."""
+    rng = np.random.default_rng(5)
+    squares, D, period = np.array([1.0, 4.0, 9.0]), np.diag(damping), 1.3
+    W, S, R = rng.standard_normal((3, 4)), rng.standard_normal((3, 5)), 0.2 * rng.standard_normal((5, 4))
+    still, swinging = rng.standard_normal((2, 4, 5))
+
+    def strength(t: np.ndarray | float) -> np.ndarray:
+        return 0.3 * (still + swinging * np.cos(2.0 * math.pi * np.asarray(t) / period)[..., None, None])
+
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        A = strength(t)
+        force = np.linalg.solve(np.eye(4) - A @ R, A @ S.T @ y[:3])
+        return np.concatenate([y[3:], W @ force - squares * y[:3] - D @ y[3:]])
+
+    columns = [solve_ivp(rhs, (0, period), s, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1] for s in np.eye(6)]
+    expected = np.linalg.eigvals(np.array(columns).T)
+    constant, edges = flow(np.diag(squares), D, period), np.linspace(0.0, period, 65)
+    found = np.linalg.eigvals(monodromy(constant, edges, W, np.vstack([S, 0.0 * S]), strength(kick_times(edges)), R))
+    assert (constant.values is None) == (damping[1] == 4.0)
+    assert np.sort(np.abs(found)) == pytest.approx(np.sort(np.abs(expected)), rel=1e-7)

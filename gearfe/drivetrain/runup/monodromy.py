@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.typing import Array, ComplexArray
+from .monodromy_kernel import AT_ONCE, Kicks, run_kicks, scratch
 
 _B = (0.0829844064174052, 0.396309801498368, -0.0390563049223486)
 _A = (0.245298957184271, 0.604872665711080)
@@ -65,6 +66,26 @@ class Flow:
         matrix = expm(length * self.matrix).astype(complex)
         return lambda x: x @ (matrix if of_rows else matrix.T)
 
+    def factors(self, lengths: Array) -> tuple[Array, Array]:
+        """The flow over some times (s), of rows of coordinates in parts (.., 2 k).
+
+        Returns
+        -------
+        turns : ndarray, shape (lengths, 2 k)
+            Factors of the coordinates in parts; (0, 2 k) where the coordinates are the state itself.
+        moves : ndarray, shape (lengths, 2 k, 2 k)
+            Matrices that rows are multiplied by there; else (0, 2 k, 2 k).
+        """
+        width = 2 * len(self.into)
+        if self.values is not None:
+            return _parts(np.exp(lengths[:, None] * self.values)), np.zeros((0, width, width))
+        from scipy.linalg import expm
+
+        moves = np.zeros((len(lengths), width, width))  # imaginary parts are 0 and stay it
+        for move, length in zip(moves, lengths.tolist(), strict=True):
+            move[::2, ::2] = expm(length * self.matrix).T
+        return np.zeros((0, width)), moves
+
 
 def flow(stiffness: Array, damping: Array, period: float) -> Flow:
     """Flow of ``y'' = -stiffness y - damping y'``, matrices of shape (n, n)."""
@@ -91,7 +112,9 @@ def kick_times(edges: Array) -> Array:
     return edges[:-1, None] + np.diff(edges)[:, None] * PLACES[None, :]
 
 
-def monodromy(constant: Flow, edges: Array, directions: Array, reads: Array, strengths: Array) -> Array:
+def monodromy(
+    constant: Flow, edges: Array, directions: Array, reads: Array, strengths: Array, yields: Array | None = None
+) -> Array:
     """Return the map of the state (scale y, v) over the time of the steps.
 
     Within a step the coordinates are those of its begin: kicks are taken there by the flow, which so acts once. Where
@@ -109,13 +132,15 @@ def monodromy(constant: Flow, edges: Array, directions: Array, reads: Array, str
         What the periodic part depends on, as rows on (y, v).
     strengths : ndarray, shape (steps, stages, d, p)
         C at the kicks.
+    yields : ndarray, shape (p, d), optional
+        What other modes add to the reads at once under unit forces; by default nothing.
 
     Returns
     -------
     matrix : ndarray, shape (2n, 2n)
         Monodromy matrix.
     """
-    n = len(directions)
+    n, (seen, forces) = len(directions), (reads.shape[1], directions.shape[1])
     into = constant.into @ np.vstack([np.zeros_like(directions), directions])
     rows = (reads.T / np.concatenate([constant.scale, np.ones(n)])) @ constant.out
     length = (edges[-1] - edges[0]) / (len(edges) - 1)
@@ -123,19 +148,29 @@ def monodromy(constant: Flow, edges: Array, directions: Array, reads: Array, str
     x = np.ascontiguousarray(constant.into.T, dtype=complex)
     calm = constant.values is not None and length * float(np.abs(constant.values.real).max(initial=0.0)) < CALM
     begins, drifts = (PLACES, [*[0.0] * len(DRIFTS), 1.0]) if calm else (np.zeros(len(PLACES)), [*DRIFTS, 0.0])
-    seen = np.array([_parts(constant.over(length * place, of_rows=True)(rows).conj()).T for place in begins])
-    pushes = [_parts(constant.over(-length * place)(into.T)) for place in begins]
-    flows = {part: constant.over(length * part) for part in set(drifts)}
-    forces, more = np.empty((2 * n, directions.shape[1])), np.empty((2 * n, 2 * x.shape[1]))
-    for step in strengths.transpose(0, 1, 3, 2) * (length * KICKS[:, None, None]):
-        for read, push, drift in zip(seen @ step, pushes, drifts, strict=True):
-            parts = x.view(float)
-            np.dot(parts, read, out=forces)
-            np.dot(forces, push, out=more)
-            parts += more
-            if drift:
-                x = flows[drift](x)
-    return np.asarray((x @ constant.out.T).real.T)
+    parts, width = _parts(x), 2 * x.shape[1]
+    turns, moves = constant.factors(length * np.array(drifts))
+    run_kicks(
+        Kicks(
+            parts,
+            np.ascontiguousarray(strengths),
+            np.zeros((seen, forces)) if yields is None else np.ascontiguousarray(yields),
+            length * KICKS,
+            np.array([_parts(constant.over(length * place, of_rows=True)(rows).conj()) for place in begins]),
+            _padded(np.array([_parts(constant.over(-length * place)(into.T)) for place in begins])),
+            turns,
+            moves,
+            np.sign(drifts),
+            scratch(forces, seen, width),
+        )
+    )
+    return np.asarray((parts.view(complex) @ constant.out.T).real.T)
+
+
+def _padded(pushes: Array) -> Array:
+    """Pushes (K, d, w) with as many more forces, without effect, as make groups of `AT_ONCE`."""
+    stages, forces, width = pushes.shape
+    return np.concatenate([pushes, np.zeros((stages, -forces % AT_ONCE, width))], axis=1)
 
 
 def _parts(values: ComplexArray) -> Array:

@@ -234,9 +234,8 @@ def around(
     both = np.zeros((len(by.values), len(pushed), len(seen)))
     both[:, rows, columns] = by.values
     # what the other modes yield at once: u = P y + R f, f = A u
-    yields = others[:, seen[of_freedoms]].T @ (others[:, pushed] / linear.squares[~kept, None])
-    A = both[:, :, of_freedoms]
-    both[:, :, of_freedoms] = np.linalg.solve(np.eye(len(pushed)) - A @ yields, A)
+    yields = others[:, seen % linear.size].T @ (others[:, pushed] / linear.squares[~kept, None])
+    yields *= of_freedoms[:, None]
     by_step = both.reshape(len(both) // stages, stages, len(pushed), len(seen))
     reads = places[:, seen % linear.size]
     reads = np.vstack([reads * of_freedoms, reads * ~of_freedoms])
@@ -247,7 +246,7 @@ def around(
         constant = flow(stiffness[among], (D - speed * linear.gyroscopic)[among], edges[-1])
 
         def map_over(first: int, last: int) -> Array:
-            return monodromy(constant, edges[first : last + 1], places[:, pushed], reads, by_step[first:last])
+            return monodromy(constant, edges[first : last + 1], places[:, pushed], reads, by_step[first:last], yields)
 
         if span.half is None:
             return _sorted(map_over(0, len(edges) - 1), free, edges[-1])
