@@ -33,6 +33,7 @@ from .style import (
     RANGE_DB,
     RED,
     Band,
+    bars,
     fixed,
     headed,
     level,
@@ -169,7 +170,7 @@ def draw_power(
     top = float(loud[shown].max(initial=-300.0)) if shown.any() else 0.0
     bottom = max(top - 60.0, float(loud[shown].min(initial=300.0)) - 3.0) if shown.any() else -10.0
     width = 0.72 * float(np.median(np.diff(frequency)))
-    axes.bar(frequency[shown], loud[shown] - bottom, width=width, bottom=bottom, color=BLUE, linewidth=0)
+    bars(axes, frequency[shown], loud[shown], width, bottom, BLUE)
     axes.set_ylim(bottom, top + 0.18 * (top - bottom) + 1.0)
     axes.set_ylabel("radiated power level  (dB re 1 pW)")
     _draw_octaves(figure.add_axes((0.655, 0.175, 0.335, 0.615)), octaves)
@@ -183,11 +184,11 @@ def _draw_octaves(axes: Any, octaves: ThirdOctaves) -> None:
     top = float(np.nanmax(np.append(plain, -300.0)))
     bottom, places = top - 60.0, np.arange(len(plain))
     for values, colour, aside, name in ((plain, BLUE, -0.2, "plain"), (weighted, ORANGE, 0.2, "A-weighted")):
-        heights = np.maximum(values - bottom, 0.0)
-        axes.bar(places + aside, heights, width=0.4, bottom=bottom, color=colour, linewidth=0, label=name)
+        bars(axes, places + aside, np.maximum(values, bottom), 0.4, bottom, colour, name)
     axes.set_ylim(bottom, top + 9.0)
     axes.set_xlim(-0.7, max(len(plain), 1) - 0.3)
-    axes.set_xticks(places, octaves.names, rotation=60, fontsize=8)
+    axes.set_xticks(places, octaves.names)
+    axes.tick_params(axis="x", labelrotation=60, labelsize=8)
     axes.set_xlabel("third octave  (Hz)")
     axes.set_title("third octaves (IEC 61260-1), A-weighting by IEC 61672-1", fontsize=9, loc="left")
     axes.legend(fontsize=8.5, frameon=False, ncols=2, loc="upper left")
@@ -244,7 +245,9 @@ def _frequency_axes(
     turning = np.flatnonzero(response.shaft_frequencies_Hz)
     if len(turning) and settled(response):
         name, turns = response.shaft_names[turning[0]], 1e-3 * float(abs(response.shaft_frequencies_Hz[turning[0]]))
-        above = axes.secondary_xaxis("top", functions=(lambda f: f / turns, lambda order: order * turns))
+        above = axes.twiny()
+        above.spines[["left", "right", "bottom"]].set_visible(False)
+        above.set_xlim(ends[0] / turns, ends[1] / turns)
         above.set_xlabel(f'order of shaft "{name}"', fontsize=9)
         above.tick_params(labelsize=8.5)
     return axes

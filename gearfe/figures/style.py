@@ -30,11 +30,10 @@ REFERENCE, RANGE_DB = 1e-6, 70.0
 
 def new_figure(width: float, height: float) -> Any:
     """Empty figure (inches) on the Agg canvas."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    from .canvas import PictureCanvas, PictureFigure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = PictureFigure(figsize=(width, height), layout="constrained")
+    PictureCanvas(figure)
     return figure
 
 
@@ -166,6 +165,29 @@ def labelled(axes: Any, title: str, below: str) -> Any:
 def legend_beside(axes: Any) -> None:
     """Names of the curves to the right of the panel."""
     axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def bars(axes: Any, x: Array, tops: Array, width: float, bottom: float, colour: str, name: str | None = None) -> None:
+    """Draw bars between `bottom` and their tops as one object: 60 rectangles take 60 times as long.
+
+    Parameters
+    ----------
+    axes : Axes
+        The axes, with limits; changed.
+    x, tops : ndarray, shape (n,)
+        Middles and upper ends.
+    width, bottom : float
+        Width and lower end of all.
+    colour : str
+        Colour.
+    name : str, optional
+        Name in the legend.
+    """
+    from matplotlib.collections import PolyCollection
+
+    left, right, low = x - 0.5 * width, x + 0.5 * width, np.full(len(x), bottom)
+    corners = np.array([[left, right, right, left], [low, low, tops, tops]]).transpose(2, 1, 0)
+    axes.add_collection(PolyCollection(list(corners), facecolors=colour, linewidths=0.0, label=name))
 
 
 def some_of(count: int, most: int) -> IntArray:

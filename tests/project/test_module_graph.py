@@ -62,6 +62,7 @@ HEAVY = {
         "gearfe.figures.flanks",
         "gearfe.gears.gearmesh.width_job",
     ): "elastic teeth; for modifications along the width only",
+    ("gearfe.figures.style", "gearfe.figures.canvas"): "matplotlib's axes; imported when the first picture is drawn",
     ("gearfe.base.tables.mechanism", "gearfe.base.tables.parameters"): "numpy, of expressions; for parameters only",
     ("gearfe.base.tables.jobs", "gearfe.base.tables.carrier"): "40 ms for the tables of trains; for trains only",
     ("gearfe.base.tables.jobs", "gearfe.base.tables.train_gearbox"): "the same; for trains only",
