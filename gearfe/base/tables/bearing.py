@@ -159,7 +159,7 @@ class BearingTable:
             if sources:
                 problem = f"conflicts with {sources[0]}, which has the stiffness for tilt"
                 raise InputError(label, list(tilt), problem, "leave one out")
-            problem = "needs stiffness_N_per_m: a hinge without it holds the shaft and tilts freely"
+            problem = "needs stiffness_N_per_m: a bearing without it is rigid"
             raise InputError(label, list(tilt), problem, "add stiffness_N_per_m = [x, y, z]")
         for key in ("damping_N_s_per_m", "tilt_damping_Nm_s_per_rad"):
             if any(getattr(self, key)) and self.damping_matrix_N_m_s_rad is not None:
@@ -168,7 +168,7 @@ class BearingTable:
         for key in (DAMPING_MATRIX, "damping_N_s_per_m", "tilt_damping_Nm_s_per_rad"):
             value = getattr(self, key)
             if not sources and value is not None and any(x for x in value if x):
-                problem = "needs a stiffness: a hinge is rigid and has nothing to damp"
+                problem = "needs a stiffness: a rigid bearing has nothing to damp"
                 raise InputError(f"{where}.{key}", value, problem, "give the stiffness, or leave it out")
         for key in (MATRIX, DAMPING_MATRIX):
             if getattr(self, key) is not None:

@@ -31,7 +31,7 @@ class _Pins:
     pin_stiffness_N_per_m: float | tuple[float, ...] | None = quantity(
         None,
         doc="of each pin, radial and tangential (N/m), the other motions being held; or three numbers: radial, along "
-        "y, tangential (N/m); left out: hinges",
+        "y, tangential (N/m); left out: rigid pins",
     )
     pin_tilt_stiffness_Nm_per_rad: Two | None = quantity(  # noqa: RUF009
         None, low=0.0, doc="with three numbers: of two tilts (N m/rad); left out: 0, it tilts freely"
@@ -67,7 +67,7 @@ class _Pins:
                 problem = f"needs three numbers of {key}: with one, pins do not tilt"
                 raise InputError(f"{where}.{tilt}", list(tilts), problem, f"write {key} = [radial, y, tangential]")
             if not least and any((*numbers, *(tilts or ()))) and self.pin_stiffness_N_per_m is None:
-                problem = "is of pins with a stiffness, and these are hinges"
+                problem = "is of pins with a stiffness, and these are rigid"
                 cure = "add pin_stiffness_N_per_m, or leave it out"
                 raise InputError(f"{where}.{key}", written, problem, cure)
 

@@ -70,7 +70,7 @@ class NamedMeshTable(TrainMeshTable):
 class NamedShaftTable(ShaftTable):
     """A shaft; what carries it are its bearings, or attachments of the housing that hold it as hinges."""
 
-    attachments: tuple[int | str, ...] = quantity((), doc="attachments of the housing that carry it as hinges")
+    attachments: tuple[int | str, ...] = quantity((), doc="attachments of the housing that carry it in rigid bearings")
 
 
 @dataclass(frozen=True)

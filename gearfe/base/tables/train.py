@@ -559,7 +559,7 @@ class TrainBearingTable(BearingTable, _Bore):
         """Without a stiffness there would be no entry."""
         super().check(where)
         if self.hinge:
-            cure = f"give it, or {MATRIX}, or type; without an entry the bore is a hinge"
+            cure = f"give it, or {MATRIX}, or type; without an entry the bearing is rigid"
             raise InputError(f"{where}.stiffness_N_per_m", None, "is required", cure)
 
 

@@ -82,7 +82,7 @@ def _bearings(train: TrainTable, values: Mapping[tuple[str, str, str], Any]) -> 
                 values.get(("bearings", name, f"force_acting_on_outer_component_{axis}"), math.nan) for axis in "uvw"
             )
             bearing = given.get(name)
-            kind = "hinge" if bearing is None else (bearing.type or "springs").replace("_", " ")
+            kind = "rigid" if bearing is None else (bearing.type or "springs").replace("_", " ")
             rows.append([name, shaft.name, kind, _text(speed), _text(math.hypot(v, w)), _text(u)])
     head = ("bearing", "shaft", "kind", "speed (1/min)", "radial force (N)", "axial force (N)")
     note = "of the shaft on the bearing; housing rigid, mean mesh stiffness of ISO 6336-1, without weights"

@@ -297,6 +297,6 @@ def _checked(model: TrainModel, speeds: ArrayLike | Sequence[float]) -> Array:
         problem = "turns against the drive of the model, whose driving flanks are others"
         raise InputError("speeds", fastest, problem, "build the model with a drive of this sense")
     if not len(model.modal.eigenvalues):
-        problem = "cannot vibrate: rigid meshes and hinges in a rigid housing follow the drive"
+        problem = "cannot vibrate: rigid meshes and bearings in a rigid housing follow the drive"
         raise InputError("train", None, problem, "give a mesh or a bearing a stiffness, or take an elastic housing")
     return given

@@ -200,7 +200,7 @@ def _check_passes(train: GearTrain, carrier: Carrier) -> None:
     """In an elastic housing, shafts of a stage whose carrier turns are held by springs, and dampers are of parts."""
     for shaft in train.shafts:
         if carrier in train.frames_of(shaft.name) and shaft.bores and train.hinged(shaft.name):
-            problem = f"is held by a hinge in an elastic housing, and turns there with carrier {carrier.name!r}"
+            problem = f"is held by a rigid bearing in an elastic housing, and turns there with carrier {carrier.name!r}"
             cure = f"give its bearings a stiffness: {', '.join(shaft.bores)}"
             raise InputError(f"shaft {shaft.name!r} bearings", list(shaft.bores), problem, cure)
     if np.any(train.damping.ratio):
@@ -219,14 +219,14 @@ def _check_frame(train: GearTrain, shaft: Shaft, frames: list[Carrier]) -> None:
     if len(frames) > 1 or fixed:
         other = f"mesh {fixed[0]!r}, whose axes are fixed" if fixed else f"carrier {frames[1].name!r}"
         problem = f"moves in its bearings with carrier {frames[0].name!r} and with {other}, at different speeds"
-        cure = "part it into two shafts on one axis with [couplings.NAME] between them, or hold it in hinges"
+        cure = "part it into two shafts on one axis with [couplings.NAME] between them, or hold it in rigid bearings"
         raise InputError(label, None, problem, cure)
     for bearing in train.bearings:
         if bearing.bore not in shaft.bores:
             continue
         if isinstance(bearing.stiffness, BallBearing | RollerBearing):
             problem = f"carries shaft {shaft.name!r} of a planetary stage, whose load goes round with the carrier"
-            raise InputError(f"bearing {bearing.bore!r}", None, problem, "give its stiffness, or a hinge")
+            raise InputError(f"bearing {bearing.bore!r}", None, problem, "give its stiffness, or a rigid bearing")
         for key in ("stiffness_matrix", "damping_matrix"):
             matrix = getattr(bearing, key)
             if not np.allclose(_turned(matrix), matrix, rtol=0.0, atol=SAME * np.abs(matrix).max()):

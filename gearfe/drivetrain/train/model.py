@@ -379,7 +379,7 @@ def _check_held(model: TrainModel) -> None:
     sliding = slides.max() >= tilts.max()
     shaft = model.train.shafts[int(np.argmax(slides if sliding else tilts))]
     problem = "is held by nothing along its axis, and the axial force of its helical gears moves it without end"
-    cure = "give one of its bearings a stiffness along the axis, or leave it out for a hinge"
+    cure = "give one of its bearings a stiffness along the axis, or leave it out for a rigid bearing"
     if not sliding:
         problem = "is held by nothing against tilting, and the forces of its gears tilt it without end"
         cure = "give it a second bearing, or one of its bearings a stiffness against tilting"

@@ -222,7 +222,7 @@ def _pins(reading: Reading, entry: dict[str, Any], planet: str, where: str) -> N
         entry["pin_stiffness_N_per_m"] = total
         reading.derived(shaft, "bearings", f"{where}.pin_stiffness_N_per_m", "sum of the bearings of a planet")
     else:
-        reading.derived(shaft, "bearings", where, "rigid bearings of the planets: pins are hinges")
+        reading.derived(shaft, "bearings", where, "rigid bearings of the planets: pins are rigid")
 
 
 def _absorb(
