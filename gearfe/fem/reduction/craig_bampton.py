@@ -92,24 +92,27 @@ def partition(stiffness: Any, mass: Any, interface: Any, internal: IntArray) -> 
         Rows that are free and in no interface.
     """
     boundary = np.asarray(interface.toarray() if sparse.issparse(interface) else interface, dtype=float)
+    moved = np.flatnonzero(boundary.any(axis=1))  # few rows, which are the columns of a symmetric matrix, too
     found = []
     for matrix in (stiffness, mass):
-        product = np.asarray(matrix @ boundary)
+        product = np.asarray(_submatrix(matrix, moved, square=False).T @ boundary[moved])
         found.append((_submatrix(matrix, internal), product[internal], _symmetric(boundary.T @ product)))
     (k_ii, k_ib, k_bb), (m_ii, m_ib, m_bb) = found
     return Partition(boundary, internal, k_ii, m_ii, k_ib, m_ib, k_bb, m_bb)
 
 
-def _submatrix(matrix: Any, rows: IntArray) -> Any:
-    """These rows and columns of a sparse matrix; blocks (BSR) stay blocks where the rows are whole ones."""
+def _submatrix(matrix: Any, rows: IntArray, *, square: bool = True) -> Any:
+    """These rows, and if `square` columns, of a sparse matrix; blocks (BSR) stay blocks where the rows are whole."""
     width = matrix.blocksize[0] if matrix.format == "bsr" else 1
     chosen = rows[::width] // width
     if width == 1 or not np.array_equal(rows, (width * chosen[:, None] + np.arange(width)).ravel()):
-        return sparse.csr_array(matrix)[rows][:, rows]
+        chosen = sparse.csr_array(matrix)[rows]
+        return chosen[:, rows] if square else chosen
     nodes = len(matrix.indptr) - 1
     blocks = sparse.csr_array((np.arange(len(matrix.indices)), matrix.indices, matrix.indptr), shape=(nodes, nodes))
-    blocks = blocks[chosen][:, chosen]
-    return sparse.bsr_array((matrix.data[blocks.data], blocks.indices, blocks.indptr), shape=(len(rows),) * 2)
+    blocks = blocks[chosen][:, chosen] if square else blocks[chosen]
+    shape = len(rows), len(rows) if square else matrix.shape[1]
+    return sparse.bsr_array((matrix.data[blocks.data], blocks.indices, blocks.indptr), shape=shape)
 
 
 @one_thread()
@@ -166,8 +169,12 @@ def reduce_model(
         )
     added, left = _corrections(factor, m_ii, modes.vectors, coupling, corrections if m else 0)
     inner = np.concatenate([modes.vectors, added], axis=1)
-    # principal axes of the whole inner space: the projection is exact whatever the modes' last digits are
-    eigenvalues, axes = np.linalg.eigh(_symmetric(inner.T @ (k_ii @ inner)))
+    # principal axes of the whole inner space: of the modes' residuals only the square is lost, some 1e-10
+    with_added = inner.T @ np.asarray(k_ii @ added)
+    energy = np.diag(np.append(modes.eigenvalues, np.zeros(added.shape[1])))
+    energy[:, len(modes.eigenvalues) :] = with_added
+    energy[len(modes.eigenvalues) :] = with_added.T
+    eigenvalues, axes = np.linalg.eigh(_symmetric(energy))
     inner = inner @ axes
     truncation = left
     if corrections and m:  # of the next level only what is K-orthogonal to the vectors kept
