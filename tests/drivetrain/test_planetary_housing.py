@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -16,7 +19,7 @@ from gearfe.drivetrain.modes.whirl import train_modes
 from gearfe.drivetrain.runup.critical import critical_speeds
 from gearfe.drivetrain.runup.orders import orders
 from gearfe.drivetrain.runup.report import phases
-from gearfe.drivetrain.runup.run_up import run_up, steady_state
+from gearfe.drivetrain.runup.run_up import RunUp, run_up, steady_state
 from gearfe.drivetrain.train import Damping, Drive, GearTrain, Guide, TrainResponse, build_train, simulate
 from gearfe.drivetrain.train.model import TrainModel
 from gearfe.drivetrain.train.states import TrainStates, train_states
@@ -279,7 +282,25 @@ def test_a_carrier_that_stands_still_needs_no_turning() -> None:
 
 
 def test_what_an_elastic_housing_refuses_is_named() -> None:
-    with pytest.raises(InputError, match="hinge in an elastic housing"):
+    with pytest.raises(InputError, match="rigid bearing in an elastic housing"):
         build_train(in_housing(stage(3, (31, 35), bearing=None)))
     with pytest.raises(InputError, match="damping ratio"):
         build_train(in_housing(stage(3, (31, 35), damping=Damping(ratio=0.05))))
+
+
+def test_sidebands_of_slow_differences_are_folded() -> None:
+    """Two mesh frequencies of 10 and 9 orders and a carrier of 2: each sum of few of them has one line."""
+    system = SimpleNamespace(turns=(0.1, 1.0 / 9.0, 0.5), orders=((1, 0, 0), (0, 1, 0)))
+    run = SimpleNamespace(train=SimpleNamespace(system=system, passes={2: ("carrier arm", 3)}))
+    cuts = orders(cast(RunUp, run), 2)
+    expected = set()
+    for a, b, c in itertools.product(range(-2, 3), range(-2, 3), range(-3, 4)):
+        if abs(a) + abs(b) <= 2 and 10 * a + 9 * b + 2 * c > 0:
+            expected.add((a, b, c))
+    assert {cut.waves for cut in cuts} == expected
+    assert len(cuts) == len(expected)
+    for cut in cuts:
+        a, b, c = cut.waves
+        assert cut.order == pytest.approx(10 * a + 9 * b + 2 * c, abs=1e-12)
+    (slow,) = [cut for cut in cuts if cut.waves == (-1, 1, 1)]
+    assert slow.names == ("1 x mesh 2 + 1 x carrier arm - 1 x mesh 1",)

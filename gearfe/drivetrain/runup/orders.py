@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,8 @@ from .run_up import RunUp
 COMBINED = 5
 #: Orders nearer to each other, relatively, are one.
 ROUND_OFF = 1e-9
+#: Frequencies that are added: multiples and names.
+Parts = Sequence[tuple[int, str]]
 
 
 class OrderCut(NamedTuple):
@@ -77,49 +79,52 @@ def orders(run: RunUp, multiples: int) -> list[OrderCut]:
     ways: list[list[tuple[int, int]]] = [[(0, 0)] for _ in system.turns]
     for mesh, cycles in enumerate(system.orders):
         ways[int(np.argmax(cycles))] += [(sign * a, mesh) for a in range(1, multiples + 1) for sign in (1, -1)]
-    found: dict[tuple[int, ...], list[tuple[int, str, int | None]]] = {}
+    found: dict[tuple[int, ...], list[tuple[int, Parts, int | None]]] = {}
     for taken in itertools.product(*ways):
         parts = [(a, mesh) for a, mesh in taken if a]
         waves = np.sum([a * np.array(system.orders[mesh]) for a, mesh in parts], axis=0, dtype=int)
         size = sum(abs(a) for a, _ in parts)
         if parts and size <= multiples and waves @ (1.0 / np.array(system.turns)) > 0.0:
             alone = parts[0][1] if len(parts) == 1 else None
-            found.setdefault(tuple(waves.tolist()), []).append((size, _combined(parts), alone))
-    made = []
+            named = [(a, f"mesh {mesh + 1}") for a, mesh in parts]
+            found.setdefault(tuple(waves.tolist()), []).append((size, named, alone))
+    made, of_meshes = list[OrderCut](), dict[tuple[int, ...], Parts]()
     for k, met in found.items():
         rising = sorted(met, key=lambda x: x[0])
         order = float(np.sum(np.array(k) / np.array(system.turns)))
-        made.append(OrderCut(k, order, tuple(name for _, name, _ in rising), rising[0][2]))
-    return sorted([*made, *_sidebands(run, made)], key=lambda cut: cut.order)
+        made.append(OrderCut(k, order, tuple(_combined(parts) for _, parts, _ in rising), rising[0][2]))
+        of_meshes[k] = rising[0][1]
+    return sorted([*made, *_sidebands(run, of_meshes)], key=lambda cut: cut.order)
 
 
-def _sidebands(run: RunUp, cuts: Sequence[OrderCut]) -> list[OrderCut]:
-    """Sidebands of orders, and orders of the carriers alone: of up to as many rotations as a carrier has planets."""
+def _sidebands(run: RunUp, of_meshes: Mapping[tuple[int, ...], Parts]) -> list[OrderCut]:
+    """Return the sidebands of orders, and orders of the carriers alone: up to as many rotations as it has planets.
+
+    A difference of mesh frequencies may be slower than the carrier. Its sideband then has the opposite sign: a line of
+    the order n - c < 0 is one of c - n.
+    """
     turns, passes = np.array(run.train.system.turns), run.train.passes
-    none = OrderCut((0,) * len(turns), 0.0, (), None)
     made = list[OrderCut]()
     for shifts in itertools.product(*(range(-planets, planets + 1) for _, planets in passes.values())):
         waves = np.zeros(len(turns), dtype=int)
         waves[list(passes)] = shifts
-        shift = float(np.sum(waves / turns))
-        more = "".join(
-            f" {'-' if k < 0 else '+'} {abs(k)} x {name}"
-            for k, (name, _) in zip(shifts, passes.values(), strict=True)
-            if k
-        )
-        for cut in (none, *cuts) if any(shifts) else ():
-            if cut.order + shift > 0.0:
-                name = "".join(cut.names[:1]) + more
-                k = tuple((np.array(cut.waves) + waves).tolist())
-                made.append(OrderCut(k, cut.order + shift, (name.removeprefix(" + ").strip(),), None))
+        carriers = [(k, name) for k, (name, _) in zip(shifts, passes.values(), strict=True) if k]
+        none: tuple[tuple[int, ...], int, Parts] = (0,) * len(turns), 1, []
+        around = [none] + [(k, sign, parts) for k, parts in of_meshes.items() for sign in (1, -1)]
+        for k, sign, parts in around if carriers else ():
+            summed = sign * np.array(k) + waves
+            order = float(np.sum(summed / turns))
+            if order > 0.0:
+                name = _combined([*((sign * a, name) for a, name in parts), *carriers])
+                made.append(OrderCut(tuple(summed.tolist()), order, (name,), None))
     return made
 
 
-def _combined(parts: Sequence[tuple[int, int]]) -> str:
+def _combined(parts: Parts) -> str:
     """``2 x mesh 1 - 1 x mesh 2``; what is added stands first."""
     said = ""
-    for a, mesh in sorted(parts, key=lambda part: part[0] < 0):
-        said += (" - " if a < 0 else " + " if said else "") + f"{abs(a)} x mesh {mesh + 1}"
+    for a, name in sorted(parts, key=lambda part: part[0] < 0):
+        said += (" - " if a < 0 else " + " if said else "") + f"{abs(a)} x {name}"
     return said
 
 
