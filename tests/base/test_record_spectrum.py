@@ -199,3 +199,9 @@ def test_the_power_of_a_fast_motion():
     assert power.power[14] == pytest.approx(0.5 * 1.2041 * 343.21 * 2e-3 * 0.02**2, rel=1e-9)
     assert np.delete(power.power, 14).max() < 1e-12 * power.power[14]
     assert power.mean == pytest.approx(0.5 * 1.2041 * 343.21 * (2e-3 * 0.02**2 + 1e-3 * 0.05**2), rel=1e-9)
+    few = TrainRecord(time[::every], every, np.array([[2e-3, 5e-4], [5e-4, 1e-3]]), signals=("contact_force_1_N",))
+    few.add(response)
+    assert few.spectra().names == ("contact_force_1_N",)
+    assert few.spectra().power.mean == pytest.approx(power.mean, rel=1e-12)
+    whole = record.spectra().value("contact_force_1_N")
+    assert few.spectra().value("contact_force_1_N") == pytest.approx(whole, rel=1e-12, abs=1e-12 * abs(whole[0]))

@@ -8,9 +8,6 @@ from ...base.errors import InputError
 from ...base.progress import one_thread
 from ..gearbox.stability import Stability
 from ..train.model import TrainModel
-from .condensed import condense
-from .run_up import steady_state
-from .stability import multipliers
 
 #: Errors of the motion, in parts of the approach under the steady force, and of the multipliers' moduli.
 MOTION, MODULUS = 1e-4, 1e-6
@@ -21,6 +18,10 @@ def train_stability(model: TrainModel) -> Stability:
     note = why_not(model)
     if note:
         return Stability(note=note)
+    from .condensed import condense
+    from .run_up import steady_state
+    from .stability import multipliers
+
     try:
         state = steady_state(model, model.steady_speed, tolerance=MOTION, stability=False)
         with one_thread():

@@ -15,7 +15,7 @@ from ...base.errors import InputError
 from ...base.progress import count, stage
 from ...base.record_spectrum import FASTEST, OVERSAMPLING
 from ...base.typing import Array
-from ...fem.reduction.error import reduction_error
+from ...fem.reduction.error import response_error
 from ...multibody import IntegrationError, Start, Status, Trajectory, constant, integrate
 from ...multibody.integrators.integrate import chosen_method
 from .gear_train import Drive, Load
@@ -292,7 +292,7 @@ def _whole(
     if finer is not None:
         estimates["integration"] = finer.error
         if model.train.housing is not None:
-            estimates["reduction"] = reduction_error(model.train.housing, options.band_hz).response
+            estimates["reduction"] = response_error(model.train.housing, options.band_hz)
     return replace(response, estimates=estimates, warnings=tuple(warnings))
 
 

@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 
 from ...base.typing import Array
-from ...fem.reduction.error import reduction_error
+from ...fem.reduction.error import response_error
 from ...fem.reduction.modal_body import ModalBody
 from ...gears.gearmesh.curve import StiffnessCurve
 from ...gears.gearmesh.law import MeshLaw
@@ -208,7 +208,7 @@ def _reduction(run: Run, body: ModalBody, base: dict[str, Array], band_hz: float
     found["coupled_frequencies_Hz"] = np.zeros_like(frequencies)
     if "lines" in base:
         at = _line_frequencies(run)
-        bounds = {f: reduction_error(body, f, points=POINTS).response for f in np.unique(at[at > band_hz]).tolist()}
+        bounds = {f: response_error(body, f, points=POINTS) for f in np.unique(at[at > band_hz]).tolist()}
         found["lines"] = np.array([bounds.get(f, bound) for f in at.tolist()]) * np.abs(base["lines"])
         found["lines"][~np.isfinite(found["lines"])] = math.nan
     if "radiated_power_mean_W" in base:

@@ -199,7 +199,8 @@ def write_run(
         run = Run(train_summary(made, {}, planned.stability, **planned.further), spectra)
         if planned.again is not None:
             with watch.stage("error estimates"):
-                repeated = passes.repeated(choice, str(response.statistics["method"]))
+                named = tuple(run.summary.get("dominant_lines", ()))
+                repeated = passes.repeated(choice, str(response.statistics["method"]), named)
                 run = Run(with_errors(run, planned.model, repeated, band_hz=planned.band_hz), spectra)
         with watch.stage("tables"):
             if spectra is not None:
@@ -270,14 +271,14 @@ class _Passes:
             self.watch.seconds["compiling"] = compiling
         return made
 
-    def repeated(self, choice: OutputChoice, method: str) -> Callable[[TrainModel], Run]:
-        """The numbers of the run with another train."""
+    def repeated(self, choice: OutputChoice, method: str, named: tuple[str, ...]) -> Callable[[TrainModel], Run]:
+        """The numbers of the run with another train, and the spectra of the named signals."""
         times, every = self.planned.times, self.planned.every
         again = given(self.planned.again, "again")
 
         def run(changed: TrainModel) -> Run:
-            found = follow(again(changed, method)(times), times, every, record=self._record(times, choice))
-            return Run(train_summary(found, {}), found.spectra)
+            found = follow(again(changed, method)(times), times, every, record=self._record(times, choice, named))
+            return Run(train_summary(replace(found, spectra=None), {}), found.spectra)
 
         return run
 
@@ -307,8 +308,8 @@ class _Passes:
             start=choice.spectrum_start, length=choice.spectrum_length,
         )  # fmt: skip
 
-    def _record(self, times: Array, choice: OutputChoice) -> TrainRecord | None:
-        """What makes the spectra; None for too short a run."""
+    def _record(self, times: Array, choice: OutputChoice, signals: tuple[str, ...] | None = None) -> TrainRecord | None:
+        """What makes the spectra of some signals, by default of all; None for too short a run."""
         if len(times) <= 2:
             return None
         return TrainRecord(
@@ -319,6 +320,7 @@ class _Passes:
             start=choice.spectrum_start,
             length=choice.spectrum_length,
             folder=self.folder,
+            signals=signals,
         )
 
 

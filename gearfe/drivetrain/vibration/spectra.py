@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -102,6 +103,9 @@ class TrainRecord:
         Begin and duration of the record (s); by default all of it.
     folder
         For temporary files of a long record.
+    signals
+        Names of the only signals whose spectra are wanted; of the radiated power there is then the mean alone, its
+        lines are NaN. By default all.
 
     Raises
     ------
@@ -119,13 +123,15 @@ class TrainRecord:
         start: float = 0.0,
         length: float | None = None,
         folder: Path | None = None,
+        signals: Collection[str] | None = None,
     ) -> None:
-        self._folder = folder
+        self._folder, self._signals = folder, signals
         self.step, self.every, self.window = uniform_step(times), every, window
         self.first, self.count = record(times, start, length)
         self.start = float(times[self.first])
+        self._radiation = radiation
         # |F^T v|^2 = v^T R v
-        self._factor = None if radiation is None else _root(np.asarray(radiation))
+        self._factor = None if radiation is None or signals is not None else _root(np.asarray(radiation))
         self._names: tuple[str, ...] = ()
         self._made: RecordSpectrum | None = None
         self._arrived, self._square = 0, 0.0
@@ -144,16 +150,20 @@ class TrainRecord:
             raise InputError("response", None, problem, "simulate at the times of gearfe.base.record_spectrum.finer")
         every = response_columns(piece) | piece.bearing_forces()
         columns = {
-            name: values for name, values in every.items() if name not in NO_SIGNALS and not name.startswith(NO_SIGNAL)
+            name: values
+            for name, values in every.items()
+            if name not in NO_SIGNALS
+            and not name.startswith(NO_SIGNAL)
+            and (self._signals is None or name in self._signals)
         }
         values = np.column_stack(list(columns.values()))
         number = self._arrived - self.first * self.every
         self._arrived += len(values)
-        if self._factor is not None and piece.modal_velocity is not None:
-            rates = piece.modal_velocity @ self._factor
-            inside = rates[max(0, -number) : max(0, self.count * self.every - number)]
-            self._square += float((inside**2).sum())
-            values = np.column_stack([values, rates])
+        if self._radiation is not None and piece.modal_velocity is not None:
+            inside = piece.modal_velocity[max(0, -number) : max(0, self.count * self.every - number)]
+            self._square += float(((inside @ self._radiation) * inside).sum())
+            if self._factor is not None:
+                values = np.column_stack([values, piece.modal_velocity @ self._factor])
         if self._made is None:
             self._names = tuple(columns)
             self._made = RecordSpectrum(
@@ -173,9 +183,11 @@ class TrainRecord:
         signals = len(self._names)
         spectrum = self._made.spectrum(signals)
         power = None
-        if self._made.signals > signals:
+        mean = AIR_IMPEDANCE * self._square / (self.count * self.every)
+        if self._radiation is not None and self._signals is not None:
+            power = RadiatedPower(spectrum.frequency, np.full(len(spectrum.frequency), np.nan), mean)
+        elif self._made.signals > signals:
             square = sum(np.abs(self._made.column(i)) ** 2 for i in range(signals, self._made.signals))
-            mean = AIR_IMPEDANCE * self._square / (self.count * self.every)
             power = RadiatedPower(spectrum.frequency, AIR_IMPEDANCE * spectrum.weight * square, mean)
         return TrainSpectra(self._names, spectrum, power, self.start, self.step, self.every)
 
