@@ -182,6 +182,13 @@ def test_means_begin_after_the_ramps_of_forces() -> None:
     assert early.load_end == free.load_end
 
 
+def test_means_begin_after_the_ramp_of_the_drive() -> None:
+    raw = tomllib.loads(job_file("gearbox"))
+    late = 1e3 * model_of(raw).load_end + 3.0
+    raw["train"]["drive"] |= {"ramp_centre_ms": late, "ramp_width_ms": 2.0}
+    assert model_of(raw).load_end == pytest.approx(1e-3 * (late + 1.0))
+
+
 @pytest.mark.parametrize(("table", "named"), [("drive", "drive"), ("loads", "load 1"), ("forces", "force 1")])
 def test_a_ramp_that_begins_after_the_end_of_the_run_is_named(table: str, named: str) -> None:
     """A ramp of 2 ms about its middle: in a run of 0.1 ms it begins after the end, or before it."""

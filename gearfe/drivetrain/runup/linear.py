@@ -106,7 +106,7 @@ class Linear:
                 object.__setattr__(self, name, np.zeros(shape))
         if (self.squares <= ROUND_OFF * self.squares.max(initial=0.0)).any():
             problem = "moves freely, so its place in steady running is open"
-            cure = "hold the housing at its feet, and each shaft along its axis"
+            cure = "hold the housing at its feet, each shaft along its axis, and one of sun, ring and carrier across it"
             raise InputError("train", None, f"a part of it {problem}", cure)
 
     @property

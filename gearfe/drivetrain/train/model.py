@@ -177,8 +177,11 @@ class TrainModel(Facts):
 
     @property
     def load_end(self) -> float:
-        """Time at which all ramps of loads and of forces on shafts have ended (s)."""
-        return max([load_end(self.train.layout), *(end for force in self.train.forces for end in force.over.breaks)])
+        """Time at which all ramps of loads, of forces on shafts and of the drive have ended (s)."""
+        drive = self.train.driven
+        over_time = [drive.speed, *(force.over for force in self.train.forces)]
+        over_time += [] if drive.torque is None else [drive.torque]
+        return max([load_end(self.train.layout), *(end for function in over_time for end in function.breaks)])
 
     @property
     def coupled_frequencies_hz(self) -> Array:

@@ -105,7 +105,7 @@ class TrainResponse(ShownTable):
     time_reached : float
         Time up to which the results hold (s).
     load_end_s : float
-        Time at which all ramps of loads and of forces on shafts have ended (s).
+        Time at which all ramps of loads, of forces on shafts and of the drive have ended (s).
     statistics, estimates : mapping
         ``steps``, ``method``, ``scheme``, ``seconds``, ``compile_seconds``, ``free_coordinates``,
         ``redundant_constraints`` (names),
