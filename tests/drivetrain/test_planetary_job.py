@@ -103,6 +103,8 @@ def test_lines_beside_a_mesh_frequency_are_named_by_the_turns_of_the_carrier() -
     assert sideband(585.0, lines, response, 1.0) == "mesh 1 x 2 - 3 x carrier arm"
     assert sideband(302.5, lines, response, 1.0) is None
     assert sideband(305.0, lines, response, 6.0) is None  # the spectrum does not part them
+    fast: Any = SimpleNamespace(carrier_frequencies_Hz={"arm": 350.0})  # 350 - 300 Hz is the family of -300 + 350 Hz
+    assert sideband(50.0, lines, fast, 1.0) == "1 x carrier arm - mesh 1 x 1"
 
 
 def test_shipped_modes_run_from_the_command_line(tmp_path: Path) -> None:

@@ -66,9 +66,9 @@ def _orders(model: TrainModel, family: MeshFamily) -> list[dict[str, Any]]:
     for harmonic in range(1, MULTIPLES + 1):
         push = bool(family.excites(harmonic)[KINDS[1]])
         order, name = harmonic * mesh, f"{harmonic} x mesh {family.names[0]}-{family.names[1]}"
-        sides = {
-            f"{name} {sign} 1 x carrier {carrier.name}": float(order + s * passes) for s, sign in ((-1, "-"), (1, "+"))
-        }
+        turn = f"1 x carrier {carrier.name}"
+        lower = f"{name} - {turn}" if order >= passes else f"{turn} - {name}"
+        sides = {lower: abs(float(order - passes)), f"{name} + {turn}": float(order + passes)}
         found.append({"name": name, "order": float(order), "sidebands": sides, "sidebands_of_ideal_planets": push})
     return found
 

@@ -90,5 +90,7 @@ def _sidebands(model: TrainModel, multiples: int) -> Iterator[tuple[Fraction, st
         for a in range(1, multiples + 1):
             for sign, passes in (("-", -1), ("+", 1)):
                 order = a * cycles + passes * abs(ratio)
-                if order > 0 and (uneven or family.carries(a, sense * passes)):
-                    yield order, f"{a} x mesh {family.meshes[0] + 1} {sign} 1 x carrier {carrier.name}", family.meshes
+                mesh, turn = f"{a} x mesh {family.meshes[0] + 1}", f"1 x carrier {carrier.name}"
+                if order and (uneven or family.carries(a, sense * passes)):
+                    # where the carrier rotates faster than its gears mesh, the lower sideband has a negative order
+                    yield abs(order), f"{mesh} {sign} {turn}" if order > 0 else f"{turn} - {mesh}", family.meshes

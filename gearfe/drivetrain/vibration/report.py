@@ -92,9 +92,11 @@ def sideband(frequency: float, lines: Sequence[OrderLine], response: TrainRespon
         for times in range(1, SIDES + 1):
             for sign, text in ((-1.0, "-"), (1.0, "+")):
                 shifted = frequency - sign * times * turns
-                line = nearest_line(shifted, lines, 0.51 * resolution) if turns > resolution else None
-                if line is not None:
+                line = nearest_line(abs(shifted), lines, 0.51 * resolution) if turns > resolution else None
+                if line is not None and shifted > 0.0:
                     return f"{line.name} x {line.order} {text} {times} x carrier {name}"
+                if line is not None:  # the carrier rotates faster than the gears mesh
+                    return f"{times} x carrier {name} - {line.name} x {line.order}"
     return None
 
 
