@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import filecmp
 import io
 import json
 import os
@@ -41,7 +42,17 @@ AT_ONCE = 4096
 #: The summary of a run, and those that are made from its other files after it.
 SUMMARY, KEPT_LATER = "summary.json", ("report.html", "tables.npz", "tables.h5", "tables.mat", "tables.uff")
 
-_records: list[list[tuple[Path, list[str]]]] = []
+
+@dataclass(frozen=True)
+class Written:
+    """Names of the files that a run wrote to a folder, and of those of an earlier run that it removed."""
+
+    folder: Path
+    names: tuple[str, ...]
+    removed: tuple[str, ...] = ()
+
+
+_records: list[list[Written]] = []
 
 
 def read_text(path: str | Path, field: str, *, foreign: bool = False) -> str:
@@ -385,9 +396,9 @@ def _plain(value: Any) -> Any:
 
 
 @contextmanager
-def recorded() -> Iterator[list[tuple[Path, list[str]]]]:
-    """Yield a list that gets the folder and the names of each set of files written inside."""
-    notes: list[tuple[Path, list[str]]] = []
+def recorded() -> Iterator[list[Written]]:
+    """Yield a list that gets an entry for each set of files written inside."""
+    notes: list[Written] = []
     _records.append(notes)
     try:
         yield notes
@@ -403,7 +414,8 @@ def whole_set(folder: Path, may_write: Sequence[str] = (), beside: Sequence[str]
     ----------
     may_write
         Patterns of all files that this kind of run can write. Files of an earlier run that this one does not replace
-        are removed, so that no old picture remains next to new tables.
+        are removed if the results changed, so that no old picture remains next to new tables. They stay if all tables
+        and summaries that both runs wrote are equal.
     beside
         Files of the same run that are in the folder already.
     """
@@ -414,13 +426,40 @@ def whole_set(folder: Path, may_write: Sequence[str] = (), beside: Sequence[str]
         new = {path.name for path in temporary.iterdir()}
         if SUMMARY in new:
             may_write = (*may_write, *KEPT_LATER)
+        earlier = {
+            old for pattern in may_write for old in folder.glob(pattern) if old.name not in new and old.is_file()
+        }
+        stale = set() if earlier and _unchanged(temporary, folder) else earlier
         for path in sorted(temporary.iterdir()):
             _move(path, folder / path.name)
-        for old in {old for pattern in may_write for old in folder.glob(pattern)}:
-            if old.name not in new and old.is_file():
-                old.unlink()
+        for old in stale:
+            old.unlink()
+        removed = tuple(sorted(old.name for old in stale))
         for record in _records:
-            record.append((folder, sorted([*new, *beside])))
+            record.append(Written(folder, tuple(sorted([*new, *beside])), removed))
+
+
+def _unchanged(new: Path, old: Path) -> bool:
+    """Return whether all tables and summaries in both folders are equal except for computing times; at least one is."""
+    common = [path for path in new.iterdir() if path.suffix in (".csv", ".json") and (old / path.name).is_file()]
+    return bool(common) and all(_equal(path, old / path.name) for path in common)
+
+
+def _equal(one: Path, other: Path) -> bool:
+    """Return whether two tables, or two summaries without their computing times, are equal."""
+    if one.suffix == ".csv":
+        return filecmp.cmp(one, other, shallow=False)
+    try:
+        contents = [json.loads(path.read_text(encoding="utf-8")) for path in (one, other)]
+    except ValueError:
+        return False
+    first, second = (
+        {key: value for key, value in content.items() if not key.startswith("timings")}
+        if isinstance(content, dict)
+        else content
+        for content in contents
+    )
+    return bool(first == second)
 
 
 def _remove_leftovers(folder: Path) -> None:

@@ -92,9 +92,9 @@ def run_along_width(
     if loads is None:
         width_job.check_stiffness_job(job)
         if fields is not None:
-            from ..gears.gearmesh.fields_output import angle_numbers
+            from ..gears.gearmesh.fields_output import announce_nearest
 
-            angle_numbers(np.degrees(width_job.stiffness_angles(job)), fields)
+            announce_nearest(np.degrees(width_job.stiffness_angles(job)), fields)
     else:
         width_job.check_map_job(job, loads)
     folder = output_folder(args.out)

@@ -154,7 +154,9 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
 
             with stage("drawing"):
                 save(pair_picture(pair, math.radians(args.angle_deg), _notes(geometry)), made / "gear_pair.png")
-        write_json(made / "gear_pair.json", {**geometry, **rated, "iso_6336": iso, "warnings": list(pair.warnings)})
+        keys = {"job": _keys_of_gears(mesh, Path(args.job).parent)}
+        found = {**geometry, **rated, **keys, "iso_6336": iso, "warnings": list(pair.warnings)}
+        write_json(made / "gear_pair.json", found)
         names = sorted(path.name for path in made.iterdir())
     _show(geometry)
     _show({"iso_6336": iso, **rated})
@@ -182,6 +184,24 @@ def _measures(args: argparse.Namespace, mesh: NamedMesh, pair: GearPair) -> dict
     names = mesh.driver.name, mesh.driven.name
     keys = {name: table.of_gear(name, box.gears) for name in names}
     return {"measures": measures(pair, names, keys, table.of_mesh(mesh.name, box.meshes), table.edition)}
+
+
+def _keys_of_gears(mesh: NamedMesh, folder: Path) -> dict[str, Any]:
+    """Keys of both gears that exported files depend on, with check sums of the files of measured flanks."""
+    import hashlib
+
+    def with_sums(value: Any, name: str = "") -> Any:
+        if isinstance(value, dict):
+            return {key: with_sums(entry, key) for key, entry in value.items() if entry not in (None, (), [])}
+        if name.endswith("_csv") and (folder / str(value)).is_file():
+            return {"file": value, "sha256": hashlib.sha256((folder / str(value)).read_bytes()).hexdigest()}
+        return value
+
+    found: dict[str, Any] = {}
+    for side, gear in zip(("pinion", "wheel"), mesh.gears, strict=True):
+        flanks = {} if gear.microgeometry is None else {"microgeometry": asdict(gear.microgeometry)}
+        found[side] = with_sums({**gear.form, **gear.drawn, **flanks})
+    return found
 
 
 def _along_width(gear: NamedGear) -> bool:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from types import FrameType
     from typing import Any, TextIO
 
+    from ..base.files import Written
+
 USAGE = "gearfe COMMAND ... ('gearfe COMMAND --help' lists the options of a command)"
 
 #: Commands that were, and where they went.
@@ -224,31 +226,42 @@ def _run_and_keep(run: Callable[[argparse.Namespace], int], parsed: argparse.Nam
     _doubt(parsed)
 
     as_json, report = getattr(parsed, "json", False), getattr(parsed, "report", False)
+    from ..base.files import recorded
+
     if not (parsed.format or as_json or report or parsed.quiet):
-        with shown(verbose=parsed.verbose):
-            return int(run(parsed))
+        with recorded() as folders, shown(verbose=parsed.verbose):
+            code = int(run(parsed))
+        _print_removed(folders)
+        return code
 
     import json
     from contextlib import redirect_stdout
-
-    from ..base.files import recorded
 
     said = io.StringIO()
     with redirect_stdout(_Both(said, None if parsed.quiet or as_json else sys.stdout)):
         with recorded() as folders, shown(io.StringIO() if parsed.quiet else None, verbose=parsed.verbose):
             code = int(run(parsed))
-        for folder, names in folders:
-            kept = _keep(folder, names, parsed, said.getvalue(), line if report else None)
+        for written in folders:
+            kept = _keep(written.folder, list(written.names), parsed, said.getvalue(), line if report else None)
             if kept:
                 print(f"also written: {', '.join(kept)}")
+        _print_removed(folders)
     if as_json:
         entries = getattr(parsed, "summary", {})
         if folders and not entries:
-            found = [{"folder": str(folder), **_summary(folder, names)} for folder, names in folders]
+            found = [{"folder": str(one.folder), **_summary(one.folder, list(one.names))} for one in folders]
             of_meshes = len(found) > 1 and hasattr(parsed, "mesh")  # one folder for each mesh
             entries = {"results": found} if of_meshes else found[-1]
         print(json.dumps({"exit_code": code, **entries}, indent=2))
     return code
+
+
+def _print_removed(folders: Sequence[Written]) -> None:
+    """Print which files of an earlier run were removed, because the results are others now."""
+    for written in folders:
+        names = [name for name in written.removed if not (written.folder / name).exists()]
+        if names:
+            print(f"removed from {written.folder} (of an earlier run with other results): {', '.join(names)}")
 
 
 class _Both(io.TextIOBase):

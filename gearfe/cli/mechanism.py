@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         run = partial(run_mechanism, estimate=not args.no_estimate, draw=drawn)
     with recorded() as written:
         outcome = run(mechanism, folder, slopes=slopes)
-    names = sorted(name for _, names in written for name in names)
+    names = sorted(name for one in written for name in one.names)
     print_results(outcome.text.splitlines(), folder, names, {}, [outcome.stopped] if outcome.stopped else ())
     return 0 if outcome.complete else 1
 

@@ -118,9 +118,9 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
         job = stiffness_job(mesh, Path(args.job).parent, pair)
         sweep = job.sweep
         if chosen is not None:
-            from ..gears.gearmesh.fields_output import angle_numbers
+            from ..gears.gearmesh.fields_output import announce_nearest
 
-            angle_numbers(np.degrees(sweep["angles"]), chosen)
+            announce_nearest(np.degrees(sweep["angles"]), chosen)
         if args.check is not None:
             from ..gears.gearmesh.check import checked_rows, whole_law
 

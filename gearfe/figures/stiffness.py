@@ -26,9 +26,9 @@ MOST_LINES = 12
 
 
 def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, Any]) -> None:
-    """Draw stiffness along the line of action and load sharing over two mesh cycles of the pinion angle.
+    """Draw secant stiffness, transmission error and load shares over two mesh cycles of the pinion angle.
 
-    Levels of the summary are drawn with them.
+    Levels of the summary are drawn with them. The transmission error is left out if the load is a given twist.
 
     Parameters
     ----------
@@ -50,23 +50,24 @@ def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve,
     with suppress(InputError):  # positions that do not cover the cycle are joined by straight lines
         fine = np.linspace(0.0, 2 * cycle, 1201)
         line = fine, curve.interpolant(method=table.interpolation)(fine).value
-    shares = _shares(curve, angles, pick)
-    figure = new_figure(9.0, 6.2 if shares else 4.4)
-    grid = figure.add_gridspec(2, 1, height_ratios=(2.6, 1.0)) if shares else figure.add_gridspec(1, 1)
-    axes = figure.add_subplot(grid[0])
+    shares, error = _shares(curve, angles, pick), found["transmission_error"]
+    heights = (2.6, *((1.0,) if error is not None else ()), *((1.0,) if shares else ()))
+    figure = new_figure(9.0, 1.8 + sum(heights))
+    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    upper = axes = figure.add_subplot(grid[0])
     tidy(axes)
     for number, ends in enumerate(np.degrees(single_pair_stretches(pair, 0.0, 2 * cycle))):
-        axes.axvspan(*ends, color="#f3f4f6", zorder=0, label=None if number else "single-pair contact (rigid)")
+        axes.axvspan(*ends, color="#f3f4f6", zorder=0, label=None if number else "one pair in contact (rigid teeth)")
     low, high = 1e-6 * np.nanmin(solved, initial=np.inf), 1e-6 * np.nanmax(solved, initial=-np.inf)
     levels = {"ISO 6336 cγ b": 1e-6 * found["iso_6336"]["c_gamma_times_width_N_per_m"]}
     if found["mesh_stiffness"] is not None:
         levels = {"mean over the cycle": 1e-6 * found["mesh_stiffness"]["mean_N_per_m"], **levels}
     for (label, level), dashes in zip(levels.items(), ((6, 3), (2, 2)), strict=False):
         if low - (high - low) <= level <= high + (high - low):
-            axes.axhline(level, color=GREY, linewidth=1.1, dashes=dashes, label=f"{label}: {level:.4g}")
+            axes.axhline(level, color=GREY, linewidth=1.1, dashes=dashes, label=f"{label}: {level:.4g} N/µm")
         else:
-            axes.plot([], [], " ", label=f"{label}: {level:.4g} (off the scale)")
-    axes.plot(np.degrees(line[0]), 1e-6 * line[1], color=BLUE, linewidth=2.0, label="k, interpolated")
+            axes.plot([], [], " ", label=f"{label}: {level:.4g} N/µm (off the scale)")
+    axes.plot(np.degrees(line[0]), 1e-6 * line[1], color=BLUE, linewidth=2.0, label="k (secant), interpolated")
     look = {"markersize": 4.5, "markerfacecolor": "white"}
     axes.plot(np.degrees(angles), 1e-6 * solved, "o", color=BLUE, label="solved positions", **look)
     failed = np.degrees(angles[curve.failed[pick]])
@@ -80,23 +81,30 @@ def stiffness_figure(path: str | Path, job: StiffnessJob, curve: StiffnessCurve,
     axes.set_xlim(*np.degrees(line[0][[0, -1]]))
     axes.margins(y=0.12)
     figure.legend(fontsize=8.5, loc="outside lower center", ncols=3, frameon=False)
-    if shares:
-        lower = figure.add_subplot(grid[1], sharex=axes)
-        tidy(lower)
+    if error is not None:
         axes.tick_params(labelbottom=False)
+        axes = figure.add_subplot(grid[1], sharex=upper)
+        tidy(axes)
+        axes.plot(np.degrees(angles), 1e6 * curve.transmission_error[pick], ".-", color=BLUE, linewidth=1.4)
+        axes.set_ylabel("transmission\nerror (µm)")
+        axes.set_title(f"peak to peak {error['peak_to_peak_um']:.3g} µm", fontsize=8.5, loc="right")
+        axes.margins(y=0.15)
+    if shares:
+        axes.tick_params(labelbottom=False)
+        axes = lower = figure.add_subplot(grid[-1], sharex=upper)
+        tidy(lower)
         angles_deg = np.degrees(angles)
-        for number, (angle, share) in enumerate(shares):
+        for number, (pair_number, angle, share) in enumerate(shares):
             color = (BLUE, ORANGE, GREEN)[number % 3]
             lower.plot(angle, share, ".-", color=color, linewidth=1.4, markersize=4)
             top = int(np.nanargmax(share))
             place = (angle[top], share[top])
             side = "left" if angle[top] <= angles_deg[0] else "right" if angle[top] >= angles_deg[-1] else "center"
             where = {"xytext": (3 if side == "left" else 0, 4), "textcoords": "offset points", "ha": side}
-            lower.annotate(f"pair {number + 1}", place, color=color, fontsize=8, **where)
+            lower.annotate(f"pair {pair_number}", place, color=color, fontsize=8, **where)
         lower.set_ylim(-0.03, 1.22)
         lower.set_yticks([0.0, 0.5, 1.0])
         lower.set_ylabel("load share (–)")
-        axes = lower
     axes.set_xlabel("pinion angle (deg)")
     save(figure, path)
 
@@ -108,8 +116,11 @@ def _twist(twist_deg: float, curve: StiffnessCurve) -> str:
     return f"twist {twist_deg:g}°{load_text}"
 
 
-def _shares(curve: StiffnessCurve, angles: Array, pick: IntArray) -> list[tuple[Array, Array]]:
-    """For each tooth pair its share of the load against the pinion angle (deg), along its whole way through contact."""
+def _shares(curve: StiffnessCurve, angles: Array, pick: IntArray) -> list[tuple[int, Array, Array]]:
+    """For each tooth pair its number and its share of the load against the pinion angle (deg), while it is in contact.
+
+    Pairs are numbered as in the column ``leading_pair``.
+    """
     moved = np.round((angles - curve.pinion_angle[pick]) / curve.mesh_cycle)
     leading = curve.leading_pair[pick] - moved
     columns = np.arange(curve.load_share.shape[1])
@@ -121,7 +132,7 @@ def _shares(curve: StiffnessCurve, angles: Array, pick: IntArray) -> list[tuple[
         mine[~np.isfinite(leading)] = np.nan
         carries = np.flatnonzero(mine > 0)
         stretch = slice(max(0, carries[0] - 1), carries[-1] + 2)
-        found.append((np.degrees(angles[stretch]), mine[stretch]))
+        found.append((int(pair), np.degrees(angles[stretch]), mine[stretch]))
     return found
 
 

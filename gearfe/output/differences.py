@@ -271,9 +271,9 @@ def comparison_lines(made: Comparison, most: int = 24) -> list[str]:
     names = [run.name for run in made.results]
     lines = [f"{made.results[0].kind.title}: " + "; ".join(f"{run.name} ({run.path})" for run in made.results)]
     for row in made.rows[:most]:
-        text = f"{row.name}: {_with(row.values[0], row.errors[0])} in {names[0]}"
+        text = f"{row.name}: run {names[0]}: {_with(row.values[0], row.errors[0], row.unit)}"
         for i, name in enumerate(names[1:]):
-            text += f"; {name}: {_difference(row, i)}"
+            text += f"; run {name} minus run {names[0]}: {_difference(row, i)}"
         lines.append(text)
     if len(made.rows) > most:
         lines.append(f"{len(made.rows) - most} more in compare.csv")
@@ -290,16 +290,16 @@ def _difference(row: Row, number: int) -> str:
     text = f"{difference:+.4g}{_error(error)} {row.unit}".rstrip()
     relative = _ratio(difference, row.values[0])
     if math.isfinite(relative) and row.unit != "dB":
-        text += f", {'+' if relative > 0.0 else ''}{percent(relative, 3)}"
-    return text + (" (within its error)" if abs(difference) <= error else "")
+        text += f" ({'+' if relative > 0.0 else ''}{percent(relative, 3)})"
+    return text + (", within its error" if abs(difference) <= error else "")
 
 
-def _with(value: float, error: float) -> str:
-    return "-" if math.isnan(value) else f"{value:.5g}{_error(error)}"
+def _with(value: float, error: float, unit: str) -> str:
+    return "-" if math.isnan(value) else f"{value:.5g}{_error(error)} {unit}".rstrip()
 
 
 def _error(error: float) -> str:
     """Text of an error; none of a formula."""
     if error == 0.0:
         return ""
-    return f" +- {error:.2g}" if math.isfinite(error) else " +- ?"
+    return f" ± {error:.2g}" if math.isfinite(error) else " ± ?"

@@ -1,4 +1,4 @@
-"""CSV files from strangers: ends of lines, columns given twice, cells without end."""
+"""CSV files from strangers: ends of lines, columns given twice, cells without end. Sets of files of repeated runs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gearfe.base.errors import InputError
-from gearfe.base.files import read_csv, read_numbers
+from gearfe.base.files import read_csv, read_numbers, recorded, whole_set, write_csv, write_json
 from gearfe.base.tables.mechanism import ValueTableTable
 from gearfe.drivetrain.housing.modal_test import read_modes
 from gearfe.mechanisms.tables import read_table
@@ -45,3 +45,31 @@ def test_columns_given_twice_are_refused(read: Callable[[Path], object], tmp_pat
     (tmp_path / "a.csv").write_text("a,b,a\n1,2,3\n")
     with pytest.raises(InputError, match="two columns a"):
         read(tmp_path / "a.csv")
+
+
+def run(folder: Path, value: float, seconds: float, *, report: bool = False) -> tuple[str, ...]:
+    """Write what a command could write; return the names of the files that it removed."""
+    with recorded() as written, whole_set(folder, ("*.csv", "*.png", "*.step")) as made:
+        write_csv(made / "curve.csv", {"a": [value, 2.0]})
+        write_json(made / "summary.json", {"job": {"x": 1}, "timings_s": {"total": seconds}})
+        if report:
+            (made / "solid.step").write_text("a solid\n")
+            (made / "curve.png").write_text("a picture\n")
+    return written[0].removed
+
+
+def test_a_repeated_run_removes_only_what_no_longer_fits(tmp_path: Path) -> None:
+    """Exports and pictures stay if the results are the same; they go, by name, with other results."""
+    assert run(tmp_path, 1.0, 3.0, report=True) == ()
+    (tmp_path / "report.html").write_text("of the first run\n")
+    assert run(tmp_path, 1.0, 4.0) == ()
+    assert {"solid.step", "curve.png", "report.html"} <= {path.name for path in tmp_path.iterdir()}
+    assert run(tmp_path, 1.5, 4.0) == ("curve.png", "report.html", "solid.step")
+    assert {path.name for path in tmp_path.iterdir()} == {"curve.csv", "summary.json"}
+
+
+def test_a_summary_of_another_job_is_another_result(tmp_path: Path) -> None:
+    run(tmp_path, 1.0, 3.0, report=True)
+    with recorded() as written, whole_set(tmp_path, ("*.csv", "*.png", "*.step")) as made:
+        write_json(made / "summary.json", {"job": {"x": 2}, "timings_s": {"total": 3.0}})
+    assert written[0].removed == ("curve.csv", "curve.png", "solid.step")

@@ -104,7 +104,7 @@ def test_files_of_an_earlier_run_do_not_stay(tmp_path: Path) -> None:
     assert main([*command, "--reactions", "--no-estimate"]) == 0
     assert {"curves.png", "picture.png", "reactions.csv"} <= {p.name for p in tmp_path.iterdir()}
     (tmp_path / "notes.txt").write_text("mine\n")
-    assert main([*command, "--no-pictures", "--no-estimate"]) == 0
+    assert main([*command[:3], "0.2", *command[4:], "--no-pictures", "--no-estimate"]) == 0
     assert {p.name for p in tmp_path.iterdir()} == {"trajectory.csv", "energy.csv", "summary.json", "notes.txt"}
 
 

@@ -237,7 +237,7 @@ def test_mistakes_in_the_file(tmp_path, capsys, changes, message):
         (["--angles", "0", "-1", "2"], "START STEP STOP = -1.0"),
         (["--fields", "x"], "'x': is no value of --fields"),
         (["--fields", "all", "2"], "must be 'all' or pinion angles"),
-        (["--angles", "1", "1", "3", "--fields", "2.5"], "none of the sweep's angles"),
+        (["--angles", "1", "1", "3", "--fields", "9.5"], "outside of the computed pinion angles"),
     ],
 )
 def test_mistakes_in_the_options(tmp_path, capsys, options, message):
@@ -366,8 +366,32 @@ def test_fields_in_any_order_and_beside_failures(tmp_path, capsys, monkeypatch):
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, "--law", "nitsche", *options]) == 1
     assert [r["status"] for r in rows(tmp_path)] == ["converged", "not_converged", "converged"]
     assert {p.name for p in tmp_path.glob("stress_*.png")} == {"stress_3deg.png", "stress_9deg.png"}
-    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options[:6], "--fields", "5.3"]) == 2
-    assert "none of the sweep's angles" in capsys.readouterr().err
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options[:6], "--fields", "12.5"]) == 2
+    assert "outside of the computed pinion angles; the nearest is 9 deg" in capsys.readouterr().err
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options[:6], "--fields", "5.3"]) == 0
+    assert "nearest computed pinion angle, 6 deg" in capsys.readouterr().err
+    assert (tmp_path / "stress_6deg.png").is_file()
+
+
+def test_torque_transmission_error_and_both_stiffnesses_are_printed(tmp_path, capsys):
+    """Under a torque; numbers are those of the table: T/(twist r_b^2) and its slope, and twist times r_b."""
+    options = ("--torque-pinion-Nm", "60", "--no-pictures")
+    assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 0
+    said = capsys.readouterr().out
+    assert "torque: 90 N m at the wheel, 60 N m at the pinion\n" in said
+    curve, told = (
+        StiffnessCurve.from_csv(tmp_path / "stiffness.csv"),
+        json.loads((tmp_path / "summary.json").read_text()),
+    )
+    error = 1e6 * curve.base_radius * curve.twist
+    assert told["transmission_error"]["peak_to_peak_um"] == pytest.approx(np.ptp(error), rel=1e-9)
+    assert f"transmission error: mean {error.mean():.4g}, peak to peak {np.ptp(error):.3g} um\n" in said
+    for name, key, values in (
+        ("secant", "mesh_stiffness", 90.0 / curve.twist / curve.base_radius**2),
+        ("tangent", "tangent_stiffness", curve.k_tangent),
+    ):
+        assert told[key]["mean_N_per_m"] == pytest.approx(values.mean(), rel=0.02)
+        assert f"mesh stiffness, {name}: mean {1e-6 * told[key]['mean_N_per_m']:.4g}, smallest" in said
 
 
 def test_load_and_pressure_are_told(tmp_path, capsys):
@@ -376,8 +400,9 @@ def test_load_and_pressure_are_told(tmp_path, capsys):
     assert main(["stiffness", str(JOB), "--out", str(tmp_path), *QUICK, *options]) == 0
     said = capsys.readouterr().out
     assert "torque at the wheel: mean" in said
-    assert "beyond the 1500 MPa that case-hardened steel endures (ISO 6336-5)" in said
-    assert "a rounded edge bearing" in said
+    assert "transmission error" not in said  # it is the given twist
+    assert "above 1500 MPa, the allowable stress number sigma_Hlim of case-hardened steel" in said
+    assert "a tip round carries load" in said
     told = json.loads((tmp_path / "summary.json").read_text())
     curve = StiffnessCurve.from_csv(tmp_path / "stiffness.csv")
     torque = told["load"]["torque_wheel_Nm"]

@@ -179,7 +179,7 @@ def refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, *line
     ("line", "message"),
     [
         (["stiffness", "--check", "1"], "--check = [1]: is for loads alike along the face width"),
-        (["stiffness", "--fields", "7.7"], "--fields = 7.7: is none of the sweep's angles"),
+        (["stiffness", "--fields", "77"], "--fields = 77.0: is outside of the computed pinion angles"),
         (["stiffness", "--animation"], "--animation = 40: is for loads alike along the face width"),
         (["stiffness", "--law", "nitsche"], "stiffness.law = 'nitsche': is for loads alike along the face width"),
         (["stiffness", "--plane", "stress"], "stiffness.plane = 'stress': is for loads alike"),
@@ -266,6 +266,16 @@ def test_the_commands_write_the_load_over_the_flank(tmp_path: Path, capsys: pyte
     printed = capsys.readouterr().out
     assert "K_Hbeta" in printed
     assert "load along the face width, by pair.misalignment_um" in printed
+    # secant and tangent stiffness as of plane gears: F over the transmission error, and the slope, which is larger
+    curve, radius = (
+        read_csv(tmp_path / "out" / "stiffness.csv"),
+        summary["derived_geometry"]["wheel"]["base_diameter_mm"],
+    )
+    force = curve["torque_wheel_Nm"] / (0.5e-3 * radius)
+    assert curve["k_mesh_N_per_m"] == pytest.approx(1e6 * force / curve["transmission_error_um"], rel=1e-9)
+    assert (curve["k_mesh_N_per_m"] < curve["k_tangent_N_per_m"]).all()
+    secant = 1e-6 * table["k_mesh_mean_N_per_m"][0]
+    assert f"mean mesh stiffness {secant:.4g} N/um (secant)" in printed
     # a map in the same folder, of two torques; then a plane curve leaves none of these files behind
     line[0] = "loadmap"
     assert main([*line[:4], "--torques-Nm", "20", "50", "--positions", "3", *sets]) == 0

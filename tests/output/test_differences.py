@@ -6,6 +6,7 @@ import csv
 import json
 import os
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from gearfe import StiffnessCurve, sweep_stiffness
 from gearfe.base.errors import InputError
 from gearfe.base.files import write_csv, write_json
 from gearfe.cli.main import main
-from gearfe.output.differences import Row, compared, difference_error
-from gearfe.output.results import read_all, read_results, short_names
+from gearfe.output.differences import Comparison, Row, compared, comparison_lines, difference_error
+from gearfe.output.results import KINDS, read_all, read_results, short_names
 from gearfe.output.run_numbers import Number
 from tests.makers import gears
 
@@ -246,3 +247,12 @@ def test_a_summary_belongs_to_the_newest_of_several_tables(tmp_path: Path) -> No
     os.utime(folder / "trajectory.csv", (1e9, 1e9))
     summaries = {one.kind.name: bool(one.summary) for one in read_all(folder, "run")}
     assert summaries == {"vibration": True, "mechanism": False}
+
+
+def test_a_printed_line_names_the_runs_and_the_unit() -> None:
+    row = Row("mean mesh stiffness", "N/µm", (106.68, 107.27), (0.078, 0.08), (0.5854,), (0.013,))
+    runs = [SimpleNamespace(name=name, path=f"{name}/stiffness.csv", kind=KINDS[1]) for name in ("100", "120")]
+    (_, line) = comparison_lines(Comparison(tuple(runs), (row,), (), ()))  # type: ignore[arg-type]
+    first, second = line.split("; ")
+    assert first == "mean mesh stiffness: run 100: 106.68 ± 0.078 N/µm"
+    assert second == "run 120 minus run 100: +0.5854 ± 0.013 N/µm (+0.549 %)"

@@ -40,19 +40,34 @@ def chosen_positions(curve: StiffnessCurve, angles_deg: Sequence[float] | None) 
 
 
 def angle_numbers(known_deg: Array, angles_deg: Sequence[float]) -> IntArray:
-    """Numbers of given angles among the sweep's angles (deg).
+    """Numbers of the computed angles (deg) that are nearest to given ones.
 
     Raises
     ------
     InputError
-        For an angle that is none of them.
+        For an angle that is farther from all of them than one step.
     """
     found = np.abs(known_deg - np.reshape(angles_deg, (-1, 1))).argmin(axis=1)
+    step = np.diff(np.sort(known_deg)).max(initial=1e-6)
     for angle, nearest in zip(angles_deg, known_deg[found], strict=True):
-        if not abs(nearest - angle) <= 1e-6:
-            problem = f"is none of the sweep's angles; the nearest is {nearest:.6g} deg"
-            raise InputError("--fields", angle, problem, "choose one of them, or change --angles")
+        if not abs(nearest - angle) <= step + 1e-6:
+            problem = f"is outside of the computed pinion angles; the nearest is {nearest:.6g} deg"
+            raise InputError("--fields", angle, problem, "choose an angle within them, or change --angles")
     return found
+
+
+def announce_nearest(known_deg: Array, angles_deg: Sequence[float]) -> None:
+    """Print which computed angle (deg) stands for each of the given ones that is none itself.
+
+    Raises
+    ------
+    InputError
+        See `angle_numbers`.
+    """
+    nearest = known_deg[angle_numbers(known_deg, angles_deg)]
+    for angle, taken in zip(angles_deg, nearest, strict=True):
+        if abs(taken - angle) > 1e-6:
+            announce(f"--fields {angle:g}: fields of the nearest computed pinion angle, {taken:.6g} deg")
 
 
 def write_fields(

@@ -21,6 +21,7 @@ from ..geometry import pitch_errors
 from ..geometry.derived import derived_geometry
 from ..geometry.deviation_job import GEARS
 from ..geometry.modifications import CHECKED, ends_of
+from ..geometry.pair import GearPair
 from ..geometry.tolerances import tolerances
 from ..geometry.validity import overlap_warnings
 from ..rating.stiffness import iso_values
@@ -41,13 +42,31 @@ def _levels(values: Array, unit: str = "") -> dict[str, float]:
     return {name + unit: float(value) for name, value in found.items()}
 
 
-def cycle_statistics(curve: StiffnessCurve, method: str) -> dict[str, float] | None:
-    """Mean, least and largest stiffness over one mesh cycle (N/m), or None where the curve does not cover it."""
+def cycle_statistics(curve: StiffnessCurve, method: str, quantity: str = "k_mesh") -> dict[str, float] | None:
+    """Mean, least and largest stiffness over one mesh cycle (N/m), or None where the curve does not cover it.
+
+    Parameters
+    ----------
+    curve : StiffnessCurve
+        The curve.
+    method : str
+        Interpolation between its positions.
+    quantity : str
+        ``k_mesh`` (secant) or ``k_tangent``.
+    """
     try:
-        interpolant = curve.interpolant(method=method)
+        interpolant = curve.interpolant(quantity, method=method)
     except InputError:
         return None
     return _levels(interpolant(np.arange(2000) * curve.mesh_cycle / 2000).value, "_N_per_m")
+
+
+def error_levels(job: StiffnessJob, curve: StiffnessCurve) -> dict[str, float] | None:
+    """Mean and peak-to-peak transmission error (um) under a torque; None if the curve does not cover the mesh cycle."""
+    if job.table.torque_Nm is None or cycle_statistics(curve, "linear") is None:
+        return None
+    error = 1e6 * curve.transmission_error[np.isfinite(curve.transmission_error)]
+    return {"mean_um": float(error.mean()), "peak_to_peak_um": float(np.ptp(error))}
 
 
 def largest_pressures(curve: StiffnessCurve) -> dict[str, Any]:
@@ -110,10 +129,24 @@ def against_iso_line(found: Mapping[str, float]) -> list[str]:
     off = found["mean_over_c_gamma"] - 1.0
     side = "below" if off < 0.0 else "above"
     return [
-        f"the mean is {percent(abs(off))} {side} that; the bodies twist between rigid bore "
-        f"and root, {percent(share)} of the flexibility: without that "
-        f"{1e-6 * found['mean_without_body_twist_N_per_m']:.4g} N/um (docs/stiffness.md)"
+        f"the mean secant stiffness is {percent(abs(off))} {side} c_gamma b; torsion of the gear bodies between bore "
+        f"and root is {percent(share)} of the flexibility, without it the stiffness would be "
+        f"{1e-6 * found['mean_without_body_twist_N_per_m']:.4g} N/um"
     ]
+
+
+def iso_line(iso: Mapping[str, float]) -> str:
+    """Return the line with the stiffness values of the standard."""
+    return (
+        f"ISO 6336-1 method B, for comparison: c' = {iso['c_prime_N_per_mm_um']:.3g}, "
+        f"c_gamma = {iso['c_gamma_N_per_mm_um']:.3g} N/(mm um); times face width: "
+        f"c_gamma b = {1e-6 * iso['c_gamma_times_width_N_per_m']:.4g} N/um"
+    )
+
+
+def torque_text(torque: float, pair: GearPair) -> str:
+    """A torque at the wheel (N m) and that at the pinion in words, without friction."""
+    return f"{torque:.4g} N m at the wheel, {torque / abs(pair.gear_ratio):.4g} N m at the pinion"
 
 
 def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, float]) -> dict[str, Any]:
@@ -144,6 +177,8 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
         **_head(job),
         "iso_6336": {**iso, **against_iso(job, iso, levels)},
         "mesh_stiffness": levels,
+        "tangent_stiffness": cycle_statistics(curve, table.interpolation, "k_tangent"),
+        "transmission_error": error_levels(job, curve),
         "error_estimate": error,
         "load": {
             "torque_wheel_Nm": _levels(torque) if len(torque) else None,
@@ -302,34 +337,39 @@ def report_lines(job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, A
     if given is not None and given["lost_motion_in_it_deg"]:
         lines.append(
             f"twist {given['twist_deg']:.6g} deg from the centred position: {given['lost_motion_in_it_deg']:.6g} deg "
-            f"of lost motion (half the backlash) and {given['deflection_deg']:.6g} deg of deflection"
+            f"of half backlash (j_bn/(2 r_b)) and {given['deflection_deg']:.6g} deg of deflection"
         )
-    for name, levels, factor, unit in (
-        ("torque at the wheel", found["load"]["torque_wheel_Nm"], 1.0, "N m"),
-        ("mesh stiffness", found["mesh_stiffness"], 1e-6, "N/um"),
-    ):
+    torque, error = found["load"]["torque_wheel_Nm"], found["transmission_error"]
+    if job.table.torque_Nm is not None:
+        lines.append(f"torque: {torque_text(job.table.torque_Nm, job.pair)}")
+    elif torque is not None:
+        lines.append(_levels_line("torque at the wheel", torque, 1.0, "N m"))
+    if error is not None:
+        mean, swing = error["mean_um"], error["peak_to_peak_um"]
+        lines.append(f"transmission error: mean {mean:.4g}, peak to peak {swing:.3g} um")
+    for name, levels in (("secant", found["mesh_stiffness"]), ("tangent", found["tangent_stiffness"])):
         if levels is not None:
-            mean, least, largest = (factor * level for level in levels.values())
-            lines.append(f"{name}: mean {mean:.4g}, least {least:.4g}, largest {largest:.4g} {unit}")
-    lines.append(
-        f"ISO 6336 method B, for comparison: c' = {iso['c_prime_N_per_mm_um']:.3g}, "
-        f"c_gamma = {iso['c_gamma_N_per_mm_um']:.3g} N/(mm um); "
-        f"c_gamma times width = {1e-6 * iso['c_gamma_times_width_N_per_m']:.4g} N/um"
-    )
-    lines += against_iso_line(iso)
+            lines.append(_levels_line(f"mesh stiffness, {name}", levels, 1e-6, "N/um"))
+    lines += [iso_line(iso), *against_iso_line(iso)]
     lines += pressure_lines(curve)
     if found["error_estimate"] is not None:
         against = "" if job.law.name == DEFAULT_LAW else "the half-plane law and "
         lines.append(
-            f"discretisation error, estimated by {against}meshes {COARSENING:g} times coarser (order {ORDER:g} "
-            f"assumed): typically {percent(curve.typical_error)}, at worst {percent(curve.worst_error)}"
+            f"discretisation error of the stiffness: median {percent(curve.typical_error)}, at most "
+            f"{percent(curve.worst_error)}, estimated by comparison with {against}meshes {COARSENING:g} times coarser"
         )
     return lines
 
 
+def _levels_line(name: str, levels: Mapping[str, float], factor: float, unit: str) -> str:
+    """Mean, smallest and largest value of a quantity in words."""
+    mean, least, largest = (factor * level for level in levels.values())
+    return f"{name}: mean {mean:.4g}, smallest {least:.4g}, largest {largest:.4g} {unit}"
+
+
 def map_lines(load_map: LoadMap) -> list[str]:
     """Return the lines to print about a map."""
-    unloaded = 1e6 * float(np.ptp(load_map.transmission_error_unloaded))
+    unloaded = round(1e6 * float(np.ptp(load_map.transmission_error_unloaded)), 6)
     (m, n), swing = load_map.shape, load_map.peak_to_peak
     lines = [f"{m} torques x {n} positions over {load_map.span}: {_statuses(load_map.cells)}"]
     lines.append(f"unloaded transmission error {unloaded:.4g} um peak to peak")
@@ -338,29 +378,49 @@ def map_lines(load_map: LoadMap) -> list[str]:
         if curve.failed.any():
             lines.append(f"at {load_map.torque[row]:.4g} N m: {curve.failed.sum()} of {n} positions have no numbers")
             continue
-        line = (
-            f"at {load_map.torque[row]:.4g} N m: mean stiffness {1e-6 * curve.k_mesh.mean():.4g} N/um, transmission "
-            f"error {1e6 * curve.transmission_error.mean():.4g} um with {1e6 * swing[row]:.3g} um peak to peak"
+        line = load_line(
+            load_map.torque[row],
+            (1e6 * curve.transmission_error.mean(), 1e6 * swing[row]),
+            (1e-6 * curve.k_mesh.mean(), 1e-6 * curve.k_tangent.mean()),
         )
         if load_map.root is not None:
             pinion, wheel = 1e-6 * load_map.root.largest[row].max(axis=0)
-            line += f", root stress {pinion:.4g} MPa (pinion), {wheel:.4g} MPa (wheel)"
+            line += f"; root stress {pinion:.4g} MPa (pinion), {wheel:.4g} MPa (wheel)"
         lines += [line, *("  " + pressure for pressure in pressure_lines(curve))]
     best = int(np.argmin(np.where(np.isfinite(swing), swing, np.inf)))
     if m > 2 and np.isfinite(swing[best]):
-        lines.append(f"least peak-to-peak error: {1e6 * swing[best]:.3g} um at {load_map.torque[best]:.4g} N m")
+        smallest = f"{1e6 * swing[best]:.3g} um at {load_map.torque[best]:.4g} N m"
+        lines.append(f"smallest peak-to-peak transmission error: {smallest}")
     if load_map.root is not None:
-        lines.append(f"root stress: estimated error at worst {percent(_largest(load_map.root.error))}")
+        lines.append(f"root stress: estimated error at most {percent(_largest(load_map.root.error))}")
     return lines
 
 
-#: What bears at an edge, and why the pressure there is a figure to compare with alone.
+def load_line(torque: float, error_um: tuple[float, float], stiffness: tuple[float, float]) -> str:
+    """Return the line of a map about one load.
+
+    Parameters
+    ----------
+    torque : float
+        At the wheel (N m).
+    error_um : (float, float)
+        Mean and peak-to-peak transmission error (um).
+    stiffness : (float, float)
+        Mean secant and tangent stiffness (N/um).
+    """
+    return (
+        f"at {torque:.4g} N m: transmission error mean {error_um[0]:.4g}, peak to peak {error_um[1]:.3g} um; mean mesh "
+        f"stiffness {stiffness[0]:.4g} N/um (secant), {stiffness[1]:.4g} N/um (tangent)"
+    )
+
+
+#: Which edge carries load, and the theory of the pressure there.
 EDGE_WORDS = {
     "singular": (
-        "a sharp edge or the kink of a linear relief",
-        "the pressure of linear elasticity is singular there",
+        "a sharp tip edge, or the start of a linear relief,",
+        "in theory the pressure there has no limit: add a tip round or a longer, parabolic relief",
     ),
-    "rounded": ("a rounded edge", "the radius of the tip round decides the pressure there"),
+    "rounded": ("a tip round", "the pressure there depends on its radius"),
 }
 
 
@@ -369,11 +429,12 @@ def pressure_lines(curve: StiffnessCurve) -> list[str]:
     found, lines = largest_pressures(curve), []
     if found["largest_hertzian_MPa"] > 0:
         line = f"Hertzian pressure on the flanks: largest {found['largest_hertzian_MPa']:.4g} MPa"
-        line += f" (the computed contact is {percent(found['its_relative_error'])} off Hertz's)"
+        off = percent(abs(found["its_relative_error"]))
+        line += f" (the computed contact width differs by {off} from Hertz's)"
         if found["largest_hertzian_MPa"] > ALLOWABLE_MPA:
             line += (
-                f", beyond the {ALLOWABLE_MPA:.0f} MPa that case-hardened steel endures (ISO 6336-5): "
-                "the model stays linear elastic where the steel would fail"
+                f", above {ALLOWABLE_MPA:.0f} MPa, the allowable stress number sigma_Hlim of case-hardened steel "
+                "(ISO 6336-5, MQ); the model stays linear elastic"
             )
         lines.append(line)
     for kind, (edge, why) in EDGE_WORDS.items():
@@ -381,8 +442,8 @@ def pressure_lines(curve: StiffnessCurve) -> list[str]:
         if count:
             largest = 1e-6 * np.nanmax(curve.edge_pressure[curve.edge == kind])
             lines.append(
-                f"{count} position{'s' if count > 1 else ''} with {edge} bearing: {why}; blunted by a "
-                f"hundredth of a module, up to {largest:.4g} MPa (column edge_pressure_MPa)"
+                f"at {count} position{'s' if count > 1 else ''} {edge} carries load; {why}; comparative pressure up to "
+                f"{largest:.4g} MPa (column edge_pressure_MPa)"
             )
     return lines
 

@@ -458,6 +458,7 @@ def headline_numbers(sweep: WidthSweep) -> dict[str, Array]:
     return {
         "transmission_error_mean": of_solved(error, np.nanmean),
         "transmission_error_peak_to_peak": of_solved(error, lambda row: np.nanmax(row) - np.nanmin(row)),
+        "k_mesh_mean": of_solved(sweep.secant, np.nanmean),
         "k_tangent_mean": of_solved(sweep.stiffness, np.nanmean),
         "largest_line_load": of_solved(peak, np.nanmax),
         "K_H_beta": sweep.k_h_beta,

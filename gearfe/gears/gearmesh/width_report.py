@@ -24,6 +24,7 @@ from ..rating.stiffness import iso_values
 from ..width import WideMesh, WidthSweep
 from ..width.sweep import mean_line_load
 from .job import StiffnessJob
+from .report import iso_line, load_line
 from .width_job import axial_sense
 from .width_root import WideRoots, roots_along, roots_of_cells
 
@@ -31,6 +32,16 @@ from .width_root import WideRoots, roots_along, roots_of_cells
 PATTERN = 61, 61
 #: Widest gap (share of its side) that the pattern bridges between points of neighbouring positions.
 BRIDGED = 0.2
+#: Headline numbers with an estimated error (`.width_job.headline_numbers`) in words.
+ERROR_WORDS = {
+    "transmission_error_mean": "transmission error, mean",
+    "transmission_error_peak_to_peak": "peak to peak",
+    "k_mesh_mean": "secant stiffness",
+    "k_tangent_mean": "tangent stiffness",
+    "largest_line_load": "largest line load",
+    "K_H_beta": "K_Hbeta",
+    "K_H_alpha": "K_Halpha",
+}
 
 
 @dataclass(frozen=True)
@@ -86,6 +97,7 @@ def sweep_columns(
         "torque_wheel_Nm": flat(sweep.torque),
         "twist_deg": np.degrees(flat(sweep.twist)),
         "transmission_error_um": 1e6 * flat(sweep.transmission_error),
+        "k_mesh_N_per_m": flat(sweep.secant) / radius**2,
         "k_tangent_N_per_m": flat(sweep.stiffness) / radius**2,
         "axial_force_wheel_N": sense * flat(sweep.axial_force),
         **{name: flat(values) for name, values in moments.items()},
@@ -264,6 +276,7 @@ def load_table(
         "torque_wheel_Nm": _mean(by_load["torque_wheel_Nm"]),
         "transmission_error_mean_um": _mean(error),
         "transmission_error_peak_to_peak_um": (np.nanmax(error, axis=1) - np.nanmin(error, axis=1)).tolist(),
+        "k_mesh_mean_N_per_m": _mean(by_load["k_mesh_N_per_m"]),
         "k_tangent_mean_N_per_m": _mean(by_load["k_tangent_N_per_m"]),
         "K_H_beta": sweep.k_h_beta.tolist(),
         "K_H_alpha": sweep.k_h_alpha.tolist(),
@@ -381,13 +394,15 @@ def width_lines(found: Mapping[str, Any]) -> list[str]:
     lines = [
         f"{sum(found['statuses'].values())} positions: {statuses}",
         f"load along the face width, by {along['because_of']}: {along['common_face_width_mm']:.6g} mm in common, "
-        f"{along['functions']} functions along it, small strain",
+        f"{along['functions']} shape functions of the load along it, small strain",
     ]
     for i, torque in enumerate(table["torque_wheel_Nm"]):
         lines += [
-            f"at {torque:.4g} N m: transmission error {table['transmission_error_mean_um'][i]:.4g} um with "
-            f"{table['transmission_error_peak_to_peak_um'][i]:.3g} um peak to peak, mean tangent stiffness "
-            f"{1e-6 * table['k_tangent_mean_N_per_m'][i]:.4g} N/um",
+            load_line(
+                torque,
+                (table["transmission_error_mean_um"][i], table["transmission_error_peak_to_peak_um"][i]),
+                (1e-6 * table["k_mesh_mean_N_per_m"][i], 1e-6 * table["k_tangent_mean_N_per_m"][i]),
+            ),
             f"  K_Hbeta {table['K_H_beta'][i]:.4g}, K_Halpha {table['K_H_alpha'][i]:.4g}; largest line load "
             f"{table['largest_line_load_N_per_mm'][i]:.4g} N/mm at y {table['largest_line_load_y_mm'][i]:.4g} mm, roll "
             f"length {table['largest_line_load_roll_length_pinion_mm'][i]:.4g} mm of the pinion; Hertzian pressure "
@@ -406,14 +421,9 @@ def width_lines(found: Mapping[str, Any]) -> list[str]:
             lines.append(f"  largest root stress: {', '.join(stresses)}")
         if found["error_estimate"] is not None:
             of_load = {name: float(np.atleast_1d(values)[i]) for name, values in found["error_estimate"].items()}
-            errors = ", ".join(f"{name} {percent(value)}" for name, value in of_load.items())
-            lines.append(f"  estimated errors, by points doubled, two more functions and coarser sections: {errors}")
-    lines.append(
-        f"ISO 6336 method B, for comparison: c' = {iso['c_prime_N_per_mm_um']:.3g}, "
-        f"c_gamma = {iso['c_gamma_N_per_mm_um']:.3g} N/(mm um); "
-        f"c_gamma times width = {1e-6 * iso['c_gamma_times_width_N_per_m']:.4g} N/um"
-    )
-    return lines
+            errors = ", ".join(f"{ERROR_WORDS[name]} {percent(value)}" for name, value in of_load.items())
+            lines.append(f"  estimated errors: {errors}")
+    return [*lines, iso_line(iso)]
 
 
 def width_warnings(job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep) -> list[str]:
@@ -426,8 +436,8 @@ def width_warnings(job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep) -> list
     ends = [end for g, face in enumerate(mesh.faces) for end in _inner_ends(face, mesh.faces[1 - g])]
     if ends:
         sentences.append(
-            f"ends of a narrower gear press on its mate ({len(ends)}): where an end is sharp the pressure is singular; "
-            "the line load holds"
+            f"{'both ends' if len(ends) > 1 else 'one end'} of the narrower gear may carry load on the wider mate: the "
+            "pressure at a sharp end is not computed, the line load is valid"
         )
     return sentences
 

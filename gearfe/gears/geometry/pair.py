@@ -300,8 +300,14 @@ class _Written:
             most = module_mm * nominal_span(teeth, x, angle, over, self._helix(side))
             if span > most + 1e3 * rounding(1e-3 * module_mm):
                 what = f"{over} spaces" if teeth < 0 else f"{over} teeth"
-                problem = f"must be <= {most:.6g} mm, the span over {what} without backlash"
-                cure = "use more profile_shift, or another span_teeth"
+                problem = (
+                    f"must be <= {most:.6g} mm, the span over {what} without backlash of {abs(teeth)} teeth, module "
+                    f"{module_mm:.6g} mm, profile_shift {x:.6g}"
+                )
+                cure = (
+                    "if you changed one of these, change span_mm and span_teeth as well, or remove both and give the "
+                    "backlash by tooth_thinning_um"
+                )
                 raise InputError("span_mm", span, problem, cure)
             self.thinned_um[side] = 1e3 * (most - span) / math.cos(angle)
             made["tooth_thinning_um"] = max(0.0, self.thinned_um[side])

@@ -123,6 +123,13 @@ class WidthSweep:
         return np.asarray(self.force[..., 2])
 
     @property
+    def secant(self) -> Array:
+        """Secant stiffness T/twist (N m/rad), shape (m, n); NaN where the twist is not positive."""
+        return np.asarray(
+            np.divide(self.torque, self.twist, out=np.full_like(self.twist, np.nan), where=self.twist > 0)
+        )
+
+    @property
     def stiffness(self) -> Array:
         """Tangent stiffness dT/dtwist (N m/rad), shape (m, n)."""
         return np.asarray(self.tangent[..., 0, 0])
