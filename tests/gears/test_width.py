@@ -112,6 +112,18 @@ def test_a_pair_alone_has_the_twist_of_the_plane_law_under_heavy_load(name):
     assert off[alone].max() < 1e-4
 
 
+def test_an_edge_that_takes_over_the_contact_is_a_mark_of_the_tables():
+    """The arm jumps where the undercut's edge takes over from the wheel's tip; tables without a mark err by 0.14 %."""
+    pair = KINKED["undercut"]
+    law = contact_lines(wide_compliance(WideMesh(pair, functions=1, coarsen=1.0, flank_coarsen=4.0))).law
+    jump = int(np.argmax(np.abs(np.diff(law.arm))))
+    assert abs(law.arm[jump + 1] - law.arm[jump]) > 0.05 * pair.wheel.base_radius
+    assert law.angle[jump + 1] - law.angle[jump] < 1e-5 * pair.mesh_cycle
+    assert np.abs(law.marks - law.angle[jump]).min() < 1e-5 * pair.mesh_cycle
+    off, _ = off_plane_law(pair, 100.0)
+    assert off.max() < 4e-4
+
+
 def test_loads_beyond_usual_ones_are_within_the_tables():
     """1,850 N/mm on a module of 1.5 mm, with a loaded edge of an undercut: neighbours err by 0.03 % per 100 N m."""
     off, _ = off_plane_law(KINKED["undercut"], 400.0)

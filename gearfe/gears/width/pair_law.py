@@ -64,6 +64,9 @@ NEAR = np.array([0.0, 0.001, 0.003, 0.005, 0.008, 0.012, 0.017, 0.024, 0.034, 0.
 COARSE = 0.02
 #: Distance of pair angles that are the same (mesh cycles).
 SAME = 1e-6
+#: Step of an arm between two marks of the table (base radii) from which on it jumps: edges jump by 0.04 and more, arms
+#: on tip rounds change by 0.004. Bisections to where: to 3e-6 mesh cycles.
+JUMP, BISECTIONS = 0.01, 8
 #: Solved loads of a pair angle below which it is left out.
 ENOUGH = 4
 #: Secant steps until both gears are turned by their halves of the twist at first contact.
@@ -99,7 +102,8 @@ class PairLaw:
     path : tuple of float
         Pair angles of the ends A and E of the path of contact (rad).
     marks : ndarray, shape (marks,)
-        Rising pair angles of these and of kinks of the flanks (rad), where the tables have kinks.
+        Rising pair angles of these, of kinks of the flanks, and of jumps of the normal (rad), where the tables have
+        kinks.
     forward : complex
         Normal on the path of contact.
     """
@@ -174,8 +178,12 @@ def _solved_law(compliance: WideCompliance, profiles: tuple[ToothDeviations, Too
     low, high = path[0] - TIPS * cycle, path[1] + TIPS * cycle
     marks = np.unique(np.concatenate([path, _kinks(model)]))
     marks = marks[(marks > low) & (marks < high)]
-    angles, contacts = pair_contacts(teeth, np.unique(np.concatenate([np.linspace(low, high, ANGLES + 1), marks])))
-    solved_angles, solved = pair_contacts(teeth, _solved_angles(low, high, marks, cycle))
+    table = np.linspace(low, high, ANGLES + 1)
+    before, behind = _jumps(teeth, np.unique(np.concatenate([table, marks])))
+    marks = np.unique(np.concatenate([marks, before]))
+    both = np.unique(np.concatenate([marks, behind]))
+    angles, contacts = pair_contacts(teeth, np.unique(np.concatenate([table, both])))
+    solved_angles, solved = pair_contacts(teeth, _solved_angles(low, high, both, cycle))
     modulus = 2 / sum(side.inverse_modulus for side in sides)
     forces = LOADS * modulus * mesh.module
     with one_thread():
@@ -242,6 +250,30 @@ def _kinks(model: HalfPlanePair) -> Array:
     pair = model.pair
     rolls = [np.asarray(face.flank.kinks, dtype=float) for face in model.teeth.faces]
     return np.array([pair.pinion_angle_at(s) for s in (*rolls[0], *(pair.tangent_length - rolls[1]))])
+
+
+def _jumps(teeth: ToothFlanks, angles: Array) -> tuple[Array, Array]:
+    """Pair angles (rad) before and behind each jump of the normal, where an edge takes over the contact.
+
+    Parameters
+    ----------
+    teeth : ToothFlanks
+        The flanks.
+    angles : ndarray, shape (n,)
+        Rising pair angles between which jumps are searched for (rad).
+    """
+    base = np.array([gear.base_radius for gear in (teeth.pair.pinion, teeth.pair.wheel)])
+    angles, contacts = pair_contacts(teeth, angles)
+    arm = contacts.arm / base
+    i = np.flatnonzero((np.abs(np.diff(arm, axis=0)) > JUMP).any(axis=1))
+    low, high, before, behind = angles[i], angles[i + 1], arm[i], arm[i + 1]
+    for _ in range(BISECTIONS if len(i) else 0):
+        middle = 0.5 * (low + high)
+        _, contacts = pair_contacts(teeth, middle)
+        known, arm = contacts.position, contacts.arm / base
+        below = np.abs(arm - before[known]).sum(axis=1) < np.abs(arm - behind[known]).sum(axis=1)
+        low[known], high[known] = np.where(below, [middle[known], high[known]], [low[known], middle[known]])
+    return low, high
 
 
 def _solved_angles(low: float, high: float, marks: Array, cycle: float) -> Array:
