@@ -125,7 +125,7 @@ def _deck(args: argparse.Namespace, job: StiffnessJob) -> tuple[dict[str, Part],
     if args.teeth is not None and args.teeth < len(loaded[0]):
         problem = "leaves loaded tooth pairs without a contact boundary: the deck would not find equilibrium"
         raise InputError("--teeth", args.teeth, problem, f"give {len(loaded[0])} or more, or leave it out")
-    begin = look_at(lines, angle).least - APART / pair.wheel.base_radius
+    begin = float(look_at(lines, angle).least[0]) - APART / pair.wheel.base_radius
     twist = float(sweep.twist[0, 0]) - begin
     parts, sections = _parts(args, job, begin, loaded)
     axis = "the axes of the job file" if axial_sense(job) > 0.0 else "seen from the other side: y and z count backwards"

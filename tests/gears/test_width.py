@@ -28,12 +28,12 @@ from gearfe.gears.width import (
 )
 from gearfe.gears.width.lines import (
     AT_END,
-    _approach_left,
     _softer_ends,
     look_at,
     own_twists,
     rows_at,
     solve_position,
+    solve_positions,
 )
 from tests.makers.half_plane_pairs import KINKED, PAIRS
 from tests.makers.wide_gears import SPUR, helical_lines, helical_mesh, spur_lines
@@ -210,26 +210,52 @@ def test_points_doubled_hardly_change_the_transmission_error(flanks):
 
 
 @pytest.mark.parametrize("flanks", EVERY.values(), ids=EVERY)
-def test_a_position_does_not_depend_on_where_its_iteration_starts(flanks):
-    """Alone, or from a neighbour on either side: the ends of the load are where the approach to the contacts ends."""
+def test_a_position_among_others_is_that_alone(flanks):
+    """Points of positions side by side are padded to one number: nothing of the others may enter."""
     lines = helical_lines().with_flanks(flanks)
+    angles = lines.compliance.mesh.sections.mesh_cycle * np.linspace(-1.0, 1.0, 7)
+    torques = 100.0 * 2.0 ** -np.arange(7)
+    for name, loads in (("torque", torques), ("twist", np.linspace(0.0, 5e-4, 7))):
+        together = solve_positions(lines, angles, **{name: loads})
+        assert len({len(one.points) for one in together}) > 2
+        for angle, load, one in zip(angles, loads, together, strict=True):
+            alone = solve_position(lines, angle, **{name: load})
+            assert one.converged
+            assert alone.converged
+            assert (one.steps, one.placings) == (alone.steps, alone.placings)
+            assert one.twist == pytest.approx(alone.twist, rel=1e-12)
+            assert one.moment == pytest.approx(alone.moment, rel=1e-9)
+            assert one.tangent == pytest.approx(alone.tangent, rel=1e-9, abs=1e-9 * np.abs(alone.tangent).max())
+
+
+def test_kinks_of_both_gears_may_be_at_one_place():
+    """Linear end reliefs of both gears over one length are one of the sum on one gear."""
+
+    def lead(amount: float) -> LeadModification:
+        return LeadModification(relief_low=EndRelief(amount, 3e-3), relief_high=EndRelief(amount, 3e-3))
+
+    twists = []
+    for leads in ((lead(12e-6), lead(8e-6)), (lead(20e-6), LeadModification())):
+        found = sweep_width(helical_lines().with_flanks(WideFlanks(leads=leads)), [100.0], positions=5)
+        assert (found.status == "converged").all()
+        twists.append(found.twist)
+    assert twists[0] == pytest.approx(twists[1], rel=1e-9)
+
+
+def test_pairs_with_an_unloaded_one_between_them_are_coupled():
+    """The influence between the outer two of three pairs hardly depends on whether the middle one is loaded."""
+    lines = helical_lines()
+
+    def without_one(roll, z, tooth):
+        return np.where(tooth == 1, -1e-3, 0.0) + 0.0 * (roll + z)
+
+    blocks = []
     cycle = lines.compliance.mesh.sections.mesh_cycle
-    for angle in cycle * np.array([0.1, 0.45, 0.8]):
-        alone = solve_position(lines, angle, torque=100.0)
-        looks = look_at(lines, angle, alone.twist)
-        known = np.maximum(_approach_left(lines, looks, alone), 0.0)  # to which the line load belongs
-        assert alone.converged
-        for apart in (-cycle / 24, cycle / 24):
-            neighbour = solve_position(lines, angle + apart, torque=100.0)
-            after = solve_position(lines, angle, torque=100.0, before=neighbour)
-            left = np.maximum(_approach_left(lines, looks, after), 0.0)
-            assert after.twist == pytest.approx(alone.twist, rel=1e-5)
-            assert np.abs(left - known).max() < 1e-4 * known.max()
-        angles = angle + cycle / 24 * np.arange(-2, 1)
-        swept = sweep_width(lines, [100.0], angles=angles)  # the third position continues the first two
-        assert swept.twist[0, 2] == pytest.approx(alone.twist, rel=1e-5)
-        peak = sweep_width(lines, [100.0], angles=[angle]).peak_line_load[0, 0]
-        assert swept.peak_line_load[0, 2] == pytest.approx(peak, rel=1e-4)
+    for flanks in (WideFlanks(), WideFlanks(topographies=(without_one, None))):
+        points = solve_position(lines.with_flanks(flanks), -1.1 * cycle, torque=200.0).points
+        blocks.append(points.influence[np.ix_(points.pair == 2, points.pair == 0)])
+        assert (points.pair == 1).any() == (flanks.topographies[0] is None)
+    assert blocks[1].mean() == pytest.approx(blocks[0].mean(), rel=0.2)
 
 
 @pytest.mark.parametrize("flanks", [RELIEVED, CORNERS, RIDGE], ids=["relieved", "corners", "ridge"])

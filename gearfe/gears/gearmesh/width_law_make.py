@@ -14,11 +14,13 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...base.errors import InputError
 from ...base.progress import count, one_thread
-from ..width import ContactLines, Misalignment
-from ..width.lines import look_at, solve_position, stored_energy
+from ...base.typing import Array
+from ..width import ContactLines
+from ..width.lines import look_at, solve_positions, stored_energy
 from .width_law import WidthLaw, WidthTable, law_coefficients
 
 #: Cells of the phase and of the approach to begin with, and how often a direction is halved at most.
@@ -40,16 +42,16 @@ LEAST_PART = 0.1
 REACH_PHASES, ROOM = 8, 1.02
 
 
-class Contact(NamedTuple):
-    """Contact at one place: energy (J), force (N), tangent (N/m), moment on the tilt (N m), dF/d tilt (N/rad)."""
+class Contacts(NamedTuple):
+    """Contacts at n places: energy (J), force (N), tangent (N/m), moment on the tilt (N m), dF/d tilt (N/rad)."""
 
-    energy: float
-    force: float
-    tangent: float
-    couple: float
-    by_tilt: float
+    energy: Array
+    force: Array
+    tangent: Array
+    couple: Array
+    by_tilt: Array
 
-    def counted(self, sense: float) -> Contact:
+    def counted(self, sense: float) -> Contacts:
         """The same with tilts counted in a sense (1 or -1)."""
         return self._replace(couple=sense * self.couple, by_tilt=sense * self.by_tilt)
 
@@ -63,8 +65,7 @@ class _Grid:
     reach: float
     tilt: float
     cells: tuple[int, int, int]
-    touches: dict[tuple[int, int], float] = field(default_factory=dict)
-    contacts: dict[tuple[int, int, int], Contact] = field(default_factory=dict)
+    known: dict[tuple[int, ...], Array] = field(default_factory=dict)
 
     @property
     def finest(self) -> tuple[int, int, int]:
@@ -72,81 +73,71 @@ class _Grid:
         a, b, c = (cells << halvings for cells, halvings in zip(self.cells, HALVINGS, strict=True))
         return a, b, c
 
-    @property
-    def radius(self) -> float:
-        return self.lines.compliance.mesh.sections.wheel.base_radius
+    def angle(self, number: Array) -> Array:
+        return np.asarray(self.lines.compliance.mesh.sections.mesh_cycle * number / self.finest[0])
 
-    def angle(self, number: float) -> float:
-        return self.lines.compliance.mesh.sections.mesh_cycle * number / self.finest[0]
+    def overlap(self, number: Array) -> Array:
+        return np.asarray(self.reach * (number / self.finest[1]) ** 2)
 
-    def overlap(self, number: float) -> float:
-        return self.reach * (number / self.finest[1]) ** 2
+    def tilted(self, number: Array) -> Array:
+        return np.asarray(self.tilt * (2.0 * number / self.finest[2] - 1.0) if self.finest[2] else 0.0 * number)
 
-    def tilted(self, number: float) -> float:
-        return self.tilt * (2.0 * number / self.finest[2] - 1.0) if self.finest[2] else 0.0
-
-    def touch(self, phase: int, tilt: int) -> float:
-        key = phase % self.finest[0], tilt
-        if key not in self.touches:
-            self.touches[key] = first_contact(self.lines, self.angle(key[0]), self.sense * self.tilted(tilt))
-        return self.touches[key]
-
-    def contact(self, phase: int, part: int, tilt: int) -> Contact:
-        key = phase % self.finest[0], part, tilt
-        if key not in self.contacts:
-            approach = self.touch(phase, tilt) + self.overlap(part)
-            at = contact_at(self.lines, self.angle(key[0]), approach, self.sense * self.tilted(tilt))
-            self.contacts[key] = at.counted(self.sense)
-        return self.contacts[key]
+    def solved(self, places: Array) -> tuple[Array, Contacts]:
+        """Return the approach at the first contact (m) and the contact at places, shape (n, 3); each is solved once."""
+        keys = [(phase % self.finest[0], part, tilt) for phase, part, tilt in places.tolist()]
+        if unknown := [key for key in dict.fromkeys(keys) if key not in self.known]:
+            phase, part, tilt = np.transpose(unknown)
+            angle, tilted = self.angle(phase), self.sense * self.tilted(tilt)
+            touch = first_contact(self.lines, angle, tilted)
+            contacts = contacts_at(self.lines, angle, touch + self.overlap(part), tilted).counted(self.sense)
+            self.known |= zip(unknown, np.stack([touch, *contacts], axis=1), strict=True)
+        touch, *values = np.transpose([self.known[key] for key in keys])
+        return touch, Contacts(*values)
 
 
-def tilted_lines(lines: ContactLines, tilt: float) -> ContactLines:
-    """Return the same gears with a further tilt in the plane of action (rad)."""
-    given = lines.flanks.misalignment
-    return lines.with_flanks(replace(lines.flanks, misalignment=Misalignment(given.in_plane + tilt, given.across)))
-
-
-def first_contact(lines: ContactLines, angle: float, tilt: float = 0.0) -> float:
-    """Return the approach (m) at which the rigid flanks touch, at a pinion angle and a further tilt (rad)."""
-    least = look_at(tilted_lines(lines, tilt), angle).least
-    if not math.isfinite(least):
-        problem = f"leave no flanks that meet at a driver's angle of {math.degrees(angle):.6g} deg"
+def first_contact(lines: ContactLines, angle: ArrayLike, tilt: ArrayLike = 0.0) -> Array:
+    """Return the approaches (m), shape (n,), at which rigid flanks touch, at pinion angles and further tilts (rad)."""
+    least = look_at(lines, angle, tilt=tilt).least
+    if not np.isfinite(least).all():
+        at = math.degrees(float(np.broadcast_to(angle, least.shape)[~np.isfinite(least)][0]))
+        problem = f"leave no flanks that meet at a driver's angle of {at:.6g} deg"
         raise InputError("flanks", None, problem, "use less modification")
     return least * lines.compliance.mesh.sections.wheel.base_radius
 
 
-def contact_at(lines: ContactLines, angle: float, approach: float, tilt: float = 0.0) -> Contact:
-    """Solve the contact at one place.
+def contacts_at(lines: ContactLines, angle: Array, approach: Array, tilt: Array) -> Contacts:
+    """Solve the contact at n places.
 
     Parameters
     ----------
     lines : ContactLines
         The gears.
-    angle, approach : float
-        Pinion angle (rad), and approach in the middle of the width (m).
-    tilt : float
-        Tilt in the plane of action beside that of the lines (rad), > 0 where it closes the gap towards larger z.
+    angle, approach : ndarray, shape (n,)
+        Pinion angles (rad), and approaches in the middle of the width (m).
+    tilt : ndarray, shape (n,)
+        Tilts in the plane of action beside that of the lines (rad), > 0 where they close the gap towards larger z.
 
     Raises
     ------
     InputError
-        Where the contact is not solved.
+        Where a contact is not solved.
     """
     radius = lines.compliance.mesh.sections.wheel.base_radius
-    solution = solve_position(tilted_lines(lines, tilt), angle, twist=approach / radius)
-    if not solution.converged:
-        problem = (
-            f"are not solved at a driver's angle of {math.degrees(angle):.6g} deg, an approach of "
-            f"{1e6 * approach:.6g} um and a tilt of {1e6 * tilt:.6g} um/m"
-        )
-        raise InputError("contacts", None, problem, "ask for a law up to smaller forces")
-    tangent = solution.tangent[0]
-    return Contact(
-        stored_energy(lines.law, solution),
-        solution.torque / radius,
-        float(tangent[0]) / radius**2,
-        float(solution.points.levers[:, 1] @ solution.moment),
-        float(tangent[1]) / radius,
+    solutions = solve_positions(lines, angle, twist=approach / radius, tilt=tilt)
+    for solution, *place in zip(solutions, angle, approach, tilt, strict=True):
+        if not solution.converged:
+            problem = (
+                f"are not solved at a driver's angle of {math.degrees(place[0]):.6g} deg, an approach of "
+                f"{1e6 * place[1]:.6g} um and a tilt of {1e6 * place[2]:.6g} um/m"
+            )
+            raise InputError("contacts", None, problem, "ask for a law up to smaller forces")
+    tangent = np.array([one.tangent[0] for one in solutions])
+    return Contacts(
+        energy=np.array([stored_energy(lines.law, one) for one in solutions]),
+        force=np.array([one.torque for one in solutions]) / radius,
+        tangent=tangent[:, 0] / radius**2,
+        couple=np.array([one.points.levers[:, 1] @ one.moment for one in solutions]),
+        by_tilt=tangent[:, 1] / radius,
     )
 
 
@@ -160,15 +151,14 @@ def reach_of(lines: ContactLines, force: float) -> float:
         For a force that no contact carries.
     """
     sections = lines.compliance.mesh.sections
-    reach = 0.0
-    for angle in sections.mesh_cycle * np.arange(REACH_PHASES) / REACH_PHASES:
-        solution = solve_position(lines, float(angle), torque=force * sections.wheel.base_radius)
-        if not solution.converged:
-            problem = f"no contact solution of this pair makes a mesh force of {force:.6g} N at all phases"
-            raise InputError("force", force, problem, "ask for a law up to smaller forces")
-        way = solution.twist * sections.wheel.base_radius - first_contact(lines, float(angle))
-        reach = max(reach, way)
-    return ROOM * reach
+    angles = sections.mesh_cycle * np.arange(REACH_PHASES) / REACH_PHASES
+    torques = np.full(REACH_PHASES, force * sections.wheel.base_radius)
+    solutions = solve_positions(lines, angles, torque=torques)
+    if not all(one.converged for one in solutions):
+        problem = f"no contact solution of this pair makes a mesh force of {force:.6g} N at all phases"
+        raise InputError("force", force, problem, "ask for a law up to smaller forces")
+    approach = sections.wheel.base_radius * np.array([one.twist for one in solutions])
+    return ROOM * float((approach - first_contact(lines, angles)).max(initial=0.0))
 
 
 def width_law(
@@ -211,8 +201,11 @@ def width_law(
                 break
             cells[halved] *= 2
         ends = ((0.0, grid.finest[0]), (LEAST_CHECKED * grid.finest[1], grid.finest[1]), (0.0, grid.finest[2]))
-        places = [[rng.uniform(*end) for end in ends] for _ in range(CHECKS)]
-        found = np.array([_error(grid, law, *place) for place in places])
+        phase, part, across = np.array([[rng.uniform(*end) for end in ends] for _ in range(CHECKS)]).T
+        angle, tilted = grid.angle(phase), grid.tilted(across)
+        approach = law.first_contact(angle, tilted) + grid.overlap(part)
+        contacts = contacts_at(grid.lines, angle, approach, sense * tilted).counted(sense)
+        found = _errors(law, angle, approach, tilted, contacts)
     return replace(law, error=float(found.max()), rms_error=float(np.sqrt(np.mean(found**2))))
 
 
@@ -228,21 +221,20 @@ def _law(grid: _Grid, cells: Sequence[int], force: float) -> WidthLaw:
         np.arange(n + (d > 0)) * (finest // max(n, 1))
         for d, (n, finest) in enumerate(zip(cells, grid.finest, strict=True))
     ]
-    phases, parts, tilts = (values.tolist() for values in numbers)
-    shape = len(phases), len(parts), len(tilts)
-    touch, contacts = np.zeros((shape[0], shape[2])), np.zeros((*shape, len(Contact._fields)))
-    for i, phase in enumerate(phases):
-        count(i, len(phases), "phases")
-        for k, tilt in enumerate(tilts):
-            touch[i, k] = grid.touch(phase, tilt)
-            for j, part in enumerate(parts[1:], start=1):
-                contacts[i, j, k] = grid.contact(phase, part, tilt)
-    overlaps = np.array([grid.overlap(part) for part in parts])
+    shape = len(numbers[0]), len(numbers[1]), len(numbers[2])
+    touch, contacts = np.zeros((shape[0], shape[2])), np.zeros((*shape, len(Contacts._fields)))
+    beyond = np.stack(np.meshgrid(*numbers[1:], indexing="ij"), axis=-1)[1:]  # the first contact
+    for i, phase in enumerate(numbers[0].tolist()):
+        count(i, shape[0], "phases")
+        places = np.insert(beyond.reshape(-1, 2), 0, phase, axis=1)
+        first, solved = grid.solved(places)
+        touch[i] = first[: shape[2]]
+        contacts[i, 1:] = np.stack(solved, axis=1).reshape(shape[1] - 1, shape[2], -1)
+    overlaps = grid.overlap(numbers[1])
     # the parabola through no force at the first contact with force and tangent of the first node
     begin = contacts[:, 1, :, 1] / overlaps[1]
     contacts[:, 0, :, 2] = np.clip(2.0 * begin - contacts[:, 1, :, 2], 0.0, 3.0 * begin)
-    angles = np.array([grid.angle(phase) for phase in phases])
-    tilted = np.array([grid.tilted(tilt) for tilt in tilts])
+    angles, tilted = grid.angle(numbers[0]), grid.tilted(numbers[2])
     mesh = grid.lines.compliance.mesh
     cycle = mesh.sections.mesh_cycle
     coefficients = law_coefficients(WidthTable(angles, overlaps, tilted, touch, *np.moveaxis(contacts, -1, 0)), cycle)
@@ -256,7 +248,7 @@ def _half_way(grid: _Grid, law: WidthLaw, cells: Sequence[int], direction: int, 
     """Root of the mean square error half way between the nodes of one direction, at nodes of the others."""
     if 2 * cells[direction] > grid.finest[direction] or not cells[direction]:
         return 0.0
-    squares = []
+    places = []
     for _ in range(HALF_WAY):
         place = []
         for d, (n, finest) in enumerate(zip(cells, grid.finest, strict=True)):
@@ -265,20 +257,15 @@ def _half_way(grid: _Grid, law: WidthLaw, cells: Sequence[int], direction: int, 
                 place.append(step * int(rng.integers(0, n)) + step // 2)
             else:
                 place.append(step * int(rng.integers(d == 1, n + 1)) if n else 0)
-        squares.append(_error(grid, law, *place) ** 2)
-    return math.sqrt(float(np.mean(squares)))
+        places.append(place)
+    phase, part, tilt = np.transpose(places)
+    touch, contacts = grid.solved(np.array(places))
+    errors = _errors(law, grid.angle(phase), touch + grid.overlap(part), grid.tilted(tilt), contacts)
+    return math.sqrt(float(np.mean(errors**2)))
 
 
-def _error(grid: _Grid, law: WidthLaw, phase: float, part: float, tilt: float) -> float:
-    """Error of force, or of the moment over half the width, in parts of the force, or of a part of the largest one."""
-    angle, tilted, overlap = grid.angle(phase), grid.tilted(tilt), grid.overlap(part)
-    if all(float(number).is_integer() for number in (phase, part, tilt)):
-        contact = grid.contact(int(phase), int(part), int(tilt))
-        approach = grid.touch(int(phase), int(tilt)) + overlap
-    else:
-        approach = float(law.first_contact([angle], [tilted])[0]) + overlap
-        solved = contact_at(grid.lines, angle, approach, grid.sense * tilted)
-        contact = solved.counted(grid.sense)
-    at = law(np.array([angle]), np.array([approach]), np.array([tilted]))
-    off = max(abs(at.force[0] - contact.force), abs(at.couple[0] - contact.couple) / (0.5 * law.width))
-    return float(off / max(contact.force, LEAST_PART * law.largest_force))
+def _errors(law: WidthLaw, angle: Array, approach: Array, tilt: Array, contacts: Contacts) -> Array:
+    """Errors of force, or of the moment over half the width, in parts of the force or of a part of the largest one."""
+    at = law(angle, approach, tilt)
+    off = np.maximum(np.abs(at.force - contacts.force), np.abs(at.couple - contacts.couple) / (0.5 * law.width))
+    return np.asarray(off / np.maximum(contacts.force, LEAST_PART * law.largest_force))

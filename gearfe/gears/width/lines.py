@@ -47,14 +47,18 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...base.typing import Array, BoolArray, IntArray
+from ..contact.position import joined, of_positions, ranges, taken
 from .compliance import WideCompliance, legendre
 from .flanks import WideFlanks
+from .mesh import WideMesh
 from .pair_law import PairLaw, pair_law
 
 #: Gauss points of a line over the whole width for each function of the load, by the root of its share of the width;
@@ -93,6 +97,9 @@ ENERGY_POINTS = 5
 LEAST_STRETCH, SHORTEST = 1e-3, 1e-9
 #: Places on a line at which its gap is looked at; distance of those beside an end of the load in parts of its length.
 LOOKS, BESIDE = 21, 0.01
+#: Functions of the load of all positions that are solved side by side: large arrays cost less per position, and more
+#: memory. Numbers that a position has for its lines.
+BATCH, KEYS = 1000, 1 << 32
 #: Steps by secants to where a line crosses a seam of the material.
 SECANTS = 4
 
@@ -112,14 +119,15 @@ class ContactLines:
             return replace(self, flanks=flanks)
         return contact_lines(self.compliance, flanks, density=self.density)
 
-    def gap(self, z: Array, rows: Rows, pair: IntArray) -> Array:
-        """Gap d (m) of tooth pairs at z (m), where `rows` has their place on the law's tables."""
+    def gap(self, z: Array, rows: Rows, pair: IntArray, tilt: Array | float = 0.0) -> Array:
+        """Gap d (m) of tooth pairs at z (m), with more tilt in the plane of action (rad); `rows` has their place."""
         flanks, mesh = self.flanks, self.compliance.mesh
         gap = np.zeros(len(z))
         for gear, tooth in enumerate((pair, -1 - pair)):
             gap -= flanks.material(gear, rows.roll[:, gear], z, tooth, mesh.faces[gear])
             gap -= flanks.profiles[gear].turn_of(tooth) * (rows.arm if gear else rows.pinion_arm)
-        return np.asarray(gap - self.levers(z, rows) @ [flanks.misalignment.in_plane, flanks.misalignment.across])
+        levers, misalignment = self.levers(z, rows), flanks.misalignment
+        return np.asarray(gap - levers[:, 0] * (misalignment.in_plane + tilt) - levers[:, 1] * misalignment.across)
 
     def levers(self, z: Array, rows: Rows) -> Array:
         """Approach of the flanks at z (m) per tilt in the plane of action and across it, shape (n, 2) (m/rad)."""
@@ -195,36 +203,33 @@ def rows_at(law: PairLaw, angle: Array) -> Rows:
 
 @dataclass(frozen=True)
 class Points:
-    """Points of the lines of contact of a position, n of them.
+    """Points of the lines of contact of a position, n of them; or of m positions: all shapes then begin with m.
 
     Attributes
     ----------
     z, weight : ndarray, shape (n,)
         Axial coordinates and Gauss weights (m).
+    real : ndarray of bool, shape (n,)
+        Whether it is a point: positions with fewer points have their last one again, which does not count.
     pair : ndarray, shape (n,)
         Tooth pairs.
     rows : Rows
         Tables of the pair's law there.
-    twist : float
-        Twist of the wheel (rad) to which the pair angles belong.
     touch : ndarray, shape (n,)
         Twist at which a point touches (rad).
     levers : ndarray, shape (n, 3)
         Twist of the wheel that a unit of twist, tilt in the plane of action and tilt across are worth (-).
-    loads : list of ndarray, shapes (n, size)
-        Unit forces of the points on the stations and functions of both gears.
     influence : ndarray, shape (n, n)
         T (rad/(N m)).
     """
 
     z: Array
     weight: Array
+    real: BoolArray
     pair: IntArray
     rows: Rows
-    twist: float
     touch: Array
     levers: Array
-    loads: list[Array]
     influence: Array
 
     def __len__(self) -> int:
@@ -233,18 +238,18 @@ class Points:
 
 def _slopes(values: Array) -> Array:
     """Mean slopes on both sides of each load, per spacing of the loads, shape (n, loads)."""
-    between = np.diff(values, axis=1)
-    return np.concatenate([between[:, :1], 0.5 * (between[:, :-1] + between[:, 1:]), between[:, -1:]], axis=1)
+    between = np.diff(values)
+    return np.concatenate([between[..., :1], 0.5 * (between[..., :-1] + between[..., 1:]), between[..., -1:]], axis=-1)
 
 
 @dataclass(frozen=True)
 class Looks:
-    """Places on all lines that can meet at a pinion angle and a twist, q of them, by tooth pair and z.
+    """Places on all lines that can meet at pinion angles and twists, q of them, by position, tooth pair and z.
 
     Attributes
     ----------
-    pair : ndarray, shape (q,)
-        Tooth pairs.
+    position, pair : ndarray, shape (q,)
+        Numbers of the positions, and tooth pairs.
     z : ndarray, shape (q,)
         Axial coordinates (m), with the ends of the lines and the kinks of their gaps.
     kink : ndarray of bool, shape (q,)
@@ -253,38 +258,50 @@ class Looks:
         Tables of the pair's law there.
     first : ndarray, shape (q,)
         Twist of the first contact at this pair angle (rad).
+    least : ndarray, shape (positions,)
+        Twist at which the rigid gears touch first (rad), infinite where they do not.
     """
 
+    position: IntArray
     pair: IntArray
     z: Array
     kink: BoolArray
     rows: Rows
     first: Array
-
-    @property
-    def least(self) -> float:
-        """Twist at which the rigid gears touch first (rad), infinite where they do not."""
-        return float(self.first.min(initial=math.inf))
+    least: Array
 
 
-def look_at(lines: ContactLines, angle: float, twist: float = 0.0, runs: Runs | None = None) -> Looks:
-    """Look at the gaps along all lines that can meet at a pinion angle.
+def look_at(
+    lines: ContactLines,
+    angle: ArrayLike,
+    twist: ArrayLike = 0.0,
+    tilt: ArrayLike = 0.0,
+    runs: Runs | None = None,
+    chosen: IntArray | None = None,
+) -> Looks:
+    """Look at the gaps along all lines that can meet at pinion angles.
 
     Parameters
     ----------
     lines : ContactLines
         The gears.
-    angle, twist : float
-        Pinion angle and twist of the wheel (rad).
+    angle, twist, tilt : array_like, shape (m,)
+        Pinion angles, twists of the wheel, and tilts in the plane of action beside that of the flanks (rad).
     runs : Runs, optional
         Loaded parts, whose ends are among the places, with two more beside each.
+    chosen : ndarray of int, optional
+        Numbers of the positions that are looked at; all without it.
     """
     mesh, law, flanks = lines.compliance.mesh, lines.law, lines.flanks
-    middle, cycle, turn = _middle(lines, angle, twist), mesh.sections.mesh_cycle, mesh.turns[0]
-    low, high = sorted(middle + turn * z for z in mesh.zone)
-    numbers = np.arange(math.ceil((law.angle[0] - high) / cycle), math.floor((law.angle[-1] - low) / cycle) + 1)
-    psi, (first, last) = middle + cycle * numbers[:, None], np.broadcast_to(mesh.zone, (len(numbers), 2)).T
-    marks = np.zeros((len(numbers), 0))
+    angle, twist, tilt = np.broadcast_arrays(np.atleast_1d(angle), twist, tilt)
+    middle, cycle, turn = _middle(lines, angle, twist), *_pitches(mesh)
+    chosen = np.arange(len(middle)) if chosen is None else chosen
+    low, high = np.sort(middle[chosen, None] + turn * np.array(mesh.zone), axis=1).T
+    lowest = np.ceil((law.angle[0] - high) / cycle).astype(np.int64)
+    count = np.maximum(np.floor((law.angle[-1] - low) / cycle).astype(np.int64) - lowest + 1, 0)
+    position, pair = np.repeat(chosen, count), ranges(lowest, count)
+    psi, (first, last) = (middle[position] + cycle * pair)[:, None], np.broadcast_to(mesh.zone, (len(pair), 2)).T
+    marks = np.zeros((len(pair), 0))
     if turn:
         ends = np.sort((law.angle[[0, -1]] - psi) / turn, axis=1)
         first, last = np.maximum(first, ends[:, 0]), np.minimum(last, ends[:, 1])
@@ -296,29 +313,57 @@ def look_at(lines: ContactLines, angle: float, twist: float = 0.0, runs: Runs | 
         if seams[:, 1].any():
             kinks.append(_kinks(seams, z, psi, turn, law.angle, law.roll[:, gear]))
         elif len(seams):
-            kinks.append(np.broadcast_to(seams[:, 2] / seams[:, 0], (len(numbers), len(seams))))
+            kinks.append(np.broadcast_to(seams[:, 2] / seams[:, 0], (len(pair), len(seams))))
     at = np.concatenate(kinks, axis=1)
     inside = (at > first[:, None]) & (at < last[:, None])
-    lines_of, places = [np.repeat(np.arange(len(numbers)), LOOKS), np.nonzero(inside)[0]], [z.ravel(), at[inside]]
-    if runs is not None and len(numbers):
+    lines_of, places = [np.repeat(np.arange(len(pair)), LOOKS), np.nonzero(inside)[0]], [z.ravel(), at[inside]]
+    if runs is not None:
+        of_runs, known = _found(_keys(position, pair), runs.keys)
         beside = BESIDE * (runs.end - runs.start)
-        of_ends = np.tile(runs.pair, 6) - numbers[0]
-        ends = np.concatenate([end + i * beside for end in (runs.start, runs.end) for i in (-1.0, 0.0, 1.0)])
-        known = (of_ends >= 0) & (of_ends < len(numbers))
-        of_ends, ends = of_ends[known], ends[known]
+        ends = np.stack([end + i * beside for end in (runs.start, runs.end) for i in (-1.0, 0.0, 1.0)], axis=1)
+        ends, of_ends = ends[known].ravel(), np.repeat(of_runs[known], 6)
         known = (ends > first[of_ends]) & (ends < last[of_ends])
         lines_of, places = [*lines_of, of_ends[known]], [*places, ends[known]]
     kink = np.repeat([False, True, False], [z.size, len(places[1]), sum(map(len, places[2:]))])
     line, z = np.concatenate(lines_of), np.concatenate(places)
     order = np.lexsort((z, line))
-    return _looks(lines, middle, numbers[line[order]], z[order], kink[order])
+    line, z, kink = line[order], z[order], kink[order]
+    return _looks(lines, middle, tilt, position[line], pair[line], z, kink)
 
 
-def _looks(lines: ContactLines, middle: float, pair: IntArray, z: Array, kink: BoolArray) -> Looks:
-    """Look at places, where the pair angle of pair 0 at z = 0 is `middle` (rad)."""
-    mesh = lines.compliance.mesh
-    rows = rows_at(lines.law, middle + mesh.turns[0] * z + pair * mesh.sections.mesh_cycle)
-    return Looks(pair, z, kink, rows, rows.touch + lines.gap(z, rows, pair) / mean_arm(lines, rows))
+def _looks(
+    lines: ContactLines, middle: Array, tilt: Array, position: IntArray, pair: IntArray, z: Array, kink: BoolArray
+) -> Looks:
+    """Look at places; `middle`, `tilt`: pair angles of pair 0 at z = 0, and further tilts, of the positions (rad)."""
+    cycle, turn = _pitches(lines.compliance.mesh)
+    rows = rows_at(lines.law, middle[position] + cycle * pair + turn * z)
+    first = rows.touch + lines.gap(z, rows, pair, tilt[position]) / mean_arm(lines, rows)
+    least = np.full(len(middle), math.inf)
+    np.minimum.at(least, position, first)
+    return Looks(position, pair, z, kink, rows, first, least)
+
+
+def _pitches(mesh: WideMesh) -> tuple[float, float]:
+    """Pair angle from one pair to the next (rad), and its growth along z (rad/m)."""
+    return mesh.sections.mesh_cycle, mesh.turns[0]
+
+
+def _keys(position: IntArray, pair: IntArray) -> IntArray:
+    """Return one number for each line, which rises with position and tooth pair."""
+    return position * KEYS + pair
+
+
+def _found(keys: IntArray, wanted: IntArray) -> tuple[IntArray, BoolArray]:
+    """Return where rising `keys` have those wanted, and whether they do; the place is 0 where they do not."""
+    at = np.searchsorted(keys, wanted)
+    known = np.append(keys, 0)[at] == wanted
+    known &= at < len(keys)
+    return np.where(known, at, 0), known
+
+
+def _starts(keys: IntArray) -> IntArray:
+    """Return where each number of sorted keys begins."""
+    return np.flatnonzero(np.diff(keys, prepend=keys[:1] - 1))
 
 
 def _kinks(seams: Array, z: Array, psi: Array, turn: float, angle: Array, roll: Array) -> Array:
@@ -355,60 +400,76 @@ def _kinks(seams: Array, z: Array, psi: Array, turn: float, angle: Array, roll: 
     return np.asarray(at.T)
 
 
-def _middle(lines: ContactLines, angle: float, twist: float) -> float:
-    """Pair angle (rad) of pair 0 at z = 0."""
+def _middle(lines: ContactLines, angle: Array, twist: Array) -> Array:
+    """Pair angles (rad) of pair 0 at z = 0."""
     return angle - 0.5 * lines.compliance.mesh.ratio * twist
 
 
 @dataclass(frozen=True)
 class Runs:
-    """Loaded parts of the lines, r of them, by tooth pair and z.
+    """Loaded parts of the lines, r of them, by position, tooth pair and z.
 
     Attributes
     ----------
-    pair : ndarray, shape (r,)
-        Tooth pairs.
+    position, pair : ndarray, shape (r,)
+        Numbers of the positions, and tooth pairs.
     start, end : ndarray, shape (r,)
         Between which z (m).
     """
 
+    position: IntArray
     pair: IntArray
     start: Array
     end: Array
 
-    def near(self, other: Runs) -> bool:
-        """Return whether the ends are those of others, to `ENDS_PLACED` of the lengths."""
-        if not np.array_equal(self.pair, other.pair):
-            return False
-        apart = np.maximum(np.abs(self.start - other.start), np.abs(self.end - other.end))
-        return bool((apart <= ENDS_PLACED * (other.end - other.start)).all())
+    @property
+    def keys(self) -> IntArray:
+        """Numbers of the lines, shape (r,)."""
+        return _keys(self.position, self.pair)
+
+    def near(self, other: Runs, size: int) -> BoolArray:
+        """Return at which of so many positions the ends are those of others, to `ENDS_PLACED` of the lengths."""
+        counts, others = (np.bincount(runs.position, minlength=size) for runs in (self, other))
+        near = counts == others
+        mine, its = (taken(runs, near[runs.position]) for runs in (self, other))
+        apart = np.maximum(np.abs(mine.start - its.start), np.abs(mine.end - its.end))
+        off = (mine.pair != its.pair) | (apart > ENDS_PLACED * (its.end - its.start))
+        near[mine.position[off]] = False
+        return near
+
+    def joined(self, others: Runs) -> Runs:
+        """Return them with others."""
+        both = joined([self, others])
+        return taken(both, np.lexsort((both.start, both.pair, both.position)))
 
     def within(self, looks: Looks) -> Runs:
         """Return what of them is on the lines that were looked at."""
-        pairs, begin = np.unique(looks.pair, return_index=True)
-        stop = np.append(begin[1:], len(looks.pair)) - 1
-        kept = np.isin(self.pair, pairs)
-        line = np.searchsorted(pairs, self.pair[kept])
+        keys = _keys(looks.position, looks.pair)
+        begin = _starts(keys)
+        line, kept = _found(keys[begin], self.keys)
+        stop = np.append(begin[1:], len(keys)) - 1
+        line = line[kept]
         start = np.maximum(self.start[kept], looks.z[begin[line]])
         end = np.minimum(self.end[kept], looks.z[stop[line]])
         long = end - start > SHORTEST * np.ptp(looks.z)
-        return Runs(self.pair[kept][long], start[long], end[long])
+        return Runs(self.position[kept][long], self.pair[kept][long], start[long], end[long])
 
 
 #: No loaded part.
-NO_RUNS = Runs(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+NO_RUNS = Runs(*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0)))
 
 
-def _runs(pair: IntArray, z: Array, left: Array) -> Runs:
-    """Return where the approach `left` to the contacts is positive; it is straight between places, by pair and z."""
-    loaded, same = left > 0.0, pair[1:] == pair[:-1]
+def _runs(looks: Looks, left: Array) -> Runs:
+    """Return where the approach `left` to the contacts is positive; it is straight between the places."""
+    keys, z = _keys(looks.position, looks.pair), looks.z
+    loaded, same = left > 0.0, keys[1:] == keys[:-1]
     size = np.abs(left)
-    zero = z[:-1] + np.diff(z) * np.divide(size[:-1], size[:-1] + size[1:], out=np.zeros(len(size) - 1), where=same)
+    zero = z[:-1] + np.diff(z) * np.divide(size[:-1], size[:-1] + size[1:], out=np.zeros(len(same)), where=same)
     starts = np.where(np.append(False, same & ~loaded[:-1]), np.append(0.0, zero), z)
     ends = np.where(np.append(same & ~loaded[1:], False), np.append(zero, 0.0), z)
     first = loaded & np.append(True, ~(same & loaded[:-1]))
     last = loaded & np.append(~(same & loaded[1:]), True)
-    return Runs(pair[first], starts[first], ends[last])
+    return Runs(looks.position[first], looks.pair[first], starts[first], ends[last])
 
 
 def mean_arm(lines: ContactLines, rows: Rows) -> Array:
@@ -416,64 +477,168 @@ def mean_arm(lines: ContactLines, rows: Rows) -> Array:
     return np.asarray(0.5 * (rows.arm + lines.compliance.mesh.ratio * rows.pinion_arm))
 
 
-def place_points(lines: ContactLines, angle: float, twist: float, looks: Looks, runs: Runs) -> Points:
+@dataclass(frozen=True)
+class Placing:
+    """Points that are placed at m positions, n at most at one of them.
+
+    Attributes
+    ----------
+    position, twist : ndarray, shape (m,)
+        Rising numbers of the positions, and the twists for which the points are placed (rad).
+    points : Points
+        Points of the positions.
+    count : ndarray, shape (m,)
+        Points of each position.
+    row, column : ndarray, shape (q,)
+        Position and number of all points, one after the other.
+    keys : ndarray, shape (q,)
+        Numbers of their lines.
+    loads : list of ndarray, shapes (q, size)
+        Unit forces of the points on the stations and functions of both gears.
+    stretches
+        Stretches that have the points.
+    """
+
+    position: IntArray
+    twist: Array
+    points: Points
+    count: IntArray
+    row: IntArray
+    column: IntArray
+    keys: IntArray
+    loads: list[Array]
+    stretches: Stretches
+
+    def flat(self, values: Array) -> Array:
+        """Return the values of all points, shape (q,), of those by position, shape (m, n)."""
+        return np.asarray(values[self.row, self.column])
+
+    def of_position(self, i: int) -> Points:
+        """Return the points of the i-th position."""
+        kept = slice(0, int(self.count[i]))
+        return replace(taken(self.points, (i, kept)), influence=self.points.influence[i, kept, kept])
+
+
+def place_points(
+    lines: ContactLines, angle: Array, twist: Array, tilt: Array, chosen: IntArray, looks: Looks, runs: Runs
+) -> Placing:
     """Place points on the loaded parts of all lines, which are divided at their kinks.
 
     Parameters
     ----------
     lines : ContactLines
         The gears.
-    angle, twist : float
-        Pinion angle and twist of the wheel (rad).
+    angle, twist, tilt : ndarray, shape (positions,)
+        As those of `look_at`.
+    chosen : ndarray, shape (m,)
+        Rising numbers of the positions.
     looks : Looks
         Kinks of the lines there.
     runs : Runs
-        Loaded parts.
+        Loaded parts at these positions alone.
     """
-    z, weight, pair = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=np.int64)]
-    for stretches in _divided(lines, looks, runs):
-        for k, a, b in stretches:
-            x, w = _gauss(_count(lines, (b - a) / lines.compliance.mesh.width))
-            z.append(0.5 * (a + b) + 0.5 * (b - a) * x)
-            weight.append(0.5 * (b - a) * w)
-            pair.append(np.full(len(x), k))
-    middle = _middle(lines, angle, twist)
-    return _points(lines, middle, twist, np.concatenate(z), np.concatenate(weight), np.concatenate(pair))
+    mesh, law, (cycle, turn) = lines.compliance.mesh, lines.law, _pitches(lines.compliance.mesh)
+    stretches = _stretches(looks, runs, LEAST_STRETCH * mesh.width)
+    middle, half = 0.5 * (stretches.low + stretches.high), 0.5 * (stretches.high - stretches.low)
+    counts = np.ceil(lines.density * mesh.count * np.sqrt(2.0 * half / mesh.width) - 1e-9).astype(np.int64)
+    counts = np.maximum(LEAST_POINTS, counts)
+    x, weight = np.concatenate([np.zeros((2, 0)), *(_gauss(count) for count in counts.tolist())], axis=1)
+    of = np.repeat(np.arange(len(counts)), counts)
+    z, weight, pair, position = middle[of] + half[of] * x, half[of] * weight, stretches.pair[of], stretches.position[of]
+    rows = rows_at(law, _middle(lines, angle, twist)[position] + turn * z + cycle * pair)
+    levers = np.concatenate([np.ones((len(z), 1)), lines.levers(z, rows) / rows.arm[:, None]], axis=1)
+    first = rows.touch + lines.gap(z, rows, pair, tilt[position]) / mean_arm(lines, rows)
+    rows = _with_ends(lines, z, rows)
+    loads, keys = _loads(lines.compliance, z, rows), _keys(position, pair)
+    end = np.searchsorted(position, chosen, side="right")
+    count = np.diff(end, prepend=0)
+    row, column = np.repeat(np.arange(len(chosen)), count), ranges(np.zeros_like(count), count)
+    place = (end - count)[:, None] + np.minimum(np.arange(count.max(initial=0)), count[:, None] - 1)
+    at_place = taken(rows, place)
+    points = Points(
+        z=z[place],
+        weight=weight[place],
+        real=np.arange(place.shape[1]) < count[:, None],
+        pair=pair[place],
+        rows=at_place,
+        touch=_touch(lines, rows, first, twist[position])[place],
+        levers=levers[place],
+        influence=_influence(lines.compliance, loads, keys, row, column, place.shape)
+        / (at_place.arm[:, :, None] * at_place.arm[:, None]),
+    )
+    return Placing(chosen, twist[chosen], points, count, row, column, keys, loads, stretches)
 
 
-def _divided(lines: ContactLines, looks: Looks, runs: Runs) -> list[list[tuple[int, float, float]]]:
-    """Return the stretches between kinks of each loaded part: tooth pair, first and last z (m)."""
-    kinks, of_kinks, apart = looks.z[looks.kink], looks.pair[looks.kink], LEAST_STRETCH * lines.compliance.mesh.width
-    parts = []
-    for k, start, end in zip(runs.pair.tolist(), runs.start.tolist(), runs.end.tolist(), strict=True):
-        inner = kinks[(of_kinks == k) & (kinks > start + apart) & (kinks < end - apart)].tolist()
-        parts.append([(k, a, b) for a, b in itertools.pairwise([start, *inner, end])])
-    return parts
+@dataclass(frozen=True)
+class Stretches:
+    """Stretches of the loaded parts between kinks, s of them, by position, tooth pair and z.
+
+    Attributes
+    ----------
+    position, pair : ndarray, shape (s,)
+        Numbers of the positions, and tooth pairs.
+    low, high : ndarray, shape (s,)
+        Between which z (m).
+    """
+
+    position: IntArray
+    pair: IntArray
+    low: Array
+    high: Array
 
 
-def _count(lines: ContactLines, share: float) -> int:
-    """Points of a stretch over so much of the width."""
-    return max(LEAST_POINTS, math.ceil(lines.density * lines.compliance.mesh.count * math.sqrt(share) - 1e-9))
+def _stretches(looks: Looks, runs: Runs, least: float) -> Stretches:
+    """Divide runs at kinks that are `least` (m) apart."""
+    z, keys = looks.z[looks.kink], _keys(looks.position, looks.pair)[looks.kink]
+    order = np.lexsort((np.concatenate([runs.start, z]), np.concatenate([runs.keys, keys])))
+    run = np.empty(len(order), dtype=np.int64)
+    run[order] = np.cumsum(order < len(runs.start)) - 1  # the last one that begins before a kink, -1 where none does
+    run = run[len(runs.start) :]
+    low, high = np.append(runs.start, math.inf)[run], np.append(runs.end, math.inf)[run]
+    kept = (np.append(runs.keys, 0)[run] == keys) & (z > low + least) & (z < high - least)
+    z, run = z[kept], run[kept]
+    kept = np.append(True, (np.diff(run) > 0) | (np.diff(z) > least))[: len(z)]  # kinks of both gears may be one
+    z, run = z[kept], run[kept]
+    of_run = np.concatenate([np.arange(len(runs.start)), run])
+    low, high = np.concatenate([runs.start, z]), np.concatenate([runs.end, z])
+    run = np.sort(of_run)
+    low, high = low[np.lexsort((low, of_run))], high[np.lexsort((high, of_run))]
+    return Stretches(runs.position[run], runs.pair[run], low, high)
 
 
 @cache
-def _gauss(count: int) -> tuple[Array, Array]:
-    return np.polynomial.legendre.leggauss(count)
+def _gauss(count: int) -> Array:
+    """Gauss points and weights on (-1, 1), shape (2, count)."""
+    return np.stack(np.polynomial.legendre.leggauss(count))
 
 
-def _points(lines: ContactLines, middle: float, twist: float, z: Array, weight: Array, pair: IntArray) -> Points:
-    mesh, law = lines.compliance.mesh, lines.law
-    rows = rows_at(law, middle + mesh.turns[0] * z + pair * mesh.sections.mesh_cycle)
-    levers = np.concatenate([np.ones((len(z), 1)), lines.levers(z, rows) / rows.arm[:, None]], axis=1)
-    first = rows.touch + lines.gap(z, rows, pair) / mean_arm(lines, rows)
-    rows = _with_ends(lines, z, rows)
-    loads = _loads(lines.compliance, z, rows)
-    influence = _influence(lines.compliance, loads, pair) / (rows.arm[:, None] * rows.arm)
-    return Points(z, weight, pair, rows, twist, _touch(lines, rows, first, twist), levers, loads, influence)
+@dataclass(frozen=True)
+class _Densities:
+    """Moments per width (N) at q places along lines, by the lines' numbers `keys` and z (m)."""
+
+    keys: IntArray
+    z: Array
+    density: Array
+
+    def at(self, keys: IntArray, z: Array) -> Array:
+        """Return them at other places, shape (p,): straight between those known on a line, 0 on other lines."""
+        start = _starts(self.keys)
+        line, known = _found(self.keys[start], keys)
+        if not known.any():
+            return np.zeros(len(z))
+        stop = np.append(start[1:], len(self.keys)) - 1
+        apart = 2.0 * (np.ptp(self.z) + np.ptp(z))  # of lines in one row
+        row = np.repeat(np.arange(len(start)), np.diff(start, append=len(self.keys)))
+        within = np.clip(z, self.z[start[line]], self.z[stop[line]])
+        return np.where(known, np.interp(line * apart + within, row * apart + self.z, self.density), 0.0)
 
 
-def _touch(lines: ContactLines, rows: Rows, first: Array, twist: float) -> Array:
-    """Twist (rad) at which places touch, to first order from a twist (rad); `first`: that of their first contact."""
+#: No load.
+NO_LOADS = _Densities(np.zeros(0, dtype=np.int64), *np.zeros((2, 0)))
+
+
+def _touch(lines: ContactLines, rows: Rows, first: Array, twist: Array) -> Array:
+    """Twist (rad) at which places touch, to first order from twists (rad); `first`: that of their first contact."""
     return np.asarray(twist - mean_arm(lines, rows) * (twist - first) / rows.arm)
 
 
@@ -528,56 +693,95 @@ def _loads(compliance: WideCompliance, z: Array, rows: Rows) -> list[Array]:
     return loads
 
 
-def _influence(compliance: WideCompliance, loads: list[Array], pair: IntArray) -> Array:
-    """Approach of the flanks at each point per force at each (m/N), shape (n, n)."""
-    found = np.zeros((len(pair), len(pair)))
-    of_pair = {k: np.flatnonzero(pair == k) for k in np.unique(pair).tolist()}
+def _influence(
+    compliance: WideCompliance,
+    loads: list[Array],
+    keys: IntArray,
+    row: IntArray,
+    column: IntArray,
+    shape: tuple[int, int],
+) -> Array:
+    """Return the approach of the flanks at points per force at those of the same position (m/N), shape (m, n, n).
+
+    Parameters
+    ----------
+    compliance : WideCompliance
+        The gears.
+    loads : list of ndarray, shapes (q, size)
+        Loads of the points on both gears.
+    keys, row, column : ndarray, shape (q,)
+        As those of `Placing`.
+    shape
+        m and n.
+    """
+    found = np.zeros((*shape, shape[1]))
+    start = _starts(keys)
+    size = np.diff(start, append=len(keys))
+    position, first, last = row[start].tolist(), column[start].tolist(), (column[start] + size).tolist()
     for gear, (side, load) in enumerate(zip(compliance.sides, loads, strict=True)):
         for step in range(compliance.steps + 1):
             # the wheel's teeth count the other way round
-            way = step * (1 - 2 * gear)
-            couples = [(of_pair[k + way], source) for k, source in of_pair.items() if k + way in of_pair]
-            if not couples:
-                break
+            on_line, known = _found(keys[start], keys[start] + step * (1 - 2 * gear))
+            source = np.flatnonzero(known)
             square = side.influence[step].reshape(load.shape[1], load.shape[1])
-            sources = np.concatenate([source for _, source in couples])
-            moved = load[sources] @ (square.T if step else square)
-            start = 0
-            for felt, source in couples:
-                block = load[felt] @ moved[start : start + len(source)].T
-                start += len(source)
+            sources = load[ranges(start[source], size[source])] if step else load
+            moved = sources @ (square.T if step else square)
+            end = 0
+            for i, j in zip(on_line[source].tolist(), source.tolist(), strict=True):
+                begin, end = end, end + last[j] - first[j]
+                block = load[start[i] : start[i] + size[i]] @ moved[begin:end].T
+                felt, loaded = slice(first[i], last[i]), slice(first[j], last[j])
                 if step == 0:
-                    found[np.ix_(felt, source)] += 0.5 * (block + block.T)
+                    found[position[i], felt, loaded] += 0.5 * (block + block.T)
                 else:
-                    found[np.ix_(felt, source)] += block
-                    found[np.ix_(source, felt)] += block.T
+                    found[position[i], felt, loaded] += block
+                    found[position[i], loaded, felt] += block.T
     return found
 
 
-def _approach_left(lines: ContactLines, looks: Looks, balance: _Balance | Solution) -> Array:
-    """Twist (rad) left to the contacts themselves at the places looked at, shape (q,); that of rigid gears below 0."""
-    compliance, points, rows = lines.compliance, balance.points, looks.rows
-    mesh, force = compliance.mesh, balance.moment / points.rows.arm
-    left = balance.twist - _touch(lines, rows, looks.first, points.twist)
-    overlaps = left > 0.0  # of rigid gears, without which nothing is loaded
-    pairs, line = np.unique(looks.pair[overlaps], return_inverse=True)
-    over_width = legendre(looks.z[overlaps], mesh.zone, mesh.count)[:, :, None]
-    values, normal = compliance.shapes.values_at(rows.arc[overlaps]), rows.tooth_normal[overlaps]
-    approach = np.zeros(len(line))
-    loaded = [(k, points.pair == k) for k in np.unique(points.pair).tolist()]
-    for gear, (side, load) in enumerate(zip(compliance.sides, points.loads, strict=True)):
-        size, moved = load.shape[1], np.zeros((len(pairs), load.shape[1]))
-        steps = side.influence.reshape(-1, size, size)
-        for k, of_pair in loaded:
-            total = force[of_pair] @ load[of_pair]
-            way = (pairs - k) * (1 - 2 * gear)
-            for i, step in enumerate(way.tolist()):
-                if abs(step) <= compliance.steps:
-                    moved[i] += steps[step] @ total if step >= 0 else total @ steps[-step]
-        along = (moved.reshape(len(pairs), size // mesh.count, mesh.count)[line] @ over_width)[..., 0]
-        shape = values[:, gear, : len(side.local.stations), None] * normal[:, gear, None]
-        approach += (shape.reshape(len(line), size // mesh.count) * along).sum(axis=1)
-    left[overlaps] -= approach / rows.arm[overlaps]
+def _approach_left(
+    lines: ContactLines, looks: Looks, left: Array, sources: IntArray, loads: list[Array], force: Array
+) -> Array:
+    """Twist (rad) left to the contacts themselves at the places looked at, shape (q,); that of rigid gears below 0.
+
+    Parameters
+    ----------
+    lines : ContactLines
+        The gears.
+    looks : Looks
+        The places.
+    left : ndarray, shape (q,)
+        Twist beyond that at which the rigid flanks touch there (rad).
+    sources : ndarray, shape (p,)
+        Numbers of the lines of points.
+    loads : list of ndarray, shapes (p, size)
+        Loads of unit forces at these points on both gears.
+    force : ndarray, shape (p,)
+        Forces there (N).
+    """
+    compliance, rows = lines.compliance, taken(looks.rows, overlaps := left > 0.0)  # without which nothing is loaded
+    mesh, keys = compliance.mesh, _keys(looks.position[overlaps], looks.pair[overlaps])
+    begin, loaded = _starts(keys), _starts(sources)
+    spans = [slice(*span) for span in itertools.pairwise([*begin.tolist(), len(keys)])]
+    over_width = legendre(looks.z[overlaps], mesh.zone, mesh.count)
+    values = compliance.shapes.values_at(rows.arc)
+    approach = np.zeros(len(keys))
+    for gear, (side, load) in enumerate(zip(compliance.sides, loads, strict=True)):
+        size = load.shape[1]
+        total = np.add.reduceat(force[:, None] * load, loaded, axis=0) if len(loaded) else np.zeros((0, size))
+        sums = np.zeros((len(begin), size))
+        for step in range(-compliance.steps, compliance.steps + 1):
+            source, known = _found(sources[loaded], keys[begin] - step * (1 - 2 * gear))
+            square = side.influence[abs(step)].reshape(size, size)
+            sums[known] += total[source[known]] @ (square.T if step >= 0 else square)
+        moved = sums.reshape(len(begin), size // mesh.count, mesh.count)
+        along = np.zeros((len(keys), moved.shape[1]))
+        for span, of_line in zip(spans, moved, strict=True):
+            along[span] = over_width[span] @ of_line.T
+        shape = values[:, gear, : len(side.local.stations), None] * rows.tooth_normal[:, gear, None]
+        approach += (shape.reshape(along.shape) * along).sum(axis=1)
+    left = left.copy()
+    left[overlaps] -= approach / rows.arm
     return left
 
 
@@ -588,7 +792,7 @@ def own_twists(law: PairLaw, rows: Rows, moment: Array) -> tuple[Array, Array]:
     share, slope, inside = _cubic(rows.yields, rows.slopes, x)
     slope = np.where(x > inside, 0.0, slope)  # beyond the forces of the table C stays, so that C f rises
     share = share + (x - inside) * slope
-    rate = np.maximum(share + slope / spacing, STIFFEST * rows.yields[:, 0])
+    rate = np.maximum(share + slope / spacing, STIFFEST * rows.yields[..., 0])
     return share * force / rows.arm, rate / rows.arm**2
 
 
@@ -616,10 +820,10 @@ def wheel_moments(law: PairLaw, points: Points, moment: Array) -> tuple[Array, A
 
 def _cubic(values: Array, slopes: Array, x: Array) -> tuple[Array, Array, Array]:
     """Cubic between the loads of a table at x (in their spacings) within it: value, slope, and that x, shape (n,)."""
-    last = values.shape[1] - 1
+    last = values.shape[-1] - 1
     inside = np.minimum(np.maximum(x, 0.0), last)
     i = np.minimum(inside.astype(np.int64), last - 1)
-    t, first = inside - i, i + np.arange(0, len(i) * (last + 1), last + 1)
+    t, first = inside - i, i + np.arange(0, i.size * (last + 1), last + 1).reshape(i.shape)
     values, slopes = values.ravel(), slopes.ravel()
     a, b, da, db = values[first], values[first + 1], slopes[first], slopes[first + 1]
     c2, c3 = 3 * (b - a) - 2 * da - db, da + db - 2 * (b - a)
@@ -640,12 +844,12 @@ class Solution:
         m = r_2 F of the points (N m), the unknowns.
     wheel_moment : ndarray, shape (n,)
         Moments of the points on the wheel (N m), whose sum is the torque.
-    runs
-        Loaded parts of the lines.
-    looks
-        Looks at the lines, with the kinks that divide these.
     tangent : ndarray, shape (3, 3)
         Torque and moments of the tilts by twist, tilt in the plane of action and tilt across (N m/rad).
+    placed
+        Twist for which the points are placed (rad).
+    stretches
+        Loaded parts of the lines between their kinks.
     converged
         Whether the iteration settled.
     steps, placings
@@ -656,9 +860,9 @@ class Solution:
     twist: float
     moment: Array
     wheel_moment: Array
-    runs: Runs
-    looks: Looks
     tangent: Array
+    placed: float
+    stretches: Stretches
     converged: bool
     steps: int
     placings: int
@@ -668,28 +872,32 @@ class Solution:
         """Torque at the wheel (N m)."""
         return float(self.wheel_moment.sum())
 
-    def continued(self, before: Solution, share: float) -> Solution:
-        """Return this solution with the twist and the ends of the load that continue those before it, to start from.
 
-        Parameters
-        ----------
-        before : Solution
-            Solution at the position before this one.
-        share : float
-            How far, in their distance (-).
-        """
-        start, end = self.runs.start.copy(), self.runs.end.copy()
-        for k in np.unique(self.runs.pair).tolist():
-            i, j = self.runs.pair == k, before.runs.pair == k
-            if np.count_nonzero(i) == np.count_nonzero(j):
-                start[i] += share * (start[i] - before.runs.start[j])
-                end[i] += share * (end[i] - before.runs.end[j])
-        twist = self.twist + share * (self.twist - before.twist)
-        return replace(self, twist=twist, runs=Runs(self.runs.pair, start, end))
+@dataclass(frozen=True)
+class LineLoads:
+    """Line loads along the loaded parts of solved positions, q of them, by position, tooth pair and z.
+
+    Attributes
+    ----------
+    position, pair : ndarray, shape (q,)
+        Numbers of the positions, and tooth pairs.
+    z : ndarray, shape (q,)
+        Axial coordinates (m).
+    roll : ndarray, shape (q, 2)
+        Roll lengths on pinion and wheel (m).
+    load : ndarray, shape (q,)
+        Forces per width (N/m).
+    """
+
+    position: IntArray
+    pair: IntArray
+    z: Array
+    roll: Array
+    load: Array
 
 
-def line_load(lines: ContactLines, angle: float, solution: Solution) -> tuple[Looks, Array]:
-    """Return places along the loaded parts of a solved position, their ends and kinks too, and the line loads (N/m).
+def line_loads(lines: ContactLines, angle: Array, solutions: Sequence[Solution]) -> LineLoads:
+    """Return line loads at places along the loaded parts of solved positions, their ends and kinks too.
 
     The line load is the force per width with which the contact yields by the approach that is left to it, as at the
     points of the lines. Where it is larger than on both sides, the place is the vertex of the parabola through all
@@ -699,32 +907,45 @@ def line_load(lines: ContactLines, angle: float, solution: Solution) -> tuple[Lo
     ----------
     lines : ContactLines
         The gears.
-    angle : float
-        Pinion angle (rad).
-    solution : Solution
-        The position.
+    angle : ndarray, shape (m,)
+        Pinion angles (rad).
+    solutions : sequence of Solution
+        The positions, at least one.
     """
-    pair, z, kink = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], [np.zeros(0, dtype=bool)]
-    for stretches in _divided(lines, solution.looks, solution.runs):
-        whole = stretches[-1][2] - stretches[0][1]
-        for i, (k, a, b) in enumerate(stretches):
-            intervals = max(LEAST_DENSE, math.ceil(DENSE * math.sqrt((b - a) / whole)))
-            x = _dense(intervals)[min(i, 1) :]  # a kink once
-            pair.append(np.full(len(x), k))
-            z.append(a + (b - a) * x)
-            kink.append((x == 0.0) | (x == 1.0))
-    middle = _middle(lines, angle, solution.points.twist)
-    looks = _looks(lines, middle, np.concatenate(pair), np.concatenate(z), np.concatenate(kink))
-    left = _approach_left(lines, looks, solution)
-    load = _load_of(lines.law, _with_ends(lines, looks.z, looks.rows), left)
+    return joined([_line_loads(lines, angle[of], solutions[of], of.start) for of in _batches(lines, len(solutions))])
+
+
+def _line_loads(lines: ContactLines, angle: Array, solutions: Sequence[Solution], first: int) -> LineLoads:
+    """Line loads of a batch of positions, of which the first has a number."""
+    mesh, numbers = lines.compliance.mesh, np.arange(len(solutions))
+    parts = joined([replace(one.stretches, position=one.stretches.position + i) for i, one in enumerate(solutions)])
+    keys = _keys(parts.position, parts.pair)
+    begins = np.append(True, (np.diff(keys) > 0) | (parts.low[1:] != parts.high[:-1]))[: len(keys)]
+    run = np.cumsum(begins) - 1
+    whole = (np.bincount(run, parts.high - parts.low))[run]
+    counts = np.maximum(LEAST_DENSE, np.ceil(DENSE * np.sqrt((parts.high - parts.low) / whole)).astype(np.int64))
+    # a kink once
+    share = [_dense(count)[0 if begin else 1 :] for count, begin in zip(counts.tolist(), begins.tolist(), strict=True)]
+    of, x = np.repeat(np.arange(len(share)), [len(one) for one in share]), np.concatenate([np.zeros(0), *share])
+    placed, twist = (np.array([getattr(one, name) for one in solutions]) for name in ("placed", "twist"))
+    middle, z = _middle(lines, angle, placed), parts.low[of] + (parts.high - parts.low)[of] * x
+    looks = _looks(lines, middle, np.zeros(len(middle)), parts.position[of], parts.pair[of], z, (x == 0.0) | (x == 1.0))
+
+    points = joined([replace(one.points, influence=np.zeros((len(one.points), 0))) for one in solutions])
+    sources = _keys(np.repeat(numbers, [len(one.points) for one in solutions]), points.pair)
+    force = np.concatenate([one.moment for one in solutions]) / points.rows.arm
+    left = twist[looks.position] - _touch(lines, looks.rows, looks.first, placed[looks.position])
+    left = _approach_left(lines, looks, left, sources, _loads(lines.compliance, points.z, points.rows), force)
+    load = _load_of(lines.law, _with_ends(lines, z, looks.rows), left)
     tops = np.flatnonzero((load[1:-1] >= load[:-2]) & (load[1:-1] > load[2:]) & ~looks.kink[1:-1]) + 1
-    before, top, behind = (looks.z[tops + i] for i in (-1, 0, 1))
+    before, top, behind = (z[tops + i] for i in (-1, 0, 1))
     rise, fall = (load[tops] - load[tops - 1]) / (top - before), (load[tops + 1] - load[tops]) / (behind - top)
     bend = (fall - rise) / (behind - before)
     vertex = 0.5 * (before + top - rise / bend)
     load[tops] += (vertex - top) * (rise + bend * (vertex - before))
-    looks.z[tops] = vertex
-    return _looks(lines, middle, looks.pair, looks.z, looks.kink), load
+    z[tops] = vertex
+    angles = middle[looks.position] + looks.pair * mesh.sections.mesh_cycle + mesh.turns[0] * z
+    return LineLoads(looks.position + first, looks.pair, z, rows_at(lines.law, angles).roll, load)
 
 
 @cache
@@ -734,172 +955,245 @@ def _dense(count: int) -> Array:
 
 
 def solve_position(
-    lines: ContactLines,
-    angle: float,
-    *,
-    torque: float | None = None,
-    twist: float | None = None,
-    before: Solution | None = None,
+    lines: ContactLines, angle: float, *, torque: float | None = None, twist: float | None = None
 ) -> Solution:
-    """Solve the contact at a pinion angle.
+    """Solve the contact at a pinion angle (rad), at a torque (N m) or a twist (rad); see `solve_positions`."""
+    load = {"torque" if twist is None else "twist": np.array([torque if twist is None else twist])}
+    return solve_positions(lines, np.array([angle]), **load)[0]
+
+
+def solve_positions(
+    lines: ContactLines,
+    angle: Array,
+    *,
+    torque: Array | None = None,
+    twist: Array | None = None,
+    tilt: Array | None = None,
+) -> list[Solution]:
+    """Solve the contact at pinion angles, side by side.
 
     Parameters
     ----------
     lines : ContactLines
         The gears.
-    angle : float
-        Pinion angle (rad).
-    torque : float, optional
+    angle : ndarray, shape (m,)
+        Pinion angles (rad).
+    torque : ndarray, shape (m,), optional
         At the wheel (N m), > 0.
-    twist : float, optional
+    twist : ndarray, shape (m,), optional
         Of the wheel (rad), from where unmodified flanks touch, instead of `torque`.
-    before : Solution, optional
-        Solved position close by, from which the iteration starts.
+    tilt : ndarray, shape (m,), optional
+        Tilts in the plane of action (rad) beside that of the flanks.
     """
-    mesh = lines.compliance.mesh
-    known: _Balance | Solution | None = before
-    runs = None if before is None else before.runs
-    at = before.twist if twist is None and before is not None else twist
-    if at is None:
+    solved: list[Solution] = []
+    tilt = np.zeros(len(angle)) if tilt is None else tilt
+    for of in _batches(lines, len(angle)):
+        load, held = (None if values is None else values[of] for values in (torque, twist))
+        solved += _solved(lines, angle[of], tilt[of], load, held)
+    return solved
+
+
+def _batches(lines: ContactLines, count: int) -> list[slice]:
+    """Divide so many positions into batches."""
+    size = math.ceil(BATCH / lines.compliance.mesh.count)
+    return [slice(start, start + size) for start in range(0, count, size)]
+
+
+def _solved(
+    lines: ContactLines, angle: Array, tilt: Array, torque: Array | None, twist: Array | None
+) -> list[Solution]:
+    """Solve a batch of positions: place points, balance them, and place them anew until the ends of the load stay."""
+    usual, size = lines.compliance.mesh.usual_stiffness, len(angle)
+    solved: list[Solution | None] = [None] * size
+    if twist is not None:
+        at = np.array(twist, dtype=float)
+    else:
         assert torque is not None
-        at = look_at(lines, angle).least + torque / mesh.usual_stiffness
-    balance, steps, number, settled = None, 0, 0, False
-    while not settled and number < PLACINGS and math.isfinite(at):
-        number += 1
-        looks = look_at(lines, angle, at, runs)
-        rigid = at - _touch(lines, looks.rows, looks.first, at)
-        if torque is not None and not (rigid > 0.0).any():
-            at += LEAST_AHEAD * torque / mesh.usual_stiffness - rigid.max(initial=-math.inf)
-            runs = None
-            continue
-        runs = _runs(looks.pair, looks.z, rigid) if runs is None else runs.within(looks)
-        points = place_points(lines, angle, at, looks, runs)
-        balance = known = _newton(lines, points, torque=torque, twist=twist, before=known, settled=ROUGH)
-        steps, placed = steps + balance.steps, runs
+        at = look_at(lines, angle, tilt=tilt).least + torque / usual
+    runs, before, steps = NO_RUNS, NO_LOADS, np.zeros(size, dtype=np.int64)
+    active = np.flatnonzero(np.isfinite(at))
+    for number in range(1, PLACINGS + 1):
+        if not len(active):
+            break
+        looks = look_at(lines, angle, at, tilt, runs, active)
+        touch = _touch(lines, looks.rows, looks.first, at[looks.position])
+        rigid = at[looks.position] - touch
+        begun = np.isin(looks.position, runs.position)  # the others begin where rigid flanks overlap
+        placed = runs.within(looks).joined(_runs(looks, np.where(begun, -1.0, rigid)))
+        placing = place_points(lines, angle, at, tilt, active, looks, placed)
+        points, load = placing.points, None if torque is None else torque[active]
+        balance = _newton(lines, points, _start(lines, placing, before), at[active], load, ROUGH)
+        steps[active] += balance.steps
+        before = _Densities(placing.keys, placing.flat(points.z), placing.flat(balance.moment / points.weight))
+
+        new, empty = at.copy(), placing.count == 0
+        new[active] = balance.twist
+        runs = placed
         if number <= FREE_PLACINGS:
-            runs = _runs(looks.pair, looks.z, _approach_left(lines, looks, balance))
-        near = abs(balance.twist - at) <= PLACED * max(balance.twist - looks.least, 0.0)
-        at = balance.twist
-        if balance.converged and near and runs.near(placed):
-            balance = _newton(lines, points, torque=torque, twist=twist, before=balance)
-            steps, settled = steps + balance.steps, balance.converged
-    if balance is None or runs is None:
-        nothing = _Balance(_nowhere(lines), math.nan, np.zeros(0), converged=False, steps=0)
-        return _solution(lines, nothing, NO_RUNS, look_at(lines, angle), 0)
-    return _solution(lines, replace(balance, steps=steps, converged=settled), runs, looks, number)
+            left, force = new[looks.position] - touch, placing.flat(balance.moment / points.rows.arm)
+            runs = _runs(looks, _approach_left(lines, looks, left, placing.keys, placing.loads, force))
+        way = np.maximum(new[active] - looks.least[active], 0.0)
+        near = (np.abs(new[active] - at[active]) <= PLACED * way) & runs.near(placed, size)[active]
+        settled = balance.converged & near
+        i = np.flatnonzero(settled | ~empty & np.isfinite(balance.twist) & (number == PLACINGS))
+        final = _newton(
+            lines, taken(points, i), balance.moment[i], balance.twist[i], None if load is None else load[i], SETTLED
+        )
+        settled[i] &= final.converged
+        final = replace(final, converged=settled[i], steps=steps[active[i]] + final.steps)
+        for j, solution in zip(active[i].tolist(), _solutions(lines.law, placing, i, final, number), strict=True):
+            solved[j] = solution
+
+        if torque is not None and empty.any():
+            deepest = np.full(size, -math.inf)
+            np.maximum.at(deepest, looks.position, rigid)
+            j = active[empty]
+            new[j] = at[j] + np.where(deepest[j] > 0.0, 0.0, LEAST_AHEAD * torque[j] / usual - deepest[j])
+        at, active = new, active[~settled & np.isfinite(new[active])]
+        runs = taken(runs, np.isin(runs.position, active))
+    return [_unsolved(lines) if one is None else one for one in solved]
 
 
-def _nowhere(lines: ContactLines) -> Points:
-    """No points."""
-    nothing = np.zeros(0)
-    return _points(lines, lines.law.angle[0], 0.0, nothing, nothing, nothing.astype(np.int64))
+def _unsolved(lines: ContactLines) -> Solution:
+    """Return a position that is not solved, without points."""
+    zero, number = np.zeros(1), np.zeros(1, dtype=np.int64)
+    looks = look_at(lines, zero, chosen=number[:0])
+    placing = place_points(lines, zero, zero, zero, number, looks, NO_RUNS)
+    balance = _Balance(np.full(1, math.nan), zero[:, None][:, :0], number > 0, number)
+    return _solutions(lines.law, placing, number, balance, 0)[0]
+
+
+def _start(lines: ContactLines, placing: Placing, before: _Densities) -> Array:
+    """Return moments (N m) to begin with, shape (m, n): along the lines before, or from the overlap."""
+    mesh, points, known = lines.compliance.mesh, placing.points, np.zeros(placing.points.z.shape)
+    known[placing.row, placing.column] = before.at(placing.keys, placing.flat(points.z))
+    rigid = np.maximum(placing.twist[:, None] - points.touch, 0.0) * (mesh.usual_stiffness / mesh.width)
+    density = np.where((known > 0.0).any(axis=1, keepdims=True), known, rigid)
+    return np.where(points.real, density * points.weight, 0.0)
 
 
 @dataclass(frozen=True)
 class _Balance:
-    """Moments (N m), shape (n,), of points at a twist (rad) that close their gaps if `converged`."""
+    """Moments (N m), shape (m, n), of points at twists (rad), shape (m,), that close their gaps where `converged`."""
 
-    points: Points
-    twist: float
+    twist: Array
     moment: Array
-    converged: bool
-    steps: int
+    converged: BoolArray
+    steps: IntArray
 
 
 def _newton(
-    lines: ContactLines,
-    points: Points,
-    *,
-    torque: float | None,
-    twist: float | None,
-    before: _Balance | Solution | None = None,
-    settled: float = SETTLED,
+    lines: ContactLines, points: Points, moment: Array, twist: Array, torque: Array | None, settled: float
 ) -> _Balance:
-    """Solve the complementary problem of the points at a torque (N m) or a twist (rad).
+    """Solve the complementary problem of the points of m positions, n at each.
 
-    It begins with the loads along the lines of the solution `before`, and ends after a step that changes the moments by
-    less than `settled` of their sum.
+    Parameters
+    ----------
+    lines : ContactLines
+        The gears.
+    points : Points
+        Points.
+    moment : ndarray, shape (m, n)
+        Moments to begin with (N m).
+    twist : ndarray, shape (m,)
+        Twists of the wheel (rad), which hold without torques.
+    torque : ndarray, shape (m,), or None
+        Torques at the wheel (N m).
+    settled
+        Change of the moments in parts of their sum, below which a step is the last.
     """
-    law, n, weight = lines.law, len(points), points.weight
-    loaded: BoolArray = np.ones(n, dtype=bool)
-    moment = np.zeros(n) if before is None else _density(before, points) * weight
-    if moment.any():
-        loaded = moment > 0
-    else:
-        rigid = np.maximum(points.twist - points.touch, 0.0)
-        moment = rigid * weight * lines.compliance.mesh.usual_stiffness / lines.compliance.mesh.width
-    at, steps, converged = math.nan if twist is None else twist, 0, n == 0 and torque is None
+    law, size, some = lines.law, len(points), points.real.any(axis=1)
+    found = _Balance(
+        twist=twist.copy() if torque is None else np.full(size, np.nan),
+        moment=np.zeros(moment.shape),
+        converged=np.logical_and(~some, torque is None),
+        steps=np.zeros(size, dtype=np.int64),
+    )
     closed = CLOSED / lines.compliance.mesh.sections.wheel.base_radius
-    while n and not converged and steps < STEPS:
+    left, steps = np.flatnonzero(some), 0
+    points, moment = taken(points, left), moment[left]
+    loaded = moment > 0.0
+    loaded |= points.real & ~loaded.any(axis=1, keepdims=True)
+    while len(left) and steps < STEPS:
         steps += 1
-        own, rate = own_twists(law, points.rows, moment / weight)
-        i = np.flatnonzero(loaded)
-        system = points.influence[i[:, None], i]
-        rate /= weight
-        system.flat[:: len(i) + 1] += rate[i]
-        right = np.ones((len(i), 2))
-        right[:, 0] = rate[i] * moment[i] - own[i] - points.touch[i]
-        answer = np.linalg.solve(system, right)
+        own, rate = own_twists(law, points.rows, moment / points.weight)
+        rate /= points.weight
+        right = np.stack([rate * moment - own - points.touch, np.ones(loaded.shape)], axis=2)
+        answer = _solved_loaded(points, rate, loaded, right)
+        at = twist[left]
         if torque is not None:
             on_wheel, worth = wheel_moments(law, points, moment)
-            missing = torque - on_wheel.sum() + worth @ moment
-            at = (missing - worth[i] @ answer[:, 0]) / (worth[i] @ answer[:, 1])
-        new = np.zeros(n)
-        new[i] = answer[:, 0] + at * answer[:, 1]
-        leaving = loaded & (new <= 0)
-        share = 1.0
-        if steps > QUICK_STEPS and leaving.any():  # up to the first point that loses its load
-            past = np.flatnonzero(leaving)
-            shares = moment[past] / np.maximum(moment[past] - new[past], 1e-300)
-            share = float(shares.min())
-            leaving = np.zeros(n, dtype=bool)
-            leaving[past[shares <= share]] = True
-        new = np.where(leaving, 0.0, np.maximum(moment + share * (new - moment), 0.0))
-        change = np.abs(new - moment).max() / max(new.sum(), 1e-300)
+            missing = torque[left] - (on_wheel - worth * moment).sum(axis=1)
+            at = (missing - (worth * answer[..., 0]).sum(axis=1)) / (worth * answer[..., 1]).sum(axis=1)
+        new = answer[..., 0] + at[:, None] * answer[..., 1]
+        leaving, share = loaded & (new <= 0.0), np.ones(len(left))
+        if steps > QUICK_STEPS:  # up to the first point that loses its load
+            shares = np.divide(moment, moment - new, out=np.full(new.shape, math.inf), where=leaving & (moment > new))
+            shares[leaving & (moment <= new)] = 0.0
+            share = np.minimum(shares.min(axis=1), 1.0)
+            leaving &= shares <= share[:, None]
+        new = np.where(leaving, 0.0, np.maximum(moment + share[:, None] * (new - moment), 0.0))
+        change = np.abs(new - moment).max(axis=1) / np.maximum(new.sum(axis=1), 1e-300)
         moment = np.where(loaded, new, 0.0)
-        overlap = np.where(loaded, 0.0, at - points.touch - points.influence @ moment)
-        entering = overlap > closed
-        if steps > QUICK_STEPS and entering.any():  # after a whole step the deepest alone
-            entering = (overlap == overlap.max()) & (share == 1.0) & (change < ONE_BY_ONE)
-        if not (leaving.any() or (overlap > closed).any()) and change < settled:
-            converged = True
+        overlap = at[:, None] - points.touch - (points.influence @ moment[..., None])[..., 0]
+        overlap = np.where(points.real & ~loaded, overlap, 0.0)
+        overlapping = overlap > closed
+        entering = overlapping
+        if steps > QUICK_STEPS:  # after a whole step the deepest alone
+            whole = (share == 1.0) & (change < ONE_BY_ONE)
+            entering = overlapping & (overlap == overlap.max(axis=1, keepdims=True)) & whole[:, None]
+        done = ~(leaving | overlapping).any(axis=1) & (change < settled)
         loaded = (loaded & ~leaving) | entering
-        if not loaded.any():
-            converged = torque is None and not (overlap > closed).any()
-            loaded = points.touch <= points.touch.min()
-    return _Balance(points, at, moment, converged, steps)
-
-
-def _solution(lines: ContactLines, balance: _Balance, runs: Runs, looks: Looks, placings: int) -> Solution:
-    law, points, moment = lines.law, balance.points, balance.moment
-    on_wheel, worth = wheel_moments(law, points, moment)
-    tangent = _tangent(law, points, moment, worth)
-    converged, steps = balance.converged, balance.steps
-    return Solution(points, balance.twist, moment, on_wheel, runs, looks, tangent, converged, steps, placings)
-
-
-def _density(before: _Balance | Solution, points: Points) -> Array:
-    """Moments per width of a solution at other points, straight along its lines (N), shape (n,)."""
-    density = before.moment / before.points.weight
-    found = np.zeros(len(points))
-    for k in np.unique(points.pair).tolist():
-        of_pair, known = np.flatnonzero(points.pair == k), np.flatnonzero(before.points.pair == k)
-        if len(known):
-            known = known[np.argsort(before.points.z[known])]
-            found[of_pair] = np.interp(points.z[of_pair], before.points.z[known], density[known])
+        none = ~loaded.any(axis=1)
+        if none.any():
+            done = np.where(none, ~overlapping.any(axis=1) & (torque is None), done)
+            loaded |= none[:, None] & points.real & (points.touch <= points.touch.min(axis=1, keepdims=True))
+        if done.any() or steps == STEPS:
+            found.twist[left], found.moment[left], found.steps[left] = at, moment, steps
+            found.converged[left] = done
+            left, points, moment, loaded = left[~done], taken(points, ~done), moment[~done], loaded[~done]
     return found
 
 
+def _solved_loaded(points: Points, rate: Array, loaded: BoolArray, right: Array) -> Array:
+    """Return (T + c')^-1 times right sides of shape (m, n, k) over the loaded points; zero at the others."""
+    system = np.where(loaded[:, :, None] & loaded[:, None, :], points.influence, 0.0)
+    i = np.arange(loaded.shape[1])
+    system[:, i, i] += np.where(loaded, rate, 1.0)
+    return np.asarray(np.linalg.solve(system, np.where(loaded[..., None], right, 0.0)))
+
+
+def _solutions(law: PairLaw, placing: Placing, rows: IntArray, balance: _Balance, placings: int) -> list[Solution]:
+    """Return the solutions of some rows of a placing; `balance` is of them alone."""
+    points, moment = taken(placing.points, rows), balance.moment
+    on_wheel, worth = wheel_moments(law, points, moment)
+    tangent = _tangent(law, points, moment, worth)
+    solutions = []
+    for i, row in enumerate(rows.tolist()):
+        own = slice(0, int(placing.count[row]))
+        solutions.append(
+            Solution(
+                points=placing.of_position(row),
+                twist=float(balance.twist[i]),
+                moment=moment[i, own],
+                wheel_moment=on_wheel[i, own],
+                tangent=tangent[i],
+                placed=float(placing.twist[row]),
+                stretches=of_positions(placing.stretches, placing.position[[row]]),
+                converged=bool(balance.converged[i]),
+                steps=int(balance.steps[i]),
+                placings=placings,
+            )
+        )
+    return solutions
+
+
 def _tangent(law: PairLaw, points: Points, moment: Array, worth: Array) -> Array:
-    """B^T (T + c')^-1 B over the loaded points (N m/rad), shape (3, 3); `worth`: derivatives of `wheel_moments`."""
-    i = np.flatnonzero(moment > 0)
-    if len(i) == 0:
-        return np.zeros((3, 3))
-    rate = own_twists(law, points.rows, moment / points.weight)[1]
-    system = points.influence[i[:, None], i]
-    system.flat[:: len(i) + 1] += rate[i] / points.weight[i]
-    levers = points.levers[i] * np.stack([worth[i], np.ones(len(i)), np.ones(len(i))], axis=1)
-    return np.asarray(levers.T @ np.linalg.solve(system, levers))
+    """Return B^T (T + c')^-1 B over the loaded points (N m/rad), shape (m, 3, 3); `worth`: as of `wheel_moments`."""
+    rate = own_twists(law, points.rows, moment / points.weight)[1] / points.weight
+    levers = points.levers * np.stack([worth, np.ones(worth.shape), np.ones(worth.shape)], axis=2)
+    answer = _solved_loaded(points, rate, moment > 0.0, levers)
+    return np.asarray(np.matmul(levers.swapaxes(1, 2), answer))
 
 
 def stored_energy(law: PairLaw, solution: Solution) -> float:

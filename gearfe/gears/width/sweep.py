@@ -27,12 +27,10 @@ from ...base.errors import InputError
 from ...base.progress import Stopwatch, one_thread
 from ...base.typing import Array, IntArray
 from ..geometry.validity import MOST_YIELD
-from .lines import ContactLines, Solution, line_load, look_at, solve_position
+from .lines import ContactLines, Solution, line_loads, look_at, solve_positions
 
 #: Pinion angles of a mesh cycle where none are given; places along the width of the mean load.
 ANGLES, ALONG = 24, 65
-#: Distance (mesh cycles) of a position from which the next one starts, and how far two are continued in theirs (-).
-NEIGHBOUR, FARTHEST = 0.13, 2.0
 #: Kinds of status of a position.
 CONVERGED, NOT_CONVERGED, NO_CONTACT = "converged", "not_converged", "no_contact"
 
@@ -175,7 +173,9 @@ def sweep_width(
         _check_twist(lines, at, max(loads))
     watch = watch or Stopwatch()
     with watch.stage("positions"), one_thread():
-        solved = [_solved(lines, at, load, by_torque) for load in loads]
+        load, name = np.repeat(loads, len(at)), "torque" if by_torque else "twist"
+        every = solve_positions(lines, np.tile(at, len(loads)), **{name: load})
+        solved = [every[i : i + len(at)] for i in range(0, len(every), len(at))]
     return _assembled(lines, at, solved, dict(watch.seconds))
 
 
@@ -193,7 +193,7 @@ def _loads(torques: ArrayLike | None, twists: ArrayLike | None) -> tuple[list[fl
 def _check_twist(lines: ContactLines, angles: Array, twist: float) -> None:
     """Raise `InputError` for a twist (rad) that overlaps the flanks by more than linear elasticity holds for."""
     mesh = lines.compliance.mesh
-    first = min((look_at(lines, angle).least for angle in angles.tolist()), default=math.inf)
+    first = float(look_at(lines, angles).least.min(initial=math.inf))
     most = first + MOST_YIELD * mesh.module / mesh.sections.wheel.base_radius
     if twist > most:
         problem = f"must be <= {most:.4g} rad: the teeth would deflect by more than {MOST_YIELD:g} modules"
@@ -214,21 +214,6 @@ def _angles(lines: ContactLines, angles: ArrayLike | None, positions: int) -> Ar
     return at
 
 
-def _solved(lines: ContactLines, angles: Array, load: float, by_torque: bool) -> list[Solution]:
-    """Positions at one load; each starts from those before it where they are close."""
-    near = NEIGHBOUR * lines.compliance.mesh.sections.mesh_cycle
-    solved: list[Solution] = []
-    for i, angle in enumerate(angles.tolist()):
-        before = solved[-1] if i and solved[-1].converged and abs(angle - angles[i - 1]) <= near else None
-        if before is not None and i > 1 and angles[i - 1] != angles[i - 2]:
-            share = (angle - angles[i - 1]) / (angles[i - 1] - angles[i - 2])
-            if solved[-2].converged and 0.0 < share <= FARTHEST:
-                before = before.continued(solved[-2], share)
-        torque, twist = (load, None) if by_torque else (None, load)
-        solved.append(solve_position(lines, angle, torque=torque, twist=twist, before=before))
-    return solved
-
-
 def _assembled(
     lines: ContactLines, angles: Array, solved: Sequence[Sequence[Solution]], timings: dict[str, float]
 ) -> WidthSweep:
@@ -238,7 +223,7 @@ def _assembled(
     torque, twist, peak, peak_z = (np.full(shape, np.nan) for _ in range(4))
     tangent, force, moment = (np.full((*shape, *more), np.nan) for more in ((3, 3), (3,), (2, 3)))
     peak_pair, peak_roll = np.full(shape, -1), np.full((*shape, 2), np.nan)
-    records = []
+    loaded = []
     for cell in np.ndindex(shape):
         solution = solved[cell[0]][cell[1]]
         if not solution.converged:
@@ -246,17 +231,18 @@ def _assembled(
             continue
         torque[cell], twist[cell], tangent[cell] = solution.torque, solution.twist, solution.tangent
         force[cell], moment[cell] = resultants(lines, solution)
-        if not (solution.moment > 0).any():
+        if (solution.moment > 0).any():
+            loaded.append(cell)
+        else:
             status[cell], peak[cell] = NO_CONTACT, 0.0
-            continue
-        pair, z, weight, roll, per_width = _along_lines(lines, float(angles[cell[1]]), solution)
-        most = int(np.argmax(per_width))
-        peak[cell], peak_z[cell], peak_pair[cell], peak_roll[cell] = per_width[most], z[most], pair[most], roll[most]
-        load, position = (np.full(len(z), number) for number in cell)
-        records.append([load, position, pair, z, weight, roll, per_width])
-    empty = [np.zeros(0, dtype=np.int64)] * 3 + [np.zeros(0)] * 2 + [np.zeros((0, 2)), np.zeros(0)]
-    points_ = LinePoints(*(np.concatenate(arrays) for arrays in zip(*(records or [empty]), strict=True)))
-    factors = [_load_factors(lines, angles, points_, number) for number in range(len(solved))]
+    points = _along_lines(lines, angles, solved, np.reshape(loaded, (-1, 2)))
+    begin = np.flatnonzero(np.diff(points.load * len(angles) + points.position, prepend=-1))
+    for of in map(slice, begin.tolist(), [*begin[1:].tolist(), len(points.z)]):
+        most = of.start + int(np.argmax(points.line_load[of]))
+        cell = points.load[most], points.position[most]
+        peak[cell], peak_z[cell], peak_pair[cell] = points.line_load[most], points.z[most], points.pair[most]
+        peak_roll[cell] = points.roll[most]
+    factors = [_load_factors(lines, angles, points, number) for number in range(len(solved))]
     return WidthSweep(
         angle=angles,
         status=status,
@@ -272,20 +258,31 @@ def _assembled(
         peak_roll=peak_roll,
         k_h_beta=np.array([beta for beta, _ in factors]),
         k_h_alpha=np.array([alpha for _, alpha in factors]),
-        points=points_,
+        points=points,
         timings=timings,
     )
 
 
-def _along_lines(lines: ContactLines, angle: float, solution: Solution) -> tuple[Array, ...]:
-    """Tooth pairs, z, lengths, roll lengths and line loads of a position: its points, and places between them."""
-    points, (looks, between) = solution.points, line_load(lines, angle, solution)
-    at_points = solution.moment / (points.weight * points.rows.arm)
-    pair, z = np.concatenate([points.pair, looks.pair]), np.concatenate([points.z, looks.z])
-    weight = np.concatenate([points.weight, np.zeros(len(looks.z))])
-    roll, load = np.concatenate([points.rows.roll, looks.rows.roll]), np.concatenate([at_points, between])
-    order = np.lexsort((z, pair))
-    return pair[order], z[order], weight[order], roll[order], load[order]
+def _along_lines(
+    lines: ContactLines, angles: Array, solved: Sequence[Sequence[Solution]], cells: IntArray
+) -> LinePoints:
+    """Points of solved positions, and places between them; `cells`: numbers of load and angle, shape (m, 2)."""
+    solutions = [solved[load][position] for load, position in cells.tolist()]
+    if not solutions:
+        none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
+        return LinePoints(none, none, none, nothing, nothing, np.zeros((0, 2)), nothing)
+    between = line_loads(lines, angles[cells[:, 1]], solutions)
+    points, counts = [one.points for one in solutions], [len(one.points) for one in solutions]
+    number = np.concatenate([np.repeat(np.arange(len(counts)), counts), between.position])
+    pair = np.concatenate([*(one.pair for one in points), between.pair])
+    z = np.concatenate([*(one.z for one in points), between.z])
+    weight = np.concatenate([*(one.weight for one in points), np.zeros(len(between.z))])
+    roll = np.concatenate([*(one.rows.roll for one in points), between.roll])
+    loads = [one.moment / (one.points.weight * one.points.rows.arm) for one in solutions]
+    order = np.lexsort((z, pair, number))
+    load, position = cells[number[order]].T
+    line_load = np.concatenate([*loads, between.load])[order]
+    return LinePoints(load, position, pair[order], z[order], weight[order], roll[order], line_load)
 
 
 def resultants(lines: ContactLines, solution: Solution) -> tuple[Array, Array]:
