@@ -69,7 +69,7 @@ def test_installations_of_the_same_kernels_share_them_and_others_do_not(tmp_path
     (two / "little_kernels.py").write_text(KERNELS.replace("2.0 * x", "x + x"))
     assert ran(two, GEARFE_CACHE=str(cache)) == "False True 0"
     cache.rename(tmp_path / "moved")
-    assert ran(one, GEARFE_CACHE=str(tmp_path / "moved")).startswith("False")
+    assert ran(one, GEARFE_CACHE=str(tmp_path / "moved")) == "True True 1"
 
 
 def test_code_that_was_cut_short_is_made_anew(tmp_path: Path) -> None:

@@ -74,15 +74,16 @@ def cache_folder(functions: Iterable[Callable[..., Any]]) -> Path | None:
 def _folders(functions: Iterable[Callable[..., Any]]) -> Iterator[Path]:
     """Return the possible folders of the compiled forms of `functions`, best first; they need not exist."""
     options = tuple(f"{k}={v}" for k, v in sorted(os.environ.items()) if k.startswith("NUMBA_"))
+    name = "kernels-" + _key(tuple(functions), options)
     for root in _roots():
-        yield root / ("kernels-" + _key(str(root), tuple(functions), options))
+        yield root / name
 
 
 @lru_cache(maxsize=64)
-def _key(root: str, functions: tuple[Callable[..., Any], ...], options: tuple[str, ...]) -> str:
+def _key(functions: tuple[Callable[..., Any], ...], options: tuple[str, ...]) -> str:
     """Return the key of compiled code, as a name; sources and machine do not change while a program runs."""
-    key = "\n".join((root, *_made_by(), *options, _text(functions)))
-    return hashlib.sha256(os.fsencode(key)).hexdigest()[:16]  # folders may have names that are no text
+    key = "\n".join((*_made_by(), *options, _text(functions)))
+    return hashlib.sha256(os.fsencode(key)).hexdigest()[:16]  # variables may have values that are no text
 
 
 def _text(functions: Iterable[Callable[..., Any]]) -> str:
