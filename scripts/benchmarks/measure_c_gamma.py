@@ -3,7 +3,7 @@
 
 The flexibility 1/k of the shipped pair (mean over the mesh cycle) is parted into
 
-- *twist of the bodies* between rigid bore and root circle, by the closed form of `body_flexibility`;
+- *twist of the bodies* between rigid bore and root circle, by the closed form of `body_twist`;
 - *bodies near the teeth*: what the rest falls by from the given bores to bores as large as the profile allows;
 - *contact*: the approach of two tooth halves by Weber and Banaschek (Schriftenreihe Antriebstechnik 11, 1953), for half
   the tooth thickness at the pitch circle, with the mean number of tooth pairs;
@@ -24,8 +24,8 @@ from pathlib import Path
 import numpy as np
 
 from gearfe import sweep_stiffness
+from gearfe.gears.gearmesh.bodies import body_twist
 from gearfe.gears.gearmesh.job import StiffnessJob, read_stiffness_job
-from gearfe.gears.gearmesh.report import body_flexibility
 from gearfe.gears.geometry.pair import GearPair
 from gearfe.gears.rating.stiffness import iso_values
 
@@ -38,6 +38,12 @@ RIM_MODULES, TORQUES = 1.5, (10.0, 30.0, 100.0, 300.0)
 def flexibility(job: StiffnessJob, torque: float) -> float:
     """Mean flexibility over the mesh cycle (m/N): that of the mean stiffness."""
     return 1.0 / float(sweep_stiffness(job.pair, job.model, torque=torque).k_mesh.mean())
+
+
+def bodies_twist(job: StiffnessJob) -> float:
+    """Flexibility of both gear bodies in torsion (m/N)."""
+    gears = (job.pair.pinion, job.pair.wheel)
+    return sum(body_twist(gear, material) for gear, material in zip(gears, job.materials, strict=True))
 
 
 def with_thin_rims(job: StiffnessJob) -> StiffnessJob:
@@ -66,9 +72,9 @@ def contact_flexibility(job: StiffnessJob, torque: float) -> float:
 def tables(job: StiffnessJob) -> list[str]:
     """Lines of both tables."""
     torque = job.table.torque_Nm or 100.0
-    whole, twist = flexibility(job, torque), body_flexibility(job)
+    whole, twist = flexibility(job, torque), bodies_twist(job)
     thin = with_thin_rims(job)
-    near = (whole - twist) - (flexibility(thin, torque) - body_flexibility(thin))
+    near = (whole - twist) - (flexibility(thin, torque) - bodies_twist(thin))
     contact = contact_flexibility(job, torque) / job.pair.contact_ratio
     parts = {
         "twist of the bodies between bore and root": twist,
@@ -77,7 +83,8 @@ def tables(job: StiffnessJob) -> list[str]:
         "teeth": whole - twist - near - contact,
     }
     moduli = [m.youngs_modulus for m in job.materials]
-    level = iso_values(job.pair, moduli[0], moduli[1])["c_gamma_times_width_N_per_m"]
+    name = "c_gamma_times_width_N_per_m"
+    level = iso_values(job.pair, moduli[0], moduli[1])[name]
     lines = ["| part of the flexibility | nm/N | share |", "|---|---|---|"]
     lines += [f"| {name} | {1e9 * value:.2f} | {100.0 * value / whole:.0f} % |" for name, value in parts.items()]
     lines += [
@@ -91,7 +98,8 @@ def tables(job: StiffnessJob) -> list[str]:
     ]
     for value in TORQUES:
         f = flexibility(job, value)
-        load = 1e-3 * value / job.pair.wheel.base_radius / job.pair.wheel.face_width
+        load = 1e-3 * value / job.pair.wheel.reference_radius / job.pair.common_width
+        level = iso_values(job.pair, moduli[0], moduli[1], line_load=load)[name]
         lines.append(
             f"| {value:g} | {load:.0f} | {1e-6 / f:.1f} | {1.0 / (f * level):.2f} | {1.0 / ((f - twist) * level):.2f} |"
         )

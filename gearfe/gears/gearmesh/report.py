@@ -24,7 +24,8 @@ from ..geometry.modifications import CHECKED, ends_of
 from ..geometry.pair import GearPair
 from ..geometry.tolerances import tolerances
 from ..geometry.validity import overlap_warnings
-from ..rating.stiffness import iso_values
+from ..rating.stiffness import LIGHT, iso_values
+from .bodies import body_bending, body_twist, contact_zone
 from .curve import BACK, EDGES, StiffnessCurve
 from .job import StiffnessJob
 from .load_map import LoadMap
@@ -34,6 +35,8 @@ from .positions import ORDER
 HARMONICS = 5
 #: Allowable contact stress of case-hardened steel for unlimited life (MPa): ISO 6336-5, material quality MQ.
 ALLOWABLE_MPA = 1500.0
+#: Line load (N/mm) that the stiffness of ISO 6336-1 is taken at below it, where that would fall to nothing.
+LEAST_LINE_LOAD = 1e-3
 
 
 def _levels(values: Array, unit: str = "") -> dict[str, float]:
@@ -91,57 +94,60 @@ def _head(job: StiffnessJob, tables: Mapping[str, Any] | None = None) -> dict[st
     }
 
 
-def body_flexibility(job: StiffnessJob) -> float:
-    r"""Flexibility along the line of action (m/N) by the twist of both gear bodies between held rim and root circle.
+def against_iso(job: StiffnessJob, torque: float, mean: float | None) -> dict[str, float]:
+    """Return c' and c_gamma of ISO 6336-1, and a mean stiffness against it with the shares of the gear bodies.
 
-    Under a torque T a disc of the width b that is held at the radius :math:`r_0` turns at :math:`r_f` by
-    :math:`T\,|1/r_0^2 - 1/r_f^2|/(4\pi G b)` (Timoshenko and Goodier, *Theory of Elasticity*, 3rd ed., 1970, art. 43).
-    Along the line of action, the flexibility is this angle times :math:`r_b^2/T`. NaN for a ring with a free rim.
+    Parameters
+    ----------
+    job : StiffnessJob
+        The gears.
+    torque : float
+        Mean torque at the wheel (N m); NaN counts as a load above 100 N/mm.
+    mean : float, optional
+        Mean stiffness over a mesh cycle (N/m), or None where it is not known.
     """
-    total = 0.0
-    for gear, material in zip((job.pair.pinion, job.pair.wheel), job.materials, strict=True):
-        if gear.internal and gear.rim == "free":
-            return math.nan
-        shear = material.youngs_modulus / (2.0 * (1.0 + material.poisson_ratio))
-        stretch = abs(1.0 / gear.held_radius**2 - 1.0 / gear.root_radius**2)
-        total += gear.base_radius**2 * stretch / (4.0 * math.pi * shear * gear.face_width)
-    return total
-
-
-def against_iso(job: StiffnessJob, iso: Mapping[str, float], levels: Mapping[str, float] | None) -> dict[str, float]:
-    """Mean stiffness against c_gamma times width, the share of the bodies' twist in its flexibility, and without it."""
-    if levels is None:
-        return {}
-    mean, twist = levels["mean_N_per_m"], body_flexibility(job)
-    rest = 1.0 / mean - twist
-    return {
+    one, two = job.materials
+    line_load = 1e-3 * torque / (job.pair.wheel.reference_radius * job.pair.common_width)
+    known = {"line_load_N_per_mm": line_load} if math.isfinite(line_load) else {}
+    load = max(line_load, LEAST_LINE_LOAD) if known else LIGHT
+    iso = iso_values(job.pair, one.youngs_modulus, two.youngs_modulus, line_load=load) | known
+    if mean is None:
+        return iso
+    bodies, zone = list(zip((job.pair.pinion, job.pair.wheel), job.materials, strict=True)), contact_zone(job.pair)
+    twist = sum(body_twist(gear, material) for gear, material in bodies)
+    bending = sum(body_bending(gear, material, zone) for gear, material in bodies)
+    left = 1.0 / mean - twist - bending
+    return iso | {
         "mean_over_c_gamma": mean / iso["c_gamma_times_width_N_per_m"],
         "share_of_body_twist": twist * mean,
-        "mean_without_body_twist_N_per_m": 1.0 / rest if rest > 0.0 else math.nan,
+        "share_of_body_bending": bending * mean,
+        "mean_with_stiff_bodies_N_per_m": 1.0 / left if left > 0.0 else math.nan,
     }
 
 
-def against_iso_line(found: Mapping[str, float]) -> list[str]:
-    """Return the line about the level of the stiffness against ISO's."""
-    share = found.get("share_of_body_twist", math.nan)
-    if not math.isfinite(share):
-        return []
-    off = found["mean_over_c_gamma"] - 1.0
-    side = "below" if off < 0.0 else "above"
-    return [
-        f"the mean secant stiffness is {percent(abs(off))} {side} c_gamma b; torsion of the gear bodies between bore "
-        f"and root is {percent(share)} of the flexibility, without it the stiffness would be "
-        f"{1e-6 * found['mean_without_body_twist_N_per_m']:.4g} N/um"
-    ]
+def against_iso_lines(iso: Mapping[str, float], kind: str) -> list[str]:
+    """Return the lines about the level of a mean stiffness, secant or tangent, against that of the standard.
 
-
-def iso_line(iso: Mapping[str, float]) -> str:
-    """Return the line with the stiffness values of the standard."""
-    return (
-        f"ISO 6336-1 method B, for comparison: c' = {iso['c_prime_N_per_mm_um']:.3g}, "
+    `iso` is from `against_iso`.
+    """
+    at = f" at {iso['line_load_N_per_mm']:.3g} N/mm" if "line_load_N_per_mm" in iso else ""
+    lines = [
+        f"ISO 6336-1 method B{at}, for comparison: c' = {iso['c_prime_N_per_mm_um']:.3g}, "
         f"c_gamma = {iso['c_gamma_N_per_mm_um']:.3g} N/(mm um); times face width: "
         f"c_gamma b = {1e-6 * iso['c_gamma_times_width_N_per_m']:.4g} N/um"
-    )
+    ]
+    twist, bending = (iso.get(f"share_of_body_{part}", math.nan) for part in ("twist", "bending"))
+    if math.isfinite(twist):
+        off = iso["mean_over_c_gamma"] - 1.0
+        shares = f"torsion of the gear bodies between bore and root is {percent(twist)} of the flexibility"
+        if bending > 0.0:
+            shares += f", their bending by the axial force {percent(bending)}"
+        lines.append(
+            f"the mean {kind} stiffness is {percent(abs(off))} {'below' if off < 0.0 else 'above'} c_gamma b; "
+            f"{shares}, without {'both' if bending > 0.0 else 'it'} the stiffness would be "
+            f"{1e-6 * iso['mean_with_stiff_bodies_N_per_m']:.4g} N/um"
+        )
+    return lines
 
 
 def torque_text(torque: float, pair: GearPair) -> str:
@@ -151,7 +157,7 @@ def torque_text(torque: float, pair: GearPair) -> str:
 
 def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, float]) -> dict[str, Any]:
     """Return the content of summary.json; stages that follow may still come to the timings."""
-    table, moduli = job.table, [material.youngs_modulus for material in job.materials]
+    table = job.table
     torque, lost = curve.torque_wheel[~curve.failed], math.degrees(curve.lost_motion)
     twist = error = None
     if table.twist_deg is not None:
@@ -172,10 +178,11 @@ def summary(job: StiffnessJob, curve: StiffnessCurve, timings: Mapping[str, floa
             "pinion_angle_deg": np.degrees(curve.pinion_angle[known]),
             "relative": curve.relative_error[known],
         }
-    iso, levels = iso_values(job.pair, moduli[0], moduli[1]), cycle_statistics(curve, table.interpolation)
+    levels = cycle_statistics(curve, table.interpolation)
+    mean_torque = float(torque.mean()) if len(torque) else math.nan
     return {
         **_head(job),
-        "iso_6336": {**iso, **against_iso(job, iso, levels)},
+        "iso_6336": against_iso(job, mean_torque, None if levels is None else levels["mean_N_per_m"]),
         "mesh_stiffness": levels,
         "tangent_stiffness": cycle_statistics(curve, table.interpolation, "k_tangent"),
         "transmission_error": error_levels(job, curve),
@@ -333,7 +340,7 @@ def report_lines(job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, A
     if curve.contact_law:
         lines.append(f"contact law: {curve.contact_law}")
     lines += deviation_lines(job)
-    given, iso = found["load"]["prescribed_twist"], found["iso_6336"]
+    given = found["load"]["prescribed_twist"]
     if given is not None and given["lost_motion_in_it_deg"]:
         lines.append(
             f"twist {given['twist_deg']:.6g} deg from the centred position: {given['lost_motion_in_it_deg']:.6g} deg "
@@ -350,7 +357,7 @@ def report_lines(job: StiffnessJob, curve: StiffnessCurve, found: Mapping[str, A
     for name, levels in (("secant", found["mesh_stiffness"]), ("tangent", found["tangent_stiffness"])):
         if levels is not None:
             lines.append(_levels_line(f"mesh stiffness, {name}", levels, 1e-6, "N/um"))
-    lines += [iso_line(iso), *against_iso_line(iso)]
+    lines += against_iso_lines(found["iso_6336"], "secant")
     lines += pressure_lines(curve)
     if found["error_estimate"] is not None:
         against = "" if job.law.name == DEFAULT_LAW else "the half-plane law and "

@@ -20,11 +20,10 @@ from ...output.exchange.vtkhdf import write_vtkhdf
 from ..geometry.derived import derived_geometry
 from ..geometry.deviation_job import GEARS
 from ..geometry.gear_data import rounding
-from ..rating.stiffness import iso_values
 from ..width import WideMesh, WidthSweep
 from ..width.sweep import mean_line_load
 from .job import StiffnessJob
-from .report import iso_line, load_line
+from .report import against_iso, against_iso_lines, load_line
 from .width_job import axial_sense
 from .width_root import WideRoots, roots_along, roots_of_cells
 
@@ -347,7 +346,9 @@ def width_summary(
     tables
         Of the job, beside those of the model.
     """
-    moduli = [material.youngs_modulus for material in job.materials]
+    by_torque = load_table(job, mesh, sweep, roots)
+    largest = int(np.argmax(np.nan_to_num(by_torque["torque_wheel_Nm"])))
+    torque, stiffness = (by_torque[name][largest] for name in ("torque_wheel_Nm", "k_tangent_mean_N_per_m"))
     statuses, counts = np.unique(sweep.status, return_counts=True)
     cause = job.mesh.along_width()
     directions = np.array([1.0, axial_sense(job), 1.0])  # of twist and tilts, from the solver's z to y
@@ -357,14 +358,14 @@ def width_summary(
         "versions": versions(),
         "derived_geometry": derived_geometry(job.pair),
         "warnings": list(job.pair.warnings),
-        "iso_6336": iso_values(job.pair, moduli[0], moduli[1]),
+        "iso_6336": against_iso(job, torque, stiffness if math.isfinite(stiffness) else None),
         "along_the_width": {
             "because_of": cause[0] if cause else None,
             "common_face_width_mm": 1e3 * mesh.width,
             "functions": mesh.count,
             "kinematics": "small",
         },
-        "by_torque": load_table(job, mesh, sweep, roots),
+        "by_torque": by_torque,
         "error_estimate": None if errors is None else dict(errors),
         "mean_tangent_twist_and_tilts_Nm_per_rad": (np.nanmean(sweep.tangent, axis=1) * along_y).tolist(),
         "statuses": dict(zip(statuses.tolist(), counts.tolist(), strict=True)),
@@ -389,7 +390,7 @@ def write_flank(path: Path, job: StiffnessJob, flank: FlankLoad) -> None:
 
 def width_lines(found: Mapping[str, Any]) -> list[str]:
     """Return the lines to print; `found` is the `width_summary`."""
-    table, along, iso = found["by_torque"], found["along_the_width"], found["iso_6336"]
+    table, along = found["by_torque"], found["along_the_width"]
     statuses = ", ".join(f"{count} {status}" for status, count in found["statuses"].items())
     lines = [
         f"{sum(found['statuses'].values())} positions: {statuses}",
@@ -423,7 +424,7 @@ def width_lines(found: Mapping[str, Any]) -> list[str]:
             of_load = {name: float(np.atleast_1d(values)[i]) for name, values in found["error_estimate"].items()}
             errors = ", ".join(f"{ERROR_WORDS[name]} {percent(value)}" for name, value in of_load.items())
             lines.append(f"  estimated errors: {errors}")
-    return [*lines, iso_line(iso)]
+    return lines + against_iso_lines(found["iso_6336"], "tangent")
 
 
 def width_warnings(job: StiffnessJob, mesh: WideMesh, sweep: WidthSweep) -> list[str]:

@@ -102,21 +102,40 @@ def single_stiffness(
     )
 
 
-def mesh_stiffness(pair: MeshGeometry, pinion_modulus: float, wheel_modulus: float) -> float:
-    """c_gamma_alpha = c' (0.75 eps_alpha + 0.25), mean stiffness of the mesh per face width (N/m^2), (91)."""
-    return single_stiffness(pair, pinion_modulus, wheel_modulus) * (0.75 * pair.contact_ratio + 0.25)
-
-
-def iso_values(pair: MeshGeometry, pinion_modulus: float, wheel_modulus: float) -> dict[str, float]:
-    """ISO 6336-1 method B for the pair: c', c_gamma per face width, and c_gamma times the common face width.
+def mesh_stiffness(
+    pair: MeshGeometry, pinion_modulus: float, wheel_modulus: float, *, line_load: float = LIGHT
+) -> float:
+    """Return the mean stiffness of the mesh per face width (N/m^2), c_gamma_alpha = c' (0.75 eps_alpha + 0.25), (91).
 
     Parameters
     ----------
-    pinion_modulus, wheel_modulus
+    pair : MeshGeometry
+        The gears.
+    pinion_modulus, wheel_modulus : float
         Young's moduli (Pa).
+    line_load : float
+        F_t K_A/b (N/mm).
     """
-    single = single_stiffness(pair, pinion_modulus, wheel_modulus)
-    mean = mesh_stiffness(pair, pinion_modulus, wheel_modulus)
+    single = single_stiffness(pair, pinion_modulus, wheel_modulus, line_load=line_load)
+    return single * (0.75 * pair.contact_ratio + 0.25)
+
+
+def iso_values(
+    pair: MeshGeometry, pinion_modulus: float, wheel_modulus: float, *, line_load: float = LIGHT
+) -> dict[str, float]:
+    """Return c' and c_gamma per face width by ISO 6336-1, method B, and c_gamma times the common face width.
+
+    Parameters
+    ----------
+    pair : MeshGeometry
+        The gears.
+    pinion_modulus, wheel_modulus : float
+        Young's moduli (Pa).
+    line_load : float
+        F_t K_A/b (N/mm); all above 100 N/mm are alike.
+    """
+    single = single_stiffness(pair, pinion_modulus, wheel_modulus, line_load=line_load)
+    mean = mesh_stiffness(pair, pinion_modulus, wheel_modulus, line_load=line_load)
     return {
         "c_prime_N_per_mm_um": single * 1e-9,
         "c_gamma_N_per_mm_um": mean * 1e-9,
