@@ -24,10 +24,10 @@ CASES: tuple[tuple[str, Any, dict[str, Any], dict[str, str]], ...] = (
         rated.HELICAL_SCUFFING | rated.HELICAL_SCUFFING_LOOSE,
     ),
     (
-        "helical stage, friction 0.040915",
+        "helical stage, R_a1 R_a2 and B_M 13.795",
         rated.helical_stage,
-        rated.HELICAL | rated.HELICAL_OIL | {"friction_coefficient": rated.HELICAL_FRICTION},
-        rated.HELICAL_WITH_FRICTION,
+        rated.HELICAL | rated.HELICAL_OIL | rated.HELICAL_FLASH,
+        rated.HELICAL_FLASH_PRINTED,
     ),
     ("planet and ring", rated.spur_ring, rated.SPUR_RING, rated.SPUR_RING_PRINTED),
     ("planet and ring, first stage", rated.first_ring, rated.FIRST_RING, rated.FIRST_RING_PRINTED),

@@ -391,9 +391,14 @@ HELICAL_SCUFFING_LOOSE: dict[str, str] = {
     "theta_MC_C": "91.37",
     "mu_m": "0.041",
 }
-#: Coefficient of friction that the printed flash temperatures have in common, and they with it.
-HELICAL_FRICTION = 0.040915
-HELICAL_WITH_FRICTION: dict[str, str] = {
+#: What all printed flash temperatures have in common: X_R twice in the friction, as if R_a were the product of both
+#: roughnesses, B_M 13.795 for the printed 13.780, and w_Bt as printed, by K_v.
+HELICAL_FLASH: dict[str, Any] = {
+    "friction_coefficient": 0.046542283 * 0.6**0.25,
+    "thermal_contact_N_per_mm_m05_s05_K": 13.795,
+    "dynamic_factor": 1.092409776 * 1119.632 / 1119.6836,
+}
+HELICAL_FLASH_PRINTED: dict[str, str] = {
     "mu_m": "0.041",
     "theta_flm_K": "30.20",
     "theta_M_C": "94.19",
