@@ -44,7 +44,7 @@ def test_integral_temperature_as_printed() -> None:
 
 
 def test_flash_temperature_as_printed_with_the_friction_that_it_implies() -> None:
-    """The product of both roughnesses in place of their mean: all printed temperatures follow.
+    """The product of both roughnesses instead of their mean: all printed temperatures follow.
 
     The formula of the standard gives 0.0465 for 0.041; docs/development/verification.md.
     """
