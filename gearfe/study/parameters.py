@@ -240,6 +240,9 @@ def key_hint(kind: str, name: str, base: Mapping[str, Any]) -> Any:
     hint: Any
     if kind == "mechanism":
         hint = MechanismFile
+        given = base.get("parameters", {})
+        if parts[0] == "parameters" and len(parts) == 2 and parts[1] not in given:  # no entry of the file uses it
+            raise unknown_name(f"{where}.parameters", parts[1], given)
     else:
         if parts[0] in (*TABLES, *NAMED) and parts[0] not in READ[kind]:
             problem = f"is no table that a {kind} job reads: it would change nothing"

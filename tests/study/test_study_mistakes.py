@@ -47,6 +47,11 @@ OUTPUT = 'y = "'
     ("old", "new", "told"),
     [
         (PLACE, "bodies.a.postion_m.0 = {", "did you mean 'position_m'"),
+        (
+            PLACE,
+            f"parameters.radius = [1.0]\n{PLACE}",
+            "study.parameters.parameters: unknown name 'radius'; known names: none",
+        ),
         (PLACE, "bodies.c.mass_kg = [1]\nbodies.a.position_m.0 = {", "unknown name 'c'; known names: a, b"),
         (PLACE, '"bodies.a.position_m.1" = [0.0]\nbodies.a.position_m.0 = {', "occurs twice"),
         (PLACE, "bodies.a.position_m = [0.0]\nbodies.a.position_m.0 = {", "TOML"),
