@@ -40,7 +40,7 @@ MOVED = {**BASE.rigid_bores, "s2+": (0.126, 0.033, 0.0), "s2-": (0.126, -0.033, 
 ALPHA_20 = dataclasses.replace(gear(30), pressure_angle=math.radians(20.0))
 
 CASES = [
-    (lambda: shafts(BASE, 1, point=(0.063, 0.0, 0.0), bores=()), "no bore holds"),
+    (lambda: shafts(BASE, 1, point=(0.063, 0.0, 0.0), bores=()), "no bearing carries"),
     (lambda: changed(shafts(BASE, 2, point=(0.126, 0.0, 0.0)), rigid_bores=MOVED), "the gears need 62.5 mm"),
     (lambda: shafts(BASE, 2, point=(0.126, 0.0, 0.0)), "off the axis of shaft 's2'"),
     (lambda: gears(BASE, 1, gear=MODULE_3), "wheel.module_mm = 3.0: gears that differ in module, 3 mm and 2.5 mm"),

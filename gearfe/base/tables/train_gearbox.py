@@ -82,7 +82,7 @@ def named_train(
                 held_by = ", ".join(map(str, bores))
                 problem = f"is a planet of carrier {shafts[name].carrier!r}, and bearings carry it: {held_by}"
                 raise InputError(f"shafts.{name}", None, problem, "leave out its bearings, or its carrier")
-        elif not bores:
+        elif not bores and not carriers:  # a member of a stage may float: the train knows which ones are
             cure = f'add [bearings.NAME] with shaft = "{name}", or attachments = ["1", "2"]'
             raise InputError(f"shafts.{name}.attachments", None, "no bearing carries the shaft", cure)
     rows = tuple(

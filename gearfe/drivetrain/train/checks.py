@@ -104,8 +104,11 @@ def _check_shafts(train: GearTrain) -> None:
             _check_sections(shaft)
         if train.carrier_of(shaft.name) is not None:
             continue
-        if not shaft.bores:
-            raise InputError(f"{label} bores", None, "no bore holds the shaft", "name the attachments that carry it")
+        if not shaft.bores and not train.frames_of(shaft.name):
+            cure = (
+                "add a bearing, or name the attachments that carry it; only sun, ring and carrier of a stage may float"
+            )
+            raise InputError(f"{label} bores", None, "no bearing carries the shaft", cure)
         for bore in shaft.bores:
             _known(f"{label} bores", "attachment", bore, points)
             if bore in taken:

@@ -189,6 +189,8 @@ def beam_shaft(train: GearTrain, shaft: Shaft) -> BeamShaft:
     for bore in shaft.bores:
         along = float(train.bore_points[bore] @ train.frame[2])
         stations.append(Station(along, f"attachment {bore}", _bore_loads(train, bore)))
+    if train.floats(shaft.name):
+        stations.append(Station(middle, "hold along the axis", ("axial", "tilt")))
     for name, end in train.shaft_ends(shaft.name):
         if not end.machine:
             stations.append(Station(train.place(end), name, ("torsion",)))

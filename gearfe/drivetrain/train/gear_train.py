@@ -60,7 +60,9 @@ class Shaft:
     length, radius
         Of the cylinder (m); of a shaft with sections the sum of their lengths and the largest radius.
     bores
-        Names of the attachments (bores) that carry it; two hinges are usual. None of a planet, which a pin carries.
+        Names of the attachments (bores) that carry it; two hinges are usual. A planet has none, for a pin carries it.
+        A sun, ring or carrier without any floats: its middle is held along the axis and against tilts, as by the teeth
+        of a coupling, and moves freely across the axis.
     density
         kg/m3.
     initial_speed
@@ -707,6 +709,10 @@ class GearTrain(Facts):
         """Whether a hinge holds a shaft."""
         springs = {bearing.bore for bearing in self.bearings}
         return any(bore not in springs for bore in self.shaft(shaft).bores)
+
+    def floats(self, shaft: str) -> bool:
+        """Whether a sun, ring or carrier has no bearings: meshes or pins alone hold it across its axis."""
+        return not self.shaft(shaft).bores and self.carrier_of(shaft) is None
 
     def frames_of(self, shaft: str) -> list[Carrier]:
         """Carriers in whose frames loads act on a shaft."""

@@ -55,6 +55,8 @@ from .shaft_sections import ShaftSections, shaft_sections
 
 #: For periods of steady running, orders of loads are taken as whole multiples of one over a whole number up to this.
 MOST_DENOMINATOR = 1000
+#: Motions along the axis and by tilts, of those of `bore_rows`, that are held where only the others are free.
+HELD_AFLOAT = [1, 3, 4]
 #: Eigenvalues below this part of the largest one are those of free rotation, and round-off.
 FREE = 1e-11
 #: Part of the mean push of mesh forces along the axes and on tilts that, on free motions, is round-off.
@@ -371,6 +373,7 @@ def _check_held(model: TrainModel) -> None:
         push[first + 3 : first + 5] += outer[3:]
     along_modes = modal.T.T @ push
     free = modal.eigenvalues <= FREE * float(modal.eigenvalues.max(initial=0.0))
+    _check_afloat(model, modal.T[:, free])
     unheld = np.where(free, along_modes, 0.0)
     lost = FREE * float(np.abs(modal.T).max(initial=0.0) * np.abs(push).max(initial=0.0))  # what hinges take leaves it
     if not float(np.linalg.norm(unheld)) > max(UNHELD * float(np.linalg.norm(along_modes)), lost):
@@ -387,6 +390,16 @@ def _check_held(model: TrainModel) -> None:
         problem = "is held by nothing against tilting, and the forces of its gears tilt it without end"
         cure = "give it a second bearing, or one of its bearings a stiffness against tilting"
     raise InputError(f"shaft {shaft.name!r} bearings", list(shaft.bores), problem, cure)
+
+
+def _check_afloat(model: TrainModel, free: Array) -> None:
+    """Raise `InputError` for a shaft without bearings that its gears let move across its axis without a force."""
+    scale = float(np.abs(model.modal.T).max(initial=0.0))
+    for shaft, first in zip(model.train.shafts, model.first.tolist(), strict=True):
+        if model.train.floats(shaft.name) and np.abs(free[first : first + 3]).max(initial=0.0) > UNHELD * scale:
+            problem = "has no bearings, and its gears let it move across its axis"
+            cure = f'add [bearings.NAME] with shaft = "{shaft.name}", or mesh it with three planets or more'
+            raise InputError(f"shaft {shaft.name!r} bearings", None, problem, cure)
 
 
 def _operating_point(train: GearTrain) -> OperatingPoint:
@@ -753,6 +766,9 @@ def _supports(
                 made.append(bearing(body, housing, rows, stiffness, damping, f"bearing {bore}"))
             else:
                 made.append(hinge(body, housing, rows, f"hinge {bore}"))
+        if train.floats(shaft.name):
+            rows = bore_rows(body, np.array(shaft.point), train.frame, None)[HELD_AFLOAT]
+            made.append(LinearJoint((body,), rows, np.zeros(len(rows)), name=f"hold of {shaft.name} along its axis"))
         if train.damping.alpha > 0.0:
             made.append(
                 LinearForce((body,), train.damping.alpha * body.mass(), 0.0 * body.mass(), f"damping of {body.name}")
@@ -820,7 +836,7 @@ def _held_by_pin(pin: Pin) -> list[int]:
     """Motions of a planet against its carrier that a pin holds: radial, along the axis, tangential, tilts."""
     if pin.stiffness is None:
         return [0, 1, 2, 3, 4]
-    return [1, 3, 4] if isinstance(pin.stiffness, float | int) else []
+    return HELD_AFLOAT if isinstance(pin.stiffness, float | int) else []
 
 
 def _pin_matrix(values: float | Five) -> Array:
