@@ -22,7 +22,7 @@ from ..base.progress import stage
 from ..base.typing import Array
 from ..multibody import Start, Status, Trajectory, integrate
 from .model import Mechanism
-from .results import Results, evaluate
+from .results import Results, outputs_at
 
 #: The finer runs' tolerance is that much smaller, their longest step that share of the median step of the first one.
 SHARPER, SHORTER, SAFETY = 30.0, 0.6, 2.0
@@ -86,9 +86,9 @@ def trajectory_error(mechanism: Mechanism, start: Start, results: Results, toler
         if finer is None or len(finer.time) < len(run.time):
             return TrajectoryError(math.nan, dict.fromkeys(results.outputs, math.nan), used)
         with np.errstate(over="ignore", invalid="ignore"):
-            other = evaluate(mechanism, finer)
+            other = outputs_at(mechanism, finer)
             for table in mechanism.file.outputs:
-                off = np.abs(results.outputs[table.name] - other.outputs[table.name])
+                off = np.abs(results.outputs[table.name] - other[table.name])
                 if table.wrap is not None:
                     off = np.minimum(off, table.wrap - off)
                 # np.maximum keeps NaN

@@ -13,7 +13,7 @@ from ..base.typing import Array
 from ..multibody import Trajectory
 from ..output.exchange.vtkhdf import VtkHdfSeries
 from .model import Mechanism
-from .plates import PlateLink
+from .plates import PlateLink, von_mises_of
 
 #: Names of the forces at the nodes, in their order.
 FORCES = ("axial_force_N", "shear_force_N", "bending_moment_N_m")
@@ -125,7 +125,7 @@ def _fields(link: PlateLink, q: Any, stress: Any) -> dict[str, Any]:
     moved = link.displacements(q)[0]
     by_part = link.nodal_stresses(stress)
     return {
-        "von_mises_Pa": link.von_mises(stress),
+        "von_mises_Pa": von_mises_of(by_part),
         "stress_xx_Pa": by_part[:, 0],
         "stress_yy_Pa": by_part[:, 1],
         "stress_xy_Pa": by_part[:, 2],

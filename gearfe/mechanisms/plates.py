@@ -23,7 +23,7 @@ from ..multibody.planar.linkage import Linkage
 
 if TYPE_CHECKING:
     from ..fem.plane import Material
-    from ..fem.reduction.plate import Interface, Plate
+    from ..fem.reduction.plate_data import Interface, Plate
 
 Point = tuple[float, float]
 #: Times whose stresses are in memory together.
@@ -153,8 +153,7 @@ class PlateLink:
 
     def von_mises(self, stress: Array) -> Array:
         """Return von Mises' stress at the nodes (Pa), shape (..., n), from stresses of the core, shape (..., s)."""
-        x, y, shear = np.moveaxis(self.nodal_stresses(stress), -1, 0)
-        return np.asarray(np.sqrt(x**2 - x * y + y**2 + 3.0 * shear**2))
+        return von_mises_of(self.nodal_stresses(stress))
 
     def largest_von_mises(self, stresses: Array) -> Array:
         """Return the largest of von Mises' stress over the nodes (Pa), shape (times,), from those of the core."""
@@ -211,8 +210,20 @@ class PlateLink:
         return len(self.part.plate.points), len(self.part.plate.triangles)
 
 
+def von_mises_of(stresses: Array) -> Array:
+    """Return von Mises' stress (Pa), shape (...), of plane stresses xx, yy, xy (Pa), shape (..., 3)."""
+    x, y, shear = np.moveaxis(stresses, -1, 0)
+    return np.asarray(np.sqrt(x * x - x * y + y * y + 3.0 * shear * shear))
+
+
 #: Modules whose text decides a reduced plate.
-_MODULES = ("fem/reduction/plate", "fem/plane", "fem/meshing/plate_mesh", "mechanisms/plates")
+_MODULES = (
+    "fem/reduction/plate",
+    "fem/reduction/plate_data",
+    "fem/plane",
+    "fem/meshing/plate_mesh",
+    "mechanisms/plates",
+)
 #: Numbers of a plate that are stored as arrays of no dimension.
 _NUMBERS = {"size": float, "mass": float, "centre": complex, "inertia": float}
 
@@ -253,7 +264,7 @@ class _Shape:
 def _reduced(shape: _Shape, text: str) -> Plate:
     """Return the reduced plate of a table and a hash of its mesh, from the cache if possible."""
     from ..fem.plane import Material
-    from ..fem.reduction.plate import Plate
+    from ..fem.reduction.plate_data import Plate
 
     table, made = shape.table, []
     material = Material(1e9 * table.youngs_modulus_GPa, table.poisson_ratio, density=table.density_kg_per_m3)
@@ -324,7 +335,7 @@ def _distance(interface: InterfaceTable, places: Array) -> Array:
 
 def _interfaces(points: Array, table: PlateTable, where: str) -> list[Interface]:
     """Nodes of every interface."""
-    from ..fem.reduction.plate import Interface
+    from ..fem.reduction.plate_data import Interface
 
     near = NEAR * float(np.hypot(*np.ptp(points, axis=0)))
     interfaces: list[Interface] = []

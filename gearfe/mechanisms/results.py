@@ -17,8 +17,10 @@ from ..base.progress import stage
 from ..base.typing import Array
 from ..multibody import Linkage, Trajectory
 from .model import Mechanism
-from .quantities import OF_JOINT, PLAIN
+from .quantities import OF_JOINT, OF_LINK, OF_SECTION, PLAIN
 
+#: Energies of the whole mechanism that outputs may name.
+ENERGIES = ("kinetic", "potential", "work", "total")
 #: States that are evaluated at once: links of some dozen points take 6 kB each for their strains.
 BLOCK = 4096
 #: Numbers of the gradients that are held at once.
@@ -91,28 +93,59 @@ class Sensitivities:
 @stage("outputs")
 def evaluate(mechanism: Mechanism, trajectory: Trajectory) -> Results:
     """Outputs and energies at the times of the trajectory."""
-    energy = energies(mechanism, trajectory)
+    energy, sections = energies(mechanism, trajectory), _sections(mechanism, trajectory)
+    return Results(trajectory, outputs_at(mechanism, trajectory, sections, energy), energy, sections)
+
+
+def outputs_at(
+    mechanism: Mechanism,
+    trajectory: Trajectory,
+    sections: Mapping[str, Array] | None = None,
+    energy: Mapping[str, Array] | None = None,
+) -> dict[str, Array]:
+    """Return the outputs of the file at the times of a trajectory.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    trajectory : Trajectory
+        Its motion.
+    sections, energy : mapping of ndarray, optional
+        Stresses of the elastic links and energies where they are known, as of `Results`; those that outputs need are
+        computed otherwise.
+    """
     needed = set().union(*(quantities(node) for node in mechanism.outputs.values())) if mechanism.outputs else set()
     needs = {kind for kind, _ in needed}
     v = trajectory.v if needs - {"angle", "x", "y", *PLAIN} else None
     a = trajectory.a if needs & {"angular_acceleration", "ax", "ay"} else None
-    sections = {
-        name: link.beam.at_nodes(trajectory.stress_at(link.beam, trajectory.time))
-        for name, link in mechanism.links.items()
-    } | {name: trajectory.stress_at(link.element, trajectory.time) for name, link in mechanism.plates.items()}
+    if sections is None and needs & {*OF_SECTION, *OF_LINK}:
+        sections = _sections(mechanism, trajectory)
     values = mechanism.values(needed, trajectory.q, v, a, sections)
     if needs & set(OF_JOINT):
         forces = reactions(mechanism, trajectory)
         ends = dict(zip(OF_JOINT, ("x_N", "y_N", "moment_N_m"), strict=True))
         values |= {(kind, joint): forces[f"{joint}_{ends[kind]}"] for kind, joint in needed if kind in ends}
     values["time", None] = trajectory.time
-    for name in ("kinetic", "potential", "work", "total"):
-        values[name, None] = energy[f"{name}_J"]
+    if needs & set(ENERGIES):
+        energy = energies(mechanism, trajectory) if energy is None else energy
+        values |= {(name, None): energy[f"{name}_J"] for name in ENERGIES}
     outputs = {}
     for table in mechanism.file.outputs:
         column = np.broadcast_to(compute(mechanism.outputs[table.name], values), trajectory.time.shape).astype(float)
         outputs[table.name] = column if table.wrap is None else wrapped(column, table.wrap)
-    return Results(trajectory, outputs, energy, sections)
+    return outputs
+
+
+def _sections(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, Array]:
+    """Stresses of the elastic links at the times of a trajectory, as of `Results`."""
+    beams = {
+        name: link.beam.at_nodes(trajectory.stress_at(link.beam, trajectory.time))
+        for name, link in mechanism.links.items()
+    }
+    return beams | {
+        name: trajectory.stress_at(link.element, trajectory.time) for name, link in mechanism.plates.items()
+    }
 
 
 def in_blocks(function: Callable[..., Array], *states: Array, size: int = BLOCK) -> Array:

@@ -28,6 +28,7 @@ HEAVY = {
     ("gearfe.mechanisms.plates", "gearfe.fem.plane"): "finite elements",
     ("gearfe.mechanisms.plates", "gearfe.fem.meshing.mesh_file"): "readers of meshes",
     ("gearfe.mechanisms.plates", "gearfe.fem.reduction.plate"): "finite elements",
+    ("gearfe.mechanisms.plates", "gearfe.fem.reduction.plate_data"): "the package of finite elements",
     ("gearfe.mechanisms.plates", "gearfe.fem.meshing.plate_mesh"): "the mesher",
     ("gearfe.gears.gearmesh.law_store", "gearfe.gears.contact.half_plane"): "scipy; a law is read from the cache",
     ("gearfe.gears.gearmesh.law_store", "gearfe.gears.gearmesh.law_make"): "scipy; a law is read from the cache",
