@@ -120,7 +120,19 @@ class ContactLines:
         return contact_lines(self.compliance, flanks, density=self.density)
 
     def gap(self, z: Array, rows: Rows, pair: IntArray, tilt: Array | float = 0.0) -> Array:
-        """Gap d (m) of tooth pairs at z (m), with more tilt in the plane of action (rad); `rows` has their place."""
+        """Return the gap d (m) of tooth pairs, shape (n,).
+
+        Parameters
+        ----------
+        z : ndarray, shape (n,)
+            Axial coordinates (m).
+        rows : Rows
+            Tables of the pair's law there.
+        pair : ndarray, shape (n,)
+            Tooth pairs.
+        tilt : ndarray, shape (n,)
+            Tilts in the plane of action beside that of the flanks (rad).
+        """
         flanks, mesh = self.flanks, self.compliance.mesh
         gap = np.zeros(len(z))
         for gear, tooth in enumerate((pair, -1 - pair)):
@@ -957,7 +969,19 @@ def _dense(count: int) -> Array:
 def solve_position(
     lines: ContactLines, angle: float, *, torque: float | None = None, twist: float | None = None
 ) -> Solution:
-    """Solve the contact at a pinion angle (rad), at a torque (N m) or a twist (rad); see `solve_positions`."""
+    """Solve the contact at one pinion angle.
+
+    Parameters
+    ----------
+    lines : ContactLines
+        The gears.
+    angle : float
+        Pinion angle (rad).
+    torque : float, optional
+        At the wheel (N m), > 0.
+    twist : float, optional
+        Of the wheel (rad), from where unmodified flanks touch, instead of `torque`.
+    """
     load = {"torque" if twist is None else "twist": np.array([torque if twist is None else twist])}
     return solve_positions(lines, np.array([angle]), **load)[0]
 
