@@ -354,7 +354,8 @@ def completed(parsed: argparse.Namespace) -> argparse.Namespace:
     for dest, value in vars(parsed).items():
         if isinstance(value, JobFile):
             setattr(parsed, dest, JobFile(value, parsed.changes))
-    if getattr(parsed, "folder_of", None) and parsed.out is None:
+    parsed.default_out = getattr(parsed, "folder_of", None) is not None and parsed.out is None
+    if parsed.default_out:
         parsed.out = str(Path("out") / Path(str(job_of(parsed))).stem / parsed.folder_of)
     if not getattr(parsed, "report", True):
         for dest in HEADING:

@@ -48,6 +48,8 @@ def run(args: argparse.Namespace) -> int:
     if args.sensitivity:
         file = replace(file, run=replace(file.run, sensitivities=tuple(args.sensitivity)))
     file.run.check("run")
+    if args.default_out and file.run.analysis != "transient":  # no analysis removes the files of another one
+        args.out = str(Path(args.out).with_name(file.run.analysis))
 
     from ..base.files import recorded
     from ..base.progress import announce

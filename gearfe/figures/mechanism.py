@@ -86,7 +86,6 @@ def draw_modes(folder: Path, mechanism: Mechanism, q: np.ndarray, modes: Modes) 
         draw_state(ax, mechanism, q[None, :], alpha=0.25)
         draw_state(ax, mechanism, moved[None, :])
         frame(ax, mechanism, np.stack([q, moved, q - size * shape]))
-        ax.set_aspect("equal", adjustable="datalim")
         ax.set_title(f"{k + 1}: {modes.frequencies[k]:.4g} Hz", fontsize=9)
     save(figure, folder / "modes.png")
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.files import output_folder, whole_set, write_csv, write_json
-from ..base.progress import stage
+from ..base.progress import announce, stage
 from ..base.shown import percent
 from ..multibody import Start, Trajectory, integrate
 from ..multibody.core.inverse import prescribed_motion
@@ -21,7 +21,8 @@ from ..multibody.core.mass_regularisation import free_motions
 from .error_estimate import TrajectoryError, trajectory_error
 from .link_files import write_links, write_plates
 from .model import Mechanism
-from .results import Results, Sensitivities, evaluate, in_blocks, reactions, reference_table
+from .results import Results, Sensitivities, evaluate, in_blocks, reactions, reference_differences, reference_table
+from .start_moves import contradictions, largest_move, moved_line
 
 #: Bodies that a line of the report names.
 MOST_NAMES = 8
@@ -101,6 +102,9 @@ def run_mechanism(
         reference_table(mechanism)  # report a mistake in it before the run
     folder = output_folder(out)
     start = mechanism.start()
+    contradicted = contradictions(mechanism, start)
+    for sentence in contradicted:
+        announce(f"warning: {sentence}")
     read = clock.perf_counter()
     times = output_times(end, run.step_s)
     method = run.method if method is None else method
@@ -141,11 +145,13 @@ def run_mechanism(
             "pictures_s": clock.perf_counter() - written,
         }
         summary = summarise(mechanism, start, results, tolerance, timings, error)
-        summary["warnings"] = list(warnings)
+        summary["warnings"] = [*contradicted, *warnings]
         write_json(draft / "summary.json", summary)
     done = trajectory.status == 0
     stopped = "" if done else f"the run stopped at {trajectory.reached:g} s of {end:g} s: {trajectory.message}"
-    return Outcome(done and not warnings, _text(summary), summary, warnings, stopped)
+    start_line = "" if contradicted or mechanism.file.start.positions else moved_line(mechanism, start)
+    text = "\n".join([*([start_line] if start_line else []), _text(summary)])
+    return Outcome(done and not warnings, text, summary, warnings, stopped)
 
 
 def output_times(end: float, step: float) -> np.ndarray:
@@ -215,7 +221,7 @@ def summarise(
     total = results.energy["total_J"]
     statistics = dict(trajectory.statistics)
     statistics.pop("compile_seconds", None)  # stands under timings
-    passages = np.asarray(statistics.pop("singular_passages", []), dtype=float)
+    passages = np.asarray(statistics.pop("change_points", []), dtype=float)
     inside = passages[passages <= trajectory.reached]
     residual = in_blocks(mechanism.system.residual, trajectory.time, trajectory.q)
     return {
@@ -233,15 +239,18 @@ def summarise(
             "net": freedoms.net,
             "net_with_rigid_links": _net_of_rigid(mechanism, start),
             "prescribed": sum(row.motion is not None for row in linkage.assembly.rows),
+            "prescribed_and_redundant": sum(linkage.assembly.rows[r].motion is not None for r in freedoms.redundant),
             "undriven_bodies": undriven_bodies(mechanism, trajectory),
             "redundant_constraints": [label[r] for r in freedoms.redundant],
             "singular_at_start": [label[r] for r in freedoms.passing],
         },
         "flexible_links": [_flexible(mechanism, results, name) for name in mechanism.links]
         + [_of_elements(mechanism, results, name) for name in mechanism.plates],
+        "largest_move_to_the_start": largest_move(mechanism, start),
         "joints": joints,
-        "singular_passages": {"count": len(inside), "first_times_s": inside[:100]},
+        "change_points": {"count": len(inside), "first_times_s": inside[:100]},
         "constraint_residual": float(np.abs(residual).max(initial=0.0)),
+        "reference_differences": reference_differences(mechanism, trajectory),
         "energy_drift_J": float(np.abs(total - total[0]).max(initial=0.0)),
         "error_estimate": None
         if error is None
@@ -345,34 +354,60 @@ def _link_line(link: dict[str, Any]) -> str:
 
 
 def _undriven_line(f: dict[str, Any]) -> str:
-    """Describe degrees of freedom that no joint drives: missing joints, free motions, and shapes of links."""
+    """Describe degrees of freedom that no joint prescribes: missing joints, free motions, and shapes of links."""
     names, drives, left = f["undriven_bodies"], f["prescribed"], f["net_with_rigid_links"]
     listed = ", ".join(names[:MOST_NAMES]) + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
-    counted = f"{_freedoms(f['net'])} driven by no joint"
-    if left != f["net"]:
-        others = f", {left} of them with rigid links" if left > 0 else ""
-        counted += f", deformations of flexible links among them{others}"
-    line = f"{counted}: forces and start velocities move {listed}"
-    if not drives or left <= 0:
+    counted = ""
+    if drives or left != f["net"]:
+        counted = f"{_counted(f['net'], 'degree')} of freedom {'is' if f['net'] == 1 else 'are'} not prescribed"
+        if left != f["net"]:
+            rigid = f", {left} of them with rigid links" if left > 0 else ""
+            counted += f" (deformations of flexible links among them{rigid})"
+        counted += ": "
+    line = f"{counted}forces and start velocities move {listed}"
+    return f"{line}; check that no joint is missing" if drives and left > 0 else line
+
+
+def _counted(count: int, name: str) -> str:
+    """Return a number with its noun."""
+    return f"{count} {name if count == 1 else 'bodies' if name == 'body' else f'{name}s'}"
+
+
+def _freedom_line(f: dict[str, Any]) -> str:
+    """Describe the degrees of freedom as textbooks count them: prescribed motions are no constraints."""
+    prescribed = f["prescribed"] - f["prescribed_and_redundant"]
+    redundant = f["redundant"] - f["prescribed_and_redundant"]
+    line = (
+        f"{_counted(f['bodies'], 'body')}: {_counted(f['coordinates'], 'coordinate')}"
+        f" - {_counted(f['constraints'] - f['prescribed'], 'joint constraint')}"
+        f"{f' + {redundant} redundant' if redundant else ''} = {_counted(f['net'] + prescribed, 'degree')} of freedom"
+    )
+    if not prescribed:
         return line
-    verb = "joint prescribes a motion" if drives == 1 else "joints prescribe motions"
-    return f"{line}, while {drives} {verb}: check that no joint is missing"
+    return f"{line}, {'which is' if f['net'] + prescribed == 1 else f'{prescribed} of them'} prescribed"
 
 
-def _freedoms(count: int) -> str:
-    return "1 degree of freedom is" if count == 1 else f"{count} degrees of freedom are"
+def _time_text(seconds: float) -> str:
+    return f"{1e3 * seconds:.2g} ms" if seconds < 0.1 else f"{seconds:.2g} s"
 
 
 def _text(summary: dict[str, Any]) -> str:
     f = summary["freedoms"]
+    passed = summary["change_points"]["count"]
     lines = [
-        f"{f['bodies']} bodies, {f['coordinates']} coordinates - {f['constraints']} constraints"
-        f" + {f['redundant']} redundant = {f['net']} free",
+        _freedom_line(f),
         *([_undriven_line(f)] if f["net"] > 0 else []),
         *(f"redundant: {name}" for name in f["redundant_constraints"]),
         *(_link_line(link) for link in summary["flexible_links"]),
-        f"{summary['method']}: {summary['status']} at {summary['reached_s']:g} s in {summary['steps']} steps,"
-        f" {summary['timings']['integrate_s']:.3f} s; singular passages: {summary['singular_passages']['count']}",
+        f"{summary['method']}: {summary['status']} at {summary['reached_s']:g} s"
+        f" in {_counted(summary['steps'], 'step')}, computing time {_time_text(summary['timings']['integrate_s'])}"
+        + (f"; {_counted(passed, 'change point')} passed" if passed else ""),
         *([_error_line(summary["error_estimate"])] if summary["error_estimate"] else []),
+        *([_reference_line(summary["reference_differences"])] if summary["reference_differences"] else []),
     ]
     return "\n".join(lines)
+
+
+def _reference_line(found: dict[str, float]) -> str:
+    differences = ", ".join(f"{name} {value:.2g}" for name, value in found.items())
+    return f"largest differences from the reference: {differences}"

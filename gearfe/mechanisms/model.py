@@ -361,6 +361,7 @@ def make_mechanism(file: MechanismFile, path: Path = Path()) -> Mechanism:
     system = System([planar, *bending[0], *bending[1], *(link.joint for link in elastic.values())])
     outputs: dict[str, Node] = {}
     mechanism = Mechanism(file, system, outputs, path, flexible, elastic, known_until(file, tables))
+    system.start_rule = mechanism.start  # so that `integrate(mechanism.system, times)` starts as the file says
     for _, load in planar.assembly.state_loads:
         if isinstance(load, ExpressionLoad):
             load.bind(mechanism)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base.files import output_folder, whole_set, write_csv, write_json
-from ..base.progress import stage
+from ..base.progress import announce, stage
 from ..base.shown import percent
 from ..base.typing import Array
 from ..multibody import Start, Status, Trajectory
@@ -21,6 +21,7 @@ from ..multibody.core.modes import Modes, modes
 from .job import MAY_WRITE, Outcome, write_elastic
 from .model import Mechanism
 from .results import Results, Sensitivities, evaluate, reactions
+from .start_moves import contradictions
 
 
 def run_rest(
@@ -54,6 +55,9 @@ def run_rest(
     began = clock.perf_counter()
     folder = output_folder(out)
     start = mechanism.start()
+    contradicted = contradictions(mechanism, start)
+    for sentence in contradicted:
+        announce(f"warning: {sentence}")
     with stage("equilibrium"):
         rest = equilibrium(mechanism.system, start)
     results = evaluate(mechanism, at_rest(mechanism, start, rest))
@@ -72,7 +76,7 @@ def run_rest(
             draw(draft, results, vibrations)
         summary = summarise_rest(mechanism, start, rest, results, vibrations)
         summary["timings"] = {"whole_s": clock.perf_counter() - began}
-        summary["warnings"] = list(warned)
+        summary["warnings"] = [*contradicted, *warned]
         write_json(draft / "summary.json", summary)
     return Outcome(not warned, _text(summary), summary, tuple(warned))
 
@@ -155,7 +159,8 @@ def summarise_rest(
 
 
 def _text(summary: dict[str, Any]) -> str:
-    lines = [f"equilibrium in {summary['steps']} steps, {summary['residual_N']:.2g} N left"]
+    steps = f"{summary['steps']} step{'' if summary['steps'] == 1 else 's'}"
+    lines = [f"equilibrium found in {steps}, residual force {summary['residual_N']:.2g} N"]
     lines += [f"{name} = {value:.9g}" for name, value in summary["outputs"].items()]
     for k, (f, d) in enumerate(zip(summary.get("frequencies_Hz", ()), summary.get("damping_ratios", ()), strict=True)):
         lines.append(f"mode {k + 1}: {f:.6g} Hz, damping {percent(d, 3)}")

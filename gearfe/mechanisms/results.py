@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -252,6 +252,32 @@ def _pulls(linkage: Linkage, q: Array, multipliers: Array) -> Array:
     return np.concatenate([on, ground], axis=2)
 
 
+def reference_differences(mechanism: Mechanism, trajectory: Trajectory) -> dict[str, float]:
+    """Return the largest difference of each output from its reference column, at the times of the reference.
+
+    Outputs at these times follow from the solution between the output times. Wrapped outputs are compared within a
+    period. Empty if the file has no reference, or the run ended before its second time.
+    """
+    reference = reference_table(mechanism)
+    if reference is None:
+        return {}
+    first, last = sorted((float(trajectory.time[0]), trajectory.reached))
+    inside = (first <= reference["t"]) & (reference["t"] <= last)
+    if inside.sum() < 2:
+        return {}
+    results = evaluate(mechanism, replace(trajectory, time=reference["t"][inside]))
+    periods = {output.name: output.wrap for output in mechanism.file.outputs}
+    found = {}
+    for name, column in mechanism.file.figure.reference_columns.items():
+        off = np.abs(results.outputs[name] - reference[column][inside])
+        period = periods[name]
+        if period is not None:
+            off = np.mod(off, period)
+            off = np.minimum(off, period - off)
+        found[name] = float(off.max())
+    return found
+
+
 def reference_table(mechanism: Mechanism) -> dict[str, Array] | None:
     """Columns of the file that ``figure.reference`` names; None where it names none.
 
@@ -269,7 +295,9 @@ def reference_table(mechanism: Mechanism) -> dict[str, Array] | None:
         rows = list(csv.DictReader(lines))
         columns = {name: np.array([float(row[name]) for row in rows]) for name in (rows[0] if rows else {})}
     except (ValueError, TypeError, csv.Error) as error:
-        raise InputError("figure.reference", str(source), f"is no table of numbers ({error})", "mend it") from None
+        raise InputError(
+            "figure.reference", str(source), f"is no table of numbers ({error})", "correct the file"
+        ) from None
     if "time_s" in columns:  # as trajectory.csv has it
         columns.setdefault("t", columns["time_s"])
     for name in ("t", *table.reference_columns.values()):

@@ -1,4 +1,4 @@
-"""A slider crank that folds, built in Python: bodies, joints, gravity, forced start velocity, singular passages."""
+"""A slider crank that folds, built in Python: bodies, joints, gravity, forced start velocity, change points."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def main() -> None:
     speed = Forced("slider speed", -4.0, lambda q: 0.0, slider_speed)  # noqa: ARG005
     start = consistent_start(system, velocities=[speed])
     made = integrate(system, np.linspace(0.0, 10.0, 2001), tolerance=1e-10, start=start)
-    passages = made.statistics["singular_passages"]
+    passages = made.statistics["change_points"]
     print(f"{made.message} in {made.statistics['steps']} steps")
-    print(f"{len(passages)} singular passages, the first at {passages[0]:.6f} s")
+    print(f"{len(passages)} change points, the first at {passages[0]:.6f} s")
     print(f"crank at the end: {made.q[-1, 2]:.12f} rad, {made.v[-1, 2]:.12f} rad/s")
     energy = sum(system.energy(made.q, made.v))
     print(f"energy {energy[0]:.12f} J, kept within {np.ptp(energy):.1e} J")

@@ -189,7 +189,9 @@ def test_command_on_the_folding_links(tmp_path, capsys):
         "--reactions",
     ]
     assert main([*arguments, "--no-pictures"]) == 0
-    assert "1 free" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "2 bodies: 6 coordinates - 5 joint constraints = 1 degree of freedom\n" in out
+    assert "; 2 change points passed" in out
     table = np.genfromtxt(tmp_path / "trajectory.csv", delimiter=",", names=True)
     header = (tmp_path / "trajectory.csv").read_text().splitlines()[0].split(",")
     assert header[0] == "time_s"
@@ -209,7 +211,7 @@ def test_command_on_the_folding_links(tmp_path, capsys):
     assert np.abs(energy["total_J"] - truth["E"][0]).max() <= 1e-8
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["freedoms"]["net"] == 1
-    assert summary["singular_passages"]["count"] == 2
+    assert summary["change_points"]["count"] == 2
     assert (tmp_path / "reactions.csv").exists()
 
 

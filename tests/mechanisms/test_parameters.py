@@ -94,7 +94,7 @@ def test_studies_and_slopes_change_a_parameter(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "field", "words"),
     [
-        ('half = "l/2"', 'half = "ell/2"', "parameters.half = 'ell/2'", "ell"),
+        ('half = "l/2"', 'half = "ell/2"', "parameters.half", "unknown name 'ell'"),
         ('half = "l/2"', 'half = "m/(l - 0.8)"', "parameters.half", "has no finite value"),
         ('half = "l/2"', "half = true", "parameters.half", "must be a number"),
         ("l = 0.8", "sin = 0.8", "parameters", "is the name of a function"),

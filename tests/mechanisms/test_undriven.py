@@ -1,4 +1,4 @@
-"""Freedoms that no joint drives are reported with the bodies that have them."""
+"""Degrees of freedom that no joint prescribes are reported with the bodies that have them."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ def report(raw: dict[str, Any], folder: Path) -> Outcome:
     ("missing", "net", "bodies", "text"),
     [
         ((), 0, [], None),
-        (("drive",), 1, ["crank", "coupler", "rocker"], "1 degree of freedom is driven by no joint.*move crank, "),
-        (("Q",), 2, ["coupler", "rocker"], "2 degrees of freedom .* coupler, rocker, while 1 .* joint is missing"),
-        (("P", "Q"), 4, ["coupler", "rocker"], "4 degrees of freedom .*while 1 joint prescribes a motion"),
-        (("Q", "drive"), 3, ["crank", "coupler", "rocker"], "3 degrees of freedom are driven by no joint"),
+        (("drive",), 1, ["crank", "coupler", "rocker"], "1 degree of freedom\nforces and start velocities move crank"),
+        (("Q",), 2, ["coupler", "rocker"], "2 degrees of freedom are not .* rocker; check that no joint"),
+        (("P", "Q"), 4, ["coupler", "rocker"], "5 degrees .*, 1 of them prescribed\n4 degrees .* not prescribed:"),
+        (("Q", "drive"), 3, ["crank", "coupler", "rocker"], "3 degrees of freedom\nforces and"),
     ],
 )  # fmt: skip
 def test_what_no_joint_drives(
@@ -65,7 +65,8 @@ def test_what_no_joint_drives(
     assert (freedoms["net"], freedoms["undriven_bodies"]) == (net, bodies)
     assert freedoms["prescribed"] == int("drive" not in missing)
     if text is None:
-        assert "driven by no joint" not in outcome.text
+        assert "9 coordinates - 8 joint constraints = 1 degree of freedom, which is prescribed\n" in outcome.text
+        assert "forces and start velocities" not in outcome.text
     else:
         assert re.search(text, outcome.text), outcome.text
 
@@ -81,6 +82,17 @@ def test_a_third_crank_leaves_one_freedom(tmp_path: Path) -> None:
     assert freedoms["undriven_bodies"] == ["crank", "coupler", "rocker"]
 
 
+def test_degrees_of_freedom_are_those_of_gruebler(tmp_path: Path) -> None:
+    """3 (n - 1) - 2 j = 1 for the four-bar, also where a joint or a second motion is redundant."""
+    raw = four_bar()
+    raw["joints"]["again"] = {"type": "hinge", "body": "crank", "point": "A"}
+    text = report(raw, tmp_path).text
+    assert "9 coordinates - 10 joint constraints + 2 redundant = 1 degree of freedom, which is prescribed" in text
+    raw = four_bar()
+    raw["joints"]["twice"] = dict(raw["joints"]["drive"])
+    assert "9 coordinates - 8 joint constraints = 1 degree of freedom, which is pre" in report(raw, tmp_path).text
+
+
 def test_flexible_links_do_not_suggest_a_missing_joint(tmp_path: Path) -> None:
     """A driven slider crank whose rod bends has all its joints; its freedoms are the shapes of the rod."""
     raw = read_toml(GEOMETRY / "elastic_slider_crank.toml")
@@ -89,7 +101,7 @@ def test_flexible_links_do_not_suggest_a_missing_joint(tmp_path: Path) -> None:
     outcome = report(raw, tmp_path)
     freedoms = outcome.summary["freedoms"]
     assert (freedoms["prescribed"], freedoms["net_with_rigid_links"]) == (1, 0)
-    assert "driven by no joint, deformations of flexible links among them: forces" in outcome.text
+    assert "not prescribed (deformations of flexible links among them): forces" in outcome.text
     assert "joint is missing" not in outcome.text
 
 
@@ -103,4 +115,4 @@ def test_a_missing_joint_shows_beside_flexible_links(joint: str, left: int, tmp_
     outcome = report(raw, tmp_path)
     assert outcome.summary["freedoms"]["net_with_rigid_links"] == left
     assert f"{left} of them with rigid links" in outcome.text
-    assert "while 1 joint prescribes a motion: check that no joint is missing" in outcome.text
+    assert outcome.text.splitlines()[1].endswith("; check that no joint is missing")

@@ -61,7 +61,7 @@ def check_n_four_bar(count: int, tolerance: float, end: float) -> None:
     made = integrate(n_four_bar(count), times, tolerance=tolerance, method="taylor")
     exact = n_four_bar_angle(count, times)
     assert made.message == "done"
-    assert len(made.statistics["singular_passages"]) == crossings(exact) > 0
+    assert len(made.statistics["change_points"]) == crossings(exact) > 0
     assert np.abs(made.q[:, 2 : 3 * (count + 1) : 3] - exact[:, None]).max() <= max(30 * tolerance, 1e-9)
     assert np.abs(made.q[:, 3 * (count + 1) + 2 :: 3]).max() <= 1e-10
 
@@ -103,7 +103,7 @@ def test_peaucellier_straight_line(tolerance):
     P = 2.0 * np.cos(angle[:, 0]) + 0.8 * np.cos(angle[:, 2])
     assert np.abs(P - (2.0**2 - 0.8**2) / 2.0).max() <= max(30 * tolerance, 1e-10)  # (OA^2 - AQ^2) / diameter
     together = crossings((angle[:, 0] - angle[:, 1]) / 2) + crossings((angle[:, 2] - angle[:, 4]) / 2)
-    assert len(made.statistics["singular_passages"]) == together > 5
+    assert len(made.statistics["change_points"]) == together > 5
     assert np.ptp(total_energy(made)) <= max(300 * tolerance, 1e-9)
 
 
@@ -129,4 +129,4 @@ def test_folds_soon_after_one_another(apart, tolerance):
     expected = sum(crossings(folding_angle(a, 3.0, fine) - pi / 2) for a in (1.0, 1.0 + apart))
     assert made.message == "done"
     assert np.abs(made.q[:, [2, 8]] - exact).max() <= 3 * tolerance
-    assert len(made.statistics["singular_passages"]) == expected
+    assert len(made.statistics["change_points"]) == expected

@@ -120,7 +120,7 @@ def test_folding_links_with_a_light_rod(mass, share, theta):
     run = integrate(with_rod(mass, share, theta, omega), times, method="taylor", tolerance=1e-11)
     np.testing.assert_allclose(run.q[:, 2], exact, atol=1e-9)
     turns = np.abs(np.diff(np.floor(run.dense(np.linspace(1e-6, 3.0, 500), 0)[:, 2] / pi - 0.5))).sum()
-    assert len(run.statistics["singular_passages"]) == turns + (theta == pi / 2)
+    assert len(run.statistics["change_points"]) == turns + (theta == pi / 2)
 
 
 @pytest.mark.parametrize("share", [1e-6, 1e-12, 1e-15, 1e-40])

@@ -77,7 +77,7 @@ def test_folding_links_against_the_reference():
     assert np.abs(omega - table["omega"]).max() <= 1e-7
     assert np.abs(a_x - table["axA"]).max() <= 1e-6
     assert np.ptp(total_energy(made)) <= 1e-8
-    assert len(made.statistics["singular_passages"]) == 11  # the reference passes +-90 degrees eleven times
+    assert len(made.statistics["change_points"]) == 11  # the reference passes +-90 degrees eleven times
 
 
 def test_error_follows_the_tolerance(andrews):

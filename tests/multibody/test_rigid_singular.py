@@ -71,7 +71,7 @@ def test_near_miss_is_no_fold():
     times = np.linspace(0.0, 1.5, 31)
     made = integrate(folding_links(pi / 4, 3.0, rod=1.001), times, tolerance=1e-10)
     assert made.status == 0
-    assert len(made.statistics["singular_passages"]) == 0
+    assert len(made.statistics["change_points"]) == 0
     assert np.ptp(total_energy(made)) <= 1e-8
     assert np.abs(np.sin(made.q[:, 2]) + 1.001 * np.sin(made.q[:, 5])).max() <= 1e-10
 
@@ -153,7 +153,7 @@ def test_parallel_cranks_turn_through_their_folds(count, tolerance):
         ).y[0]  # fmt: skip
         assert made.status == 0
         flat = np.abs(np.diff(np.floor(exact / pi))).sum()
-        assert len(made.statistics["singular_passages"]) == flat > 0
+        assert len(made.statistics["change_points"]) == flat > 0
         assert np.abs(made.q[:, 3 * count + 2]).max() <= max(10 * tolerance, 1e-10)
         assert np.abs(made.q[:, 2] - exact).max() <= max(100 * tolerance, 1e-9)
 
@@ -231,7 +231,7 @@ def test_four_bars_pass_their_flat_position(sides, tolerance):
         made = integrate(system, times, tolerance=tolerance, start=start)
         assert made.status == 0
         turns = np.floor((exact - pi) / (2 * pi))
-        assert len(made.statistics["singular_passages"]) >= np.ptp(turns) > 0
+        assert len(made.statistics["change_points"]) >= np.ptp(turns) > 0
         coupler = np.array([B - A for A, B in map(bar.points, exact)])
         pointed = sides[1] * np.column_stack([np.cos(made.q[:, 5]), np.sin(made.q[:, 5])])
         assert np.abs(made.q[:, 2] - exact).max() <= max(100 * tolerance, 1e-9)

@@ -62,6 +62,15 @@ def test_formats_hold_the_numbers_of_the_tables(tmp_path, capsys):
         np.testing.assert_allclose(sets[si_name]["x"], x, rtol=1e-9, atol=1e-9 * x.max(), err_msg=name)
 
 
+def test_comments_above_the_header_are_skipped(tmp_path):
+    """The shipped reference of Andrews' mechanism begins with one."""
+    table = read_csv(GEOMETRY / "andrews_reference.csv")
+    assert list(table)[:2] == ["t", "beta"]
+    assert table["t"][-1] == 0.03
+    (tmp_path / "words.csv").write_text("name,x\n#1,2.0\n", encoding="utf-8")
+    assert read_csv(tmp_path / "words.csv")["name"].tolist() == ["#1"]
+
+
 #: Column -> specific data type, exponents of length and force, unit: Universal File Format, data set 58, addendum A.
 KINDS = {
     "transmission_error_1_um": (8, 1, 0, "m"),

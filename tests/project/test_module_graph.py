@@ -67,7 +67,7 @@ HEAVY = {
     ("gearfe.drivetrain.runup.train_stability", "gearfe.drivetrain.runup.run_up"): "the same",
     ("gearfe.drivetrain.runup.train_stability", "gearfe.drivetrain.runup.stability"): "the same",
     ("gearfe.figures.style", "gearfe.figures.canvas"): "matplotlib's axes; imported when the first picture is drawn",
-    ("gearfe.base.tables.mechanism", "gearfe.base.tables.parameters"): "numpy, of expressions; for parameters only",
+    ("gearfe.base.tables.parameters", "gearfe.base.expressions"): "numpy; for files with expressions only",
     ("gearfe.base.tables.jobs", "gearfe.base.tables.carrier"): "40 ms for the tables of trains; for trains only",
     ("gearfe.base.tables.jobs", "gearfe.base.tables.train_gearbox"): "the same; for trains only",
 }

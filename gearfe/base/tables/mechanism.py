@@ -14,6 +14,7 @@ from .beam import BeamTable, check_on_axis
 from .jobs import TABLES
 from .joint_coordinates import LinksTable, with_links
 from .kinds import FORCES, GONE_METHODS, JOINTS, MOTIONS, UNIT_OF, Kind
+from .parameters import with_parameters
 from .plate import PlateTable
 
 Pair = tuple[float, float]
@@ -273,7 +274,7 @@ class OutputTable:
 
     name: str = quantity(doc="column name with its unit, such as crank_angle_rad")
     value: str = quantity(doc="arithmetic expression over quantities of the mechanism")
-    wrap: float | None = quantity(None, above=0.0, doc="period to wrap to (6.283185307179586 for an angle)")
+    wrap: float | None = quantity(None, above=0.0, doc='period to wrap to ("2*pi" for an angle)')
 
     def check(self, where: str) -> None:
         """A name that fits a CSV header."""
@@ -440,17 +441,14 @@ def read_mechanism_file(path: str | Path) -> MechanismFile:
 def mechanism_tables(raw: Mapping[str, Any]) -> MechanismFile:
     """Return the tables of a parsed mechanism file.
 
-    Expressions of parameters are evaluated; links whose joints have positions become bodies.
+    Expressions, also of parameters, are evaluated; links whose joints have positions become bodies.
 
     Raises
     ------
     InputError
         For every mistake in them.
     """
-    if raw.get("parameters"):
-        from .parameters import with_parameters
-
-        raw = with_parameters(MechanismFile, raw)
+    raw = with_parameters(MechanismFile, raw)
     return build(MechanismFile, with_links(raw), "")
 
 

@@ -1,7 +1,8 @@
-"""[parameters] of a mechanism file: numbers by name, which stand for themselves in the keys of all other tables.
+"""[parameters] of a mechanism file: numbers by name for the keys of all other tables.
 
-Where a key takes a number, it may have an expression of parameters instead, ``length_m = "2*r"``. Expressions of loads,
-outputs and start values know the parameters by their names.
+Where a key takes a number, it may have an expression instead, of numbers and parameters: ``length_m = "2*r"``,
+``angle_rad = "pi/4"``. Expressions of loads, outputs and start values know the parameters by their names. Expressions
+load NumPy, so they are imported where a file has some.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ from typing import Any
 
 from ..config import check_size, type_hints
 from ..errors import InputError
-from ..expressions import CONSTANTS, FUNCTIONS, Names, compute, parse
 from ..other_units import partner
 
 #: Name of the table.
@@ -38,17 +38,17 @@ def with_parameters(table: type, raw: Mapping[str, Any]) -> dict[str, Any]:
     InputError
         For names that are none, and expressions that are not arithmetic, use unknown names, or have no finite value.
     """
-    given = raw.get(PARAMETERS)
+    given = raw.get(PARAMETERS, {})
     if not isinstance(given, Mapping):  # which is an error of its own
         return dict(raw)
     known: dict[str, float] = {}
-    functions = {name for name, _ in FUNCTIONS}
+    taken = _taken() if given else set()
     for name, value in given.items():
         label = f"{PARAMETERS}.{name}"
         if not name.isidentifier():
             problem = "must be a word of letters, digits and _ (it is used in expressions)"
             raise InputError(PARAMETERS, name, problem, "rename it")
-        if name in functions or name in CONSTANTS:
+        if name in taken:
             raise InputError(PARAMETERS, name, "is the name of a function or a constant", "rename it")
         number = _value(value, label, known) if isinstance(value, str) else value
         if isinstance(number, bool) or not isinstance(number, int | float):
@@ -61,7 +61,14 @@ def with_parameters(table: type, raw: Mapping[str, Any]) -> dict[str, Any]:
         if name not in used:
             raise InputError(f"{PARAMETERS}.{name}", None, "is used nowhere", "use it in a key, or remove it")
     tables = {name: _resolved(type_hints(table).get(name, Any), value, name, known) for name, value in raw.items()}
-    return {**tables, PARAMETERS: known}
+    return {**tables, PARAMETERS: known} if known else tables
+
+
+def _taken() -> set[str]:
+    """Names of functions and constants, which no parameter may have."""
+    from ..expressions import CONSTANTS, FUNCTIONS
+
+    return {*(name for name, _ in FUNCTIONS), *CONSTANTS}
 
 
 def _words(part: Any) -> Iterator[str]:
@@ -78,8 +85,14 @@ def _words(part: Any) -> Iterator[str]:
 
 
 def _value(text: str, label: str, known: Mapping[str, float]) -> float:
+    from ..expressions import Names, compute, parse
+
     names = Names(what="a number", constants=known)
-    value = float(compute(parse(text, label, names), {}))
+    try:
+        value = float(compute(parse(text, label, names), {}))
+    except InputError as error:
+        problem = f"must be a number, or an expression of numbers and parameters: {error.problem}"
+        raise InputError(label, text, problem, error.cure) from None
     if not math.isfinite(value):
         raise InputError(label, text, "has no finite value", "correct it, or the parameters that it uses")
     return value

@@ -32,6 +32,9 @@ class System:
     def __init__(self, elements: Sequence[Element]) -> None:
         self.elements = tuple(elements)
         self._known: dict[Hashable, Any] = {}
+        #: Returns the `Start` at a time (s) of runs without another one, as a mechanism file has it; None: the start
+        #: poses of the elements, made consistent.
+        self.start_rule: Callable[[float], Any] | None = None
         if not any(e.size for e in self.elements):
             raise InputError("elements", None, "nothing can move", "give the system at least one body")
         place: dict[int, np.ndarray] = {}

@@ -52,7 +52,7 @@ class Trajectory(Shown):
     method : str
         The one used.
     statistics
-        Scheme, steps, order, singular passages, seconds to compile; the link without
+        Scheme, steps, order, change points, seconds to compile; the link without
         mass that ended the run.
     dense
         Coordinates at any time of the run, by derivative.

@@ -81,7 +81,8 @@ def integrate(
     tolerance : float
         Accuracy asked for, relative to 1 rad and to the size of the mechanism; 1e-13 to 0.1.
     start : Start, optional
-        From `consistent_start`; by default the start poses of the bodies, made consistent (and remembered).
+        From `consistent_start`. By default that of the mechanism file with its table [start], or for a system built in
+        Python the start poses and velocities of the bodies, made consistent (and kept).
     longest : float
         Longest step (s).
     most_steps : int
@@ -232,7 +233,8 @@ def _run(
 
 
 def _default_start(system: System, time: float) -> Start:
-    return system.once(("start", time), lambda: consistent_start(system, time))
+    rule = system.start_rule or partial(consistent_start, system)
+    return system.once(("start", time), lambda: rule(time))
 
 
 def _check(times: np.ndarray, method: str, tolerance: float) -> None:

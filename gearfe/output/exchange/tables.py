@@ -14,6 +14,7 @@ The CSV files carry 17 significant digits, so what is read from them is what was
 from __future__ import annotations
 
 import csv
+import itertools
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -43,7 +44,9 @@ LONGEST = 63
 
 
 def read_csv(path: str | Path) -> dict[str, Array]:
-    """Columns of a table: numbers (double precision), or texts where a value is none.
+    """Read the columns of a CSV table: numbers (double precision), or texts where a value is none.
+
+    Lines above the header that begin with ``#`` are comments.
 
     Raises
     ------
@@ -51,9 +54,10 @@ def read_csv(path: str | Path) -> dict[str, Array]:
         For a file that is no table.
     """
     with Path(path).open(encoding="utf-8-sig", newline="") as stream:
-        rows = list(csv.reader(stream))
+        rows = list(csv.reader(itertools.dropwhile(lambda line: line.startswith("#"), stream)))
     if not rows or any(len(row) != len(rows[0]) for row in rows):
-        raise InputError("table", str(path), "must have a header and rows of its length", "write it again")
+        problem = "must have a header, and rows with as many cells"
+        raise InputError("table", str(path), problem, "correct the file, or run the command again that wrote it")
     columns: dict[str, Array] = {}
     for name, values in zip(
         rows[0], zip(*rows[1:], strict=True) if len(rows) > 1 else [()] * len(rows[0]), strict=True

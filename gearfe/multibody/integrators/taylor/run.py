@@ -141,7 +141,7 @@ def run_taylor(
     status : Status
         Why the run ended.
     statistics : dict
-        Scheme, steps, order, times of singular passages.
+        Scheme, steps, order, times of change points.
     """
     system, tables, order, w, both, _ = shared
     t0 = start.time
@@ -190,7 +190,7 @@ def run_taylor(
         "steps": done,
         "order": order,
         "compile_seconds": compiling,
-        "singular_passages": ends[np.flatnonzero(np.concatenate([p[2] for p in parts]))],
+        "change_points": ends[np.flatnonzero(np.concatenate([p[2] for p in parts]))],
     }
     if problem:
         statistics["load_problem"] = problem
