@@ -152,8 +152,15 @@ def test_what_is_wrong_with_a_stage_is_named(changes: dict[str, Any], text: str)
 def test_planets_that_collide_are_named() -> None:
     """At 60 deg the tips of two planets of 22 teeth overlap: 78 mm < 2 * 48 mm."""
     raw = tables(**at_angles([0.0, 60.0]), carriers__arm__pin_tangential_errors_um=None)
-    with pytest.raises(InputError, match=r"'planet_1'.*overlaps gear 'planet_2'"):
+    with pytest.raises(InputError, match=r"carriers\.arm\.planets = 2: gear 'planet_1' overlaps gear 'planet_2'.*75\."):
         build_train(made(raw))
+
+
+def test_messages_have_the_tables_of_the_planets_as_written() -> None:
+    """The file has [gears.planet], not one table for each planet."""
+    for key, value in (("addendum", 3.0), ("module_mm", 4.5), ("rack_tip_radius", 0.9)):
+        with pytest.raises(InputError, match=rf"^gears\.planet\.{key} = {value}: "):
+            build_train(made(tables(**{f"gears__planet__{key}": value})))
 
 
 def test_modes_are_drawn_beside_the_orders_of_shafts_that_turn(tmp_path: Path) -> None:

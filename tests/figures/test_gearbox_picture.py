@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from matplotlib.text import Text
 
+from gearfe.base.errors import InputError
 from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.layout import GearboxLayout, gearbox_layout
 from gearfe.figures.gearbox import gearbox_picture
@@ -105,12 +106,28 @@ def test_planets_that_overlap_are_named() -> None:
     assert layout.collisions() == []
     raw["carriers"]["arm"]["planets"] = 6
     del raw["carriers"]["arm"]["pin_tangential_errors_um"]
+    least = 2.0 * math.degrees(math.asin(layout.gear("planet_1").tip_radius / 0.078))
+    for named in (raw, {**raw, "train": None}):
+        given = {name: table for name, table in named.items() if table is not None}
+        with pytest.raises(InputError, match=r"carriers\.arm\.planets = 6: gear 'planet_1' overlaps") as caught:
+            gearbox_layout(given, "box.toml")
+        assert f"axes 78 mm apart, tip circles need more than {2e3 * layout.gear('planet_1').tip_radius:.6g} mm" in str(
+            caught.value
+        )
+        assert f"at least {least:.2f}" in str(caught.value)
+        assert f"at most {math.floor(360.0 / least)} equally spaced" in str(caught.value)
+
+
+def test_gears_that_overlap_without_a_carrier_are_listed() -> None:
+    """What stands in a drawing may not fit yet."""
+    raw = tomllib.loads(text())
+    raw["shafts"]["s3"]["x_mm"] = raw["shafts"]["s1"]["x_mm"] + 1.0
     layout = gearbox_layout(raw, "box.toml")
     assert layout is not None
-    common = 2e3 * layout.gear("planet_1").tip_radius - 2.0 * 78.0 * math.sin(math.pi / 6)
-    lines = layout.collisions()
-    assert len(lines) == 6
-    assert lines[0].startswith(f"gears planet_1 and planet_2 overlap by {common:.4g} mm over 50 mm of width")
+    common = sum(layout.gear(name).tip_radius for name in ("sun", "wheel_1")) - 1e-3
+    assert [line.partition(" over ")[0] for line in layout.collisions()] == [
+        f"gears sun and wheel_1 overlap by {1e3 * common:.4g} mm"
+    ]
 
 
 def test_sections_of_an_elastic_shaft_are_drawn() -> None:

@@ -8,7 +8,7 @@ into a `Gearbox`. The code below them does not depend on the form of the file, e
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -403,6 +403,7 @@ def named_gearbox(
     materials: Mapping[str, MaterialTable],
     *,
     shafts: Iterable[str] | None = None,
+    planets: Collection[str] = (),
 ) -> Gearbox:
     """Return the gears and meshes of [gears.NAME] and [meshes.NAME], with the keys of [stiffness] left out.
 
@@ -412,6 +413,8 @@ def named_gearbox(
         The tables by name.
     shafts : iterable of str, optional
         Names of the shafts, if the file has any: then every gear is on one.
+    planets : collection of str
+        Gears that the file has once for several planets: NAME_1, NAME_2, ... Messages have its table, [gears.NAME].
 
     Raises
     ------
@@ -420,7 +423,8 @@ def named_gearbox(
         pressure angles that differ.
     """
     known = None if shafts is None else list(shafts)
-    gear_of = {name: _named_gear(name, table, materials, known) for name, table in gears.items()}
+    written = {name: name.rpartition("_")[0] if name in planets else name for name in gears}
+    gear_of = {name: _named_gear(name, written[name], table, materials, known) for name, table in gears.items()}
     for mates in _meshing(meshes.values()):
         tables = {name: gears[name] for name in gears if name in mates}
         helix_deg = next((table.helix_angle_deg for table in tables.values() if table.helix_angle_deg), 0.0)
@@ -428,7 +432,10 @@ def named_gearbox(
         for name, table in tables.items():
             module = module_mm_of(table, table.module_mm, common, gear_of[name].form["helix_angle_deg"])
             gear_of[name] = replace(gear_of[name], form={**gear_of[name].form, "module_mm": module})
-    mesh_of = {name: _named_mesh(name, table, gear_of) for name, table in meshes.items()}
+    mesh_of = {}
+    for name, entry in meshes.items():
+        once = name.rpartition("_")[0] if {entry.driver, entry.driven} & set(planets) else name
+        mesh_of[name] = _named_mesh(name, once, entry, gear_of)
     twins: dict[frozenset[str], str] = {}
     for name, mesh in mesh_of.items():
         both = frozenset((mesh.driver.name, mesh.driven.name))
@@ -450,9 +457,9 @@ def _meshing(meshes: Iterable[NamedMeshTable]) -> list[set[str]]:
 
 
 def _named_gear(
-    name: str, table: NamedGearTable, materials: Mapping[str, MaterialTable], shafts: list[str] | None
+    name: str, written: str, table: NamedGearTable, materials: Mapping[str, MaterialTable], shafts: list[str] | None
 ) -> NamedGear:
-    where = f"gears.{name}"
+    where = f"gears.{written}"
     material, material_where = MaterialTable(), DEFAULT
     if isinstance(table.material, MaterialTable):
         material, material_where = table.material, f"{where}.material"
@@ -494,8 +501,8 @@ def _or(names: Iterable[str]) -> str:
     return " or ".join(f'"{name}"' for name in names)
 
 
-def _named_mesh(name: str, table: NamedMeshTable, gears: Mapping[str, NamedGear]) -> NamedMesh:
-    where = f"meshes.{name}"
+def _named_mesh(name: str, written: str, table: NamedMeshTable, gears: Mapping[str, NamedGear]) -> NamedMesh:
+    where = f"meshes.{written}"
     for key in ("driver", "driven"):
         if getattr(table, key) not in gears:
             raise unknown_name(f"{where}.{key}", getattr(table, key), gears)

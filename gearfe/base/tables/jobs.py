@@ -258,8 +258,10 @@ def only_mesh(raw: dict[str, Any], path: str | Path, name: str | None = None, fi
 def _gearbox(tables: Mapping[str, Any]) -> Gearbox:
     """Gears and meshes of [pair], or those by name."""
     if "gears" in tables:
-        shafts = tables.get("shafts")
-        return named_gearbox(tables["gears"], tables["meshes"], tables.get("materials", {}), shafts=shafts)
+        shafts, gears = tables.get("shafts"), tables["gears"]
+        carried = {name for name, shaft in (shafts or {}).items() if shaft.carrier is not None}
+        planets = [name for name, gear in gears.items() if gear.shaft in carried]
+        return named_gearbox(gears, tables["meshes"], tables.get("materials", {}), shafts=shafts, planets=planets)
     return pair_gearbox(tables["pair"], tables.get("microgeometry"))
 
 

@@ -1,21 +1,24 @@
 """Where the gears, shafts and bearings of a job file are: to be looked at before anything is computed.
 
-Nothing has to fit for it: shafts that are not where the gears need them are what it shows.
+Shafts that are not where the gears need them are what it shows. Planets of a carrier that overlap are refused.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ...base.tables.carrier import TrainCarrierTable
 from ...base.tables.gearbox import Gearbox
 from ...base.tables.jobs import OF_GEARS, gearbox_of, planet_tables, train_tables
 from ...base.tables.train import TrainTable
 from ...base.tables.train_gearbox import named_train, with_materials
 from ...gears.geometry.pair import gear_of, pair_of
+from ..train.checks import planets_overlap
 from .job import bore_places, shaft_of
 
 #: Distances that differ by no more agree (m).
@@ -102,10 +105,12 @@ class GearboxLayout:
         """The gear of that name."""
         return next(gear for gear in self.gears if gear.name == name)
 
-    def collisions(self) -> list[str]:
-        """Return a line for each couple of gears that are not in mesh, and whose tip circles overlap in one plane."""
+    def overlapping(self) -> Iterator[tuple[PlacedGear, PlacedGear, float, float]]:
+        """Yield couples of gears that are not in mesh and whose tip circles overlap: by how much, over which width (m).
+
+        Gears on one shaft and rings are left out.
+        """
         meshing = {frozenset((mesh.driver, mesh.driven)) for mesh in self.meshes}
-        lines = []
         for one, two in itertools.combinations(self.gears, 2):
             facing = 0.5 * (one.width + two.width) - abs(one.centre[1] - two.centre[1])
             if one.teeth < 0 or two.teeth < 0 or one.shaft == two.shaft or facing <= CLOSE:
@@ -113,11 +118,15 @@ class GearboxLayout:
             apart = math.hypot(two.centre[0] - one.centre[0], two.centre[2] - one.centre[2])
             common = one.tip_radius + two.tip_radius - apart
             if common > CLOSE and frozenset((one.name, two.name)) not in meshing:
-                lines.append(
-                    f"gears {one.name} and {two.name} overlap by {1e3 * common:.4g} mm over {1e3 * facing:.4g} mm of "
-                    "width: move their shafts apart, or one gear along its shaft"
-                )
-        return lines
+                yield one, two, common, facing
+
+    def collisions(self) -> list[str]:
+        """Return a line for each couple of gears that overlap."""
+        return [
+            f"gears {one.name} and {two.name} overlap by {1e3 * common:.4g} mm over {1e3 * facing:.4g} mm of "
+            "width: move their shafts apart, or one gear along its shaft"
+            for one, two, common, facing in self.overlapping()
+        ]
 
 
 def gearbox_layout(raw: dict[str, Any], path: str | Path) -> GearboxLayout | None:
@@ -126,7 +135,7 @@ def gearbox_layout(raw: dict[str, Any], path: str | Path) -> GearboxLayout | Non
     Raises
     ------
     InputError
-        For mistakes in the tables, and gears that cannot run together.
+        For mistakes in the tables, gears that cannot run together, and planets of a carrier that overlap.
     """
     tables: dict[str, Any]
     if "train" in raw:
@@ -135,7 +144,8 @@ def gearbox_layout(raw: dict[str, Any], path: str | Path) -> GearboxLayout | Non
     elif "shafts" in raw:
         raw, tables = planet_tables(raw, path, ("gears", "meshes", "shafts"), (*OF_GEARS, "housing"))
         box = gearbox_of(raw, path)
-        table = named_train(TrainTable(), tables["meshes"], tables["shafts"], tables.get("bearings", {}))
+        bearings, carriers = tables.get("bearings", {}), tables.get("carriers", {})
+        table = named_train(TrainTable(), tables["meshes"], tables["shafts"], bearings, carriers=carriers)
         table = with_materials(table, tables.get("materials", {}), "shafts.{name}")
     else:
         return None
@@ -154,7 +164,20 @@ def gearbox_layout(raw: dict[str, Any], path: str | Path) -> GearboxLayout | Non
         )
         for s in table.shafts
     )
-    return _placed(box, shafts)
+    layout = _placed(box, shafts)
+    for carrier in table.carriers:
+        _check_planets(layout, carrier, {s.name for s in table.shafts if s.carrier == carrier.name})
+    return layout
+
+
+def _check_planets(layout: GearboxLayout, carrier: TrainCarrierTable, planets: set[str]) -> None:
+    """Raise `InputError` for planets of a carrier that overlap, as a train does."""
+    places = {shaft.name: shaft.centre for shaft in layout.shafts}
+    for one, two, common, _ in layout.overlapping():
+        if {one.shaft, two.shaft} <= planets:
+            needed, (x, _, z) = one.tip_radius + two.tip_radius, places[carrier.shaft]
+            arm = math.hypot(one.centre[0] - x, one.centre[2] - z)
+            raise planets_overlap(carrier.name, len(planets), (one.name, two.name), needed, needed - common, arm)
 
 
 def _placed(box: Gearbox, shafts: tuple[PlacedShaft, ...]) -> GearboxLayout:

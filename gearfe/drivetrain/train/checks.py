@@ -693,6 +693,7 @@ def _check_room(train: GearTrain) -> None:
                 if room + other.gear.tip_radius <= ring.gear.tip_radius:
                     continue  # within the ring
             if one.shaft == two.shaft or room < one.gear.tip_radius + two.gear.tip_radius:
+                _check_planets_apart(train, one, two, room)
                 problem = f"overlaps gear {two.name!r} over {1e3 * overlap(one, two):.6g} mm along the axis"
                 raise InputError(f"gear {one.name!r}", None, problem, "move one along its shaft, or let them mesh")
         for shaft in train.shafts:
@@ -710,6 +711,44 @@ def _check_room(train: GearTrain) -> None:
             if one.gear.tip_radius > room:
                 problem = f"its tip cuts {1e3 * (one.gear.tip_radius - room):.4g} mm into shaft {shaft.name!r}"
                 raise InputError(f"gear {one.name!r}", None, problem, "thinner shaft, smaller gear, or a shorter shaft")
+
+
+def _check_planets_apart(train: GearTrain, one: ShaftGear, two: ShaftGear, apart: float) -> None:
+    """Raise `InputError` for gears that overlap and are those of planets of one carrier."""
+    carrier = train.carrier_of(one.shaft)
+    if carrier is None or carrier is not train.carrier_of(two.shaft) or one.shaft == two.shaft:
+        return
+    raise planets_overlap(
+        carrier.name, len(carrier.pins), (one.name, two.name), one.gear.tip_radius + two.gear.tip_radius, apart,
+        shaft_distance(train, one.shaft, carrier.shaft),
+    )  # fmt: skip
+
+
+def planets_overlap(
+    carrier: str, count: int, names: tuple[str, str], needed: float, apart: float, arm: float
+) -> InputError:
+    """Return the error for planets whose tip circles overlap.
+
+    Parameters
+    ----------
+    carrier, count
+        Name of the carrier, and the number of its planets.
+    names
+        Of two gears that overlap.
+    needed, apart, arm
+        Sum of their tip radii, distance of their axes, and that from the axis of the carrier (m).
+    """
+    least = 2.0 * math.asin(min(1.0, 0.5 * needed / arm))
+    problem = (
+        f"gear {names[0]!r} overlaps gear {names[1]!r}: axes {1e3 * apart:.6g} mm apart, tip circles need more than "
+        f"{1e3 * needed:.6g} mm"
+    )
+    most = int(2.0 * math.pi / least * (1.0 - SAME))
+    apart_deg = f"{math.degrees(least) + 5e-4:.3f} deg"
+    cure = (
+        f"place neighbouring planets at least {apart_deg} apart, at most {most} equally spaced, or use smaller planets"
+    )
+    return InputError(f"carriers.{carrier}.planets", count, problem, cure)
 
 
 def _check_shaft_room(train: GearTrain, one: Shaft, two: Shaft) -> None:
