@@ -1,4 +1,4 @@
-"""``gearfe gear JOB.toml``: derived geometry of a gear pair and a drawing of it in mesh."""
+"""``gearfe gear JOB.toml``: geometry of a gear pair by ISO 21771, and a drawing of it in mesh."""
 
 from __future__ import annotations
 
@@ -23,6 +23,53 @@ EXPORTS = ("csv", "dxf", "step", "brep")
 #: The whole job as REXS, beside the forms of each gear.
 REXS = "rexs"
 FILES = tuple(f"{side}.{form}" for side in ("pinion", "wheel") for form in EXPORTS)
+
+#: Symbols of the printed values by ISO 21771 and ISO 6336-1, and what they are where the name leaves it open.
+SYMBOLS = {
+    "gear_ratio": "u = z_2/z_1",
+    "centre_distance_mm": "a_w",
+    "working_pressure_angle_deg": "alpha_wt",
+    "base_pitch_mm": "p_bt",
+    "backlash_mm": "j_wt, circumferential at the working pitch circles",
+    "normal_backlash_mm": "j_bn, along the line of action",
+    "lost_motion_to_contact_deg": "j_bn/(2 r_b2): wheel from centred teeth to contact",
+    "contact_ratio": "eps_alpha, between the tip circles",
+    "contact_ratio_active": "between the starts of the tip rounds",
+    "contact_ratio_effective": "between the starts of the reliefs",
+    "overlap_ratio": "eps_beta",
+    "total_contact_ratio": "eps_gamma",
+    "helix_angle_deg": "beta",
+    "base_helix_angle_deg": "beta_b",
+    "working_helix_angle_deg": "beta_w",
+    "transverse_module_mm": "m_t",
+    "transverse_pressure_angle_deg": "alpha_t",
+    "common_face_width_mm": "b_w",
+    "path_length_mm": "g_alpha",
+    "mesh_cycle_deg": "360 deg/z_1",
+    "teeth": "z",
+    "module_mm": "m_n",
+    "pitch_diameter_mm": "d, reference diameter",
+    "working_pitch_diameter_mm": "d_w",
+    "base_diameter_mm": "d_b",
+    "tip_diameter_mm": "d_a",
+    "root_diameter_mm": "d_f",
+    "form_diameter_mm": "d_Ff",
+    "active_tip_diameter_mm": "d_Na",
+    "active_root_diameter_mm": "d_Nf",
+    "tip_thickness_mm": "s_a",
+    "profile_shift": "x",
+    "span_teeth": "k",
+    "span_mm": "W_k",
+    "ball_diameter_mm": "D_M",
+    "over_balls_mm": "M_dK",
+    "lead_mm": "p_z",
+    "virtual_teeth": "z_n",
+    "pinion_specific_sliding": "zeta_1",
+    "wheel_specific_sliding": "zeta_2",
+    "c_prime_N_per_mm_um": "c'",
+    "c_gamma_N_per_mm_um": "c_gamma",
+    "c_gamma_times_width_N_per_m": "c_gamma b",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -283,10 +330,10 @@ def _notes(geometry: dict[str, Any]) -> str:
         "centre distance": f"{geometry['centre_distance_mm']:.6g} mm",
         "working pressure angle": f"{geometry['working_pressure_angle_deg']:.5g}°",
         "contact ratio": f"{geometry['contact_ratio']:.4g}",
-        "  less tip rounds": f"{geometry['contact_ratio_active']:.4g}",
-        "  less relief": f"{geometry['contact_ratio_effective']:.4g}",
+        "  between tip rounds": f"{geometry['contact_ratio_active']:.4g}",
+        "  between reliefs": f"{geometry['contact_ratio_effective']:.4g}",
         **helix,
-        "backlash": f"{geometry['backlash_mm']:.4g} mm",
+        "backlash j_wt": f"{geometry['backlash_mm']:.4g} mm",
     }
     return "\n".join(f"{name:<23}{value}" for name, value in rows.items())
 
@@ -298,5 +345,5 @@ def _show(values: dict[str, Any], indent: str = "") -> None:
             _show(value, indent + "  ")
             continue
         several = value if isinstance(value, (list, tuple)) else [value]
-        texts = [f"{one:.9g}" if isinstance(one, float) else str(one) for one in several]
-        print(f"{indent}{name:<{34 - len(indent)}} {', '.join(texts)}")
+        texts = [f"{one:.7g}" if isinstance(one, float) else str(one) for one in several]
+        print(f"{indent}{name:<{34 - len(indent)}} {', '.join(texts):<14} {SYMBOLS.get(name, '')}".rstrip())

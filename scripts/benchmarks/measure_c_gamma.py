@@ -3,7 +3,7 @@
 
 The flexibility 1/k of the shipped pair (mean over the mesh cycle) is parted into
 
-- *twist of the bodies* between rigid bore and root circle, by the closed form of `body_twist`;
+- *torsion of the gear bodies* between rigid bore and root circle, by the closed form of `body_twist`;
 - *bodies near the teeth*: what the rest falls by from the given bores to bores as large as the profile allows;
 - *contact*: the approach of two tooth halves by Weber and Banaschek (Schriftenreihe Antriebstechnik 11, 1953), for half
   the tooth thickness at the pitch circle, with the mean number of tooth pairs;
@@ -77,7 +77,7 @@ def tables(job: StiffnessJob) -> list[str]:
     near = (whole - twist) - (flexibility(thin, torque) - bodies_twist(thin))
     contact = contact_flexibility(job, torque) / job.pair.contact_ratio
     parts = {
-        "twist of the bodies between bore and root": twist,
+        "torsion of the gear bodies between bore and root": twist,
         f"bodies near the teeth (against rims of {RIM_MODULES:g} modules)": near,
         "contact": contact,
         "teeth": whole - twist - near - contact,
@@ -88,12 +88,12 @@ def tables(job: StiffnessJob) -> list[str]:
     lines = ["| part of the flexibility | nm/N | share |", "|---|---|---|"]
     lines += [f"| {name} | {1e9 * value:.2f} | {100.0 * value / whole:.0f} % |" for name, value in parts.items()]
     lines += [
-        f"| whole | {1e9 * whole:.2f} | 100 % |",
+        f"| total | {1e9 * whole:.2f} | 100 % |",
         f"| 1/(c_γ b) of ISO 6336-1 | {1e9 / level:.2f} | {100.0 / (level * whole):.0f} % |",
     ]
     lines += [
         "",
-        "| torque (N m) | line load (N/mm) | mean k (N/µm) | k/(c_γ b) | without the twist of the bodies |",
+        "| torque (N m) | line load (N/mm) | mean k (N/µm) | k/(c_γ b) | without the torsion of the bodies |",
         "|---|---|---|---|---|",
     ]
     for value in TORQUES:

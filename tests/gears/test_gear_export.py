@@ -113,12 +113,15 @@ def test_the_command_exports_both_gears(tmp_path, capfd):
     assert set(table["piece"]) >= {"involute_left", "tip_right", "trochoid_left"}
     assert main([*line, "iges"]) == 2
     assert "csv, dxf, step, brep" in capfd.readouterr().err
-    # a later export leaves no old solid of other gears
-    assert main([*line, "csv"]) == 0
-    assert not (tmp_path / "out" / "wheel.step").exists()
-    # one gear by its file's name, without a picture
-    assert main([*line, "pinion.csv", "--no-pictures"]) == 0
+    # a later run keeps the solids of the same gears
+    assert main([*line[:-1], "--no-pictures"]) == 0
+    assert (tmp_path / "out" / "wheel.step").exists()
+    # and leaves none of other gears; one gear by its file's name, without a picture
+    capfd.readouterr()
+    other = ["--no-pictures", "--set", "pair.wheel.bore_diameter_mm=12"]
+    assert main([*line, "pinion.csv", *other]) == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"gear_pair.json", "pinion.csv"}
+    assert "pinion.step, wheel.csv, wheel.step" in capfd.readouterr().out.splitlines()[-1]
     assert main([*line, "pinon.csv"]) == 2
     assert "did you mean 'pinion.csv'" in capfd.readouterr().err
 

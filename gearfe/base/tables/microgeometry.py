@@ -58,38 +58,44 @@ class FlankTable:
         for key in ("crowning", "slope")
     } | {"points": renamed("points_mm_um")}
 
-    tip_relief_um: float | None = quantity(None, doc="tip relief (um), at the tip circle", low=0.0)
-    tip_relief_length_mm: float | None = quantity(None, doc="roll length of it from the tip circle (mm)", above=0.0)
+    tip_relief_um: float | None = quantity(None, doc="tip relief C_alpha a (um), at the tip circle", low=0.0)
+    tip_relief_length_mm: float | None = quantity(
+        None, doc="its roll length L_C alpha a from the tip circle (mm)", above=0.0
+    )
     tip_relief_start_mm: float | None = quantity(None, doc="or the roll length where it starts (mm)", above=0.0)
-    tip_relief_start_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
+    tip_relief_start_diameter_mm: float | None = quantity(None, doc="or the diameter d_C alpha a there (mm)", above=0.0)
     tip_relief_end_mm: float | None = quantity(
         None, doc="roll length where it has its amount (mm), if not the tip circle", above=0.0
     )
     tip_relief_end_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
     tip_relief_shape: str = quantity("linear", doc="linear, arc or parabolic", choices=SHAPES)
-    root_relief_um: float | None = quantity(None, doc="root relief (um), at the form circle", low=0.0)
-    root_relief_length_mm: float | None = quantity(None, doc="roll length of it from the form circle (mm)", above=0.0)
+    root_relief_um: float | None = quantity(None, doc="root relief C_alpha f (um), at the form circle", low=0.0)
+    root_relief_length_mm: float | None = quantity(
+        None, doc="its roll length L_C alpha f from the form circle (mm)", above=0.0
+    )
     root_relief_start_mm: float | None = quantity(None, doc="or the roll length where it starts (mm)", above=0.0)
-    root_relief_start_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
+    root_relief_start_diameter_mm: float | None = quantity(
+        None, doc="or the diameter d_C alpha f there (mm)", above=0.0
+    )
     root_relief_end_mm: float | None = quantity(
         None, doc="roll length where it has its amount (mm), if not the form circle", low=0.0
     )
     root_relief_end_diameter_mm: float | None = quantity(None, doc="or the diameter there (mm)", above=0.0)
     root_relief_shape: str = quantity("linear", doc="linear, arc or parabolic", choices=SHAPES)
-    profile_crowning_um: float = quantity(0.0, doc="profile crowning (um), the ends lie that much back")
+    profile_crowning_um: float = quantity(0.0, doc="profile crowning C_alpha (um), removed at both ends of the profile")
     profile_slope_um: float = quantity(
-        0.0, doc="profile slope (um), from form to tip circle, > 0: more material at the tip"
+        0.0, doc="profile slope C_H alpha (um), from form to tip circle, > 0: more material at the tip"
     )
-    helix_crowning_um: float = quantity(0.0, doc="helix crowning C_beta (um), the ends of the width lie that much back")
+    helix_crowning_um: float = quantity(0.0, doc="helix crowning C_beta (um), removed at both ends of the width")
     helix_slope_um: float = quantity(
-        0.0, doc="helix slope f_Hbeta (um), over the face width, > 0: more material at the larger y"
+        0.0, doc="helix slope C_H beta (um) over the face width, > 0: more material at the larger y"
     )
     bias_um: float = quantity(
-        0.0, doc="twist of the flank (um): helix slope at the tip circle less that at the form circle"
+        0.0, doc="flank twist S (um): helix slope at the tip circle minus that at the form circle"
     )
-    end_relief_low_um: float | None = quantity(None, doc="end relief (um), at the end of smaller y", low=0.0)
+    end_relief_low_um: float | None = quantity(None, doc="end relief C_beta I (um), at the end of smaller y", low=0.0)
     end_relief_low_length_mm: float | None = quantity(None, doc="length of it along the width (mm)", above=0.0)
-    end_relief_high_um: float | None = quantity(None, doc="end relief (um), at the end of larger y", low=0.0)
+    end_relief_high_um: float | None = quantity(None, doc="end relief C_beta II (um), at the end of larger y", low=0.0)
     end_relief_high_length_mm: float | None = quantity(None, doc="length of it along the width (mm)", above=0.0)
     end_relief_shape: str = quantity("linear", doc="linear or parabolic, of both ends", choices=("linear", "parabolic"))
     triangular_reliefs: tuple[TriangularReliefTable, ...] = quantity((), doc="reliefs of corners")
@@ -105,8 +111,8 @@ class FlankTable:
         doc="file with a grid over the flank: roll_length_mm (or diameter_mm), y_mm from the middle of the width, "
         "deviation_um, and tooth where teeth differ",
     )
-    pitch_um: tuple[float, ...] = quantity((), doc="index deviations of all teeth (um), along the reference circle")
-    single_pitch_um: tuple[float, ...] = quantity((), doc="or the single pitch deviations (um), which add up to 0")
+    pitch_um: tuple[float, ...] = quantity((), doc="index deviations F_i of all teeth (um), along the reference circle")
+    single_pitch_um: tuple[float, ...] = quantity((), doc="or the single pitch deviations f_pi (um), which add up to 0")
     pitch_csv: str | None = quantity(None, doc="or a file with the columns tooth and pitch_um")
     run_out_um: float = quantity(
         0.0, doc="amplitude of a sine of one turn (um) of the index deviations, those of an eccentric gear", low=0.0
