@@ -208,9 +208,9 @@ def campbell_figure(found: Campbell, title: str) -> Any:
         []
         if not lines
         else [
-            Line2D([], [], color=ORDER, linewidth=0.8, label="mesh order"),
+            Line2D([], [], color=ORDER, linewidth=0.8, label="mesh order (2×m1: twice mesh 1)"),
             Line2D([], [], color=ORDER, linewidth=0.8, dashes=(4, 2), label="shaft order"),
-            Line2D([], [], linestyle="", marker="o", label="critical speed that its order reaches", **EXCITED),
+            Line2D([], [], linestyle="", marker="o", label="critical speed, excited (dots: not excited)", **EXCITED),
         ]
     )
     figure.legend(handles=handles, loc="outside lower left", ncols=4, fontsize=8, frameon=False)
