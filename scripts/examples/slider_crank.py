@@ -34,12 +34,12 @@ def main() -> None:
     system = slider_crank(pi / 4)
     speed = Forced("slider speed", -4.0, lambda q: 0.0, slider_speed)  # noqa: ARG005
     start = consistent_start(system, velocities=[speed])
-    made = integrate(system, np.linspace(0.0, 10.0, 2001), tolerance=1e-10, start=start)
-    passages = made.statistics["change_points"]
-    print(f"{made.message} in {made.statistics['steps']} steps")
+    run = integrate(system, np.linspace(0.0, 10.0, 2001), tolerance=1e-10, start=start)
+    passages = run.statistics["change_points"]
+    print(f"{run.message} in {run.statistics['steps']} steps")
     print(f"{len(passages)} change points, the first at {passages[0]:.6f} s")
-    print(f"crank at the end: {made.q[-1, 2]:.12f} rad, {made.v[-1, 2]:.12f} rad/s")
-    energy = sum(system.energy(made.q, made.v))
+    print(f"crank at the end: {run.q[-1, 2]:.12f} rad, {run.v[-1, 2]:.12f} rad/s")
+    energy = sum(system.energy(run.q, run.v))
     print(f"energy {energy[0]:.12f} J, kept within {np.ptp(energy):.1e} J")
 
 

@@ -155,8 +155,8 @@ class ValueTableTable:
 class JointTable:
     """[joints.NAME]; which keys belong to which type is in `JOINTS`."""
 
-    type: str = quantity(choices=tuple(JOINTS), doc='type of joint; with at_m left out: "hinge"')
-    body: str = quantity(doc="body that the joint holds, or give at_m and links")
+    type: str = quantity(choices=tuple(JOINTS), doc='type of joint; required without at_m, with it "hinge" by default')
+    body: str = quantity(doc="body that the joint holds; required without at_m")
     at_m: Pair | None = quantity(
         None, doc="position at the start, [x, y] in m, instead of body, to and points: hinge, slot or prismatic"
     )
@@ -191,7 +191,7 @@ class JointTable:
     motion_rad: Function | None = quantity(
         None, doc="motion of an angle (rad): a number, a function of time, or an expression of it"
     )
-    motion_rad_per_s: Function | None = quantity(None, doc="motion of a rate (rad/s), likewise")
+    motion_rad_per_s: Function | None = quantity(None, doc="motion of a rate (rad/s), likewise; motion_rpm in 1/min")
     motion_m: Function | None = quantity(None, doc="motion of x or y (m), likewise")
 
     #: Removed keys, see `gearfe.base.config.build`.
@@ -233,7 +233,9 @@ class ForceTable:
     coordinate: str | None = quantity(None, choices=("angle", "x", "y"), doc="coordinate that the spring acts on")
     reference_m: float | None = quantity(None, doc="x or y at which the spring is free, in m (default: 0)")
     reference_rad: float | None = quantity(None, doc="angle at which the spring is free, in rad (default: 0)")
-    rate_rad_per_s: float | None = quantity(None, doc="rate of a turning frame about the ground's origin in rad/s")
+    rate_rad_per_s: float | None = quantity(
+        None, doc="rate of a rotating frame about the ground's origin in rad/s; rate_rpm in 1/min"
+    )
     x_N: Function | None = quantity(None, doc="force in x in N: a number, a function of time, or an expression")
     y_N: Function | None = quantity(None, doc="force in y in N: a number, a function of time, or an expression")
     moment_N_m: Function | None = quantity(None, doc="moment in N m: a number, a function of time, or an expression")

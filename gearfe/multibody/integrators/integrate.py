@@ -72,14 +72,13 @@ def integrate(
     times : array_like
         Times at which results are wanted (s), rising or falling; the first is the start.
     method : {"auto", "taylor", "implicit", "symplectic"}
-        "taylor": Taylor series of the index-3 equations, where rows and forces can be written on a tape (planar
-        linkages, loads by expression, frames in vectors). Gear trains, whose constraints are linear and whose only
-        force has a law with a series, are integrated in modal coordinates. "implicit": collocation at 7 points of Radau
-        IIA, for stiff systems, flexible links and elements without a series. "auto" takes one of these two by a rule
-        (`chosen_method`). "symplectic": collocation at Gauss's points in steps of one length, which keeps the energy
-        where nothing takes any.
+        "taylor": Taylor series, for systems whose equations are available as such (all mechanism files with rigid
+        links). Gear trains, whose constraints are linear and whose only force has a law with a series, are integrated
+        in modal coordinates. "implicit": collocation at 7 points of Radau IIA, for stiff systems, flexible links and
+        forces written in plain Python. "auto" takes one of these two by a rule (`chosen_method`). "symplectic":
+        collocation at Gauss's points in steps of equal length, which conserves energy if nothing dissipates it.
     tolerance : float
-        Accuracy asked for, relative to 1 rad and to the size of the mechanism; 1e-13 to 0.1.
+        Allowed error of a step, of angles in rad and of positions relative to the size of the mechanism; 1e-13 to 0.1.
     start : Start, optional
         From `consistent_start`. By default that of the mechanism file with its table [start], or for a system built in
         Python the start poses and velocities of the bodies, made consistent (and kept).

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 class StateFunction(ABC):
     """A load f(t, q, v) of the coordinates and velocities of a whole linkage.
 
-    Values, slopes and corners follow from its registers on a tape. A load that cannot be written on a tape is a
-    `LocalForce`, or the ``force`` of another element (`multibody.core.contract`). Where it has no value, a step is made
-    shorter and the run ends at last; `value` is NaN there, and `problem` says why.
+    The law is written with the operations of a `Tape`, from which values and derivatives are computed. A load that
+    cannot be written so is a `LocalForce`, or the ``force`` of another element (`multibody.core.contract`). Where it
+    has no value, steps become shorter until the run ends; `value` is NaN there, and `problem` gives the reason.
     """
 
     @abstractmethod
