@@ -76,7 +76,7 @@ ONE_BY_ONE = 1e-3
 STEPS, CLOSED = 300, 1e-12
 #: Change of the moments in parts of their sum in the last step, and in that for points that may be placed anew. The
 #: iteration converges quadratically: what is left after it is about the square.
-SETTLED, ROUGH = 1e-7, 3e-3
+SETTLED, ROUGH = 1e-9, 3e-3
 #: A, k and q of free ends at Poisson's ratios (-), within 2 % of the resolved block.
 AT_END = {0.2: (2.79, 0.264, 2.03), 0.3: (2.35, 0.301, 1.60), 0.4: (2.13, 0.329, 1.43)}
 #: Least roll length (modules) for the curvature that the half widths at free ends follow from.
