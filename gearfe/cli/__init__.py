@@ -9,7 +9,7 @@ only when that command runs or prints its help.
 COMMANDS: dict[str, tuple[str, str]] = {
     "stiffness": (
         "mesh stiffness of a gear pair over its rotation: table, picture, summary, fields",
-        "gearfe stiffness pair.toml --torque-Nm 100 --fields 5 --set pair.pinion.teeth=21",
+        "gearfe stiffness pair.toml --torque-Nm 100 --fields 5 --set pair.pinion.bore_diameter_mm=30",
     ),
     "loadmap": (
         "stiffness, transmission error, orders, load share, pressure, root stress over angle and torque; with reliefs, "

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 Table = TypeVar("Table", bound="DataclassInstance")
 #: What a help calls the value of an option.
 METAVARS = {float: "X", int: "N", str: "NAME"}
+#: Shortest stage that is printed (s).
+SHORTEST_S = 0.1
 #: What a help calls a job file.
 METAVARS_OF_FILES = {"job": "JOB.toml", "study": "STUDY.toml"}
 #: Formats of ``--format`` beside CSV; their writers are in `gearfe.output.exchange.tables`.
@@ -461,6 +463,7 @@ def print_results(
         print(line)
     print(f"written to {folder}: " + ", ".join(names))
     if seconds:
-        print("seconds: " + ", ".join(f"{name} {value:.2f}" for name, value in seconds.items()))
+        long = {name: value for name, value in seconds.items() if value >= SHORTEST_S or name == "total"}
+        print("seconds: " + ", ".join(f"{name} {value:.2f}" for name, value in long.items()))
     for sentence in warnings:
         print(f"gearfe: warning: {sentence}", file=sys.stderr)

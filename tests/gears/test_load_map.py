@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from gearfe import LoadMap, sweep_loads, sweep_stiffness
+from gearfe.base.config import read_toml
 from gearfe.base.errors import InputError
-from gearfe.base.tables.jobs import load_job
+from gearfe.base.tables.jobs import load_job, whole_gearbox, with_loads
 from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.job import read_train_job
 from gearfe.drivetrain.gearbox.mesh_stiffness import train_curves
@@ -217,6 +218,18 @@ def test_mistakes_are_named(tmp_path, capsys, options, said):
     assert main(["loadmap", str(JOB), "--out", str(tmp_path / "out"), *options]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_torque_of_stiffness_is_that_of_a_map_without_one(tmp_path):
+    text = JOB.read_text().partition("\n[stiffness]\n")[0] + "\n[stiffness]\ntorque_pinion_Nm = 20.0\n"
+    for more, torques in (
+        ("", [30.0]),
+        ("\n[loadmap]\ntorque_start_Nm = 5.0\ntorque_stop_Nm = 10.0\ntorque_count = 2\n", [5.0, 10.0]),
+    ):
+        (tmp_path / "job.toml").write_text(text + more)
+        raw = read_toml(tmp_path / "job.toml")
+        (mesh,) = with_loads(whole_gearbox(raw, tmp_path / "job.toml"), raw).meshes.values()
+        assert mesh.loads.torques() == pytest.approx(torques)
 
 
 def test_torques_must_be_given(tmp_path, capsys):

@@ -266,16 +266,20 @@ def _gearbox(tables: Mapping[str, Any]) -> Gearbox:
 
 
 def with_loads(box: Gearbox, raw: Mapping[str, Any], variant: str | None = None) -> Gearbox:
-    """Return the gearbox with [stiffness] and [loadmap] in each mesh, each with the keys that the mesh has instead."""
-    meshes = {
-        name: replace(
-            mesh,
-            stiffness=stiffness_of(raw, variant, name).at_wheel(mesh.ratio),
-            loads=_loads_of(raw, name).at_wheel(mesh.ratio),
-        )
-        for name, mesh in box.meshes.items()
-    }
-    return replace(box, meshes=meshes)
+    """Return the gearbox with [stiffness] and [loadmap] in each mesh, each with the keys that the mesh has instead.
+
+    Without torques in [loadmap] the torque of [stiffness] is taken.
+    """
+
+    def loaded(name: str, mesh: NamedMesh) -> NamedMesh:
+        stiffness = stiffness_of(raw, variant, name).at_wheel(mesh.ratio)
+        loads = _loads_of(raw, name).at_wheel(mesh.ratio)
+        given = (loads.torques_Nm, loads.torque_start_Nm, loads.torque_stop_Nm)
+        if stiffness.torque_Nm is not None and given == (None, None, None):
+            loads = replace(loads, torques_Nm=(stiffness.torque_Nm,))
+        return replace(mesh, stiffness=stiffness, loads=loads)
+
+    return replace(box, meshes={name: loaded(name, mesh) for name, mesh in box.meshes.items()})
 
 
 def _loads_of(raw: Mapping[str, Any], mesh: str) -> LoadMapTable:
