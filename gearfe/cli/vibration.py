@@ -262,6 +262,7 @@ def _spectrum_lines(response: TrainResponse, train: GearTrain, written: Written,
     from ..base.errors import given
     from ..drivetrain.gearbox.report import attachment_to_draw
     from ..drivetrain.vibration.errors import with_error
+    from ..drivetrain.vibration.report import line_texts
 
     made, summary = given(written.spectra, "spectra"), written.summary
     lines = [
@@ -270,8 +271,7 @@ def _spectrum_lines(response: TrainResponse, train: GearTrain, written: Written,
     ]
     attachment = attachment_to_draw(response.attachment_names, choice.attachment, train)
     found = summary["dominant_lines"][f"attachment_{attachment}_acceleration_m_per_s2"][:4]
-    texts = [f"{x['frequency_Hz']:.0f} Hz {x['amplitude']:.3g}{with_error(x.get('error_estimate'))}" for x in found]
-    lines += [f"normal acceleration at attachment {attachment} (m/s2): " + ", ".join(texts)] if texts else []
+    lines += [f"normal acceleration at attachment {attachment} (m/s2): {line_texts(found)}"] if found else []
     if made.power is not None:
         part = summary.get("headline_errors", {}).get("radiated_power_mean_W")
         decibels = None if part is None else 10.0 * math.log10(1.0 + float(part) / max(made.power.mean, 1e-300))

@@ -172,14 +172,14 @@ def draw_power(
     width = 0.72 * float(np.median(np.diff(frequency)))
     bars(axes, frequency[shown], loud[shown], width, bottom, BLUE)
     axes.set_ylim(bottom, top + 0.18 * (top - bottom) + 1.0)
-    axes.set_ylabel("radiated power level  (dB re 1 pW)")
+    axes.set_ylabel("radiated power level  (dB re 1e-12 W)")
     _draw_octaves(figure.add_axes((0.655, 0.175, 0.335, 0.615)), octaves)
     save(figure, path)
 
 
 def _draw_octaves(axes: Any, octaves: ThirdOctaves) -> None:
     """Levels in third octaves, plain and A-weighted; bands without a line are empty."""
-    panel(axes, "level  (dB re 1 pW)", "", "")
+    panel(axes, "level  (dB re 1e-12 W)", "", "")
     plain, weighted = decibels(octaves.power), decibels(octaves.weighted)
     top = float(np.nanmax(np.append(plain, -300.0)))
     bottom, places = top - 60.0, np.arange(len(plain))

@@ -214,7 +214,7 @@ def _vibration_numbers(run: Results) -> list[Number]:
         factor = DECIBELS / mean
         found.append(
             Number(
-                "mean radiated power (re 1 pW)",
+                "mean radiated power (re 1e-12 W)",
                 "dB",
                 finite(power.get("mean_level_dB")),
                 {s: factor * x for s, x in sizes.items()},

@@ -17,7 +17,7 @@ from gearfe.drivetrain.train import GearTrain, build_train, simulate
 from gearfe.drivetrain.train.model import TrainModel
 from gearfe.drivetrain.vibration.errors import FORCES, PEAKS, STARTS, Run, with_errors
 from gearfe.drivetrain.vibration.follow import follow
-from gearfe.drivetrain.vibration.report import train_summary
+from gearfe.drivetrain.vibration.report import line_texts, train_summary
 from gearfe.drivetrain.vibration.spectra import TrainRecord
 from gearfe.gears.gearmesh.curve import StiffnessCurve
 from gearfe.multibody import TimeFunction, constant
@@ -219,3 +219,16 @@ def test_command_tells_one_error_for_each_number(tmp_path: Path, capsys: pytest.
     assert main(["vibration", str(job), "--out", str(out), "--no-pictures", "--no-estimate"]) == 0
     assert " +- " not in capsys.readouterr().out
     assert "headline_errors" not in json.loads((out / "summary.json").read_text())
+
+
+def test_printed_lines_have_a_question_mark_if_their_error_exceeds_half_of_the_value() -> None:
+    sure = {"frequency_Hz": 1857.1, "amplitude": 8.45, "near": "mesh 1 x 1", "error_estimate": 4.2}
+    doubtful = {"frequency_Hz": 5714.3, "amplitude": 6.21, "near": "mesh 1 x 3", "error_estimate": 3.9}
+    unknown = {"frequency_Hz": 571.4, "amplitude": 11.4, "near": None, "error_estimate": math.nan}
+    without = {"frequency_Hz": 571.4, "amplitude": 11.4, "near": None}
+    assert line_texts([sure, unknown]) == "1857 Hz 8.45 +- 4.2 (mesh 1 x 1), 571 Hz 11.4 +- ?"
+    assert line_texts([without]) == "571 Hz 11.4"
+    remark = "; ?: error estimate above half of the value"
+    assert line_texts([doubtful, sure]) == (
+        "5714 Hz 6.21? +- 3.9 (mesh 1 x 3), 1857 Hz 8.45 +- 4.2 (mesh 1 x 1)" + remark
+    )

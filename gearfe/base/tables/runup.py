@@ -23,7 +23,7 @@ class RunUpTable:
     band_Hz: float | None = quantity(
         None, above=0.0, doc="highest frequency of interest (Hz); left out: that of [housing.reduction], or 5000"
     )
-    multiples: int = quantity(5, low=1, high=50, doc="multiples of each mesh frequency that are cut out as orders")
+    multiples: int = quantity(5, low=1, high=50, doc="harmonics of each mesh frequency in orders.csv")
     shaft_multiples: int = quantity(
         2,
         low=0,

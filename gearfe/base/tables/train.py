@@ -330,7 +330,7 @@ class TrainMeshTable:
     mesh_table: str | None = quantity(
         None,
         doc="CSV file next to the job file: stiffness and static transmission error over a pitch; columns: "
-        "docs/vibration.md",
+        "docs/train.md",
     )
     stiffness_N_per_m: float | None = quantity(
         None, above=0.0, doc="constant stiffness (N/m), dF/d approach in the transverse section"

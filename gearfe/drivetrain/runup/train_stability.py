@@ -50,8 +50,8 @@ def why_not(model: TrainModel) -> str:
         (not len(model.modal.eigenvalues), "nothing can vibrate: rigid meshes in a rigid housing follow the drive"),
         (
             any(not (line.rigid or line.pulls) for line in model.meshes),
-            "teeth may separate, so a transient does not tell which periodic motion it approaches: `gearfe runup` "
-            "finds these motions and the multipliers of each",
+            "not computed, because teeth may separate and several steady motions may exist; `gearfe runup` computes "
+            "each with its multipliers",
         ),
     )
     return next((note for there, note in reasons if there), "")

@@ -18,6 +18,7 @@ from ..gearbox.stability import Stability
 from ..train.gear_train import GearTrain
 from ..train.mesh_element import LEAST_REFERENCE, PHASES
 from ..train.response import TrainResponse
+from .errors import with_error
 from .follow import Followed
 from .spectra import TrainSpectra
 
@@ -27,6 +28,8 @@ NAMED = 5
 SIDES = 6
 #: Lines smaller than this part of the largest one are round-off.
 LEAST = 1e-6
+#: Error estimate over amplitude above which a printed line has a question mark: it may be half or twice as high.
+UNCERTAIN = 0.5
 
 
 def fundamentals(response: TrainResponse) -> dict[str, float]:
@@ -67,6 +70,24 @@ def dominant(spectra: TrainSpectra, response: TrainResponse, name: str) -> list[
             }
         )
     return found
+
+
+def line_texts(lines: Sequence[Mapping[str, Any]]) -> str:
+    """Return the printed form of dominant lines: frequency, amplitude, error estimate, and harmonic or sideband.
+
+    Parameters
+    ----------
+    lines : sequence of mappings
+        Dominant lines of the summary. One whose error estimate exceeds `UNCERTAIN` of its amplitude has a question mark.
+    """
+    texts, doubted = [], False
+    for line in lines:
+        error, amplitude, near = line.get("error_estimate"), line["amplitude"], line.get("near")
+        doubtful = error is not None and np.isfinite(error) and error > UNCERTAIN * amplitude
+        mark, order = "?" if doubtful else "", f" ({near})" if near else ""
+        texts.append(f"{line['frequency_Hz']:.0f} Hz {amplitude:.3g}{mark}{with_error(error)}{order}")
+        doubted = doubted or doubtful
+    return ", ".join(texts) + ("; ?: error estimate above half of the value" if doubted else "")
 
 
 def sideband(frequency: float, lines: Sequence[OrderLine], response: TrainResponse, resolution: float) -> str | None:
