@@ -31,7 +31,7 @@ def cut(rows: Rows, order: float, column: str) -> tuple[np.ndarray, np.ndarray]:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     """Files of the page's command."""
-    page = DOCS / "vibration.md"
+    page = DOCS / "spectra.md"
     (line,) = [line for line in command_lines(page) if "2000*time" in line]
     out = tmp_path_factory.mktemp("run_up")
     _, *words = shlex.split(line)

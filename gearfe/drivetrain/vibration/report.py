@@ -28,7 +28,7 @@ NAMED = 5
 SIDES = 6
 #: Lines smaller than this part of the largest one are round-off.
 LEAST = 1e-6
-#: Error estimate over amplitude above which a printed line has a question mark: it may be half or twice as high.
+#: Error estimate over amplitude above which a printed line has a question mark.
 UNCERTAIN = 0.5
 
 
@@ -78,7 +78,8 @@ def line_texts(lines: Sequence[Mapping[str, Any]]) -> str:
     Parameters
     ----------
     lines : sequence of mappings
-        Dominant lines of the summary. One whose error estimate exceeds `UNCERTAIN` of its amplitude has a question mark.
+        Dominant lines of the summary. A line whose error estimate exceeds `UNCERTAIN` times its amplitude gets a
+        question mark.
     """
     texts, doubted = [], False
     for line in lines:
