@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..config import check_size, type_hints
-from ..errors import InputError
+from ..errors import InputError, unknown_name
 from ..other_units import partner
 
 #: Name of the table.
@@ -85,14 +85,18 @@ def _words(part: Any) -> Iterator[str]:
 
 
 def _value(text: str, label: str, known: Mapping[str, float]) -> float:
+    problem = "must be a number, or an expression of numbers and parameters: "
+    if text.isidentifier() and text not in {*known, "pi"}:  # a mere word, which needs no NumPy to be refused
+        unknown = unknown_name(label, text, [*known, "pi"])
+        raise InputError(label, text, problem + unknown.problem, unknown.cure)
+
     from ..expressions import Names, compute, parse
 
     names = Names(what="a number", constants=known)
     try:
         value = float(compute(parse(text, label, names), {}))
     except InputError as error:
-        problem = f"must be a number, or an expression of numbers and parameters: {error.problem}"
-        raise InputError(label, text, problem, error.cure) from None
+        raise InputError(label, text, problem + error.problem, error.cure) from None
     if not math.isfinite(value):
         raise InputError(label, text, "has no finite value", "correct it, or the parameters that it uses")
     return value
