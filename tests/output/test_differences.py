@@ -126,7 +126,7 @@ def test_the_command_writes_table_summary_and_picture(tmp_path: Path, capsys: py
     assert main(["compare", *map(str, paths), "--out", str(out)]) == 0
     said = capsys.readouterr().out
     assert "mean mesh stiffness: " in said
-    assert "y: +" in said
+    assert "run y minus run x: +" in said
     assert sorted(path.name for path in out.iterdir()) == ["compare.csv", "compare.json", "compare.png"]
     with (out / "compare.csv").open(encoding="utf-8", newline="") as stream:
         table = list(csv.DictReader(stream))
@@ -140,7 +140,7 @@ def test_the_command_writes_table_summary_and_picture(tmp_path: Path, capsys: py
     copy = tmp_path / "copy of x.csv"
     copy.write_bytes((paths[0] / "stiffness.csv").read_bytes())
     assert main(["compare", str(paths[1]), str(copy), "--out", str(out), "--names", "new", "old", "--no-pictures"]) == 0
-    assert "old: -" in capsys.readouterr().out
+    assert "run old minus run new: -" in capsys.readouterr().out
     assert not (out / "compare.png").exists()
 
 

@@ -35,6 +35,7 @@ RUN = (
     "face_width.md",
     "fields.md",
     "housing.md",
+    "housing_mesh.md",
     "howto.md",
     "loadmap.md",
 )

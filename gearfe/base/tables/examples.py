@@ -431,7 +431,7 @@ def job_file(kind: str) -> str:
 def _commented() -> str:
     """Further tables behind ##: a single # stands before keys of the tables above."""
     lines = [f"## {line}".rstrip() for line in EXTENSION.splitlines()]
-    head = "# Optional tables: remove the ## of those that you need (docs/shafts.md, docs/bearings.md)."
+    head = "# Optional tables: remove the ## of those that you need (docs/shafts.md, docs/bearings.md, docs/drives.md)."
     return "\n".join(["", head, *lines, ""])
 
 

@@ -177,7 +177,7 @@ def read_modes(path: str | Path) -> TestModes:
     elif suffix == ".npz":
         modes = _of_body(ModalBody.load(path))
     else:
-        raise InputError("--compare", str(path), "must end in .csv, .uff, .unv or .npz", "see docs/housing.md")
+        raise InputError("--compare", str(path), "must end in .csv, .uff, .unv or .npz", "see docs/modal_test.md")
     return _checked(modes, path)
 
 
