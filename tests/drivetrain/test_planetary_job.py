@@ -20,6 +20,7 @@ from gearfe.cli.main import main
 from gearfe.drivetrain.gearbox.job import job_train, train_job
 from gearfe.drivetrain.gearbox.stage_report import stage_entries
 from gearfe.drivetrain.train import GearTrain, build_train
+from gearfe.drivetrain.train.checks import planets_overlap
 from gearfe.drivetrain.vibration.report import sideband
 from tests.campaigns.toml_text import toml_text
 from tests.makers.files import job_file
@@ -152,8 +153,22 @@ def test_what_is_wrong_with_a_stage_is_named(changes: dict[str, Any], text: str)
 def test_planets_that_collide_are_named() -> None:
     """At 60 deg the tips of two planets of 22 teeth overlap: 78 mm < 2 * 48 mm."""
     raw = tables(**at_angles([0.0, 60.0]), carriers__arm__pin_tangential_errors_um=None)
-    with pytest.raises(InputError, match=r"carriers\.arm\.planets = 2: gear 'planet_1' overlaps gear 'planet_2'.*75\."):
+    text = r"^carriers\.arm: has 2 planets, and gear 'planet_1' overlaps gear 'planet_2'.*at least 75\."
+    with pytest.raises(InputError, match=text):
         build_train(made(raw))
+
+
+def test_angles_that_teeth_do_not_allow_are_named_by_their_key() -> None:
+    """The file has planet_angles_deg, not planets."""
+    raw = tables(**at_angles([0.0, 121.0, 240.0]))
+    with pytest.raises(InputError, match=r"^carriers\.arm\.planet_angles_deg: planet 2 does not mesh with gears"):
+        build_train(made(raw))
+
+
+def test_no_angle_is_proposed_for_planets_larger_than_their_carrier() -> None:
+    """Two planets opposite each other are 2 r_c apart at most."""
+    assert "deg" not in str(planets_overlap("arm", 2, ("a", "b"), needed=0.21, apart=0.2, arm=0.1))
+    assert "at least 60.000" in str(planets_overlap("arm", 7, ("a", "b"), needed=0.1 - 2e-9, apart=0.09, arm=0.1))
 
 
 def test_messages_have_the_tables_of_the_planets_as_written() -> None:

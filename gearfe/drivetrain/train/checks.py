@@ -738,17 +738,19 @@ def planets_overlap(
     needed, apart, arm
         Sum of their tip radii, distance of their axes, and that from the axis of the carrier (m).
     """
-    least = 2.0 * math.asin(min(1.0, 0.5 * needed / arm))
     problem = (
         f"gear {names[0]!r} overlaps gear {names[1]!r}: axes {1e3 * apart:.6g} mm apart, tip circles need more than "
         f"{1e3 * needed:.6g} mm"
     )
-    most = int(2.0 * math.pi / least * (1.0 - SAME))
-    apart_deg = f"{math.degrees(least) + 5e-4:.3f} deg"
-    cure = (
-        f"place neighbouring planets at least {apart_deg} apart, at most {most} equally spaced, or use smaller planets"
-    )
-    return InputError(f"carriers.{carrier}.planets", count, problem, cure)
+    cure = "use smaller planets"
+    if needed < 2.0 * arm:  # else no angle is large enough
+        least = 2.0 * math.asin(0.5 * needed / arm)
+        most = int(2.0 * math.pi / least * (1.0 - SAME))
+        cure = (
+            f"place neighbouring planets at least {math.degrees(least) + 5e-4:.3f} deg apart (at most {most} equally "
+            f"spaced, as far as tooth numbers allow), or {cure}"
+        )
+    return InputError(f"carriers.{carrier}", None, f"has {count} planets, and {problem}", cure)
 
 
 def _check_shaft_room(train: GearTrain, one: Shaft, two: Shaft) -> None:

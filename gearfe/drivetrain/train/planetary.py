@@ -81,13 +81,14 @@ def _not_assembled(
         f"planet {number} does not mesh with gears {chain.one.name!r} and {chain.two.name!r} at once, "
         f"{degrees:.9g} deg from planet 1: ({chain.sum}) * {degrees:.9g} / 360 = {turned:.6g} must be a whole number"
     )
-    cure = f"place it {near[0]} or {near[1]} deg from planet 1 (planet_angles_deg = [0.0, ...])"
     step = 2.0 * math.pi / count
     if all(abs(angle - angles[0] - k * step) < 1e-9 for k, angle in enumerate(angles)):
         fitting = [str(n) for n in range(2, 13) if chain.teeth % n == 0]
         numbers = f"take {' or '.join(fitting)} equally spaced planets" if fitting else "change tooth numbers"
         cure = f"{numbers}, or write their angles: multiples of {pitch:.9g} deg from planet 1"
-    return InputError(f"carriers.{carrier.name}.planets", count, problem, cure)
+        return InputError(f"carriers.{carrier.name}.planets", count, problem, cure)
+    cure = f"place it {near[0]} or {near[1]} deg from planet 1"
+    return InputError(f"carriers.{carrier.name}.planet_angles_deg", None, problem, cure)
 
 
 def _chains(layout: TrainLayout, carrier: LayoutCarrier, planets: set[int]) -> Iterator[_Chain]:
