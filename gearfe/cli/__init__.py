@@ -22,7 +22,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
     "rating": (
         "load capacity by ISO 6336: safety factors of flanks and roots with every value and its formula",
-        "gearfe rating pair.toml --torque-Nm 200 --speed-rpm 1500",
+        "gearfe rating pair.toml --torque-driver-Nm 200 --speed-rpm 1500",
     ),
     "mesh": (
         "meshes of a gear pair with named boundaries, as .msh, .vtu or .inp, or a CalculiX deck of its contact",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..gears.rating.rate import Rating
 
 #: Keys of the table [rating] that options stand for.
-KEYS = ("edition", "torque_Nm", "speed_rpm", "life_h", "application_factor", "quality")
+KEYS = ("edition", "torque_driver_Nm", "speed_rpm", "life_h", "application_factor", "quality")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -48,7 +48,7 @@ def test_numbers_and_functions_of_time_are_turned() -> None:
 def test_every_table_with_a_speed_takes_both() -> None:
     run = build(RunUpTable, {"speed_start_rpm": 1000, "speed_stop_rpm": 2000.0, "speeds": 3}, "runup")
     assert (run.speed_start_rad_per_s, run.speed_stop_rad_per_s) == pytest.approx((1000 * RPM, 2000 * RPM))
-    rating = build(RatingTable, {"torque_Nm": 1.0, "speed_rad_per_s": 100.0}, "rating")  # the other way round
+    rating = build(RatingTable, {"torque_driver_Nm": 1.0, "speed_rad_per_s": 100.0}, "rating")  # the other way round
     assert rating.speed_rpm == pytest.approx(100.0 / RPM)
 
 
@@ -101,7 +101,7 @@ def test_set_and_options(tmp_path: Path) -> None:
 )
 def test_errors_name_the_key_that_was_written(keys: dict[str, object], words: list[str]) -> None:
     with pytest.raises(InputError) as caught:
-        build(RatingTable, {"torque_Nm": 1.0, **keys}, "rating")
+        build(RatingTable, {"torque_driver_Nm": 1.0, **keys}, "rating")
     for part in words:
         assert part in str(caught.value)
 

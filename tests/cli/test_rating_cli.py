@@ -65,7 +65,17 @@ def test_all_meshes_of_a_gearbox(tmp_path: Path) -> None:
 
 
 def test_options_win_over_the_file(tmp_path: Path) -> None:
-    line = ["rating", str(FZG), "--torque-Nm", "200", "--edition", "2006", "--out", str(tmp_path), "--no-pictures"]
+    line = [
+        "rating",
+        str(FZG),
+        "--torque-driver-Nm",
+        "200",
+        "--edition",
+        "2006",
+        "--out",
+        str(tmp_path),
+        "--no-pictures",
+    ]
     assert main(line) == 0
     made = json.loads((tmp_path / "rating.json").read_text())
     assert (made["load"]["torque"], made["edition"]) == (200.0, "ISO 6336:2006")
@@ -73,8 +83,10 @@ def test_options_win_over_the_file(tmp_path: Path) -> None:
 
 def test_options_win_over_the_keys_of_single_gears_and_meshes(tmp_path: Path) -> None:
     job = tmp_path / "job.toml"
-    job.write_text(FZG.read_text() + "quality = 8\n\n[rating.meshes.pinion-wheel]\ntorque_Nm = 90.0\nlife_h = 7.0\n")
-    options = ["--torque-Nm", "200", "--quality", "4", "--life-h", "900"]
+    job.write_text(
+        FZG.read_text() + "quality = 8\n\n[rating.meshes.pinion-wheel]\ntorque_driver_Nm = 90.0\nlife_h = 7.0\n"
+    )
+    options = ["--torque-driver-Nm", "200", "--quality", "4", "--life-h", "900"]
     assert main(["rating", str(job), *options, "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
     rating = json.loads((tmp_path / "out" / "rating.json").read_text())
     assert (rating["load"]["torque"], rating["load"]["hours"]) == (200.0, 900.0)
@@ -97,7 +109,7 @@ def test_the_written_example_runs(tmp_path: Path) -> None:
         (["rating.speed_rpm=-3"], "rating.speed_rpm"),
         (["rating.thickness_allowances_um=[-90,-60]"], "upper allowance"),
         (["rating.ball_diameter_mm=2"], "ball_diameter_mm = 2"),
-        (["rating.spectrum=[{torque_Nm=1,speed_rpm=1}]"], "hours"),
+        (["rating.spectrum=[{torque_driver_Nm=1,speed_rpm=1}]"], "hours"),
         (["rating.edition=2010"], "2006 or 2019"),
         (["rating.quality=12"], "1 to 11"),
         (["rating.material=V"], "yield_strength_MPa"),
@@ -128,7 +140,7 @@ def test_files_without_the_table_or_the_speed(tmp_path: Path, capsys: pytest.Cap
 
 def test_internal_gears(tmp_path: Path) -> None:
     job = FZG.with_name("internal.toml")
-    line = ["rating", str(job), "--set", "rating.speed_rpm=1000", "--set", "rating.torque_Nm=100"]
+    line = ["rating", str(job), "--set", "rating.speed_rpm=1000", "--set", "rating.torque_driver_Nm=100"]
     assert main([*line, "--out", str(tmp_path / "out"), "--no-pictures"]) == 0
     made = json.loads((tmp_path / "out" / "rating.json").read_text())
     assert made["gears"] == {"gear_1": "planet", "gear_2": "ring"}
@@ -178,7 +190,7 @@ def test_computed_values_beside_the_standard(tmp_path: Path, capsys: pytest.Capt
 
 
 def test_computed_values_of_loads_along_the_width(tmp_path: Path) -> None:
-    job = ["--set", "rating.speed_rpm=1500", "--set", "rating.torque_Nm=135", "--set", "stiffness.coarsen=2"]
+    job = ["--set", "rating.speed_rpm=1500", "--set", "rating.torque_driver_Nm=135", "--set", "stiffness.coarsen=2"]
     line = ["rating", str(FZG.with_name("helical.toml")), *job, "--with-computed", "--out", str(tmp_path)]
     assert main([*line, "--no-pictures"]) == 0
     made = json.loads((tmp_path / "rating.json").read_text())
@@ -204,7 +216,7 @@ def test_dynamic_factor_of_a_run_up(tmp_path: Path, capsys: pytest.CaptureFixtur
     lines = ["speed_rad_per_s,dynamic_factor_1,dynamic_factor_2", "100,1.2,1.0", "120,1.6,1.1"]
     (tmp_path / "run" / "runup.csv").write_text("\n".join(lines) + "\n")
     speed = 110.0 * 30.0 / 3.141592653589793
-    line = ["rating", str(job), "--set", f"rating.speed_rpm={speed}", "--set", "rating.torque_Nm=50"]
+    line = ["rating", str(job), "--set", f"rating.speed_rpm={speed}", "--set", "rating.torque_driver_Nm=50"]
     line += ["--out", str(tmp_path / "out"), "--no-pictures", "--runup", str(tmp_path / "run")]
     line += ["--mesh", "first"]
     assert main([*line, "--with-computed"]) == 0
@@ -245,7 +257,14 @@ def test_dynamic_factor_of_a_run_up_with_several_motions(
     job = tmp_path / "box.toml"
     job.write_text(job_file("gearbox"))
     (tmp_path / "runup.csv").write_text("\n".join(["speed_rad_per_s,branch,stable,dynamic_factor_1", *rows]) + "\n")
-    line = ["rating", str(job), "--set", f"rating.speed_rpm={110.0 * 30.0 / math.pi!r}", "--set", "rating.torque_Nm=50"]
+    line = [
+        "rating",
+        str(job),
+        "--set",
+        f"rating.speed_rpm={110.0 * 30.0 / math.pi!r}",
+        "--set",
+        "rating.torque_driver_Nm=50",
+    ]
     line += ["--mesh", "first", "--runup", str(tmp_path), "--out", str(tmp_path / "out"), "--no-pictures"]
     code = main(line)
     if isinstance(expected, str):
@@ -258,9 +277,18 @@ def test_dynamic_factor_of_a_run_up_with_several_motions(
 
 
 def test_computed_values_of_a_torque_out_of_range(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    line = ["rating", str(FZG), "--computed", "--set", "rating.torque_Nm=1e7", "--out", str(tmp_path), "--no-pictures"]
+    line = [
+        "rating",
+        str(FZG),
+        "--computed",
+        "--set",
+        "rating.torque_driver_Nm=1e7",
+        "--out",
+        str(tmp_path),
+        "--no-pictures",
+    ]
     assert main(line) == 2
-    assert "rating.torque_Nm" in capsys.readouterr().err
+    assert "rating.torque_driver_Nm" in capsys.readouterr().err
 
 
 def test_computed_values_where_the_larger_gear_drives(tmp_path: Path) -> None:
@@ -272,7 +300,7 @@ def test_computed_values_where_the_larger_gear_drives(tmp_path: Path) -> None:
         "pair.wheel.teeth": 16,
         "pair.wheel.tip_diameter_mm": 82.45,
         "stiffness.torque_Nm": 135.5,
-        "rating.torque_Nm": 203.25,
+        "rating.torque_driver_Nm": 203.25,
         "rating.speed_rpm": 1000,
     }
     changes = [word for key, value in swapped.items() for word in ("--set", f"{key}={value}")]
@@ -290,7 +318,7 @@ def test_computed_values_where_the_larger_gear_drives(tmp_path: Path) -> None:
 def test_a_mesh_that_the_train_does_not_have(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The message names the meshes of [train], instead of asking for a table that is there."""
     job = tmp_path / "train.toml"
-    job.write_text((GEOMETRY / "gear_train.toml").read_text() + "\n[rating]\ntorque_Nm = 10.0\n")
+    job.write_text((GEOMETRY / "gear_train.toml").read_text() + "\n[rating]\ntorque_driver_Nm = 10.0\n")
     line = ["rating", str(job), "--out", str(tmp_path / "out"), "--no-pictures"]
     assert main(line) == 2
     message = capsys.readouterr().err

@@ -59,7 +59,7 @@ from tests.places import GEOMETRY
 
 #: A table without the hours that a spectrum adds up, and a part of such a spectrum.
 WITHOUT_LIFE = {key: value for key, value in SPUR.items() if key != "life_h"}
-PART = {"torque_Nm": SPUR["torque_Nm"], "speed_rpm": SPUR["speed_rpm"], "hours": SPUR["life_h"]}
+PART = {"torque_driver_Nm": SPUR["torque_driver_Nm"], "speed_rpm": SPUR["speed_rpm"], "hours": SPUR["life_h"]}
 
 
 def found(rating: Rating) -> dict[str, Any]:
@@ -158,7 +158,7 @@ def test_a_ring_that_drives_is_rated_at_its_own_torque_and_speed(given: bool) ->
         raw = tomllib.loads(text)
         raw["meshes"]["outer"] |= {"driver": driver, "driven": driven}
         box = whole_gearbox(raw, "job.toml")
-        keys = {"speed_rpm": 220.0 / ratio, **({"torque_Nm": 500.0 * ratio} if given else {})}
+        keys = {"speed_rpm": 220.0 / ratio, **({"torque_driver_Nm": 500.0 * ratio} if given else {})}
         table = build(RatingTable, keys, "rating")
         rated.append(rate_mesh(box.meshes["outer"], table, box.gears, box.meshes))
     one, two = rated
@@ -266,7 +266,13 @@ def test_edition_of_2019_against_a_rated_helical_pair() -> None:
         replace(gear, addendum=0.5 * (1e-3 * tip - gear.pitch_diameter) / gear.module - gear.profile_shift)
         for gear, tip in zip((made.pinion, made.wheel), tips, strict=True)
     ]
-    keys = {"torque_Nm": 1e6, "speed_rpm": 10.0, "quality": 5, "sigma_h_lim_MPa": 1500.0, "sigma_f_lim_MPa": 430.0}
+    keys = {
+        "torque_driver_Nm": 1e6,
+        "speed_rpm": 10.0,
+        "quality": 5,
+        "sigma_h_lim_MPa": 1500.0,
+        "sigma_f_lim_MPa": 430.0,
+    }
     keys |= {"flank_roughness_um": 4.8, "helix_slope_um": 20.0}
     values = found(rate(MeshGeometry(*gears, 1.6), keys))
     printed = {"Z_H": 2.19, "Z_eps": 0.866, "Z_beta": 1.017, "Z_E": 189.81}
@@ -314,7 +320,7 @@ def test_the_driver_may_be_the_larger_gear() -> None:
     back = MeshGeometry(made.wheel, made.pinion, made.centre_distance)
     keys = SPUR | {"gears": {"wheel": {"mates": 3}, "pinion": {"alternating_factor": 0.7}}}
     # each of the three planets has a third of the torque
-    keys |= {"torque_Nm": 2 * SPUR["torque_Nm"] / 3, "speed_rpm": SPUR["speed_rpm"] / 2}
+    keys |= {"torque_driver_Nm": 2 * SPUR["torque_driver_Nm"] / 3, "speed_rpm": SPUR["speed_rpm"] / 2}
     one, two = rate(made, SPUR), rate(back, keys)
     assert two.names == ("wheel", "pinion")
     assert two.driver == 1
@@ -337,7 +343,7 @@ def test_mates_share_the_torque_of_their_own_gear(
     """F_t = 2 T/d of the driver over its number of mates, whichever gear has fewer teeth."""
     sun, planet = (Gear(z, 6e-3, math.radians(20), 30e-3, 30e-3) for z in teeth)
     gears, names = ((sun, planet), ("sun", "planet")) if driver_is_sun else ((planet, sun), ("planet", "sun"))
-    keys = {"torque_Nm": torque, "speed_rpm": 100.0, "gears": {"sun": {"mates": 3}}}
+    keys = {"torque_driver_Nm": torque, "speed_rpm": 100.0, "gears": {"sun": {"mates": 3}}}
     rating = rate(MeshGeometry(*gears), keys, names=names)
     assert rating.general.F_t_N == pytest.approx(force, rel=1e-12)
 
@@ -350,7 +356,7 @@ def test_tip_relief_of_the_microgeometry_counts() -> None:
             pair = {{ module_mm = 4.5, pressure_angle_deg = 20, face_width_mm = 14{form}, material = {{}},
                 pinion = {{ teeth = 20, bore_diameter_mm = 20 }}, wheel = {{ teeth = 30, bore_diameter_mm = 20 }} }}
             microgeometry = {{ {microgeometry} }}
-            rating = {{ torque_Nm = 100, speed_rpm = 1000{rating} }}
+            rating = {{ torque_driver_Nm = 100, speed_rpm = 1000{rating} }}
         """
         raw = tomllib.loads(" ".join(text.split()).replace("} m", "}\nm").replace("} r", "}\nr"))
         box = whole_gearbox(raw, "job.toml")
@@ -369,7 +375,7 @@ def test_tip_relief_of_the_microgeometry_counts() -> None:
 
 
 def test_torque_of_the_stiffness_is_that_of_one_mesh() -> None:
-    text = job_file("rating").replace("torque_Nm = 100.0 ", "# ") + "\n[stiffness]\ntorque_Nm = 75.0\n"
+    text = job_file("rating").replace("torque_driver_Nm = 100.0 ", "# ") + "\n[stiffness]\ntorque_Nm = 75.0\n"
     raw = tomllib.loads(text)
     raw["rating"].setdefault("gears", {})["pinion"] = {"mates": 3}
     box = whole_gearbox(raw, "job.toml")
@@ -409,7 +415,7 @@ def test_static_work_hardening_falls_from_130_to_470_hbw() -> None:
 @pytest.mark.parametrize("material", [{}, {"material": "V", "hardness": 300.0, "yield_strength_MPa": 700.0}])
 def test_a_relief_of_one_gear_does_not_make_more_vibration_than_none(gear: str, relief: float, material: Any) -> None:
     """K_v of gears that are fine enough for B_k: the other tip is as running-in makes it."""
-    table = {"torque_Nm": 9000.0, "speed_rpm": 360.0, "quality": 4, "gears": {"wheel": material}}
+    table = {"torque_driver_Nm": 9000.0, "speed_rpm": 360.0, "quality": 4, "gears": {"wheel": material}}
     none = rate(helical_stage(), table)
     one = rate(
         helical_stage(),
@@ -542,22 +548,28 @@ def test_allowable_stress_numbers() -> None:
 @pytest.mark.parametrize(
     ("keys", "field"),
     [
-        ({"torque_Nm": None}, r"rating\.torque_Nm"),
+        ({"torque_driver_Nm": None}, r"rating\.torque_driver_Nm"),
         ({"speed_rpm": None}, r"rating\.speed_rpm"),
         ({"edition": 2013}, r"edition.*2006 or 2019"),
         ({"material": "V"}, r"rating\.gears\.pinion\.yield_strength_MPa"),
         ({"material": "steel"}, r"rating\.material"),
-        ({"torque_Nm": -1.0}, r"rating\.torque_Nm"),
+        ({"torque_driver_Nm": -1.0}, r"rating\.torque_driver_Nm"),
         ({"bearing_span_mm": 400.0}, r"rating\.shaft_diameter_mm"),
         ({"bearing_span_mm": 400.0, "shaft_diameter_mm": 90.0, "pinion_offset_mm": 200.0}, r"pinion_offset_mm.*120"),
         ({"gears": {"pinon": {}}}, r"rating\.gears.*pinion"),
         ({"gears": {"pinion": {"quality": 13}}}, r"rating\.gears\.pinion\.quality"),
-        ({"meshes": {"other": {"torque_Nm": 1.0}}}, r"rating\.meshes"),
+        ({"meshes": {"other": {"torque_driver_Nm": 1.0}}}, r"rating\.meshes"),
         ({"rim_thickness_mm": 5.0}, r"rim_thickness_mm.*0\.5"),
         ({"quality": 12, "edition": 2019}, r"quality.*1 to 11.*single_pitch_um"),
         ({"hardnes": 700.0}, r"hardness"),
-        ({"spectrum": [{"torque_Nm": 9.0, "speed_rpm": 9.0, "hours": 9.0}]}, r"rating\.life_h = .*leave it out"),
-        ({"spectrum": [PART], "life_h": None, "torque_Nm": None}, r"rating\.speed_rpm = .*leave it out.*torque_Nm"),
+        ({"torque_Nm": 40.0}, r"rating\.torque_Nm.*torque_driver_Nm = 40.*stiffness"),
+        ({"meshes": {"pinion-wheel": {"torque_Nm": 40.0}}}, r"torque_driver_Nm = 40"),
+        ({"spectrum": [{"torque_Nm": 9.0}], "life_h": None}, r"torque_driver_Nm = 9"),
+        ({"spectrum": [{"torque_driver_Nm": 9.0, "speed_rpm": 9.0, "hours": 9.0}]}, r"rating\.life_h = .*leave it out"),
+        (
+            {"spectrum": [PART], "life_h": None, "torque_driver_Nm": None},
+            r"rating\.speed_rpm = .*leave it out.*torque_driver_Nm",
+        ),
     ],
 )
 def test_tables_that_are_refused(keys: dict[str, Any], field: str) -> None:
@@ -633,7 +645,7 @@ def test_loss_factor_of_three_pairs_by_quadrature() -> None:
 
 def test_too_high_contact_ratios_are_refused() -> None:
     with pytest.raises(InputError, match=r"contact ratio.*<= 2\.5"):
-        rate(deep_pair(1.55), {"torque_Nm": 100.0, "speed_rpm": 100.0})
+        rate(deep_pair(1.55), {"torque_driver_Nm": 100.0, "speed_rpm": 100.0})
 
 
 def test_scuffing_of_deep_teeth_is_left_out_with_a_warning() -> None:
@@ -691,7 +703,7 @@ def test_a_spectrum_of_two_parts_by_hand() -> None:
     """Damage adds up; with its own safety factor the spectrum damages by 1."""
     loads = [(1.5, 1000.0), (0.9, 100_000.0)]
     spectrum = [
-        {"torque_Nm": share * SPUR["torque_Nm"], "speed_rpm": SPUR["speed_rpm"], "hours": hours}
+        {"torque_driver_Nm": share * SPUR["torque_driver_Nm"], "speed_rpm": SPUR["speed_rpm"], "hours": hours}
         for share, hours in loads
     ]
     rating = rate(spur_stage(), WITHOUT_LIFE | {"spectrum": spectrum})
@@ -706,18 +718,20 @@ def test_a_spectrum_of_two_parts_by_hand() -> None:
 
 def test_a_spectrum_is_rated_at_its_largest_torque() -> None:
     """S_H, S_F and N_L are those of that part over all hours; the torque of [stiffness] is not used."""
-    strong = {"torque_Nm": SPUR["torque_Nm"], "speed_rpm": 10.0, "hours": 100.0}
-    fast = {"torque_Nm": 0.5 * SPUR["torque_Nm"], "speed_rpm": 250.0, "hours": 5000.0}
-    keys = {key: value for key, value in WITHOUT_LIFE.items() if key not in ("torque_Nm", "speed_rpm")}
+    strong = {"torque_driver_Nm": SPUR["torque_driver_Nm"], "speed_rpm": 10.0, "hours": 100.0}
+    fast = {"torque_driver_Nm": 0.5 * SPUR["torque_driver_Nm"], "speed_rpm": 250.0, "hours": 5000.0}
+    keys = {key: value for key, value in WITHOUT_LIFE.items() if key not in ("torque_driver_Nm", "speed_rpm")}
     rating = rate(spur_stage(), keys | {"spectrum": [fast, strong]}, torque=1.0)
-    plain = rate(spur_stage(), keys | {"torque_Nm": strong["torque_Nm"], "speed_rpm": 10.0, "life_h": 5100.0})
+    plain = rate(
+        spur_stage(), keys | {"torque_driver_Nm": strong["torque_driver_Nm"], "speed_rpm": 10.0, "life_h": 5100.0}
+    )
     assert (rating.S_H, rating.S_F) == (plain.S_H, plain.S_F)
     assert rating.flank.N_L == pytest.approx((60.0 * 10.0 * 5100.0 * 3, 60.0 * 10.0 * 5100.0 / 2))
 
 
 def test_safety_factors_of_the_spectrum_are_compared_with_the_required_ones() -> None:
-    part = PART | {"torque_Nm": 3 * SPUR["torque_Nm"], "hours": 100.0}
-    keys = WITHOUT_LIFE | {"torque_Nm": 1000.0, "spectrum": [part]}
+    part = PART | {"torque_driver_Nm": 3 * SPUR["torque_driver_Nm"], "hours": 100.0}
+    keys = WITHOUT_LIFE | {"torque_driver_Nm": 1000.0, "spectrum": [part]}
     rating = rate(spur_stage(), keys)
     assert min(rating.S_H) > 1.25 > max(rating.service.S_H_spectrum)
     for name, symbol, value, least in (
@@ -729,7 +743,7 @@ def test_safety_factors_of_the_spectrum_are_compared_with_the_required_ones() ->
 
 
 def test_static_overload_has_no_life() -> None:
-    part = {"torque_Nm": 20 * SPUR["torque_Nm"], "speed_rpm": 1.0, "hours": 1e-3}
+    part = {"torque_driver_Nm": 20 * SPUR["torque_driver_Nm"], "speed_rpm": 1.0, "hours": 1e-3}
     rating = rate(spur_stage(), WITHOUT_LIFE | {"spectrum": [part]})
     assert rating.service.U_H[0] >= 1e9
     assert rating.service.life_flank_h[0] < 1e-6
@@ -774,5 +788,5 @@ def test_pressure_of_the_fzg_pair_as_printed() -> None:
         Gear(z, 4.5e-3, math.radians(20), 14e-3, 30e-3, profile_shift=x, addendum=tip / 4.5 - z / 2 - x)
         for z, x, tip in ((16, 0.1817, 41.228), (24, 0.1715, 59.182))
     ]
-    rating = rate(MeshGeometry(gears[0], gears[1], 91.5e-3), {"torque_Nm": 200.0, "speed_rpm": 1500.0})
+    rating = rate(MeshGeometry(gears[0], gears[1], 91.5e-3), {"torque_driver_Nm": 200.0, "speed_rpm": 1500.0})
     assert rating.flank.sigma_H0_MPa / rating.flank.Z_eps == pytest.approx(1347.3, abs=0.05)

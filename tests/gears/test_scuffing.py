@@ -101,7 +101,7 @@ def test_the_driver_decides_on_which_side_contact_begins() -> None:
     """Gears that exchange driving have the factor of approach on the other side of the pitch point."""
     forward = rate(spur_stage(), SPUR_OIL).scuffing
     pair = spur_stage()
-    table = SPUR_OIL | {"torque_Nm": 2.0 * SPUR["torque_Nm"] / 3.0, "speed_rpm": 0.5 * SPUR["speed_rpm"]}
+    table = SPUR_OIL | {"torque_driver_Nm": 2.0 * SPUR["torque_driver_Nm"] / 3.0, "speed_rpm": 0.5 * SPUR["speed_rpm"]}
     table["gears"] = {"wheel": {"mates": 3}, "pinion": {"alternating_factor": 0.7}}
     turned = rate(MeshGeometry(pair.wheel, pair.pinion, pair.centre_distance), table)
     backward = turned.scuffing
@@ -208,6 +208,6 @@ def test_a_gear_without_relief_does_not_take_that_of_its_mate() -> None:
 
 def test_flanks_that_friction_does_not_heat_are_infinitely_safe() -> None:
     """A torque whose flash temperature is lost in rounding against that of the oil."""
-    heat = rate(spur_stage(), SPUR_OIL | {"torque_Nm": 1e-300}).scuffing
+    heat = rate(spur_stage(), SPUR_OIL | {"torque_driver_Nm": 1e-300}).scuffing
     assert heat is not None
     assert math.isinf(heat.S_B)

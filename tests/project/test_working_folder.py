@@ -36,7 +36,7 @@ LINES = {
     "stiffness": [["gear_train.toml", *COARSE, "--angles", "0", "9", "9", "--fields", "0", "--no-estimate"]],
     "loadmap": [["gear_train.toml", *COARSE, "--torques-Nm", "50", "--positions", "3", "--law", "half_plane"]],
     "gear": [["gear_train.toml", "--export", "dxf"]],
-    "rating": [["gear_train.toml", "--set", "rating={torque_Nm=50,speed_rpm=900}"]],
+    "rating": [["gear_train.toml", "--set", "rating={torque_driver_Nm=50,speed_rpm=900}"]],
     "mesh": [["gear_train.toml", *COARSE, "--out", "gears.msh"]],
     "mechanism": [["slider_crank.toml", "--until", "0.02"]],
     "housing": [["box.toml", *BOX, "--modes", "2"]],

@@ -314,7 +314,7 @@ MECHANISM: dict[str, Any] = {
 LOADMAP: dict[str, Any] = {"torques_Nm": [20.0, 50.0, 100.0, 200.0], "root_stress": True}
 
 RATING: dict[str, Any] = {
-    "torque_Nm": 100.0,
+    "torque_driver_Nm": 100.0,
     "speed_rpm": 1500.0,
     "life_h": 20_000.0,
     "application_factor": 1.25,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 from ..config import Removed, quantity, renamed
-from ..errors import InputError, unknown_name
+from ..errors import InputError, shown, unknown_name
 
 #: Editions of ISO 6336; that of 2006 goes with the tolerances of ISO 1328-1:1995, that of 2019 with those of 2013.
 EDITIONS = (2006, 2019)
@@ -27,6 +27,14 @@ OILS = (*("mineral", "polyalphaolefin", "polyglycol", "water_soluble_polyglycol"
 LUBRICATION = ("dip", "spray", "spray_and_dip", "submerged")
 #: Helix modifications of ISO 6336-1, Table 8.
 HELIX_MODIFICATIONS = ("none", "crowning", "crowning_of_load", "correction", "correction_and_crowning", "end_relief")
+
+
+def _at_driver(torque: Any) -> str:
+    return f"write torque_driver_Nm = {shown(torque)} for the driver; torque_Nm of [stiffness] is at the wheel"
+
+
+#: Torque of a rating under the name that [stiffness] has for the wheel's torque.
+DRIVER_TORQUE: dict[str, Removed] = {"torque_Nm": ("does not say which shaft it is of", _at_driver)}
 
 
 @dataclass(frozen=True)
@@ -122,7 +130,9 @@ class GearRatingTable:
 class SpectrumBinTable:
     """A part of a load spectrum."""
 
-    torque_Nm: float = quantity(doc="torque at the driver (N m)", above=0.0)
+    REMOVED: ClassVar[dict[str, Removed]] = DRIVER_TORQUE
+
+    torque_driver_Nm: float = quantity(doc="torque at the driver (N m)", above=0.0)
     speed_rpm: float = quantity(doc="speed of the driver (1/min)", above=0.0)
     hours: float = quantity(doc="time at this load (h)", above=0.0)
 
@@ -131,7 +141,9 @@ class SpectrumBinTable:
 class MeshRatingTable:
     """Load, lubricant and factors of one mesh."""
 
-    torque_Nm: float | None = quantity(None, above=0.0, doc="torque at the driver (N m)")
+    REMOVED: ClassVar[dict[str, Removed]] = DRIVER_TORQUE
+
+    torque_driver_Nm: float | None = quantity(None, above=0.0, doc="torque at the driver (N m)")
     speed_rpm: float | None = quantity(
         None,
         above=0.0,
@@ -206,13 +218,15 @@ class MeshRatingTable:
         None, doc="upper and lower allowance of the centre distance (um), for the backlash"
     )
     spectrum: tuple[SpectrumBinTable, ...] | None = quantity(
-        None, doc="load spectrum for damage and life by Miner's rule; left out: torque_Nm, speed_rpm and life_h"
+        None, doc="load spectrum for damage and life by Miner's rule; left out: torque_driver_Nm, speed_rpm and life_h"
     )
 
 
 @dataclass(frozen=True)
 class RatingTable(MeshRatingTable, GearRatingTable):
     """Keys of all meshes and gears, and those of single ones by name, which win."""
+
+    REMOVED: ClassVar[dict[str, Removed]] = GearRatingTable.REMOVED | MeshRatingTable.REMOVED
 
     edition: int = quantity(2019, low=2006, high=2019, doc="edition of ISO 6336: 2006 or 2019")
     gears: dict[str, GearRatingTable] = quantity(dict, doc="keys of gears by their names")  # noqa: RUF009

@@ -173,6 +173,6 @@ def _loaded(
             cure = "add the speed of the driver (1/min), or give train.drive a speed"
             raise InputError(f"rating.meshes.{mesh}.speed_rpm", None, problem, cure)
         more["speed_rpm"] = load.speed
-    if merged.torque_Nm is None and not given and load.torque > 0.0:
-        more["torque_Nm"] = load.torque * (mates or table.mates or 1)
+    if merged.torque_driver_Nm is None and not given and load.torque > 0.0:
+        more["torque_driver_Nm"] = load.torque * (mates or table.mates or 1)
     return {**table.meshes, mesh: replace(own, **more)}

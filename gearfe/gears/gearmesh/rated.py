@@ -72,7 +72,7 @@ def compared(job: StiffnessJob, rating: Rating) -> list[Compared]:
         For a torque out of range, and what the computation refuses.
     """
     torque = 0.5 * rating.general.F_t_N * job.pair.wheel.pitch_diameter
-    check_torque(job.pair, PairModel(job.materials), torque, "rating.torque_Nm")
+    check_torque(job.pair, PairModel(job.materials), torque, "rating.torque_driver_Nm")
     return _of_width(job, rating, torque) if job.mesh.along_width() else _of_sections(job, rating, torque)
 
 

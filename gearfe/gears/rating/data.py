@@ -299,23 +299,23 @@ def load_of(table: MeshRatingTable, where: str, torque: float | None = None) -> 
         For a missing torque or speed, keys that a spectrum replaces, and keys of the shaft that need each other.
     """
     spectrum = table.spectrum or ()
-    given, speed, hours = table.torque_Nm, table.speed_rpm, table.life_h or LIFE
+    given, speed, hours = table.torque_driver_Nm, table.speed_rpm, table.life_h or LIFE
     if spectrum:
         if table.life_h is not None:
             cure = "leave it out: the hours of the spectrum add up"
             raise InputError(f"{where}.life_h", table.life_h, "cannot be given together with a spectrum", cure)
         if speed is not None and given is None:
-            problem = "must not be given with a spectrum, unless torque_Nm is given, too"
-            cure = "leave it out: the part with the largest torque has a speed; or add torque_Nm"
+            problem = "must not be given with a spectrum, unless torque_driver_Nm is given, too"
+            cure = "leave it out: the part with the largest torque has a speed; or add torque_driver_Nm"
             raise InputError(f"{where}.speed_rpm", speed, problem, cure)
-        largest = max(spectrum, key=lambda part: (part.torque_Nm, part.speed_rpm))
-        given = largest.torque_Nm if given is None else given
+        largest = max(spectrum, key=lambda part: (part.torque_driver_Nm, part.speed_rpm))
+        given = largest.torque_driver_Nm if given is None else given
         speed = largest.speed_rpm if speed is None else speed
         hours = sum(part.hours for part in spectrum)
     given = torque if given is None else given
     if given is None:
-        cure = "add torque_Nm (N m at the driver) to [rating], or torque_Nm to [stiffness]"
-        raise InputError(f"{where}.torque_Nm", None, "no torque is given", cure)
+        cure = "add torque_driver_Nm (N m) to [rating], or torque_Nm (of the wheel) to [stiffness]"
+        raise InputError(f"{where}.torque_driver_Nm", None, "no torque is given", cure)
     if speed is None:
         raise InputError(
             f"{where}.speed_rpm", None, "is required", "add the speed of the driver (1/min), or a table [train]"

@@ -316,7 +316,7 @@ def _rated(
         return general, of_flank, root(data, two, load, general, edition=table.edition, cycles=cycles)
 
     general, of_flank, of_root = stressed(load.torque, load.speed)
-    parts = [(part.torque_Nm, part.speed_rpm, part.hours) for part in load.spectrum]
+    parts = [(part.torque_driver_Nm, part.speed_rpm, part.hours) for part in load.spectrum]
     parts = parts or [(load.torque, load.speed, load.hours)]
     made = [stressed(torque, speed) for torque, speed, _ in parts]
     of_service = service(
