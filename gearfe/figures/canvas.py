@@ -20,6 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import XAxis, XTick, YAxis, YTick
 from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg, get_hinting_flag
 from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont
 from matplotlib.ticker import NullLocator
 
 from ..base.typing import Array
@@ -159,14 +160,15 @@ class _Written:
     size: tuple[float, float, float]
 
 
-_WRITTEN: dict[tuple[str, int, float], _Written] = {}
+_WRITTEN: dict[tuple[str, int, str, int, float], _Written] = {}
 
 
 class _Renderer(RendererAgg):
     """Agg that lays out and draws a text once."""
 
     def _written(self, text: str, prop: Any) -> _Written:
-        key = (text, hash(prop), self.dpi)
+        # a family such as "sans-serif" names the font that the settings of matplotlib give it now
+        key = (text, hash(prop), findfont(prop), get_hinting_flag(), self.dpi)
         if key not in _WRITTEN:
             if len(_WRITTEN) >= KEPT_TEXTS:
                 _WRITTEN.clear()

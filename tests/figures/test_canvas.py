@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
@@ -87,6 +88,16 @@ def test_kept_texts_are_as_large_as_drawn_ones(text: str) -> None:
     assert renderer.get_text_width_height_descent(text, prop, False) == pytest.approx(
         plain.get_text_width_height_descent(text, prop, False)
     )
+
+
+def test_kept_texts_follow_the_settings_of_matplotlib() -> None:
+    """The same properties name another font after a change of rcParams, here one whose letters are equally wide."""
+    renderer, prop = PictureCanvas(PictureFigure(dpi=130)).get_renderer(), FontProperties(size=40.0)
+    wide = [renderer.get_text_width_height_descent(text, prop, False)[0] for text in ("illi" * 4, "mwwm" * 4)]
+    assert wide[1] > 2.0 * wide[0]
+    with rc_context({"font.sans-serif": ["DejaVu Sans Mono"]}):
+        even = [renderer.get_text_width_height_descent(text, prop, False)[0] for text in ("illi" * 4, "mwwm" * 4)]
+    assert even[1] == pytest.approx(even[0], rel=0.1)
 
 
 @pytest.mark.parametrize("angle", [0.0, 90.0])
