@@ -13,6 +13,8 @@ from .model import Mechanism
 
 #: Displacement (rad, or relative to the size of the mechanism) that rounded positions of a drawing may cause.
 ROUNDED = 1e-3
+#: Angle (rad) after which a body has the same pose.
+TURN = 2.0 * math.pi
 
 
 def contradictions(mechanism: Mechanism, start: Start) -> list[str]:
@@ -25,16 +27,17 @@ def contradictions(mechanism: Mechanism, start: Start) -> list[str]:
         table = mechanism.file.joints[names[joint]]
         if row.motion is None or table.type != "prescribed" or table.coordinate == "rate":
             continue
-        if abs(gaps[number]) <= ROUNDED * system.row_units[number]:
-            continue
         unit = UNIT_OF[str(table.coordinate)]
+        gap = math.remainder(gaps[number], TURN) if unit == "rad" else float(gaps[number])
+        if abs(gap) <= ROUNDED * system.row_units[number]:
+            continue
         motion = getattr(table, f"motion_{unit}")
         key = f"joints.{names[joint]}.motion_{unit}" + ("" if not isinstance(motion, str | float) else f" = {motion!r}")
         wanted = round(float(row.motion(start.time)), 12)  # without the rounding of a sampled expression
-        drawn = wanted + float(gaps[number])
+        drawn = wanted + gap
         found.append(
             f"{key}: is {wanted:.6g} {unit} at the start, but the start poses of the file give {drawn:.6g} {unit}."
-            f" {moved_line(mechanism, start)}; add {gaps[number]:.6g} to the motion, or change the start poses"
+            f" {moved_line(mechanism, start)}; add {gap:.6g} to the motion, or change the start poses"
         )
     return found
 
@@ -42,10 +45,11 @@ def contradictions(mechanism: Mechanism, start: Start) -> list[str]:
 def largest_move(mechanism: Mechanism, start: Start) -> dict[str, Any] | None:
     """Return name, displacement (m) and rotation (rad) of the body that closing the joints moved most.
 
-    None if no body moved by more than `ROUNDED`.
+    None if no body moved by more than `ROUNDED`; whole turns leave the pose as it is.
     """
     size = mechanism.linkage.size
     moved = (start.q - mechanism.system.start_q)[:size]
+    moved[2::3] -= TURN * np.round(moved[2::3] / TURN)
     relative = np.abs(moved / mechanism.system.units[:size]).reshape(-1, 3).max(axis=1)
     body = int(relative.argmax())
     if relative[body] <= ROUNDED:

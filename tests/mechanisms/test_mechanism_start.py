@@ -14,6 +14,7 @@ from gearfe.cli.main import main
 from gearfe.mechanisms import evaluate, load_mechanism
 from gearfe.mechanisms.job import run_mechanism
 from gearfe.mechanisms.results import reference_differences
+from gearfe.mechanisms.start_moves import contradictions, moved_line
 from gearfe.multibody import integrate
 from tests.places import GEOMETRY
 
@@ -52,6 +53,16 @@ def test_a_run_of_flexible_links_begins_as_the_file_says() -> None:
     mechanism = load_mechanism(GEOMETRY / "elastic_slider_crank.toml")
     run = integrate(mechanism.system, [0.0, 1e-4], tolerance=1e-5)
     np.testing.assert_array_equal(run.start.v, mechanism.start().v)
+
+
+@pytest.mark.parametrize("turns", [1, -2])
+def test_whole_turns_do_not_contradict_the_drawing(tmp_path: Path, turns: int) -> None:
+    drawn = math.atan2(PIN[1], PIN[0])
+    mechanism = load_mechanism(four_bar(tmp_path, f"{drawn + 2.0 * math.pi * turns!r} + 2*pi*time"))
+    start = mechanism.start()
+    assert start.q[2] == pytest.approx(mechanism.system.start_q[2] + 2.0 * math.pi * turns)
+    assert contradictions(mechanism, start) == []
+    assert moved_line(mechanism, start) == ""
 
 
 def test_a_motion_that_contradicts_the_drawing_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
