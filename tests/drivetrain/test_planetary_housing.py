@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from fractions import Fraction
 from types import SimpleNamespace
 from typing import cast
 
@@ -24,6 +25,7 @@ from gearfe.drivetrain.train import Damping, Drive, GearTrain, Guide, TrainRespo
 from gearfe.drivetrain.train.model import TrainModel
 from gearfe.drivetrain.train.states import TrainStates, train_states
 from gearfe.multibody import constant, integrate
+from tests.drivetrain.test_planetary_roles import built, roles, two_stages
 from tests.makers.planetary import stage
 from tests.makers.trains import curve, elastic
 
@@ -286,6 +288,24 @@ def test_what_an_elastic_housing_refuses_is_named() -> None:
         build_train(in_housing(stage(3, (31, 35), bearing=None)))
     with pytest.raises(InputError, match="damping ratio"):
         build_train(in_housing(stage(3, (31, 35), damping=Damping(ratio=0.05))))
+
+
+def test_two_stages_in_a_stiff_housing_are_those_in_a_rigid_one() -> None:
+    """Two carriers turn at different speeds; what the housing yields falls as its stiffness rises."""
+    raw = roles(two_stages(), "sun", "arm2", -60.0, ring=Fraction(0), ring2=Fraction(0))
+    raw["train"]["damping"] = {"rayleigh_beta_s": 2e-6}
+    rigid = built(raw)
+    assert len(rigid.train.carriers) == 2
+    times = np.linspace(0.0, 2e-3, 201)
+    expected = simulate(rigid, times, tolerance=1e-8).contact_force
+
+    def off(factor: float) -> float:
+        response = simulate(build_train(in_housing(rigid.train, factor)), times, tolerance=1e-8)
+        return float(np.abs(response.contact_force - expected).max() / np.abs(expected).max())
+
+    near, nearer = off(1e6), off(1e7)
+    assert near < 1e-3
+    assert nearer == pytest.approx(0.1 * near, rel=0.1)
 
 
 def test_sidebands_of_slow_differences_are_folded() -> None:
